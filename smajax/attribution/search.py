@@ -1,0 +1,239 @@
+"""Search for what the base model lacks: screen, refit the best single effects and pairs, judge on runs left out.
+
+Round by round one effect (or a pair) is added. A candidate is judged by its error on each fit run in turn, fitted to
+the others; the held-out runs are not looked at. The search stops when nothing stands out in the score test, or when
+the best candidate does not predict left-out runs better beyond a penalty per coefficient and beyond chance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from smajax.attribution.screen import Score, screen, significant, switches
+from smajax.effects.library import LIBRARY
+from smajax.fit.problem import Lane, Problem
+from smajax.fit.sensitivity import sensitivity
+from smajax.fit.solve import Progress, Solution, misfits, quiet
+from smajax.fit.uncertainty import held
+from smajax.report.findings import Round
+from smajax.residual.noise_like import correlation_time, split_runs
+
+SIGNIFICANT = 0.01  # of the score tests of one round, counted together
+PENALTY = 0.01  # by how much of its mean square a coefficient must lower the error on left-out runs
+CHANCE = 2.0  # by how many standard errors of the paired difference, too
+SINGLES, PAIRS = 5, 3  # refitted in a round: eight lanes, one batch
+JUDGED = 3  # candidates taken to the left-out runs
+MOST_ROUNDS = 6
+
+Solve = Callable[..., list[Solution]]  # `fit.solve.solve`, or that with a memory
+
+
+@dataclass(frozen=True)
+class Model:
+    """A set of effects with fitted values, and how it does on runs left out."""
+
+    effects: tuple[str, ...]
+    values: np.ndarray  # (P + 1,)
+    cost: float
+    left_out: np.ndarray  # misfit (SI) of each fit run by the model fitted to the others, (R, N)
+    left_out_rmse: float
+
+
+@dataclass
+class Evidence:
+    """What was learnt of one effect over the whole search."""
+
+    first_score: Score | None = None
+    alone_rmse: float = float("nan")  # fit runs, effect added alone in the first round
+    alone_left_out_rmse: float = float("nan")
+    without_left_out_rmse: float = float("nan")  # the final model with this effect taken out again
+
+
+@dataclass
+class Search:
+    """The search's settings and memory."""
+
+    problem: Problem
+    unknowns: tuple[str, ...]
+    bounds: Mapping[str, tuple[float, float]]
+    candidates: tuple[str, ...]
+    solve: Solve
+    progress: Progress = quiet
+    evidence: dict[str, Evidence] = field(default_factory=dict)
+    rounds: list[Round] = field(default_factory=list)
+
+    def free(self, effects: Sequence[str]) -> list[str]:
+        """Every free parameter of a model with `effects`."""
+        return [*self.unknowns, *(name for effect in effects for name in self.coefficients(effect))]
+
+    def coefficients(self, effect: str) -> list[str]:
+        return [name for name in self.problem.names if name.startswith(f"{effect}.")]
+
+    def slots(self, effects: Sequence[str]) -> int:
+        """Slots that a round starting from `effects` needs: room for the two largest candidates together."""
+        sizes = sorted((len(self.coefficients(name)) for name in self.candidates), reverse=True)
+        return len(self.free(effects)) + sum(sizes[:2])
+
+    def lane(self, effects: Sequence[str], values: np.ndarray, slots: int, without: int | None = None) -> Lane:
+        weights = np.ones(self.problem.batch.output.shape[0])
+        if without is not None:
+            weights[without] = 0.0
+        return self.problem.lane(self.free(effects), self.bounds, values, slots, weights)
+
+    def rmse(self, misfit: np.ndarray) -> float:
+        return float(np.sqrt((misfit**2).sum() / np.asarray(self.problem.batch.mask).sum()))
+
+    def judged(self, fitted: Sequence[tuple[tuple[str, ...], Solution]], slots: int) -> list[Model]:
+        """Leave each fit run out in turn, refit to the others from the full fit, and predict the one left out."""
+        runs = self.problem.batch.output.shape[0]
+        if runs < 2:  # nothing can be left out: the fit itself is all there is, and the report says so
+            everything = misfits(self.problem, [solution.values for _, solution in fitted])
+            return [
+                Model(effects, solution.values, solution.cost, misfit, self.rmse(misfit))
+                for (effects, solution), misfit in zip(fitted, everything, strict=True)
+            ]
+        lanes = [self.lane(effects, s.values, slots, run) for effects, s in fitted for run in range(runs)]
+        folds = self.solve(
+            self.problem, lanes, legs=3, enough=1e-2, progress=self.progress, what="predicting runs left out"
+        )
+        everything = misfits(self.problem, [fold.values for fold in folds])
+        models = []
+        for index, (effects, solution) in enumerate(fitted):
+            left_out = np.stack([everything[index * runs + run, run] for run in range(runs)])
+            models.append(Model(effects, solution.values, solution.cost, left_out, self.rmse(left_out)))
+        return models
+
+    def better(self, new: Model, old: Model) -> tuple[bool, str]:
+        """Does `new` predict left-out runs better, beyond its extra coefficients and beyond chance?"""
+        extra = len(self.free(new.effects)) - len(self.free(old.effects))
+        gain = 1.0 - (new.left_out_rmse / old.left_out_rmse) ** 2
+        z = _paired(old.left_out, new.left_out, np.asarray(self.problem.batch.mask))
+        enough = gain > PENALTY * extra and z > CHANCE
+        told = (
+            f"error on left-out runs {_short(old.left_out_rmse)} -> {_short(new.left_out_rmse)} "
+            f"({gain:+.0%} of its mean square, {z:.1f} standard errors)"
+        )
+        return enough, told
+
+
+def _short(value: float) -> str:
+    return f"{value:.3g}"
+
+
+def _paired(old: np.ndarray, new: np.ndarray, mask: np.ndarray) -> float:
+    """Mean drop of the squared error over its standard error, on blocks longer than the residual's memory."""
+    gains, block = [], int(np.ceil(2.0 * correlation_time(split_runs(old, mask))))
+    for before, after, valid in zip(old, new, mask, strict=True):
+        drop = (before**2 - after**2)[valid > 0]
+        width = min(block, max(1, len(drop) // 4))
+        gains += [float(piece.mean()) for piece in np.array_split(drop, max(1, len(drop) // width))]
+    spread = np.std(gains, ddof=1) / np.sqrt(len(gains)) if len(gains) > 1 else np.inf
+    return float(np.mean(gains) / spread) if spread > 0.0 else 0.0
+
+
+def start_values(model_values: np.ndarray, names: Sequence[str], score: Score) -> np.ndarray:
+    """The present fit with an effect's coefficients moved off their base, to the side the score test points to."""
+    values = np.array(model_values)
+    for effect in score.effects:
+        for name, size in LIBRARY[effect].starts.items():
+            full = f"{effect}.{name}"
+            side = -1.0 if score.coefficients.get(full, 0.0) < 0.0 else 1.0
+            values[names.index(full)] = side * size if full in switches(effect) else size
+    return values
+
+
+def search(setting: Search, base: Solution) -> tuple[Model, Model]:
+    """(base model, final model). Fills `setting.evidence` and `setting.rounds` on the way."""
+    problem, names = setting.problem, setting.problem.names
+    slots = setting.slots(())
+    first = setting.judged([((), base)], slots)[0]
+    model = first
+    for number in range(1, MOST_ROUNDS + 1):
+        left = [name for name in setting.candidates if name not in model.effects]
+        singles, pairs = scores_at(setting, model, left)
+        for score in singles:
+            setting.evidence.setdefault(score.effects[0], Evidence(first_score=score))
+        if not significant(singles, SIGNIFICANT) and not significant(pairs, SIGNIFICANT):
+            lowest = min((score.p_value for score in singles), default=1.0)
+            why = f"no candidate stands out in the score test (smallest p-value {lowest:.2g} of {len(singles)})"
+            setting.rounds.append(Round(number, (), "", why))
+            break
+        slots = setting.slots(model.effects)
+        chosen = [*singles[:SINGLES], *pairs[:PAIRS]]
+        lanes = [
+            setting.lane((*model.effects, *score.effects), start_values(model.values, names, score), slots)
+            for score in chosen
+        ]
+        solutions = setting.solve(problem, lanes, progress=setting.progress, what=f"round {number}: refitting candidates")
+        fitted = [((*model.effects, *s.effects), solution) for s, solution in zip(chosen, solutions, strict=True)]
+        if number == 1:
+            samples = float(np.asarray(problem.batch.mask).sum())
+            for effects, solution in fitted:
+                if len(effects) == 1:
+                    setting.evidence[effects[0]].alone_rmse = float(problem.noise_sigma * np.sqrt(solution.cost / samples))
+        weighed = sorted(fitted, key=lambda entry: entry[1].cost * (1.0 + PENALTY * len(setting.free(entry[0]))))
+        judged = setting.judged(weighed[:JUDGED], slots)
+        if number == 1:
+            for entry in judged:
+                if len(entry.effects) == 1:
+                    setting.evidence[entry.effects[0]].alone_left_out_rmse = entry.left_out_rmse
+        best = min(judged, key=lambda m: m.left_out_rmse**2 * (1.0 + PENALTY * len(setting.free(m.effects))))
+        enough, why = setting.better(best, model)
+        tried = tuple((" + ".join(entry.effects), entry.left_out_rmse) for entry in judged)
+        new = [name for name in best.effects if name not in model.effects]
+        setting.rounds.append(Round(number, tried, " + ".join(new) if enough else "", why))
+        if not enough:
+            break
+        model = best
+    return first, pruned(setting, model)
+
+
+def scores_at(setting: Search, model: Model, left: Sequence[str]) -> tuple[list[Score], list[Score]]:
+    """Score tests of the effects not yet in `model`, at its fit."""
+    every = [*setting.unknowns, *(name for effect in setting.candidates for name in setting.coefficients(effect))]
+    at = sensitivity(setting.problem, model.values, every)
+    index = setting.problem.names.index
+    loose = [
+        name for name in setting.free(model.effects) if not held(float(model.values[index(name)]), *setting.bounds[name])
+    ]
+    return screen(at, loose, left, setting.bounds)
+
+
+def pruned(setting: Search, model: Model) -> Model:
+    """Take out again every effect that the others have made needless."""
+    names = setting.problem.names
+    while len(model.effects) > 1:
+        slots = setting.slots(model.effects)
+        lanes, smaller = [], []
+        for effect in model.effects:
+            rest = tuple(name for name in model.effects if name != effect)
+            values = np.array(model.values)
+            for name, value in zip(setting.coefficients(effect), base_values(effect, setting.coefficients(effect)), strict=True):
+                values[names.index(name)] = value
+            lanes.append(setting.lane(rest, values, slots))
+            smaller.append(rest)
+        solutions = setting.solve(
+            setting.problem, lanes, legs=3, progress=setting.progress, what="taking effects out again"
+        )
+        judged = setting.judged(list(zip(smaller, solutions, strict=True)), slots)
+        for entry in judged:
+            gone = next(name for name in model.effects if name not in entry.effects)
+            setting.evidence[gone].without_left_out_rmse = entry.left_out_rmse
+        needless = [entry for entry in judged if not setting.better(model, entry)[0]]
+        if not needless:
+            break
+        best = min(needless, key=lambda m: m.left_out_rmse)
+        gone = next(name for name in model.effects if name not in best.effects)
+        why = f"taken out again: {setting.better(model, best)[1]} with it is not enough"
+        setting.rounds.append(Round(len(setting.rounds) + 1, ((" + ".join(best.effects), best.left_out_rmse),), f"without {gone}", why))
+        model = best
+    return model
+
+
+def base_values(effect: str, coefficients: Sequence[str]) -> list[float]:
+    """Base values of an effect's coefficients, in the order of their full names."""
+    base = LIBRARY[effect].base()
+    return [float(getattr(base, name.split(".", 1)[1])) for name in coefficients]

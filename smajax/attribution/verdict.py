@@ -1,0 +1,115 @@
+"""The answer in words: what the numbers allow, and nothing beyond."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from smajax.effects.library import LIBRARY
+from smajax.experiment.record import Experiment
+from smajax.report.display import display
+from smajax.report.findings import EffectFinding, ParameterFinding, Portrait, RunFinding, Verdict
+from smajax.residual.portrait import noise_like
+
+def verdict(added: Sequence[str], after: Portrait) -> Verdict:
+    """Of the four, by whether something was added and whether what is left is noise."""
+    if noise_like(after):
+        return "explained" if added else "adequate"
+    return "partly explained" if added else "not in the library"
+
+
+def shown(value: float, unit: str, quantity: str) -> str:
+    """A value in the unit an engineer reads."""
+    edge = display(unit, quantity)
+    return f"{edge.of(value):.3g} {edge.unit}"
+
+
+def pooled(runs: Sequence[RunFinding], role: str, which: str) -> float:
+    """Root mean square over all samples of the runs with `role`; NaN when there are none."""
+    squares = [getattr(run, f"rmse_{which}") ** 2 * len(run.time) for run in runs if run.role == role]
+    samples = [len(run.time) for run in runs if run.role == role]
+    return float(np.sqrt(sum(squares) / sum(samples))) if samples else float("nan")
+
+
+def summary(
+    answer: Verdict, experiment: Experiment, runs: Sequence[RunFinding], effects: Sequence[EffectFinding], after: Portrait
+) -> tuple[str, ...]:
+    """The verdict in sentences."""
+    unit, name = experiment.output_unit, experiment.output_name
+    added = [effect for effect in effects if effect.added]
+    opening = {
+        "adequate": "Nothing is missing that these runs can show: the base model leaves nothing but measurement noise.",
+        "explained": f"The base model lacks {_listed(added)}. With it, what is left is measurement noise.",
+        "partly explained": f"The base model lacks {_listed(added)}. That explains part of the misfit; more is missing.",
+        "not in the library": "Something is missing, and it is not in the library: no candidate effect predicts left-out "
+        "runs better.",
+    }
+    told = [opening[answer]]
+    for role, words in (("fit", "fit"), ("held-out", "held-out")):
+        before, now = pooled(runs, role, "before"), pooled(runs, role, "after")
+        if np.isfinite(before):
+            told.append(
+                f"Error on the {words} runs: {shown(before, unit, name)}"
+                + (f" before, {shown(now, unit, name)} after." if added else ".")
+            )
+    told.append(f"Measurement noise: {shown(experiment.noise_sigma, unit, name)} ({experiment.noise_how}).")
+    told += [effect.sentence for effect in added]
+    worse = [run.name for run in runs if run.role == "held-out" and run.rmse_after > 1.02 * run.rmse_before]
+    if worse:
+        told.append(f"Mind: on {', '.join(worse)}, which the fit never saw, the extended model does worse than the base model.")
+    if not any(run.role == "held-out" for run in runs):
+        told.append("No run was held out, so nothing here was tested on data that the fit never saw.")
+    if noise_like(after) and after.ratio > 1.2:
+        told.append(
+            f"What is left has no memory but is {after.ratio:.1f} times the declared noise: the noise was declared too small."
+        )
+    return tuple(told)
+
+
+def _listed(added: Sequence[EffectFinding]) -> str:
+    names = [effect.title for effect in added]
+    return names[0] if len(names) == 1 else ", ".join(names[:-1]) + " and " + names[-1] if names else "nothing"
+
+
+def unexplained(
+    answer: Verdict, experiment: Experiment, runs: Sequence[RunFinding], after: Portrait
+) -> tuple[str, ...]:
+    """What the final model leaves."""
+    if answer in ("adequate", "explained"):
+        return ("Nothing beyond noise on the fit runs.",)
+    told = [*after.sentences]
+    fit = pooled(runs, "fit", "after")
+    for run in runs:
+        if run.role == "held-out" and run.rmse_after > 2.0 * fit:
+            told.append(
+                f"{run.name} is {run.rmse_after / fit:.1f} times as far off as the fit runs. Something differs between that run and them "
+                "(another day, another state of the wire) which no effect within a run can explain."
+            )
+    return tuple(told)
+
+
+def cannot_know(
+    experiment: Experiment, parameters: Sequence[ParameterFinding], effects: Sequence[EffectFinding], fit_runs: int
+) -> tuple[str, ...]:
+    """What these runs cannot tell, whatever the fit says."""
+    told = [f"{p.name}: {p.remark}; its value is not measured by these runs." for p in parameters if p.remark]
+    left = [effect for effect in effects if not effect.added]
+    absorbed = [e.title for e in left if e.evidence.get("score_gain", 0.0) < 1e-4]
+    if absorbed:
+        told.append(
+            f"Small amounts of {', '.join(absorbed)} would not show: these runs have nothing that the fitted parameters do not absorb."
+        )
+    if fit_runs < 3:
+        told.append(f"With {fit_runs} fit run(s) the left-out test is weak: give at least three of different kinds.")
+    if experiment.offset:
+        told.append("The zero of the output: each run has its own offset, fitted to that run, also for held-out runs.")
+    fixed = sorted(name for name in experiment.parameters if "." not in name)
+    if fixed:
+        told.append(f"Anything that shifts what was taken as known: {', '.join(fixed)}.")
+    return tuple(told)
+
+
+def evidence_titles() -> dict[str, str]:
+    """Name -> title of every effect."""
+    return {name: effect.title for name, effect in LIBRARY.items()}

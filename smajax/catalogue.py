@@ -1,0 +1,43 @@
+"""What an experiment file may name: presets, effects, and every parameter of a combination with unit and bounds."""
+
+from __future__ import annotations
+
+from smajax.effects.library import LIBRARY, at_base
+from smajax.experiment.catalogue import Catalogue, ModelDescription, ParameterInfo
+from smajax.load.coupon import Coupon
+from smajax.parameters import parameters
+from smajax.presets import DRIVES, LOADS, WIRES, build
+from smajax.system import System
+
+
+def describe(wire: str, load: str, drive: str) -> ModelDescription:
+    """Parameters and channels of one combination. ValueError when the three do not go together."""
+    system = build(wire, load, drive)
+    if isinstance(system.load, Coupon) != (drive == "none"):
+        raise ValueError(
+            f"load `{load}` with drive `{drive}`: a coupon's temperature is prescribed, so it takes the drive `none`; "
+            f"every other load is heated and takes one of {sorted(set(DRIVES) - {'none'})}."
+        )
+    name, unit = system.load.reading
+    return ModelDescription(
+        parameters={entry.name: ParameterInfo(entry.unit, entry.low, entry.high) for entry in parameters(system).values()},
+        inputs_required=system.load.inputs_required | system.drive.inputs_required,
+        inputs_optional=system.load.inputs_optional | system.drive.inputs_optional | {"ambient_temperature"},
+        outputs={name: unit},
+    )
+
+
+CATALOGUE = Catalogue(wires=tuple(WIRES), loads=tuple(LOADS), drives=tuple(DRIVES), effects=tuple(LIBRARY), describe=describe)
+
+
+def candidates(system: System, only: tuple[str, ...] | None, excluded: tuple[str, ...]) -> tuple[str, ...]:
+    """Names of the effects that this system can show: a coupon has no heat balance, no circuit and no guide."""
+    useless = {"heat", "electrical", "mechanics"} if isinstance(system.load, Coupon) else set()
+    return tuple(
+        name
+        for name, effect in LIBRARY.items()
+        if effect.equation not in useless and name not in excluded and (only is None or name in only)
+    )
+
+
+__all__ = ["CATALOGUE", "at_base", "candidates", "describe"]

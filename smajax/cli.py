@@ -1,0 +1,120 @@
+"""The command line: `smajax close-loop experiment.toml --out DIR` and `smajax demo`."""
+
+from __future__ import annotations
+
+import json
+import os
+import shlex
+import sys
+import webbrowser
+from importlib import resources
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.console import Console
+
+if TYPE_CHECKING:
+    from smajax.report.findings import Findings
+
+app = typer.Typer(
+    name="smajax",
+    help="Shape-memory-alloy wire actuators: from measured runs to the physical effect that a model lacks.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    add_completion=True,
+)
+console = Console(stderr=True)
+DEMOS = ("latent", "complete")
+
+
+def _loop(experiment: Path, out: Path, command: str) -> tuple[Findings, Path]:
+    # Imported here so that `--help` does not wait for JAX; x64 is the caller's choice, and this is the caller.
+    import jax
+
+    jax.config.update("jax_enable_x64", True)
+    from smajax.catalogue import CATALOGUE
+    from smajax.close_loop import close_loop
+    from smajax.experiment.load import load_experiment
+    from smajax.progress import shown
+    from smajax.report.write import write_report
+
+    # Before the work, not after it: a folder that cannot be written to is found out at once.
+    out.mkdir(parents=True, exist_ok=True)
+    loaded = load_experiment(experiment, CATALOGUE)
+    with shown(console) as progress:
+        findings = close_loop(loaded, memory=out / "fits", progress=progress, command=command)
+    return findings, write_report(findings, out)
+
+
+def _say(findings: Findings, page: Path) -> None:
+    typer.echo(f"\n{findings.title}\nVerdict: {findings.verdict}")
+    for sentence in findings.summary:
+        typer.echo(f"  {sentence}")
+    typer.echo(f"Report: {page.resolve()}")
+
+
+@app.command("close-loop")
+def close_loop_command(
+    experiment: Annotated[Path, typer.Argument(help="experiment.toml, or the folder that holds it")],
+    out: Annotated[Path, typer.Option(help="folder for report.html and report.json; finished fits are kept there too")],
+    json_out: Annotated[bool, typer.Option("--json", help="print report.json on stdout instead of words")] = False,
+    open_page: Annotated[bool, typer.Option("--open", help="open the report in a browser")] = False,
+) -> None:
+    """Fit the base model, find what it lacks, add it, and report the error before and after.
+
+    Ctrl-C loses nothing: the same command with the same --out goes on from the fits that are finished.
+
+    Example:  smajax close-loop experiment.toml --out report
+    """
+    findings, page = _loop(experiment, out, f"smajax close-loop {shlex.quote(str(experiment))} --out {shlex.quote(str(out))}")
+    if json_out:
+        from smajax.report.json_file import findings_to_json
+
+        typer.echo(json.dumps(findings_to_json(findings)))
+    else:
+        _say(findings, page)
+    if open_page:
+        webbrowser.open(page.resolve().as_uri())
+
+
+@app.command()
+def demo(
+    out: Annotated[Path, typer.Option(help="folder for the reports")] = Path("demo-report"),
+    only: Annotated[str | None, typer.Option(help=f"one of {', '.join(DEMOS)}")] = None,
+    open_page: Annotated[bool, typer.Option("--open/--no-open", help="open the first report in a browser")] = True,
+) -> None:
+    """The main job on two virtual benches shipped with the package: one lacks an effect, the other lacks nothing.
+
+    Each bench was made by a simulator that shares no code with this one; what it really contains lies in truth.toml,
+    which the loop does not read and which is printed after each verdict.
+    """
+    if only is not None and only not in DEMOS:
+        raise typer.BadParameter(f"there is no demo `{only}`; choose one of {', '.join(DEMOS)}.", param_hint="--only")
+    pages = []
+    for name in DEMOS if only is None else (only,):
+        with resources.as_file(resources.files("smajax") / "demo" / name) as folder:
+            typer.echo(f"\n=== {name} ===")
+            findings, page = _loop(folder / "experiment.toml", out / name, f"smajax demo --only {name}")
+            _say(findings, page)
+            typer.echo("The truth, which the loop did not read:")
+            for line in (folder / "truth.toml").read_text(encoding="utf-8").splitlines():
+                typer.echo(f"  {line}")
+        pages.append(page)
+    if open_page and sys.stdout.isatty() and not os.environ.get("CI"):
+        webbrowser.open(pages[0].resolve().as_uri())
+
+
+def main() -> None:
+    """Entry point: errors that a user can mend are said in one paragraph with exit code 2, without a traceback."""
+    from smajax.experiment.errors import ExperimentError
+    from smajax.measured.table import MeasuredDataError
+
+    try:
+        app()
+    except (ExperimentError, MeasuredDataError, OSError) as error:
+        console.print(f"error: {error}", style="red", markup=False, highlight=False, soft_wrap=True)
+        raise SystemExit(2) from None
+    except KeyboardInterrupt:
+        console.print("Interrupted. Finished fits are kept: run the same command again to go on.", soft_wrap=True)
+        raise SystemExit(130) from None

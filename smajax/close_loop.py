@@ -1,0 +1,297 @@
+"""The main job: experiment -> check -> base fit -> residual -> search -> extended model -> findings."""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+import time as clock
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from scipy.stats import qmc
+
+from smajax.attribution.memory import Memory
+from smajax.attribution.search import Evidence, Model, Search, scores_at, search
+from smajax.attribution.verdict import cannot_know, summary, unexplained, verdict
+from smajax.catalogue import candidates
+from smajax.effects.library import LIBRARY
+from smajax.experiment.record import Experiment, Run
+from smajax.extended import base_model, extended
+from smajax.fit.batch import RunBatch, pack, simulate_batch
+from smajax.fit.problem import Problem
+from smajax.fit.sensitivity import Sensitivity, sensitivity
+from smajax.fit.solve import LANES, Progress, Solution, quiet
+from smajax.fit.uncertainty import Uncertainty, identifiability, uncertainty
+from smajax.parameters import parameters
+from smajax.report.findings import (
+    CoefficientFinding,
+    EffectFinding,
+    Findings,
+    ParameterFinding,
+    Portrait,
+    RunFinding,
+)
+from smajax.residual.portrait import portrait
+from smajax.types import Trajectory
+
+SEED = 2004
+# The starts beside the given one are spread over this share of each box, around the given start.
+SPREAD = 0.4
+
+
+@dataclass(frozen=True)
+class _Job:
+    """What every stage of one loop shares."""
+
+    experiment: Experiment
+    fit_runs: tuple[Run, ...]
+    problem: Problem
+    unknowns: tuple[str, ...]
+    bounds: dict[str, tuple[float, float]]
+    candidates: tuple[str, ...]
+
+    @property
+    def every(self) -> list[str]:
+        """Unknowns and all coefficients of all candidates: one Jacobian serves every question."""
+        return [*self.unknowns, *(name for name in self.problem.names if "." in name)]
+
+
+def _job(experiment: Experiment) -> _Job:
+    base = base_model(experiment)
+    names = candidates(base, experiment.effects_only, experiment.effects_excluded)
+    full = extended(base, names, {n: v for n, v in experiment.parameters.items() if "." in n})
+    runs = tuple(run for run in experiment.runs if run.role == "fit")
+    batch = pack(runs, experiment.step, experiment.parameters)
+    problem = Problem.build(full, batch, experiment.noise_sigma, experiment.offset)
+    bounds = {entry.name: (entry.low, entry.high) for entry in parameters(full).values()}
+    bounds |= {unknown.name: (unknown.low, unknown.high) for unknown in experiment.unknowns}
+    return _Job(experiment, runs, problem, tuple(u.name for u in experiment.unknowns), bounds, names)
+
+
+def close_loop(
+    experiment: Experiment, *, memory: Path, progress: Progress = quiet, command: str = "", seed: int = SEED
+) -> Findings:
+    """Fit the base model, look at what it leaves, find what it lacks, and judge on runs the fit never saw.
+
+    `memory` is a folder for finished fits: a loop that was interrupted goes on from there. Held-out runs are simulated
+    once, at the very end. The caller chooses precision; anything but float64 is refused with a ValueError, because the
+    differences that decide here are far below float32's rounding over a run.
+    """
+    if not jax.config.jax_enable_x64:
+        raise ValueError(
+            "close_loop needs float64, but JAX runs in float32. Call `jax.config.update('jax_enable_x64', True)` first."
+        )
+    began = clock.monotonic()
+    job = _job(experiment)
+    kept = Memory(memory)
+    progress("checking what these runs can tell", 0.0)
+    start = job.problem.start_values()
+    at_start = sensitivity(job.problem, start, job.every)
+    check = [*experiment.warnings, *identifiability(at_start, job.unknowns, job.bounds)]
+    progress("checking what these runs can tell", 1.0)
+    for line in check:
+        progress(f"check: {line}", 1.0)
+
+    setting = Search(job.problem, job.unknowns, job.bounds, job.candidates, kept.solve, progress)
+    base = _base_fit(job, setting, start, seed)
+    first, final = search(setting, base)
+
+    progress("standard errors and pictures", 0.0)
+    before = _told(job, setting, first, start)
+    after = _told(job, setting, final, start) if final.effects else before
+    effects = _effects(job, setting, final, after)
+    runs, portrait_before, portrait_after = _compare(job, first, final)
+    progress("standard errors and pictures", 1.0)
+    answer = verdict(final.effects, portrait_after)
+    return Findings(
+        experiment=experiment.name,
+        title=experiment.title,
+        source=experiment.path.name,
+        verdict=answer,
+        summary=summary(answer, experiment, runs, effects, portrait_after),
+        unexplained=unexplained(answer, experiment, runs, portrait_after),
+        cannot_know=cannot_know(experiment, after.parameters, effects, len(job.fit_runs)),
+        check=tuple(check),
+        output_name=experiment.output_name,
+        output_unit=experiment.output_unit,
+        noise_sigma=experiment.noise_sigma,
+        noise_how=experiment.noise_how,
+        runs=runs,
+        before=before.parameters,
+        after=after.parameters,
+        effects=effects,
+        portrait_before=portrait_before,
+        portrait_after=portrait_after,
+        rounds=tuple(setting.rounds),
+        provenance=_provenance(experiment, kept, command, seed, clock.monotonic() - began),
+    )
+
+
+def _base_fit(job: _Job, setting: Search, start: np.ndarray, seed: int) -> Solution:
+    """Base model from the declared start and from Sobol points around it, in one batch."""
+    names, slots = job.problem.names, setting.slots(())
+    points = [start]
+    sobol = qmc.Sobol(len(job.unknowns), seed=seed)
+    for shares in sobol.random(LANES)[: LANES - 1]:
+        point = np.array(start)
+        for name, share in zip(job.unknowns, shares, strict=True):
+            low, high = job.bounds[name]
+            middle = float(np.clip(start[names.index(name)], low, high))
+            point[names.index(name)] = np.clip(
+                middle + SPREAD * (share - 0.5) * (high - low), low + 0.02 * (high - low), high - 0.02 * (high - low)
+            )
+        points.append(point)
+    lanes = [setting.lane((), point, slots) for point in points]
+    solutions = setting.solve(job.problem, lanes, progress=setting.progress, what="fitting the base model")
+    return min(solutions, key=lambda solution: solution.cost)
+
+
+@dataclass(frozen=True)
+class _Told:
+    parameters: tuple[ParameterFinding, ...]
+    uncertainty: Uncertainty
+
+
+def _told(job: _Job, setting: Search, model: Model, start: np.ndarray) -> _Told:
+    """Every free parameter of `model` with its standard error and remark."""
+    names = setting.free(model.effects)
+    index = job.problem.names.index
+    at: Sensitivity = sensitivity(job.problem, model.values, job.every)
+    values = {name: float(model.values[index(name)]) for name in names}
+    known = uncertainty(at, names, values, job.bounds)
+    table = parameters(job.problem.system)
+    return _Told(
+        tuple(
+            ParameterFinding(
+                name,
+                table[name].unit,
+                values[name],
+                known.standard_error[name],
+                *job.bounds[name],
+                float(start[index(name)]),
+                known.remark[name],
+            )
+            for name in names
+        ),
+        known,
+    )
+
+
+def _effects(job: _Job, setting: Search, final: Model, after: _Told) -> tuple[EffectFinding, ...]:
+    """Every candidate with its evidence: added ones first, then by score."""
+    left = [name for name in job.candidates if name not in final.effects]
+    last = {score.effects[0]: score for score in scores_at(setting, final, left)[0]} if left else {}
+    told = {parameter.name: parameter for parameter in after.parameters}
+    findings = []
+    for name in job.candidates:
+        effect, seen = LIBRARY[name], setting.evidence.get(name, Evidence())
+        coefficients = {
+            full.split(".", 1)[1]: CoefficientFinding(told[full].value, told[full].standard_error, told[full].unit)
+            for full in setting.coefficients(name)
+            if full in told
+        }
+        evidence = {
+            "score_gain": seen.first_score.gain if seen.first_score else float("nan"),
+            "score_statistic": seen.first_score.statistic if seen.first_score else float("nan"),
+            "score_p_value": seen.first_score.p_value if seen.first_score else float("nan"),
+            "alone_rmse_fit": seen.alone_rmse,
+            "leave_one_out_rmse": seen.alone_left_out_rmse,
+            "leave_one_out_rmse_without": seen.without_left_out_rmse,
+            "score_p_value_at_the_end": last[name].p_value if name in last else float("nan"),
+            "score_gain_at_the_end": last[name].gain if name in last else float("nan"),
+        }
+        findings.append(
+            EffectFinding(
+                name, effect.title, effect.equation, effect.formula, effect.sentence, name in final.effects, coefficients, evidence
+            )
+        )
+    return tuple(sorted(findings, key=lambda f: (not f.added, -np.nan_to_num(f.evidence["score_gain"]))))
+
+
+@eqx.filter_jit
+def _simulated(problem: Problem, values: jax.Array, batch: RunBatch) -> Trajectory:
+    return simulate_batch(problem.system_at(values), batch)
+
+
+def _compare(job: _Job, first: Model, final: Model) -> tuple[tuple[RunFinding, ...], Portrait, Portrait]:
+    """Every run, held-out ones included, by both models; and the portraits of the fit runs' residuals."""
+    experiment = job.experiment
+    batch = pack(experiment.runs, experiment.step, experiment.parameters)
+    before = _simulated(job.problem, jnp.asarray(first.values), batch)
+    after = _simulated(job.problem, jnp.asarray(final.values), batch)
+    runs = []
+    residuals: dict[str, list[np.ndarray]] = {"before": [], "after": []}
+    states: dict[str, list[dict[str, np.ndarray]]] = {"before": [], "after": []}
+    for index, run in enumerate(experiment.runs):
+        n = len(run.time)
+        readings, offsets, errors = {}, {}, {}
+        for which, trajectory in (("before", before), ("after", after)):
+            reading = np.asarray(trajectory.reading)[index, :n]
+            offsets[which] = float(np.mean(run.output - reading)) if experiment.offset else 0.0
+            readings[which] = reading + offsets[which]
+            errors[which] = float(np.sqrt(np.mean((run.output - readings[which]) ** 2)))
+            if run.role == "fit":
+                residuals[which].append(run.output - readings[which])
+                states[which].append(_series(run, trajectory, index))
+        shown = {name: np.asarray(getattr(after, name))[index, :n] for name in ("temperature", "martensite_fraction", "stress")}
+        runs.append(
+            RunFinding(
+                run.name,
+                "fit" if run.role == "fit" else "held-out",
+                run.time,
+                run.inputs,
+                run.output,
+                readings["before"],
+                readings["after"],
+                shown,
+                offsets["before"],
+                offsets["after"],
+                errors["before"],
+                errors["after"],
+            )
+        )
+    sigma = experiment.noise_sigma
+    return (
+        tuple(runs),
+        portrait(residuals["before"], states["before"], sigma),
+        portrait(residuals["after"], states["after"], sigma),
+    )
+
+
+def _series(run: Run, trajectory: Trajectory, index: int) -> dict[str, np.ndarray]:
+    """What a residual is held against."""
+    n = len(run.time)
+    temperature = np.asarray(trajectory.temperature)[index, :n]
+    series = {
+        "time": run.time - run.time[0],
+        "temperature": temperature,
+        "martensite_fraction": np.asarray(trajectory.martensite_fraction)[index, :n],
+        "stress": np.asarray(trajectory.stress)[index, :n],
+        "temperature_rate": np.gradient(temperature),
+    }
+    return series | {name: values for name, values in run.inputs.items() if name not in series}
+
+
+def _provenance(experiment: Experiment, kept: Memory, command: str, seed: int, seconds: float) -> dict[str, str]:
+    versions = {name: metadata.version(name) for name in ("smajax", "jax", "equinox", "optimistix", "numpy", "scipy")}
+    return {
+        **{f"version of {name}": version for name, version in versions.items()},
+        "python": platform.python_version(),
+        "machine": f"{platform.system()} {platform.machine()}, {jax.default_backend()}",
+        "command": command,
+        "seed": str(seed),
+        "step": f"{experiment.step} s",
+        "seconds": f"{seconds:.0f}",
+        "batches of fits taken from an earlier, interrupted run": str(kept.reused),
+        "sha256 of the experiment file": hashlib.sha256(experiment.path.read_bytes()).hexdigest(),
+        **{f"sha256 of {run.name}": run.sha256 for run in experiment.runs},
+    }
+
+
+__all__: Sequence[str] = ("close_loop",)

@@ -1,0 +1,21 @@
+"""The contract of a drive: what the amplifier puts into each metre of wire."""
+
+from __future__ import annotations
+
+import abc
+from typing import ClassVar
+
+import equinox as eqx
+
+from smajax.types import Inputs, Scalar
+
+
+class AbstractDrive(eqx.Module):
+    """Electrical power from the input channels."""
+
+    inputs_required: ClassVar[frozenset[str]]
+    inputs_optional: ClassVar[frozenset[str]] = frozenset()
+
+    @abc.abstractmethod
+    def power(self, resistance: Scalar, length: Scalar, inputs: Inputs) -> Scalar:
+        """I^2 R per metre of wire, W/m; `resistance` in ohm/m, `length` in m."""

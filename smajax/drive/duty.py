@@ -1,0 +1,20 @@
+"""Pulse-width modulation of a fixed supply, averaged over its period."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from smajax.drive.base import AbstractDrive
+from smajax.parameters import parameter
+from smajax.types import Inputs, Scalar
+
+
+class Duty(AbstractDrive):
+    """Mean power = duty * V_s^2 / (R l_0^2) per metre: the wire is far slower than the modulation."""
+
+    supply_voltage: Scalar = parameter("V", 0.1, 1e3, "voltage of the supply while the switch is closed")
+
+    inputs_required: ClassVar[frozenset[str]] = frozenset({"duty"})
+
+    def power(self, resistance: Scalar, length: Scalar, inputs: Inputs) -> Scalar:
+        return inputs["duty"] * (self.supply_voltage / length) ** 2 / resistance

@@ -1,0 +1,75 @@
+"""The contract of an effect: what a missing piece of physics may change, one method an equation.
+
+An effect is an immutable module whose coefficients are `parameter` fields. With its switches at their base value
+(usually zero) every method must return exactly what the base model has, so that the extended model contains the base
+model. The default methods below change nothing; an effect overrides the one equation it is about.
+"""
+
+from __future__ import annotations
+
+import abc
+from typing import TYPE_CHECKING, ClassVar
+
+import equinox as eqx
+
+from smajax.types import Scalar
+
+if TYPE_CHECKING:
+    from smajax.wire.wire import Wire
+
+
+class AbstractEffect(eqx.Module):
+    """One candidate for what a model lacks."""
+
+    effect_name: ClassVar[str]  # "latent_heat"
+    title: ClassVar[str]  # "latent heat of transformation"
+    equation: ClassVar[str]  # heat, electrical, kinetics, constitutive, mechanics, sensor, input
+    formula: ClassVar[str]  # plain text, with its source
+    sentence: ClassVar[str]  # for an engineer: what its presence means
+    # Coefficients that switch the effect on: their base value is zero and the score test looks at them. The others
+    # (a width, a scale) mean nothing until a switch is off zero and keep their default until then.
+    switches: ClassVar[tuple[str, ...]]
+    # Where a refit begins, per coefficient: off the base value, because a coefficient that starts on its bound at
+    # zero stays there.
+    starts: ClassVar[dict[str, float]]
+
+    @classmethod
+    @abc.abstractmethod
+    def base(cls) -> AbstractEffect:
+        """The effect at its base value: present in the equations and changing nothing."""
+
+    def stored_heat(self, wire: Wire, temperature: Scalar, fraction: Scalar) -> Scalar | float:
+        """Heat stored per metre beside m c_p T, J/m."""
+        return 0.0
+
+    def heat_loss(self, wire: Wire, temperature: Scalar, ambient: Scalar) -> Scalar | float:
+        """Heat lost per metre beside h_c A_c (T - T_inf), W/m."""
+        return 0.0
+
+    def ambient_shift(self, time: Scalar) -> Scalar | float:
+        """Added to the ambient temperature, C."""
+        return 0.0
+
+    def resistance_factor(self, temperature: Scalar, fraction: Scalar) -> Scalar | float:
+        """Relative change of the resistance per metre, -."""
+        return 0.0
+
+    def heating_shape(self, z: Scalar, remaining: Scalar) -> Scalar:
+        """Share of martensite left at the reduced distance z = (y_A - A_s)/(A_f - A_s); 1 far below, 0 far above."""
+        return remaining
+
+    def cooling_shape(self, z: Scalar, remaining: Scalar) -> Scalar:
+        """Share of austenite left at the reduced distance z = (y_M - M_f)/(M_s - M_f); 0 far below, 1 far above."""
+        return remaining
+
+    def strain(self, wire: Wire, temperature: Scalar, stress: Scalar, fraction: Scalar) -> Scalar | float:
+        """Strain beside eps_L xi and the elastic part, a function of state, -."""
+        return 0.0
+
+    def friction_limit(self) -> Scalar | float:
+        """Coulomb limit of the load's friction, N (N m for an arm)."""
+        return 0.0
+
+    def sensor_time_constant(self) -> Scalar | float:
+        """Time constant of a first-order sensor, s."""
+        return 0.0

@@ -1,0 +1,45 @@
+"""The library of candidate effects: one file and one line here each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from smajax.effects.ambient_drift import AmbientDrift
+from smajax.effects.asymmetric_transformation import AsymmetricTransformation
+from smajax.effects.base import AbstractEffect
+from smajax.effects.coulomb_friction import CoulombFriction
+from smajax.effects.latent_heat import LatentHeat
+from smajax.effects.phase_resistance import PhaseResistance
+from smajax.effects.radiation import Radiation
+from smajax.effects.rising_convection import RisingConvection
+from smajax.effects.sensor_lag import SensorLag
+from smajax.effects.smooth_transformation import SmoothTransformation
+from smajax.effects.stress_dependent_strain import StressDependentStrain
+from smajax.effects.thermal_expansion import ThermalExpansion
+from smajax.effects.two_part_transformation import TwoPartTransformation
+
+LIBRARY: dict[str, type[AbstractEffect]] = {
+    effect.effect_name: effect
+    for effect in (
+        LatentHeat,
+        RisingConvection,
+        Radiation,
+        AmbientDrift,
+        PhaseResistance,
+        SmoothTransformation,
+        AsymmetricTransformation,
+        TwoPartTransformation,
+        ThermalExpansion,
+        StressDependentStrain,
+        CoulombFriction,
+        SensorLag,
+    )
+}
+
+
+def at_base(names: Sequence[str]) -> tuple[AbstractEffect, ...]:
+    """The named effects, present and changing nothing. Raises KeyError, listing the library, for an unknown name."""
+    unknown = [name for name in names if name not in LIBRARY]
+    if unknown:
+        raise KeyError(f"No effect named {unknown} in the library; it has {sorted(LIBRARY)}.")
+    return tuple(LIBRARY[name].base() for name in names)

@@ -1,0 +1,1 @@
+"""Experiments: a TOML file and the measured files it names, as one validated record."""

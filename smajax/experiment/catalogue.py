@@ -1,0 +1,57 @@
+"""What the program can simulate, as far as an experiment file refers to it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+INPUT_UNITS: Mapping[str, str] = MappingProxyType(
+    {
+        "voltage": "V",
+        "current": "A",
+        "duty": "1",
+        "mass": "kg",
+        "temperature": "degC",
+        "stress": "Pa",
+        "ambient_temperature": "degC",
+    }
+)
+
+
+@dataclass(frozen=True)
+class ParameterInfo:
+    """Unit of a parameter (the program's own: SI, degC, rad) and the widest values that make physical sense."""
+
+    unit: str
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class ModelDescription:
+    """What one combination of wire, load and drive needs and gives.
+
+    parameters: name -> unit and bounds. outputs: name of each quantity that can be compared with a sensor -> unit.
+    input_units: input channel -> the program's own unit.
+    """
+
+    parameters: Mapping[str, ParameterInfo]
+    inputs_required: frozenset[str]
+    inputs_optional: frozenset[str]
+    outputs: Mapping[str, str]
+    input_units: Mapping[str, str] = field(default_factory=lambda: INPUT_UNITS)
+
+
+@dataclass(frozen=True)
+class Catalogue:
+    """Names that an experiment file may use, and the description of a combination of them.
+
+    describe(wire, load, drive) raises ValueError when the three do not go together.
+    """
+
+    wires: Collection[str]
+    loads: Collection[str]
+    drives: Collection[str]
+    effects: Collection[str]
+    describe: Callable[[str, str, str], ModelDescription]

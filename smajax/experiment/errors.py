@@ -1,0 +1,37 @@
+"""The error of an experiment file: which file, which key, what was got, what was expected."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from smajax.measured.table import MeasuredDataError, listed, nearest
+from smajax.units import UnitError
+
+
+class ExperimentError(ValueError):
+    """An experiment file that cannot be used; the message reads `file: key.path: what is wrong and what to do`."""
+
+    def __init__(self, path: Path, key: str, message: str) -> None:
+        super().__init__(f"{path}: {key}: {message}" if key else f"{path}: {message}")
+        self.path = path
+        self.key = key
+
+
+def check_name(path: Path, key: str, kind: str, name: str, known: Iterable[str]) -> None:
+    """Raises ExperimentError unless `name` is one of the known names of that kind."""
+    names = sorted(known)
+    if name not in names:
+        raise ExperimentError(
+            path, key, f"there is no {kind} {name!r}{nearest(name, names)}; there are: {listed(names)}"
+        )
+
+
+@contextmanager
+def at_key(path: Path, key: str) -> Iterator[None]:
+    """Turns an error of a unit or of a measured file into an ExperimentError at that key."""
+    try:
+        yield
+    except (UnitError, MeasuredDataError) as error:
+        raise ExperimentError(path, key, str(error)) from error

@@ -1,0 +1,106 @@
+"""Warnings about measured runs that are allowed and look wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from smajax.experiment.signals import ReadRun, Signal
+from smajax.measured.table import Array
+
+FEW_SAMPLES = 20
+GAP_STEPS = 5.0
+FLAT_SAMPLES = 5
+
+
+def _sticks_at(values: Array, extreme: float) -> bool:
+    """Whether the signal runs into `extreme` and stays exactly there, as one cut off by its range does.
+
+    Coming to rest looks the same except for the speed of arrival, so only a fast one counts.
+    """
+    at = values == extreme
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], at.astype(np.int8), [0]])))
+    fast = 0.02 * float(np.ptp(values))
+    for begin, end in zip(edges[::2], edges[1::2], strict=True):
+        if end - begin < FLAT_SAMPLES:
+            continue
+        before = values[max(begin - 2, 0)]
+        after = values[min(end + 1, values.size - 1)]
+        if abs(before - extreme) > fast or abs(after - extreme) > fast:
+            return True
+    return False
+
+
+def _output_warnings(run: str, name: str, signal: Signal) -> list[str]:
+    values = signal.values
+    if np.ptp(values) == 0.0:
+        return [f"run {run!r}: the output {name!r} is constant ({values[0]:g}); nothing can be learnt from it"]
+    cut = [
+        word for word, extreme in (("highest", values.max()), ("lowest", values.min())) if _sticks_at(values, extreme)
+    ]
+    return [
+        f"run {run!r}: the output {name!r} runs into its {word} value and stays exactly there; "
+        "is the sensor at the end of its range, or the load at a stop?"
+        for word in cut
+    ]
+
+
+def _time_warnings(run: str, name: str, signal: Signal) -> list[str]:
+    intervals = np.diff(signal.time)
+    usual = float(np.median(intervals))
+    longest = int(np.argmax(intervals))
+    if intervals[longest] <= GAP_STEPS * usual:
+        return []
+    return [
+        f"run {run!r}: {name!r} has a gap of {intervals[longest]:.4g} s at {signal.time[longest]:.6g} s "
+        f"(usual interval {usual:.4g} s); it is bridged, check that nothing happened in it"
+    ]
+
+
+def run_warnings(read: ReadRun, output_name: str, step: float) -> list[str]:
+    """What looks wrong in one run, one sentence each."""
+    run = read.run
+    found: list[str] = []
+    if run.time.size < FEW_SAMPLES:
+        found.append(f"run {run.name!r}: only {run.time.size} samples at a step of {step:g} s; is the step too long?")
+    for name, signal in read.signals.items():
+        found += _time_warnings(run.name, name, signal)
+        if name != output_name and np.ptp(signal.values) == 0.0:
+            found.append(f"run {run.name!r}: the input {name!r} is constant ({signal.values[0]:g})")
+    duty = run.inputs.get("duty")
+    if duty is not None and (duty.min() < 0.0 or duty.max() > 1.0):
+        found.append(
+            f"run {run.name!r}: the duty goes from {duty.min():g} to {duty.max():g}, outside 0 to 1; is it in percent?"
+        )
+    output = read.signals[output_name]
+    found += _output_warnings(run.name, output_name, output)
+    sensor_step = float(np.median(np.diff(output.time)))
+    if step < 0.95 * sensor_step:
+        found.append(
+            f"run {run.name!r}: the step of {step:g} s is shorter than the sensor's {sensor_step:g} s; values between "
+            "two samples are interpolated and their errors are not independent"
+        )
+    return found
+
+
+def quantum_warning(runs: Sequence[ReadRun], sensor_noise: float, unit: str) -> list[str]:
+    """Whether the sensor's increment exceeds its noise, both before resampling and in the output's own unit."""
+    quantum = float(np.median([read.quantum for read in runs]))
+    if quantum <= sensor_noise:
+        return []
+    return [
+        f"the output's increment of {quantum:.4g} {unit} is larger than its noise of {sensor_noise:.4g} {unit} at the "
+        "sensor's rate; residuals of that size are rounding"
+    ]
+
+
+def copy_warnings(runs: Sequence[ReadRun]) -> list[str]:
+    """Runs that are the same files: a held-out run that was fitted too proves nothing."""
+    first: dict[str, str] = {}
+    found: list[str] = []
+    for read in runs:
+        twin = first.setdefault(read.run.sha256, read.run.name)
+        if twin != read.run.name:
+            found.append(f"runs {twin!r} and {read.run.name!r} have the same data")
+    return found

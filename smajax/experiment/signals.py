@@ -1,0 +1,166 @@
+"""The measured files of one run, brought to the experiment's clock."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from smajax.experiment.errors import ExperimentError, at_key
+from smajax.experiment.record import Run
+from smajax.experiment.schema import ChannelSection, RunSection, TimeSection
+from smajax.measured.noise import detect_quantum
+from smajax.measured.resample import resample_input, resample_output, uniform_clock
+from smajax.measured.table import Array, MeasuredDataError, Table, check_time
+from smajax.units import convert, parse_quantity
+
+MOST_SAMPLES = 2_000_000
+
+
+@dataclass(frozen=True)
+class Signal:
+    """One channel as measured, in the program's own unit: time and values, both (n,)."""
+
+    time: Array
+    values: Array
+
+
+@dataclass(frozen=True)
+class ReadRun:
+    """A run on the clock, and what of its raw signals the noise estimate and the warnings need.
+
+    signals: channel -> as measured. noise_gain: sigma of the output's white noise on the clock over that of the
+    sensor. quantum: the sensor's increment, 0.0 when none shows.
+    """
+
+    run: Run
+    signals: Mapping[str, Signal]
+    noise_gain: float
+    quantum: float
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What is common to the runs of one experiment file: where to look and what to turn it into.
+
+    units: channel or input -> the program's own unit. tables: reads a file, once however often it is asked for.
+    """
+
+    path: Path
+    folder: Path
+    channels: Mapping[str, ChannelSection]
+    time: TimeSection | None
+    units: Mapping[str, str]
+    output_name: str
+    step: float
+    tables: Callable[[Path], Table]
+
+
+def _channel_file(reading: Reading, run: RunSection, name: str) -> tuple[str, Path]:
+    """(key path, file) of one channel in one run."""
+    if run.file is not None:
+        return f"runs.{run.name}.file", reading.folder / run.file
+    files = run.files or {}
+    if name not in files:
+        raise ExperimentError(
+            reading.path, f"runs.{run.name}.files", f"gives no file for channel {name!r}; add {name} = '...'"
+        )
+    return f"runs.{run.name}.files.{name}", reading.folder / files[name]
+
+
+def _signal(table: Table, key: str | int, channel: ChannelSection, own_unit: str, time: TimeSection | None) -> Signal:
+    """One channel from its table. Raises MeasuredDataError."""
+    values = convert(table.column(key), channel.unit, own_unit)
+    clock = table.clock(key)
+    if time is not None and time.kind == "sample":
+        clock = np.arange(values.size, dtype=np.float64)
+    elif clock is None:
+        if time is None or time.column is None:
+            raise MeasuredDataError(
+                f"{table.path}: {key!r} carries no time; add [time] with column = '...', or kind = 'sample'"
+            )
+        clock = convert(table.column(time.column), time.unit, "s")
+    if clock.size != values.size:
+        raise MeasuredDataError(f"{table.path}: {key!r} has {values.size} values and its time has {clock.size}")
+    check_time(clock, f"{table.path}: {key!r}")
+    return Signal(time=clock, values=values)
+
+
+def _read_signals(reading: Reading, run: RunSection) -> tuple[dict[str, Signal], tuple[Path, ...]]:
+    """Every channel of the run that is not a constant, and the files they are from."""
+    signals: dict[str, Signal] = {}
+    used: dict[Path, None] = {}
+    for name, channel in reading.channels.items():
+        if name in run.inputs:
+            continue
+        key = channel.variable if channel.variable is not None else channel.column
+        if key is None:
+            raise ExperimentError(
+                reading.path,
+                f"channels.{name}",
+                f"has no column or variable and run {run.name!r} gives no constant; give one of the three "
+                f"(the constant as {name} = 'number unit' in the run's [runs.inputs])",
+            )
+        where, file = _channel_file(reading, run, name)
+        with at_key(reading.path, where):
+            signals[name] = _signal(reading.tables(file), key, channel, reading.units[name], reading.time)
+        used[file] = None
+    return signals, tuple(used)
+
+
+def _digest(files: tuple[Path, ...]) -> str:
+    digest = hashlib.sha256()
+    for file in files:
+        digest.update(file.read_bytes())
+    return digest.hexdigest()
+
+
+def read_run(reading: Reading, run: RunSection, parameters: dict[str, float]) -> ReadRun:
+    """Reads one run. Its clock covers the time that all its signals have in common. Raises ExperimentError."""
+    where = f"runs.{run.name}"
+    signals, files = _read_signals(reading, run)
+    start = max(signal.time[0] for signal in signals.values())
+    end = min(signal.time[-1] for signal in signals.values())
+    if end <= start:
+        spans = ", ".join(f"{name} {s.time[0]:g}..{s.time[-1]:g} s" for name, s in signals.items())
+        raise ExperimentError(
+            reading.path, where, f"its signals have no time in common ({spans}); check files and units"
+        )
+    if (end - start) / reading.step > MOST_SAMPLES:
+        raise ExperimentError(
+            reading.path, "sampling.step", f"{reading.step:g} s cuts run {run.name!r} into over {MOST_SAMPLES} samples"
+        )
+    clock = uniform_clock(start, end, reading.step)
+    if clock.size < 2:
+        raise ExperimentError(
+            reading.path,
+            "sampling.step",
+            f"run {run.name!r} lasts {end - start:g} s, less than a step of {reading.step:g} s",
+        )
+    inputs: dict[str, Array] = {}
+    for name, signal in signals.items():
+        if name != reading.output_name:
+            inputs[name] = resample_input(signal.time, signal.values, clock, reading.step)
+    for name, value in run.inputs.items():
+        with at_key(reading.path, f"{where}.inputs.{name}"):
+            inputs[name] = np.full(clock.size, parse_quantity(value, reading.units[name]))
+    measured = signals[reading.output_name]
+    output = resample_output(measured.time, measured.values, clock, reading.step)
+    return ReadRun(
+        run=Run(
+            name=run.name,
+            role=run.role,
+            time=clock,
+            inputs=inputs,
+            output=output.values,
+            parameters=parameters,
+            files=files,
+            sha256=_digest(files),
+        ),
+        signals=signals,
+        noise_gain=output.noise_gain,
+        quantum=detect_quantum(measured.values),
+    )

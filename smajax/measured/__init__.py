@@ -1,0 +1,1 @@
+"""Measured signals: files to tables, tables to signals on one uniform clock, and their noise."""

@@ -1,0 +1,107 @@
+"""MATLAB version 5 files: Simulink "Structure with time" and plain numeric arrays."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from smajax.measured.table import Array, MeasuredDataError, Table
+
+_MAGIC = b"MATLAB "
+
+
+def _plain(value: Any) -> Any:
+    """The content of MATLAB's 1 x 1 boxes; anything else as it is."""
+    while isinstance(value, np.ndarray) and value.dtype == object and value.size == 1:
+        value = value.ravel()[0]
+    return value
+
+
+def _numbers(value: Any) -> Array | None:
+    """A real array of at most two dimensions, one signal a column, shape (n, k); None when it is something else."""
+    value = np.asarray(_plain(value))
+    if value.dtype.kind not in "fiub":
+        return None
+    if value.ndim > 2:
+        # Simulink logs a vector signal as (width, 1, n).
+        value = np.squeeze(value)
+        if value.ndim > 2:
+            return None
+        value = value.T if value.ndim == 2 else value
+    if value.ndim < 2 or 1 in value.shape:
+        value = value.reshape(-1, 1)
+    return np.asarray(value, dtype=np.float64)
+
+
+def _names(base: str, values: Array) -> list[str]:
+    return [base] if values.shape[1] == 1 else [f"{base}[{k}]" for k in range(1, values.shape[1] + 1)]
+
+
+def _add_structure(name: str, value: Any, columns: dict[str, Array], clocks: dict[str, Array]) -> str | None:
+    """Adds the signals of one "Structure with time" to columns and clocks; returns why it could not, or None."""
+    fields = value.dtype.names or ()
+    if "signals" not in fields:
+        return f"variable {name!r} is a struct with fields {list(fields)}; expected 'time' and 'signals.values'"
+    if value.size != 1:
+        return f"variable {name!r} is a {value.shape} array of structs; expected a single one"
+    record = value.ravel()[0]
+    signals = np.asarray(record["signals"])
+    inner = signals.dtype.names or ()
+    if "values" not in inner or signals.size == 0:
+        return f"variable {name!r}: its field 'signals' has fields {list(inner)}; expected 'values'"
+    time = _numbers(record["time"]) if "time" in fields else None
+    for number, signal in enumerate(signals.ravel(), start=1):
+        base = name if signals.size == 1 else f"{name}.{number}"
+        values = _numbers(signal["values"])
+        if values is None:
+            return f"variable {name!r}: its field 'signals.values' is not a real array"
+        if time is not None and time.size and values.shape[0] != time.size:
+            return f"variable {name!r}: {time.size} times and {values.shape[0]} values; expected as many of both"
+        for column, one in zip(_names(base, values), values.T, strict=True):
+            columns[column] = one
+            if time is not None and time.size:
+                clocks[column] = time[:, 0]
+    return None
+
+
+def read_mat(path: Path) -> Table:
+    """Reads every numeric signal of a MATLAB v5 file.
+
+    A "Structure with time" becomes a column with its own clock; an array (n, k) becomes columns name[1] ... name[k].
+    A variable of another structure is an error only when it is asked for. Raises MeasuredDataError.
+    """
+    import scipy.io
+
+    with path.open("rb") as file:
+        start = file.read(16)
+    if start.startswith(b"MATLAB 7.3") or start.startswith(b"\x89HDF"):
+        raise MeasuredDataError(f"{path}: is a MATLAB 7.3 file; save it again with save(..., '-v7')")
+    if not start.startswith(_MAGIC):
+        raise MeasuredDataError(f"{path}: is not the MATLAB version 5 file that its suffix says")
+    try:
+        content = scipy.io.loadmat(path, struct_as_record=True, squeeze_me=False)
+    except Exception as error:  # a damaged file raises whatever its bytes happen to lead to
+        raise MeasuredDataError(f"{path}: the MATLAB file is damaged or cut short ({error})") from error
+
+    columns: dict[str, Array] = {}
+    clocks: dict[str, Array] = {}
+    unusable: dict[str, str] = {}
+    for name, raw in content.items():
+        if name.startswith("__"):
+            continue
+        value = np.asarray(_plain(raw))
+        if value.dtype.names:
+            reason = _add_structure(name, value, columns, clocks)
+            if reason is not None:
+                unusable[name] = reason
+            continue
+        values = _numbers(value)
+        if values is None:
+            unusable[name] = f"variable {name!r} is an array of {value.dtype}; expected real numbers"
+            continue
+        columns.update(zip(_names(name, values), values.T, strict=True))
+    if not columns:
+        raise MeasuredDataError(f"{path}: no signal in it; {'; '.join(unusable.values()) or 'it has no variable'}")
+    return Table(path=path, columns=columns, clocks=clocks, unusable=unusable)

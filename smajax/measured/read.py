@@ -1,0 +1,35 @@
+"""The reader for each kind of measured file, by suffix."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from types import MappingProxyType
+
+from smajax.measured.csv_file import read_csv
+from smajax.measured.mat_file import read_mat
+from smajax.measured.table import MeasuredDataError, Table, listed, nearest
+
+# A new file kind is one line here.
+READERS: Mapping[str, Callable[[Path], Table]] = MappingProxyType(
+    {".csv": read_csv, ".txt": read_csv, ".tsv": read_csv, ".mat": read_mat}
+)
+
+
+def read_table(path: str | Path) -> Table:
+    """Reads one measured file with the reader for its suffix. Raises MeasuredDataError."""
+    path = Path(path)
+    reader = READERS.get(path.suffix.lower())
+    if reader is None:
+        raise MeasuredDataError(
+            f"{path}: files ending in {path.suffix or 'nothing'!r} cannot be read; expected {listed(READERS)}"
+        )
+    if not path.exists():
+        beside = [one.name for one in path.parent.iterdir()] if path.parent.is_dir() else []
+        what = f"the folder {path.parent} does not exist" if not path.parent.is_dir() else "there is no such file"
+        raise MeasuredDataError(f"{path}: {what}{nearest(path.name, beside)}")
+    if not path.is_file():
+        raise MeasuredDataError(f"{path}: is a folder; expected a file")
+    if path.stat().st_size == 0:
+        raise MeasuredDataError(f"{path}: the file is empty")
+    return reader(path)

@@ -1,0 +1,98 @@
+"""Signals of different rates on one uniform clock.
+
+An input is a command that holds between its samples, so its value for a step is its mean over that step. An output
+is a measurement of something smooth, so its value is the one at the clock instant, averaged over one step when the
+clock is slower than the sensor, which keeps what is faster than the clock from folding into the residual.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from smajax.measured.table import Array
+
+# Below this many sensor samples a step there is nothing to average.
+DECIMATION_FROM = 1.05
+
+
+@dataclass(frozen=True)
+class Resampled:
+    """values (n,) on the clock, and by how much resampling shrank the sigma of white measurement noise (1: not)."""
+
+    values: Array
+    noise_gain: float
+
+
+def uniform_clock(start: float, end: float, step: float) -> Array:
+    """Times start, start + step, ... not beyond end, shape (n,), all in seconds."""
+    # The tolerance keeps the last instant when rounding put the end a hair before it.
+    count = int(np.floor((end - start) / step + 1e-6)) + 1
+    return np.asarray(start + step * np.arange(count), dtype=np.float64)
+
+
+def _piecewise_constant_integral(time: Array, values: Array, at: Array) -> Array:
+    """Integral from time[0] to each of `at` of the signal that holds values[i] from time[i], the last one for ever."""
+    area = np.concatenate([[0.0], np.cumsum(values[:-1] * np.diff(time))])
+    index = np.clip(np.searchsorted(time, at, side="right") - 1, 0, time.size - 1)
+    return area[index] + values[index] * (at - time[index])
+
+
+def _piecewise_linear_integral(time: Array, values: Array, at: Array) -> Array:
+    """Integral from time[0] to each of `at`, inside the samples, of the straight lines between the samples."""
+    area = np.concatenate([[0.0], np.cumsum(0.5 * (values[1:] + values[:-1]) * np.diff(time))])
+    index = np.clip(np.searchsorted(time, at, side="right") - 1, 0, time.size - 2)
+    into = at - time[index]
+    slope = (values[index + 1] - values[index]) / (time[index + 1] - time[index])
+    return area[index] + values[index] * into + 0.5 * slope * into**2
+
+
+def resample_input(time: Array, values: Array, clock: Array, step: float) -> Array:
+    """Mean of a held signal over each [clock_i, clock_i + step), shape (len(clock),).
+
+    time, values (n,): the samples, each held until the next. The mean is the exact integral over the step, so a pulse
+    of one sample keeps its integral whatever the step.
+    """
+    edges = np.stack([clock, clock + step])
+    low, high = _piecewise_constant_integral(time, values, edges)
+    # A mean cannot leave the range of what it averages; rounding of the running integral could, by a hair.
+    return np.asarray(np.clip((high - low) / step, values.min(), values.max()), dtype=np.float64)
+
+
+def resample_output(time: Array, values: Array, clock: Array, step: float) -> Resampled:
+    """A measured signal at each clock instant, shape (len(clock),), with its noise gain.
+
+    When the sensor is faster than the clock: the mean, over the window of one step centred on the instant, of the
+    straight lines between the samples. It has no delay, is exact for a ramp and suppresses tones above the clock's
+    Nyquist frequency. Near the ends of the record the window shrinks evenly on both sides, so that it stays centred.
+    Otherwise: the straight line between the neighbouring samples.
+    """
+    per_step = step / float(np.median(np.diff(time)))
+    if per_step < DECIMATION_FROM:
+        return Resampled(values=np.interp(clock, time, values), noise_gain=1.0)
+    half = np.minimum(0.5 * step, np.minimum(clock - time[0], time[-1] - clock))
+    half = np.maximum(half, 0.0)
+    # The integral grows along the run while a window's share does not: centred values keep the rounding small.
+    centre = float(np.mean(values))
+    at_instant = np.interp(clock, time, values)
+    low, high = _piecewise_linear_integral(time, values - centre, np.stack([clock - half, clock + half]))
+    wide = half > 1e-6 * step
+    mean = centre + (high - low) / np.where(wide, 2.0 * half, 1.0)
+    return Resampled(values=np.where(wide, mean, at_instant), noise_gain=window_noise_gain(per_step))
+
+
+def window_noise_gain(samples_per_step: float) -> float:
+    """Sigma of white noise after the window mean of `resample_output`, over its sigma before; about 1/sqrt(samples).
+
+    The sample j away from the instant weighs the integral over the window of the hat function centred on it.
+    """
+    half = 0.5 * samples_per_step
+    reach = np.arange(-int(half) - 2, int(half) + 3, dtype=np.float64)
+
+    def hat_integral(at: Array) -> Array:
+        inside = np.clip(at, -1.0, 1.0)
+        return np.where(inside < 0.0, 0.5 * (1.0 + inside) ** 2, 1.0 - 0.5 * (1.0 - inside) ** 2)
+
+    weights = (hat_integral(half - reach) - hat_integral(-half - reach)) / samples_per_step
+    return float(np.sqrt(np.sum(weights**2)))

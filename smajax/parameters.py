@@ -1,0 +1,107 @@
+"""Named physical parameters: unit, bounds and meaning written once beside the field, read by every later stage."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+Module = TypeVar("Module", bound=eqx.Module)
+
+
+def _as_float_array(value: Any) -> Any:
+    # Arrays, not Python floats: a float would be static under jit and every new value would compile again.
+    return value if isinstance(value, jax.core.Tracer) else jnp.asarray(value, dtype=float)
+
+
+def parameter(unit: str, low: float, high: float, about: str, **kwargs: Any) -> Any:
+    """A dataclass field for one physical parameter.
+
+    `unit` is SI with temperatures in C; `low` and `high` are the widest values that make physical sense (the bounds
+    within which the simulator promises finite results); `about` is one line for tables and reports.
+    """
+    metadata = {"unit": unit, "low": low, "high": high, "about": about}
+    return eqx.field(converter=_as_float_array, metadata=metadata, **kwargs)
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """Where a parameter lives in a model, and what it is."""
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    about: str
+    path: tuple[str | int, ...]
+
+
+def parameters(model: eqx.Module) -> dict[str, Parameter]:
+    """Every parameter of `model` by name. Effects (anything with an `effect_name`) prefix theirs: `latent_heat.enthalpy`."""
+    found: dict[str, Parameter] = {}
+
+    def walk(node: Any, path: tuple[str | int, ...], prefix: str) -> None:
+        if isinstance(node, (tuple, list)):
+            for index, child in enumerate(node):
+                walk(child, (*path, index), prefix)
+        if not isinstance(node, eqx.Module):
+            return
+        prefix = f"{node.effect_name}." if hasattr(node, "effect_name") else prefix
+        for entry in dataclasses.fields(node):
+            here = (*path, entry.name)
+            if "unit" in entry.metadata:
+                name = prefix + entry.name
+                if name in found:
+                    raise ValueError(
+                        f"Two parameters are named `{name}`, at {found[name].path} and at {here}. Rename one: "
+                        "every stage after this one knows parameters by name."
+                    )
+                meta = entry.metadata
+                found[name] = Parameter(name, meta["unit"], meta["low"], meta["high"], meta["about"], here)
+            else:
+                walk(getattr(node, entry.name), here, prefix)
+
+    walk(model, (), "")
+    return found
+
+
+def _lookup(model: Any, path: tuple[str | int, ...]) -> Any:
+    for key in path:
+        model = model[key] if isinstance(key, int) else getattr(model, key)
+    return model
+
+
+def _select(model: eqx.Module, names: Sequence[str]) -> list[Parameter]:
+    table = parameters(model)
+    unknown = [name for name in names if name not in table]
+    if unknown:
+        raise ValueError(f"No parameter named {unknown}; this model has {sorted(table)}.")
+    return [table[name] for name in names]
+
+
+def get_parameters(model: eqx.Module, names: Sequence[str]) -> Float[Array, " names"]:
+    """The values of `names`, in that order, SI."""
+    return jnp.stack([jnp.asarray(_lookup(model, entry.path), dtype=float) for entry in _select(model, names)])
+
+
+def set_parameters(model: Module, values: Mapping[str, Any]) -> Module:
+    """`model` with the named values put in; everything else is shared.
+
+    Raises ValueError when a name is not a parameter of the model.
+    """
+    entries = _select(model, list(values))
+    if not entries:
+        return model
+    where = lambda m: [_lookup(m, entry.path) for entry in entries]  # noqa: E731
+    return eqx.tree_at(where, model, [_as_float_array(values[entry.name]) for entry in entries])
+
+
+def set_vector(model: Module, names: Sequence[str], vector: Float[Array, " names"]) -> Module:
+    """`set_parameters` from a vector in the order of `names`: the form that an optimiser differentiates."""
+    return set_parameters(model, {name: vector[index] for index, name in enumerate(names)})

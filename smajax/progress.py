@@ -1,0 +1,45 @@
+"""Progress of long work: a bar in a terminal, one line a stage elsewhere."""
+
+from __future__ import annotations
+
+import sys
+import time as clock
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+from smajax.fit.solve import Progress as Report
+
+
+@contextmanager
+def shown(console: Console) -> Iterator[Report]:
+    """Yields `report(what, share)`; share 1 closes the stage. Lines that begin with "check: " are said, not measured."""
+    began = clock.monotonic()
+    if not sys.stderr.isatty():
+        last = ""
+
+        def line(what: str, share: float) -> None:
+            nonlocal last
+            if what.startswith("check: ") or (what != last and share < 1.0):
+                console.print(f"[{clock.monotonic() - began:6.1f} s] {what}", markup=False, highlight=False, soft_wrap=True)
+                last = what
+
+        yield line
+        return
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console) as bar:
+        open_tasks: dict[str, TaskID] = {}
+
+        def move(what: str, share: float) -> None:
+            if what.startswith("check: "):
+                bar.console.print(what, markup=False, highlight=False)
+                return
+            if what not in open_tasks:
+                open_tasks[what] = bar.add_task(what, total=1.0)
+            bar.update(open_tasks[what], completed=share)
+            if share >= 1.0:
+                open_tasks.pop(what)
+
+        yield move

@@ -1,0 +1,96 @@
+"""How numbers look at the edge: millimetres, degrees, per cent and megapascals instead of the program's SI."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+
+from smajax.experiment.catalogue import INPUT_UNITS
+
+Value = TypeVar("Value", float, np.ndarray)
+
+
+@dataclass(frozen=True)
+class Display:
+    """The unit that a reader sees, and how many of it make one of the program's own."""
+
+    unit: str
+    factor: float
+
+    def of(self, value: Value) -> Value:
+        """`value` (SI, degrees Celsius, radians; any shape) in the unit shown, which differs by a factor only."""
+        return value * self.factor
+
+
+_SHOWN = {
+    "m": Display("mm", 1e3),
+    "rad": Display("deg", math.degrees(1.0)),
+    "Pa": Display("MPa", 1e-6),
+    "Pa/K": Display("MPa/K", 1e-6),
+    "degC": Display("°C", 1.0),
+    "ohm m": Display("µΩ m", 1e6),
+    "J/kg": Display("J/g", 1e-3),
+    "kg": Display("g", 1e3),
+    "-": Display("", 1.0),
+    "1": Display("", 1.0),
+    "": Display("", 1.0),
+}
+_PERCENT = Display("%", 100.0)
+
+
+def display(unit: str, quantity: str = "") -> Display:
+    """How to show a value given in `unit`; a unit that has no entry is shown as it is.
+
+    A strain is the one plain number that is read in per cent: `quantity`, its name, tells it from the others.
+    """
+    if unit in ("-", "1", "") and quantity.endswith("strain"):
+        return _PERCENT
+    return _SHOWN.get(unit) or Display(unit.replace("^2", "²").replace("^3", "³").replace("^4", "⁴"), 1.0)
+
+
+def digits(value: float | None, count: int = 4, zeros: bool = False) -> str:
+    """`value` with `count` significant digits, trailing zeros kept if `zeros`; a dash where there is no number."""
+    if value is None or not math.isfinite(value):
+        return "–"
+    text = f"{value:{'#' if zeros else ''}.{count}g}"
+    if "e" in text:
+        mantissa, exponent = text.split("e")
+        return f"{mantissa.rstrip('.')}e{int(exponent)}"
+    return text.rstrip(".")
+
+
+def chance(value: float | None) -> str:
+    """A p-value with two digits; one too small for a float is not zero."""
+    return "< 1e-300" if value is not None and 0.0 <= value < 1e-300 else digits(value, 2)
+
+
+def with_error(value: float, error: float | None) -> str:
+    """`24.19 ± 0.21`: the error with two significant digits, the value to the same decimals. Without one, the value."""
+    if error is None or not math.isfinite(error) or not math.isfinite(value) or error <= 0.0:
+        return digits(value)
+    decimals = 1 - math.floor(math.log10(error))
+    if not 0 <= decimals <= 6:
+        return f"{digits(value)} ± {digits(error, 2)}"
+    return f"{value:.{decimals}f} ± {error:.{decimals}f}"
+
+
+def label(name: str) -> str:
+    """A name as words: `sensor_lag.time_constant` -> `sensor lag: time constant`."""
+    return name.replace(".", ": ").replace("_", " ")
+
+
+def axis_label(name: str, shown: Display) -> str:
+    """`position (mm)`, or the name alone for a plain number."""
+    return f"{label(name)} ({shown.unit})" if shown.unit else label(name)
+
+
+# The record keeps input channels and model states by name only.
+_CHANNELS = {**INPUT_UNITS, "martensite_fraction": "1"}
+
+
+def channel(name: str) -> Display:
+    """How to show the input channel or model state `name`."""
+    return display(_CHANNELS.get(name, "1"), name)

@@ -1,0 +1,115 @@
+"""What one closed loop found: the record that the loop fills and that the report and its JSON are written from.
+
+Arrays are numpy, SI, temperatures in degrees Celsius, angles in radians; nothing in here simulates or fits.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+Role = Literal["fit", "held-out"]
+Verdict = Literal["adequate", "explained", "partly explained", "not in the library"]
+
+
+@dataclass(frozen=True)
+class RunFinding:
+    """One measured run beside the two models; every array has shape (n,) on the same clock."""
+
+    name: str
+    role: Role
+    time: np.ndarray  # s
+    inputs: dict[str, np.ndarray]  # SI, by channel name
+    measured: np.ndarray  # SI unit of the output
+    before: np.ndarray  # base model, the run's own offset included
+    after: np.ndarray  # extended model; equal to `before` when nothing was added
+    states: dict[str, np.ndarray]  # of the model after: temperature (C), martensite_fraction (-), stress (Pa)
+    offset_before: float
+    offset_after: float
+    rmse_before: float
+    rmse_after: float
+
+
+@dataclass(frozen=True)
+class ParameterFinding:
+    """One fitted number. `standard_error` is None when the runs cannot tell it (then `remark` says so)."""
+
+    name: str
+    unit: str
+    value: float
+    standard_error: float | None
+    lower: float
+    upper: float
+    start: float
+    remark: str = ""  # "at its lower bound", "moves together with ...", ...
+
+
+@dataclass(frozen=True)
+class CoefficientFinding:
+    value: float
+    standard_error: float | None
+    unit: str
+
+
+@dataclass(frozen=True)
+class EffectFinding:
+    """One candidate of the library. `evidence` holds numbers only; NaN where a stage was not reached."""
+
+    name: str  # "latent_heat"
+    title: str  # "latent heat of transformation"
+    equation: str  # the equation it changes: heat, electrical, kinetics, constitutive, mechanics, sensor, input
+    formula: str  # the change itself, plain text, with its source
+    sentence: str  # one sentence for an engineer: what it would mean if it were there
+    added: bool
+    coefficients: dict[str, CoefficientFinding]
+    evidence: dict[str, float]  # score_statistic, score_p_value, leave_one_out_rmse, leave_one_out_gain, rmse_fit, ...
+
+
+@dataclass(frozen=True)
+class Portrait:
+    """What the residual (measured minus model) of the fit runs looks like."""
+
+    rmse: float
+    noise_sigma: float
+    ratio: float  # rmse / noise_sigma
+    white: bool
+    whiteness_p_value: float
+    by_phase: dict[str, dict[str, float]]  # "heating, transforming" -> {samples, share_of_squared_error, mean, rmse}
+    correlation: dict[str, float]  # with time, input, temperature, martensite_fraction, stress, rate
+    sentences: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Round:
+    """One round of the search: what was tried and what it brought on runs left out in turn."""
+
+    number: int
+    tried: tuple[tuple[str, float], ...]  # ("latent_heat + radiation", leave-one-out rmse)
+    chosen: str  # "" when the search stopped here
+    why: str
+
+
+@dataclass(frozen=True)
+class Findings:
+    experiment: str  # short name
+    title: str
+    source: str  # path of the experiment file as given
+    verdict: Verdict
+    summary: tuple[str, ...]  # the answer, in sentences
+    unexplained: tuple[str, ...]  # what stays unexplained
+    cannot_know: tuple[str, ...]  # what these runs cannot tell
+    check: tuple[str, ...]  # what was said before anything was fitted
+    output_name: str
+    output_unit: str  # SI
+    noise_sigma: float
+    noise_how: str  # "given" or "estimated ..."
+    runs: tuple[RunFinding, ...]
+    before: tuple[ParameterFinding, ...]
+    after: tuple[ParameterFinding, ...]
+    effects: tuple[EffectFinding, ...]
+    portrait_before: Portrait
+    portrait_after: Portrait
+    rounds: tuple[Round, ...]
+    provenance: dict[str, str] = field(default_factory=dict)  # versions, seed, data hashes, command, seconds

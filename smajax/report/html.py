@@ -1,0 +1,186 @@
+"""The findings as one self-contained page: no file beside it and nothing fetched, so it can be sent by mail."""
+
+from __future__ import annotations
+
+import base64
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from markupsafe import Markup
+
+from smajax.report import pictures
+from smajax.report.display import chance, digits, display, label, with_error
+from smajax.report.findings import Findings, ParameterFinding
+
+VERDICTS = {
+    "adequate": ("The model is adequate", "good"),
+    "explained": ("The missing physics is found", "good"),
+    "partly explained": ("Part of the missing physics is found", "fair"),
+    "not in the library": ("Something is missing that the library does not hold", "poor"),
+}
+# Headings of the evidence in the order of the stages; a number with no heading here is shown under its own name.
+EVIDENCE = {
+    "score_gain": "score test: gain foretold",
+    "score_statistic": "score statistic",
+    "score_p_value": "score p-value",
+    "alone_rmse_fit": "fit runs, with it alone",
+    "leave_one_out_rmse": "left-out runs, with it",
+    "leave_one_out_rmse_without": "left-out runs, without it",
+    "score_gain_at_the_end": "gain foretold at the end",
+    "score_p_value_at_the_end": "p-value at the end",
+}
+# Said of the effects that were added, but no column of the table of all candidates.
+ASIDE = {"score_statistic", "leave_one_out_rmse_without", "score_gain_at_the_end"}
+
+
+@dataclass(frozen=True)
+class Shown:
+    """One number of a table: as text, in the unit shown, and as the record has it."""
+
+    text: str
+    value: float | None
+
+
+def shown(value: float | None, unit: str, quantity: str = "", count: int = 4, zeros: bool = False) -> Shown:
+    """`value` (SI) for a table cell, in the unit that a reader sees; the digits as `display.digits` has them."""
+    return Shown(digits(None if value is None else display(unit, quantity).of(value), count, zeros), value)
+
+
+def estimate(value: float, error: float | None, unit: str, quantity: str = "") -> Shown:
+    """`value ± standard error` for a table cell; the value alone where the runs cannot tell."""
+    seen = display(unit, quantity)
+    return Shown(with_error(seen.of(value), None if error is None else seen.of(error)), value)
+
+
+def picture(png: bytes | None, alt: str, kind: str = "wide") -> Markup:
+    """An image element that carries its own bytes; nothing for a picture that there is none of."""
+    if png is None:
+        return Markup("")
+    data = base64.b64encode(png).decode("ascii")
+    return Markup('<img class="{}" src="data:image/png;base64,{}" alt="{}">').format(kind, data, alt)
+
+
+def _parameter_rows(findings: Findings) -> list[dict[str, Any]]:
+    """One row a parameter, before and after side by side, in the order of the record."""
+    before = {found.name: found for found in findings.before}
+    after = {found.name: found for found in findings.after}
+    rows = []
+    for name in dict.fromkeys([*before, *after]):
+        any_ = after.get(name) or before[name]
+        rows.append(
+            {
+                "name": name,
+                "unit": display(any_.unit, name).unit,
+                "start": shown(any_.start, any_.unit, name),
+                "before": _fitted(before.get(name)),
+                "after": _fitted(after.get(name)),
+                "bounds": f"{shown(any_.lower, any_.unit, name).text} … {shown(any_.upper, any_.unit, name).text}",
+                "remark": _remarks(before.get(name), after.get(name)),
+            }
+        )
+    return rows
+
+
+def _fitted(found: ParameterFinding | None) -> Shown:
+    if found is None:
+        return Shown("–", None)
+    return estimate(found.value, found.standard_error, found.unit, found.name)
+
+
+def _remarks(before: ParameterFinding | None, after: ParameterFinding | None) -> str:
+    first, second = before.remark if before else "", after.remark if after else ""
+    if first == second or not first or not before or not after:
+        return second or first
+    return f"before: {first}" + (f"; after: {second}" if second else "")
+
+
+def _evidence(findings: Findings) -> list[str]:
+    """The columns of evidence: those known, in a fixed order, then whatever else the record holds."""
+    held = dict.fromkeys(name for effect in findings.effects for name in effect.evidence)
+    return [name for name in EVIDENCE if name in held] + [name for name in held if name not in EVIDENCE]
+
+
+def _evidence_cell(findings: Findings, name: str, value: float) -> Shown:
+    if "rmse" in name:
+        return shown(value, findings.output_unit, findings.output_name, 3, zeros=True)
+    return Shown(chance(value) if "p_value" in name else digits(value, 3, zeros=True), value)
+
+
+def _phase_rows(findings: Findings) -> list[dict[str, Any]]:
+    before, after = findings.portrait_before.by_phase, findings.portrait_after.by_phase
+    return [
+        {"phase": phase, "before": before.get(phase, {}), "after": after.get(phase, {})}
+        for phase in dict.fromkeys([*before, *after])
+    ]
+
+
+def _correlations(findings: Findings) -> list[dict[str, Any]]:
+    before, after = findings.portrait_before.correlation, findings.portrait_after.correlation
+    return [
+        {"with": label(name), "before": before.get(name), "after": after.get(name)}
+        for name in dict.fromkeys([*before, *after])
+    ]
+
+
+def _runs(findings: Findings) -> list[dict[str, Any]]:
+    """Every run with its numbers and its pictures."""
+    return [
+        {
+            "run": run,
+            "noise_ratio": run.rmse_after / findings.noise_sigma if findings.noise_sigma > 0.0 else float("nan"),
+            "over_time": picture(pictures.run_over_time(findings, run), f"Run {run.name} over time"),
+            "hysteresis": picture(
+                pictures.run_hysteresis(findings, run), f"Run {run.name} against the wire's temperature"
+            ),
+        }
+        for run in findings.runs
+    ]
+
+
+def findings_to_html(findings: Findings) -> str:
+    """The whole page, as text. Names and sentences of the record are escaped; numbers are those of the record."""
+    environment = Environment(
+        loader=FileSystemLoader(Path(__file__).parent),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    title, tone = VERDICTS[findings.verdict]
+
+    def output(value: float | None) -> Shown:
+        return shown(value, findings.output_unit, findings.output_name, 3, zeros=True)
+
+    return environment.get_template("template.html").render(
+        f=findings,
+        verdict_title=title,
+        tone=tone,
+        unit=display(findings.output_unit, findings.output_name).unit,
+        output=output,
+        number=lambda value, count=3: Shown(digits(value, count, zeros=True), value),
+        estimate=estimate,
+        chance=chance,
+        unit_of=lambda unit, name="": display(unit, name).unit,
+        label=label,
+        single=pictures.nothing_added(findings),
+        added=[effect for effect in findings.effects if effect.added],
+        ranked=pictures.ranked(findings.effects),
+        evidence=_evidence(findings),
+        columns=[name for name in _evidence(findings) if name not in ASIDE],
+        known=lambda value: value is not None and math.isfinite(value),
+        evidence_title=lambda name: EVIDENCE.get(name, label(name)),
+        evidence_cell=lambda name, value: _evidence_cell(findings, name, value),
+        parameters=_parameter_rows(findings),
+        runs=_runs(findings),
+        phases=_phase_rows(findings),
+        correlations=_correlations(findings),
+        picture_errors=picture(pictures.errors_by_run(findings), "Error of each run before and after", "narrow"),
+        picture_candidates=picture(
+            pictures.candidates_ranked(findings), "Candidates by error on runs left out", "narrow"
+        ),
+        picture_phases=picture(pictures.residual_by_phase(findings), "Residual by phase of the wire"),
+        picture_correlation=picture(pictures.residual_correlation(findings), "Autocorrelation of the residual"),
+    )

@@ -1,0 +1,123 @@
+"""The findings as plain JSON values: the same numbers as the page, SI and unrounded, for a program to read."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from smajax.report.findings import CoefficientFinding, EffectFinding, Findings, ParameterFinding, Portrait, RunFinding
+
+
+def plain(value: Any) -> Any:
+    """`value` as strict JSON allows it: numpy scalars become Python's, NaN and infinities (JSON has none) become null.
+
+    Raises TypeError for anything that has no JSON form.
+    """
+    if value is None or isinstance(value, str):
+        return value
+    if isinstance(value, (bool, np.bool_)):
+        return bool(value)
+    if isinstance(value, (int, np.integer)):
+        return int(value)
+    if isinstance(value, (float, np.floating)):
+        return float(value) if math.isfinite(value) else None
+    if isinstance(value, Mapping):
+        return {str(key): plain(entry) for key, entry in value.items()}
+    if isinstance(value, (list, tuple, np.ndarray)):
+        return [plain(entry) for entry in value]
+    raise TypeError(f"got {type(value).__name__} in the findings, expected text, numbers, lists or mappings of those")
+
+
+def _run(run: RunFinding) -> dict[str, Any]:
+    return {
+        "name": run.name,
+        "role": run.role,
+        "samples": len(run.time),
+        "duration": run.time[-1] - run.time[0] if len(run.time) else None,
+        "rmse_before": run.rmse_before,
+        "rmse_after": run.rmse_after,
+        "offset_before": run.offset_before,
+        "offset_after": run.offset_after,
+    }
+
+
+def _parameter(found: ParameterFinding) -> dict[str, Any]:
+    return {
+        "value": found.value,
+        "standard_error": found.standard_error,
+        "unit": found.unit,
+        "lower": found.lower,
+        "upper": found.upper,
+        "start": found.start,
+        "remark": found.remark,
+    }
+
+
+def _coefficient(found: CoefficientFinding) -> dict[str, Any]:
+    return {"value": found.value, "standard_error": found.standard_error, "unit": found.unit}
+
+
+def _effect(effect: EffectFinding) -> dict[str, Any]:
+    return {
+        "name": effect.name,
+        "title": effect.title,
+        "equation": effect.equation,
+        "formula": effect.formula,
+        "sentence": effect.sentence,
+        "added": effect.added,
+        "coefficients": {name: _coefficient(found) for name, found in effect.coefficients.items()},
+        "evidence": effect.evidence,
+    }
+
+
+def _portrait(portrait: Portrait) -> dict[str, Any]:
+    return {
+        "rmse": portrait.rmse,
+        "noise_sigma": portrait.noise_sigma,
+        "ratio": portrait.ratio,
+        "white": portrait.white,
+        "whiteness_p_value": portrait.whiteness_p_value,
+        "by_phase": portrait.by_phase,
+        "correlation": portrait.correlation,
+        "sentences": portrait.sentences,
+    }
+
+
+def findings_to_json(findings: Findings) -> dict[str, Any]:
+    """The record without its time series, ready for `json.dumps(..., allow_nan=False)`."""
+    record = {
+        "experiment": findings.experiment,
+        "title": findings.title,
+        "source": findings.source,
+        "verdict": findings.verdict,
+        "summary": findings.summary,
+        "output": {
+            "name": findings.output_name,
+            "unit": findings.output_unit,
+            "noise_sigma": findings.noise_sigma,
+            "noise_how": findings.noise_how,
+        },
+        "runs": [_run(run) for run in findings.runs],
+        "before": {"parameters": {found.name: _parameter(found) for found in findings.before}},
+        "after": {"parameters": {found.name: _parameter(found) for found in findings.after}},
+        "effects": [_effect(effect) for effect in findings.effects],
+        "portrait_before": _portrait(findings.portrait_before),
+        "portrait_after": _portrait(findings.portrait_after),
+        "rounds": [
+            {
+                "number": entry.number,
+                "tried": [{"model": model, "leave_one_out_rmse": rmse} for model, rmse in entry.tried],
+                "chosen": entry.chosen,
+                "why": entry.why,
+            }
+            for entry in findings.rounds
+        ],
+        "unexplained": findings.unexplained,
+        "cannot_know": findings.cannot_know,
+        "check": findings.check,
+        "provenance": findings.provenance,
+    }
+    return {key: plain(value) for key, value in record.items()}

@@ -1,0 +1,284 @@
+"""The report's pictures, each a function from the record to a PNG.
+
+Figures are made through matplotlib's object interface: no backend is chosen and no state is shared, so a program that
+plots on its own is not disturbed.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from smajax.report.display import axis_label, channel, display, label
+from smajax.report.findings import EffectFinding, Findings, Portrait, RunFinding
+
+MEASURED, BEFORE, AFTER, NOISE, QUIET = "#1d1d1f", "#c8553d", "#1f6fb2", "#d9dce1", "#9aa0a8"
+THICK: dict[str, Any] = {"color": MEASURED, "linewidth": 2.2, "alpha": 0.55}  # the measured curve, under the models
+WIDTH = 6.6  # inches; with the text size below still readable on a telephone
+NARROW = 5.2  # for pictures of one simple panel
+DPI = 150
+SAMPLES_DRAWN = 3000  # per curve: more than the pixels across
+STRIPS = 3  # input channels drawn under one run
+
+
+def _png(figure: Figure) -> bytes:
+    stream = io.BytesIO()
+    figure.savefig(stream, format="png", dpi=DPI, facecolor="white", metadata={"Software": None})
+    return stream.getvalue()
+
+
+def _figure(height: float, width: float = WIDTH) -> Figure:
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def _tidy(axes: Axes) -> None:
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.tick_params(labelsize=9, color=QUIET)
+    axes.grid(True, color="#eceef1", linewidth=0.7)
+    axes.set_axisbelow(True)
+
+
+def _thinned(samples: int) -> slice:
+    return slice(None, None, max(1, samples // SAMPLES_DRAWN))
+
+
+def _extremes(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A long series by the lowest and highest sample of each bucket, so that no peak is lost; short ones unchanged."""
+    size = -(-2 * len(time) // SAMPLES_DRAWN)
+    if size <= 2:
+        return time, values
+    whole = len(time) // size * size
+    buckets = np.nan_to_num(values[:whole].reshape(-1, size))
+    rows = np.arange(len(buckets)) * size
+    picked = np.sort(np.stack([rows + buckets.argmin(axis=1), rows + buckets.argmax(axis=1)]), axis=0).T.ravel()
+    picked = np.append(picked, np.arange(whole, len(time)))
+    return time[picked], values[picked]
+
+
+def nothing_added(findings: Findings) -> bool:
+    """Whether the model after is the model before."""
+    return not any(effect.added for effect in findings.effects)
+
+
+def _models(findings: Findings, run: RunFinding) -> list[tuple[str, np.ndarray, str]]:
+    """The models to draw for one run: name, values, colour. One only when nothing was added."""
+    if nothing_added(findings):
+        return [("base model", run.before, AFTER)]
+    return [("before: base model", run.before, BEFORE), ("after: extended model", run.after, AFTER)]
+
+
+def _varying(inputs: dict[str, np.ndarray]) -> list[str]:
+    return [name for name, values in inputs.items() if np.ptp(values) > 0.0][:STRIPS]
+
+
+def run_over_time(findings: Findings, run: RunFinding) -> bytes:
+    """Output measured, before and after; the residuals with the noise band; the varying inputs on thin strips."""
+    shown = display(findings.output_unit, findings.output_name)
+    models, strips = _models(findings, run), _varying(run.inputs)
+    figure = _figure(4.7 + 0.75 * max(len(strips) - 1, 0))
+    rows = figure.subplots(2 + len(strips), 1, sharex=True, height_ratios=[3.0, 1.5, *[0.7] * len(strips)])
+    output, residual = rows[0], rows[1]
+    output.plot(
+        *_extremes(run.time, shown.of(run.measured)), color=MEASURED, linewidth=2.2, alpha=0.55, label="measured"
+    )
+    for name, values, colour in models:
+        output.plot(*_extremes(run.time, shown.of(values)), color=colour, linewidth=1.2, label=name)
+        residual.plot(*_extremes(run.time, shown.of(run.measured - values)), color=colour, linewidth=0.9)
+    output.set_ylabel(axis_label(findings.output_name, shown), fontsize=9)
+    band = 2.0 * shown.of(findings.noise_sigma)
+    residual.axhspan(-band, band, color=NOISE, zorder=0, label="noise, ± 2 σ")
+    residual.axhline(0.0, color=QUIET, linewidth=0.6)
+    residual.set_ylabel("measured\n− model" + (f" ({shown.unit})" if shown.unit else ""), fontsize=9)
+    for axes, name in zip(rows[2:], strips, strict=True):
+        unit = channel(name)
+        axes.plot(*_extremes(run.time, unit.of(run.inputs[name])), color="#5b6470", linewidth=0.9)
+        axes.set_ylabel(f"{label(name)}\n({unit.unit})" if unit.unit else label(name), fontsize=8)
+    rows[-1].set_xlabel("time (s)", fontsize=9)
+    for axes in rows:
+        _tidy(axes)
+        axes.margins(x=0.01)
+    figure.legend(loc="outside upper center", ncols=4, frameon=False, fontsize=9)
+    figure.align_ylabels(list(rows))
+    return _png(figure)
+
+
+def run_hysteresis(findings: Findings, run: RunFinding) -> bytes | None:
+    """Output, and the martensite fraction, against the wire's temperature; None for a model without a temperature."""
+    if "temperature" not in run.states:
+        return None
+    shown = display(findings.output_unit, findings.output_name)
+    thin = _thinned(len(run.time))
+    temperature = run.states["temperature"][thin]
+    fraction = run.states.get("martensite_fraction")
+    figure = _figure(4.7, width=4.6)
+    heights = [2.2] if fraction is None else [2.2, 1.0]
+    rows = figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
+    rows[0].plot(temperature, shown.of(run.measured[thin]), color=MEASURED, linewidth=2.2, alpha=0.55, label="measured")
+    rows[0].plot(
+        temperature, shown.of(run.after[thin]), color=AFTER, linewidth=1.2, label=_models(findings, run)[-1][0]
+    )
+    rows[0].set_ylabel(axis_label(findings.output_name, shown), fontsize=9)
+    figure.legend(loc="outside upper center", ncols=2, frameon=False, fontsize=9)
+    if fraction is not None:
+        rows[1].plot(temperature, fraction[thin], color="#6a4c93", linewidth=1.2)
+        rows[1].set_ylim(-0.05, 1.05)
+        rows[1].set_ylabel("martensite\nfraction", fontsize=9)
+    rows[-1].set_xlabel("wire temperature of the model (°C)", fontsize=9)
+    for axes in rows:
+        _tidy(axes)
+    return _png(figure)
+
+
+def errors_by_run(findings: Findings) -> bytes:
+    """Bars of each run's rms error before and after beside the noise; held-out runs are hatched and say so."""
+    shown = display(findings.output_unit, findings.output_name)
+    runs = findings.runs
+    single = nothing_added(findings)
+    figure = _figure(0.9 + 0.42 * max(len(runs), 2), NARROW)
+    axes = figure.subplots()
+    places = np.arange(len(runs))[::-1]
+    for row, run in zip(places, runs, strict=True):
+        hatch = "////" if run.role == "held-out" else None
+        bars = [(run.rmse_after, AFTER, 0.0)]
+        if not single:
+            bars = [(run.rmse_before, BEFORE, 0.2), (run.rmse_after, AFTER, -0.2)]
+        for value, colour, shift in bars:
+            axes.barh(row + shift, shown.of(value), 0.36, color=colour, hatch=hatch, edgecolor="white", linewidth=0.0)
+    names = [f"{_short(run.name)}\n(held out)" if run.role == "held-out" else _short(run.name) for run in runs]
+    axes.set_yticks(places, [_literal(name) for name in names])
+    for name, colour in [("base model", AFTER)] if single else [("before", BEFORE), ("after", AFTER)]:
+        axes.barh(0.0, np.nan, color=colour, label=name)
+    axes.axvline(shown.of(findings.noise_sigma), color=MEASURED, linestyle="--", linewidth=1.0, label="noise")
+    axes.set_xlabel(f"rms error ({shown.unit})" if shown.unit else "rms error", fontsize=9)
+    axes.set_xlim(left=0.0)
+    axes.set_ylim(-0.6, len(runs) - 0.4)
+    figure.legend(loc="outside upper center", ncols=3, frameon=False, fontsize=9)
+    _tidy(axes)
+    axes.grid(False, axis="y")
+    return _png(figure)
+
+
+def _short(name: str, width: int = 26) -> str:
+    return name if len(name) <= width else name[: width - 1] + "…"
+
+
+def _literal(text: str) -> str:
+    """Text as it stands: a dollar sign would begin a formula."""
+    return text.replace("$", r"\$")
+
+
+def candidates_ranked(findings: Findings) -> bytes | None:
+    """The error on runs left out in turn, per candidate, best first; None when no candidate came that far."""
+    scored = ranked(findings.effects)
+    scored = [effect for effect in scored if np.isfinite(_left_out(effect))]
+    if not scored:
+        return None
+    shown = display(findings.output_unit, findings.output_name)
+    figure = _figure(0.9 + 0.32 * max(len(scored), 3), NARROW)
+    axes = figure.subplots()
+    places = np.arange(len(scored))[::-1]
+    colours = [AFTER if effect.added else QUIET for effect in scored]
+    axes.barh(places, [shown.of(_left_out(effect)) for effect in scored], 0.62, color=colours)
+    axes.set_yticks(places, [label(effect.name) for effect in scored])
+    for tick, effect in zip(axes.get_yticklabels(), scored, strict=True):
+        tick.set_fontweight("bold" if effect.added else "normal")
+    axes.axvline(shown.of(findings.noise_sigma), color=MEASURED, linestyle="--", linewidth=1.0, label="noise")
+    for name, colour in (("added", AFTER), ("not added", QUIET)):
+        axes.barh(0.0, np.nan, color=colour, label=name)
+    unit = f" ({shown.unit})" if shown.unit else ""
+    axes.set_xlabel(f"rms error on runs left out in turn{unit}", fontsize=9)
+    axes.set_xlim(left=0.0)
+    axes.set_ylim(-0.6, len(scored) - 0.4)
+    figure.legend(loc="outside upper center", ncols=3, frameon=False, fontsize=9)
+    _tidy(axes)
+    axes.grid(False, axis="y")
+    return _png(figure)
+
+
+def _left_out(effect: EffectFinding) -> float:
+    return effect.evidence.get("leave_one_out_rmse", float("nan"))
+
+
+def ranked(effects: Sequence[EffectFinding]) -> list[EffectFinding]:
+    """The added effects first, then by error on runs left out, then by the score test; those not reached last."""
+
+    def key(effect: EffectFinding) -> tuple[bool, float, float]:
+        error, chance = _left_out(effect), effect.evidence.get("score_p_value", float("nan"))
+        return not effect.added, error if np.isfinite(error) else np.inf, chance if np.isfinite(chance) else np.inf
+
+    return sorted(effects, key=key)
+
+
+def residual_by_phase(findings: Findings) -> bytes | None:
+    """By phase of the wire: where the squared error sits beside where the samples are, and the rms error itself."""
+    portraits = [("before", findings.portrait_before, BEFORE, 0.2), ("after", findings.portrait_after, AFTER, -0.2)]
+    if nothing_added(findings):
+        portraits = [("base model", findings.portrait_after, AFTER, 0.0)]
+    phases = list(dict.fromkeys(phase for _, portrait, _, _ in portraits for phase in portrait.by_phase))
+    if not phases:
+        return None
+    shown = display(findings.output_unit, findings.output_name)
+    figure = _figure(0.95 + 0.42 * max(len(phases), 2))
+    share, error = figure.subplots(1, 2, sharey=True)
+    places = np.arange(len(phases))[::-1]
+
+    def column(portrait: Portrait, key: str) -> np.ndarray:
+        return np.array([portrait.by_phase.get(phase, {}).get(key, np.nan) for phase in phases], dtype=float)
+
+    for name, portrait, colour, shift in portraits:
+        share.barh(places + shift, 100.0 * column(portrait, "share_of_squared_error"), 0.36, color=colour, label=name)
+        error.barh(places + shift, shown.of(1.0) * column(portrait, "rmse"), 0.36, color=colour)
+    samples = column(portraits[-1][1], "samples")
+    share.plot(
+        100.0 * samples / np.nansum(samples), places, "|", color=MEASURED, markersize=18, label="share of the samples"
+    )
+    error.axvline(shown.of(findings.noise_sigma), color=MEASURED, linestyle="--", linewidth=1.0, label="noise")
+    share.set_yticks(places, [_literal(phase) for phase in phases])
+    share.set_xlabel("share of the squared error (%)", fontsize=9)
+    error.set_xlabel(f"rms error ({shown.unit})" if shown.unit else "rms error", fontsize=9)
+    figure.legend(loc="outside upper center", ncols=4, frameon=False, fontsize=9)
+    for axes in (share, error):
+        axes.set_xlim(left=0.0)
+        _tidy(axes)
+        axes.grid(False, axis="y")
+    return _png(figure)
+
+
+def autocorrelation(series: Sequence[np.ndarray], lags: int) -> np.ndarray:
+    """Autocorrelation of several series about zero, pooled; shape (lags + 1,), 1 at lag 0.
+
+    About zero and not about the mean, because a lasting offset is as much an error as any other.
+    """
+    clean = [np.nan_to_num(np.asarray(values, dtype=float)) for values in series]
+    power = sum(float(values @ values) for values in clean)
+    if power == 0.0:
+        return np.full(lags + 1, np.nan)
+    return np.array([sum(float(v[: len(v) - k] @ v[k:]) for v in clean if k < len(v)) for k in range(lags + 1)]) / power
+
+
+def residual_correlation(findings: Findings) -> bytes | None:
+    """Autocorrelation of the fit runs' residuals before and after, with the 95 % band of white noise."""
+    runs = [run for run in findings.runs if run.role == "fit" and len(run.time) > 8]
+    if not runs:
+        return None
+    lags = min(200, min(len(run.time) for run in runs) // 4)
+    step = float(np.median(np.diff(runs[0].time)))
+    figure = _figure(2.6)
+    axes = figure.subplots()
+    band = 1.96 / np.sqrt(sum(len(run.time) for run in runs))
+    axes.axhspan(-band, band, color=NOISE, zorder=0, label="95 % of white noise")
+    axes.axhline(0.0, color=QUIET, linewidth=0.6)
+    for index, (name, _, colour) in enumerate(_models(findings, runs[0])):
+        models = [run.after if index or nothing_added(findings) else run.before for run in runs]
+        curve = autocorrelation([run.measured - model for run, model in zip(runs, models, strict=True)], lags)
+        axes.plot(step * np.arange(1, lags + 1), curve[1:], color=colour, linewidth=1.4, label=name)
+    axes.set_xlabel("lag (s)", fontsize=9)
+    axes.set_ylabel("autocorrelation\nof the residual", fontsize=9)
+    figure.legend(loc="outside upper center", ncols=3, frameon=False, fontsize=9)
+    _tidy(axes)
+    return _png(figure)

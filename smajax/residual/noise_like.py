@@ -1,0 +1,51 @@
+"""Is a residual noise? Autocorrelation, whiteness, and how many independent samples there are."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy import stats
+
+LAGS = 20
+
+
+def autocorrelation(series: np.ndarray, lags: int) -> np.ndarray:
+    """Autocorrelation at lags 0..`lags` of one run's residual (n,), mean removed."""
+    centred = series - series.mean()
+    power = float(centred @ centred)
+    if power == 0.0:
+        return np.concatenate([[1.0], np.zeros(lags)])
+    reach = min(lags, len(series) - 1)
+    found = [1.0] + [float(centred[:-lag] @ centred[lag:]) / power for lag in range(1, reach + 1)]
+    return np.asarray(found + [0.0] * (lags - reach))
+
+
+def whiteness_p_value(runs: Sequence[np.ndarray], lags: int = LAGS) -> float:
+    """Ljung-Box over all runs at once: the chance of such autocorrelations in white noise.
+
+    Q = sum over runs of n (n + 2) sum_k r_k^2 / (n - k), chi-square with lags x runs degrees of freedom.
+    """
+    statistic = 0.0
+    for run in runs:
+        n, r = len(run), autocorrelation(run, lags)
+        statistic += n * (n + 2) * float(np.sum(r[1:] ** 2 / (n - np.arange(1, lags + 1))))
+    return float(stats.chi2.sf(statistic, lags * len(runs)))
+
+
+def correlation_time(runs: Sequence[np.ndarray]) -> float:
+    """Samples per independent sample, at least 1: 1 + 2 sum of autocorrelations up to the first that is not positive."""
+    total, weight = 0.0, 0
+    for run in runs:
+        reach = max(1, len(run) // 4)
+        r = autocorrelation(run, reach)[1:]
+        negative = np.flatnonzero(r <= 0.0)
+        stop = negative[0] if len(negative) else len(r)
+        total += len(run) * (1.0 + 2.0 * float(r[:stop].sum()))
+        weight += len(run)
+    return max(1.0, total / weight)
+
+
+def split_runs(misfit: np.ndarray, mask: np.ndarray) -> list[np.ndarray]:
+    """Misfit (R, N) and mask (R, N) -> one array of measured samples per run."""
+    return [row[valid > 0] for row, valid in zip(misfit, mask, strict=True)]

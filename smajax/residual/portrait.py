@@ -1,0 +1,87 @@
+"""Portrait of a residual: its size against the noise, its memory, and where in a run it lives."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from smajax.report.findings import Portrait
+from smajax.residual.noise_like import whiteness_p_value
+
+WHITE = 0.01  # a residual whose whiteness has a smaller p-value has structure
+# A residual may miss the noise level by this share of its mean square and still be called noise: a noise sigma is
+# rarely known better, and no effect worth a name hides in 2 %.
+LEFT_OVER = 0.02
+
+
+def phase_of(fraction: np.ndarray, temperature: np.ndarray, ambient: float) -> np.ndarray:
+    """One word per sample for what the wire is doing, from the model's own states; shape (n,)."""
+    rate = np.gradient(fraction)
+    moving = np.abs(rate) > 1e-4
+    warming = np.gradient(temperature) > 0.0
+    hot = temperature - ambient > 0.25 * max(float(np.max(temperature) - ambient), 1e-9)
+    resting = np.where(hot, np.where(warming, "hot, warming", "hot, cooling"), "cold")
+    return np.where(moving, np.where(rate < 0.0, "heating, transforming", "cooling, transforming"), resting)
+
+
+def portrait(
+    residuals: Sequence[np.ndarray], states: Sequence[Mapping[str, np.ndarray]], noise_sigma: float
+) -> Portrait:
+    """Portrait of the fit runs' residuals (SI, one array of shape (n,) a run).
+
+    `states` gives, run by run, series of the model to hold the residual against; `temperature` and
+    `martensite_fraction` are needed, others (inputs, stress, rates) are correlated as well.
+    """
+    everything = np.concatenate(residuals)
+    rmse = float(np.sqrt(np.mean(everything**2)))
+    p_value = whiteness_p_value(residuals)
+    ambient = min(float(np.min(state["temperature"])) for state in states)
+    phases = np.concatenate(
+        [phase_of(state["martensite_fraction"], state["temperature"], ambient) for state in states]
+    )
+    total = float(everything @ everything)
+    by_phase = {}
+    for phase in sorted(set(phases.tolist())):
+        here = everything[phases == phase]
+        by_phase[str(phase)] = {
+            "samples": float(len(here)),
+            "share_of_squared_error": float(here @ here) / total if total else 0.0,
+            "mean": float(here.mean()),
+            "rmse": float(np.sqrt(np.mean(here**2))),
+        }
+    correlation = {}
+    for name in states[0]:
+        series = np.concatenate([np.asarray(state[name], float) for state in states])
+        spread = series.std() * everything.std()
+        correlation[name] = float(np.mean((series - series.mean()) * (everything - everything.mean())) / spread) if spread else 0.0
+    ratio = rmse / noise_sigma
+    white = p_value > WHITE
+    return Portrait(
+        rmse, noise_sigma, ratio, white, p_value, by_phase, correlation, _sentences(ratio, white, by_phase, correlation)
+    )
+
+
+def noise_like(found: Portrait) -> bool:
+    """Nothing left to explain: no memory beyond chance, or no more than `LEFT_OVER` of the mean square over the noise."""
+    excess = 1.0 - 1.0 / max(found.ratio, 1e-9) ** 2
+    at_level = excess <= LEFT_OVER
+    # White but far above the declared noise: the noise was declared too small, and no model can mend that.
+    return at_level or found.white
+
+
+def _sentences(
+    ratio: float, white: bool, by_phase: Mapping[str, Mapping[str, float]], correlation: Mapping[str, float]
+) -> tuple[str, ...]:
+    told = [f"The residual is {ratio:.1f} times the measurement noise and {'has no memory' if white else 'has a memory: one sample tells the next'}."]
+    if white:
+        return tuple(told)
+    worst = max(by_phase, key=lambda name: by_phase[name]["share_of_squared_error"])
+    told.append(
+        f"{by_phase[worst]['share_of_squared_error']:.0%} of its square falls into the phase “{worst}” "
+        f"({by_phase[worst]['samples'] / sum(entry['samples'] for entry in by_phase.values()):.0%} of the samples)."
+    )
+    strongest = max(correlation, key=lambda name: abs(correlation[name]))
+    if abs(correlation[strongest]) > 0.2:
+        told.append(f"It goes most with {strongest.replace('_', ' ')} (correlation {correlation[strongest]:+.2f}).")
+    return tuple(told)

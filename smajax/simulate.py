@@ -1,0 +1,70 @@
+"""The only scan: a system and its input series -> a trajectory. `jit`, `vmap` and `grad` stay outside."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import jax
+import jax.numpy as jnp
+from jax import lax
+
+from smajax.load.coupon import Coupon
+from smajax.step import step
+from smajax.system import System, initial_state
+from smajax.types import Scalar, Series, State, Trajectory
+
+
+def check_inputs(system: System, inputs: Mapping[str, Series]) -> int:
+    """Number of samples; ValueError when a channel is missing, unknown, or of another length."""
+    required = system.load.inputs_required | system.drive.inputs_required
+    allowed = required | system.load.inputs_optional | system.drive.inputs_optional | {"ambient_temperature"}
+    missing, unknown = sorted(required - set(inputs)), sorted(set(inputs) - allowed)
+    if missing or unknown:
+        raise ValueError(
+            f"`inputs` must have the channels {sorted(required)} and may have {sorted(allowed - required)}, but "
+            f"{missing} are missing and {unknown} mean nothing to this load and drive."
+        )
+    lengths = {name: jnp.shape(series) for name, series in inputs.items()}
+    if not lengths:
+        raise ValueError("`inputs` is empty: without one series there is no clock. Give e.g. `ambient_temperature`.")
+    if len(set(lengths.values())) != 1 or len(next(iter(lengths.values()))) != 1:
+        raise ValueError(
+            f"Every input must be one series of the same length, but the shapes are {lengths}. Use `jax.vmap` over "
+            "a batch, and `jnp.full(n, value)` for a constant."
+        )
+    return next(iter(lengths.values()))[0]
+
+
+def simulate(
+    system: System, inputs: Mapping[str, Series], dt: Scalar | float, initial: State | None = None
+) -> Trajectory:
+    """Simulate over the samples of `inputs`, each of shape (n,), SI, `dt` seconds apart.
+
+    The result holds the states at t_0 ... t_{n-1}; input i is held from t_i to t_{i+1} (a coupon's inputs are values
+    at t_i). `initial` defaults to rest with the first inputs. Raises ValueError for missing or ill-shaped inputs.
+    """
+    check_inputs(system, inputs)
+    series = {name: jnp.asarray(values, dtype=float) for name, values in inputs.items()}
+    state = initial_state(system, {name: values[0] for name, values in series.items()}) if initial is None else initial
+    ahead = isinstance(system.load, Coupon)
+    held = {name: values[1:] if ahead else values[:-1] for name, values in series.items()}
+
+    def body(state: State, now: dict[str, Scalar]) -> tuple[State, State]:
+        new = step(system, state, now, dt)
+        return new, new
+
+    _, states = lax.scan(body, state, held)
+    states = jax.tree.map(lambda first, rest: jnp.concatenate([first[None], rest]), state, states)
+    w, m = states.wire, states.motion
+    return Trajectory(
+        time=states.time,
+        temperature=w.temperature,
+        stress=w.stress,
+        strain=w.strain,
+        martensite_fraction=w.martensite_fraction,
+        xi_M=w.xi_M,
+        xi_A=w.xi_A,
+        position=m.position,
+        velocity=m.velocity,
+        reading=states.reading,
+    )

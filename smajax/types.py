@@ -1,0 +1,55 @@
+"""Shared array types and the records that travel through a simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import equinox as eqx
+from jaxtyping import Array, Float
+
+Scalar = Float[Array, ""]
+Series = Float[Array, " time"]
+Inputs = Mapping[str, Scalar]  # one value per input channel, SI, held over one step
+
+
+class WireState(eqx.Module):
+    """Memory of one wire between two steps."""
+
+    temperature: Scalar  # C
+    stress: Scalar  # Pa, tension positive, never negative: a wire cannot push
+    strain: Scalar  # -, the wire's own strain; larger than the geometric one while the wire is slack
+    martensite_fraction: Scalar  # -, 1 = all martensite
+    xi_M: Scalar  # amplitude of the martensite-to-austenite curve, eq. 3.3
+    xi_A: Scalar  # floor of the austenite-to-martensite curve, eq. 3.5
+
+
+class Motion(eqx.Module):
+    """Memory of the load."""
+
+    position: Scalar  # m (rad for an arm), positive when the wire contracts
+    velocity: Scalar  # m/s (rad/s)
+    friction: Scalar  # -, -1..1: the part of the Coulomb limit in use, positive against +velocity
+
+
+class State(eqx.Module):
+    """Everything that the next step needs."""
+
+    time: Scalar  # s
+    wire: WireState
+    motion: Motion
+    reading: Scalar  # what the sensor shows: m, rad, or - (strain)
+
+
+class Trajectory(eqx.Module):
+    """A simulated run: the states at t_0 ... t_{n-1}, every array of shape (n,)."""
+
+    time: Series
+    temperature: Series
+    stress: Series
+    strain: Series
+    martensite_fraction: Series
+    xi_M: Series
+    xi_A: Series
+    position: Series
+    velocity: Series
+    reading: Series

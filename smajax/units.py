@@ -1,0 +1,160 @@
+"""Physical units: the only file that knows units other than the program's own.
+
+Everywhere else numbers are SI, temperatures are degrees Celsius and angles are radians. Text such as
+`"24.2 J/g"` is turned into such a number here, once, when a file is read.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+_NUMBER = re.compile(r"^\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*$")
+_DIMENSIONLESS = {"", "1", "-"}
+# Spellings that people write and the unit library does not know, or knows as something else.
+_SPELLINGS = (("°C", "degC"), ("ºC", "degC"), ("℃", "degC"), ("°F", "degF"), ("°", "deg"), ("Ohm", "ohm"), ("·", "*"))
+
+
+class UnitError(ValueError):
+    """A quantity whose unit is missing, not known, or of another kind than the one expected."""
+
+
+@lru_cache(maxsize=1)
+def _registry() -> Any:
+    """The unit registry, created at first use because reading its definitions takes a noticeable time."""
+    import pint
+
+    return pint.UnitRegistry(cache_folder=None)
+
+
+@lru_cache(maxsize=512)
+def _unit(text: str) -> Any:
+    """The unit that `text` names; raises UnitError when there is none such."""
+    name = text.strip()
+    if name in _DIMENSIONLESS:
+        return _registry().parse_units("dimensionless")
+    for found, meant in _SPELLINGS:
+        name = name.replace(found, meant)
+    try:
+        # Inside a compound unit ("J/(kg degC)") a degree is a difference: pint's as_delta.
+        return _registry().parse_units(name, as_delta=True)
+    except Exception as error:  # besides its own errors the unit library lets those of Python's tokenizer through
+        raise UnitError(f"unit {text!r} is not known; write it like 'J/(kg K)', 'W/m^2/K', 'MPa/K', 'degC'") from error
+
+
+def _is_absolute(unit: Any) -> bool:
+    """Whether the unit is one of absolute temperature on a scale with an offset (degC, degF)."""
+    return str(unit) in ("degree_Celsius", "degree_Fahrenheit")
+
+
+def _is_temperature(unit: Any) -> bool:
+    return bool(unit.dimensionality == _registry().kelvin.dimensionality)
+
+
+def _difference(unit: Any) -> Any:
+    """The unit of a difference of two values in `unit` (delta_degC for degC, the unit itself otherwise)."""
+    return _registry().parse_units(f"delta_{unit}") if _is_absolute(unit) else unit
+
+
+def _plain(unit: Any) -> str:
+    return "1 (no unit)" if str(unit) == "dimensionless" else f"{unit:~C}".replace("**", "^")
+
+
+def _hint(got: str) -> str:
+    words = re.findall(r"[A-Za-z]+", got)
+    if "C" in words:
+        return " ('C' is the coulomb; write degC)"
+    if "F" in words:
+        return " ('F' is the farad; write degF)"
+    return ""
+
+
+def _factor(got: str, expected: str, difference: bool) -> tuple[Any, Any]:
+    """The two units, checked to be of one kind, ready for a conversion from the first to the second."""
+    source, target = _unit(got), _unit(expected)
+    if source.dimensionality != target.dimensionality:
+        raise UnitError(
+            f"got unit {got!r} ({source.dimensionality}), expected one like {expected!r} ({target.dimensionality})"
+            f"{_hint(got)}; change the unit or the quantity"
+        )
+    if _is_temperature(target):
+        if difference or not _is_absolute(target):
+            # The program's absolute temperatures are degC, so a kelvin asked for is always a difference.
+            return _difference(source), _difference(target)
+        if str(source).startswith("delta_"):
+            raise UnitError(f"got a temperature difference ({got!r}), expected a temperature in {expected!r}")
+    if not target.dimensionality:
+        angle = _registry().radian
+        root = _registry().get_root_units
+        source_is_angle, target_is_angle = root(source)[1] == angle, root(target)[1] == angle
+        if target_is_angle and not source_is_angle:
+            raise UnitError(f"got {got or 'no unit'!r}, expected an angle; write it with 'deg' or 'rad'")
+        if source_is_angle and not target_is_angle and str(target) == "dimensionless":
+            raise UnitError(f"got an angle ({got!r}), expected a plain number or a percentage")
+    return source, target
+
+
+def convert(
+    values: float | NDArray[np.float64], unit: str, expected: str, difference: bool = False
+) -> NDArray[np.float64]:
+    """Values of any shape measured in `unit`, given in `expected`; same shape.
+
+    difference: the values are differences (a noise, a width), so degC to K adds nothing.
+    Raises UnitError when the units are unknown or not of one kind.
+    """
+    source, target = _factor(unit, expected, difference)
+    numbers = np.asarray(values, dtype=np.float64)
+    return np.asarray(_registry().Quantity(numbers, source).to(target).magnitude, dtype=np.float64)
+
+
+def parse_quantity(value: str | float, expected: str, difference: bool = False) -> float:
+    """The number that a quantity such as `"24.2 J/g"` is in the unit `expected` (`"J/kg"`: 24200.0).
+
+    A bare number is accepted only where the expected unit is "1": anything else must say its unit.
+    `expected` "degC" reads "341 K" as the absolute 67.85; `expected` "K" is always a difference.
+    Raises UnitError naming what was got, what was expected and what to do.
+    """
+    if isinstance(value, str):
+        match = _NUMBER.match(value)
+        if match is None:
+            raise UnitError(f"got {value!r}, expected a number and a unit like '1.5 {_plain(_unit(expected))}'")
+        number, unit = float(match.group(1)), match.group(2)
+    else:
+        number, unit = float(value), ""
+    if not math.isfinite(number):
+        raise UnitError(f"got {value!r}, expected a finite number in {expected!r}")
+    if unit in _DIMENSIONLESS and expected not in _DIMENSIONLESS:
+        raise UnitError(f"got {value!r} without a unit, expected one like {expected!r}; write '{number:g} {expected}'")
+    return float(convert(number, unit, expected, difference))
+
+
+def to_si(value: str | float, unit: str) -> float:
+    """The value in the program's own units (SI, degC, rad).
+
+    A number is taken to be in `unit`; text carries its own unit, which must be of the same kind as `unit`.
+    `to_si(24.2, "J/g")` and `to_si("24.2 J/g", "J/kg")` are both 24200.0.
+    Raises UnitError as `parse_quantity` does.
+    """
+    own = own_unit(unit)
+    if isinstance(value, str):
+        return parse_quantity(value, own)
+    return float(convert(value, unit, own))
+
+
+def own_unit(unit: str) -> str:
+    """The program's own unit for what `unit` measures: "K" and "degF" -> "degC", "deg" -> "rad", else SI base."""
+    found = _unit(unit)
+    if _is_temperature(found) and not str(found).startswith("delta_"):
+        return "degC"
+    return _compact(_registry().get_root_units(found)[1])
+
+
+def _compact(unit: Any) -> str:
+    """Base units as text; grams, which the library takes as its root, become kilograms."""
+    text = "1" if str(unit) == "dimensionless" else f"{unit:C}".replace("**", "^")
+    return re.sub(r"\bgram\b", "kilogram", text)

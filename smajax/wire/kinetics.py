@@ -1,0 +1,158 @@
+r"""Phase kinetics: temperature, stress and memory -> martensite fraction (eq. 3.3-3.6, 3.17, 3.18, 3.26 corrected).
+
+Both branches are closed forms of one driving temperature each, $y_A = T - \sigma/C_A$ and $y_M = T - \sigma/C_M$:
+
+    heating   xi = min(xi, xi_M h(y_A)),            h falls from 1 at A_s to 0 at A_f   (eq. 3.3)
+    cooling   xi = max(xi, 1 - (1 - xi_A) k(y_M)),  k rises from 0 at M_f to 1 at M_s   (eq. 3.5)
+
+so a step never leaves [0, 1] and never has to be clipped. The carried amplitudes xi_M and xi_A are renewed only while
+the *other* branch transforms, scaled so that the curve passes through the present state. Eq. 3.26 as printed renews
+xi_M in every pause as well, after which a resumed heating never completes; the corrected form is continuous at a
+reversal, complete at the end of the range, and blind to a pause.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Bool
+
+from smajax.effects.base import AbstractEffect
+from smajax.parameters import parameter
+from smajax.types import Scalar, WireState
+from smajax.wire.conditions import AbstractConditions
+
+# Below this share a branch counts as finished: dividing by less would make the renewed amplitude pure rounding.
+FINISHED = 1e-9
+# A transformation range narrower than this is a jump that no step can follow.
+NARROWEST_RANGE = 0.05  # C
+
+
+class Kinetics(eqx.Module):
+    """Transformation temperatures at zero stress, their slopes, and the conditions under which a branch is followed."""
+
+    austenite_start: Scalar = parameter("degC", -100.0, 400.0, "A_s at zero stress")
+    austenite_finish: Scalar = parameter("degC", -100.0, 400.0, "A_f at zero stress")
+    martensite_start: Scalar = parameter("degC", -150.0, 400.0, "M_s at zero stress")
+    martensite_finish: Scalar = parameter("degC", -150.0, 400.0, "M_f at zero stress")
+    stress_slope_austenite: Scalar = parameter("Pa/K", 1e6, 1e8, "C_A: stress per degree of A_s and A_f")
+    stress_slope_martensite: Scalar = parameter("Pa/K", 1e6, 1e8, "C_M: stress per degree of M_s and M_f")
+    conditions: AbstractConditions
+
+
+def heating_temperature(law: Kinetics, temperature: Scalar, stress: Scalar) -> Scalar:
+    r"""$y_A = T - \sigma / C_A$, C: what has to pass A_s and A_f."""
+    return temperature - stress / law.stress_slope_austenite
+
+
+def cooling_temperature(law: Kinetics, temperature: Scalar, stress: Scalar) -> Scalar:
+    r"""$y_M = T - \sigma / C_M$, C: what has to pass M_s and M_f."""
+    return temperature - stress / law.stress_slope_martensite
+
+
+def martensite_left(law: Kinetics, effects: Sequence[AbstractEffect], temperature: Scalar, stress: Scalar) -> Scalar:
+    r"""h = (1 + cos[pi (y_A - A_s)/(A_f - A_s)]) / 2, 1 below the range and 0 above (Elahinia 2004, eq. 3.10)."""
+    width = jnp.maximum(law.austenite_finish - law.austenite_start, NARROWEST_RANGE)
+    z = (heating_temperature(law, temperature, stress) - law.austenite_start) / width
+    share = 0.5 * (1.0 + jnp.cos(jnp.pi * jnp.clip(z, 0.0, 1.0)))
+    for effect in effects:
+        share = effect.heating_shape(z, share)
+    return share
+
+
+def austenite_left(law: Kinetics, effects: Sequence[AbstractEffect], temperature: Scalar, stress: Scalar) -> Scalar:
+    r"""k = (1 - cos[pi (y_M - M_f)/(M_s - M_f)]) / 2, 0 below the range and 1 above (Elahinia 2004, eq. 3.5)."""
+    width = jnp.maximum(law.martensite_start - law.martensite_finish, NARROWEST_RANGE)
+    z = (cooling_temperature(law, temperature, stress) - law.martensite_finish) / width
+    share = 0.5 * (1.0 - jnp.cos(jnp.pi * jnp.clip(z, 0.0, 1.0)))
+    for effect in effects:
+        share = effect.cooling_shape(z, share)
+    return share
+
+
+def steepest_slope(law: Kinetics) -> Scalar:
+    """About the largest |d xi / dT| of either cosine, 1/C: pi / (2 width) of the narrower range."""
+    widths = jnp.minimum(law.austenite_finish - law.austenite_start, law.martensite_start - law.martensite_finish)
+    return 0.5 * jnp.pi / jnp.maximum(widths, NARROWEST_RANGE)
+
+
+class Branch(eqx.Module):
+    """Which branch a step is on; both False: no transformation."""
+
+    heating: Bool[Array, ""]
+    cooling: Bool[Array, ""]
+
+
+def curves(
+    law: Kinetics, effects: Sequence[AbstractEffect], state: WireState, temperature: Scalar, stress: Scalar
+) -> tuple[Scalar, Scalar]:
+    """xi on the heating curve (eq. 3.3) and on the cooling curve (eq. 3.5) through `state`'s amplitudes."""
+    heated = state.xi_M * martensite_left(law, effects, temperature, stress)
+    cooled = 1.0 - (1.0 - state.xi_A) * austenite_left(law, effects, temperature, stress)
+    return heated, cooled
+
+
+def open_branches(law: Kinetics, effects: Sequence[AbstractEffect], state: WireState) -> Branch:
+    """Branches whose range the wire is in (or before) at `state`: one that is behind it transforms nothing any more."""
+    return Branch(
+        martensite_left(law, effects, state.temperature, state.stress) > FINISHED,
+        austenite_left(law, effects, state.temperature, state.stress) > FINISHED,
+    )
+
+
+def choose_branch(
+    law: Kinetics,
+    state: WireState,
+    open_at_start: Branch,
+    temperature: Scalar,
+    stress: Scalar,
+    heated: Scalar,
+    cooled: Scalar,
+) -> Branch:
+    """The branch on which a step to (`temperature`, `stress`), tried with the fraction frozen, has to transform.
+
+    `heated` and `cooled` are the curves there. The ranges are [A_s', A_f'] for heating and [M_f', M_s'] for cooling
+    (eq. 3.18 prints A_s in the place of M_s, twice; Table 3.3 and eq. 3.6 have M_s).
+    """
+    warmer, tighter = temperature - state.temperature, stress - state.stress
+    loss, gain = state.martensite_fraction - heated, cooled - state.martensite_fraction
+    may_heat = law.conditions.heats(warmer, tighter, law.stress_slope_austenite) & open_at_start.heating
+    may_cool = law.conditions.cools(warmer, tighter, law.stress_slope_martensite) & open_at_start.cooling
+    heating, cooling = (loss > 0.0) & may_heat, (gain > 0.0) & may_cool
+    # Overlapping ranges can ask for both; one step transforms one way only (source, after eq. 3.26).
+    return Branch(heating & ~(cooling & (gain > loss)), cooling & ~(heating & (gain <= loss)))
+
+
+def fraction_on(state: WireState, branch: Branch, heated: Scalar, cooled: Scalar) -> Scalar:
+    """xi at the end of a step on `branch`; unchanged off both.
+
+    The branch was chosen where its curve lies beyond the present fraction, and the caller stays on that side.
+    """
+    return jnp.where(branch.heating, heated, jnp.where(branch.cooling, cooled, state.martensite_fraction))
+
+
+def renewed(
+    law: Kinetics,
+    effects: Sequence[AbstractEffect],
+    old: WireState,
+    branch: Branch,
+    temperature: Scalar,
+    stress: Scalar,
+    xi: Scalar,
+) -> tuple[Scalar, Scalar]:
+    """(xi_M, xi_A) after a step that ended at (`temperature`, `stress`, `xi`): eq. 3.26, corrected.
+
+    A curve that its conditions kept the wire from following (Liang's, when the stress falls faster than the
+    temperature) is re-anchored at the present state too: the source integrates rates there and so does not jump.
+    """
+    h = martensite_left(law, effects, temperature, stress)
+    k = austenite_left(law, effects, temperature, stress)
+    through_heating = xi / jnp.maximum(h, FINISHED)
+    through_cooling = 1.0 - (1.0 - xi) / jnp.maximum(k, FINISHED)
+    missed_heating = ~branch.heating & (old.xi_M * h < xi)
+    missed_cooling = ~branch.cooling & (1.0 - (1.0 - old.xi_A) * k > xi)
+    xi_M = jnp.where(branch.cooling | missed_heating, through_heating, old.xi_M)
+    xi_A = jnp.where(branch.heating | missed_cooling, through_cooling, old.xi_A)
+    return xi_M, xi_A

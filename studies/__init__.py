@@ -1,0 +1,1 @@
+"""Studies: the independent reference integration and the scripts that make data."""

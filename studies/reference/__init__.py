@@ -1,0 +1,1 @@
+"""Independent, event-aware reference integration of the wire models (scipy only)."""

@@ -1,0 +1,20 @@
+"""Shared by all tests: float64, and where the measured data are."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import jax
+import pytest
+
+jax.config.update("jax_enable_x64", True)
+
+
+@pytest.fixture(scope="session")
+def measured_data() -> Path:
+    """Folder of measured data of real wires; the test skips, saying so, where there is none."""
+    folder = Path(os.environ.get("SMAJAX_DATA", Path(__file__).parents[1] / ".." / "shared" / "data"))
+    if not folder.is_dir():
+        pytest.skip(f"no measured data at {folder}: set SMAJAX_DATA to the folder that holds them")
+    return folder

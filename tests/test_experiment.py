@@ -1,0 +1,347 @@
+"""An experiment file and its runs to one record, and what is said about each mistake."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.io
+
+from smajax.experiment.catalogue import Catalogue, ModelDescription, ParameterInfo
+from smajax.experiment.errors import ExperimentError
+from smajax.experiment.load import load_experiment
+from smajax.experiment.record import Experiment
+
+
+def describe(wire: str, load: str, drive: str) -> ModelDescription:
+    if load == "coupon" and drive != "none":
+        raise ValueError("a coupon has no drive; write drive = 'none'")
+    parameters = {
+        "wire_length": ParameterInfo("m", 1e-3, 1e2),
+        "specific_heat": ParameterInfo("J/(kg K)", 50.0, 5e3),
+        "ambient_temperature": ParameterInfo("degC", -100.0, 150.0),
+        "stress_slope_austenite": ParameterInfo("Pa/K", 1e6, 1e8),
+    }
+    if load == "coupon":
+        return ModelDescription(parameters, frozenset({"temperature", "stress"}), frozenset(), {"strain": "-"})
+    optional = frozenset({"ambient_temperature"})
+    return ModelDescription(parameters, frozenset({"duty"}), optional, {"position": "m", "temperature": "degC"})
+
+
+CATALOGUE = Catalogue(
+    wires={"flexinol", "niti"},
+    loads={"bias_spring", "coupon"},
+    drives={"duty", "none"},
+    effects={"latent_heat", "friction"},
+    describe=describe,
+)
+
+BENCH = """
+title = "Bench"
+[model]
+wire = "flexinol"
+load = "bias_spring"
+drive = "duty"
+[model.parameters]
+wire_length = "96 cm"
+[unknown.specific_heat]
+low = "300 J/(kg K)"
+high = "0.5 cal/(g degC)"
+start = "0.2 cal/(g degC)"
+[nuisance]
+offset = true
+[sampling]
+step = "50 ms"
+[time]
+column = "time"
+unit = "ms"
+[channels.duty]
+role = "input"
+column = "duty"
+unit = "%"
+[channels.position]
+role = "output"
+column = "pos"
+unit = "mm"
+noise = "0.01 mm"
+[[runs]]
+name = "A"
+role = "fit"
+file = "a.csv"
+[[runs]]
+name = "B"
+role = "held-out"
+file = "b.csv"
+[runs.parameters]
+ambient_temperature = "297.15 K"
+"""
+
+
+def write_run(path: Path, count: int = 500, seed: int = 0, header: str = "time,duty,pos") -> None:
+    """A run at 100 Hz (time in ms, duty in percent, position in mm with 0.01 mm of noise)."""
+    time = 10.0 * np.arange(count)
+    duty = np.where(time < 1000.0, 0.0, 20.0)
+    position = 0.002 * np.maximum(time - 1000.0, 0.0) + np.random.default_rng(seed).normal(scale=0.01, size=count)
+    np.savetxt(path, np.stack([time, duty, position], axis=1), delimiter=",", header=header, comments="")
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Path:
+    folder = tmp_path / "bench"
+    folder.mkdir()
+    write_run(folder / "a.csv")
+    write_run(folder / "b.csv", count=720, seed=1)
+    (folder / "experiment.toml").write_text(BENCH)
+    return folder
+
+
+def changed(folder: Path, old: str, new: str) -> Path:
+    text = (folder / "experiment.toml").read_text()
+    assert old in text
+    (folder / "experiment.toml").write_text(text.replace(old, new, 1))
+    return folder
+
+
+def load(folder: Path) -> Experiment:
+    return load_experiment(folder / "experiment.toml", CATALOGUE)
+
+
+def test_a_whole_experiment_in_si(bench: Path) -> None:
+    got = load(bench)
+    assert (got.name, got.title, got.wire, got.load, got.drive) == ("bench", "Bench", "flexinol", "bias_spring", "duty")
+    assert got.parameters == {"wire_length": pytest.approx(0.96)}
+    (unknown,) = got.unknowns
+    assert (unknown.name, unknown.unit) == ("specific_heat", "J/(kg K)")
+    assert (unknown.low, unknown.start, unknown.high) == pytest.approx((300.0, 836.8, 2092.0))
+    assert (got.output_name, got.output_unit, got.step, got.offset) == ("position", "m", 0.05, True)
+    first, second = got.runs
+    assert (first.name, first.role, second.name, second.role) == ("A", "fit", "B", "held-out")
+    assert first.time.shape == first.output.shape == first.inputs["duty"].shape == (100,)
+    assert second.time.shape == (144,)
+    np.testing.assert_allclose(first.inputs["duty"], np.where(first.time < 0.999, 0.0, 0.2), atol=1e-12)
+    np.testing.assert_allclose(first.output, 0.002 * np.maximum(first.time - 1.0, 0.0), atol=3e-5)
+    assert second.parameters == {"ambient_temperature": pytest.approx(24.0)}
+    assert first.sha256 == hashlib.sha256((bench / "a.csv").read_bytes()).hexdigest()
+    assert got.warnings == ()
+    assert load_experiment(bench, CATALOGUE).name == "bench"
+
+
+def test_a_given_noise_shrinks_with_the_average_over_a_step(bench: Path) -> None:
+    got = load(bench)
+    at_rest = np.concatenate([run.output[1:20] for run in got.runs])
+    assert got.noise_sigma == pytest.approx(1e-5 * 0.427, rel=0.01)
+    assert np.std(at_rest) == pytest.approx(got.noise_sigma, rel=0.35)
+    assert "given as 0.01 mm" in got.noise_how
+
+
+def test_an_estimated_noise_is_the_one_on_the_clock(bench: Path) -> None:
+    got = load(changed(bench, 'noise = "0.01 mm"', 'noise = "estimate"'))
+    assert got.noise_sigma == pytest.approx(1e-5 * 0.427, rel=0.25)
+    assert got.noise_how.startswith("estimated from 1 fit run")
+
+
+def test_matlab_files_one_a_channel(bench: Path) -> None:
+    for name, interval, values in (("Duty", 0.001, np.full(3001, 0.2)), ("Pos", 0.01, np.arange(300) * 1e-5)):
+        record = {"time": interval * np.arange(values.size), "signals": {"values": values}, "blockName": "m"}
+        scipy.io.savemat(bench / f"{name}.mat", {name: record})
+    text = BENCH.replace('[time]\ncolumn = "time"\nunit = "ms"\n', "")
+    text = text.replace('column = "duty"\nunit = "%"', 'variable = "Duty"\nunit = "1"')
+    text = text.replace('column = "pos"\nunit = "mm"', 'variable = "Pos"\nunit = "m"')
+    both = 'files = { duty = "Duty.mat", position = "Pos.mat" }'
+    text = text.replace('file = "a.csv"', both).replace('file = "b.csv"', both)
+    (bench / "experiment.toml").write_text(text)
+    got = load(bench)
+    run = got.runs[0]
+    assert run.time.shape == (60,)
+    np.testing.assert_allclose(run.inputs["duty"], 0.2)
+    np.testing.assert_allclose(run.output, 1e-3 * run.time, atol=1e-12)
+    assert [file.name for file in run.files] == ["Duty.mat", "Pos.mat"]
+    assert any("runs 'A' and 'B' have the same data" in one for one in got.warnings)
+    assert any("the input 'duty' is constant" in one for one in got.warnings)
+
+
+COUPON = """
+[model]
+wire = "niti"
+load = "coupon"
+drive = "none"
+[time]
+kind = "sample"
+[channels.temperature]
+role = "input"
+column = 1
+unit = "K"
+[channels.strain]
+role = "output"
+column = 2
+unit = "%"
+noise = "0.01 %"
+[[runs]]
+name = "50 MPa"
+role = "fit"
+file = "50.txt"
+[runs.inputs]
+stress = "50 MPa"
+[effects]
+exclude = ["friction"]
+"""
+
+
+def test_a_coupon_without_time_and_with_a_constant_input(tmp_path: Path) -> None:
+    np.savetxt(tmp_path / "50.txt", np.stack([300.0 + np.arange(30.0), np.linspace(4.0, 0.0, 30) ** 2], axis=1))
+    (tmp_path / "isobaric.toml").write_text(COUPON)
+    got = load_experiment(tmp_path / "isobaric.toml", CATALOGUE)
+    (run,) = got.runs
+    assert got.name == "isobaric"
+    np.testing.assert_array_equal(run.time, np.arange(30.0))
+    np.testing.assert_allclose(run.inputs["temperature"], 26.85 + np.arange(30.0), rtol=1e-12)
+    np.testing.assert_array_equal(run.inputs["stress"], 50e6)
+    assert run.output[0] == pytest.approx(0.16)
+    assert (got.noise_sigma, got.step, got.effects_only, got.effects_excluded) == (1e-4, 1.0, None, ("friction",))
+
+
+def test_the_data_folder_from_the_environment_or_beside_a_parent(bench: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    changed(bench, "[nuisance]", '[data]\nfolder = "${SMAJAX_DATA}/mine"\n[nuisance]')
+    monkeypatch.delenv("SMAJAX_DATA", raising=False)
+    with pytest.raises(ExperimentError, match=r"data.folder: .*SMAJAX_DATA"):
+        load(bench)
+    for root in (bench.parent / "shared" / "data", bench.parent / "elsewhere"):
+        (root / "mine").mkdir(parents=True)
+        write_run(root / "mine" / "a.csv", count=100 if root.name == "elsewhere" else 200)
+        write_run(root / "mine" / "b.csv", seed=1)
+    assert load(bench).runs[0].time.size == 40
+    monkeypatch.setenv("SMAJAX_DATA", str(bench.parent / "elsewhere"))
+    assert load(bench).runs[0].time.size == 20
+    monkeypatch.setenv("SMAJAX_DATA", str(bench.parent / "gone"))
+    with pytest.raises(ExperimentError, match=r"data.folder: .*does not exist"):
+        load(bench)
+
+
+MISTAKES = [
+    ("offset = true", "ofset = true", r"nuisance.ofset: is not a known key; did you mean 'offset'"),
+    ("[sampling]", "[samplng]", r"experiment\.toml: samplng: is not a known key; did you mean 'sampling'"),
+    ('wire = "flexinol"', 'wire = "flexinoll"', r"model.wire: there is no wire 'flexinoll'; did you mean 'flexinol'"),
+    ('load = "bias_spring"', 'load = "spring"', r"model.load: there is no load 'spring'"),
+    ('load = "bias_spring"', 'load = "coupon"', r"model: a coupon has no drive"),
+    ('drive = "duty"', 'drive = "duti"', r"model.drive: .*did you mean 'duty'"),
+    ('drive = "duty"', "drive = 3", r"model.drive: got 3, expected the name of a drive"),
+    ('drive = "duty"\n', "", r"model.drive: is missing; expected the name of a drive"),
+    ("wire_length =", "wire_lenght =", r"model.parameters.wire_lenght: .*did you mean 'wire_length'"),
+    ('"96 cm"', '"96 s"', r"model.parameters.wire_length: got unit 's'.*expected one like 'm'"),
+    ('"96 cm"', "0.96", r"model.parameters.wire_length: got 0.96 without a unit"),
+    ('"96 cm"', "[1]", r"model.parameters.wire_length: got \[1\], expected a table of name"),
+    ('"96 cm"', '"960 km"', r"model.parameters.wire_length: got '960 km', that is 960000 m; expected 0.001 to 100 m"),
+    ("wire_length =", 'specific_heat = "1 J/(kg K)"\nwire_length =', r"specific_heat: is given here and is an unknown"),
+    ("[unknown.specific_heat]", "[unknown.specific_het]", r"unknown.specific_het: .*did you mean 'specific_heat'"),
+    ('"300 J/(kg K)"', '"3000 J/(kg K)"', r"unknown.specific_heat.low: got '3000 .*not below high"),
+    ('start = "0.2 cal', 'start = "0.9 cal', r"unknown.specific_heat.start: got '0.9 .*expected between"),
+    ('low = "300 J/(kg K)"', 'low = "300 J/K"', r"experiment\.toml: unknown.specific_heat.low: got unit 'J/K'"),
+    ('low = "300 J/(kg K)"\n', "", r"unknown.specific_heat.low: is missing"),
+    ('step = "50 ms"', 'step = "50 mm"', r"sampling.step: got unit 'mm'"),
+    ('step = "50 ms"', 'step = "-1 s"', r"sampling.step: got '-1 s', expected a time above zero"),
+    ('step = "50 ms"', 'step = "1 ns"', r"sampling.step: .*cuts run 'A'"),
+    ('step = "50 ms"', 'step = "1 h"', r"sampling.step: run 'A' lasts 4.99 s"),
+    ('column = "time"\n', "", r"time: names no column"),
+    ('unit = "%"', 'unit = "V"', r"channels.duty.unit: got unit 'V'.*expected one like '1'"),
+    ('role = "input"\n', "", r"channels.duty.role: is missing; expected 'input' or 'output'"),
+    ('role = "input"', 'role = "output"', r"channels: got the outputs duty, position; expected exactly one"),
+    ("[channels.duty]", "[channels.ambient_temperature]", r"channels.ambient_temperature.unit: got unit '%'"),
+    ("[channels.duty]", "[channels.dutty]", r"channels.dutty: the model has no input 'dutty'; did you mean 'duty'"),
+    (
+        '[channels.duty]\nrole = "input"\ncolumn = "duty"\nunit = "%"\n',
+        "",
+        r"channels: the model needs the input 'duty', which no channel gives",
+    ),
+    ('column = "duty"\n', "", r"channels.duty: has no column or variable and run 'A' gives no constant"),
+    ('column = "duty"', 'column = "dutty"', r"runs.A.file: .*no column 'dutty'; it has: time, duty, pos; did you mean"),
+    ('column = "pos"', 'column = "pos"\nvariable = "x"', r"channels.position: got both column and variable"),
+    ('noise = "0.01 mm"', 'noise = "0.01 s"', r"channels.position.noise: got unit 's'"),
+    ('noise = "0.01 mm"', 'noise = "0 mm"', r"channels.position.noise: got '0 mm', expected a noise above zero"),
+    ('unit = "%"', 'unit = "%"\nnoise = "1 %"', r"channels.duty: got a noise for an input"),
+    ('role = "fit"', 'role = "held-out"', r"runs: no run has role = 'fit'"),
+    ('role = "fit"', 'role = "train"', r"runs.A.role: got 'train', expected 'fit' or 'held-out'"),
+    ('name = "B"', 'name = "A"', r"runs.A.name: is used by two runs"),
+    ('name = "B"\n', "", r"runs.\[2\].name: is missing"),
+    ('file = "a.csv"', 'file = "aa.csv"', r"runs.A.file: .*aa.csv: there is no such file; did you mean 'a.csv'"),
+    ('file = "a.csv"\n', "", r"runs.A: got neither file nor files"),
+    ('file = "a.csv"', 'files = { duty = "a.csv" }', r"runs.A.files: gives no file for channel 'position'"),
+    (
+        'file = "a.csv"',
+        'files = { dut = "a.csv" }',
+        r"runs.A.files.dut: there is no channel 'dut'; did you mean 'duty'",
+    ),
+    ("ambient_temperature =", "ambient =", r"runs.B.parameters.ambient: there is no parameter 'ambient'"),
+    ('"297.15 K"', '"297.15 V"', r"runs.B.parameters.ambient_temperature: got unit 'V'"),
+    ("[[runs]]", '[effects]\nonly = ["latent"]\n[[runs]]', r"effects.only: .*did you mean 'latent_heat'"),
+    ("[[runs]]", '[data]\nfolder = "${HOME}"\n[[runs]]', r"data.folder: got \$\{HOME\}; only"),
+    ('title = "Bench"', "title = ", r"experiment\.toml: is not TOML: .*line 2"),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "words"), MISTAKES, ids=[words for _, _, words in MISTAKES])
+def test_a_mistake_is_named_with_its_file_and_key(bench: Path, old: str, new: str, words: str) -> None:
+    with pytest.raises(ExperimentError, match=words) as caught:
+        load(changed(bench, old, new))
+    assert str(caught.value).startswith(str(bench / "experiment.toml") + ": ")
+    assert "pydantic" not in str(caught.value)
+
+
+def test_a_file_without_runs_or_without_a_file(bench: Path) -> None:
+    (bench / "experiment.toml").write_text(BENCH[: BENCH.index("[[runs]]")])
+    with pytest.raises(ExperimentError, match=r"runs: is missing; expected one section \[\[runs\]\] a run"):
+        load(bench)
+    with pytest.raises(ExperimentError, match="there is no such file"):
+        load_experiment(bench / "other.toml", CATALOGUE)
+
+
+def test_a_bad_sample_is_refused_with_its_run(bench: Path) -> None:
+    for cells, words in (
+        ("5000,nan,0", "column 'duty' has 1 value"),
+        ("5000,0,zero", "line 502, column 'pos': 'zero' is not a number"),
+        ("-5,0,0", "time does not increase at sample 501"),
+    ):
+        write_run(bench / "a.csv")
+        with (bench / "a.csv").open("a") as file:
+            file.write(cells + "\n")
+        with pytest.raises(ExperimentError, match=f"runs.A.file: .*a.csv: .*{words}"):
+            load(bench)
+
+
+def rewrite(path: Path, duty: float = 20.0, position: np.ndarray | None = None, count: int = 500) -> None:
+    """The run of `write_run` in one of its wrong forms."""
+    time = 10.0 * np.arange(count)
+    noisy = 0.01 * np.random.default_rng(7).normal(size=count) + 0.002 * time
+    columns = [time, np.where(time < 100, 0, duty), noisy if position is None else position]
+    np.savetxt(path, np.stack(columns, axis=1), delimiter=",", header="time,duty,pos", comments="")
+
+
+def test_what_looks_wrong_is_a_warning(bench: Path) -> None:
+    swing = 10.0 * np.sin(np.arange(500) / 20.0)
+    cases: list[tuple[str, dict[str, object]]] = [
+        ("outside 0 to 1; is it in percent", {"duty": 2000.0}),
+        ("the output 'position' is constant", {"position": np.zeros(500)}),
+        ("runs into its highest value and stays exactly there", {"position": np.minimum(swing, 7.0)}),
+        ("runs into its lowest value and stays exactly there", {"position": np.maximum(swing, -7.0)}),
+        ("increment of 0.0005 m is larger than its noise of 1e-05 m", {"position": 0.5 * np.round(swing / 0.5)}),
+        ("only 10 samples", {"count": 50}),
+    ]
+    for words, change in cases:
+        rewrite(bench / "a.csv", **change)  # type: ignore[arg-type]
+        assert any(words in one for one in load(bench).warnings), (words, load(bench).warnings)
+    rewrite(bench / "a.csv")
+    assert load(bench).warnings == ()
+    assert any("shorter than the sensor's" in one for one in load(changed(bench, '"50 ms"', '"2 ms"')).warnings)
+
+
+def test_a_gap_in_time_is_a_warning(bench: Path) -> None:
+    lines = (bench / "a.csv").read_text().splitlines()
+    (bench / "a.csv").write_text("\n".join(lines[:200] + lines[300:]) + "\n")
+    assert any("'position' has a gap of 1.01 s" in one for one in load(bench).warnings)
+
+
+def test_a_noise_that_cannot_be_seen_has_to_be_given(bench: Path) -> None:
+    rewrite(bench / "a.csv", position=np.zeros(500))
+    with pytest.raises(ExperimentError, match=r"channels.position.noise: no noise can be seen"):
+        load(changed(bench, 'noise = "0.01 mm"', 'noise = "estimate"'))

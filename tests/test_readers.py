@@ -1,0 +1,178 @@
+"""Measured files of each kind, and what is said about each mistake."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.io
+
+from smajax.measured.read import read_table
+from smajax.measured.table import MeasuredDataError, check_time
+
+
+def written(path: Path, text: str) -> Path:
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "time,pos\n0,1.5\n1,2.5\n",
+        "time\tpos\n0\t1.5\n1\t2.5\n",
+        "time;pos\n0;1.5\n1;2.5\n",
+        "time pos\r\n 0   1.5\r\n 1   2.5\r\n\r\n",
+        '# a comment\n"time", "pos"\n0, 1.5\n\n1, 2.5e0\n',
+        "\ufefftime,pos\n0,1.5\n1,2.5",
+    ],
+)
+def test_text_tables_of_any_separator(tmp_path: Path, text: str) -> None:
+    table = read_table(written(tmp_path / "run.csv", text))
+    assert list(table.columns) == ["time", "pos"]
+    np.testing.assert_array_equal(table.column("pos"), [1.5, 2.5])
+    np.testing.assert_array_equal(table.column(1), [0.0, 1.0])
+    assert table.clock("pos") is None
+
+
+def test_a_text_table_without_header_has_numbered_columns(tmp_path: Path) -> None:
+    table = read_table(written(tmp_path / "run.txt", "0\t1.5\n1\t2.5\n"))
+    np.testing.assert_array_equal(table.column(2), [1.5, 2.5])
+
+
+def test_a_header_may_hold_another_encoding_and_commas(tmp_path: Path) -> None:
+    path = tmp_path / "run.txt"
+    path.write_bytes("T(°C),in strain\n20 0.1\n30 0.2\n".encode("latin-1"))
+    np.testing.assert_array_equal(read_table(path).column(2), [0.1, 0.2])
+
+
+def test_a_column_of_text_is_an_error_only_when_asked_for(tmp_path: Path) -> None:
+    table = read_table(written(tmp_path / "run.csv", "time,label,x\n0,idle,1\n1,hot,2\n"))
+    np.testing.assert_array_equal(table.column("x"), [1.0, 2.0])
+    with pytest.raises(MeasuredDataError, match=r"run\.csv: line 2, column 'label': 'idle' is not a number"):
+        table.column("label")
+
+
+def test_a_missing_column_lists_those_there_are(tmp_path: Path) -> None:
+    table = read_table(written(tmp_path / "run.csv", "Time,Strain\n0,1\n1,2\n"))
+    with pytest.raises(MeasuredDataError, match="no column 'strian'; it has: Time, Strain; did you mean 'Strain'"):
+        table.column("strian")
+    with pytest.raises(MeasuredDataError, match="no column number 3; it has columns 1 to 2"):
+        table.column(3)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "the file is empty"),
+        ("\n\n", "holds no data line"),
+        ("time,x\n", "a header and no data line"),
+        ("time,x\n0,1\n1,2,3\n", "line 3 has 3 cells, expected 2"),
+        ("time,x,y\n0,1\n", "the header has 3 cells"),
+        ("x,x\n0,1\n", "given more than once"),
+    ],
+)
+def test_a_text_table_with_a_mistake(tmp_path: Path, text: str, words: str) -> None:
+    with pytest.raises(MeasuredDataError, match=words):
+        read_table(written(tmp_path / "run.csv", text))
+
+
+@pytest.mark.parametrize(
+    ("cell", "words"),
+    [
+        ("oops", "line 3, column 'x': 'oops' is not a number"),
+        ("", "line 3, column 'x': the cell is empty"),
+        ("1,5", "write a decimal point"),
+        ("nan", "not finite, the first is nan in sample 2"),
+        ("-inf", "not finite, the first is -inf in sample 2"),
+    ],
+)
+def test_a_cell_that_is_no_number(tmp_path: Path, cell: str, words: str) -> None:
+    table = read_table(written(tmp_path / "run.csv", f"time;x\n0;1\n1;{cell}\n2;1\n"))
+    with pytest.raises(MeasuredDataError, match=words):
+        table.column("x")
+
+
+def test_files_that_are_missing_or_of_another_kind(tmp_path: Path) -> None:
+    written(tmp_path / "Step01.csv", "0,1\n")
+    with pytest.raises(MeasuredDataError, match=r"no such file; did you mean 'Step01.csv'"):
+        read_table(tmp_path / "Step1.csv")
+    with pytest.raises(MeasuredDataError, match="does not exist"):
+        read_table(tmp_path / "nowhere" / "Step1.csv")
+    with pytest.raises(MeasuredDataError, match=r"files ending in '\.xlsx' cannot be read; expected \.csv"):
+        read_table(tmp_path / "a.xlsx")
+    (tmp_path / "folder.csv").mkdir()
+    with pytest.raises(MeasuredDataError, match="is a folder"):
+        read_table(tmp_path / "folder.csv")
+
+
+def test_files_that_are_not_what_their_suffix_says(tmp_path: Path) -> None:
+    scipy.io.savemat(tmp_path / "good.mat", {"x": np.arange(4.0)})
+    content = (tmp_path / "good.mat").read_bytes()
+    (tmp_path / "renamed.csv").write_bytes(content)
+    with pytest.raises(MeasuredDataError, match="is a MATLAB file"):
+        read_table(tmp_path / "renamed.csv")
+    (tmp_path / "picture.txt").write_bytes(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR")
+    with pytest.raises(MeasuredDataError, match="binary data"):
+        read_table(tmp_path / "picture.txt")
+    with pytest.raises(MeasuredDataError, match="is not the MATLAB version 5 file"):
+        read_table(written(tmp_path / "text.mat", "time,x\n0,1\n"))
+    (tmp_path / "cut.mat").write_bytes(content[:150])
+    with pytest.raises(MeasuredDataError, match="damaged or cut short"):
+        read_table(tmp_path / "cut.mat")
+    (tmp_path / "new.mat").write_bytes(b"MATLAB 7.3 MAT-file, Platform: GLNXA64")
+    with pytest.raises(MeasuredDataError, match=r"MATLAB 7\.3 file; save it again"):
+        read_table(tmp_path / "new.mat")
+
+
+def test_simulink_structures_carry_their_own_time(tmp_path: Path) -> None:
+    time = np.array([[0.0], [0.1], [0.2]])
+    signals = {"values": np.array([[1.0], [2.0], [3.0]]), "dimensions": 1.0, "label": "duty"}
+    pair = {"time": time, "signals": {"values": np.array([[1.0, 4.0], [2.0, 5.0], [3.0, 6.0]])}}
+    scipy.io.savemat(
+        tmp_path / "run.mat",
+        {"Duty": {"time": time, "signals": signals, "blockName": "model/Duty"}, "Pair": pair, "gain": [1.0, 2.0]},
+    )
+    table = read_table(tmp_path / "run.mat")
+    np.testing.assert_array_equal(table.column("Duty"), [1.0, 2.0, 3.0])
+    np.testing.assert_array_equal(table.clock("Duty"), [0.0, 0.1, 0.2])
+    np.testing.assert_array_equal(table.column("Pair[2]"), [4.0, 5.0, 6.0])
+    np.testing.assert_array_equal(table.column("gain"), [1.0, 2.0])
+    assert table.clock("gain") is None
+
+
+def test_mat_variables_of_another_structure_or_missing(tmp_path: Path) -> None:
+    scipy.io.savemat(
+        tmp_path / "run.mat",
+        {
+            "Other": {"t": [0.0, 1.0], "y": [1.0, 2.0]},
+            "Short": {"time": [0.0, 1.0], "signals": {"values": [1.0, 2.0, 3.0]}},
+            "text": "words",
+            "x": np.arange(3.0),
+        },
+    )
+    table = read_table(tmp_path / "run.mat")
+    for name, words in {
+        "Other": r"struct with fields \['t', 'y'\]; expected 'time' and 'signals.values'",
+        "Short": "2 times and 3 values",
+        "text": "expected real numbers",
+        "othr": "no column 'othr'; it has: x, Other, Short, text; did you mean 'Other'",
+    }.items():
+        with pytest.raises(MeasuredDataError, match=words):
+            table.column(name)
+    scipy.io.savemat(tmp_path / "none.mat", {"text": "words"})
+    with pytest.raises(MeasuredDataError, match="no signal in it"):
+        read_table(tmp_path / "none.mat")
+
+
+def test_time_must_increase() -> None:
+    check_time(np.array([0.0, 1.0, 5.0]), "here")
+    with pytest.raises(
+        MeasuredDataError, match=r"here: time does not increase at sample 3 \(1 then 1\) and at 1 other"
+    ):
+        check_time(np.array([0.0, 1.0, 1.0, 0.5]), "here")
+    with pytest.raises(MeasuredDataError, match="expected at least two"):
+        check_time(np.array([0.0]), "here")
+    with pytest.raises(MeasuredDataError, match="time is nan in sample 2"):
+        check_time(np.array([0.0, np.nan]), "here")

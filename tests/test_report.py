@@ -1,0 +1,393 @@
+"""The report: both files hold the record's own numbers, and the page needs nothing beside itself."""
+
+from __future__ import annotations
+
+import base64
+import dataclasses
+import io
+import json
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from smajax.report import pictures
+from smajax.report.display import digits, display, with_error
+from smajax.report.findings import (
+    CoefficientFinding,
+    EffectFinding,
+    Findings,
+    ParameterFinding,
+    Portrait,
+    Role,
+    Round,
+    RunFinding,
+)
+from smajax.report.html import findings_to_html
+from smajax.report.json_file import findings_to_json
+from smajax.report.write import write_report
+
+NOISE = 2.0e-5  # m
+NAN = float("nan")
+
+
+def made_run(name: str, role: Role, seed: int, samples: int = 1200) -> RunFinding:
+    """A heating and a cooling that the model before gets too fast and the model after gets right but for noise."""
+    rng = np.random.default_rng(seed)
+    time = np.linspace(0.0, 60.0, samples)
+    voltage = np.where(time % 30.0 < 15.0, 6.0 + 0.3 * seed, 0.5)
+
+    def temperature(lag: float) -> np.ndarray:
+        values = np.empty_like(time)
+        values[0] = 23.0
+        for k in range(1, samples):
+            target = 23.0 + 1.9 * voltage[k] ** 2
+            values[k] = values[k - 1] + (target - values[k - 1]) * (time[1] / lag)
+        return values
+
+    def position(degrees: np.ndarray) -> np.ndarray:
+        return 0.02475 * (1.0 - fraction(degrees))
+
+    def fraction(degrees: np.ndarray) -> np.ndarray:
+        return 0.5 * (1.0 + np.cos(np.pi * np.clip((degrees - 55.0) / 25.0, 0.0, 1.0)))
+
+    true = temperature(4.0)
+    measured = position(true) + rng.normal(0.0, NOISE, samples)
+    before, after = position(temperature(3.6)), position(true) + 1e-6
+    return RunFinding(
+        name=name,
+        role=role,
+        time=time,
+        inputs={"voltage": voltage, "mass": np.full(samples, 0.075)},
+        measured=measured,
+        before=before,
+        after=after,
+        states={"temperature": true, "martensite_fraction": fraction(true), "stress": np.full(samples, 41.6e6)},
+        offset_before=1.234567e-4,
+        offset_after=2.5e-6,
+        rmse_before=float(np.sqrt(np.mean((measured - before) ** 2))),
+        rmse_after=float(np.sqrt(np.mean((measured - after) ** 2))),
+    )
+
+
+def made_phase(samples: float, share: float, mean: float, rmse: float) -> dict[str, float]:
+    return {"samples": samples, "share_of_squared_error": share, "mean": mean, "rmse": rmse}
+
+
+def made_portrait(rmse: float, white: bool, sentences: tuple[str, ...]) -> Portrait:
+    return Portrait(
+        rmse=rmse,
+        noise_sigma=NOISE,
+        ratio=rmse / NOISE,
+        white=white,
+        whiteness_p_value=0.41 if white else 1.2e-48,
+        by_phase={
+            "heating, transforming": {
+                "samples": 310.0,
+                "share_of_squared_error": 0.71,
+                "mean": 3e-4,
+                "rmse": rmse * 1.6,
+            },
+            "cooling, transforming": {
+                "samples": 420.0,
+                "share_of_squared_error": 0.25,
+                "mean": -2e-4,
+                "rmse": rmse * 0.8,
+            },
+            "not transforming": made_phase(1670.0, 0.04, 0.0, rmse * 0.2),
+        },
+        correlation={"time": 0.01, "input": 0.34 if not white else 0.02, "martensite_fraction": NAN},
+        sentences=sentences,
+    )
+
+
+def made_effect(name: str, title: str, equation: str, left_out: float, added: bool = False) -> EffectFinding:
+    return EffectFinding(
+        name=name,
+        title=title,
+        equation=equation,
+        formula="m c_p dT/dt = ... + m dH dxi/dt (Elahinia 2004, eq. 3.1 with the latent heat that it leaves out)",
+        sentence="The wire takes up heat while it turns into austenite and gives it back while it returns.",
+        added=added,
+        coefficients={"enthalpy": CoefficientFinding(24187.3, 210.6, "J/kg")} if added else {},
+        evidence={
+            "score_statistic": 812.4 if added else 3.2,
+            "score_p_value": 3.1e-88 if added else 0.21,
+            "leave_one_out_rmse": left_out,
+            "leave_one_out_gain": 0.95 if added else NAN,
+        },
+    )
+
+
+@pytest.fixture(scope="module")
+def findings() -> Findings:
+    runs = (made_run("step 6 V", "fit", 0), made_run("<b>x</b>", "fit", 1), made_run("sine, held", "held-out", 2))
+    return Findings(
+        experiment="latent",
+        title="Dead weight, 75 g",
+        source="latent/experiment.toml",
+        verdict="explained",
+        summary=(
+            "The model lacks the latent heat of transformation: 24.2 ± 0.2 J/g.",
+            "With it the error on runs that were held out falls from 1.1 mm to 0.020 mm, the noise of the measurement.",
+        ),
+        unexplained=(),
+        cannot_know=("Convection coefficient and specific heat move together: no run cools from above 90 °C.",),
+        check=("3 runs, 2 to fit and 1 held out; 1200 samples each at 20 Hz.",),
+        output_name="position",
+        output_unit="m",
+        noise_sigma=NOISE,
+        noise_how="estimated from the flat part of the runs",
+        runs=runs,
+        before=(
+            ParameterFinding("convection_coefficient", "W/(m^2 K)", 131.45678, 0.812, 1.0, 5e3, 150.0, ""),
+            ParameterFinding("recoverable_strain", "-", 0.0461, 1.2e-5, 0.0, 0.12, 0.04, ""),
+            ParameterFinding("stress_slope_austenite", "Pa/K", 1e6, None, 1e6, 1e8, 6.89e6, "at its lower bound"),
+        ),
+        after=(
+            ParameterFinding("convection_coefficient", "W/(m^2 K)", 149.98765, 0.301, 1.0, 5e3, 150.0, ""),
+            ParameterFinding("recoverable_strain", "-", 0.0460, 1.1e-5, 0.0, 0.12, 0.04, ""),
+            ParameterFinding("stress_slope_austenite", "Pa/K", 6.9e6, 4e4, 1e6, 1e8, 6.89e6, ""),
+            ParameterFinding("latent_heat.enthalpy", "J/kg", 24187.3, 210.6, 0.0, 1e5, 1e4, ""),
+        ),
+        effects=(
+            made_effect("radiation", "radiation to the surroundings", "heat", 1.02e-3),
+            made_effect("latent_heat", "latent heat of transformation", "heat", 2.04e-5, added=True),
+            made_effect("sensor_lag", "lag of the sensor", "sensor", NAN),
+        ),
+        portrait_before=made_portrait(1.1e-3, False, ("71 % of it lies in heating while transforming.",)),
+        portrait_after=made_portrait(2.0e-5, True, ("The residual is white.",)),
+        rounds=(
+            Round(
+                1,
+                (("base", 1.1e-3), ("latent_heat", 2.04e-5), ("radiation", 1.02e-3)),
+                "latent_heat",
+                "Best by far.",
+            ),
+            Round(2, (("latent_heat + radiation", 2.05e-5),), "", "Nothing more is gained on runs left out."),
+        ),
+        provenance={"smajax": "0.1.0", "seed": "0", "command": "smajax close-loop latent/experiment.toml"},
+    )
+
+
+class Page(HTMLParser):
+    """What a browser would fetch, the text, the pictures and the numbers that cells carry."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.source = text
+        self.addresses: list[str] = []
+        self.tags: list[str] = []
+        self.text: list[str] = []
+        self.numbers: list[tuple[float, str]] = []  # (of the record, as shown)
+        self.cell: float | None = None
+        self.feed(text)
+
+    def handle_starttag(self, tag, attributes):
+        self.tags.append(tag)
+        values = dict(attributes)
+        self.addresses += [value for name in ("src", "href", "srcset", "action", "data") if (value := values.get(name))]
+        self.cell = float(values["data-v"]) if tag == "td" and "data-v" in values else None
+
+    def handle_data(self, data):
+        self.text.append(data)
+        if self.cell is not None:
+            self.numbers.append((self.cell, data))
+            self.cell = None
+
+    def images(self) -> list[np.ndarray]:
+        prefix = "data:image/png;base64,"
+        coded = [address.removeprefix(prefix) for address in self.addresses if address.startswith(prefix)]
+        return [np.asarray(Image.open(io.BytesIO(base64.b64decode(text))).convert("L")) for text in coded]
+
+
+@pytest.fixture(scope="module")
+def folder(findings, tmp_path_factory) -> Path:
+    """A folder that the report was written into once, over an older one."""
+    folder = tmp_path_factory.mktemp("out") / "new" / "report"
+    folder.mkdir(parents=True)
+    (folder / "report.html").write_text("older")
+    assert write_report(findings, folder) == folder / "report.html"
+    return folder
+
+
+@pytest.fixture(scope="module")
+def page(folder) -> Page:
+    return Page((folder / "report.html").read_text(encoding="utf-8"))
+
+
+def test_both_files_are_written_whole_and_nothing_else(folder, page):
+    assert sorted(entry.name for entry in folder.iterdir()) == ["report.html", "report.json"]
+    assert page.source.startswith("<!DOCTYPE html>")
+    assert page.source.rstrip().endswith("</html>")
+
+
+def test_the_folder_is_made(findings, tmp_path, monkeypatch):
+    monkeypatch.setattr("smajax.report.write.findings_to_html", lambda findings: "page")
+    assert write_report(findings, tmp_path / "a" / "b").read_text() == "page"
+
+
+@pytest.mark.parametrize("below", ["", "deeper"])
+def test_a_file_in_the_folders_place_is_refused_by_name(findings, tmp_path, below):
+    (tmp_path / "taken").write_text("kept")
+    with pytest.raises(NotADirectoryError, match=r"taken.*expected a folder"):
+        write_report(findings, tmp_path / "taken" / below)
+    assert (tmp_path / "taken").read_text() == "kept"
+
+
+def test_json_is_strict_and_holds_the_record(findings, folder):
+    def refuse(name: str) -> None:
+        raise AssertionError(f"{name} is not JSON")
+
+    read = json.loads((folder / "report.json").read_text(encoding="utf-8"), parse_constant=refuse)
+    assert read == findings_to_json(findings)
+    assert read["verdict"] == "explained"
+    assert read["output"] == {
+        "name": "position",
+        "unit": "m",
+        "noise_sigma": NOISE,
+        "noise_how": "estimated from the flat part of the runs",
+    }
+    assert [run["rmse_before"] for run in read["runs"]] == [run.rmse_before for run in findings.runs]
+    assert read["runs"][2]["role"] == "held-out"
+    assert read["runs"][2]["samples"] == 1200
+    assert read["before"]["parameters"]["stress_slope_austenite"]["standard_error"] is None
+    assert read["after"]["parameters"]["latent_heat.enthalpy"]["value"] == 24187.3
+    latent = next(effect for effect in read["effects"] if effect["added"])
+    assert latent["name"] == "latent_heat"
+    assert latent["coefficients"]["enthalpy"] == {"value": 24187.3, "standard_error": 210.6, "unit": "J/kg"}
+
+
+def test_what_is_no_number_is_null(findings):
+    run = dataclasses.replace(findings.runs[0], rmse_after=float("inf"), offset_after=NAN)
+    read = findings_to_json(dataclasses.replace(findings, runs=(run,)))
+    assert read["runs"][0]["rmse_after"] is None
+    assert read["runs"][0]["offset_after"] is None
+    assert read["effects"][2]["evidence"]["leave_one_out_rmse"] is None
+
+
+def test_numpy_scalars_are_plain_numbers_and_arrays_lists(findings):
+    run = dataclasses.replace(findings.runs[0], rmse_after=np.float32(0.5))
+    assert findings_to_json(dataclasses.replace(findings, runs=(run,)))["runs"][0]["rmse_after"] == 0.5
+
+
+def test_the_page_fetches_nothing(page):
+    assert page.addresses
+    assert [address for address in page.addresses if not address.startswith(("#", "data:"))] == []
+    assert not re.search(r"@import|url\(|https?://", page.source)
+
+
+def test_names_are_text_and_never_markup(page):
+    assert "b" not in page.tags
+    assert "<b>x</b>" in page.text
+
+
+def test_the_verdict_comes_first(page, findings):
+    text = " ".join(page.text)
+    assert text.index(findings.summary[0]) < text.index("Error of every run") < text.index("What was added, and why")
+
+
+def test_every_contents_entry_leads_somewhere(page):
+    targets = set(re.findall(r'id="([^"]+)"', page.source))
+    links = set(re.findall(r'href="#([^"]+)"', page.source))
+    assert len(links) > 10
+    assert links <= targets
+
+
+def test_no_picture_is_blank(page, findings):
+    images = page.images()
+    assert len(images) == 2 * len(findings.runs) + 4
+    for image in images:
+        assert image.shape[1] > 500
+        assert image.std() > 10.0
+
+
+def test_numbers_in_tables_are_those_of_the_record(page, findings):
+    carried = [value for value, _ in page.numbers]
+    for run in findings.runs:
+        assert run.rmse_before in carried
+        assert run.rmse_after in carried
+    for found in (*findings.before, *findings.after):
+        assert found.value in carried
+    assert (findings.runs[0].rmse_before, f"{1e3 * findings.runs[0].rmse_before:.3g}") in page.numbers  # shown in mm
+    assert (24187.3, "24.19 ± 0.21") in page.numbers  # J/g
+    assert (0.0461, "4.6100 ± 0.0012") in page.numbers  # a strain, per cent
+    assert (1e6, "1") in page.numbers  # MPa/K, no standard error to show
+
+
+def test_a_model_that_lacks_nothing_has_one_column(findings):
+    effects = tuple(dataclasses.replace(effect, added=False) for effect in findings.effects)
+    runs = tuple(dataclasses.replace(run, after=run.before, rmse_after=run.rmse_before) for run in findings.runs)
+    adequate = dataclasses.replace(findings, verdict="adequate", effects=effects, runs=runs, rounds=())
+    page = Page(findings_to_html(adequate))
+    headings = " ".join(page.text)
+    assert "The model is adequate" in headings
+    assert "offset after" not in headings
+    assert all(image.std() > 5.0 for image in page.images())
+
+
+def test_a_diverged_model_is_still_drawn(findings):
+    run = dataclasses.replace(findings.runs[0], before=np.full(1200, NAN), rmse_before=NAN)
+    broken = dataclasses.replace(findings, runs=(run, *findings.runs[1:]))
+    assert all(image.std() > 10.0 for image in Page(findings_to_html(broken)).images())
+
+
+def test_a_run_without_a_temperature_has_no_hysteresis_picture(findings):
+    assert pictures.run_hysteresis(findings, dataclasses.replace(findings.runs[0], states={})) is None
+
+
+def test_long_runs_keep_their_peaks(findings):
+    time = np.linspace(0.0, 1.0, 100_003)
+    values = np.zeros_like(time)
+    values[77_777], values[100_002] = 5.0, -3.0
+    thin_time, thin_values = pictures._extremes(time, values)
+    assert len(thin_time) < 2 * pictures.SAMPLES_DRAWN
+    assert (thin_values.max(), thin_values.min()) == (5.0, -3.0)
+    assert thin_time[thin_values.argmax()] == time[77_777]
+    assert np.all(np.diff(thin_time) >= 0.0)
+
+
+def test_autocorrelation_of_white_noise_and_of_a_sine():
+    rng = np.random.default_rng(0)
+    white = pictures.autocorrelation([rng.normal(size=20_000), rng.normal(size=10_000)], 50)
+    assert white[0] == 1.0
+    assert np.abs(white[1:]).max() < 4.0 / np.sqrt(30_000)
+    sine = pictures.autocorrelation([np.sin(2.0 * np.pi * np.arange(10_000) / 100.0)], 100)
+    assert sine[50] == pytest.approx(-1.0, abs=0.01)
+    assert sine[100] == pytest.approx(1.0, abs=0.011)
+
+
+@pytest.mark.parametrize(
+    ("unit", "quantity", "value", "text"),
+    [
+        ("m", "position", 0.0123456, "12.35"),
+        ("rad", "angle", np.pi / 4.0, "45"),
+        ("-", "strain", 0.041, "4.1"),
+        ("-", "martensite_fraction", 0.041, "0.041"),
+        ("Pa", "stress", 172e6, "172"),
+        ("N s/m", "damping", 2.0, "2"),
+        ("W/(m^2 K)", "", 1.0e-7, "1e-7"),
+        ("m", "position", NAN, "–"),
+    ],
+)
+def test_units_at_the_edge(unit, quantity, value, text):
+    assert digits(display(unit, quantity).of(value)) == text
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "text"),
+    [
+        (149.98765, 0.301, "149.99 ± 0.30"),
+        (24.1873, 0.2106, "24.19 ± 0.21"),
+        (2.0, None, "2"),
+        (2.0, NAN, "2"),
+        (71234.0, 512.0, "7.123e4 ± 5.1e2"),
+        (3.2e-9, 1.1e-9, "3.2e-9 ± 1.1e-9"),
+        (NAN, 0.1, "–"),
+    ],
+)
+def test_an_error_sets_the_decimals_of_its_value(value, error, text):
+    assert with_error(value, error) == text

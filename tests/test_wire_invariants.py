@@ -1,0 +1,142 @@
+"""What the source promises of any wire, any drive, any load: checked on random ones."""
+
+from __future__ import annotations
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from smajax.effects.library import LIBRARY, at_base
+from smajax.extended import extended
+from smajax.parameters import get_parameters, parameters, set_parameters
+from smajax.presets import build
+from smajax.simulate import simulate
+from smajax.wire.constitutive import young_modulus
+
+RIGS = {
+    "arm": (build("niti_table_3_1", "arm", "amplified_voltage"), "voltage", 9.0),
+    "dead_weight": (build("flexinol_table_3_2", "dead_weight", "voltage"), "voltage", 12.0),
+    "bias_spring": (build("flexinol_ht_500um", "bias_spring", "duty"), "duty", 0.3),
+}
+RUN = eqx.filter_jit(simulate)
+SAMPLES = 400
+DT = 0.02
+
+
+def _inputs(channel: str, top: float, levels: list[float]) -> dict[str, jax.Array]:
+    steps = jnp.repeat(jnp.asarray(levels), SAMPLES // len(levels))
+    return {channel: top * jnp.pad(steps, (0, SAMPLES - len(steps)), mode="edge")}
+
+
+def _spread(system: eqx.Module, shares: list[float]) -> eqx.Module:
+    """Every parameter moved by up to half of itself, within its declared bounds."""
+    table = parameters(system)
+    names = list(table)
+    moved = {}
+    for index, name in enumerate(names):
+        value = float(get_parameters(system, [name])[0])
+        share = shares[index % len(shares)]
+        moved[name] = float(np.clip(value * (0.5 + share), table[name].low, table[name].high))
+    return set_parameters(system, moved)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    rig=st.sampled_from(sorted(RIGS)),
+    levels=st.lists(st.floats(0.0, 1.0), min_size=4, max_size=4),
+    shares=st.lists(st.floats(0.0, 1.0), min_size=7, max_size=7),
+)
+def test_fraction_stays_in_range_and_stress_is_never_negative(rig: str, levels: list[float], shares: list[float]) -> None:
+    system, channel, top = RIGS[rig]
+    run = RUN(_spread(system, shares), _inputs(channel, top, levels), DT)
+    for name in ("temperature", "stress", "strain", "martensite_fraction", "position", "velocity", "reading"):
+        assert np.isfinite(getattr(run, name)).all(), f"{name} is not finite"
+    assert run.martensite_fraction.min() >= 0.0
+    assert run.martensite_fraction.max() <= 1.0
+    assert run.stress.min() >= 0.0
+
+
+@settings(max_examples=15, deadline=None)
+@given(
+    levels=st.lists(st.floats(0.0, 1.0), min_size=4, max_size=4),
+    shares=st.lists(st.floats(0.05, 0.95), min_size=5, max_size=5),
+)
+def test_fraction_stays_in_range_with_every_effect_on(levels: list[float], shares: list[float]) -> None:
+    system, channel, top = RIGS["dead_weight"]
+    full = extended(system, tuple(LIBRARY))
+    names = [name for name in parameters(full) if "." in name]
+    table = parameters(full)
+    # A tenth of each coefficient's box: the whole of it lets expansion alone outrun the recoverable strain.
+    on = {
+        name: float(np.clip(0.1 * (table[name].low + shares[k % 5] * (table[name].high - table[name].low)), table[name].low, table[name].high))
+        for k, name in enumerate(names)
+    }
+    run = RUN(set_parameters(full, on), _inputs(channel, top, levels), DT)
+    assert np.isfinite(run.position).all()
+    assert np.isfinite(run.temperature).all()
+    assert 0.0 <= float(run.martensite_fraction.min()) <= float(run.martensite_fraction.max()) <= 1.0
+
+
+def test_every_effect_at_its_base_value_is_the_base_model() -> None:
+    for rig, (system, channel, top) in RIGS.items():
+        inputs = _inputs(channel, top, [0.8, 0.2, 1.0, 0.0])
+        plain = RUN(system, inputs, DT)
+        for name in LIBRARY:
+            same = RUN(extended(system, (name,)), inputs, DT)
+            for which in ("temperature", "martensite_fraction", "stress", "reading"):
+                np.testing.assert_allclose(
+                    getattr(same, which), getattr(plain, which), rtol=1e-12, atol=1e-12, err_msg=f"{rig}, {name}, {which}"
+                )
+
+
+def test_every_effect_changes_something_off_its_base_value() -> None:
+    system, channel, top = RIGS["dead_weight"]
+    inputs = _inputs(channel, top, [0.75, 0.2, 0.8, 0.0])
+    plain = RUN(system, inputs, DT)
+    for name, effect in LIBRARY.items():
+        starts = {f"{name}.{coefficient}": size for coefficient, size in effect.starts.items()}
+        moved = RUN(extended(system, (name,), starts), inputs, DT)
+        assert float(jnp.abs(moved.reading - plain.reading).max()) > 1e-6, f"{name} changes nothing"
+
+
+def test_stored_states_satisfy_the_rate_form_without_drift() -> None:
+    """Eq. 3.2 summed over the stored stage ends gives back the stored stress (taut wire), over many cycles."""
+    system, channel, top = RIGS["dead_weight"]
+    cycle = jnp.concatenate([jnp.full(150, 0.7), jnp.full(150, 0.0)])
+    run = RUN(system, {channel: top * jnp.tile(cycle, 40)}, DT)
+    wire = system.wire
+    # At constant load the stress is m g / A_w whenever the mass is at rest, whatever happened before.
+    resting = np.arange(299, 300 * 40, 300)
+    expected = 0.075 * 9.81 / (0.25 * np.pi * 150e-6**2)
+    np.testing.assert_allclose(run.stress[resting], expected, rtol=1e-6)
+    # The wire's own strain is the geometric one at every step: nothing was lost to a clipped fraction.
+    np.testing.assert_allclose(run.strain, -run.position / wire.wire_length, atol=1e-12)
+
+
+def test_one_step_satisfies_the_constitutive_increment() -> None:
+    system, _, _ = RIGS["dead_weight"]
+    from smajax.load.coupon import Coupon
+
+    coupon = eqx.tree_at(lambda s: s.load, system, Coupon(), is_leaf=lambda x: x is system.load)
+    temperature = jnp.concatenate([jnp.linspace(23.0, 120.0, 200), jnp.linspace(120.0, 23.0, 200)])
+    stress = 1e6 * (60.0 + 40.0 * jnp.sin(jnp.linspace(0.0, 9.0, 400)))
+    run = RUN(coupon, {"temperature": temperature, "stress": stress}, 1.0)
+    wire = system.wire
+    xi, law = run.martensite_fraction, system.wire.constitutive
+    modulus = young_modulus(wire, 0.5 * (xi[1:] + xi[:-1]))
+    increment = (
+        modulus * (jnp.diff(run.strain) - law.recoverable_strain * jnp.diff(xi)) + law.thermal_modulus * jnp.diff(run.temperature)
+    )
+    np.testing.assert_allclose(jnp.cumsum(increment), run.stress[1:] - run.stress[0], rtol=1e-8, atol=1.0)
+
+
+def test_at_base_refuses_an_unknown_effect() -> None:
+    try:
+        at_base(("latent_heet",))
+    except KeyError as error:
+        assert "latent_heat" in str(error)
+    else:
+        raise AssertionError("an unknown effect was accepted")
