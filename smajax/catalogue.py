@@ -20,14 +20,18 @@ def describe(wire: str, load: str, drive: str) -> ModelDescription:
         )
     name, unit = system.load.reading
     return ModelDescription(
-        parameters={entry.name: ParameterInfo(entry.unit, entry.low, entry.high) for entry in parameters(system).values()},
+        parameters={
+            entry.name: ParameterInfo(entry.unit, entry.low, entry.high) for entry in parameters(system).values()
+        },
         inputs_required=system.load.inputs_required | system.drive.inputs_required,
         inputs_optional=system.load.inputs_optional | system.drive.inputs_optional | {"ambient_temperature"},
         outputs={name: unit},
     )
 
 
-CATALOGUE = Catalogue(wires=tuple(WIRES), loads=tuple(LOADS), drives=tuple(DRIVES), effects=tuple(LIBRARY), describe=describe)
+CATALOGUE = Catalogue(
+    wires=tuple(WIRES), loads=tuple(LOADS), drives=tuple(DRIVES), effects=tuple(LIBRARY), describe=describe
+)
 
 
 def candidates(system: System, only: tuple[str, ...] | None, excluded: tuple[str, ...]) -> tuple[str, ...]:

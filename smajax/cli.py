@@ -67,7 +67,9 @@ def close_loop_command(
 
     Example:  smajax close-loop experiment.toml --out report
     """
-    findings, page = _loop(experiment, out, f"smajax close-loop {shlex.quote(str(experiment))} --out {shlex.quote(str(out))}")
+    findings, page = _loop(
+        experiment, out, f"smajax close-loop {shlex.quote(str(experiment))} --out {shlex.quote(str(out))}"
+    )
     if json_out:
         from smajax.report.json_file import findings_to_json
 

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.stats import qmc
 
 from smajax.attribution.memory import Memory
-from smajax.attribution.search import Evidence, Model, Search, scores_at, search
+from smajax.attribution.search import Evidence, Model, Search, Start, scores_at, search
 from smajax.attribution.verdict import cannot_know, summary, unexplained, verdict
 from smajax.catalogue import candidates
 from smajax.effects.library import LIBRARY
@@ -26,7 +26,7 @@ from smajax.extended import base_model, extended
 from smajax.fit.batch import RunBatch, pack, simulate_batch
 from smajax.fit.problem import Problem
 from smajax.fit.sensitivity import Sensitivity, sensitivity
-from smajax.fit.solve import LANES, Progress, Solution, quiet
+from smajax.fit.solve import Progress, Solution, quiet
 from smajax.fit.uncertainty import Uncertainty, identifiability, uncertainty
 from smajax.parameters import parameters
 from smajax.report.findings import (
@@ -43,6 +43,7 @@ from smajax.types import Trajectory
 SEED = 2004
 # The starts beside the given one are spread over this share of each box, around the given start.
 SPREAD = 0.4
+STARTS = 4
 
 
 @dataclass(frozen=True)
@@ -83,7 +84,7 @@ def close_loop(
     once, at the very end. The caller chooses precision; anything but float64 is refused with a ValueError, because the
     differences that decide here are far below float32's rounding over a run.
     """
-    if not jax.config.jax_enable_x64:
+    if jnp.zeros(()).dtype != jnp.float64:
         raise ValueError(
             "close_loop needs float64, but JAX runs in float32. Call `jax.config.update('jax_enable_x64', True)` first."
         )
@@ -96,7 +97,7 @@ def close_loop(
     check = [*experiment.warnings, *identifiability(at_start, job.unknowns, job.bounds)]
     progress("checking what these runs can tell", 1.0)
     for line in check:
-        progress(f"check: {line}", 1.0)
+        progress(f"say: check: {line}", 1.0)
 
     setting = Search(job.problem, job.unknowns, job.bounds, job.candidates, kept.solve, progress)
     base = _base_fit(job, setting, start, seed)
@@ -135,10 +136,10 @@ def close_loop(
 
 def _base_fit(job: _Job, setting: Search, start: np.ndarray, seed: int) -> Solution:
     """Base model from the declared start and from Sobol points around it, in one batch."""
-    names, slots = job.problem.names, setting.slots(())
+    names = job.problem.names
     points = [start]
     sobol = qmc.Sobol(len(job.unknowns), seed=seed)
-    for shares in sobol.random(LANES)[: LANES - 1]:
+    for shares in sobol.random(STARTS)[: STARTS - 1]:
         point = np.array(start)
         for name, share in zip(job.unknowns, shares, strict=True):
             low, high = job.bounds[name]
@@ -147,8 +148,7 @@ def _base_fit(job: _Job, setting: Search, start: np.ndarray, seed: int) -> Solut
                 middle + SPREAD * (share - 0.5) * (high - low), low + 0.02 * (high - low), high - 0.02 * (high - low)
             )
         points.append(point)
-    lanes = [setting.lane((), point, slots) for point in points]
-    solutions = setting.solve(job.problem, lanes, progress=setting.progress, what="fitting the base model")
+    solutions, _ = setting.fit([Start((), point) for point in points], "fitting the base model")
     return min(solutions, key=lambda solution: solution.cost)
 
 
@@ -208,7 +208,14 @@ def _effects(job: _Job, setting: Search, final: Model, after: _Told) -> tuple[Ef
         }
         findings.append(
             EffectFinding(
-                name, effect.title, effect.equation, effect.formula, effect.sentence, name in final.effects, coefficients, evidence
+                name,
+                effect.title,
+                effect.equation,
+                effect.formula,
+                effect.sentence,
+                name in final.effects,
+                coefficients,
+                evidence,
             )
         )
     return tuple(sorted(findings, key=lambda f: (not f.added, -np.nan_to_num(f.evidence["score_gain"]))))
@@ -239,7 +246,10 @@ def _compare(job: _Job, first: Model, final: Model) -> tuple[tuple[RunFinding, .
             if run.role == "fit":
                 residuals[which].append(run.output - readings[which])
                 states[which].append(_series(run, trajectory, index))
-        shown = {name: np.asarray(getattr(after, name))[index, :n] for name in ("temperature", "martensite_fraction", "stress")}
+        shown = {
+            name: np.asarray(getattr(after, name))[index, :n]
+            for name in ("temperature", "martensite_fraction", "stress")
+        }
         runs.append(
             RunFinding(
                 run.name,

@@ -15,15 +15,18 @@ from smajax.fit.solve import Progress as Report
 
 @contextmanager
 def shown(console: Console) -> Iterator[Report]:
-    """Yields `report(what, share)`; share 1 closes the stage. Lines that begin with "check: " are said, not measured."""
+    """Yields `report(what, share)`; share 1 closes the stage. What begins with "say: " is a sentence, not a stage."""
     began = clock.monotonic()
     if not sys.stderr.isatty():
         last = ""
 
         def line(what: str, share: float) -> None:
             nonlocal last
-            if what.startswith("check: ") or (what != last and share < 1.0):
-                console.print(f"[{clock.monotonic() - began:6.1f} s] {what}", markup=False, highlight=False, soft_wrap=True)
+            if what.startswith("say: ") or (what != last and share < 1.0):
+                told = what.removeprefix("say: ")
+                console.print(
+                    f"[{clock.monotonic() - began:6.1f} s] {told}", markup=False, highlight=False, soft_wrap=True
+                )
                 last = what
 
         yield line
@@ -33,8 +36,8 @@ def shown(console: Console) -> Iterator[Report]:
         open_tasks: dict[str, TaskID] = {}
 
         def move(what: str, share: float) -> None:
-            if what.startswith("check: "):
-                bar.console.print(what, markup=False, highlight=False)
+            if what.startswith("say: "):
+                bar.console.print(what.removeprefix("say: "), markup=False, highlight=False)
                 return
             if what not in open_tasks:
                 open_tasks[what] = bar.add_task(what, total=1.0)

@@ -19,7 +19,7 @@ fixed, has the derivative that the implicit function theorem gives, in forward a
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import equinox as eqx
 import jax
@@ -34,6 +34,8 @@ from smajax.wire.constitutive import strain_at, stress_at, young_modulus
 from smajax.wire.heat import cross_section, heat_rate, stored_heat
 from smajax.wire.kinetics import Branch, choose_branch, curves, fraction_on, open_branches, renewed, steepest_slope
 from smajax.wire.resistance import resistance_per_metre
+
+Tree = TypeVar("Tree")
 
 GAMMA = 1.0 - 0.5**0.5
 MOST_ITERATIONS = 25
@@ -147,16 +149,18 @@ class _Iterate(NamedTuple):
     at_low: Scalar  # kinetic residual there; infinite while it has not been tried
     at_high: Scalar
     finished: Scalar  # bool
-    count: Scalar
+    iterations: Scalar
 
 
-def _linearised(system: System, stage: Stage, inputs: Inputs, branch: Branch, z: Unknowns):
+def _linearised(
+    system: System, stage: Stage, inputs: Inputs, branch: Branch, z: Unknowns
+) -> tuple[list[Scalar], list[list[Scalar]], tuple[Scalar, Scalar]]:
     """(residual, Jacobian rows, kinetic curves) at `z`."""
     columns = []
     for field in Unknowns._fields:
         # One unknown at a time: what does not depend on it is then known to have no derivative and is never computed,
         # which a batched `jacfwd` cannot know.
-        def along(value: Scalar, field: str = field):
+        def along(value: Scalar, field: str = field) -> tuple[Unknowns, tuple[Scalar, Scalar]]:
             return _residual(system, stage, inputs, branch, z._replace(**{field: value}))
 
         here = getattr(z, field)
@@ -216,7 +220,7 @@ def _solved(system: System, stage: Stage, inputs: Inputs) -> _Iterate:
         change = jnp.maximum(change, jnp.abs(position - at.z.position) / position_scale)
         # Never on the first iteration: the trial must have moved before it is asked which branch it is on.
         small = jnp.maximum(change, jnp.abs(step[2]) / stress_scale) <= TOLERANCE
-        converged = small & (at.count > 0)
+        converged = small & (at.iterations > 0)
         asked = choose_branch(law, old, open_at_start, at.z.temperature, at.z.stress, heated, cooled)
         starts = at.trying & converged & (asked.heating | asked.cooling)
         return _Iterate(
@@ -229,11 +233,11 @@ def _solved(system: System, stage: Stage, inputs: Inputs) -> _Iterate:
             jnp.where(at.trying, -jnp.inf, at_low),
             jnp.where(at.trying, jnp.inf, at_high),
             converged & ~starts,
-            at.count + 1,
+            at.iterations + 1,
         )
 
     def unfinished(at: _Iterate) -> Scalar:
-        return ~at.finished & (at.count < MOST_ITERATIONS)
+        return ~at.finished & (at.iterations < MOST_ITERATIONS)
 
     no, zero = jnp.zeros_like(xi, bool), jnp.zeros_like(xi)
     guess = Unknowns(old.temperature, stage.old.motion.position, old.stress, xi)
@@ -252,7 +256,7 @@ def _solved(system: System, stage: Stage, inputs: Inputs) -> _Iterate:
     return lax.while_loop(unfinished, iterate, first)
 
 
-def _held(tree):
+def _held(tree: Tree) -> Tree:
     return jax.tree.map(lax.stop_gradient, tree)
 
 
@@ -319,9 +323,7 @@ def _coupon_step(system: System, state: State, inputs: Inputs, dt: Scalar) -> St
     xi = fraction_on(old, branch, heated, cooled)
     xi_M, xi_A = renewed(wire.kinetics, effects, old, branch, temperature, stress, xi)
     strain = strain_at(wire, effects, old, temperature, stress, xi)
-    return State(
-        state.time + dt, WireState(temperature, stress, strain, xi, xi_M, xi_A), state.motion, state.reading
-    )
+    return State(state.time + dt, WireState(temperature, stress, strain, xi, xi_M, xi_A), state.motion, state.reading)
 
 
 def step(system: System, state: State, inputs: Inputs, dt: Scalar | float) -> State:

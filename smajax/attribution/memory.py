@@ -24,10 +24,18 @@ class Memory:
         self.reused = 0
 
     def solve(
-        self, problem: Problem, lanes: Sequence[Lane], *, progress: Progress = quiet, what: str = "fitting", **settings: Any
+        self,
+        problem: Problem,
+        lanes: Sequence[Lane],
+        *,
+        progress: Progress = quiet,
+        what: str = "fitting",
+        **settings: Any,
     ) -> list[Solution]:
         """As `fit.solve.solve`."""
-        digest = hashlib.sha256(repr((smajax.__version__, jax.__version__, problem.names, sorted(settings.items()))).encode())
+        digest = hashlib.sha256(
+            repr((smajax.__version__, jax.__version__, problem.names, sorted(settings.items()))).encode()
+        )
         digest.update(repr((problem.batch.dt, problem.offset, problem.batch.override_names)).encode())
         for leaf in jax.tree.leaves((problem.system, problem.batch, problem.noise_sigma, list(lanes))):
             digest.update(np.asarray(leaf).tobytes())

@@ -90,6 +90,12 @@ def _scaled(columns: np.ndarray) -> np.ndarray:
     return columns[:, norm > 0.0] / norm[norm > 0.0]
 
 
-def significant(scores: Sequence[Score], level: float) -> bool:
-    """Does any of the scores stand out among that many looks? (Bonferroni)"""
-    return bool(scores) and min(score.p_value for score in scores) * len(scores) < level
+def significant(scores: Sequence[Score], level: float, least_gain: float) -> bool:
+    """Does any score stand out among that many looks (Bonferroni), and promise more than `least_gain` a coefficient?
+
+    The second half keeps a search from starting for what it could not accept: many samples make the tiniest bias of
+    the integrator significant.
+    """
+    return any(
+        score.p_value * len(scores) < level and score.gain > least_gain * len(score.coefficients) for score in scores
+    )

@@ -7,6 +7,7 @@ the best candidate does not predict left-out runs better beyond a penalty per co
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -14,21 +15,31 @@ import numpy as np
 
 from smajax.attribution.screen import Score, screen, significant, switches
 from smajax.effects.library import LIBRARY
-from smajax.fit.problem import Lane, Problem
+from smajax.fit.problem import Problem
 from smajax.fit.sensitivity import sensitivity
 from smajax.fit.solve import Progress, Solution, misfits, quiet
 from smajax.fit.uncertainty import held
 from smajax.report.findings import Round
 from smajax.residual.noise_like import correlation_time, split_runs
 
-SIGNIFICANT = 0.01  # of the score tests of one round, counted together
+SIGNIFICANT = 1e-3  # of the score tests of one round, counted together
 PENALTY = 0.01  # by how much of its mean square a coefficient must lower the error on left-out runs
 CHANCE = 2.0  # by how many standard errors of the paired difference, too
-SINGLES, PAIRS = 5, 3  # refitted in a round: eight lanes, one batch
+SINGLES, PAIRS = 6, 2  # refitted in a round
+NEARLY_GAUSS_NEWTON = 1e6  # `start_cost` of a fit that begins close to its optimum
 JUDGED = 3  # candidates taken to the left-out runs
 MOST_ROUNDS = 6
 
 Solve = Callable[..., list[Solution]]  # `fit.solve.solve`, or that with a memory
+
+
+@dataclass(frozen=True)
+class Start:
+    """Where one fit begins: the effects whose coefficients are free, all parameters, and the run that is left out."""
+
+    effects: tuple[str, ...]
+    values: np.ndarray  # (P + 1,), in the order of the whole library's problem
+    without: int | None = None
 
 
 @dataclass(frozen=True)
@@ -65,6 +76,12 @@ class Search:
     evidence: dict[str, Evidence] = field(default_factory=dict)
     rounds: list[Round] = field(default_factory=list)
 
+    def note(self, done: Round) -> None:
+        """Keep a round and say what came of it."""
+        self.rounds.append(done)
+        told = f"round {done.number}: {done.chosen or 'nothing added'}; {done.why}"
+        self.progress(f"say: {told}", 1.0)
+
     def free(self, effects: Sequence[str]) -> list[str]:
         """Every free parameter of a model with `effects`."""
         return [*self.unknowns, *(name for effect in effects for name in self.coefficients(effect))]
@@ -72,37 +89,47 @@ class Search:
     def coefficients(self, effect: str) -> list[str]:
         return [name for name in self.problem.names if name.startswith(f"{effect}.")]
 
-    def slots(self, effects: Sequence[str]) -> int:
-        """Slots that a round starting from `effects` needs: room for the two largest candidates together."""
-        sizes = sorted((len(self.coefficients(name)) for name in self.candidates), reverse=True)
-        return len(self.free(effects)) + sum(sizes[:2])
+    def restricted(self, effects: Sequence[str]) -> Problem:
+        """The same runs with a model that carries only `effects`: what is not in play costs nothing in a fit."""
+        kept = tuple(effect for effect in self.problem.system.effects if effect.effect_name in effects)
+        system = dataclasses.replace(self.problem.system, effects=kept)
+        return Problem.build(system, self.problem.batch, self.problem.noise_sigma, self.problem.offset)
 
-    def lane(self, effects: Sequence[str], values: np.ndarray, slots: int, without: int | None = None) -> Lane:
-        weights = np.ones(self.problem.batch.output.shape[0])
-        if without is not None:
-            weights[without] = 0.0
-        return self.problem.lane(self.free(effects), self.bounds, values, slots, weights)
+    def fit(self, starts: Sequence[Start], what: str, **settings: float) -> tuple[list[Solution], np.ndarray]:
+        """Fit every start in one go: (solutions with full parameter vectors, misfit of all runs at each, (S, R, N))."""
+        together = [name for name in self.candidates if any(name in start.effects for start in starts)]
+        problem = self.restricted(together)
+        slots = max(len(self.free(start.effects)) for start in starts)
+        index = [self.problem.names.index(name) for name in problem.names] + [len(self.problem.names)]
+        lanes = []
+        for start in starts:
+            weights = np.ones(problem.batch.output.shape[0])
+            if start.without is not None:
+                weights[start.without] = 0.0
+            lanes.append(problem.lane(self.free(start.effects), self.bounds, start.values[index], slots, weights))
+        solutions = self.solve(problem, lanes, progress=self.progress, what=what, **settings)
+        found = misfits(problem, [solution.values for solution in solutions])
+        whole = []
+        for start, solution in zip(starts, solutions, strict=True):
+            values = np.array(start.values)
+            values[index] = solution.values
+            whole.append(dataclasses.replace(solution, values=values))
+        return whole, found
 
     def rmse(self, misfit: np.ndarray) -> float:
         return float(np.sqrt((misfit**2).sum() / np.asarray(self.problem.batch.mask).sum()))
 
-    def judged(self, fitted: Sequence[tuple[tuple[str, ...], Solution]], slots: int) -> list[Model]:
+    def judged(self, fitted: Sequence[tuple[tuple[str, ...], Solution]]) -> list[Model]:
         """Leave each fit run out in turn, refit to the others from the full fit, and predict the one left out."""
         runs = self.problem.batch.output.shape[0]
-        if runs < 2:  # nothing can be left out: the fit itself is all there is, and the report says so
-            everything = misfits(self.problem, [solution.values for _, solution in fitted])
-            return [
-                Model(effects, solution.values, solution.cost, misfit, self.rmse(misfit))
-                for (effects, solution), misfit in zip(fitted, everything, strict=True)
-            ]
-        lanes = [self.lane(effects, s.values, slots, run) for effects, s in fitted for run in range(runs)]
-        folds = self.solve(
-            self.problem, lanes, legs=3, enough=1e-2, progress=self.progress, what="predicting runs left out"
-        )
-        everything = misfits(self.problem, [fold.values for fold in folds])
+        # With one run nothing can be left out: the fit itself is all there is, and the report says so.
+        folds: list[int | None] = list(range(runs)) if runs > 1 else [None]
+        starts = [Start(effects, solution.values, run) for effects, solution in fitted for run in folds]
+        _, found = self.fit(starts, "predicting runs left out", legs=3, enough=5e-3, start_cost=NEARLY_GAUSS_NEWTON)
         models = []
-        for index, (effects, solution) in enumerate(fitted):
-            left_out = np.stack([everything[index * runs + run, run] for run in range(runs)])
+        for place, (effects, solution) in enumerate(fitted):
+            own = found[place * len(folds) : (place + 1) * len(folds)]
+            left_out = np.stack([own[run, run] for run in range(runs)]) if runs > 1 else own[0]
             models.append(Model(effects, solution.values, solution.cost, left_out, self.rmse(left_out)))
         return models
 
@@ -148,47 +175,63 @@ def start_values(model_values: np.ndarray, names: Sequence[str], score: Score) -
 def search(setting: Search, base: Solution) -> tuple[Model, Model]:
     """(base model, final model). Fills `setting.evidence` and `setting.rounds` on the way."""
     problem, names = setting.problem, setting.problem.names
-    slots = setting.slots(())
-    first = setting.judged([((), base)], slots)[0]
+    first = setting.judged([((), base)])[0]
     model = first
     for number in range(1, MOST_ROUNDS + 1):
         left = [name for name in setting.candidates if name not in model.effects]
         singles, pairs = scores_at(setting, model, left)
         for score in singles:
             setting.evidence.setdefault(score.effects[0], Evidence(first_score=score))
-        if not significant(singles, SIGNIFICANT) and not significant(pairs, SIGNIFICANT):
-            lowest = min((score.p_value for score in singles), default=1.0)
-            why = f"no candidate stands out in the score test (smallest p-value {lowest:.2g} of {len(singles)})"
-            setting.rounds.append(Round(number, (), "", why))
+        if not any(significant(scores, SIGNIFICANT, PENALTY) for scores in (singles, pairs)):
+            most = max((score.gain for score in singles), default=0.0)
+            why = (
+                f"no candidate stands out in the score test: none of {len(singles)} promises more than {most:.1%} of "
+                "the mean square"
+            )
+            setting.note(Round(number, (), "", why))
             break
-        slots = setting.slots(model.effects)
         chosen = [*singles[:SINGLES], *pairs[:PAIRS]]
-        lanes = [
-            setting.lane((*model.effects, *score.effects), start_values(model.values, names, score), slots)
-            for score in chosen
-        ]
-        solutions = setting.solve(problem, lanes, progress=setting.progress, what=f"round {number}: refitting candidates")
+        starts = [Start((*model.effects, *score.effects), start_values(model.values, names, score)) for score in chosen]
+        solutions, _ = setting.fit(starts, f"round {number}: refitting candidates", legs=4, enough=1e-2)
         fitted = [((*model.effects, *s.effects), solution) for s, solution in zip(chosen, solutions, strict=True)]
         if number == 1:
             samples = float(np.asarray(problem.batch.mask).sum())
             for effects, solution in fitted:
                 if len(effects) == 1:
-                    setting.evidence[effects[0]].alone_rmse = float(problem.noise_sigma * np.sqrt(solution.cost / samples))
+                    setting.evidence[effects[0]].alone_rmse = float(
+                        problem.noise_sigma * np.sqrt(solution.cost / samples)
+                    )
         weighed = sorted(fitted, key=lambda entry: entry[1].cost * (1.0 + PENALTY * len(setting.free(entry[0]))))
-        judged = setting.judged(weighed[:JUDGED], slots)
+        judged = setting.judged(polished(setting, weighed[:JUDGED]))
         if number == 1:
             for entry in judged:
                 if len(entry.effects) == 1:
                     setting.evidence[entry.effects[0]].alone_left_out_rmse = entry.left_out_rmse
-        best = min(judged, key=lambda m: m.left_out_rmse**2 * (1.0 + PENALTY * len(setting.free(m.effects))))
+        best = simplest(setting, judged)
         enough, why = setting.better(best, model)
         tried = tuple((" + ".join(entry.effects), entry.left_out_rmse) for entry in judged)
         new = [name for name in best.effects if name not in model.effects]
-        setting.rounds.append(Round(number, tried, " + ".join(new) if enough else "", why))
+        setting.note(Round(number, tried, " + ".join(new) if enough else "", why))
         if not enough:
             break
         model = best
     return first, pruned(setting, model)
+
+
+def polished(
+    setting: Search, fitted: Sequence[tuple[tuple[str, ...], Solution]]
+) -> list[tuple[tuple[str, ...], Solution]]:
+    """The same fits taken to their optimum: a fit stopped short looks worse on left-out runs than its model is."""
+    starts = [Start(effects, solution.values) for effects, solution in fitted]
+    solutions, _ = setting.fit(starts, "polishing the best", legs=3, enough=1e-4, start_cost=NEARLY_GAUSS_NEWTON)
+    return [(effects, new) for (effects, _), new in zip(fitted, solutions, strict=True)]
+
+
+def simplest(setting: Search, judged: Sequence[Model]) -> Model:
+    """The model with the fewest coefficients among those that the best one does not beat beyond penalty and chance."""
+    best = min(judged, key=lambda m: m.left_out_rmse)
+    alike = [m for m in judged if m is best or not setting.better(best, m)[0]]
+    return min(alike, key=lambda m: (len(setting.free(m.effects)), m.left_out_rmse))
 
 
 def scores_at(setting: Search, model: Model, left: Sequence[str]) -> tuple[list[Score], list[Score]]:
@@ -197,7 +240,9 @@ def scores_at(setting: Search, model: Model, left: Sequence[str]) -> tuple[list[
     at = sensitivity(setting.problem, model.values, every)
     index = setting.problem.names.index
     loose = [
-        name for name in setting.free(model.effects) if not held(float(model.values[index(name)]), *setting.bounds[name])
+        name
+        for name in setting.free(model.effects)
+        if not held(float(model.values[index(name)]), *setting.bounds[name])
     ]
     return screen(at, loose, left, setting.bounds)
 
@@ -206,19 +251,17 @@ def pruned(setting: Search, model: Model) -> Model:
     """Take out again every effect that the others have made needless."""
     names = setting.problem.names
     while len(model.effects) > 1:
-        slots = setting.slots(model.effects)
-        lanes, smaller = [], []
+        starts = []
         for effect in model.effects:
             rest = tuple(name for name in model.effects if name != effect)
             values = np.array(model.values)
-            for name, value in zip(setting.coefficients(effect), base_values(effect, setting.coefficients(effect)), strict=True):
+            for name, value in zip(
+                setting.coefficients(effect), base_values(effect, setting.coefficients(effect)), strict=True
+            ):
                 values[names.index(name)] = value
-            lanes.append(setting.lane(rest, values, slots))
-            smaller.append(rest)
-        solutions = setting.solve(
-            setting.problem, lanes, legs=3, progress=setting.progress, what="taking effects out again"
-        )
-        judged = setting.judged(list(zip(smaller, solutions, strict=True)), slots)
+            starts.append(Start(rest, values))
+        solutions, _ = setting.fit(starts, "taking effects out again", legs=3)
+        judged = setting.judged([(start.effects, solution) for start, solution in zip(starts, solutions, strict=True)])
         for entry in judged:
             gone = next(name for name in model.effects if name not in entry.effects)
             setting.evidence[gone].without_left_out_rmse = entry.left_out_rmse
@@ -228,7 +271,9 @@ def pruned(setting: Search, model: Model) -> Model:
         best = min(needless, key=lambda m: m.left_out_rmse)
         gone = next(name for name in model.effects if name not in best.effects)
         why = f"taken out again: {setting.better(model, best)[1]} with it is not enough"
-        setting.rounds.append(Round(len(setting.rounds) + 1, ((" + ".join(best.effects), best.left_out_rmse),), f"without {gone}", why))
+        setting.note(
+            Round(len(setting.rounds) + 1, ((" + ".join(best.effects), best.left_out_rmse),), f"without {gone}", why)
+        )
         model = best
     return model
 

@@ -12,6 +12,7 @@ from smajax.report.display import display
 from smajax.report.findings import EffectFinding, ParameterFinding, Portrait, RunFinding, Verdict
 from smajax.residual.portrait import noise_like
 
+
 def verdict(added: Sequence[str], after: Portrait) -> Verdict:
     """Of the four, by whether something was added and whether what is left is noise."""
     if noise_like(after):
@@ -33,7 +34,11 @@ def pooled(runs: Sequence[RunFinding], role: str, which: str) -> float:
 
 
 def summary(
-    answer: Verdict, experiment: Experiment, runs: Sequence[RunFinding], effects: Sequence[EffectFinding], after: Portrait
+    answer: Verdict,
+    experiment: Experiment,
+    runs: Sequence[RunFinding],
+    effects: Sequence[EffectFinding],
+    after: Portrait,
 ) -> tuple[str, ...]:
     """The verdict in sentences."""
     unit, name = experiment.output_unit, experiment.output_name
@@ -57,7 +62,9 @@ def summary(
     told += [effect.sentence for effect in added]
     worse = [run.name for run in runs if run.role == "held-out" and run.rmse_after > 1.02 * run.rmse_before]
     if worse:
-        told.append(f"Mind: on {', '.join(worse)}, which the fit never saw, the extended model does worse than the base model.")
+        told.append(
+            f"Mind: on {', '.join(worse)}, which the fit never saw, the extended model does worse than the base model."
+        )
     if not any(run.role == "held-out" for run in runs):
         told.append("No run was held out, so nothing here was tested on data that the fit never saw.")
     if noise_like(after) and after.ratio > 1.2:

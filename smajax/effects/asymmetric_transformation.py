@@ -21,7 +21,9 @@ def _skewed(share: Scalar, skew: Scalar) -> Scalar:
 class AsymmetricTransformation(AbstractEffect):
     r"""$h \to h + a h (1 - h)$, its own a for heating and for cooling; a > 0 transforms late."""
 
-    heating: Scalar = parameter("-", -0.95, 0.95, "a of the martensite-to-austenite curve; > 0: martensite lasts longer")
+    heating: Scalar = parameter(
+        "-", -0.95, 0.95, "a of the martensite-to-austenite curve; > 0: martensite lasts longer"
+    )
     cooling: Scalar = parameter("-", -0.95, 0.95, "a of the austenite-to-martensite curve; > 0: austenite lasts longer")
 
     effect_name: ClassVar[str] = "asymmetric_transformation"

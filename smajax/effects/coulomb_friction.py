@@ -17,7 +17,9 @@ class CoulombFriction(AbstractEffect):
     effect_name: ClassVar[str] = "coulomb_friction"
     title: ClassVar[str] = "Coulomb friction"
     equation: ClassVar[str] = "mechanics"
-    formula: ClassVar[str] = "inertia a + resistance + F_c sign(v) = lever A_w sigma (eq. 3.8, 3.13; presliding after Dahl 1968)"
+    formula: ClassVar[str] = (
+        "inertia a + resistance + F_c sign(v) = lever A_w sigma (eq. 3.8, 3.13; presliding after Dahl 1968)"
+    )
     sentence: ClassVar[str] = (
         "The guide sticks: the load stays where it is until the force has changed by twice the friction, at every "
         "change of direction."

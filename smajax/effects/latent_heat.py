@@ -21,7 +21,9 @@ class LatentHeat(AbstractEffect):
     effect_name: ClassVar[str] = "latent_heat"
     title: ClassVar[str] = "latent heat of transformation"
     equation: ClassVar[str] = "heat"
-    formula: ClassVar[str] = "m c_p dT/dt = I^2 R - h_c A_c (T - T_inf) + m dH dxi/dt (Elahinia 2004, Table 3.2; missing in eq. 3.1)"
+    formula: ClassVar[str] = (
+        "m c_p dT/dt = I^2 R - h_c A_c (T - T_inf) + m dH dxi/dt (Elahinia 2004, Table 3.2; missing in eq. 3.1)"
+    )
     sentence: ClassVar[str] = (
         "While it transforms the wire absorbs heat without getting warmer, and gives it back on cooling: "
         "both strokes are slower than the heat balance alone says, and the same at rest."

@@ -18,7 +18,9 @@ class SensorLag(AbstractEffect):
     title: ClassVar[str] = "sensor lag"
     equation: ClassVar[str] = "sensor"
     formula: ClassVar[str] = "tau dy/dt + y = x between the true value x and the reading y"
-    sentence: ClassVar[str] = "The sensor (or its filter) shows the value with a delay: the motion is right, the reading is late."
+    sentence: ClassVar[str] = (
+        "The sensor (or its filter) shows the value with a delay: the motion is right, the reading is late."
+    )
     switches: ClassVar[tuple[str, ...]] = ("time_constant",)
     starts: ClassVar[dict[str, float]] = {"time_constant": 0.1}
 

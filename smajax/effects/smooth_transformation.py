@@ -22,7 +22,9 @@ class SmoothTransformation(AbstractEffect):
     effect_name: ClassVar[str] = "smooth_transformation"
     title: ClassVar[str] = "smooth transformation"
     equation: ClassVar[str] = "kinetics"
-    formula: ClassVar[str] = "h = (1 - w) h_cos(z) + w / (1 + exp[2 pi (z - 1/2)]) in eq. 3.3 and 3.5, z the reduced distance"
+    formula: ClassVar[str] = (
+        "h = (1 - w) h_cos(z) + w / (1 + exp[2 pi (z - 1/2)]) in eq. 3.3 and 3.5, z the reduced distance"
+    )
     sentence: ClassVar[str] = (
         "The transformation starts before A_s and ends after A_f (and the same on cooling): grains of a real wire "
         "do not switch at one temperature."

@@ -23,7 +23,9 @@ class TwoPartTransformation(AbstractEffect):
     effect_name: ClassVar[str] = "two_part_transformation"
     title: ClassVar[str] = "two-part transformation (sharp core, long tails)"
     equation: ClassVar[str] = "kinetics"
-    formula: ClassVar[str] = "h = (1 - w) h_cos(z) + w / (1 + exp[(z - 1/2 - s)/b]) in eq. 3.3 and 3.5, w and s by branch"
+    formula: ClassVar[str] = (
+        "h = (1 - w) h_cos(z) + w / (1 + exp[(z - 1/2 - s)/b]) in eq. 3.3 and 3.5, w and s by branch"
+    )
     sentence: ClassVar[str] = (
         "Most of the wire transforms in a narrow range while a part of it (its ends, its grips, grains of another "
         "orientation) follows over a much wider one."

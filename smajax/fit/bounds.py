@@ -12,16 +12,12 @@ EDGE = 1e-3
 AT_BOUND = 2e-3
 
 
-def bounded(
-    free: Float[Array, "*p"], low: Float[Array, "*p"], high: Float[Array, "*p"]
-) -> Float[Array, "*p"]:
+def bounded(free: Float[Array, "*p"], low: Float[Array, "*p"], high: Float[Array, "*p"]) -> Float[Array, "*p"]:
     """From the whole line into (low, high)."""
     return low + (high - low) * jax.nn.sigmoid(free)
 
 
-def unbounded(
-    value: Float[Array, "*p"], low: Float[Array, "*p"], high: Float[Array, "*p"]
-) -> Float[Array, "*p"]:
+def unbounded(value: Float[Array, "*p"], low: Float[Array, "*p"], high: Float[Array, "*p"]) -> Float[Array, "*p"]:
     """The inverse of `bounded`; a value on or over a bound is first moved inside by `EDGE` of the box."""
     share = jnp.clip((value - low) / (high - low), EDGE, 1.0 - EDGE)
     return jnp.log(share) - jnp.log1p(-share)

@@ -38,7 +38,7 @@ class Problem(eqx.Module):
     offset: bool = eqx.field(static=True)
 
     @classmethod
-    def build(cls, system: System, batch: RunBatch, noise_sigma: float, offset: bool) -> Problem:
+    def build(cls, system: System, batch: RunBatch, noise_sigma: float | Array, offset: bool) -> Problem:
         return cls(system, tuple(parameters(system)), batch, jnp.asarray(noise_sigma), offset)
 
     def start_values(self) -> np.ndarray:
@@ -61,14 +61,8 @@ class Problem(eqx.Module):
         low = [bounds[name][0] for name in free] + [-1.0] * (slots - len(free))
         high = [bounds[name][1] for name in free] + [1.0] * (slots - len(free))
         runs = self.batch.output.shape[0]
-        return Lane(
-            np.asarray(index),
-            np.asarray(low),
-            np.asarray(high),
-            np.asarray(values),
-            np.ones(runs) if weights is None else weights,
-            np.asarray(1.0),
-        )
+        full = np.ones(runs) if weights is None else weights
+        return Lane(*(jnp.asarray(part) for part in (index, low, high, values, full, 1.0)))
 
     def system_at(self, values: Float[Array, " parameter"]) -> System:
         return set_vector(self.system, self.names, values[:-1])

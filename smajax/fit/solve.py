@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -16,9 +17,9 @@ from smajax.fit.problem import Lane, Problem, free_of, residual, values_of
 STEPS_PER_LEG = 10
 # The residual's square at the start of a leg. The solver damps with the identity and starts at one: with this cost a
 # parameter that matters is hardly damped and one that does not is held. Left in units of the noise the cost is 1e6,
-# the damping nothing, and a fit far from its optimum rejects every step.
-START_COST = 10.0
-LANES = 8  # lanes solved at once: larger batches cost as much per lane on a CPU, and every size compiles anew
+# the damping next to nothing, and a fit far from its optimum rejects every step.
+START_COST = 1e3
+LANES = 4  # lanes solved at once: larger batches cost as much per lane on a CPU, and every size compiles anew
 
 Progress = Callable[[str, float], None]  # (what, share done 0..1)
 
@@ -38,12 +39,12 @@ class Solution:
 
 
 def stacked(lanes: Sequence[Lane]) -> Lane:
-    return jax.tree.map(lambda *leaves: jnp.asarray(np.stack(leaves)), *lanes)
+    return jax.tree.map(lambda *leaves: jnp.stack(leaves), *lanes)
 
 
 @eqx.filter_jit
 def _leg(free: jax.Array, lanes: Lane, problem: Problem) -> tuple[jax.Array, jax.Array, jax.Array]:
-    solver = optx.LevenbergMarquardt(rtol=1e-5, atol=1e-5)
+    solver: Any = optx.LevenbergMarquardt(rtol=1e-5, atol=1e-5)
 
     def one(free: jax.Array, lane: Lane) -> tuple[jax.Array, jax.Array, jax.Array]:
         solution = optx.least_squares(
@@ -66,6 +67,7 @@ def solve(
     *,
     legs: int = 6,
     enough: float = 1e-3,
+    start_cost: float = START_COST,
     progress: Progress = quiet,
     what: str = "fitting",
 ) -> list[Solution]:
@@ -83,7 +85,7 @@ def solve(
         done = np.zeros(LANES, bool)
         leg = 0
         while leg < legs and not done[: len(some)].all():
-            scale = np.sqrt(np.maximum(cost, 1e-12) / START_COST)
+            scale = np.sqrt(np.maximum(cost, 1e-12) / start_cost)
             new, new_cost, converged = _leg(free, batch._replace(scale=jnp.asarray(scale)), problem)
             new_cost = np.asarray(new_cost) * scale**2
             better = new_cost < cost

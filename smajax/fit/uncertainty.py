@@ -100,7 +100,9 @@ def identifiability(at: Sensitivity, names: Sequence[str], bounds: Mapping[str, 
     for i, first in enumerate(seen):
         for j in range(i + 1, len(seen)):
             if abs(correlation[i, j]) > TOGETHER:
-                told.append(f"{first} and {seen[j]} move together (correlation {correlation[i, j]:+.3f}): trust their combination, not each.")
+                told.append(
+                    f"{first} and {seen[j]} move together (correlation {correlation[i, j]:+.3f}): trust their combination, not each."
+                )
     if len(told) == 1 and rank == len(names):
         told.append("Each unknown shows in the runs by itself.")
     return told

@@ -37,9 +37,7 @@ def portrait(
     rmse = float(np.sqrt(np.mean(everything**2)))
     p_value = whiteness_p_value(residuals)
     ambient = min(float(np.min(state["temperature"])) for state in states)
-    phases = np.concatenate(
-        [phase_of(state["martensite_fraction"], state["temperature"], ambient) for state in states]
-    )
+    phases = np.concatenate([phase_of(state["martensite_fraction"], state["temperature"], ambient) for state in states])
     total = float(everything @ everything)
     by_phase = {}
     for phase in sorted(set(phases.tolist())):
@@ -54,7 +52,9 @@ def portrait(
     for name in states[0]:
         series = np.concatenate([np.asarray(state[name], float) for state in states])
         spread = series.std() * everything.std()
-        correlation[name] = float(np.mean((series - series.mean()) * (everything - everything.mean())) / spread) if spread else 0.0
+        correlation[name] = (
+            float(np.mean((series - series.mean()) * (everything - everything.mean())) / spread) if spread else 0.0
+        )
     ratio = rmse / noise_sigma
     white = p_value > WHITE
     return Portrait(
@@ -73,7 +73,9 @@ def noise_like(found: Portrait) -> bool:
 def _sentences(
     ratio: float, white: bool, by_phase: Mapping[str, Mapping[str, float]], correlation: Mapping[str, float]
 ) -> tuple[str, ...]:
-    told = [f"The residual is {ratio:.1f} times the measurement noise and {'has no memory' if white else 'has a memory: one sample tells the next'}."]
+    told = [
+        f"The residual is {ratio:.1f} times the measurement noise and {'has no memory' if white else 'has a memory: one sample tells the next'}."
+    ]
     if white:
         return tuple(told)
     worst = max(by_phase, key=lambda name: by_phase[name]["share_of_squared_error"])

@@ -1,0 +1,47 @@
+# %% [markdown]
+# # From measured runs to the missing effect
+#
+# A virtual bench lifts a weight with a wire whose latent heat the base model leaves out. The loop gets seven logged
+# runs and an experiment file, and has to find that out. Open this file as a notebook (jupytext) or run it as it is.
+
+# %%
+import tempfile
+from importlib import resources
+from pathlib import Path
+
+import jax
+
+jax.config.update("jax_enable_x64", True)
+
+from smajax.catalogue import CATALOGUE  # noqa: E402
+from smajax.close_loop import close_loop  # noqa: E402
+from smajax.experiment.load import load_experiment  # noqa: E402
+from smajax.report.write import write_report  # noqa: E402
+
+# %% [markdown]
+# The experiment: what is known, what is to be found within which bounds, and which runs are held out.
+
+# %%
+with resources.as_file(resources.files("smajax") / "demo" / "latent") as folder:
+    experiment = load_experiment(folder / "experiment.toml", CATALOGUE)
+for unknown in experiment.unknowns:
+    print(f"{unknown.name:25s} {unknown.low:10.4g} .. {unknown.high:10.4g} {unknown.unit}")
+for run in experiment.runs:
+    print(f"{run.name:15s} {run.role:10s} {len(run.time)} samples")
+
+# %% [markdown]
+# The loop. Finished fits are kept in a folder, so it can be interrupted.
+
+# %%
+out = Path(tempfile.mkdtemp())
+findings = close_loop(experiment, memory=out / "fits", progress=lambda what, share: None)
+print(findings.verdict)
+print(*findings.summary, sep="\n")
+
+# %% [markdown]
+# Every number of the page is in `findings`; the page itself is one file.
+
+# %%
+for run in findings.runs:
+    print(f"{run.name:15s} {run.role:10s} {1e3 * run.rmse_before:8.3f} -> {1e3 * run.rmse_after:8.3f} mm")
+print(write_report(findings, out))

@@ -1,0 +1,75 @@
+"""The command line says what is wrong in one paragraph and exits with 2."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+
+def _run(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
+    code = "from smajax.cli import main; main()"
+    return subprocess.run(
+        [sys.executable, "-c", code, *arguments], cwd=cwd, capture_output=True, text=True, timeout=120, check=False
+    )
+
+
+def test_help_names_the_commands(tmp_path: Path) -> None:
+    told = _run("--help", cwd=tmp_path)
+    assert told.returncode == 0
+    assert "close-loop" in told.stdout
+    assert "demo" in told.stdout
+
+
+def test_missing_experiment_file(tmp_path: Path) -> None:
+    told = _run("close-loop", "nowhere.toml", "--out", "report", cwd=tmp_path)
+    assert told.returncode == 2
+    assert "nowhere.toml" in told.stderr
+    assert "Traceback" not in told.stderr
+
+
+def test_output_that_is_a_file(tmp_path: Path) -> None:
+    (tmp_path / "report").write_text("mine")
+    (tmp_path / "experiment.toml").write_text("title = 'x'")
+    told = _run("close-loop", "experiment.toml", "--out", "report", cwd=tmp_path)
+    assert told.returncode == 2
+    assert "report" in told.stderr
+    assert "Traceback" not in told.stderr
+    assert (tmp_path / "report").read_text() == "mine"
+
+
+def test_misspelt_parameter_is_named(tmp_path: Path) -> None:
+    (tmp_path / "run.csv").write_text("t,v,x\n" + "\n".join(f"{k / 10},5,{k / 1e4}" for k in range(50)))
+    (tmp_path / "experiment.toml").write_text(
+        """
+title = "typo"
+[model]
+wire = "flexinol_table_3_2"
+load = "dead_weight"
+drive = "voltage"
+[unknown]
+convection_coeficient = { low = "40 W/m^2/K", high = "400 W/m^2/K", start = "150 W/m^2/K" }
+[sampling]
+step = "100 ms"
+[channels.voltage]
+role = "input"
+column = "v"
+unit = "V"
+[channels.position]
+role = "output"
+column = "x"
+unit = "m"
+noise = "0.1 mm"
+[time]
+column = "t"
+unit = "s"
+[[runs]]
+name = "a"
+role = "fit"
+file = "run.csv"
+"""
+    )
+    told = _run("close-loop", "experiment.toml", "--out", "report", cwd=tmp_path)
+    assert told.returncode == 2
+    assert "convection_coefficient" in told.stderr  # the nearest known name
+    assert "Traceback" not in told.stderr
