@@ -1,7 +1,7 @@
 # %% [markdown]
 # # From measured runs to the missing effect
 #
-# A virtual bench lifts a weight with a wire whose latent heat the base model leaves out. The loop gets seven logged
+# A virtual bench lifts a weight with a wire whose latent heat the base model leaves out. The loop gets six logged
 # runs and an experiment file, and has to find that out. Open this file as a notebook (jupytext) or run it as it is.
 
 # %%

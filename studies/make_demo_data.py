@@ -1,4 +1,4 @@
-"""Make the demo's virtual dead-weight bench: two sets of seven runs, from the reference integration with noise.
+"""Make the demo's virtual dead-weight bench: two sets of six runs, from the reference integration with noise.
 
     python -m studies.make_demo_data
 
@@ -99,10 +99,9 @@ def decaying_sine(mean: float, amplitude: float, period: float, decay: float) ->
 
 
 def programs(full: float, pulse: float) -> list[Run]:
-    """Seven runs; `full`: volts that complete the transformation under 640 g; `pulse`: seconds that half do."""
+    """Six runs; `full`: volts that complete the transformation under 640 g; `pulse`: seconds that half do."""
     light, heavy = np.full(TIMES.size, 0.64), np.full(TIMES.size, 1.07)
     steps = levels((2, 0), (12, full), (10, 0), (10, 0.93 * full), (10, 0.45 * full), (6, 1.1 * full), (10, 0))
-    stairs = [0.62, 0.8, 0.86, 0.92, 0.98, 1.06, 0.9, 0.8, 0.72, 0.66, 0.6, 0.4]
     pulses = levels(
         *[(1, 0.0)],
         *[
@@ -121,7 +120,6 @@ def programs(full: float, pulse: float) -> list[Run]:
     swapped = levels((22, 1.07), (12, 0.56), (14, 1.07), (12, 0.56))
     return [
         Run("steps", "fit", steps, light),
-        Run("staircase", "fit", levels(*[(5, share * full) for share in stairs]), light),
         Run("triangle", "fit", triangle, light),
         Run("pulses", "fit", pulses, light),
         Run("heavier", "fit", heavier, heavy),

@@ -24,11 +24,11 @@ from smajax.residual.noise_like import correlation_time, split_runs
 
 SIGNIFICANT = 1e-3  # of the score tests of one round, counted together
 PENALTY = 0.01  # by how much of its mean square a coefficient must lower the error on left-out runs
-CHANCE = 2.0  # by how many standard errors of the paired difference, too
+CHANCE = 1.0  # by how many standard errors of the paired difference, too (the one-standard-error rule)
 SINGLES, PAIRS = 6, 2  # refitted in a round
 NEARLY_GAUSS_NEWTON = 1e6  # `start_cost` of a fit that begins close to its optimum
 JUDGED = 3  # candidates taken to the left-out runs
-MOST_ROUNDS = 6
+MOST_ROUNDS = 4
 
 Solve = Callable[..., list[Solution]]  # `fit.solve.solve`, or that with a memory
 
@@ -138,7 +138,9 @@ class Search:
         extra = len(self.free(new.effects)) - len(self.free(old.effects))
         gain = 1.0 - (new.left_out_rmse / old.left_out_rmse) ** 2
         z = _paired(old.left_out, new.left_out, np.asarray(self.problem.batch.mask))
-        enough = gain > PENALTY * extra and z > CHANCE
+        # The fit itself must gain as well: a left-out run of its own kind can favour a needless coefficient by luck.
+        fitted = 1.0 - new.cost / old.cost if old.cost > 0.0 else 0.0
+        enough = min(gain, fitted) > PENALTY * extra and z > CHANCE
         told = (
             f"error on left-out runs {_short(old.left_out_rmse)} -> {_short(new.left_out_rmse)} "
             f"({gain:+.0%} of its mean square, {z:.1f} standard errors)"
@@ -202,12 +204,16 @@ def search(setting: Search, base: Solution) -> tuple[Model, Model]:
                         problem.noise_sigma * np.sqrt(solution.cost / samples)
                     )
         weighed = sorted(fitted, key=lambda entry: entry[1].cost * (1.0 + PENALTY * len(setting.free(entry[0]))))
-        judged = setting.judged(polished(setting, weighed[:JUDGED]))
+        taken = weighed[:JUDGED]
+        alone = next((entry for entry in weighed if len(entry[0]) == len(model.effects) + 1), taken[0])
+        if alone not in taken:  # a pair is never added without its best single effect having had its chance
+            taken = [*taken[:-1], alone]
+        judged = setting.judged(polished(setting, taken))
         if number == 1:
             for entry in judged:
                 if len(entry.effects) == 1:
                     setting.evidence[entry.effects[0]].alone_left_out_rmse = entry.left_out_rmse
-        best = simplest(setting, judged)
+        best = simplest(setting, judged, model)
         enough, why = setting.better(best, model)
         tried = tuple((" + ".join(entry.effects), entry.left_out_rmse) for entry in judged)
         new = [name for name in best.effects if name not in model.effects]
@@ -227,11 +233,15 @@ def polished(
     return [(effects, new) for (effects, _), new in zip(fitted, solutions, strict=True)]
 
 
-def simplest(setting: Search, judged: Sequence[Model]) -> Model:
-    """The model with the fewest coefficients among those that the best one does not beat beyond penalty and chance."""
-    best = min(judged, key=lambda m: m.left_out_rmse)
-    alike = [m for m in judged if m is best or not setting.better(best, m)[0]]
-    return min(alike, key=lambda m: (len(setting.free(m.effects)), m.left_out_rmse))
+def simplest(setting: Search, judged: Sequence[Model], present: Model) -> Model:
+    """Of the models that beat the present one, the one with the fewest coefficients that the best of them does not beat.
+
+    The best of all when none beats the present one: the caller then says by how much it falls short.
+    """
+    eligible = [m for m in judged if setting.better(m, present)[0]]
+    best = min(eligible or judged, key=lambda m: m.left_out_rmse)
+    alike = [m for m in eligible if m is best or not setting.better(best, m)[0]]
+    return min(alike or [best], key=lambda m: (len(setting.free(m.effects)), m.left_out_rmse))
 
 
 def scores_at(setting: Search, model: Model, left: Sequence[str]) -> tuple[list[Score], list[Score]]:
