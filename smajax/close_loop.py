@@ -28,7 +28,7 @@ from smajax.fit.problem import Problem
 from smajax.fit.sensitivity import Sensitivity, sensitivity
 from smajax.fit.solve import Progress, Solution, quiet
 from smajax.fit.uncertainty import Uncertainty, identifiability, uncertainty
-from smajax.parameters import parameters
+from smajax.parameters import get_parameters, parameters
 from smajax.report.findings import (
     CoefficientFinding,
     EffectFinding,
@@ -38,6 +38,7 @@ from smajax.report.findings import (
     RunFinding,
 )
 from smajax.residual.portrait import portrait
+from smajax.system import System
 from smajax.types import Trajectory
 
 SEED = 2004
@@ -63,12 +64,18 @@ class _Job:
         return [*self.unknowns, *(name for name in self.problem.names if "." in name)]
 
 
+def _defaults(system: System) -> dict[str, float]:
+    """The model's own value of every parameter: what holds in a run that does not override it."""
+    names = list(parameters(system))
+    return dict(zip(names, np.asarray(get_parameters(system, names)).tolist(), strict=True))
+
+
 def _job(experiment: Experiment) -> _Job:
     base = base_model(experiment)
     names = candidates(base, experiment.effects_only, experiment.effects_excluded)
     full = extended(base, names, {n: v for n, v in experiment.parameters.items() if "." in n})
     runs = tuple(run for run in experiment.runs if run.role == "fit")
-    batch = pack(runs, experiment.step, experiment.parameters)
+    batch = pack(runs, experiment.step, _defaults(full))
     problem = Problem.build(full, batch, experiment.noise_sigma, experiment.offset)
     bounds = {entry.name: (entry.low, entry.high) for entry in parameters(full).values()}
     bounds |= {unknown.name: (unknown.low, unknown.high) for unknown in experiment.unknowns}
@@ -115,7 +122,7 @@ def close_loop(
         title=experiment.title,
         source=experiment.path.name,
         verdict=answer,
-        summary=summary(answer, experiment, runs, effects, portrait_after),
+        summary=summary(answer, experiment, runs, effects, portrait_after, len(job.candidates)),
         unexplained=unexplained(answer, experiment, runs, portrait_after),
         cannot_know=cannot_know(experiment, after.parameters, effects, len(job.fit_runs)),
         check=tuple(check),
@@ -229,7 +236,7 @@ def _simulated(problem: Problem, values: jax.Array, batch: RunBatch) -> Trajecto
 def _compare(job: _Job, first: Model, final: Model) -> tuple[tuple[RunFinding, ...], Portrait, Portrait]:
     """Every run, held-out ones included, by both models; and the portraits of the fit runs' residuals."""
     experiment = job.experiment
-    batch = pack(experiment.runs, experiment.step, experiment.parameters)
+    batch = pack(experiment.runs, experiment.step, _defaults(job.problem.system))
     before = _simulated(job.problem, jnp.asarray(first.values), batch)
     after = _simulated(job.problem, jnp.asarray(final.values), batch)
     runs = []

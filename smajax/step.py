@@ -39,8 +39,10 @@ Tree = TypeVar("Tree")
 
 GAMMA = 1.0 - 0.5**0.5
 MOST_ITERATIONS = 25
-# Newton stops when no unknown moves by more than this share of its scale: 1 C, 1 % strain, 1 MPa, and xi in full.
+# Newton stops when no unknown moves by more than this share of its scale: 1 C, 1 % strain, 1e-4 E, and xi in full;
+# in float32, by more than what rounding alone moves it.
 TOLERANCE = 1e-8
+ROUNDINGS = 1e3
 # Coulomb friction builds up over this much motion (a bristle bends before it slips), in units of position.
 PRESLIDING = 2e-5
 
@@ -185,6 +187,7 @@ def _solved(system: System, stage: Stage, inputs: Inputs) -> _Iterate:
     open_at_start = open_branches(law, system.effects, old)
     softest = jnp.minimum(law.stress_slope_austenite, law.stress_slope_martensite)
     steepest = steepest_slope(law)
+    tolerance = max(TOLERANCE, ROUNDINGS * float(jnp.finfo(xi.dtype).eps))
 
     def iterate(at: _Iterate) -> _Iterate:
         residual, jacobian, (heated, cooled) = _linearised(system, stage, inputs, at.branch, at.z)
@@ -200,7 +203,7 @@ def _solved(system: System, stage: Stage, inputs: Inputs) -> _Iterate:
         free = here + right[3] / rows[3][3]
         # Safeguarded Newton: a step out of the bracket goes to its end once (the end of the range is a common
         # solution), and after that to the secant through both ends.
-        inside = ((free > low) & (free < high)) | (jnp.abs(residual[3]) <= TOLERANCE)
+        inside = ((free > low) & (free < high)) | (jnp.abs(residual[3]) <= tolerance)
         end, at_end = jnp.where(free <= low, low, high), jnp.where(free <= low, at_low, at_high)
         share = jnp.clip(at_low / (at_low - at_high), 0.1, 0.9)
         secant = low + jnp.where(jnp.isfinite(share), share, 0.5) * (high - low)
@@ -219,7 +222,7 @@ def _solved(system: System, stage: Stage, inputs: Inputs) -> _Iterate:
         change = jnp.maximum(jnp.abs(step[0]), jnp.abs(fraction - here))
         change = jnp.maximum(change, jnp.abs(position - at.z.position) / position_scale)
         # Never on the first iteration: the trial must have moved before it is asked which branch it is on.
-        small = jnp.maximum(change, jnp.abs(step[2]) / stress_scale) <= TOLERANCE
+        small = jnp.maximum(change, jnp.abs(step[2]) / stress_scale) <= tolerance
         converged = small & (at.iterations > 0)
         asked = choose_branch(law, old, open_at_start, at.z.temperature, at.z.stress, heated, cooled)
         starts = at.trying & converged & (asked.heating | asked.cooling)

@@ -149,3 +149,16 @@ def test_one_step_satisfies_the_constitutive_increment() -> None:
 def test_at_base_refuses_an_unknown_effect() -> None:
     with pytest.raises(KeyError, match="latent_heat"):
         at_base(("latent_heet",))
+
+
+def test_float32_follows_float64() -> None:
+    """The same run in single precision: same branches, and a fraction within 1e-3."""
+    system, channel, top = RIGS["dead_weight"]
+    inputs = _inputs(channel, top, [0.75, 0.2, 0.7, 0.0])
+    double = RUN(system, inputs, DT)
+    with jax.enable_x64(False):
+        narrow = jax.tree.map(lambda leaf: leaf.astype(jnp.float32) if eqx.is_array(leaf) else leaf, (system, inputs))
+        single = RUN(*narrow, DT)
+    assert single.position.dtype == jnp.float32
+    assert float(np.abs(np.asarray(single.martensite_fraction) - np.asarray(double.martensite_fraction)).max()) < 1e-3
+    assert double.martensite_fraction.min() < 0.2

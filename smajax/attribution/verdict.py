@@ -39,16 +39,17 @@ def summary(
     runs: Sequence[RunFinding],
     effects: Sequence[EffectFinding],
     after: Portrait,
+    tried: int,
 ) -> tuple[str, ...]:
-    """The verdict in sentences."""
+    """The verdict in sentences; `tried` is the number of candidate effects that were looked at."""
     unit, name = experiment.output_unit, experiment.output_name
     added = [effect for effect in effects if effect.added]
     opening = {
-        "adequate": "Nothing is missing that these runs can show: the base model leaves nothing but measurement noise.",
-        "explained": f"The base model lacks {_listed(added)}. With it, what is left is measurement noise.",
+        "adequate": "Nothing is missing that the fit runs can show: on them the base model leaves nothing but measurement noise.",
+        "explained": f"The base model lacks {_listed(added)}. With it, what is left on the fit runs is measurement noise.",
         "partly explained": f"The base model lacks {_listed(added)}. That explains part of the misfit; more is missing.",
-        "not in the library": "Something is missing, and it is not in the library: no candidate effect predicts left-out "
-        "runs better.",
+        "not in the library": f"Something is missing, and none of the {tried} candidate effects that were tried accounts "
+        "for it: none lowers the error enough, on runs left out as well as on the fit.",
     }
     told = [opening[answer]]
     for role, words in (("fit", "fit"), ("held-out", "held-out")):
@@ -60,6 +61,9 @@ def summary(
             )
     told.append(f"Measurement noise: {shown(experiment.noise_sigma, unit, name)} ({experiment.noise_how}).")
     told += [effect.sentence for effect in added]
+    told += _held_out_warnings(runs, experiment)
+    if sum(run.role == "fit" for run in runs) == 1 and added:
+        told.append("There is one fit run only: effects were judged on the fit itself, no run could be left out.")
     worse = [run.name for run in runs if run.role == "held-out" and run.rmse_after > 1.02 * run.rmse_before]
     if worse:
         told.append(
@@ -69,9 +73,21 @@ def summary(
         told.append("No run was held out, so nothing here was tested on data that the fit never saw.")
     if noise_like(after) and after.ratio > 1.2:
         told.append(
-            f"What is left has no memory but is {after.ratio:.1f} times the declared noise: the noise was declared too small."
+            f"What is left has no memory but is {after.ratio:.1f} times the declared noise: either the noise was declared too small or something fast is missing."
         )
     return tuple(told)
+
+
+def _held_out_warnings(runs: Sequence[RunFinding], experiment: Experiment) -> list[str]:
+    """One sentence for each held-out run that the final model predicts clearly worse than it fits."""
+    level = max(2.0 * pooled(runs, "fit", "after"), 2.0 * experiment.noise_sigma)
+    return [
+        f"{run.name}, which was held out, is off by {shown(run.rmse_after, experiment.output_unit, experiment.output_name)}, "
+        f"{run.rmse_after / pooled(runs, 'fit', 'after'):.1f} times the fit runs' error: something differs between that run "
+        "and them (another day, another state of the wire) which the model does not have."
+        for run in runs
+        if run.role == "held-out" and run.rmse_after > level
+    ]
 
 
 def _listed(added: Sequence[EffectFinding]) -> str:
@@ -83,16 +99,10 @@ def unexplained(
     answer: Verdict, experiment: Experiment, runs: Sequence[RunFinding], after: Portrait
 ) -> tuple[str, ...]:
     """What the final model leaves."""
+    warnings = _held_out_warnings(runs, experiment)
     if answer in ("adequate", "explained"):
-        return ("Nothing beyond noise on the fit runs.",)
-    told = [*after.sentences]
-    fit = pooled(runs, "fit", "after")
-    for run in runs:
-        if run.role == "held-out" and run.rmse_after > 2.0 * fit:
-            told.append(
-                f"{run.name} is {run.rmse_after / fit:.1f} times as far off as the fit runs. Something differs between that run and them "
-                "(another day, another state of the wire) which no effect within a run can explain."
-            )
+        return ("Nothing beyond noise on the fit runs.", *warnings)
+    told = [*after.sentences, *warnings]
     return tuple(told)
 
 
@@ -101,12 +111,6 @@ def cannot_know(
 ) -> tuple[str, ...]:
     """What these runs cannot tell, whatever the fit says."""
     told = [f"{p.name}: {p.remark}; its value is not measured by these runs." for p in parameters if p.remark]
-    left = [effect for effect in effects if not effect.added]
-    absorbed = [e.title for e in left if e.evidence.get("score_gain", 0.0) < 1e-4]
-    if absorbed:
-        told.append(
-            f"Small amounts of {', '.join(absorbed)} would not show: these runs have nothing that the fitted parameters do not absorb."
-        )
     if fit_runs < 3:
         told.append(f"With {fit_runs} fit run(s) the left-out test is weak: give at least three of different kinds.")
     if experiment.offset:

@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 class StressDependentStrain(AbstractEffect):
     r"""$\varepsilon_L(\sigma) = \varepsilon_L + g [1 - e^{-\sigma/\sigma_k}]$ (the form of Lagoudas et al. 2012, H^cur)."""
 
-    gain: Scalar = parameter("-", -0.06, 0.06, "g: recoverable strain added at high stress")
+    # Not negative: a strain that falls with stress faster than the elastic one rises is no material.
+    gain: Scalar = parameter("-", 0.0, 0.06, "g: recoverable strain added at high stress")
     scale: Scalar = parameter("Pa", 1e7, 6e8, "sigma_k: stress over which it grows")
 
     effect_name: ClassVar[str] = "stress_dependent_strain"

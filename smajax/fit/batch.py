@@ -58,9 +58,7 @@ def pack(runs: Sequence[Run], dt: float, defaults: dict[str, float]) -> RunBatch
         inputs={name: jnp.asarray([padded(run.inputs[name], "edge") for run in runs]) for name in channels},
         output=jnp.asarray([padded(run.output, "zero") for run in runs]),
         mask=jnp.asarray([padded(np.ones(len(run.time)), "zero") for run in runs]),
-        overrides=jnp.asarray(
-            [[run.parameters.get(name, defaults.get(name, np.nan)) for name in names] for run in runs]
-        ),
+        overrides=jnp.asarray([[run.parameters.get(name, defaults[name]) for name in names] for run in runs]),
         override_names=names,
         dt=dt,
     )

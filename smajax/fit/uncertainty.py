@@ -80,12 +80,19 @@ def identifiability(at: Sensitivity, names: Sequence[str], bounds: Mapping[str, 
 
     From the Jacobian at the start values and the noise alone: it promises nothing about a model that lacks something.
     """
+    if not names:
+        return ["Nothing is declared unknown: the base model is taken as it is."]
     columns = at.columns(names)
     span = np.asarray([bounds[name][1] - bounds[name][0] for name in names])
     boxed = columns * span
     singular = np.linalg.svd(boxed, compute_uv=False)
     rank = int(np.sum(singular > 1e-8 * singular[0])) if singular[0] > 0.0 else 0
     told = [f"The Jacobian of {len(boxed)} samples by {len(names)} unknowns has rank {rank}."]
+    if rank < len(names):
+        told.append(
+            f"Only {rank} combination(s) of the {len(names)} unknowns show in these runs: standard errors of the ones that "
+            "make up the rest mean nothing. Fix one of them."
+        )
     blind = [name for index, name in enumerate(names) if not np.any(columns[:, index])]
     told += [f"{name}: nothing in these runs depends on it; fix it or measure something else." for name in blind]
     seen = [name for name in names if name not in blind]

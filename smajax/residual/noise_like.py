@@ -24,13 +24,17 @@ def autocorrelation(series: np.ndarray, lags: int) -> np.ndarray:
 def whiteness_p_value(runs: Sequence[np.ndarray], lags: int = LAGS) -> float:
     """Ljung-Box over all runs at once: the chance of such autocorrelations in white noise.
 
-    Q = sum over runs of n (n + 2) sum_k r_k^2 / (n - k), chi-square with lags x runs degrees of freedom.
+    Q = sum over runs of n (n + 2) sum_k r_k^2 / (n - k), chi-square with as many degrees of freedom
+    as lags were taken over all runs.
     """
-    statistic = 0.0
+    statistic, freedom = 0.0, 0
     for run in runs:
-        n, r = len(run), autocorrelation(run, lags)
-        statistic += n * (n + 2) * float(np.sum(r[1:] ** 2 / (n - np.arange(1, lags + 1))))
-    return float(stats.chi2.sf(statistic, lags * len(runs)))
+        n = len(run)
+        reach = max(1, min(lags, n // 2))
+        r = autocorrelation(run, reach)
+        statistic += n * (n + 2) * float(np.sum(r[1:] ** 2 / (n - np.arange(1, reach + 1))))
+        freedom += reach
+    return float(stats.chi2.sf(statistic, freedom))
 
 
 def correlation_time(runs: Sequence[np.ndarray]) -> float:
