@@ -58,7 +58,7 @@ def _score(
         room = (high - low)[seen]
         lower, upper = np.minimum(low[seen] / room, 0.0), np.maximum(high[seen] / room, 0.0)
         solved = optimize.lsq_linear(boxed[:, seen], residual, bounds=(lower - 1e-12, upper + 1e-12))
-        found[seen] = np.clip(solved.x * room, np.minimum(low[seen], 0.0), np.maximum(high[seen], 0.0))
+        found[seen] = solved.x * room
     before = float(residual @ residual)
     after = residual - columns @ found
     gain = max(0.0, 1.0 - float(after @ after) / before) if before else 0.0
