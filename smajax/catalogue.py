@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from smajax.effects.library import LIBRARY, at_base
+from smajax.effects.library import LIBRARY
 from smajax.experiment.catalogue import Catalogue, ModelDescription, ParameterInfo
 from smajax.load.coupon import Coupon
 from smajax.parameters import parameters
@@ -42,6 +42,3 @@ def candidates(system: System, only: tuple[str, ...] | None, excluded: tuple[str
         for name, effect in LIBRARY.items()
         if effect.equation not in useless and name not in excluded and (only is None or name in only)
     )
-
-
-__all__ = ["CATALOGUE", "at_base", "candidates", "describe"]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import platform
 import time as clock
-from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
@@ -58,11 +57,6 @@ class _Job:
     bounds: dict[str, tuple[float, float]]
     candidates: tuple[str, ...]
 
-    @property
-    def every(self) -> list[str]:
-        """Unknowns and all coefficients of all candidates: one Jacobian serves every question."""
-        return [*self.unknowns, *(name for name in self.problem.names if "." in name)]
-
 
 def _defaults(system: System) -> dict[str, float]:
     """The model's own value of every parameter: what holds in a run that does not override it."""
@@ -100,13 +94,13 @@ def close_loop(
     kept = Memory(memory)
     progress("checking what these runs can tell", 0.0)
     start = job.problem.start_values()
-    at_start = sensitivity(job.problem, start, job.every)
+    setting = Search(job.problem, job.unknowns, job.bounds, job.candidates, kept.solve, progress)
+    at_start = sensitivity(job.problem, start, setting.every)
     check = [*experiment.warnings, *identifiability(at_start, job.unknowns, job.bounds)]
     progress("checking what these runs can tell", 1.0)
     for line in check:
         progress(f"say: check: {line}", 1.0)
 
-    setting = Search(job.problem, job.unknowns, job.bounds, job.candidates, kept.solve, progress)
     base = _base_fit(job, setting, start, seed)
     first, final = search(setting, base)
 
@@ -169,7 +163,7 @@ def _told(job: _Job, setting: Search, model: Model, start: np.ndarray) -> _Told:
     """Every free parameter of `model` with its standard error and remark."""
     names = setting.free(model.effects)
     index = job.problem.names.index
-    at: Sensitivity = sensitivity(job.problem, model.values, job.every)
+    at: Sensitivity = sensitivity(job.problem, model.values, setting.every)
     values = {name: float(model.values[index(name)]) for name in names}
     known = uncertainty(at, names, values, job.bounds)
     table = parameters(job.problem.system)
@@ -309,6 +303,3 @@ def _provenance(experiment: Experiment, kept: Memory, command: str, seed: int, s
         "sha256 of the experiment file": hashlib.sha256(experiment.path.read_bytes()).hexdigest(),
         **{f"sha256 of {run.name}": run.sha256 for run in experiment.runs},
     }
-
-
-__all__: Sequence[str] = ("close_loop",)

@@ -30,11 +30,14 @@ DIAMETER = 0.31e-3  # m
 AREA = np.pi * DIAMETER**2 / 4
 DAMPING = 100.0  # N s/m, about critical for this wire and mass
 
-LATENT = DeadWeightParameters(
+BENCH = DeadWeightParameters(
     diameter=DIAMETER,
     damping=DAMPING,
     resistance_martensite=76e-8 / AREA,
     resistance_austenite=84e-8 / AREA,
+)
+LATENT = replace(
+    BENCH,
     convection_coefficient=90.0,
     specific_heat=560.0,
     recoverable_strain=0.0435,
@@ -44,11 +47,8 @@ LATENT = DeadWeightParameters(
     martensite_finish=42.5,
     latent_heat=24.2e3,  # table 3.2 prints it, eq. 3.1 leaves it out
 )
-COMPLETE = DeadWeightParameters(
-    diameter=DIAMETER,
-    damping=DAMPING,
-    resistance_martensite=76e-8 / AREA,
-    resistance_austenite=84e-8 / AREA,
+COMPLETE = replace(
+    BENCH,
     convection_coefficient=104.0,
     specific_heat=640.0,
     recoverable_strain=0.0405,

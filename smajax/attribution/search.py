@@ -86,6 +86,11 @@ class Search:
         """Every free parameter of a model with `effects`."""
         return [*self.unknowns, *(name for effect in effects for name in self.coefficients(effect))]
 
+    @property
+    def every(self) -> list[str]:
+        """Unknowns and all coefficients of all candidates: one Jacobian serves every question."""
+        return self.free(self.candidates)
+
     def coefficients(self, effect: str) -> list[str]:
         return [name for name in self.problem.names if name.startswith(f"{effect}.")]
 
@@ -142,14 +147,10 @@ class Search:
         fitted = 1.0 - new.cost / old.cost if old.cost > 0.0 else 0.0
         enough = min(gain, fitted) > PENALTY * extra and z > CHANCE
         told = (
-            f"error on left-out runs {_short(old.left_out_rmse)} -> {_short(new.left_out_rmse)} "
+            f"error on left-out runs {old.left_out_rmse:.3g} -> {new.left_out_rmse:.3g} "
             f"({gain:+.0%} of its mean square, {z:.1f} standard errors)"
         )
         return enough, told
-
-
-def _short(value: float) -> str:
-    return f"{value:.3g}"
 
 
 def _paired(old: np.ndarray, new: np.ndarray, mask: np.ndarray) -> float:
@@ -246,8 +247,7 @@ def simplest(setting: Search, judged: Sequence[Model], present: Model) -> Model:
 
 def scores_at(setting: Search, model: Model, left: Sequence[str]) -> tuple[list[Score], list[Score]]:
     """Score tests of the effects not yet in `model`, at its fit."""
-    every = [*setting.unknowns, *(name for effect in setting.candidates for name in setting.coefficients(effect))]
-    at = sensitivity(setting.problem, model.values, every)
+    at = sensitivity(setting.problem, model.values, setting.every)
     index = setting.problem.names.index
     loose = [
         name
@@ -265,10 +265,9 @@ def pruned(setting: Search, model: Model) -> Model:
         for effect in model.effects:
             rest = tuple(name for name in model.effects if name != effect)
             values = np.array(model.values)
-            for name, value in zip(
-                setting.coefficients(effect), base_values(effect, setting.coefficients(effect)), strict=True
-            ):
-                values[names.index(name)] = value
+            base = LIBRARY[effect].base()
+            for name in setting.coefficients(effect):
+                values[names.index(name)] = float(getattr(base, name.removeprefix(f"{effect}.")))
             starts.append(Start(rest, values))
         solutions, _ = setting.fit(starts, "taking effects out again", legs=3)
         judged = setting.judged([(start.effects, solution) for start, solution in zip(starts, solutions, strict=True)])
@@ -286,9 +285,3 @@ def pruned(setting: Search, model: Model) -> Model:
         )
         model = best
     return model
-
-
-def base_values(effect: str, coefficients: Sequence[str]) -> list[float]:
-    """Base values of an effect's coefficients, in the order of their full names."""
-    base = LIBRARY[effect].base()
-    return [float(getattr(base, name.split(".", 1)[1])) for name in coefficients]

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from smajax.effects.library import LIBRARY
 from smajax.experiment.record import Experiment
 from smajax.report.display import display
 from smajax.report.findings import EffectFinding, ParameterFinding, Portrait, RunFinding, Verdict
@@ -119,8 +118,3 @@ def cannot_know(
     if fixed:
         told.append(f"Anything that shifts what was taken as known: {', '.join(fixed)}.")
     return tuple(told)
-
-
-def evidence_titles() -> dict[str, str]:
-    """Name -> title of every effect."""
-    return {name: effect.title for name, effect in LIBRARY.items()}
