@@ -55,10 +55,13 @@ def _compare(system: System, inputs: dict[str, jax.Array]) -> None:
         size = abs(float(at[index])) or 1e-2 * (table[name].high - table[name].low)
         step = 1e-6 * size
         value = float(at[index])
-        # On a bound (an effect that starts at zero) the difference is one-sided, of second order.
-        if value - step < table[name].low:
-            points = [evaluate(at.at[index].set(value + k * step)) for k in (0, 1, 2)]
-            difference = np.asarray((-3 * points[0] + 4 * points[1] - points[2]) / (2 * step))
+        # On a bound (an effect that starts at zero) the difference is one-sided, of second order, and wide enough that
+        # a tail of this weight is not below the share at which a branch counts as finished.
+        inward = 1.0 if value - step < table[name].low else -1.0 if value + step > table[name].high else 0.0
+        if inward:
+            step = 1e-5 * (table[name].high - table[name].low)
+            points = [evaluate(at.at[index].set(value + inward * k * step)) for k in (0, 1, 2)]
+            difference = np.asarray((-3 * points[0] + 4 * points[1] - points[2]) / (2 * inward * step))
         else:
             difference = np.asarray(
                 (evaluate(at.at[index].set(value + step)) - evaluate(at.at[index].set(value - step))) / (2 * step)
