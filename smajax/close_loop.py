@@ -102,7 +102,7 @@ def close_loop(
         progress(f"say: check: {line}", 1.0)
 
     base = _base_fit(job, setting, start, seed)
-    first, final = search(setting, base)
+    first, final = search(setting, base, start)
 
     progress("standard errors and pictures", 0.0)
     before = _told(job, setting, first, start)
@@ -118,7 +118,7 @@ def close_loop(
         verdict=answer,
         summary=summary(answer, experiment, runs, effects, portrait_after, len(job.candidates)),
         unexplained=unexplained(answer, experiment, runs, portrait_after),
-        cannot_know=cannot_know(experiment, after.parameters, effects, len(job.fit_runs)),
+        cannot_know=cannot_know(experiment, after.parameters, effects, setting.rounds, len(job.fit_runs)),
         check=tuple(check),
         output_name=experiment.output_name,
         output_unit=experiment.output_unit,

@@ -4,7 +4,8 @@ The source closes heat, kinetics, constitutive law and motion into one algebraic
 L-stable two-stage SDIRK scheme (order 2, $\gamma = 1 - 1/\sqrt 2$) solves
 
     heat          H(T, xi) = H_b + g [power - losses]
-    motion        inertia a(x) + resistance(x, v(x)) + friction(x) = lever A_w sigma,  v = (x - x_b)/g, a = (v - v_b)/g
+    motion        inertia a(x) + resistance(x, v(x)) + friction(x) = lever A_w sigma,  v = (x - x_b)/g, a = (v - v_b)/g;
+                 x is at the end stop where this would carry it beyond (inelastic)
     constitutive  sigma = stress_at(strain(x), T, xi)                (eq. 3.2, increments exact: nothing drifts)
     kinetics      xi = closed form of eq. 3.3 or 3.5 at (T, sigma), or unchanged
 
@@ -101,6 +102,18 @@ def _rates(system: System, stage: Stage, inputs: Inputs, z: Unknowns) -> tuple[S
     return _heating(system, stage, inputs, z.temperature, z.fraction), velocity, acceleration
 
 
+def _free_position(system: System, stage: Stage, inputs: Inputs, z: Unknowns) -> Scalar:
+    """The position less what the equation of motion is off by, in units of position; `z.position` where it holds."""
+    load = system.load
+    assert isinstance(load, AbstractMovingLoad)
+    _, velocity, acceleration = _rates(system, stage, inputs, z)
+    inertia = load.inertia(inputs)
+    friction = _friction_limit(system) * _friction(stage, z.position)[0]
+    pull = load.lever() * cross_section(system.wire) * z.stress
+    resisting = load.resistance(z.position, velocity, inputs) + friction
+    return z.position - (inertia * acceleration + resisting - pull) * stage.step**2 / inertia
+
+
 def _residual(
     system: System, stage: Stage, inputs: Inputs, branch: Branch, z: Unknowns
 ) -> tuple[Unknowns, tuple[Scalar, Scalar]]:
@@ -110,15 +123,14 @@ def _residual(
     """
     wire, effects, load, old = system.wire, system.effects, system.load, stage.old.wire
     assert isinstance(load, AbstractMovingLoad)
-    heating, velocity, acceleration = _rates(system, stage, inputs, z)
+    heating, _, _ = _rates(system, stage, inputs, z)
     capacity = stored_heat(wire, (), jnp.ones_like(z.temperature), z.fraction)
     heat = (stored_heat(wire, effects, z.temperature, z.fraction) - stage.heat - stage.step * heating) / capacity
 
-    inertia = load.inertia(inputs)
-    friction = _friction_limit(system) * _friction(stage, z.position)[0]
-    pull = load.lever() * cross_section(wire) * z.stress
-    resisting = load.resistance(z.position, velocity, inputs) + friction
-    motion = (inertia * acceleration + resisting - pull) * stage.step**2 / inertia
+    # Projected on the range between the end stops: at a stop the equation reads "position = stop".
+    free = _free_position(system, stage, inputs, z)
+    lower, upper = load.limits()
+    motion = z.position - jnp.where(free < lower, lower, jnp.where(free > upper, upper, free))
 
     strain = -load.contraction(wire) * (z.position - load.start())
     asked = stress_at(wire, effects, old, strain, z.temperature, z.stress, z.fraction)
@@ -292,16 +304,13 @@ def _stage(system: System, stage: Stage, inputs: Inputs) -> tuple[State, Scalar,
     xi = jnp.where(along.heating | along.cooling, xi, old.martensite_fraction)
 
     heating, velocity, acceleration = _rates(system, stage, inputs, z)
-    # Inelastic end stops: the position is held, the wire keeps what it has at that position.
     lower, upper = load.limits()
-    position = jnp.clip(z.position, lower, upper)
-    stopped = position != z.position
-    velocity = jnp.where(stopped, 0.0, velocity)
-    acceleration = jnp.where(stopped, 0.0, acceleration)
-    geometric = -load.contraction(wire) * (position - load.start())
-    stress = jnp.where(
-        stopped, stress_at(wire, effects, old, geometric, z.temperature, z.stress, xi), jnp.maximum(z.stress, 0.0)
-    )
+    free = _free_position(system, stage, inputs, z)
+    below, above = free < lower, free > upper
+    position = jnp.where(below, lower, jnp.where(above, upper, z.position))
+    velocity = jnp.where(below | above, 0.0, velocity)  # inelastic
+    acceleration = jnp.where(below | above, 0.0, acceleration)
+    stress = jnp.maximum(z.stress, 0.0)
     xi_M, xi_A = renewed(wire.kinetics, effects, old, branch, touching, z.temperature, stress, xi)
     strain = strain_at(wire, effects, old, z.temperature, stress, xi)
     friction, _ = _friction(stage, position)

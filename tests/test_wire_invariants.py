@@ -16,6 +16,7 @@ from smajax.parameters import get_parameters, parameters, set_parameters
 from smajax.presets import build
 from smajax.simulate import simulate
 from smajax.wire.constitutive import young_modulus
+from smajax.wire.kinetics import martensite_left
 
 RIGS = {
     "arm": (build("niti_table_3_1", "arm", "amplified_voltage"), "voltage", 9.0),
@@ -163,3 +164,17 @@ def test_float32_follows_float64() -> None:
     assert single.position.dtype == jnp.float32
     assert float(np.abs(np.asarray(single.martensite_fraction) - np.asarray(double.martensite_fraction)).max()) < 1e-3
     assert double.martensite_fraction.min() < 0.2
+
+
+def test_at_an_end_stop_the_fraction_is_that_of_the_stressed_wire() -> None:
+    """Held by the stop the wire is tighter, which keeps it from transforming: xi = h(T - sigma/C_A) still holds."""
+    system = set_parameters(RIGS["arm"][0], {"upper_stop": 0.5})
+    run = RUN(system, {"voltage": jnp.full(800, 7.3)}, 0.01)
+    stopped = np.asarray(run.position) >= 0.5
+    assert stopped.sum() > 100
+    assert np.abs(run.velocity[stopped]).max() == 0.0
+    law = system.wire.kinetics
+    on_curve = martensite_left(law, (), run.temperature, run.stress)
+    heating = stopped & (np.gradient(np.asarray(run.temperature)) > 1e-3)
+    assert heating.sum() > 50
+    np.testing.assert_allclose(run.martensite_fraction[heating], on_curve[heating], atol=1e-9)

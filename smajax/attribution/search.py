@@ -27,6 +27,7 @@ PENALTY = 0.01  # by how much of its mean square a coefficient must lower the er
 CHANCE = 1.0  # by how many standard errors of the paired difference, too (the one-standard-error rule)
 SINGLES, PAIRS = 6, 2  # refitted in a round
 NEARLY_GAUSS_NEWTON = 1e6  # `start_cost` of a fit that begins close to its optimum
+CLEARLY = 0.02  # share of the mean square by which a second start must fit better to count as another optimum
 JUDGED = 3  # candidates taken to the left-out runs
 MOST_ROUNDS = 4
 
@@ -51,6 +52,16 @@ class Model:
     cost: float
     left_out: np.ndarray  # misfit (SI) of each fit run by the model fitted to the others, (R, N)
     left_out_rmse: float
+    folds: np.ndarray  # parameters of those fits, (R, P + 1)
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A set of effects fitted to all runs, and for each run a start that has never seen it."""
+
+    effects: tuple[str, ...]
+    solution: Solution
+    blind: np.ndarray  # (R, P + 1); (1, P + 1) when there is one run only
 
 
 @dataclass
@@ -124,18 +135,42 @@ class Search:
     def rmse(self, misfit: np.ndarray) -> float:
         return float(np.sqrt((misfit**2).sum() / np.asarray(self.problem.batch.mask).sum()))
 
-    def judged(self, fitted: Sequence[tuple[tuple[str, ...], Solution]]) -> list[Model]:
-        """Leave each fit run out in turn, refit to the others from the full fit, and predict the one left out."""
+    def judged(self, fitted: Sequence[Fitted]) -> list[Model]:
+        """Leave each fit run out in turn, refit to the others, and predict the one left out.
+
+        Two starts a fold: one that has never seen the run left out, and the fit to all runs. The second wins only
+        where it fits the *others* clearly better (the first was caught in a local optimum): in a direction that only
+        the run left out determines both fit alike, and the first keeps that run's secret.
+        """
         runs = self.problem.batch.output.shape[0]
         # With one run nothing can be left out: the fit itself is all there is, and the report says so.
         folds: list[int | None] = list(range(runs)) if runs > 1 else [None]
-        starts = [Start(effects, solution.values, run) for effects, solution in fitted for run in folds]
-        _, found = self.fit(starts, "predicting runs left out", legs=3, enough=5e-3, start_cost=NEARLY_GAUSS_NEWTON)
+        starts = [
+            Start(entry.effects, values, run)
+            for entry in fitted
+            for place, run in enumerate(folds)
+            for values in (entry.blind[place], entry.solution.values)
+        ]
+        solved, found = self.fit(
+            starts, "predicting runs left out", legs=3, enough=5e-3, start_cost=NEARLY_GAUSS_NEWTON
+        )
         models = []
-        for place, (effects, solution) in enumerate(fitted):
-            own = found[place * len(folds) : (place + 1) * len(folds)]
-            left_out = np.stack([own[run, run] for run in range(runs)]) if runs > 1 else own[0]
-            models.append(Model(effects, solution.values, solution.cost, left_out, self.rmse(left_out)))
+        for place, entry in enumerate(fitted):
+            best = []
+            for fold in range(len(folds)):
+                blind = 2 * (place * len(folds) + fold)
+                best.append(blind + int(solved[blind + 1].cost < (1.0 - CLEARLY) * solved[blind].cost))
+            left_out = np.stack([found[best[run], run] for run in range(runs)]) if runs > 1 else found[best[0]]
+            models.append(
+                Model(
+                    entry.effects,
+                    entry.solution.values,
+                    entry.solution.cost,
+                    left_out,
+                    self.rmse(left_out),
+                    np.stack([solved[k].values for k in best]),
+                )
+            )
         return models
 
     def better(self, new: Model, old: Model) -> tuple[bool, str]:
@@ -164,21 +199,30 @@ def _paired(old: np.ndarray, new: np.ndarray, mask: np.ndarray) -> float:
     return float(np.mean(gains) / spread) if spread > 0.0 else 0.0
 
 
-def start_values(model_values: np.ndarray, names: Sequence[str], score: Score) -> np.ndarray:
-    """The present fit with an effect's coefficients moved off their base, to the side the score test points to."""
+def start_values(
+    model_values: np.ndarray, names: Sequence[str], score: Score, bounds: Mapping[str, tuple[float, float]]
+) -> np.ndarray:
+    """A fit, (..., P + 1), with an effect's coefficients moved off their base, to the side the score test points to.
+
+    The effect's own side where the test is silent or points out of the bounds.
+    """
     values = np.array(model_values)
     for effect in score.effects:
         for name, size in LIBRARY[effect].starts.items():
             full = f"{effect}.{name}"
-            side = -1.0 if score.coefficients.get(full, 0.0) < 0.0 else 1.0
-            values[names.index(full)] = side * size if full in switches(effect) else size
+            asked = float(np.copysign(size, score.coefficients.get(full, 0.0) or size))
+            low, high = bounds[full]
+            values[..., names.index(full)] = asked if full in switches(effect) and low < asked < high else size
     return values
 
 
-def search(setting: Search, base: Solution) -> tuple[Model, Model]:
-    """(base model, final model). Fills `setting.evidence` and `setting.rounds` on the way."""
+def search(setting: Search, base: Solution, start: np.ndarray) -> tuple[Model, Model]:
+    """(base model, final model). Fills `setting.evidence` and `setting.rounds` on the way.
+
+    `start` (P + 1,) are the values as declared, before anything was fitted.
+    """
     problem, names = setting.problem, setting.problem.names
-    first = setting.judged([((), base)])[0]
+    first = setting.judged([Fitted((), base, np.stack([start] * problem.batch.output.shape[0]))])[0]
     model = first
     for number in range(1, MOST_ROUNDS + 1):
         left = [name for name in setting.candidates if name not in model.effects]
@@ -194,19 +238,27 @@ def search(setting: Search, base: Solution) -> tuple[Model, Model]:
             setting.note(Round(number, (), "", why))
             break
         chosen = [*singles[:SINGLES], *pairs[:PAIRS]]
-        starts = [Start((*model.effects, *score.effects), start_values(model.values, names, score)) for score in chosen]
+        starts = [
+            Start((*model.effects, *score.effects), start_values(model.values, names, score, setting.bounds))
+            for score in chosen
+        ]
         solutions, _ = setting.fit(starts, f"round {number}: refitting candidates", legs=4, enough=1e-2)
-        fitted = [((*model.effects, *s.effects), solution) for s, solution in zip(chosen, solutions, strict=True)]
+        fitted = [
+            Fitted(begun.effects, solution, start_values(model.folds, names, score, setting.bounds))
+            for begun, solution, score in zip(starts, solutions, chosen, strict=True)
+        ]
         if number == 1:
             samples = float(np.asarray(problem.batch.mask).sum())
-            for effects, solution in fitted:
-                if len(effects) == 1:
-                    setting.evidence[effects[0]].alone_rmse = float(
-                        problem.noise_sigma * np.sqrt(solution.cost / samples)
+            for one in fitted:
+                if len(one.effects) == 1:
+                    setting.evidence[one.effects[0]].alone_rmse = float(
+                        problem.noise_sigma * np.sqrt(one.solution.cost / samples)
                     )
-        weighed = sorted(fitted, key=lambda entry: entry[1].cost * (1.0 + PENALTY * len(setting.free(entry[0]))))
+        weighed = sorted(
+            fitted, key=lambda entry: entry.solution.cost * (1.0 + PENALTY * len(setting.free(entry.effects)))
+        )
         taken = weighed[:JUDGED]
-        alone = next((entry for entry in weighed if len(entry[0]) == len(model.effects) + 1), taken[0])
+        alone = next((entry for entry in weighed if len(entry.effects) == len(model.effects) + 1), taken[0])
         if alone not in taken:  # a pair is never added without its best single effect having had its chance
             taken = [*taken[:-1], alone]
         judged = setting.judged(polished(setting, taken))
@@ -214,35 +266,39 @@ def search(setting: Search, base: Solution) -> tuple[Model, Model]:
             for entry in judged:
                 if len(entry.effects) == 1:
                     setting.evidence[entry.effects[0]].alone_left_out_rmse = entry.left_out_rmse
-        best = simplest(setting, judged, model)
+        best, alike = simplest(setting, judged, model)
         enough, why = setting.better(best, model)
-        tried = tuple((" + ".join(entry.effects), entry.left_out_rmse) for entry in judged)
-        new = [name for name in best.effects if name not in model.effects]
-        setting.note(Round(number, tried, " + ".join(new) if enough else "", why))
+
+        def new(entry: Model, present: Model = model) -> str:
+            return " + ".join(name for name in entry.effects if name not in present.effects)
+
+        tried = tuple((new(entry), entry.left_out_rmse) for entry in judged)
+        ties = tuple(new(entry) for entry in alike) if enough else ()
+        setting.note(Round(number, tried, new(best) if enough else "", why, ties))
         if not enough:
             break
         model = best
     return first, pruned(setting, model)
 
 
-def polished(
-    setting: Search, fitted: Sequence[tuple[tuple[str, ...], Solution]]
-) -> list[tuple[tuple[str, ...], Solution]]:
+def polished(setting: Search, fitted: Sequence[Fitted]) -> list[Fitted]:
     """The same fits taken to their optimum: a fit stopped short looks worse on left-out runs than its model is."""
-    starts = [Start(effects, solution.values) for effects, solution in fitted]
+    starts = [Start(entry.effects, entry.solution.values) for entry in fitted]
     solutions, _ = setting.fit(starts, "polishing the best", legs=3, enough=1e-4, start_cost=NEARLY_GAUSS_NEWTON)
-    return [(effects, new) for (effects, _), new in zip(fitted, solutions, strict=True)]
+    return [dataclasses.replace(entry, solution=new) for entry, new in zip(fitted, solutions, strict=True)]
 
 
-def simplest(setting: Search, judged: Sequence[Model], present: Model) -> Model:
+def simplest(setting: Search, judged: Sequence[Model], present: Model) -> tuple[Model, list[Model]]:
     """Of the models that beat the present one, the one with the fewest coefficients that the best of them does not beat.
 
-    The best of all when none beats the present one: the caller then says by how much it falls short.
+    Beside it the others of its size or more that cannot be told from the best. The best of all when none beats the
+    present one: the caller then says by how much it falls short.
     """
     eligible = [m for m in judged if setting.better(m, present)[0]]
     best = min(eligible or judged, key=lambda m: m.left_out_rmse)
     alike = [m for m in eligible if m is best or not setting.better(best, m)[0]]
-    return min(alike or [best], key=lambda m: (len(setting.free(m.effects)), m.left_out_rmse))
+    chosen = min(alike or [best], key=lambda m: (len(setting.free(m.effects)), m.left_out_rmse))
+    return chosen, [m for m in alike if m is not chosen]
 
 
 def scores_at(setting: Search, model: Model, left: Sequence[str]) -> tuple[list[Score], list[Score]]:
@@ -261,16 +317,23 @@ def pruned(setting: Search, model: Model) -> Model:
     """Take out again every effect that the others have made needless."""
     names = setting.problem.names
     while len(model.effects) > 1:
-        starts = []
+        starts, blind = [], []
         for effect in model.effects:
             rest = tuple(name for name in model.effects if name != effect)
-            values = np.array(model.values)
+            values, folds = np.array(model.values), np.array(model.folds)
             base = LIBRARY[effect].base()
             for name in setting.coefficients(effect):
-                values[names.index(name)] = float(getattr(base, name.removeprefix(f"{effect}.")))
+                off = float(getattr(base, name.removeprefix(f"{effect}.")))
+                values[names.index(name)] = folds[:, names.index(name)] = off
             starts.append(Start(rest, values))
+            blind.append(folds)
         solutions, _ = setting.fit(starts, "taking effects out again", legs=3)
-        judged = setting.judged([(start.effects, solution) for start, solution in zip(starts, solutions, strict=True)])
+        judged = setting.judged(
+            [
+                Fitted(start.effects, solution, folds)
+                for start, solution, folds in zip(starts, solutions, blind, strict=True)
+            ]
+        )
         for entry in judged:
             gone = next(name for name in model.effects if name not in entry.effects)
             setting.evidence[gone].without_left_out_rmse = entry.left_out_rmse

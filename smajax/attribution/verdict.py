@@ -8,8 +8,11 @@ import numpy as np
 
 from smajax.experiment.record import Experiment
 from smajax.report.display import display
-from smajax.report.findings import EffectFinding, ParameterFinding, Portrait, RunFinding, Verdict
+from smajax.report.findings import EffectFinding, ParameterFinding, Portrait, Round, RunFinding, Verdict
 from smajax.residual.portrait import noise_like
+
+# A residual this many times the declared noise, or the other way round, says that the noise was declared wrongly.
+WRONG_NOISE = 1.2
 
 
 def verdict(added: Sequence[str], after: Portrait) -> Verdict:
@@ -70,9 +73,14 @@ def summary(
         )
     if not any(run.role == "held-out" for run in runs):
         told.append("No run was held out, so nothing here was tested on data that the fit never saw.")
-    if noise_like(after) and after.ratio > 1.2:
+    if noise_like(after) and after.ratio > WRONG_NOISE:
         told.append(
             f"What is left has no memory but is {after.ratio:.1f} times the declared noise: either the noise was declared too small or something fast is missing."
+        )
+    if after.ratio < 1.0 / WRONG_NOISE:
+        told.append(
+            f"What is left is {after.ratio:.2f} times the declared noise: the noise was declared too large, and an effect "
+            "smaller than it may hide. Declare it smaller, or as 'estimate', and run again."
         )
     return tuple(told)
 
@@ -106,10 +114,25 @@ def unexplained(
 
 
 def cannot_know(
-    experiment: Experiment, parameters: Sequence[ParameterFinding], effects: Sequence[EffectFinding], fit_runs: int
+    experiment: Experiment,
+    parameters: Sequence[ParameterFinding],
+    effects: Sequence[EffectFinding],
+    rounds: Sequence[Round],
+    fit_runs: int,
 ) -> tuple[str, ...]:
     """What these runs cannot tell, whatever the fit says."""
-    told = [f"{p.name}: {p.remark}; its value is not measured by these runs." for p in parameters if p.remark]
+    titles = {effect.name: effect.title for effect in effects}
+
+    def named(model: str) -> str:
+        return " with ".join(titles[name] for name in model.split(" + "))
+
+    told = [
+        f"Whether it is {named(entry.chosen)}, or {' or '.join(named(model) for model in entry.alike)}: runs left out are "
+        "predicted alike by either. The one with the fewest coefficients was taken."
+        for entry in rounds
+        if entry.alike
+    ]
+    told += [f"{p.name}: {p.remark}; its value is not measured by these runs." for p in parameters if p.remark]
     if fit_runs < 3:
         told.append(f"With {fit_runs} fit run(s) the left-out test is weak: give at least three of different kinds.")
     if experiment.offset:

@@ -33,7 +33,8 @@ class ModelDescription:
     """What one combination of wire, load and drive needs and gives.
 
     parameters: name -> unit and bounds. outputs: name of each quantity that can be compared with a sensor -> unit.
-    input_units: input channel -> the program's own unit.
+    input_units: input channel -> the program's own unit. inputs_sampled: inputs that are measured at an instant and
+    vary smoothly, as an output is; every other input is a command that holds between its samples.
     """
 
     parameters: Mapping[str, ParameterInfo]
@@ -41,6 +42,7 @@ class ModelDescription:
     inputs_optional: frozenset[str]
     outputs: Mapping[str, str]
     input_units: Mapping[str, str] = field(default_factory=lambda: INPUT_UNITS)
+    inputs_sampled: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ import numpy as np
 from smajax.experiment.catalogue import Catalogue, ModelDescription, ParameterInfo
 from smajax.experiment.errors import ExperimentError, at_key, check_name
 from smajax.experiment.folder import data_folder
-from smajax.experiment.plausibility import copy_warnings, quantum_warning, run_warnings
+from smajax.experiment.plausibility import constant_warnings, copy_warnings, quantum_warning, run_warnings
 from smajax.experiment.record import Experiment, Unknown
 from smajax.experiment.schema import ExperimentFile, Quantity, read_schema
 from smajax.experiment.signals import Reading, ReadRun, read_run
@@ -199,6 +199,7 @@ def load_experiment(path: str | Path, catalogue: Catalogue) -> Experiment:
         time=file.time,
         units=units,
         output_name=output_name,
+        inputs_sampled=model.inputs_sampled,
         step=_step(path, file),
         tables=lru_cache(maxsize=None)(read_table),
     )
@@ -206,6 +207,7 @@ def load_experiment(path: str | Path, catalogue: Catalogue) -> Experiment:
     fit = [read for read in runs if read.run.role == "fit"]
     sigma, sensor_sigma, how = _noise(path, file, output_name, units[output_name], fit)
     warnings = [text for read in runs for text in run_warnings(read, output_name, reading.step)]
+    warnings += constant_warnings(runs, output_name)
     warnings += quantum_warning(fit, sensor_sigma, units[output_name])
     warnings += copy_warnings(runs)
     return Experiment(

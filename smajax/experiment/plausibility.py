@@ -66,8 +66,6 @@ def run_warnings(read: ReadRun, output_name: str, step: float) -> list[str]:
         found.append(f"run {run.name!r}: only {run.time.size} samples at a step of {step:g} s; is the step too long?")
     for name, signal in read.signals.items():
         found += _time_warnings(run.name, name, signal)
-        if name != output_name and np.ptp(signal.values) == 0.0:
-            found.append(f"run {run.name!r}: the input {name!r} is constant ({signal.values[0]:g})")
     duty = run.inputs.get("duty")
     if duty is not None and (duty.min() < 0.0 or duty.max() > 1.0):
         found.append(
@@ -82,6 +80,17 @@ def run_warnings(read: ReadRun, output_name: str, step: float) -> list[str]:
             "two samples are interpolated and their errors are not independent"
         )
     return found
+
+
+def constant_warnings(runs: Sequence[ReadRun], output_name: str) -> list[str]:
+    """Inputs that never change in any run although they are read from files: the wrong column looks like that."""
+    still = [
+        name
+        for name in runs[0].signals
+        if name != output_name
+        and all(np.ptp(read.signals[name].values) == 0.0 for read in runs if name in read.signals)
+    ]
+    return [f"the input {name!r} never changes in any run; is it the right column?" for name in still]
 
 
 def quantum_warning(runs: Sequence[ReadRun], sensor_noise: float, unit: str) -> list[str]:

@@ -46,7 +46,7 @@ class ReadRun:
 class Reading:
     """What is common to the runs of one experiment file: where to look and what to turn it into.
 
-    units: channel or input -> the program's own unit. tables: reads a file, once however often it is asked for.
+    units: channel or input -> the program's own unit. inputs_sampled: see ModelDescription. tables: reads a file, once however often it is asked for.
     """
 
     path: Path
@@ -55,6 +55,7 @@ class Reading:
     time: TimeSection | None
     units: Mapping[str, str]
     output_name: str
+    inputs_sampled: frozenset[str]
     step: float
     tables: Callable[[Path], Table]
 
@@ -142,7 +143,9 @@ def read_run(reading: Reading, run: RunSection, parameters: dict[str, float]) ->
         )
     inputs: dict[str, Array] = {}
     for name, signal in signals.items():
-        if name != reading.output_name:
+        if name in reading.inputs_sampled:
+            inputs[name] = resample_output(signal.time, signal.values, clock, reading.step).values
+        elif name != reading.output_name:
             inputs[name] = resample_input(signal.time, signal.values, clock, reading.step)
     for name, value in run.inputs.items():
         with at_key(reading.path, f"{where}.inputs.{name}"):

@@ -13,6 +13,10 @@ from smajax.residual.noise_like import correlation_time, split_runs
 
 # Two parameters whose estimates are correlated more than this move together: the runs see one combination of them.
 TOGETHER = 0.98
+# A direction in which the scaled columns are shorter than this share of the longest is one the runs do not see; a
+# parameter with more than `SHARE` of its own in such directions has no standard error.
+UNSEEN = 1e-5
+SHARE = 0.1
 # A predicted standard error beyond this share of the allowed box: the runs say nothing that the box does not.
 VAGUE = 0.25
 
@@ -50,6 +54,13 @@ def _covariance(columns: np.ndarray, runs: Sequence[np.ndarray]) -> tuple[np.nda
     return bread @ meat @ bread, scale
 
 
+def _unseen_share(scaled: np.ndarray) -> np.ndarray:
+    """How much of each parameter lies in directions that the runs do not see, 0..1, shape (parameters,)."""
+    _, singular, directions = np.linalg.svd(scaled, full_matrices=False)
+    unseen = directions[singular <= UNSEEN * singular[0]]
+    return np.asarray(np.linalg.norm(unseen, axis=0))
+
+
 def uncertainty(
     at: Sensitivity, names: Sequence[str], values: Mapping[str, float], bounds: Mapping[str, tuple[float, float]]
 ) -> Uncertainty:
@@ -61,16 +72,21 @@ def uncertainty(
         return Uncertainty(errors, remark)
     columns = at.columns(loose)
     covariance, scale = _covariance(columns, split_runs(at.misfit, at.mask))
+    unseen = _unseen_share(columns / scale)
     error = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     for index, name in enumerate(loose):
         blind = not np.any(columns[:, index])
-        errors[name] = None if blind else float(error[index] / scale[index])
+        lost = unseen[index] > SHARE
+        errors[name] = None if blind or lost else float(error[index] / scale[index])
         if blind:
             remark[name] = "no effect on these runs"
+        elif lost:
+            others = [loose[k] for k in np.flatnonzero(unseen > SHARE) if k != index]
+            remark[name] = f"the runs see only a combination of it with {', '.join(others)}"
     correlation = covariance / np.outer(np.where(error > 0, error, 1.0), np.where(error > 0, error, 1.0))
     for index, name in enumerate(loose):
         partners = [loose[k] for k in np.flatnonzero(np.abs(correlation[index]) > TOGETHER) if k != index]
-        if partners:
+        if partners and not remark[name]:
             remark[name] = f"moves together with {', '.join(partners)}"
     return Uncertainty(errors, remark)
 

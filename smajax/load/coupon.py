@@ -12,4 +12,6 @@ class Coupon(eqx.Module):
 
     inputs_required: ClassVar[frozenset[str]] = frozenset({"temperature", "stress"})
     inputs_optional: ClassVar[frozenset[str]] = frozenset()
+    # Measured at an instant, as the strain is; the inputs of other loads are commands that hold over a step.
+    inputs_sampled: ClassVar[frozenset[str]] = inputs_required
     reading: ClassVar[tuple[str, str]] = ("strain", "-")

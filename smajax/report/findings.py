@@ -89,6 +89,7 @@ class Round:
     tried: tuple[tuple[str, float], ...]  # ("latent_heat + radiation", leave-one-out rmse)
     chosen: str  # "" when the search stopped here
     why: str
+    alike: tuple[str, ...] = ()  # what left-out runs cannot tell from the chosen one, chosen because it is simplest
 
 
 @dataclass(frozen=True)

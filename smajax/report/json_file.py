@@ -112,6 +112,7 @@ def findings_to_json(findings: Findings) -> dict[str, Any]:
                 "tried": [{"model": model, "leave_one_out_rmse": rmse} for model, rmse in entry.tried],
                 "chosen": entry.chosen,
                 "why": entry.why,
+                "alike": entry.alike,
             }
             for entry in findings.rounds
         ],

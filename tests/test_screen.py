@@ -1,0 +1,84 @@
+"""Score test and the verdict's whiteness: right about noise, blind to what the fitted parameters absorb."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from smajax.attribution.screen import Score, screen
+from smajax.attribution.search import start_values
+from smajax.effects.library import LIBRARY
+from smajax.fit.sensitivity import Sensitivity
+from smajax.residual.noise_like import correlation_time, whiteness_p_value
+
+NAMES = ("convection_coefficient", "latent_heat.enthalpy", "ambient_drift.rate", "sensor_lag.time_constant")
+BOUNDS = {NAMES[0]: (1.0, 500.0), NAMES[1]: (0.0, 6e4), NAMES[2]: (-0.1, 0.1), NAMES[3]: (0.0, 3.0)}
+EFFECTS = ("latent_heat", "ambient_drift", "sensor_lag")
+
+
+def _at(columns: np.ndarray, misfit: np.ndarray) -> Sensitivity:
+    return Sensitivity(NAMES, misfit[None], columns[None], np.ones((1, len(misfit))))
+
+
+def _columns(rng: np.random.Generator, n: int = 800) -> np.ndarray:
+    return rng.normal(size=(n, 4)) * [1.0, 1e-4, 50.0, 1.0]
+
+
+def test_the_effect_that_is_there_comes_first_with_its_size() -> None:
+    rng = np.random.default_rng(1)
+    columns = _columns(rng)
+    misfit = -columns[:, 2] * 0.05 + 3.0 * columns[:, 0] + rng.normal(size=800)
+    singles, pairs = screen(_at(columns, misfit), NAMES[:1], EFFECTS, BOUNDS)
+    assert singles[0].effects == ("ambient_drift",)
+    assert singles[0].coefficients["ambient_drift.rate"] == pytest.approx(0.05, rel=0.1)
+    assert singles[0].p_value < 1e-6
+    assert min(score.p_value for score in singles[1:]) > 1e-3
+    assert "ambient_drift" in pairs[0].effects
+
+
+def test_what_the_fitted_parameters_absorb_is_no_evidence() -> None:
+    rng = np.random.default_rng(2)
+    columns = _columns(rng)
+    columns[:, 1] = 1e-4 * columns[:, 0]
+    singles, _ = screen(_at(columns, -3.0 * columns[:, 0]), NAMES[:1], EFFECTS, BOUNDS)
+    found = {score.effects[0]: score for score in singles}
+    assert found["latent_heat"].gain < 1e-6
+
+
+def test_p_values_are_uniform_when_nothing_is_missing() -> None:
+    rng = np.random.default_rng(3)
+    small = [
+        screen(_at(_columns(rng), rng.normal(size=800)), NAMES[:1], ("ambient_drift",), BOUNDS)[0][0].p_value < 0.1
+        for _ in range(300)
+    ]
+    assert np.mean(small) == pytest.approx(0.1, abs=0.06)
+
+
+def test_a_coefficient_is_not_asked_to_leave_its_bounds() -> None:
+    rng = np.random.default_rng(4)
+    columns = _columns(rng)
+    singles, _ = screen(_at(columns, columns[:, 1] * 1e4), NAMES[:1], ("latent_heat",), BOUNDS)
+    assert singles[0].coefficients["latent_heat.enthalpy"] == pytest.approx(0.0, abs=1.0)
+    assert singles[0].gain < 1e-3
+
+
+@pytest.mark.parametrize(("score", "expected"), [(-0.01, -0.02), (0.3, 0.02), (0.0, 0.02)])
+def test_a_refit_starts_on_the_side_that_the_score_points_to(score: float, expected: float) -> None:
+    found = start_values(np.zeros((2, 4)), NAMES, Score(EFFECTS[1:2], 0.5, 9.0, 0.0, {NAMES[2]: score}), BOUNDS)
+    np.testing.assert_allclose(found[:, 2], expected)
+    assert not found[:, [0, 1, 3]].any()
+
+
+def test_a_refit_never_starts_out_of_bounds() -> None:
+    found = start_values(np.zeros(4), NAMES, Score(EFFECTS[:1], 0.5, 9.0, 0.0, {NAMES[1]: -6e-8}), BOUNDS)
+    assert found[1] == LIBRARY["latent_heat"].starts["enthalpy"]
+
+
+def test_whiteness_and_memory_of_noise() -> None:
+    rng = np.random.default_rng(5)
+    white = [rng.normal(size=500) for _ in range(3)]
+    smooth = [np.convolve(run, np.ones(10) / 10, mode="valid") for run in white]
+    assert whiteness_p_value(white) > 1e-3
+    assert whiteness_p_value(smooth) < 1e-12
+    assert correlation_time(white) == pytest.approx(1.0, abs=0.4)
+    assert correlation_time(smooth) == pytest.approx(10.0, rel=0.4)
