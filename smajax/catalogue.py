@@ -26,6 +26,7 @@ def describe(wire: str, load: str, drive: str) -> ModelDescription:
         inputs_required=system.load.inputs_required | system.drive.inputs_required,
         inputs_optional=system.load.inputs_optional | system.drive.inputs_optional | {"ambient_temperature"},
         outputs={name: unit},
+        inputs_squared=system.drive.inputs_squared,
         inputs_sampled=system.load.inputs_sampled if isinstance(system.load, Coupon) else frozenset(),
     )
 

@@ -22,11 +22,12 @@ from smajax.catalogue import candidates
 from smajax.effects.library import LIBRARY
 from smajax.experiment.record import Experiment, Run
 from smajax.extended import base_model, extended
-from smajax.fit.batch import RunBatch, pack, simulate_batch
+from smajax.fit.batch import RunBatch, halved, pack, simulate_batch
 from smajax.fit.problem import Problem
 from smajax.fit.sensitivity import Sensitivity, sensitivity
 from smajax.fit.solve import Progress, Solution, quiet
 from smajax.fit.uncertainty import Uncertainty, identifiability, uncertainty
+from smajax.load.coupon import Coupon
 from smajax.parameters import get_parameters, parameters
 from smajax.report.findings import (
     CoefficientFinding,
@@ -102,13 +103,14 @@ def close_loop(
         progress(f"say: check: {line}", 1.0)
 
     base = _base_fit(job, setting, start, seed)
-    first, final = search(setting, base, start)
+    first, final = search(setting, base)
 
     progress("standard errors and pictures", 0.0)
     before = _told(job, setting, first, start)
     after = _told(job, setting, final, start) if final.effects else before
     effects = _effects(job, setting, final, after)
     runs, portrait_before, portrait_after = _compare(job, first, final)
+    integration = _integration_error(job, final)
     progress("standard errors and pictures", 1.0)
     answer = verdict(final.effects, portrait_after)
     return Findings(
@@ -118,7 +120,9 @@ def close_loop(
         verdict=answer,
         summary=summary(answer, experiment, runs, effects, portrait_after, len(job.candidates)),
         unexplained=unexplained(answer, experiment, runs, portrait_after),
-        cannot_know=cannot_know(experiment, after.parameters, effects, setting.rounds, len(job.fit_runs)),
+        cannot_know=cannot_know(
+            experiment, after.parameters, effects, setting.rounds, len(job.fit_runs), integration, _preset(job)
+        ),
         check=tuple(check),
         output_name=experiment.output_name,
         output_unit=experiment.output_unit,
@@ -151,6 +155,11 @@ def _base_fit(job: _Job, setting: Search, start: np.ndarray, seed: int) -> Solut
         points.append(point)
     solutions, _ = setting.fit([Start((), point) for point in points], "fitting the base model")
     return min(solutions, key=lambda solution: solution.cost)
+
+
+def _preset(job: _Job) -> list[str]:
+    """Parameters of the base model that are not fitted."""
+    return [name for name in parameters(base_model(job.experiment)) if name not in job.unknowns]
 
 
 @dataclass(frozen=True)
@@ -273,6 +282,18 @@ def _compare(job: _Job, first: Model, final: Model) -> tuple[tuple[RunFinding, .
         portrait(residuals["before"], states["before"], sigma),
         portrait(residuals["after"], states["after"], sigma),
     )
+
+
+def _integration_error(job: _Job, final: Model) -> float:
+    """By how much the output (rms, worst fit run, SI, offset aside) changes when the step is halved."""
+    if isinstance(job.problem.system.load, Coupon):
+        return 0.0  # a closed form at each sample
+    batch, values = job.problem.batch, jnp.asarray(final.values)
+    coarse = _simulated(job.problem, values, batch).reading
+    fine = _simulated(job.problem, values, halved(batch)).reading[:, ::2]
+    change, mask = np.asarray(fine - coarse), np.asarray(batch.mask)
+    centred = change - (job.experiment.offset * (change * mask).sum(1) / mask.sum(1))[:, None]
+    return float(np.sqrt(((centred * mask) ** 2).sum(1) / mask.sum(1)).max())
 
 
 def _series(run: Run, trajectory: Trajectory, index: int) -> dict[str, np.ndarray]:

@@ -33,16 +33,7 @@ from smajax.system import System, ambient_temperature
 from smajax.types import Inputs, Motion, Scalar, State, WireState
 from smajax.wire.constitutive import strain_at, stress_at, young_modulus
 from smajax.wire.heat import cross_section, heat_rate, stored_heat
-from smajax.wire.kinetics import (
-    Branch,
-    choose_branch,
-    curves,
-    fraction_on,
-    open_branches,
-    renewed,
-    steepest_slope,
-    touched,
-)
+from smajax.wire.kinetics import Branch, choose_branch, curves, fraction_on, open_branches, renewed, steepest_slope
 from smajax.wire.resistance import resistance_per_metre
 
 Tree = TypeVar("Tree")
@@ -289,19 +280,15 @@ def _stage(system: System, stage: Stage, inputs: Inputs) -> tuple[State, Scalar,
     wire, effects, load, old = system.wire, system.effects, system.load, stage.old.wire
     assert isinstance(load, AbstractMovingLoad)
     solved = _solved(_held(system), _held(stage), _held(dict(inputs)))
-    # The one differentiated Newton step; the Jacobian of the last iteration is the one at the solution to rounding. A
-    # step that only touches a curve is differentiated along it: its row of the Jacobian is the same.
     branch = solved.branch
-    heated, cooled = _held(curves(wire.kinetics, effects, old, solved.z.temperature, solved.z.stress))
-    touching = touched(wire.kinetics, _held(old), branch, solved.z.temperature, solved.z.stress, heated, cooled)
-    along = Branch(branch.heating | touching.heating, branch.cooling | touching.cooling)
-    residual, _ = _residual(system, stage, inputs, along, solved.z)
+    # The one differentiated Newton step; the Jacobian of the last iteration is the one at the solution to rounding.
+    residual, _ = _residual(system, stage, inputs, branch, solved.z)
     rows, right = _eliminated(solved.jacobian, [-value for value in residual])
     step = _back_substituted(rows, right, right[3] / rows[3][3])
     z = Unknowns(*(value + change for value, change in zip(solved.z, step, strict=True)))
     # Rounding of the last correction only; not `clip`, which halves the derivative at the ends themselves.
     xi = jnp.where(z.fraction > 1.0, 1.0, jnp.where(z.fraction < 0.0, 0.0, z.fraction))
-    xi = jnp.where(along.heating | along.cooling, xi, old.martensite_fraction)
+    xi = jnp.where(branch.heating | branch.cooling, xi, old.martensite_fraction)
 
     heating, velocity, acceleration = _rates(system, stage, inputs, z)
     lower, upper = load.limits()
@@ -311,7 +298,7 @@ def _stage(system: System, stage: Stage, inputs: Inputs) -> tuple[State, Scalar,
     velocity = jnp.where(below | above, 0.0, velocity)  # inelastic
     acceleration = jnp.where(below | above, 0.0, acceleration)
     stress = jnp.maximum(z.stress, 0.0)
-    xi_M, xi_A = renewed(wire.kinetics, effects, old, branch, touching, z.temperature, stress, xi)
+    xi_M, xi_A = renewed(wire.kinetics, effects, old, branch, z.temperature, stress, xi)
     strain = strain_at(wire, effects, old, z.temperature, stress, xi)
     friction, _ = _friction(stage, position)
     new = State(
@@ -346,10 +333,8 @@ def _coupon_step(system: System, state: State, inputs: Inputs, dt: Scalar) -> St
     heated, cooled = curves(wire.kinetics, effects, old, temperature, stress)
     open_at_start = open_branches(wire.kinetics, effects, old)
     branch = choose_branch(wire.kinetics, old, open_at_start, temperature, stress, heated, cooled)
-    touching = touched(wire.kinetics, old, branch, temperature, stress, heated, cooled)
-    along = Branch(branch.heating | touching.heating, branch.cooling | touching.cooling)
-    xi = fraction_on(old, along, heated, cooled)
-    xi_M, xi_A = renewed(wire.kinetics, effects, old, branch, touching, temperature, stress, xi)
+    xi = fraction_on(old, branch, heated, cooled)
+    xi_M, xi_A = renewed(wire.kinetics, effects, old, branch, temperature, stress, xi)
     strain = strain_at(wire, effects, old, temperature, stress, xi)
     return State(state.time + dt, WireState(temperature, stress, strain, xi, xi_M, xi_A), state.motion, state.reading)
 

@@ -56,6 +56,23 @@ def test_demo_with_nothing_missing_is_adequate(tmp_path: Path) -> None:
         assert abs(parameter.value - truth[parameter.name]) < 4 * parameter.standard_error + 2e-3 * abs(parameter.value)
 
 
+def test_one_run_no_unknown_and_no_candidate_still_give_an_answer(tmp_path: Path) -> None:
+    """The base model taken as it is, on one run: said to be off, and that nothing could be tried or left out."""
+    with resources.as_file(resources.files("smajax") / "demo" / "complete") as folder:
+        head, *runs = (folder / "experiment.toml").read_text().split("[[runs]]")
+        before, after = head.split("[unknown]")
+        _, after = after.split("[nuisance]")
+        text = f"{before}[effects]\nonly = []\n[nuisance]{after}[[runs]]{runs[0]}"
+        (tmp_path / "experiment.toml").write_text(text)
+        (tmp_path / "steps.csv").write_bytes((folder / "steps.csv").read_bytes())
+    findings = close_loop(load_experiment(tmp_path / "experiment.toml", CATALOGUE), memory=tmp_path / "fits")
+    assert findings.verdict == "not in the library"
+    assert findings.before == ()
+    assert "no candidate effect was to be tried" in findings.summary[0]
+    assert any("no run could be left out" in line for line in findings.summary)
+    assert any("Nothing is declared unknown" in line for line in findings.check)
+
+
 def _change(run: RunFinding, which: str, start: float, end: float) -> float:
     series = getattr(run, which)
     near = [int(np.argmin(np.abs(run.time - at))) for at in (start, end)]

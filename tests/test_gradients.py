@@ -7,6 +7,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from smajax.attribution.screen import switches
+from smajax.attribution.search import NUDGE
 from smajax.effects.library import LIBRARY
 from smajax.extended import extended
 from smajax.fit.problem import Problem
@@ -52,14 +54,15 @@ def _compare(system: System, inputs: dict[str, jax.Array]) -> None:
     evaluate = jax.jit(features)
     table = parameters(system)
     for index, name in enumerate(names):
-        size = abs(float(at[index])) or 1e-2 * (table[name].high - table[name].low)
-        step = 1e-6 * size
-        value = float(at[index])
-        # On a bound (an effect that starts at zero) the difference is one-sided, of second order, and wide enough that
-        # a tail of this weight is not below the share at which a branch counts as finished.
+        value, room = float(at[index]), table[name].high - table[name].low
+        step = 1e-6 * (abs(value) or 1e-2 * room)
+        if "." in name and abs(value) < 1e-2 * room:
+            # A coefficient next to nothing: wide enough to rise above rounding, and not across zero.
+            step = min(1e-5 * room, 0.1 * abs(value) or 1e-5 * room)
+        # On a bound (a wire that starts as martensite) the difference is one-sided, of second order.
         inward = 1.0 if value - step < table[name].low else -1.0 if value + step > table[name].high else 0.0
         if inward:
-            step = 1e-5 * (table[name].high - table[name].low)
+            step = 1e-5 * room
             points = [evaluate(at.at[index].set(value + inward * k * step)) for k in (0, 1, 2)]
             difference = np.asarray((-3 * points[0] + 4 * points[1] - points[2]) / (2 * inward * step))
         else:
@@ -78,10 +81,14 @@ def test_every_base_parameter(case: str) -> None:
 
 
 @pytest.mark.parametrize("effect", sorted(LIBRARY))
-@pytest.mark.parametrize("on", [False, True], ids=["at base", "switched on"])
-def test_every_effect_coefficient(effect: str, on: bool) -> None:
+@pytest.mark.parametrize("share", [NUDGE, 1.0], ids=["next to nothing", "switched on"])
+def test_every_effect_coefficient(effect: str, share: float) -> None:
+    """At its start, and where its score is taken: at exactly zero a tail has no derivative (see `scores_at`)."""
     system, inputs = CASES["dead_weight"]
-    starts = {f"{effect}.{name}": size for name, size in LIBRARY[effect].starts.items()} if on else {}
+    starts = {
+        name: size * (share if name in switches(effect) else 1.0)
+        for name, size in ((f"{effect}.{key}", size) for key, size in LIBRARY[effect].starts.items())
+    }
     _compare(extended(system, (effect,), starts), inputs)
 
 

@@ -123,3 +123,15 @@ def test_no_quantum_is_seen_where_there_is_none() -> None:
 def test_too_few_samples_for_an_estimate() -> None:
     with pytest.raises(ValueError, match="got 7 samples, expected at least 8"):
         estimate_noise(np.zeros(7))
+
+
+def test_a_switched_voltage_keeps_its_heat() -> None:
+    """25 V for a fifth of the time heats like 25 sqrt(1/5) V, not like 5 V."""
+    time = np.arange(0.0, 1.0, 1e-3)
+    values = np.where((np.arange(time.size) % 10) < 2, 25.0, 0.0)
+    clock = uniform_clock(0.0, 0.9, 0.05)
+    np.testing.assert_allclose(resample_input(time, values, clock, 0.05, squared=True), 25.0 * np.sqrt(0.2), rtol=1e-9)
+    np.testing.assert_allclose(
+        resample_input(time, -values, clock, 0.05, squared=True), -25.0 * np.sqrt(0.2), rtol=1e-9
+    )
+    np.testing.assert_allclose(resample_input(time, values, clock, 0.05), 5.0, rtol=1e-9)

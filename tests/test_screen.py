@@ -64,9 +64,9 @@ def test_a_coefficient_is_not_asked_to_leave_its_bounds() -> None:
 
 @pytest.mark.parametrize(("score", "expected"), [(-0.01, -0.02), (0.3, 0.02), (0.0, 0.02)])
 def test_a_refit_starts_on_the_side_that_the_score_points_to(score: float, expected: float) -> None:
-    found = start_values(np.zeros((2, 4)), NAMES, Score(EFFECTS[1:2], 0.5, 9.0, 0.0, {NAMES[2]: score}), BOUNDS)
-    np.testing.assert_allclose(found[:, 2], expected)
-    assert not found[:, [0, 1, 3]].any()
+    found = start_values(np.zeros(4), NAMES, Score(EFFECTS[1:2], 0.5, 9.0, 0.0, {NAMES[2]: score}), BOUNDS)
+    np.testing.assert_allclose(found[2], expected)
+    assert not found[[0, 1, 3]].any()
 
 
 def test_a_refit_never_starts_out_of_bounds() -> None:

@@ -22,7 +22,8 @@ def test_standard_errors_are_those_of_least_squares_when_the_residual_is_white()
     columns = rng.normal(size=(4000, 3)) * [1.0, 10.0, 0.1]
     found = uncertainty(_sensitivity(columns, rng.normal(size=4000)), "abc", VALUES, BOUNDS)
     expected = np.sqrt(np.diag(np.linalg.inv(columns.T @ columns)))
-    np.testing.assert_allclose([found.standard_error[name] for name in "abc"], expected, rtol=0.2)
+    errors = np.asarray([found.standard_error[name] for name in "abc"], float)
+    np.testing.assert_allclose(errors, expected, rtol=0.2)
     assert not any(found.remark.values())
 
 

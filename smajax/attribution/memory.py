@@ -5,19 +5,29 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import jax
 import numpy as np
 
-import smajax
 from smajax.fit.problem import Lane, Problem
 from smajax.fit.solve import Progress, Solution, quiet, solve
 
 
+@lru_cache(maxsize=1)
+def _code() -> str:
+    """Digest of the package's source: a fit by other code is another fit."""
+    digest = hashlib.sha256()
+    package = Path(__file__).parents[1]
+    for file in sorted(package.rglob("*.py")):
+        digest.update(file.read_bytes())
+    return digest.hexdigest()
+
+
 class Memory:
-    """`fit.solve.solve` that looks in `folder` first. A key covers data, model, lanes, settings and version."""
+    """`fit.solve.solve` that looks in `folder` first. A key covers data, model, lanes, settings and code."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -33,9 +43,7 @@ class Memory:
         **settings: Any,
     ) -> list[Solution]:
         """As `fit.solve.solve`."""
-        digest = hashlib.sha256(
-            repr((smajax.__version__, jax.__version__, problem.names, sorted(settings.items()))).encode()
-        )
+        digest = hashlib.sha256(repr((_code(), jax.__version__, problem.names, sorted(settings.items()))).encode())
         digest.update(repr((problem.batch.dt, problem.offset, problem.batch.override_names)).encode())
         for leaf in jax.tree.leaves((problem.system, problem.batch, problem.noise_sigma, list(lanes))):
             digest.update(np.asarray(leaf).tobytes())

@@ -77,7 +77,7 @@ def screen(
 ) -> tuple[list[Score], list[Score]]:
     """(single effects, pairs), each ranked by gain. `fitted` are the loose parameters at the present fit."""
     residual = at.residual()
-    basis = np.linalg.qr(_scaled(at.columns(fitted)))[0] if fitted else np.zeros((len(residual), 0))
+    basis = np.linalg.qr(scaled(at.columns(fitted)))[0] if fitted else np.zeros((len(residual), 0))
     residual = residual - basis @ (basis.T @ residual)
     singles = [_score((name,), at, basis, residual, bounds) for name in candidates]
     pairs = [_score(two, at, basis, residual, bounds) for two in itertools.combinations(candidates, 2)]
@@ -85,7 +85,8 @@ def screen(
     return sorted(singles, key=rank), sorted(pairs, key=rank)
 
 
-def _scaled(columns: np.ndarray) -> np.ndarray:
+def scaled(columns: np.ndarray) -> np.ndarray:
+    """The columns that are not all zero, each of length one."""
     norm = np.linalg.norm(columns, axis=0)
     return columns[:, norm > 0.0] / norm[norm > 0.0]
 

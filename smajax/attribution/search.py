@@ -10,10 +10,11 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
-from smajax.attribution.screen import Score, screen, significant, switches
+from smajax.attribution.screen import Score, scaled, screen, significant, switches
 from smajax.effects.library import LIBRARY
 from smajax.fit.problem import Problem
 from smajax.fit.sensitivity import sensitivity
@@ -27,9 +28,11 @@ PENALTY = 0.01  # by how much of its mean square a coefficient must lower the er
 CHANCE = 1.0  # by how many standard errors of the paired difference, too (the one-standard-error rule)
 SINGLES, PAIRS = 6, 2  # refitted in a round
 NEARLY_GAUSS_NEWTON = 1e6  # `start_cost` of a fit that begins close to its optimum
-CLEARLY = 0.02  # share of the mean square by which a second start must fit better to count as another optimum
+NUDGE = 1e-3  # share of an effect's start at which its score is taken
+INSIDE = 0.03  # a refit starts at least this share of the box away from bounds to which a poorer model was driven
+TOLD = 1.0  # to what share of itself the other runs must tell an effect's size for a left-out run to count
 JUDGED = 3  # candidates taken to the left-out runs
-MOST_ROUNDS = 4
+MOST_ROUNDS = 3
 
 Solve = Callable[..., list[Solution]]  # `fit.solve.solve`, or that with a memory
 
@@ -52,16 +55,13 @@ class Model:
     cost: float
     left_out: np.ndarray  # misfit (SI) of each fit run by the model fitted to the others, (R, N)
     left_out_rmse: float
-    folds: np.ndarray  # parameters of those fits, (R, P + 1)
 
 
-@dataclass(frozen=True)
-class Fitted:
-    """A set of effects fitted to all runs, and for each run a start that has never seen it."""
+class Fitted(NamedTuple):
+    """A set of effects fitted to all runs."""
 
     effects: tuple[str, ...]
     solution: Solution
-    blind: np.ndarray  # (R, P + 1); (1, P + 1) when there is one run only
 
 
 @dataclass
@@ -105,6 +105,15 @@ class Search:
     def coefficients(self, effect: str) -> list[str]:
         return [name for name in self.problem.names if name.startswith(f"{effect}.")]
 
+    def inside(self, model: Model) -> np.ndarray:
+        """The values of `model`, with the free ones that lie at a bound moved off it."""
+        values = np.array(model.values)
+        for name in self.free(model.effects):
+            low, high = self.bounds[name]
+            room, place = INSIDE * (high - low), self.problem.names.index(name)
+            values[place] = np.clip(values[place], low + room, high - room)
+        return values
+
     def restricted(self, effects: Sequence[str]) -> Problem:
         """The same runs with a model that carries only `effects`: what is not in play costs nothing in a fit."""
         kept = tuple(effect for effect in self.problem.system.effects if effect.effect_name in effects)
@@ -115,7 +124,8 @@ class Search:
         """Fit every start in one go: (solutions with full parameter vectors, misfit of all runs at each, (S, R, N))."""
         together = [name for name in self.candidates if any(name in start.effects for start in starts)]
         problem = self.restricted(together)
-        slots = max(len(self.free(start.effects)) for start in starts)
+        # At least one slot: with nothing free it is a dummy, and the fit returns its start.
+        slots = max(1, *(len(self.free(start.effects)) for start in starts))
         index = [self.problem.names.index(name) for name in problem.names] + [len(self.problem.names)]
         lanes = []
         for start in starts:
@@ -135,43 +145,57 @@ class Search:
     def rmse(self, misfit: np.ndarray) -> float:
         return float(np.sqrt((misfit**2).sum() / np.asarray(self.problem.batch.mask).sum()))
 
-    def judged(self, fitted: Sequence[Fitted]) -> list[Model]:
+    def judged(self, fitted: Sequence[Fitted], present: Model | None = None) -> list[Model]:
         """Leave each fit run out in turn, refit to the others, and predict the one left out.
 
-        Two starts a fold: one that has never seen the run left out, and the fit to all runs. The second wins only
-        where it fits the *others* clearly better (the first was caught in a local optimum): in a direction that only
-        the run left out determines both fit alike, and the first keeps that run's secret.
+        A fold starts at the fit to all runs, so that it is this model which is tried and not another optimum of it. In
+        a direction that only the run left out can tell the fold would keep what that run said: where the others do not
+        tell the size of what is new (`told_without`), `present`'s error stands and the effect is credited with nothing.
         """
         runs = self.problem.batch.output.shape[0]
         # With one run nothing can be left out: the fit itself is all there is, and the report says so.
         folds: list[int | None] = list(range(runs)) if runs > 1 else [None]
-        starts = [
-            Start(entry.effects, values, run)
-            for entry in fitted
-            for place, run in enumerate(folds)
-            for values in (entry.blind[place], entry.solution.values)
-        ]
-        solved, found = self.fit(
-            starts, "predicting runs left out", legs=3, enough=5e-3, start_cost=NEARLY_GAUSS_NEWTON
-        )
+        starts = [Start(entry.effects, entry.solution.values, run) for entry in fitted for run in folds]
+        _, found = self.fit(starts, "predicting runs left out", legs=3, enough=5e-3, start_cost=NEARLY_GAUSS_NEWTON)
         models = []
         for place, entry in enumerate(fitted):
-            best = []
-            for fold in range(len(folds)):
-                blind = 2 * (place * len(folds) + fold)
-                best.append(blind + int(solved[blind + 1].cost < (1.0 - CLEARLY) * solved[blind].cost))
-            left_out = np.stack([found[best[run], run] for run in range(runs)]) if runs > 1 else found[best[0]]
+            own = found[place * len(folds) : (place + 1) * len(folds)]
+            left_out = np.stack([own[run, run] for run in range(runs)]) if runs > 1 else own[0]
+            if present is not None and runs > 1:
+                told = self.told_without(entry, present)
+                left_out = np.where(told[:, None], left_out, present.left_out)
             models.append(
-                Model(
-                    entry.effects,
-                    entry.solution.values,
-                    entry.solution.cost,
-                    left_out,
-                    self.rmse(left_out),
-                    np.stack([solved[k].values for k in best]),
-                )
+                Model(entry.effects, entry.solution.values, entry.solution.cost, left_out, self.rmse(left_out))
             )
         return models
+
+    def told_without(self, entry: Fitted, present: Model) -> np.ndarray:
+        """Run by run: do the other runs tell the size of what is new against `present`? Shape (R,).
+
+        They do when the trace of the new coefficients in them, less what the other free parameters absorb, stands out
+        of the residual so far that its size is known to within `TOLD` of itself. Two new effects are taken together:
+        how they share a trace is no matter here.
+        """
+        at = sensitivity(self.problem, entry.solution.values, self.every)
+        index, values = self.problem.names.index, entry.solution.values
+        new = [effect for effect in entry.effects if effect not in present.effects]
+        own = [name for effect in new for name in self.coefficients(effect)]
+        bases = [float(getattr(LIBRARY[e].base(), n.removeprefix(f"{e}."))) for e in new for n in self.coefficients(e)]
+        size = np.asarray([values[index(name)] for name in own]) - bases
+        others = [
+            name
+            for name in self.free(entry.effects)
+            if name not in own and not held(float(values[index(name)]), *self.bounds[name])
+        ]
+        level = float(np.mean(at.residual() ** 2)) * correlation_time(split_runs(at.misfit, at.mask))
+        told = []
+        for run in range(len(at.mask)):
+            rest = dataclasses.replace(at, mask=at.mask * (np.arange(len(at.mask)) != run)[:, None])
+            trace = rest.columns(own) @ size
+            basis = np.linalg.qr(scaled(rest.columns(others)))[0]
+            trace = trace - basis @ (basis.T @ trace)
+            told.append(float(trace @ trace) * TOLD**2 > level)
+        return np.asarray(told)
 
     def better(self, new: Model, old: Model) -> tuple[bool, str]:
         """Does `new` predict left-out runs better, beyond its extra coefficients and beyond chance?"""
@@ -181,8 +205,9 @@ class Search:
         # The fit itself must gain as well: a left-out run of its own kind can favour a needless coefficient by luck.
         fitted = 1.0 - new.cost / old.cost if old.cost > 0.0 else 0.0
         enough = min(gain, fitted) > PENALTY * extra and z > CHANCE
+        left_out = "left-out runs" if len(old.left_out) > 1 else "the one fit run itself"
         told = (
-            f"error on left-out runs {old.left_out_rmse:.3g} -> {new.left_out_rmse:.3g} "
+            f"error on {left_out} {old.left_out_rmse:.3g} -> {new.left_out_rmse:.3g} "
             f"({gain:+.0%} of its mean square, {z:.1f} standard errors)"
         )
         return enough, told
@@ -202,7 +227,7 @@ def _paired(old: np.ndarray, new: np.ndarray, mask: np.ndarray) -> float:
 def start_values(
     model_values: np.ndarray, names: Sequence[str], score: Score, bounds: Mapping[str, tuple[float, float]]
 ) -> np.ndarray:
-    """A fit, (..., P + 1), with an effect's coefficients moved off their base, to the side the score test points to.
+    """A fit, (P + 1,), with an effect's coefficients moved off their base, to the side the score test points to.
 
     The effect's own side where the test is silent or points out of the bounds.
     """
@@ -212,17 +237,14 @@ def start_values(
             full = f"{effect}.{name}"
             asked = float(np.copysign(size, score.coefficients.get(full, 0.0) or size))
             low, high = bounds[full]
-            values[..., names.index(full)] = asked if full in switches(effect) and low < asked < high else size
+            values[names.index(full)] = asked if full in switches(effect) and low < asked < high else size
     return values
 
 
-def search(setting: Search, base: Solution, start: np.ndarray) -> tuple[Model, Model]:
-    """(base model, final model). Fills `setting.evidence` and `setting.rounds` on the way.
-
-    `start` (P + 1,) are the values as declared, before anything was fitted.
-    """
+def search(setting: Search, base: Solution) -> tuple[Model, Model]:
+    """(base model, final model). Fills `setting.evidence` and `setting.rounds` on the way."""
     problem, names = setting.problem, setting.problem.names
-    first = setting.judged([Fitted((), base, np.stack([start] * problem.batch.output.shape[0]))])[0]
+    first = setting.judged([Fitted((), base)])[0]
     model = first
     for number in range(1, MOST_ROUNDS + 1):
         left = [name for name in setting.candidates if name not in model.effects]
@@ -238,15 +260,13 @@ def search(setting: Search, base: Solution, start: np.ndarray) -> tuple[Model, M
             setting.note(Round(number, (), "", why))
             break
         chosen = [*singles[:SINGLES], *pairs[:PAIRS]]
+        begin = setting.inside(model)
         starts = [
-            Start((*model.effects, *score.effects), start_values(model.values, names, score, setting.bounds))
+            Start((*model.effects, *score.effects), start_values(begin, names, score, setting.bounds))
             for score in chosen
         ]
         solutions, _ = setting.fit(starts, f"round {number}: refitting candidates", legs=4, enough=1e-2)
-        fitted = [
-            Fitted(begun.effects, solution, start_values(model.folds, names, score, setting.bounds))
-            for begun, solution, score in zip(starts, solutions, chosen, strict=True)
-        ]
+        fitted = [Fitted(begun.effects, solution) for begun, solution in zip(starts, solutions, strict=True)]
         if number == 1:
             samples = float(np.asarray(problem.batch.mask).sum())
             for one in fitted:
@@ -261,8 +281,8 @@ def search(setting: Search, base: Solution, start: np.ndarray) -> tuple[Model, M
         alone = next((entry for entry in weighed if len(entry.effects) == len(model.effects) + 1), taken[0])
         if alone not in taken:  # a pair is never added without its best single effect having had its chance
             taken = [*taken[:-1], alone]
-        judged = setting.judged(polished(setting, taken))
-        if number == 1:
+        judged = setting.judged(polished(setting, taken), model)
+        if number == 1 and problem.batch.output.shape[0] > 1:
             for entry in judged:
                 if len(entry.effects) == 1:
                     setting.evidence[entry.effects[0]].alone_left_out_rmse = entry.left_out_rmse
@@ -278,6 +298,9 @@ def search(setting: Search, base: Solution, start: np.ndarray) -> tuple[Model, M
         if not enough:
             break
         model = best
+    else:
+        why = f"the search ends after {MOST_ROUNDS} rounds, whatever more there may be"
+        setting.note(Round(MOST_ROUNDS + 1, (), "", why))
     return first, pruned(setting, model)
 
 
@@ -285,26 +308,34 @@ def polished(setting: Search, fitted: Sequence[Fitted]) -> list[Fitted]:
     """The same fits taken to their optimum: a fit stopped short looks worse on left-out runs than its model is."""
     starts = [Start(entry.effects, entry.solution.values) for entry in fitted]
     solutions, _ = setting.fit(starts, "polishing the best", legs=3, enough=1e-4, start_cost=NEARLY_GAUSS_NEWTON)
-    return [dataclasses.replace(entry, solution=new) for entry, new in zip(fitted, solutions, strict=True)]
+    return [Fitted(entry.effects, new) for entry, new in zip(fitted, solutions, strict=True)]
 
 
 def simplest(setting: Search, judged: Sequence[Model], present: Model) -> tuple[Model, list[Model]]:
     """Of the models that beat the present one, the one with the fewest coefficients that the best of them does not beat.
 
-    Beside it the others of its size or more that cannot be told from the best. The best of all when none beats the
-    present one: the caller then says by how much it falls short.
+    Beside it the others that cannot be told from the best, but for those that only add to it. The best of all when
+    none beats the present one: the caller then says by how much it falls short.
     """
     eligible = [m for m in judged if setting.better(m, present)[0]]
     best = min(eligible or judged, key=lambda m: m.left_out_rmse)
     alike = [m for m in eligible if m is best or not setting.better(best, m)[0]]
     chosen = min(alike or [best], key=lambda m: (len(setting.free(m.effects)), m.left_out_rmse))
-    return chosen, [m for m in alike if m is not chosen]
+    return chosen, [m for m in alike if not set(chosen.effects) <= set(m.effects)]
 
 
 def scores_at(setting: Search, model: Model, left: Sequence[str]) -> tuple[list[Score], list[Score]]:
-    """Score tests of the effects not yet in `model`, at its fit."""
-    at = sensitivity(setting.problem, model.values, setting.every)
+    """Score tests of the effects not yet in `model`, at its fit.
+
+    Each is switched on by next to nothing: a transformation with a tail follows its curve where one without rests, so
+    at exactly zero the coefficient of a tail has no derivative there.
+    """
     index = setting.problem.names.index
+    values = np.array(model.values)
+    for effect in left:
+        for name in switches(effect):
+            values[index(name)] += NUDGE * LIBRARY[effect].starts[name.removeprefix(f"{effect}.")]
+    at = sensitivity(setting.problem, values, setting.every)
     loose = [
         name
         for name in setting.free(model.effects)
@@ -317,32 +348,32 @@ def pruned(setting: Search, model: Model) -> Model:
     """Take out again every effect that the others have made needless."""
     names = setting.problem.names
     while len(model.effects) > 1:
-        starts, blind = [], []
+        starts = []
         for effect in model.effects:
             rest = tuple(name for name in model.effects if name != effect)
-            values, folds = np.array(model.values), np.array(model.folds)
+            values = np.array(model.values)
             base = LIBRARY[effect].base()
             for name in setting.coefficients(effect):
-                off = float(getattr(base, name.removeprefix(f"{effect}.")))
-                values[names.index(name)] = folds[:, names.index(name)] = off
+                values[names.index(name)] = float(getattr(base, name.removeprefix(f"{effect}.")))
             starts.append(Start(rest, values))
-            blind.append(folds)
         solutions, _ = setting.fit(starts, "taking effects out again", legs=3)
-        judged = setting.judged(
+        # All against one another and none with credit withheld, so that like is compared with like.
+        whole = Solution(model.values, model.cost, True, 0)
+        kept, *judged = setting.judged(
             [
-                Fitted(start.effects, solution, folds)
-                for start, solution, folds in zip(starts, solutions, blind, strict=True)
+                Fitted(model.effects, whole),
+                *(Fitted(start.effects, solution) for start, solution in zip(starts, solutions, strict=True)),
             ]
         )
         for entry in judged:
             gone = next(name for name in model.effects if name not in entry.effects)
             setting.evidence[gone].without_left_out_rmse = entry.left_out_rmse
-        needless = [entry for entry in judged if not setting.better(model, entry)[0]]
+        needless = [entry for entry in judged if not setting.better(kept, entry)[0]]
         if not needless:
             break
         best = min(needless, key=lambda m: m.left_out_rmse)
         gone = next(name for name in model.effects if name not in best.effects)
-        why = f"taken out again: {setting.better(model, best)[1]} with it is not enough"
+        why = f"taken out again: {setting.better(kept, best)[1]} with it is not enough"
         setting.note(
             Round(len(setting.rounds) + 1, ((" + ".join(best.effects), best.left_out_rmse),), f"without {gone}", why)
         )

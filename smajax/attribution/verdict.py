@@ -46,12 +46,16 @@ def summary(
     """The verdict in sentences; `tried` is the number of candidate effects that were looked at."""
     unit, name = experiment.output_unit, experiment.output_name
     added = [effect for effect in effects if effect.added]
+    several = sum(run.role == "fit" for run in runs) > 1
+    judged_on = "on runs left out as well as on the fit" if several else "on the one fit run itself"
     opening = {
         "adequate": "Nothing is missing that the fit runs can show: on them the base model leaves nothing but measurement noise.",
         "explained": f"The base model lacks {_listed(added)}. With it, what is left on the fit runs is measurement noise.",
         "partly explained": f"The base model lacks {_listed(added)}. That explains part of the misfit; more is missing.",
         "not in the library": f"Something is missing, and none of the {tried} candidate effects that were tried accounts "
-        "for it: none lowers the error enough, on runs left out as well as on the fit.",
+        f"for it: none lowers the error enough, {judged_on}."
+        if tried
+        else "Something is missing, and no candidate effect was to be tried: the experiment file leaves none.",
     }
     told = [opening[answer]]
     for role, words in (("fit", "fit"), ("held-out", "held-out")):
@@ -64,7 +68,7 @@ def summary(
     told.append(f"Measurement noise: {shown(experiment.noise_sigma, unit, name)} ({experiment.noise_how}).")
     told += [effect.sentence for effect in added]
     told += _held_out_warnings(runs, experiment)
-    if sum(run.role == "fit" for run in runs) == 1 and added:
+    if not several:
         told.append("There is one fit run only: effects were judged on the fit itself, no run could be left out.")
     worse = [run.name for run in runs if run.role == "held-out" and run.rmse_after > 1.02 * run.rmse_before]
     if worse:
@@ -119,25 +123,52 @@ def cannot_know(
     effects: Sequence[EffectFinding],
     rounds: Sequence[Round],
     fit_runs: int,
+    integration: float,
+    preset: Sequence[str],
 ) -> tuple[str, ...]:
-    """What these runs cannot tell, whatever the fit says."""
+    """What these runs cannot tell, whatever the fit says.
+
+    `integration` (SI of the output): by how much halving the step changes the model's output. `preset`: parameters
+    of the base model that were not fitted.
+    """
     titles = {effect.name: effect.title for effect in effects}
 
     def named(model: str) -> str:
         return " with ".join(titles[name] for name in model.split(" + "))
 
+    added = {effect.name for effect in effects if effect.added}
     told = [
-        f"Whether it is {named(entry.chosen)}, or {' or '.join(named(model) for model in entry.alike)}: runs left out are "
-        "predicted alike by either. The one with the fewest coefficients was taken."
+        f"Whether it is {named(entry.chosen)}, or {' or '.join(named(model) for model in entry.alike)}: runs left out do "
+        "not tell them apart. The one with the fewest coefficients was taken."
         for entry in rounds
-        if entry.alike
+        if entry.alike and set(entry.chosen.split(" + ")) <= added
     ]
     told += [f"{p.name}: {p.remark}; its value is not measured by these runs." for p in parameters if p.remark]
-    if fit_runs < 3:
-        told.append(f"With {fit_runs} fit run(s) the left-out test is weak: give at least three of different kinds.")
+    if fit_runs == 2:
+        told.append("With two fit runs the left-out test is weak: give at least three of different kinds.")
+    elif fit_runs == 1:
+        told.append(
+            "With one fit run no run can be left out to test an effect: give at least three of different kinds."
+        )
     if experiment.offset:
         told.append("The zero of the output: each run has its own offset, fitted to that run, also for held-out runs.")
-    fixed = sorted(name for name in experiment.parameters if "." not in name)
-    if fixed:
-        told.append(f"Anything that shifts what was taken as known: {', '.join(fixed)}.")
+    if integration > 0.0:
+        told.append(
+            f"Anything below {shown(integration, experiment.output_unit, experiment.output_name)}: by so much the "
+            f"model's output changes when the step of {experiment.step:g} s is halved"
+            + (
+                ". That is not small beside the noise: take a shorter step."
+                if integration > 0.5 * experiment.noise_sigma
+                else "."
+            )
+        )
+    declared = sorted(name for name in experiment.parameters if "." not in name)
+    if declared:
+        told.append(f"Anything that shifts what was declared as known: {', '.join(declared)}.")
+    rest = sorted(set(preset) - set(declared))
+    if rest:
+        told.append(
+            f"Nor what the presets {experiment.wire} and {experiment.load} give: {', '.join(rest)}. A fitted value is "
+            "right as far as these are; a heat capacity, a loss or a latent heat scales with density and resistivity."
+        )
     return tuple(told)

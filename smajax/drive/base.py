@@ -15,6 +15,8 @@ class AbstractDrive(eqx.Module):
 
     inputs_required: ClassVar[frozenset[str]]
     inputs_optional: ClassVar[frozenset[str]] = frozenset()
+    # Channels that heat by their square: their value over a step is the root of the mean square, not the mean.
+    inputs_squared: ClassVar[frozenset[str]] = frozenset()
 
     @abc.abstractmethod
     def power(self, resistance: Scalar, length: Scalar, inputs: Inputs) -> Scalar:

@@ -18,6 +18,7 @@ class Voltage(AbstractDrive):
     amplifier_gain: Scalar = parameter("-", 1e-3, 1e3, "gain between the voltage channel and the wire")
 
     inputs_required: ClassVar[frozenset[str]] = frozenset({"voltage"})
+    inputs_squared: ClassVar[frozenset[str]] = inputs_required
 
     def power(self, resistance: Scalar, length: Scalar, inputs: Inputs) -> Scalar:
         return (self.amplifier_gain * inputs["voltage"] / length) ** 2 / resistance

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-import jax.numpy as jnp
-
 from smajax.effects.base import AbstractEffect
 from smajax.parameters import parameter
 from smajax.types import Scalar
@@ -14,8 +12,7 @@ from smajax.types import Scalar
 def _skewed(share: Scalar, skew: Scalar) -> Scalar:
     # 0 and 1 stay where they are, and the map rises monotonically for |skew| < 1. It works on the share that is
     # left, not on the temperature, so that it goes together with curves that have no end.
-    inside = jnp.clip(share, 0.0, 1.0)
-    return inside + skew * inside * (1.0 - inside)
+    return share + skew * share * (1.0 - share)
 
 
 class AsymmetricTransformation(AbstractEffect):

@@ -34,7 +34,8 @@ class ModelDescription:
 
     parameters: name -> unit and bounds. outputs: name of each quantity that can be compared with a sensor -> unit.
     input_units: input channel -> the program's own unit. inputs_sampled: inputs that are measured at an instant and
-    vary smoothly, as an output is; every other input is a command that holds between its samples.
+    vary smoothly, as an output is; every other input is a command that holds between its samples. inputs_squared: of
+    those, the ones that act by their square (a voltage on a resistor).
     """
 
     parameters: Mapping[str, ParameterInfo]
@@ -43,6 +44,7 @@ class ModelDescription:
     outputs: Mapping[str, str]
     input_units: Mapping[str, str] = field(default_factory=lambda: INPUT_UNITS)
     inputs_sampled: frozenset[str] = frozenset()
+    inputs_squared: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True)

@@ -200,6 +200,7 @@ def load_experiment(path: str | Path, catalogue: Catalogue) -> Experiment:
         units=units,
         output_name=output_name,
         inputs_sampled=model.inputs_sampled,
+        inputs_squared=model.inputs_squared,
         step=_step(path, file),
         tables=lru_cache(maxsize=None)(read_table),
     )

@@ -46,7 +46,7 @@ class ReadRun:
 class Reading:
     """What is common to the runs of one experiment file: where to look and what to turn it into.
 
-    units: channel or input -> the program's own unit. inputs_sampled: see ModelDescription. tables: reads a file, once however often it is asked for.
+    units: channel or input -> the program's own unit. inputs_sampled, inputs_squared: see ModelDescription. tables: reads a file, once however often it is asked for.
     """
 
     path: Path
@@ -56,6 +56,7 @@ class Reading:
     units: Mapping[str, str]
     output_name: str
     inputs_sampled: frozenset[str]
+    inputs_squared: frozenset[str]
     step: float
     tables: Callable[[Path], Table]
 
@@ -146,7 +147,9 @@ def read_run(reading: Reading, run: RunSection, parameters: dict[str, float]) ->
         if name in reading.inputs_sampled:
             inputs[name] = resample_output(signal.time, signal.values, clock, reading.step).values
         elif name != reading.output_name:
-            inputs[name] = resample_input(signal.time, signal.values, clock, reading.step)
+            inputs[name] = resample_input(
+                signal.time, signal.values, clock, reading.step, squared=name in reading.inputs_squared
+            )
     for name, value in run.inputs.items():
         with at_key(reading.path, f"{where}.inputs.{name}"):
             inputs[name] = np.full(clock.size, parse_quantity(value, reading.units[name]))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 
 import equinox as eqx
@@ -61,6 +62,17 @@ def pack(runs: Sequence[Run], dt: float, defaults: dict[str, float]) -> RunBatch
         overrides=jnp.asarray([[run.parameters.get(name, defaults[name]) for name in names] for run in runs]),
         override_names=names,
         dt=dt,
+    )
+
+
+def halved(batch: RunBatch) -> RunBatch:
+    """The same runs at half the step, for inputs that hold over a step; sample i of `batch` is sample 2 i."""
+    return dataclasses.replace(
+        batch,
+        inputs={name: jnp.repeat(series, 2, axis=1) for name, series in batch.inputs.items()},
+        output=jnp.repeat(batch.output, 2, axis=1),
+        mask=jnp.repeat(batch.mask, 2, axis=1),
+        dt=0.5 * batch.dt,
     )
 
 

@@ -62,7 +62,8 @@ class Problem(eqx.Module):
         high = [bounds[name][1] for name in free] + [1.0] * (slots - len(free))
         runs = self.batch.output.shape[0]
         full = np.ones(runs) if weights is None else weights
-        return Lane(*(jnp.asarray(part) for part in (index, low, high, values, full, 1.0)))
+        slot = jnp.asarray(index, dtype=int)
+        return Lane(slot, *(jnp.asarray(part) for part in (low, high, values, full, 1.0)))
 
     def system_at(self, values: Float[Array, " parameter"]) -> System:
         return set_vector(self.system, self.names, values[:-1])

@@ -44,6 +44,6 @@ def _evaluate(problem: Problem, values: jax.Array, slots: jax.Array) -> tuple[ja
 
 def sensitivity(problem: Problem, values: np.ndarray, names: Sequence[str]) -> Sensitivity:
     """Misfit and Jacobian at `values` (P + 1,), by `names`. One forward-mode pass over all runs."""
-    slots = jnp.asarray([problem.names.index(name) for name in names])
+    slots = jnp.asarray([problem.names.index(name) for name in names], dtype=int)
     misfit, jacobian = _evaluate(problem, jnp.asarray(values), slots)
     return Sensitivity(tuple(names), np.asarray(misfit), np.asarray(jacobian), np.asarray(problem.batch.mask))

@@ -54,11 +54,11 @@ def _covariance(columns: np.ndarray, runs: Sequence[np.ndarray]) -> tuple[np.nda
     return bread @ meat @ bread, scale
 
 
-def _unseen_share(scaled: np.ndarray) -> np.ndarray:
-    """How much of each parameter lies in directions that the runs do not see, 0..1, shape (parameters,)."""
+def _unseen(scaled: np.ndarray) -> np.ndarray:
+    """Projector on the directions that the runs do not see, (parameters, parameters)."""
     _, singular, directions = np.linalg.svd(scaled, full_matrices=False)
-    unseen = directions[singular <= UNSEEN * singular[0]]
-    return np.asarray(np.linalg.norm(unseen, axis=0))
+    unseen = directions[singular <= UNSEEN * singular[:1]]
+    return np.asarray(unseen.T @ unseen)
 
 
 def uncertainty(
@@ -72,16 +72,18 @@ def uncertainty(
         return Uncertainty(errors, remark)
     columns = at.columns(loose)
     covariance, scale = _covariance(columns, split_runs(at.misfit, at.mask))
-    unseen = _unseen_share(columns / scale)
+    seen = np.any(columns, axis=0)
+    unseen = np.zeros((len(loose), len(loose)))
+    unseen[np.ix_(seen, seen)] = _unseen(columns[:, seen] / scale[seen])
     error = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     for index, name in enumerate(loose):
-        blind = not np.any(columns[:, index])
-        lost = unseen[index] > SHARE
+        blind = not seen[index]
+        lost = unseen[index, index] > SHARE**2
         errors[name] = None if blind or lost else float(error[index] / scale[index])
         if blind:
             remark[name] = "no effect on these runs"
         elif lost:
-            others = [loose[k] for k in np.flatnonzero(unseen > SHARE) if k != index]
+            others = [loose[k] for k in np.flatnonzero(np.abs(unseen[index]) > SHARE**2) if k != index]
             remark[name] = f"the runs see only a combination of it with {', '.join(others)}"
     correlation = covariance / np.outer(np.where(error > 0, error, 1.0), np.where(error > 0, error, 1.0))
     for index, name in enumerate(loose):

@@ -1,6 +1,7 @@
 """Signals of different rates on one uniform clock.
 
-An input is a command that holds between its samples, so its value for a step is its mean over that step. An output
+An input is a command that holds between its samples, so its value for a step is its mean over that step (a voltage's
+is the root of its mean square, since that is what heats). An output
 is a measurement of something smooth, so its value is the one at the clock instant, averaged over one step when the
 clock is slower than the sensor, which keeps what is faster than the clock from folding into the residual.
 """
@@ -48,12 +49,16 @@ def _piecewise_linear_integral(time: Array, values: Array, at: Array) -> Array:
     return area[index] + values[index] * into + 0.5 * slope * into**2
 
 
-def resample_input(time: Array, values: Array, clock: Array, step: float) -> Array:
+def resample_input(time: Array, values: Array, clock: Array, step: float, *, squared: bool = False) -> Array:
     """Mean of a held signal over each [clock_i, clock_i + step), shape (len(clock),).
 
     time, values (n,): the samples, each held until the next. The mean is the exact integral over the step, so a pulse
-    of one sample keeps its integral whatever the step.
+    of one sample keeps its integral whatever the step. With `squared` it is the root of the mean square, with the sign
+    of the mean: what a signal that acts by its square (the voltage on a heater) amounts to over the step.
     """
+    if squared:
+        sign = np.where(resample_input(time, values, clock, step) < 0.0, -1.0, 1.0)
+        return np.asarray(sign * np.sqrt(resample_input(time, values**2, clock, step)), dtype=np.float64)
     edges = np.stack([clock, clock + step])
     low, high = _piecewise_constant_integral(time, values, edges)
     # A mean cannot leave the range of what it averages; rounding of the running integral could, by a hair.

@@ -125,26 +125,6 @@ def choose_branch(
     return Branch(heating & ~(cooling & (gain > loss)), cooling & ~(heating & (gain <= loss)))
 
 
-def touched(
-    law: Kinetics, state: WireState, branch: Branch, temperature: Scalar, stress: Scalar, heated: Scalar, cooled: Scalar
-) -> Branch:
-    """The curve on which a step that transforms nothing ends all the same: outside every range they meet at xi.
-
-    The value is the same on it and off it, the derivative is not: a coefficient at zero that would lengthen a tail
-    moves the fraction there (its one-sided derivative). A score test that missed this would be blind to tails.
-    """
-    warmer, tighter = temperature - state.temperature, stress - state.stress
-    xi = state.martensite_fraction
-    neither = ~branch.heating & ~branch.cooling
-    heating = neither & _meet(heated, xi) & law.conditions.heats(warmer, tighter, law.stress_slope_austenite)
-    cooling = neither & _meet(cooled, xi) & law.conditions.cools(warmer, tighter, law.stress_slope_martensite)
-    return Branch(heating, cooling & ~heating)
-
-
-def _meet(curve: Scalar, xi: Scalar) -> Bool[Array, ""]:
-    return jnp.abs(curve - xi) <= 16.0 * jnp.finfo(xi.dtype).eps
-
-
 def fraction_on(state: WireState, branch: Branch, heated: Scalar, cooled: Scalar) -> Scalar:
     """xi at the end of a step on `branch`; unchanged off both.
 
@@ -158,15 +138,11 @@ def renewed(
     effects: Sequence[AbstractEffect],
     old: WireState,
     branch: Branch,
-    touching: Branch,
     temperature: Scalar,
     stress: Scalar,
     xi: Scalar,
 ) -> tuple[Scalar, Scalar]:
     """(xi_M, xi_A) after a step that ended at (`temperature`, `stress`, `xi`): eq. 3.26, corrected.
-
-    A branch that is behind the wire transforms nothing any more, yet it renews the other one (`touching`, see
-    `touched`): with a tail however small it would.
 
     A curve that its conditions kept the wire from following (Liang's, when the stress falls faster than the
     temperature) is re-anchored at the present state too: the source integrates rates there and so does not jump.
@@ -177,8 +153,6 @@ def renewed(
     through_cooling = 1.0 - (1.0 - xi) / jnp.maximum(k, FINISHED)
     missed_heating = ~branch.heating & (old.xi_M * h < xi)
     missed_cooling = ~branch.cooling & (1.0 - (1.0 - old.xi_A) * k > xi)
-    cooled_through = touching.cooling & (k <= FINISHED) & (h > FINISHED)
-    heated_through = touching.heating & (h <= FINISHED) & (k > FINISHED)
-    xi_M = jnp.where(branch.cooling | missed_heating | cooled_through, through_heating, old.xi_M)
-    xi_A = jnp.where(branch.heating | missed_cooling | heated_through, through_cooling, old.xi_A)
+    xi_M = jnp.where(branch.cooling | missed_heating, through_heating, old.xi_M)
+    xi_A = jnp.where(branch.heating | missed_cooling, through_cooling, old.xi_A)
     return xi_M, xi_A

@@ -1,0 +1,59 @@
+"""Judging on runs left out: what only the run left out could have told is credited with nothing."""
+
+from __future__ import annotations
+
+import jax.numpy as jnp
+import numpy as np
+
+from smajax.attribution.search import Fitted, Model, Search
+from smajax.extended import extended
+from smajax.fit.batch import RunBatch, simulate_batch
+from smajax.fit.problem import Problem
+from smajax.fit.solve import Solution, solve
+from smajax.presets import build
+
+DT, SAMPLES, NOISE = 0.1, 200, 1e-4
+BOUNDS = {"convection_coefficient": (50.0, 400.0), "latent_heat.enthalpy": (0.0, 6e4)}
+
+
+def _setting() -> Search:
+    """A run that transforms and one that stays at rest, by a wire with latent heat."""
+    heated = jnp.concatenate([jnp.full(100, 9.0), jnp.zeros(100)])
+    inputs = {"voltage": jnp.stack([heated, jnp.zeros(SAMPLES)])}
+    base = build("flexinol_table_3_2", "dead_weight", "voltage")
+    blank = RunBatch(inputs, jnp.zeros((2, SAMPLES)), jnp.ones((2, SAMPLES)), jnp.zeros((2, 0)), (), DT)
+    truth = simulate_batch(extended(base, ("latent_heat",), {"latent_heat.enthalpy": 2e4}), blank).reading
+    noise = NOISE * np.random.default_rng(7).normal(size=truth.shape)
+    batch = RunBatch(inputs, truth + noise, blank.mask, blank.overrides, (), DT)
+    problem = Problem.build(extended(base, ("latent_heat",), {}), batch, NOISE, False)
+    return Search(problem, ("convection_coefficient",), BOUNDS, ("latent_heat",), solve)
+
+
+def _at(setting: Search, enthalpy: float) -> Solution:
+    values = setting.problem.start_values()
+    values[setting.problem.names.index("latent_heat.enthalpy")] = enthalpy
+    return Solution(values, 1.0, True, 1)
+
+
+def test_an_effect_that_one_run_alone_shows_is_not_told_without_it() -> None:
+    setting = _setting()
+    nothing = np.full((2, SAMPLES), 5e-3)
+    present = Model((), _at(setting, 0.0).values, 2.0, nothing, setting.rmse(nothing))
+    entry = Fitted(("latent_heat",), _at(setting, 2e4))
+    assert setting.told_without(entry, present).tolist() == [False, True]
+    judged = setting.judged([entry], present)[0]
+    np.testing.assert_array_equal(judged.left_out[0], present.left_out[0])
+    assert np.sqrt(np.mean(judged.left_out[1] ** 2)) < 1.2 * NOISE
+
+
+def test_a_model_that_predicts_left_out_runs_worse_is_not_better() -> None:
+    setting = _setting()
+    rng = np.random.default_rng(3)
+    small, large = (size * rng.normal(size=(2, SAMPLES)) for size in (1e-4, 3e-4))
+    old = Model((), setting.problem.start_values(), 2.0, small, setting.rmse(small))
+    new = Model(("latent_heat",), setting.problem.start_values(), 1.0, large, setting.rmse(large))
+    assert not setting.better(new, old)[0]
+    assert setting.better(
+        Model(("latent_heat",), old.values, 0.1, small, setting.rmse(small)),
+        Model((), old.values, 1.0, large, setting.rmse(large)),
+    )[0]
