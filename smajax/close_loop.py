@@ -17,7 +17,7 @@ from scipy.stats import qmc
 
 from smajax.attribution.memory import Memory
 from smajax.attribution.search import Evidence, Model, Search, Start, scores_at, search
-from smajax.attribution.verdict import cannot_know, summary, unexplained, verdict
+from smajax.attribution.verdict import cannot_know, shown, summary, unexplained, verdict
 from smajax.catalogue import candidates
 from smajax.effects.library import LIBRARY
 from smajax.experiment.record import Experiment, Run
@@ -95,7 +95,15 @@ def close_loop(
     kept = Memory(memory)
     progress("checking what these runs can tell", 0.0)
     start = job.problem.start_values()
-    setting = Search(job.problem, job.unknowns, job.bounds, job.candidates, kept.solve, progress)
+    setting = Search(
+        job.problem,
+        job.unknowns,
+        job.bounds,
+        job.candidates,
+        kept.solve,
+        lambda value: shown(value, experiment.output_unit, experiment.output_name),
+        progress,
+    )
     at_start = sensitivity(job.problem, start, setting.every)
     check = [*experiment.warnings, *identifiability(at_start, job.unknowns, job.bounds)]
     progress("checking what these runs can tell", 1.0)

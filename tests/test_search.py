@@ -26,7 +26,7 @@ def _setting() -> Search:
     noise = NOISE * np.random.default_rng(7).normal(size=truth.shape)
     batch = RunBatch(inputs, truth + noise, blank.mask, blank.overrides, (), DT)
     problem = Problem.build(extended(base, ("latent_heat",), {}), batch, NOISE, False)
-    return Search(problem, ("convection_coefficient",), BOUNDS, ("latent_heat",), solve)
+    return Search(problem, ("convection_coefficient",), BOUNDS, ("latent_heat",), solve, "{:.3g} m".format)
 
 
 def _at(setting: Search, enthalpy: float) -> Solution:

@@ -63,6 +63,14 @@ def test_a_parameter_that_nothing_depends_on_is_said() -> None:
     assert any("b: nothing in these runs depends on it" in line for line in identifiability(at, "ab", BOUNDS))
 
 
+def test_a_parameter_known_worse_than_its_range_has_no_standard_error() -> None:
+    rng = np.random.default_rng(6)
+    at = _sensitivity(rng.normal(size=(500, 2)) * [1.0, 1e-3], rng.normal(size=500))
+    found = uncertainty(at, "ab", VALUES, BOUNDS)
+    assert found.standard_error["b"] is None
+    assert "range open" in found.remark["b"]
+
+
 def test_a_parameter_on_its_bound_has_no_standard_error() -> None:
     rng = np.random.default_rng(5)
     at = _sensitivity(rng.normal(size=(500, 2)), rng.normal(size=500))

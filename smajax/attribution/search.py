@@ -83,6 +83,7 @@ class Search:
     bounds: Mapping[str, tuple[float, float]]
     candidates: tuple[str, ...]
     solve: Solve
+    shown: Callable[[float], str]  # an error in the unit that an engineer reads
     progress: Progress = quiet
     evidence: dict[str, Evidence] = field(default_factory=dict)
     rounds: list[Round] = field(default_factory=list)
@@ -207,7 +208,7 @@ class Search:
         enough = min(gain, fitted) > PENALTY * extra and z > CHANCE
         left_out = "left-out runs" if len(old.left_out) > 1 else "the one fit run itself"
         told = (
-            f"error on {left_out} {old.left_out_rmse:.3g} -> {new.left_out_rmse:.3g} "
+            f"error on {left_out} {self.shown(old.left_out_rmse)} -> {self.shown(new.left_out_rmse)} "
             f"({gain:+.0%} of its mean square, {z:.1f} standard errors)"
         )
         return enough, told
@@ -301,7 +302,15 @@ def search(setting: Search, base: Solution) -> tuple[Model, Model]:
     else:
         why = f"the search ends after {MOST_ROUNDS} rounds, whatever more there may be"
         setting.note(Round(MOST_ROUNDS + 1, (), "", why))
-    return first, pruned(setting, model)
+    return first, refined(setting, pruned(setting, model))
+
+
+def refined(setting: Search, model: Model) -> Model:
+    """The final model taken to its optimum, from where it is and from a little off its bounds: error bars want that."""
+    starts = [Start(model.effects, values) for values in (model.values, setting.inside(model))]
+    solutions, _ = setting.fit(starts, "polishing the final model", enough=1e-4, start_cost=NEARLY_GAUSS_NEWTON)
+    best = min(solutions, key=lambda solution: solution.cost)
+    return dataclasses.replace(model, values=best.values, cost=best.cost) if best.cost < model.cost else model
 
 
 def polished(setting: Search, fitted: Sequence[Fitted]) -> list[Fitted]:

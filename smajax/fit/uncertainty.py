@@ -85,6 +85,10 @@ def uncertainty(
         elif lost:
             others = [loose[k] for k in np.flatnonzero(np.abs(unseen[index]) > SHARE**2) if k != index]
             remark[name] = f"the runs see only a combination of it with {', '.join(others)}"
+    for index, name in enumerate(loose):
+        room = bounds[name][1] - bounds[name][0]
+        if not remark[name] and error[index] / scale[index] > room:
+            errors[name], remark[name] = None, "the runs leave all of its range open"
     correlation = covariance / np.outer(np.where(error > 0, error, 1.0), np.where(error > 0, error, 1.0))
     for index, name in enumerate(loose):
         partners = [loose[k] for k in np.flatnonzero(np.abs(correlation[index]) > TOGETHER) if k != index]
