@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from smajax.effects.library import LIBRARY
 from smajax.experiment.catalogue import Catalogue, ModelDescription, ParameterInfo
-from smajax.load.coupon import Coupon
+from smajax.load.coupon import AbstractCoupon
 from smajax.parameters import parameters
 from smajax.presets import DRIVES, LOADS, WIRES, build
 from smajax.system import System
@@ -13,7 +13,7 @@ from smajax.system import System
 def describe(wire: str, load: str, drive: str) -> ModelDescription:
     """Parameters and channels of one combination. ValueError when the three do not go together."""
     system = build(wire, load, drive)
-    if isinstance(system.load, Coupon) != (drive == "none"):
+    if isinstance(system.load, AbstractCoupon) != (drive == "none"):
         raise ValueError(
             f"load `{load}` with drive `{drive}`: a coupon's temperature is prescribed, so it takes the drive `none`; "
             f"every other load is heated and takes one of {sorted(set(DRIVES) - {'none'})}."
@@ -27,7 +27,7 @@ def describe(wire: str, load: str, drive: str) -> ModelDescription:
         inputs_optional=system.load.inputs_optional | system.drive.inputs_optional | {"ambient_temperature"},
         outputs={name: unit},
         inputs_squared=system.drive.inputs_squared,
-        inputs_sampled=system.load.inputs_sampled if isinstance(system.load, Coupon) else frozenset(),
+        inputs_sampled=system.load.inputs_required if isinstance(system.load, AbstractCoupon) else frozenset(),
     )
 
 
@@ -38,7 +38,7 @@ CATALOGUE = Catalogue(
 
 def candidates(system: System, only: tuple[str, ...] | None, excluded: tuple[str, ...]) -> tuple[str, ...]:
     """Names of the effects that this system can show: a coupon has no heat balance, no circuit and no guide."""
-    useless = {"heat", "electrical", "mechanics"} if isinstance(system.load, Coupon) else set()
+    useless = {"heat", "electrical", "mechanics"} if isinstance(system.load, AbstractCoupon) else set()
     return tuple(
         name
         for name, effect in LIBRARY.items()

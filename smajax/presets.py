@@ -9,19 +9,23 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
+from smajax.controller.stress_sliding import StressSliding
 from smajax.drive.base import AbstractDrive
+from smajax.drive.current import Current
 from smajax.drive.duty import Duty
 from smajax.drive.none import NoDrive
+from smajax.drive.power import Power
 from smajax.drive.voltage import Voltage
 from smajax.load.arm import Arm
 from smajax.load.base import AbstractMovingLoad
 from smajax.load.bias_spring import BiasSpring
-from smajax.load.coupon import Coupon
+from smajax.load.coupon import AbstractCoupon, Coupon, StrainCoupon
 from smajax.load.dead_weight import DeadWeight
+from smajax.parameters import set_parameters
 from smajax.system import System
 from smajax.wire.conditions import Enhanced
 from smajax.wire.constitutive import Constitutive
-from smajax.wire.heat import Heat
+from smajax.wire.heat import Heat, cross_section
 from smajax.wire.kinetics import Kinetics
 from smajax.wire.resistance import Resistance
 from smajax.wire.wire import Wire
@@ -44,9 +48,13 @@ def niti_table_3_1() -> Wire:
             stress_slope_martensite=10.3e6,
             conditions=Enhanced(),
         ),
-        # theta_T as printed: positive, that is, a wire which shrinks on heating.
+        # eps_L: 2 r (135 deg)/l_0 = 0.043 is the printed stroke of the arm; with the printed 0.04 it ends at 81 deg, and
+        # M5 and M6 need 85. theta_T as printed: positive, that is, a wire which shrinks on heating.
         constitutive=Constitutive(
-            young_modulus_austenite=75e9, young_modulus_martensite=28e9, recoverable_strain=0.04, thermal_modulus=0.55e6
+            young_modulus_austenite=75e9,
+            young_modulus_martensite=28e9,
+            recoverable_strain=0.043,
+            thermal_modulus=0.55e6,
         ),
     )
 
@@ -76,6 +84,16 @@ def flexinol_table_3_2() -> Wire:
             thermal_modulus=0.55e6,
         ),
     )
+
+
+def niti_table_3_1_expanding() -> Wire:
+    """The wire of Table 3.1 with the physical sign of theta_T: it lengthens when heated."""
+    return set_parameters(niti_table_3_1(), {"thermal_modulus": -0.55e6})
+
+
+def flexinol_table_3_2_expanding() -> Wire:
+    """The wire of Table 3.2 with the physical sign of theta_T: it lengthens when heated."""
+    return set_parameters(flexinol_table_3_2(), {"thermal_modulus": -0.55e6})
 
 
 def flexinol_ht_500um() -> Wire:
@@ -137,7 +155,7 @@ def arm() -> Arm:
     """Rotary arm of Table 3.1. Geometry that the source omits, chosen once.
 
     The length makes the wire carry the printed sigma_0 = 75 MPa at -45 deg. The spring is slack there and pulls on a
-    lever of 45 mm, about the link's own length: with it 7.2 V stops inside the range and 7.3 V passes the angle of
+    lever of 48 mm, about the link's own length: with it 7.2 V stops inside the range and 7.3 V passes the angle of
     greatest stress (M2, M3), and the wire stays taut to the top. The damping lets a swing die out in about a second.
     """
     return Arm(
@@ -146,7 +164,7 @@ def arm() -> Arm:
         payload_mass=0.05719,
         link_mass=0.0187,
         spring_stiffness=3.871,
-        spring_lever=0.045,
+        spring_lever=0.048,
         spring_rest_angle=-math.pi / 4,
         damping=3e-3,
         start_angle=-math.pi / 4,
@@ -156,13 +174,18 @@ def arm() -> Arm:
 
 
 def voltage() -> Voltage:
-    """No amplifier."""
-    return Voltage(amplifier_gain=1.0)
+    """No amplifier, and no limit that a bench would meet."""
+    return Voltage(amplifier_gain=1.0, amplifier_limit=1e3)
 
 
 def amplified_voltage() -> Voltage:
     """The arm's amplifier: 2 in the source's reading of eq. 4.28 (V^2/R with the R of one metre), so 2 l_0 here."""
-    return Voltage(amplifier_gain=1.8)
+    return Voltage(amplifier_gain=1.8, amplifier_limit=1e3)
+
+
+def flexinol_voltage() -> Voltage:
+    """The dead weight's amplifier ("amplified before being applied", sec. 3.5): 1.6 puts the onset just above 4 V (M11)."""
+    return Voltage(amplifier_gain=1.6, amplifier_limit=1e3)
 
 
 def duty() -> Duty:
@@ -171,20 +194,49 @@ def duty() -> Duty:
 
 
 WIRES: dict[str, Callable[[], Wire]] = {
-    entry.__name__: entry for entry in (niti_table_3_1, flexinol_table_3_2, flexinol_ht_500um, flexinol_isobaric)
+    entry.__name__: entry
+    for entry in (
+        niti_table_3_1,
+        niti_table_3_1_expanding,
+        flexinol_table_3_2,
+        flexinol_table_3_2_expanding,
+        flexinol_ht_500um,
+        flexinol_isobaric,
+    )
 }
-LOADS: dict[str, Callable[[], AbstractMovingLoad | Coupon]] = {
+LOADS: dict[str, Callable[[], AbstractMovingLoad | AbstractCoupon]] = {
     "dead_weight": dead_weight,
     "bias_spring": bias_spring,
     "arm": arm,
     "coupon": Coupon,
+    "strain_coupon": StrainCoupon,
 }
 DRIVES: dict[str, Callable[[], AbstractDrive]] = {
     "voltage": voltage,
     "amplified_voltage": amplified_voltage,
+    "flexinol_voltage": flexinol_voltage,
+    "current": Current,
+    "power": Power,
     "duty": duty,
     "none": NoDrive,
 }
+
+
+def stress_sliding(system: System) -> StressSliding:
+    """Stress-based sliding control of the arm (sec. 4.7) that knows its arm; the source prints no gains."""
+    if not isinstance(system.load, Arm):
+        raise ValueError(f"stress-based sliding control is derived for the arm, not for {type(system.load).__name__}.")
+    return StressSliding(
+        arm=system.load,
+        cross_section=cross_section(system.wire),
+        surface_slope=3.0,
+        gain=8.5e-3,
+        boundary=4.0,
+        stress_gain=2.5e-7,
+        stress_integral_gain=2.5e-7,
+        stress_derivative_gain=0.0,
+        largest_voltage=8.7,
+    )
 
 
 def build(wire: str, load: str, drive: str) -> System:

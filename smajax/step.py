@@ -28,18 +28,19 @@ import jax.numpy as jnp
 from jax import lax
 
 from smajax.load.base import AbstractMovingLoad
-from smajax.load.coupon import Coupon
+from smajax.load.coupon import Coupon, StrainCoupon
 from smajax.system import System, ambient_temperature
 from smajax.types import Inputs, Motion, Scalar, State, WireState
 from smajax.wire.constitutive import strain_at, stress_at, young_modulus
 from smajax.wire.heat import cross_section, heat_rate, stored_heat
-from smajax.wire.kinetics import Branch, choose_branch, curves, fraction_on, open_branches, renewed, steepest_slope
+from smajax.wire.kinetics import Branch, choose_branch, curves, fraction_on, open_branches, remembered, steepest_slope
 from smajax.wire.resistance import resistance_per_metre
 
 Tree = TypeVar("Tree")
 
 GAMMA = 1.0 - 0.5**0.5
-MOST_ITERATIONS = 25
+MOST_ITERATIONS = 50
+UNDAMPED = 12  # iterations before every second step is halved
 # Newton stops when no unknown moves by more than this share of its scale: 1 C, 1 % strain, 1e-4 E, and xi in full;
 # in float32, by more than what rounding alone moves it.
 TOLERANCE = 1e-8
@@ -113,17 +114,21 @@ def _residual(
     Beside them the two curves of the kinetics at `z`, from which the branch is chosen.
     """
     wire, effects, load, old = system.wire, system.effects, system.load, stage.old.wire
-    assert isinstance(load, AbstractMovingLoad)
-    heating, _, _ = _rates(system, stage, inputs, z)
-    capacity = stored_heat(wire, (), jnp.ones_like(z.temperature), z.fraction)
-    heat = (stored_heat(wire, effects, z.temperature, z.fraction) - stage.heat - stage.step * heating) / capacity
+    if isinstance(load, StrainCoupon):
+        heat, motion = z.temperature - inputs["temperature"], z.position + inputs["strain"]
+        strain = -z.position
+    else:
+        assert isinstance(load, AbstractMovingLoad)
+        heating, _, _ = _rates(system, stage, inputs, z)
+        capacity = stored_heat(wire, (), jnp.ones_like(z.temperature), z.fraction)
+        heat = (stored_heat(wire, effects, z.temperature, z.fraction) - stage.heat - stage.step * heating) / capacity
 
-    # Projected on the range between the end stops: at a stop the equation reads "position = stop".
-    free = _free_position(system, stage, inputs, z)
-    lower, upper = load.limits()
-    motion = z.position - jnp.where(free < lower, lower, jnp.where(free > upper, upper, free))
+        # Projected on the range between the end stops: at a stop the equation reads "position = stop".
+        free = _free_position(system, stage, inputs, z)
+        lower, upper = load.limits()
+        motion = z.position - jnp.where(free < lower, lower, jnp.where(free > upper, upper, free))
+        strain = -load.contraction(wire) * (z.position - load.start())
 
-    strain = -load.contraction(wire) * (z.position - load.start())
     asked = stress_at(wire, effects, old, strain, z.temperature, z.stress, z.fraction)
     heated, cooled = curves(wire.kinetics, effects, old, z.temperature, z.stress)
     kinetics = z.fraction - fraction_on(old, branch, heated, cooled)
@@ -189,11 +194,11 @@ def _solved(system: System, stage: Stage, inputs: Inputs) -> _Iterate:
 
     The fraction is held in its bracket, and friction passes through sticking on its way from one slip to the other.
     """
-    load, law, old = system.load, system.wire.kinetics, stage.old.wire
-    assert isinstance(load, AbstractMovingLoad)
+    law, old = system.wire.kinetics, stage.old.wire
     xi = old.martensite_fraction
     stress_scale = 1e-4 * young_modulus(system.wire, xi)
-    position_scale = 0.01 / load.contraction(system.wire)
+    contraction = system.load.contraction(system.wire) if isinstance(system.load, AbstractMovingLoad) else 1.0
+    position_scale = 0.01 / contraction
     slips = _friction_limit(system) > 0.0
     sticks = stage.old.motion.position - PRESLIDING * stage.old.motion.friction
     open_at_start = open_branches(law, system.effects, old)
@@ -217,13 +222,17 @@ def _solved(system: System, stage: Stage, inputs: Inputs) -> _Iterate:
         # solution), and after that to the secant through both ends.
         inside = ((free > low) & (free < high)) | (jnp.abs(residual[3]) <= tolerance)
         end, at_end = jnp.where(free <= low, low, high), jnp.where(free <= low, at_low, at_high)
-        share = jnp.clip(at_low / (at_low - at_high), 0.1, 0.9)
+        share = jnp.clip(at_low / (at_low - at_high), 0.3, 0.7)
         secant = low + jnp.where(jnp.isfinite(share), share, 0.5) * (high - low)
         fraction = jnp.where(inside, free, jnp.where(jnp.isfinite(at_end), secant, end))
         # Not trusted and on its way out of the bracket: first mend the other three at this fraction.
         fraction = jnp.where(trusted | inside, fraction, here)
         fraction = jnp.where(at.trying, xi, fraction)
         step = _back_substituted(rows, right, fraction - here)
+        # A stiff-soft-stiff wire (detwinning) can send Newton to and fro between its two stiff ends.
+        late = (at.iterations > UNDAMPED) & (at.iterations % 2 == 0)
+        step = [jnp.where(late, 0.5 * change, change) for change in step]
+        fraction = here + step[3]
         position = at.z.position + step[1]
         _, before = _friction(stage, at.z.position)
         _, after = _friction(stage, position)
@@ -275,10 +284,9 @@ def _held(tree: Tree) -> Tree:
     return jax.tree.map(lax.stop_gradient, tree)
 
 
-def _stage(system: System, stage: Stage, inputs: Inputs) -> tuple[State, Scalar, Scalar, Scalar]:
-    """Solve one stage: (state at its end, dH/dt, v, a)."""
-    wire, effects, load, old = system.wire, system.effects, system.load, stage.old.wire
-    assert isinstance(load, AbstractMovingLoad)
+def _ended(system: System, stage: Stage, inputs: Inputs) -> tuple[WireState, Unknowns]:
+    """Solve one stage: the wire at its end, and the unknowns there."""
+    wire, effects, old = system.wire, system.effects, stage.old.wire
     solved = _solved(_held(system), _held(stage), _held(dict(inputs)))
     branch = solved.branch
     # The one differentiated Newton step; the Jacobian of the last iteration is the one at the solution to rounding.
@@ -289,7 +297,16 @@ def _stage(system: System, stage: Stage, inputs: Inputs) -> tuple[State, Scalar,
     # Rounding of the last correction only; not `clip`, which halves the derivative at the ends themselves.
     xi = jnp.where(z.fraction > 1.0, 1.0, jnp.where(z.fraction < 0.0, 0.0, z.fraction))
     xi = jnp.where(branch.heating | branch.cooling, xi, old.martensite_fraction)
+    stress = jnp.maximum(z.stress, 0.0)
+    strain = strain_at(wire, effects, old, z.temperature, stress, xi)
+    return remembered(wire.kinetics, effects, old, branch, z.temperature, stress, strain, xi), z
 
+
+def _stage(system: System, stage: Stage, inputs: Inputs) -> tuple[State, Scalar, Scalar, Scalar]:
+    """One stage of a moving load: (state at its end, dH/dt, v, a)."""
+    load = system.load
+    assert isinstance(load, AbstractMovingLoad)
+    wire, z = _ended(system, stage, inputs)
     heating, velocity, acceleration = _rates(system, stage, inputs, z)
     lower, upper = load.limits()
     free = _free_position(system, stage, inputs, z)
@@ -297,16 +314,8 @@ def _stage(system: System, stage: Stage, inputs: Inputs) -> tuple[State, Scalar,
     position = jnp.where(below, lower, jnp.where(above, upper, z.position))
     velocity = jnp.where(below | above, 0.0, velocity)  # inelastic
     acceleration = jnp.where(below | above, 0.0, acceleration)
-    stress = jnp.maximum(z.stress, 0.0)
-    xi_M, xi_A = renewed(wire.kinetics, effects, old, branch, z.temperature, stress, xi)
-    strain = strain_at(wire, effects, old, z.temperature, stress, xi)
     friction, _ = _friction(stage, position)
-    new = State(
-        stage.time,
-        WireState(z.temperature, stress, strain, xi, xi_M, xi_A),
-        Motion(position, velocity, friction),
-        stage.old.reading,
-    )
+    new = State(stage.time, wire, Motion(position, velocity, friction), stage.old.reading)
     return new, heating, velocity, acceleration
 
 
@@ -334,21 +343,32 @@ def _coupon_step(system: System, state: State, inputs: Inputs, dt: Scalar) -> St
     open_at_start = open_branches(wire.kinetics, effects, old)
     branch = choose_branch(wire.kinetics, old, open_at_start, temperature, stress, heated, cooled)
     xi = fraction_on(old, branch, heated, cooled)
-    xi_M, xi_A = renewed(wire.kinetics, effects, old, branch, temperature, stress, xi)
     strain = strain_at(wire, effects, old, temperature, stress, xi)
-    return State(state.time + dt, WireState(temperature, stress, strain, xi, xi_M, xi_A), state.motion, state.reading)
+    new = remembered(wire.kinetics, effects, old, branch, temperature, stress, strain, xi)
+    return State(state.time + dt, new, state.motion, state.reading)
+
+
+def _strain_coupon_step(system: System, state: State, inputs: Inputs, dt: Scalar) -> State:
+    """Temperature and strain at the end of the step are prescribed: stress and fraction are solved for."""
+    zero = jnp.zeros_like(state.wire.temperature)
+    stage = Stage(state, state.time + dt, dt, zero, zero, zero)
+    wire, z = _ended(system, stage, inputs)
+    return State(stage.time, wire, Motion(z.position, zero, zero), state.reading)
 
 
 def step(system: System, state: State, inputs: Inputs, dt: Scalar | float) -> State:
     """Advance one system by `dt` seconds with `inputs` (SI, scalars) held.
 
     Pure and differentiable in every floating argument; `vmap` it over any of them. For a coupon `inputs` are the
-    temperature and stress at the end of the step. The result satisfies eq. 3.2 against `state` to rounding.
+    values at the end of the step. The result satisfies the constitutive law against `state` to rounding.
     """
     dt = jnp.asarray(dt, dtype=float)
     if isinstance(system.load, Coupon):
         new = _coupon_step(system, state, inputs, dt)
         shown = new.wire.strain
+    elif isinstance(system.load, StrainCoupon):
+        new = _strain_coupon_step(system, state, inputs, dt)
+        shown = new.wire.stress
     else:
         new = _moving_step(system, state, inputs, dt)
         shown = new.motion.position

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from smajax.drive.base import AbstractDrive
 from smajax.effects.base import AbstractEffect
 from smajax.load.base import AbstractMovingLoad
-from smajax.load.coupon import Coupon
+from smajax.load.coupon import AbstractCoupon, StrainCoupon
 from smajax.parameters import parameter
 from smajax.types import Inputs, Motion, Scalar, State
 from smajax.wire.heat import cross_section
@@ -19,7 +19,7 @@ class System(eqx.Module):
     """One actuator (or one coupon) with the effects that its equations carry."""
 
     wire: Wire
-    load: AbstractMovingLoad | Coupon
+    load: AbstractMovingLoad | AbstractCoupon
     drive: AbstractDrive
     effects: tuple[AbstractEffect, ...] = ()
     start_fraction: Scalar = parameter("-", 0.0, 1.0, "martensite fraction at the start", default=1.0)
@@ -33,18 +33,24 @@ def ambient_temperature(system: System, time: Scalar, inputs: Inputs) -> Scalar:
 
 def initial_state(system: System, inputs: Inputs) -> State:
     """At rest with the first inputs: a moving load in equilibrium at ambient temperature, a coupon as prescribed."""
-    if isinstance(system.load, Coupon):
-        temperature, stress = inputs["temperature"], inputs["stress"]
-        position = reading = jnp.zeros_like(stress)
+    strain = jnp.zeros_like(system.start_fraction)
+    if isinstance(system.load, AbstractCoupon):
+        temperature = inputs["temperature"]
+        position = stress = reading = jnp.zeros_like(temperature)
+        if isinstance(system.load, StrainCoupon):
+            strain = inputs["strain"]
+            position = -strain
+        else:
+            stress = inputs["stress"]
     else:
         position = reading = system.load.start()
         temperature = ambient_temperature(system, jnp.zeros_like(position), inputs)
         at_rest = system.load.resistance(position, jnp.zeros_like(position), inputs)
         # An end stop may carry part of the load, the wire the rest; what the wire carries is what pulls on it.
         stress = jnp.maximum(at_rest / (system.load.lever() * cross_section(system.wire)), 0.0)
-    temperature, stress, position, reading, fraction = jnp.broadcast_arrays(
-        temperature, stress, position, reading, system.start_fraction
+    temperature, stress, strain, position, reading, fraction = jnp.broadcast_arrays(
+        temperature, stress, strain, position, reading, system.start_fraction
     )
     zero = jnp.zeros_like(stress)
-    wire = start(system.wire, system.effects, temperature, stress, fraction)
+    wire = start(system.wire, system.effects, temperature, stress, strain, fraction)
     return State(zero, wire, Motion(position, zero, zero), reading)

@@ -21,6 +21,8 @@ class WireState(eqx.Module):
     martensite_fraction: Scalar  # -, 1 = all martensite
     xi_M: Scalar  # amplitude of the martensite-to-austenite curve, eq. 3.3
     xi_A: Scalar  # floor of the austenite-to-martensite curve, eq. 3.5
+    detwinned_fraction: Scalar  # xi_s: the part of the martensite that gives strain, all of it without Brinson's split
+    formed_by_loading: Scalar  # 1 where loading, not cooling, formed the martensite last; else 0
 
 
 class Motion(eqx.Module):
@@ -50,6 +52,7 @@ class Trajectory(eqx.Module):
     martensite_fraction: Series
     xi_M: Series
     xi_A: Series
+    detwinned_fraction: Series
     position: Series
     velocity: Series
     reading: Series

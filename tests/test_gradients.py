@@ -12,10 +12,11 @@ from smajax.attribution.search import NUDGE
 from smajax.effects.library import LIBRARY
 from smajax.extended import extended
 from smajax.fit.problem import Problem
-from smajax.parameters import get_parameters, parameters, set_parameters, set_vector
+from smajax.parameters import set_parameters
 from smajax.presets import build
 from smajax.simulate import simulate
 from smajax.system import System
+from tests.derivatives import compare, open_loop
 
 DT = 0.05
 
@@ -39,45 +40,9 @@ CASES: dict[str, tuple[System, dict[str, jax.Array]]] = {
 }
 
 
-def _compare(system: System, inputs: dict[str, jax.Array]) -> None:
-    names = list(parameters(system))
-    at = get_parameters(system, names)
-
-    def features(vector: jax.Array) -> jax.Array:
-        run = simulate(set_vector(system, names, vector), inputs, DT)
-        # Smooth in time, so that a kink of one sample does not hide the derivative; several, so that none is blind.
-        return jnp.stack(
-            [run.reading.mean(), run.reading[150:].mean(), run.reading[-100:].mean(), run.temperature.mean()]
-        )
-
-    forward = np.asarray(jax.jit(jax.jacfwd(features))(at))
-    evaluate = jax.jit(features)
-    table = parameters(system)
-    for index, name in enumerate(names):
-        value, room = float(at[index]), table[name].high - table[name].low
-        step = 1e-6 * (abs(value) or 1e-2 * room)
-        if "." in name and abs(value) < 1e-2 * room:
-            # A coefficient next to nothing: wide enough to rise above rounding, and not across zero.
-            step = min(1e-5 * room, 0.1 * abs(value) or 1e-5 * room)
-        # On a bound (a wire that starts as martensite) the difference is one-sided, of second order.
-        inward = 1.0 if value - step < table[name].low else -1.0 if value + step > table[name].high else 0.0
-        if inward:
-            step = 1e-5 * room
-            points = [evaluate(at.at[index].set(value + inward * k * step)) for k in (0, 1, 2)]
-            difference = np.asarray((-3 * points[0] + 4 * points[1] - points[2]) / (2 * inward * step))
-        else:
-            difference = np.asarray(
-                (evaluate(at.at[index].set(value + step)) - evaluate(at.at[index].set(value - step))) / (2 * step)
-            )
-        rounding = 1e-13 * np.abs(np.asarray(evaluate(at))).max() / step
-        scale = np.abs(difference).max() * 1e-4 + rounding
-        error = np.abs(forward[:, index] - difference).max()
-        assert error <= scale, f"{name}: automatic {forward[:, index]}, differences {difference}"
-
-
 @pytest.mark.parametrize("case", sorted(CASES))
 def test_every_base_parameter(case: str) -> None:
-    _compare(*CASES[case])
+    compare(CASES[case][0], open_loop(CASES[case][1], DT))
 
 
 @pytest.mark.parametrize("effect", sorted(LIBRARY))
@@ -89,7 +54,7 @@ def test_every_effect_coefficient(effect: str, share: float) -> None:
         name: size * (share if name in switches(effect) else 1.0)
         for name, size in ((f"{effect}.{key}", size) for key, size in LIBRARY[effect].starts.items())
     }
-    _compare(extended(system, (effect,), starts), inputs)
+    compare(extended(system, (effect,), starts), open_loop(inputs, DT))
 
 
 def test_reverse_mode_agrees_with_forward_mode() -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Sequence
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -14,16 +13,7 @@ import numpy as np
 
 from smajax.fit.problem import Lane, Problem
 from smajax.fit.solve import Progress, Solution, quiet, solve
-
-
-@lru_cache(maxsize=1)
-def _code() -> str:
-    """Digest of the package's source: a fit by other code is another fit."""
-    digest = hashlib.sha256()
-    package = Path(__file__).parents[1]
-    for file in sorted(package.rglob("*.py")):
-        digest.update(file.read_bytes())
-    return digest.hexdigest()
+from smajax.source_mark import source_mark
 
 
 class Memory:
@@ -43,7 +33,9 @@ class Memory:
         **settings: Any,
     ) -> list[Solution]:
         """As `fit.solve.solve`."""
-        digest = hashlib.sha256(repr((_code(), jax.__version__, problem.names, sorted(settings.items()))).encode())
+        digest = hashlib.sha256(
+            repr((source_mark(), jax.__version__, problem.names, sorted(settings.items()))).encode()
+        )
         digest.update(repr((problem.batch.dt, problem.offset, problem.batch.override_names)).encode())
         for leaf in jax.tree.leaves((problem.system, problem.batch, problem.noise_sigma, list(lanes))):
             digest.update(np.asarray(leaf).tobytes())

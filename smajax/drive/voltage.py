@@ -1,8 +1,10 @@
-"""Voltage on the wire through an amplifier."""
+"""Voltage on the wire through an amplifier with limits."""
 
 from __future__ import annotations
 
 from typing import ClassVar
+
+import jax.numpy as jnp
 
 from smajax.drive.base import AbstractDrive
 from smajax.parameters import parameter
@@ -12,13 +14,17 @@ from smajax.types import Inputs, Scalar
 class Voltage(AbstractDrive):
     r"""$I = g V / (R l_0)$, so $I^2 R = (g V / l_0)^2 / R$ per metre.
 
-    Eq. 4.28 prints V^2/R with the R of one metre; that is a gain of l_0 here, and the amplifier's comes on top.
+    Eq. 4.28 prints V^2/R with the R of one metre; that is a gain of l_0 here, and the amplifier's comes on top. Beyond
+    the amplifier's limit the wire gets the limit, and the derivative with respect to V is zero.
     """
 
     amplifier_gain: Scalar = parameter("-", 1e-3, 1e3, "gain between the voltage channel and the wire")
+    amplifier_limit: Scalar = parameter("V", 1e-3, 1e5, "largest voltage that the amplifier puts on the wire")
 
     inputs_required: ClassVar[frozenset[str]] = frozenset({"voltage"})
     inputs_squared: ClassVar[frozenset[str]] = inputs_required
 
     def power(self, resistance: Scalar, length: Scalar, inputs: Inputs) -> Scalar:
-        return (self.amplifier_gain * inputs["voltage"] / length) ** 2 / resistance
+        asked = jnp.abs(self.amplifier_gain * inputs["voltage"])
+        put = jnp.where(asked < self.amplifier_limit, asked, self.amplifier_limit)
+        return (put / length) ** 2 / resistance

@@ -62,8 +62,10 @@ class AbstractEffect(eqx.Module):
         """Share of austenite left at the reduced distance z = (y_M - M_f)/(M_s - M_f); 0 far below, 1 far above."""
         return remaining
 
-    def strain(self, wire: Wire, temperature: Scalar, stress: Scalar, fraction: Scalar) -> Scalar | float:
-        """Strain beside eps_L xi and the elastic part, a function of state, -."""
+    def strain(
+        self, wire: Wire, temperature: Scalar, stress: Scalar, fraction: Scalar, detwinned: Scalar
+    ) -> Scalar | float:
+        """Strain beside eps_L xi_s and the elastic part, a function of state, -; `detwinned` is xi_s."""
         return 0.0
 
     def friction_limit(self) -> Scalar | float:

@@ -36,5 +36,7 @@ class StressDependentStrain(AbstractEffect):
     def base(cls) -> StressDependentStrain:
         return cls(gain=0.0, scale=1e8)
 
-    def strain(self, wire: Wire, temperature: Scalar, stress: Scalar, fraction: Scalar) -> Scalar | float:
-        return self.gain * (1.0 - jnp.exp(-stress / self.scale)) * fraction
+    def strain(
+        self, wire: Wire, temperature: Scalar, stress: Scalar, fraction: Scalar, detwinned: Scalar
+    ) -> Scalar | float:
+        return self.gain * (1.0 - jnp.exp(-stress / self.scale)) * detwinned

@@ -37,6 +37,8 @@ class ThermalExpansion(AbstractEffect):
     def base(cls) -> ThermalExpansion:
         return cls(martensite=0.0, austenite=0.0)
 
-    def strain(self, wire: Wire, temperature: Scalar, stress: Scalar, fraction: Scalar) -> Scalar | float:
+    def strain(
+        self, wire: Wire, temperature: Scalar, stress: Scalar, fraction: Scalar, detwinned: Scalar
+    ) -> Scalar | float:
         coefficient = fraction * self.martensite + (1.0 - fraction) * self.austenite
         return coefficient * (temperature - wire.heat.ambient_temperature)

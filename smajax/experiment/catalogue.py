@@ -10,10 +10,12 @@ INPUT_UNITS: Mapping[str, str] = MappingProxyType(
     {
         "voltage": "V",
         "current": "A",
+        "power": "W",
         "duty": "1",
         "mass": "kg",
         "temperature": "degC",
         "stress": "Pa",
+        "strain": "1",
         "ambient_temperature": "degC",
     }
 )

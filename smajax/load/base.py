@@ -2,8 +2,8 @@
 
     inertia * a + resistance(position, velocity) = lever * A_w * stress,     strain = -contraction * (position - start)
 
-Position is in metres, or radians for an arm, positive when the wire contracts. A coupon, whose stress and temperature
-are prescribed, does not move and has a step of its own (`load/coupon.py`).
+Position is in metres, or radians for an arm, positive when the wire contracts. A coupon, whose temperature
+and stress or strain are prescribed, has no equation of motion (`load/coupon.py`).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Coupon: a wire whose temperature and stress are prescribed, in a testing machine with an oven."""
+"""Coupons: a wire in a testing machine with an oven, its temperature and its stress or strain prescribed."""
 
 from __future__ import annotations
 
@@ -7,11 +7,26 @@ from typing import ClassVar
 import equinox as eqx
 
 
-class Coupon(eqx.Module):
-    """No heat balance and no motion: the inputs are the temperature (C) and the stress (Pa), the reading is strain."""
+class AbstractCoupon(eqx.Module):
+    """No heat balance and no motion: every input is measured at an instant, as the reading is.
+
+    The inputs of other loads are commands that hold over a step.
+    """
+
+    inputs_required: ClassVar[frozenset[str]]
+    inputs_optional: ClassVar[frozenset[str]] = frozenset()
+    reading: ClassVar[tuple[str, str]]
+
+
+class Coupon(AbstractCoupon):
+    """Prescribed temperature (C) and stress (Pa); the reading is the strain."""
 
     inputs_required: ClassVar[frozenset[str]] = frozenset({"temperature", "stress"})
-    inputs_optional: ClassVar[frozenset[str]] = frozenset()
-    # Measured at an instant, as the strain is; the inputs of other loads are commands that hold over a step.
-    inputs_sampled: ClassVar[frozenset[str]] = inputs_required
     reading: ClassVar[tuple[str, str]] = ("strain", "-")
+
+
+class StrainCoupon(AbstractCoupon):
+    """Prescribed temperature (C) and strain; the reading is the stress. The wire is unloaded at the first sample."""
+
+    inputs_required: ClassVar[frozenset[str]] = frozenset({"temperature", "strain"})
+    reading: ClassVar[tuple[str, str]] = ("stress", "Pa")

@@ -1,23 +1,79 @@
-"""Constitutive law in rate form (eq. 3.2): strain, temperature and martensite fraction -> stress."""
+"""Constitutive law: strain, temperature and martensite fraction -> stress, in rate (eq. 3.2) or integrated form (4.51)."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import abc
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
+from jax import lax
 
 from smajax.effects.base import AbstractEffect
 from smajax.parameters import parameter
 from smajax.types import Scalar, WireState
+from smajax.wire.stiffness import AbstractStiffness, Mixed
 
 if TYPE_CHECKING:
     from smajax.wire.wire import Wire
 
+ROUNDINGS = 4.0
+MOST_HALVINGS = 60
+Bracket = tuple[Scalar, Scalar, Scalar, Scalar, Scalar]  # iterate, low, high, last change, count
+
+
+class AbstractForm(eqx.Module):
+    """How eq. 3.2 is carried from one state to the next."""
+
+    @abc.abstractmethod
+    def unloaded_strain(
+        self, wire: Wire, effects: Sequence[AbstractEffect], old: WireState, new: WireState
+    ) -> tuple[Scalar, Scalar]:
+        """(strain at which the stress would be zero, modulus) at `new`; its own stress and strain are guesses."""
+
+
+class RateForm(AbstractForm):
+    r"""Eq. 3.2, $\dot\sigma = E \dot\varepsilon + \theta_T \dot T + \Omega \dot\xi_s$, over one step with E at the middle fraction.
+
+    With E(xi) this is not the derivative of any sigma(strain, T, xi): a cycle that transforms at one stress and returns
+    at another does not close. With a constant E it is, and agrees with the integrated form.
+    """
+
+    def unloaded_strain(
+        self, wire: Wire, effects: Sequence[AbstractEffect], old: WireState, new: WireState
+    ) -> tuple[Scalar, Scalar]:
+        law = wire.constitutive
+        middle = 0.5 * (old.martensite_fraction + new.martensite_fraction)
+        modulus = young_modulus(wire, middle)
+        grown = transformation_strain(wire, middle) * (new.detwinned_fraction - old.detwinned_fraction)
+        grown = grown + effect_strain(wire, effects, new) - effect_strain(wire, effects, old)
+        thermal = law.thermal_modulus * (new.temperature - old.temperature)
+        return old.strain + grown - (old.stress + thermal) / modulus, modulus
+
+
+class IntegratedForm(AbstractForm):
+    r"""Eq. 4.51 with eq. 3.2's thermal term: $\sigma = E(\xi)(\varepsilon - \varepsilon_L \xi_s) + \theta_T (T - T_\infty)$.
+
+    A function of state: every closed cycle closes. The strain counts from the wire's start, as everywhere.
+    """
+
+    def unloaded_strain(
+        self, wire: Wire, effects: Sequence[AbstractEffect], old: WireState, new: WireState
+    ) -> tuple[Scalar, Scalar]:
+        def at_no_stress(at: WireState) -> Scalar:
+            thermal = wire.constitutive.thermal_modulus * (at.temperature - wire.heat.ambient_temperature)
+            own = transformation_strain(wire, at.martensite_fraction) * at.detwinned_fraction
+            return own + effect_strain(wire, effects, at) - thermal / young_modulus(wire, at.martensite_fraction)
+
+        elastic = old.stress / young_modulus(wire, old.martensite_fraction)
+        modulus = young_modulus(wire, new.martensite_fraction)
+        return old.strain - elastic + at_no_stress(new) - at_no_stress(old), modulus
+
 
 class Constitutive(eqx.Module):
-    """Constants of eq. 3.2 with E(xi) of eq. 3.15."""
+    """Constants of eq. 3.2, which of them depend on the fraction, and the form in which it is integrated."""
 
     young_modulus_austenite: Scalar = parameter("Pa", 1e9, 2e11, "E_A")
     young_modulus_martensite: Scalar = parameter("Pa", 1e9, 2e11, "E_M")
@@ -25,37 +81,34 @@ class Constitutive(eqx.Module):
     thermal_modulus: Scalar = parameter(
         "Pa/K", -5e6, 5e6, "theta_T = -E alpha; the source prints +0.55 MPa/C, which is a wire that shrinks when heated"
     )
+    stiffness: AbstractStiffness = Mixed()
+    form: AbstractForm = RateForm()
 
 
 def young_modulus(wire: Wire, fraction: Scalar) -> Scalar:
-    r"""$E = E_A + \xi (E_M - E_A)$, Pa (Elahinia 2004, eq. 3.15)."""
+    r"""$E = E_A + \xi (E_M - E_A)$, Pa (Elahinia 2004, eq. 3.15), or what the law's stiffness says instead."""
     law = wire.constitutive
-    return law.young_modulus_austenite + fraction * (law.young_modulus_martensite - law.young_modulus_austenite)
+    return law.stiffness.young_modulus(law.young_modulus_austenite, law.young_modulus_martensite, fraction)
 
 
-def state_strain(
-    wire: Wire, effects: Sequence[AbstractEffect], temperature: Scalar, stress: Scalar, fraction: Scalar
-) -> Scalar:
-    r"""$\varepsilon_L \xi$ and what effects add to it: the strain that is a function of state, -."""
-    base = wire.constitutive.recoverable_strain * fraction
-    return base + sum(effect.strain(wire, temperature, stress, fraction) for effect in effects)
-
-
-def unloaded_strain(
-    wire: Wire, effects: Sequence[AbstractEffect], old: WireState, temperature: Scalar, stress: Scalar, xi: Scalar
-) -> tuple[Scalar, Scalar]:
-    r"""(strain at which the stress would be zero, modulus) after a step from `old`.
-
-    Eq. 3.2, $\dot\sigma = E \dot\varepsilon + \theta_T \dot T + \Omega \dot\xi$ with $\Omega = -E(\xi) \varepsilon_L$,
-    is taken over one step with E at the middle fraction. It is solved together with the fraction, never after it: a
-    fraction that is clipped once the stress has used its rate leaves a strain error for good.
-    """
-    modulus = young_modulus(wire, 0.5 * (old.martensite_fraction + xi))
-    grown = state_strain(wire, effects, temperature, stress, xi) - state_strain(
-        wire, effects, old.temperature, old.stress, old.martensite_fraction
+def transformation_strain(wire: Wire, fraction: Scalar) -> Scalar:
+    r"""$-\Omega/E$, the strain of one unit of detwinned fraction: eps_L where Omega = -E eps_L."""
+    law = wire.constitutive
+    return law.stiffness.transformation_strain(
+        law.young_modulus_austenite, law.young_modulus_martensite, law.recoverable_strain, fraction
     )
-    thermal = wire.constitutive.thermal_modulus * (temperature - old.temperature)
-    return old.strain + grown - (old.stress + thermal) / modulus, modulus
+
+
+def effect_strain(wire: Wire, effects: Sequence[AbstractEffect], at: WireState) -> Scalar | float:
+    """Strain that the effects add to eps_L xi_s and the elastic part, a function of state, -."""
+    state = at.temperature, at.stress, at.martensite_fraction, at.detwinned_fraction
+    return sum(effect.strain(wire, *state) for effect in effects)
+
+
+def _tried(wire: Wire, old: WireState, temperature: Scalar, stress: Scalar, xi: Scalar) -> WireState:
+    """`old` with the unknowns of a step put in, and the detwinned part that belongs to them."""
+    detwinned = wire.kinetics.variants.detwinned(old, stress, xi)
+    return WireState(temperature, stress, old.strain, xi, old.xi_M, old.xi_A, detwinned, old.formed_by_loading)
 
 
 def stress_at(
@@ -67,14 +120,56 @@ def stress_at(
     stress: Scalar,
     xi: Scalar,
 ) -> Scalar:
-    """Stress that `strain` asks for, Pa; zero when the wire is slack. `stress` is the guess that effects see."""
-    free, modulus = unloaded_strain(wire, effects, old, temperature, stress, xi)
-    return modulus * jnp.maximum(strain - free, 0.0)
+    """Stress that `strain` asks for, Pa; zero when the wire is slack. `stress` is the guess that effects see.
+
+    Solved together with the fraction, never after it: a fraction that is clipped once the stress has used its rate
+    leaves a strain error for good.
+    """
+
+    def asked(guess: Scalar) -> Scalar:
+        new = _tried(wire, old, temperature, guess, xi)
+        free, modulus = wire.constitutive.form.unloaded_strain(wire, effects, old, new)
+        return modulus * jnp.maximum(strain - free, 0.0)
+
+    if not wire.kinetics.variants.detwins:
+        return asked(stress)
+    # What the rounding of a strain makes of the stress.
+    rounding = ROUNDINGS * jnp.finfo(stress.dtype).eps * lax.stop_gradient(young_modulus(wire, xi))
+    return _consistent(asked, jnp.zeros_like(stress), rounding)
+
+
+def _consistent(asked: Callable[[Scalar], Scalar], zero: Scalar, tolerance: Scalar) -> Scalar:
+    """The stress that asks for itself where detwinning answers a stress with far more strain than elasticity does.
+
+    `asked` falls as its guess rises, so the root lies between zero and `asked(0)`: Newton steps held in that bracket.
+    Only the last step is differentiated, which gives the derivative of the root.
+    """
+    high = lax.stop_gradient(asked(zero))
+
+    def newton(at: Scalar) -> tuple[Scalar, Scalar]:
+        value, slope = jax.value_and_grad(lambda guess: guess - asked(guess))(at)
+        return lax.stop_gradient(value), lax.stop_gradient(slope)
+
+    def body(at: Bracket) -> Bracket:
+        here, low, high, _, count = at
+        value, slope = newton(here)
+        low, high = jnp.where(value < 0.0, here, low), jnp.where(value > 0.0, here, high)
+        free = here - value / slope
+        there = jnp.where((value == 0.0) | ((free > low) & (free < high)), free, 0.5 * (low + high))
+        return there, low, high, jnp.abs(there - here), count + 1
+
+    def unfinished(at: Bracket) -> Scalar:
+        return (at[3] > tolerance) & (at[4] < MOST_HALVINGS)
+
+    root, *_ = lax.while_loop(unfinished, body, (high, zero, high, zero + jnp.inf, jnp.zeros_like(high, int)))
+    _, slope = newton(root)
+    return root - (root - asked(root)) / slope
 
 
 def strain_at(
     wire: Wire, effects: Sequence[AbstractEffect], old: WireState, temperature: Scalar, stress: Scalar, xi: Scalar
 ) -> Scalar:
     """The wire's own strain at a given stress, -: the same law read the other way round."""
-    free, modulus = unloaded_strain(wire, effects, old, temperature, stress, xi)
+    new = _tried(wire, old, temperature, stress, xi)
+    free, modulus = wire.constitutive.form.unloaded_strain(wire, effects, old, new)
     return free + stress / modulus

@@ -5,10 +5,9 @@ Both branches are closed forms of one driving temperature each, $y_A = T - \sigm
     heating   xi = min(xi, xi_M h(y_A)),            h falls from 1 at A_s to 0 at A_f   (eq. 3.3)
     cooling   xi = max(xi, 1 - (1 - xi_A) k(y_M)),  k rises from 0 at M_f to 1 at M_s   (eq. 3.5)
 
-so a step never leaves [0, 1] and never has to be clipped. The carried amplitudes xi_M and xi_A are renewed only while
-the *other* branch transforms, scaled so that the curve passes through the present state. Eq. 3.26 as printed renews
-xi_M in every pause as well, after which a resumed heating never completes; the corrected form is continuous at a
-reversal, complete at the end of the range, and blind to a pause.
+so a step never leaves [0, 1] and never has to be clipped. A law is a choice of four parts, each a file beside this one
+(`laws.py` has the authors' choices): the `shape` of h and k, the `conditions` under which a branch is followed, the
+`renewal` of the carried amplitudes xi_M and xi_A, and the `variants` of martensite.
 """
 
 from __future__ import annotations
@@ -23,15 +22,16 @@ from smajax.effects.base import AbstractEffect
 from smajax.parameters import parameter
 from smajax.types import Scalar, WireState
 from smajax.wire.conditions import AbstractConditions
+from smajax.wire.renewal import FINISHED, AbstractRenewal, Corrected
+from smajax.wire.shape import AbstractShape, Cosine
+from smajax.wire.variants import AbstractVariants, Single
 
-# Below this share a branch counts as finished: dividing by less would make the renewed amplitude pure rounding.
-FINISHED = 1e-9
 # A transformation range narrower than this is a jump that no step can follow.
 NARROWEST_RANGE = 0.05  # C
 
 
 class Kinetics(eqx.Module):
-    """Transformation temperatures at zero stress, their slopes, and the conditions under which a branch is followed."""
+    """Transformation temperatures at zero stress, their slopes, and the four parts of a law."""
 
     austenite_start: Scalar = parameter("degC", -100.0, 400.0, "A_s at zero stress")
     austenite_finish: Scalar = parameter("degC", -100.0, 400.0, "A_f at zero stress")
@@ -40,6 +40,9 @@ class Kinetics(eqx.Module):
     stress_slope_austenite: Scalar = parameter("Pa/K", 1e6, 1e8, "C_A: stress per degree of A_s and A_f")
     stress_slope_martensite: Scalar = parameter("Pa/K", 1e6, 1e8, "C_M: stress per degree of M_s and M_f")
     conditions: AbstractConditions
+    shape: AbstractShape = Cosine()
+    renewal: AbstractRenewal = Corrected()
+    variants: AbstractVariants = Single()
 
 
 def heating_temperature(law: Kinetics, temperature: Scalar, stress: Scalar) -> Scalar:
@@ -53,29 +56,29 @@ def cooling_temperature(law: Kinetics, temperature: Scalar, stress: Scalar) -> S
 
 
 def martensite_left(law: Kinetics, effects: Sequence[AbstractEffect], temperature: Scalar, stress: Scalar) -> Scalar:
-    r"""h = (1 + cos[pi (y_A - A_s)/(A_f - A_s)]) / 2, 1 below the range and 0 above (Elahinia 2004, eq. 3.10)."""
+    r"""h((y_A - A_s)/(A_f - A_s)) of the law's shape and the effects: 1 below the range (Elahinia 2004, eq. 3.10)."""
     width = jnp.maximum(law.austenite_finish - law.austenite_start, NARROWEST_RANGE)
     z = (heating_temperature(law, temperature, stress) - law.austenite_start) / width
-    share = 0.5 * (1.0 + jnp.cos(jnp.pi * jnp.clip(z, 0.0, 1.0)))
+    share = law.shape.martensite_left(z)
     for effect in effects:
         share = effect.heating_shape(z, share)
     return share
 
 
 def austenite_left(law: Kinetics, effects: Sequence[AbstractEffect], temperature: Scalar, stress: Scalar) -> Scalar:
-    r"""k = (1 - cos[pi (y_M - M_f)/(M_s - M_f)]) / 2, 0 below the range and 1 above (Elahinia 2004, eq. 3.5)."""
+    r"""k((y_M - M_f)/(M_s - M_f)) of the law's shape and the effects: 1 above the range (Elahinia 2004, eq. 3.5)."""
     width = jnp.maximum(law.martensite_start - law.martensite_finish, NARROWEST_RANGE)
     z = (cooling_temperature(law, temperature, stress) - law.martensite_finish) / width
-    share = 0.5 * (1.0 - jnp.cos(jnp.pi * jnp.clip(z, 0.0, 1.0)))
+    share = law.shape.austenite_left(z)
     for effect in effects:
         share = effect.cooling_shape(z, share)
     return share
 
 
 def steepest_slope(law: Kinetics) -> Scalar:
-    """About the largest |d xi / dT| of either cosine, 1/C: pi / (2 width) of the narrower range."""
+    """About the largest |d xi / dT| of either branch, 1/C: that of the shape over the narrower range."""
     widths = jnp.minimum(law.austenite_finish - law.austenite_start, law.martensite_start - law.martensite_finish)
-    return 0.5 * jnp.pi / jnp.maximum(widths, NARROWEST_RANGE)
+    return law.shape.steepest() / jnp.maximum(widths, NARROWEST_RANGE)
 
 
 class Branch(eqx.Module):
@@ -85,21 +88,24 @@ class Branch(eqx.Module):
     cooling: Bool[Array, ""]
 
 
+def _shares(law: Kinetics, effects: Sequence[AbstractEffect], state: WireState) -> tuple[Scalar, Scalar]:
+    """(h, k) at a state."""
+    at = state.temperature, state.stress
+    return martensite_left(law, effects, *at), austenite_left(law, effects, *at)
+
+
 def curves(
     law: Kinetics, effects: Sequence[AbstractEffect], state: WireState, temperature: Scalar, stress: Scalar
 ) -> tuple[Scalar, Scalar]:
-    """xi on the heating curve (eq. 3.3) and on the cooling curve (eq. 3.5) through `state`'s amplitudes."""
-    heated = state.xi_M * martensite_left(law, effects, temperature, stress)
-    cooled = 1.0 - (1.0 - state.xi_A) * austenite_left(law, effects, temperature, stress)
-    return heated, cooled
+    """xi on the heating curve (eq. 3.3) and on the cooling curve (eq. 3.5) that belong to `state`."""
+    h, k = martensite_left(law, effects, temperature, stress), austenite_left(law, effects, temperature, stress)
+    return law.renewal.curves(state, *_shares(law, effects, state), h, k)
 
 
 def open_branches(law: Kinetics, effects: Sequence[AbstractEffect], state: WireState) -> Branch:
     """Branches whose range the wire is in (or before) at `state`: one that is behind it transforms nothing any more."""
-    return Branch(
-        martensite_left(law, effects, state.temperature, state.stress) > FINISHED,
-        austenite_left(law, effects, state.temperature, state.stress) > FINISHED,
-    )
+    h, k = _shares(law, effects, state)
+    return Branch(h > FINISHED, k > FINISHED)
 
 
 def choose_branch(
@@ -118,7 +124,8 @@ def choose_branch(
     """
     warmer, tighter = temperature - state.temperature, stress - state.stress
     loss, gain = state.martensite_fraction - heated, cooled - state.martensite_fraction
-    may_heat = law.conditions.heats(warmer, tighter, law.stress_slope_austenite) & open_at_start.heating
+    loaded = state.formed_by_loading > 0.5
+    may_heat = law.conditions.heats(warmer, tighter, law.stress_slope_austenite, loaded) & open_at_start.heating
     may_cool = law.conditions.cools(warmer, tighter, law.stress_slope_martensite) & open_at_start.cooling
     heating, cooling = (loss > 0.0) & may_heat, (gain > 0.0) & may_cool
     # Overlapping ranges can ask for both; one step transforms one way only (source, after eq. 3.26).
@@ -133,26 +140,20 @@ def fraction_on(state: WireState, branch: Branch, heated: Scalar, cooled: Scalar
     return jnp.where(branch.heating, heated, jnp.where(branch.cooling, cooled, state.martensite_fraction))
 
 
-def renewed(
+def remembered(
     law: Kinetics,
     effects: Sequence[AbstractEffect],
     old: WireState,
     branch: Branch,
     temperature: Scalar,
     stress: Scalar,
+    strain: Scalar,
     xi: Scalar,
-) -> tuple[Scalar, Scalar]:
-    """(xi_M, xi_A) after a step that ended at (`temperature`, `stress`, `xi`): eq. 3.26, corrected.
-
-    A curve that its conditions kept the wire from following (Liang's, when the stress falls faster than the
-    temperature) is re-anchored at the present state too: the source integrates rates there and so does not jump.
-    """
-    h = martensite_left(law, effects, temperature, stress)
-    k = austenite_left(law, effects, temperature, stress)
-    through_heating = xi / jnp.maximum(h, FINISHED)
-    through_cooling = 1.0 - (1.0 - xi) / jnp.maximum(k, FINISHED)
-    missed_heating = ~branch.heating & (old.xi_M * h < xi)
-    missed_cooling = ~branch.cooling & (1.0 - (1.0 - old.xi_A) * k > xi)
-    xi_M = jnp.where(branch.cooling | missed_heating, through_heating, old.xi_M)
-    xi_A = jnp.where(branch.heating | missed_cooling, through_cooling, old.xi_A)
-    return xi_M, xi_A
+) -> WireState:
+    """The wire after a step that ended at (`temperature`, `stress`, `strain`, `xi`), its memory brought up to date."""
+    h, k = martensite_left(law, effects, temperature, stress), austenite_left(law, effects, temperature, stress)
+    xi_M, xi_A = law.renewal.renewed(old, branch.heating, branch.cooling, h, k, xi)
+    by_loading = (stress - old.stress) / law.stress_slope_martensite > old.temperature - temperature
+    formed_by_loading = jnp.where(branch.cooling, 1.0 * by_loading, old.formed_by_loading)
+    detwinned = law.variants.detwinned(old, stress, xi)
+    return WireState(temperature, stress, strain, xi, xi_M, xi_A, detwinned, formed_by_loading)

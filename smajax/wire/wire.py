@@ -12,7 +12,7 @@ from smajax.parameters import parameter
 from smajax.types import Scalar, WireState
 from smajax.wire.constitutive import Constitutive
 from smajax.wire.heat import Heat
-from smajax.wire.kinetics import FINISHED, Kinetics, austenite_left, martensite_left
+from smajax.wire.kinetics import Kinetics, austenite_left, martensite_left
 from smajax.wire.resistance import Resistance
 
 
@@ -28,15 +28,21 @@ class Wire(eqx.Module):
 
 
 def start(
-    wire: Wire, effects: Sequence[AbstractEffect], temperature: Scalar, stress: Scalar, fraction: Scalar
+    wire: Wire,
+    effects: Sequence[AbstractEffect],
+    temperature: Scalar,
+    stress: Scalar,
+    strain: Scalar,
+    fraction: Scalar,
 ) -> WireState:
-    """A wire at rest at the given temperature (C), stress (Pa) and martensite fraction; its strain counts from here.
+    """A wire at rest at the given temperature (C), stress (Pa), martensite fraction, and strain, which counts from here.
 
     xi_M = 1 and xi_A = 0 for a fully martensitic cold wire, as the source says (sec. 3.7); anywhere else both curves
     are laid through the given state.
     """
     h = martensite_left(wire.kinetics, effects, temperature, stress)
     k = austenite_left(wire.kinetics, effects, temperature, stress)
-    xi_M = fraction / jnp.maximum(h, FINISHED)
-    xi_A = jnp.where(fraction >= 1.0, 0.0, 1.0 - (1.0 - fraction) / jnp.maximum(k, FINISHED))
-    return WireState(temperature, stress, jnp.zeros_like(stress), fraction, xi_M, xi_A)
+    xi_M, xi_A = wire.kinetics.renewal.start(h, k, fraction)
+    detwinned = wire.kinetics.variants.detwinned_at_start(stress, fraction)
+    zero = jnp.zeros_like(stress)
+    return WireState(temperature, stress, strain, fraction, xi_M, xi_A, detwinned, zero)

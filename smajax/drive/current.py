@@ -1,0 +1,18 @@
+"""A current source."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from smajax.drive.base import AbstractDrive
+from smajax.types import Inputs, Scalar
+
+
+class Current(AbstractDrive):
+    r"""$I^2 R$ per metre (Elahinia 2004, eq. 3.1): with R(xi) the power falls as the wire turns to the phase of less R."""
+
+    inputs_required: ClassVar[frozenset[str]] = frozenset({"current"})
+    inputs_squared: ClassVar[frozenset[str]] = inputs_required
+
+    def power(self, resistance: Scalar, length: Scalar, inputs: Inputs) -> Scalar:
+        return inputs["current"] ** 2 * resistance

@@ -1,0 +1,17 @@
+"""Prescribed electrical power, as a controlled supply or a heat balance in a paper gives it."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from smajax.drive.base import AbstractDrive
+from smajax.types import Inputs, Scalar
+
+
+class Power(AbstractDrive):
+    r"""$P / l_0$ per metre, whatever the resistance."""
+
+    inputs_required: ClassVar[frozenset[str]] = frozenset({"power"})
+
+    def power(self, resistance: Scalar, length: Scalar, inputs: Inputs) -> Scalar:
+        return inputs["power"] / length

@@ -1,0 +1,145 @@
+"""Figures -> a folder: a picture and a JSON file a row, and the table as a page for a browser and for a repository."""
+
+from __future__ import annotations
+
+import html
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from smajax.figures.row import Row
+from smajax.fit.solve import Progress
+from smajax.source_mark import source_mark
+
+SIZE = (9.0, 5.6)  # inches
+DPI = 90
+MARK = ".made-by"  # which code and setting the folder's files come from
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A row whose picture and record lie in the folder."""
+
+    row: Row
+    holds: bool
+    found: str
+    caveat: str
+
+    @property
+    def verdict(self) -> str:
+        """One word or two for the table."""
+        return ("holds, see note" if self.caveat else "holds") if self.holds else "fails"
+
+
+def _kept(row: Row, folder: Path) -> Drawn | None:
+    record, picture = folder / f"{row.name}.json", folder / f"{row.name}.png"
+    if not (record.exists() and picture.exists()):
+        return None
+    found = json.loads(record.read_text(encoding="utf-8"))
+    return Drawn(row, found["holds"], found["found"], found["caveat"])
+
+
+def _made(row: Row, folder: Path, fast: bool) -> Drawn:
+    result = row.work(fast)
+    figure = Figure(figsize=SIZE)
+    result.draw(figure)
+    figure.savefig(folder / f"{row.name}.png", dpi=DPI, facecolor="white", metadata={"Software": None})
+    record = {
+        "id": row.name,
+        "where": row.where,
+        "system": row.system,
+        "claim": row.claim,
+        "holds": bool(result.holds),
+        "found": result.found,
+        "numbers": result.numbers,
+        "caveat": result.caveat,
+    }
+    # Last and at once: a record means that its picture is there too.
+    part = folder / f"{row.name}.json.part"
+    part.write_text(json.dumps(record, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+    part.replace(folder / f"{row.name}.json")
+    return Drawn(row, bool(result.holds), result.found, result.caveat)
+
+
+def draw(rows: Sequence[Row], folder: Path, fast: bool, progress: Progress) -> list[Drawn]:
+    """Make each row, or take it from `folder` where an interrupted call of this code and setting has finished it."""
+    folder.mkdir(parents=True, exist_ok=True)
+    mark = folder / MARK
+    setting = f"{'fast' if fast else 'full'} {source_mark()}\n"
+    if not mark.exists() or mark.read_text(encoding="utf-8") != setting:
+        for old in (*folder.glob("*.json"), *folder.glob("*.png")):
+            old.unlink()
+        mark.write_text(setting, encoding="utf-8")
+    drawn = []
+    for index, row in enumerate(rows):
+        progress(f"{row.name}: {row.system}", 0.0)
+        drawn.append(_kept(row, folder) or _made(row, folder, fast))
+        progress(f"{row.name}: {row.system}", 1.0)
+        progress(f"say: {row.name} {drawn[-1].verdict} ({index + 1} of {len(rows)})", 1.0)
+    return drawn
+
+
+def as_markdown(drawn: Sequence[Drawn]) -> str:
+    """What the source says, what was measured, whether it holds; then each picture."""
+    lines = [
+        "# Figures of the source, reproduced",
+        "",
+        "Source: M. H. Elahinia (2004). Made by `smajax figures`; beside each picture lies a JSON file with its numbers.",
+        "",
+        "| | system | what the source says | what was measured | |",
+        "|---|---|---|---|---|",
+    ]
+    for one in drawn:
+        row = one.row
+        cells = (f"[{row.name}](#{row.name.lower()}), {row.where}", row.system, row.claim, one.found, one.verdict)
+        lines.append(f"| {' | '.join(cells)} |")
+    for one in drawn:
+        lines += [
+            "",
+            f"## {one.row.name}",
+            "",
+            f"{one.row.system} ({one.row.where}). {one.found[0].upper()}{one.found[1:]}.",
+        ]
+        lines += ["", f"Note: {one.caveat}"] if one.caveat else []
+        lines += ["", f"![{one.row.name}]({one.row.name}.png)"]
+    return "\n".join(lines) + "\n"
+
+
+def as_page(drawn: Sequence[Drawn]) -> str:
+    """The same for a browser."""
+    say = html.escape
+    style = (
+        "body{font:15px/1.45 system-ui,sans-serif;max-width:1080px;margin:2em auto;padding:0 1em;color:#1d1d1f}"
+        "td,th{text-align:left;vertical-align:top;padding:.35em .6em;border-bottom:1px solid #e3e5e9}"
+        "table{border-collapse:collapse;font-size:14px}img{max-width:100%}.fails{color:#c8553d;font-weight:600}"
+    )
+    rows = "".join(
+        f'<tr><td><a href="#{one.row.name}">{one.row.name}</a><br>{say(one.row.where)}</td><td>{say(one.row.system)}</td>'
+        f"<td>{say(one.row.claim)}</td><td>{say(one.found)}</td>"
+        f'<td class="{"holds" if one.holds else "fails"}">{one.verdict}</td></tr>'
+        for one in drawn
+    )
+    parts = "".join(
+        f'<h2 id="{one.row.name}">{one.row.name}: {say(one.row.system)}</h2><p>{say(one.found)}.</p>'
+        + (f"<p>Note: {say(one.caveat)}</p>" if one.caveat else "")
+        + f'<img src="{one.row.name}.png" alt="{one.row.name}">'
+        for one in drawn
+    )
+    return (
+        f'<!doctype html><html lang="en"><meta charset="utf-8"><title>Figures of the source</title><style>{style}</style>'
+        "<h1>Figures of the source, reproduced</h1><p>Source: M. H. Elahinia (2004).</p><table><tr><th></th><th>system</th>"
+        f"<th>what the source says</th><th>what was measured</th><th></th></tr>{rows}</table>{parts}</html>\n"
+    )
+
+
+def as_text(drawn: Sequence[Drawn]) -> str:
+    """The table for a terminal."""
+    lines = []
+    for one in drawn:
+        lines += [f"{one.row.name:>4}  {one.row.claim}", f"      {one.verdict}: {one.found}"]
+        lines += [f"      note: {one.caveat}"] if one.caveat else []
+    lines.append(f"{sum(one.holds for one in drawn)} of {len(drawn)} hold.")
+    return "\n".join(lines)

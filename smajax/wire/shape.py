@@ -1,0 +1,60 @@
+"""How the transformation proceeds through its range: cosine (Liang, Brinson) or exponential (Tanaka)."""
+
+from __future__ import annotations
+
+import abc
+import math
+
+import equinox as eqx
+import jax.numpy as jnp
+
+from smajax.types import Scalar
+
+# Tanaka's material constants are chosen so that 1 % is left at the far end of the range: A_a = ln(0.01)/(A_f - A_s).
+LEFT_AT_THE_END = math.log(100.0)
+
+
+class AbstractShape(eqx.Module):
+    """Shares of the old phase left, at the reduced distance z through the range of a branch."""
+
+    @abc.abstractmethod
+    def martensite_left(self, z: Scalar) -> Scalar:
+        """h(z), z = (y_A - A_s)/(A_f - A_s): 1 up to z = 0, falling after it."""
+
+    @abc.abstractmethod
+    def austenite_left(self, z: Scalar) -> Scalar:
+        """k(z), z = (y_M - M_f)/(M_s - M_f): 1 from z = 1 on, falling as z falls."""
+
+    @abc.abstractmethod
+    def steepest(self) -> float:
+        """Largest |dh/dz|, -."""
+
+
+class Cosine(AbstractShape):
+    r"""h = (1 + cos pi z)/2 and k = (1 - cos pi z)/2 for 0 <= z <= 1 (Elahinia 2004, eq. 3.3, 3.5 and 2.14, 2.15)."""
+
+    def martensite_left(self, z: Scalar) -> Scalar:
+        return 0.5 * (1.0 + jnp.cos(jnp.pi * jnp.clip(z, 0.0, 1.0)))
+
+    def austenite_left(self, z: Scalar) -> Scalar:
+        return 0.5 * (1.0 - jnp.cos(jnp.pi * jnp.clip(z, 0.0, 1.0)))
+
+    def steepest(self) -> float:
+        return 0.5 * math.pi
+
+
+class Exponential(AbstractShape):
+    r"""$h = e^{-z \ln 100}$ for z >= 0 and $k = e^{-(1 - z) \ln 100}$ for z <= 1 (Elahinia 2004, eq. 2.3).
+
+    With $A_a = \ln 0.01/(A_f - A_s)$, $A_m = \ln 0.01/(M_f - M_s)$ and $B = -A/C$. The transformation never quite ends,
+    and it begins with a corner: the slope at z = 0 is the one from outside, zero.
+    """
+
+    def martensite_left(self, z: Scalar) -> Scalar:
+        return jnp.exp(-LEFT_AT_THE_END * jnp.where(z > 0.0, z, 0.0))
+
+    def austenite_left(self, z: Scalar) -> Scalar:
+        return jnp.exp(-LEFT_AT_THE_END * jnp.where(z < 1.0, 1.0 - z, 0.0))
+
+    def steepest(self) -> float:
+        return LEFT_AT_THE_END

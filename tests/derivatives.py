@@ -1,0 +1,63 @@
+"""Automatic derivatives of a simulated run against differences: shared by the tests of gradients."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from smajax.parameters import get_parameters, parameters, set_vector
+from smajax.simulate import simulate
+from smajax.system import System
+
+Features = Callable[[System], jax.Array]
+
+
+def open_loop(inputs: dict[str, jax.Array], dt: float) -> Features:
+    """Means of the reading and the temperature over parts of a run.
+
+    Smooth in time, so that a kink of one sample does not hide the derivative; several, so that none is blind.
+    """
+
+    def features(system: System) -> jax.Array:
+        run = simulate(system, inputs, dt)
+        return jnp.stack(
+            [run.reading.mean(), run.reading[150:].mean(), run.reading[-100:].mean(), run.temperature.mean()]
+        )
+
+    return features
+
+
+def compare(system: System, of: Features) -> None:
+    """Forward-mode derivatives of `of` by every parameter equal central differences to 1e-4 of their size."""
+    names = list(parameters(system))
+    at = get_parameters(system, names)
+
+    def features(vector: jax.Array) -> jax.Array:
+        return of(set_vector(system, names, vector))
+
+    forward = np.asarray(jax.jit(jax.jacfwd(features))(at))
+    evaluate = jax.jit(features)
+    table = parameters(system)
+    for index, name in enumerate(names):
+        value, room = float(at[index]), table[name].high - table[name].low
+        step = 1e-6 * (abs(value) or 1e-2 * room)
+        if "." in name and abs(value) < 1e-2 * room:
+            # A coefficient next to nothing: wide enough to rise above rounding, and not across zero.
+            step = min(1e-5 * room, 0.1 * abs(value) or 1e-5 * room)
+        # On a bound (a wire that starts as martensite) the difference is one-sided, of second order.
+        inward = 1.0 if value - step < table[name].low else -1.0 if value + step > table[name].high else 0.0
+        if inward:
+            step = 1e-5 * room
+            points = [evaluate(at.at[index].set(value + inward * k * step)) for k in (0, 1, 2)]
+            difference = np.asarray((-3 * points[0] + 4 * points[1] - points[2]) / (2 * inward * step))
+        else:
+            difference = np.asarray(
+                (evaluate(at.at[index].set(value + step)) - evaluate(at.at[index].set(value - step))) / (2 * step)
+            )
+        rounding = 1e-13 * np.abs(np.asarray(evaluate(at))).max() / step
+        scale = np.abs(difference).max() * 1e-4 + rounding
+        error = np.abs(forward[:, index] - difference).max()
+        assert error <= scale, f"{name}: automatic {forward[:, index]}, differences {difference}"

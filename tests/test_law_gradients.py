@@ -1,0 +1,177 @@
+"""Derivatives under every law and load, in forward and reverse mode, at kinks, and across a branch change."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from smajax.closed_loop import simulate_closed_loop
+from smajax.parameters import get_parameters, parameters, set_parameters, set_vector
+from smajax.presets import build, stress_sliding
+from smajax.simulate import simulate
+from smajax.system import System
+from smajax.wire.laws import LAWS, under_law
+from tests.derivatives import compare
+
+DT = 0.05
+NAMES = sorted(LAWS)
+
+
+def _under(law: str, wire: str, load: str, drive: str) -> System:
+    system = build(wire, load, drive)
+    return dataclasses.replace(system, wire=under_law(system.wire, law))
+
+
+def _moved(top: float, wanted: float):
+    """Final and mean reading, least fraction, and the cost of tracking `wanted`, of a heated and cooled actuator."""
+    levels = jnp.concatenate([jnp.full(100, 1.0), jnp.full(40, 0.7), jnp.full(60, 0.96), jnp.full(60, 0.0)]) * top
+
+    def features(system: System) -> jax.Array:
+        channel = "duty" if "duty" in system.drive.inputs_required else "voltage"
+        run = simulate(system, {channel: levels}, DT)
+        scale = jnp.abs(wanted)
+        return jnp.stack(
+            [
+                run.reading[199] / scale,
+                run.reading.mean() / scale,
+                run.martensite_fraction.min(),
+                jnp.mean((run.reading / scale - 1.0) ** 2),
+            ]
+        )
+
+    return features
+
+
+MOVING = {
+    "arm": ("niti_table_3_1", "arm", "amplified_voltage", 7.3, 0.5),
+    "dead_weight": ("flexinol_table_3_2", "dead_weight", "voltage", 7.4, 0.02),
+    "bias_spring": ("flexinol_ht_500um", "bias_spring", "duty", 0.35, 0.01),
+}
+
+
+@pytest.mark.parametrize("law", NAMES)
+@pytest.mark.parametrize("load", sorted(MOVING))
+def test_every_parameter_of_a_moving_load(law: str, load: str) -> None:
+    wire, name, drive, top, wanted = MOVING[load]
+    compare(_under(law, wire, name, drive), _moved(top, wanted))
+
+
+@pytest.mark.parametrize("law", NAMES)
+@pytest.mark.parametrize("load", ["coupon", "strain_coupon"])
+def test_every_parameter_of_a_coupon(law: str, load: str) -> None:
+    """A path on which temperature and load change together, with a reversal inside each range."""
+    system = _under(law, "flexinol_table_3_2", load, "none")
+    n = 300
+    temperature = jnp.interp(
+        jnp.arange(n) / n, jnp.array([0.0, 0.3, 0.5, 0.8, 1.0]), jnp.array([25.0, 97.0, 61.0, 99.0, 40.0])
+    )
+    wave = jnp.sin(0.04 * jnp.arange(n))
+    prescribed = {"stress": 1e6 * (110.0 + 37.0 * wave)} if load == "coupon" else {"strain": 0.006 + 0.0047 * wave}
+
+    def features(system: System) -> jax.Array:
+        run = simulate(system, {"temperature": temperature, **prescribed}, 1.0)
+        scale = 0.01 if load == "coupon" else 1e8
+        return jnp.stack([run.reading.mean() / scale, run.reading[150:].mean() / scale, run.martensite_fraction.mean()])
+
+    compare(system, features)
+
+
+def test_closed_loop_has_the_derivatives_of_its_gains() -> None:
+    arm = build("niti_table_3_1", "arm", "amplified_voltage")
+    target = jnp.full(301, 0.3)
+    gains = ["surface_slope", "gain", "boundary", "stress_gain", "stress_integral_gain"]
+    table = parameters(stress_sliding(arm))
+    assert set(gains) <= set(table)
+    at = get_parameters(stress_sliding(arm), gains)
+
+    @jax.jit
+    def cost(share: jax.Array) -> jax.Array:
+        loop = simulate_closed_loop(arm, set_vector(stress_sliding(arm), gains, at * share), target, 0.02)
+        return jnp.mean((loop.run.position - loop.target) ** 2)
+
+    one = jnp.ones(len(gains))
+    automatic = np.asarray(jax.jit(jax.grad(cost))(one))
+    step = 1e-5
+    for k in range(len(gains)):
+        along = jnp.zeros(len(gains)).at[k].set(step)
+        difference = float(cost(one + along) - cost(one - along)) / (2 * step)
+        assert automatic[k] == pytest.approx(difference, rel=1e-4, abs=1e-8), gains[k]
+
+
+def _finite(system: System, inputs: dict[str, jax.Array], dt: float = DT) -> None:
+    names = list(parameters(system))
+
+    def ends(vector: jax.Array) -> jax.Array:
+        run = simulate(set_vector(system, names, vector), inputs, dt)
+        return jnp.stack([run.reading[-1], run.martensite_fraction.min(), run.temperature[-1], run.stress.mean()])
+
+    at = get_parameters(system, names)
+    forward = np.asarray(jax.jit(jax.jacfwd(ends))(at))
+    backward = np.asarray(jax.jit(jax.jacrev(ends))(at))
+    assert np.isfinite(forward).all()
+    np.testing.assert_allclose(backward, forward, rtol=1e-6, atol=1e-9 * np.abs(forward).max())
+
+
+@pytest.mark.parametrize("law", NAMES)
+def test_derivatives_are_finite_at_the_start_of_a_range(law: str) -> None:
+    """The wire sits exactly on A_s' with all martensite, then on M_s' with none: the slopes there are 0/0 forms."""
+    system = _under(law, "flexinol_table_3_2", "coupon", "none")
+    stress = 68.9e6  # moves every temperature by exactly 10 C
+    temperature = jnp.array([23.0, 78.0, 78.0, 79.0, 88.0, 88.0, 62.0, 62.0, 61.0, 52.0, 52.0, 23.0])
+    _finite(system, {"temperature": temperature, "stress": jnp.full(12, stress)}, 1.0)
+    _finite(system, {"temperature": jnp.array([23.0, 78.0]), "stress": jnp.full(2, stress)}, 1.0)
+
+
+def test_derivatives_are_finite_at_end_stops_and_when_slack() -> None:
+    arm = set_parameters(build("niti_table_3_1", "arm", "amplified_voltage"), {"upper_stop": 0.5})
+    _finite(arm, {"voltage": jnp.concatenate([jnp.full(300, 8.0), jnp.zeros(100)])})
+    weight = build("flexinol_table_3_2", "dead_weight", "voltage")
+    run = simulate(weight, {"voltage": jnp.concatenate([jnp.full(150, 12.0), jnp.zeros(150)])}, DT)
+    _finite(weight, {"voltage": jnp.concatenate([jnp.full(150, 12.0), jnp.zeros(150)])})
+    assert (np.asarray(run.stress) == 0.0).any(), "the case does not go slack any more"
+
+
+def test_a_clipped_voltage_has_the_derivative_of_the_limit() -> None:
+    """Beyond the amplifier's limit the end depends on the limit and not on the voltage; below it, the other way round."""
+    weight = build("flexinol_table_3_2", "dead_weight", "voltage")
+
+    @jax.jit
+    def end(limit: jax.Array, volts: jax.Array) -> jax.Array:
+        limited = set_parameters(weight, {"amplifier_limit": limit})
+        return simulate(limited, {"voltage": jnp.full(60, volts)}, DT).temperature[-1]
+
+    slope = jax.jit(jax.grad(end, argnums=(0, 1)))
+    beyond = slope(jnp.asarray(5.0), jnp.asarray(8.0))
+    below = slope(jnp.asarray(8.0), jnp.asarray(5.0))
+    assert float(beyond[0]) > 0.0
+    assert float(beyond[1]) == 0.0
+    assert float(below[0]) == 0.0
+    assert float(below[1]) == pytest.approx(float(beyond[0]), rel=1e-12)
+    assert all(np.isfinite(float(value)) for value in slope(jnp.asarray(5.0), jnp.asarray(5.0)))
+
+
+def test_a_parameter_walks_across_a_branch_change() -> None:
+    """From a voltage that never reaches A_s' to one that transforms to the end: the derivative follows the path."""
+    weight = build("flexinol_table_3_2", "dead_weight", "voltage")
+
+    @eqx.filter_jit
+    def end(volts: jax.Array) -> jax.Array:
+        return 1e3 * simulate(weight, {"voltage": jnp.full(200, volts)}, DT).position.mean()
+
+    volts = jnp.linspace(6.3, 8.1, 61)
+    value = np.asarray(jax.vmap(end)(volts))
+    slope = np.asarray(jax.vmap(jax.grad(end))(volts))
+    assert np.isfinite(slope).all()
+    step = 1e-5
+    difference = np.asarray(jax.vmap(end)(volts + step) - jax.vmap(end)(volts - step)) / (2 * step)
+    close = np.abs(slope - difference) <= 1e-4 * np.abs(difference).max()
+    assert close.mean() >= 0.95, "more than a kink or two disagree"
+    # The derivative integrates to the value across the change of branch, so that nothing is lost at it.
+    total = np.trapezoid(slope, volts)
+    assert total == pytest.approx(value[-1] - value[0], rel=0.03)
+    assert slope[0] < 0.1 * slope.max()
