@@ -48,7 +48,8 @@ def _moved(top: float, wanted: float):
 
 
 MOVING = {
-    "arm": ("niti_table_3_1", "arm", "amplified_voltage", 7.3, 0.5),
+    # Below the voltage at which the arm snaps through: there a step of 50 ms is all kinks.
+    "arm": ("niti_table_3_1", "arm", "amplified_voltage", 7.1, 0.5),
     "dead_weight": ("flexinol_table_3_2", "dead_weight", "voltage", 7.4, 0.02),
     "bias_spring": ("flexinol_ht_500um", "bias_spring", "duty", 0.35, 0.01),
 }
@@ -78,7 +79,9 @@ def test_every_parameter_of_a_coupon(law: str, load: str) -> None:
         scale = 0.01 if load == "coupon" else 1e8
         return jnp.stack([run.reading.mean() / scale, run.reading[150:].mean() / scale, run.martensite_fraction.mean()])
 
-    compare(system, features)
+    # Whether loading formed the martensite is yes or no: with a trace of austenite at the start it turns to yes at once,
+    # and there is no derivative.
+    compare(system, features, {"start_fraction"} if law in ("tanaka", "brinson") else ())
 
 
 def test_closed_loop_has_the_derivatives_of_its_gains() -> None:

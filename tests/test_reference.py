@@ -76,14 +76,14 @@ def test_full_transformation_at_7_3_volt(arm_73: dict[str, np.ndarray]) -> None:
 
 
 def test_stress_and_fraction_stay_consistent_at_the_end_of_the_range() -> None:
-    """With the printed eps_L and a 50 mm link 7.3 V ends near 80.5 degrees.
+    """With the printed eps_L, a 50 mm link and a 45 mm lever 7.3 V ends near 80.5 degrees.
 
     A fraction clipped after the stress has used its unclipped rate leaves a strain error for good: 112 degrees.
     """
-    printed = {"recoverable_strain": 0.04, "arm_length": 0.05}
+    printed = {"recoverable_strain": 0.04, "arm_length": 0.05, "spring_lever": 0.045}
     run = RUN(set_parameters(_arm(), printed), {"voltage": jnp.full(3001, 7.3)}, 0.01)
     assert run.martensite_fraction[-1] == 0.0
-    assert np.degrees(run.position[-1]) == pytest.approx(80.5, abs=0.6)
+    assert np.degrees(run.position[-1]) == pytest.approx(80.5, abs=1.0)
 
 
 def test_higher_voltage_ends_higher() -> None:

@@ -10,13 +10,13 @@ from smajax.figures.rigs import LAWS, arm, controlled
 from smajax.figures.row import Result, Row
 from smajax.simulate import DEFAULT_STEP
 
-TARGETS = (-25.0, -5.0, 5.0)  # degrees, 8 s each
+TARGETS = (-20.0, 0.0, -10.0)  # degrees, 10 s each
 
 
 def work(fast: bool) -> Result:
     """Sliding control through three set points, each law in turn."""
     dt = PERIOD if fast else DEFAULT_STEP
-    samples = round(8.0 / dt)
+    samples = round(10.0 / dt)
     target = np.radians(np.append(np.repeat(TARGETS, samples), TARGETS[-1]))
     loops = {law: controlled(arm(law), jnp.asarray(target), dt, PERIOD) for law in LAWS}
     angles = {law: np.degrees(loop.run.position) for law, loop in loops.items()}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import abc
+import dataclasses
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
@@ -108,7 +109,13 @@ def effect_strain(wire: Wire, effects: Sequence[AbstractEffect], at: WireState) 
 def _tried(wire: Wire, old: WireState, temperature: Scalar, stress: Scalar, xi: Scalar) -> WireState:
     """`old` with the unknowns of a step put in, and the detwinned part that belongs to them."""
     detwinned = wire.kinetics.variants.detwinned(old, stress, xi)
-    return WireState(temperature, stress, old.strain, xi, old.xi_M, old.xi_A, detwinned, old.formed_by_loading)
+    changed = {
+        "temperature": temperature,
+        "stress": stress,
+        "martensite_fraction": xi,
+        "detwinned_fraction": detwinned,
+    }
+    return dataclasses.replace(old, **changed)
 
 
 def stress_at(

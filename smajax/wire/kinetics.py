@@ -152,8 +152,19 @@ def remembered(
 ) -> WireState:
     """The wire after a step that ended at (`temperature`, `stress`, `strain`, `xi`), its memory brought up to date."""
     h, k = martensite_left(law, effects, temperature, stress), austenite_left(law, effects, temperature, stress)
-    xi_M, xi_A = law.renewal.renewed(old, branch.heating, branch.cooling, h, k, xi)
+    kept = law.renewal.renewed(old, branch.heating, branch.cooling, h, k, xi)
     by_loading = (stress - old.stress) / law.stress_slope_martensite > old.temperature - temperature
     formed_by_loading = jnp.where(branch.cooling, 1.0 * by_loading, old.formed_by_loading)
     detwinned = law.variants.detwinned(old, stress, xi)
-    return WireState(temperature, stress, strain, xi, xi_M, xi_A, detwinned, formed_by_loading)
+    return WireState(
+        temperature,
+        stress,
+        strain,
+        xi,
+        kept.xi_M,
+        kept.xi_A,
+        kept.heating_missed,
+        kept.cooling_missed,
+        detwinned,
+        formed_by_loading,
+    )

@@ -14,12 +14,21 @@ from smajax.types import Scalar, WireState
 FINISHED = 1e-9
 
 
+class Amplitudes(eqx.Module):
+    """What a renewal carries from step to step."""
+
+    xi_M: Scalar
+    xi_A: Scalar
+    heating_missed: Scalar  # 1 from where the wire was kept from a curve until it follows one again; else 0
+    cooling_missed: Scalar
+
+
 class AbstractRenewal(eqx.Module):
     """`h` and `k` are the shares of martensite and austenite that the two shapes leave at some temperature and stress."""
 
     @abc.abstractmethod
-    def start(self, h: Scalar, k: Scalar, xi: Scalar) -> tuple[Scalar, Scalar]:
-        """(xi_M, xi_A) of a wire at rest at the fraction `xi`: 1 and 0 for cold martensite (sec. 3.7)."""
+    def start(self, h: Scalar, k: Scalar, xi: Scalar) -> Amplitudes:
+        """Of a wire at rest at the fraction `xi`: xi_M = 1 and xi_A = 0 for cold martensite (sec. 3.7)."""
 
     @abc.abstractmethod
     def curves(self, old: WireState, h_old: Scalar, k_old: Scalar, h: Scalar, k: Scalar) -> tuple[Scalar, Scalar]:
@@ -34,21 +43,26 @@ class AbstractRenewal(eqx.Module):
         h: Scalar,
         k: Scalar,
         xi: Scalar,
-    ) -> tuple[Scalar, Scalar]:
-        """(xi_M, xi_A) after a step on a branch that ended at the fraction `xi`."""
+    ) -> Amplitudes:
+        """After a step on a branch that ended at the fraction `xi`."""
 
 
 class Corrected(AbstractRenewal):
     """Renewed only while the other branch transforms, scaled so that the curve passes through the present state.
 
-    Continuous at a reversal, complete at the end of the range, and blind to a pause. A curve that its conditions kept
-    the wire from following (Liang's, when the stress falls faster than the temperature) is re-anchored at the present
-    state too: the source integrates rates there and so does not jump.
+    Continuous at a reversal, complete at the end of the range, and blind to a pause. Where the conditions keep the wire
+    from following a curve (Liang's, when the stress falls faster than the temperature) the source, which integrates
+    rates, does not jump when they let it again: from the miss on the curve is laid through the present state.
     """
 
-    def start(self, h: Scalar, k: Scalar, xi: Scalar) -> tuple[Scalar, Scalar]:
+    def start(self, h: Scalar, k: Scalar, xi: Scalar) -> Amplitudes:
         floor = 1.0 - (1.0 - xi) / jnp.maximum(k, FINISHED)
-        return xi / jnp.maximum(h, FINISHED), jnp.where(xi >= 1.0, 0.0, floor)
+        return Amplitudes(
+            xi / jnp.maximum(h, FINISHED),
+            jnp.where(xi >= 1.0, 0.0, floor),
+            1.0 * ((h <= FINISHED) & (xi > 0.0)),
+            1.0 * ((k <= FINISHED) & (xi < 1.0)),
+        )
 
     def curves(self, old: WireState, h_old: Scalar, k_old: Scalar, h: Scalar, k: Scalar) -> tuple[Scalar, Scalar]:
         return old.xi_M * h, 1.0 - (1.0 - old.xi_A) * k
@@ -61,12 +75,19 @@ class Corrected(AbstractRenewal):
         h: Scalar,
         k: Scalar,
         xi: Scalar,
-    ) -> tuple[Scalar, Scalar]:
-        missed_heating = ~heating & (old.xi_M * h < xi)
-        missed_cooling = ~cooling & (1.0 - (1.0 - old.xi_A) * k > xi)
-        xi_M = jnp.where(cooling | missed_heating, xi / jnp.maximum(h, FINISHED), old.xi_M)
-        xi_A = jnp.where(heating | missed_cooling, 1.0 - (1.0 - xi) / jnp.maximum(k, FINISHED), old.xi_A)
-        return xi_M, xi_A
+    ) -> Amplitudes:
+        beyond_heating = ~heating & (old.xi_M * h < xi)
+        beyond_cooling = ~cooling & (1.0 - (1.0 - old.xi_A) * k > xi)
+        held = ~heating & ~cooling
+        missed_heating = held & (beyond_heating | (old.heating_missed > 0.5))
+        missed_cooling = held & (beyond_cooling | (old.cooling_missed > 0.5))
+        laid_heating, laid_cooling = xi / jnp.maximum(h, FINISHED), 1.0 - (1.0 - xi) / jnp.maximum(k, FINISHED)
+        return Amplitudes(
+            jnp.where(cooling | beyond_heating | missed_heating, laid_heating, old.xi_M),
+            jnp.where(heating | beyond_cooling | missed_cooling, laid_cooling, old.xi_A),
+            1.0 * missed_heating,
+            1.0 * missed_cooling,
+        )
 
 
 class AsPrinted(AbstractRenewal):
@@ -76,8 +97,8 @@ class AsPrinted(AbstractRenewal):
     range: a resumed heating never reaches xi = 0 at A_f'.
     """
 
-    def start(self, h: Scalar, k: Scalar, xi: Scalar) -> tuple[Scalar, Scalar]:
-        return xi, jnp.where(xi >= 1.0, 0.0, xi)
+    def start(self, h: Scalar, k: Scalar, xi: Scalar) -> Amplitudes:
+        return Amplitudes(xi, jnp.where(xi >= 1.0, 0.0, xi), jnp.zeros_like(xi), jnp.zeros_like(xi))
 
     def curves(self, old: WireState, h_old: Scalar, k_old: Scalar, h: Scalar, k: Scalar) -> tuple[Scalar, Scalar]:
         xi = old.martensite_fraction
@@ -93,5 +114,6 @@ class AsPrinted(AbstractRenewal):
         h: Scalar,
         k: Scalar,
         xi: Scalar,
-    ) -> tuple[Scalar, Scalar]:
-        return jnp.where(heating, old.xi_M, xi), jnp.where(heating, xi, old.xi_A)
+    ) -> Amplitudes:
+        never = jnp.zeros_like(xi)
+        return Amplitudes(jnp.where(heating, old.xi_M, xi), jnp.where(heating, xi, old.xi_A), never, never)

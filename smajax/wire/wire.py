@@ -42,7 +42,18 @@ def start(
     """
     h = martensite_left(wire.kinetics, effects, temperature, stress)
     k = austenite_left(wire.kinetics, effects, temperature, stress)
-    xi_M, xi_A = wire.kinetics.renewal.start(h, k, fraction)
+    kept = wire.kinetics.renewal.start(h, k, fraction)
     detwinned = wire.kinetics.variants.detwinned_at_start(stress, fraction)
     zero = jnp.zeros_like(stress)
-    return WireState(temperature, stress, strain, fraction, xi_M, xi_A, detwinned, zero)
+    return WireState(
+        temperature,
+        stress,
+        strain,
+        fraction,
+        kept.xi_M,
+        kept.xi_A,
+        kept.heating_missed + zero,
+        kept.cooling_missed + zero,
+        detwinned,
+        zero,
+    )

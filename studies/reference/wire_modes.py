@@ -109,7 +109,7 @@ class Modes:
         resistance = w.resistance_austenite + xi * (w.resistance_martensite - w.resistance_austenite)
         excess = temperature - w.ambient_temperature
         convection = w.convection_coefficient * (1 + w.convection_slope * excess)
-        heat = ((w.gain * self.volts(t) / w.length) ** 2 / resistance - convection * self.surface * excess) / self.mass
+        heat = (w.electric_heat(self.volts(t), resistance) - convection * self.surface * excess) / self.mass
         speed = 0.0 if self.stop else speed
         strain_rate = -load.ratio * speed / w.length
         if self.slack:

@@ -5,6 +5,17 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+CHOICES: dict[str, tuple[str | None, ...]] = {
+    "conditions": ("enhanced", "liang"),
+    "law": (None, "tanaka", "liang", "brinson", "enhanced"),
+    "drive": ("voltage", "current", "power"),
+    "constitutive": ("rate", "integrated"),
+    "stiffness": ("mixed", "martensite"),
+    "renewal": ("corrected", "printed"),
+    "anchor": ("condition", "motion"),
+}
+LAW_ONLY = ("constitutive", "stiffness", "renewal", "anchor")
+
 
 @dataclass(frozen=True, kw_only=True)
 class WireParameters:
@@ -35,18 +46,36 @@ class WireParameters:
     gain: float = 1.0  # amplifier: I = gain V / (R length)
     initial_temperature: float | None = None  # degC; None: ambient
     initial_martensite_fraction: float = 1.0
-    conditions: str = "enhanced"  # or "liang"
+    conditions: str = "enhanced"  # without a `law`: or "liang", whose xi jumps onto a curve passed while it was off
+    law: str | None = None  # "tanaka", "liang", "brinson" or "enhanced" (wire_law.LAWS); their xi never jumps
+    drive: str = "voltage"  # what the input is: or "current" (A), or "power" (W over the whole wire)
+    # The rest is read only with a law, and by the path integration.
+    constitutive: str = "rate"  # eq. 3.2; or "integrated": eq. 4.51 with the thermal term
+    stiffness: str = "mixed"  # E(xi), eq. 3.15; or "martensite": E_M throughout
+    renewal: str = "corrected"  # of xi_M and xi_A, eq. 3.26; or "printed"
+    anchor: str = "condition"  # a curve passed while off is re-anchored once its condition holds; or "motion": y' too
+    detwinning_start: float = 100e6  # Pa, split laws
+    detwinning_finish: float = 170e6
+    initial_detwinned_fraction: float | None = None  # xi_s; None: the least that the first stress allows
 
     def __post_init__(self) -> None:
-        if self.conditions not in ("enhanced", "liang"):
-            raise ValueError(
-                f"conditions is {self.conditions!r}; expected 'enhanced' or 'liang'; choose one of the two"
-            )
+        for name, allowed in CHOICES.items():
+            if getattr(self, name) not in allowed:
+                raise ValueError(f"{name} is {getattr(self, name)!r}; expected one of {allowed}; choose one of them")
+        changed = [name for name in LAW_ONLY if getattr(self, name) != CHOICES[name][0]]
+        if self.law is None and changed:
+            raise ValueError(f"{changed} set without a law; expected a law beside them; set law='enhanced', say")
 
     @property
     def area(self) -> float:
         """Cross-section, m^2."""
         return math.pi * self.diameter**2 / 4
+
+    def electric_heat(self, value: float, resistance: float) -> float:
+        """Heat per metre, W/m, from the input (V, A or W, as `drive` says) and the resistance per metre."""
+        if self.drive == "current":
+            return value**2 * resistance
+        return value / self.length if self.drive == "power" else (self.gain * value / self.length) ** 2 / resistance
 
 
 @dataclass(frozen=True, kw_only=True)

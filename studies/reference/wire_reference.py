@@ -8,22 +8,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.integrate import solve_ivp
 
-from studies.reference.wire_modes import Load, Modes, Vector
+from studies.reference.event_march import Vector, march
+from studies.reference.loaded_modes import LoadedModes
+from studies.reference.wire_modes import Load, Modes
 from studies.reference.wire_parameters import ArmParameters, DeadWeightParameters, WireParameters
 
 __all__ = ["ArmParameters", "DeadWeightParameters", "WireParameters", "simulate_arm", "simulate_dead_weight"]
 
 Voltage = float | Callable[[float], float]
+Piece = tuple[float, Voltage, Load]
+Controller = Callable[[float, float, float, float, float, float, Any], tuple[float, Any]]
 GRAVITY = 9.81
-MAX_EVENTS = 100_000
-MAX_STEP = 1e-2  # s: events are looked for at step ends, so a step must be short against the load's vibration
-FINEST_STEP = 1e-5
-SCALES = np.array([1.0, 1e6, 1e-2, 1e-2, 1e-4])  # absolute tolerances of T, stress, q, q', gap per unit of rtol
+SCALES = np.array([1.0, 1e6, 1e-2, 1e-2, 1e-4, 1e-1])  # absolute tolerances of T, stress, q, q', gap, xi_s, per rtol
 
 
 def simulate_arm(
@@ -33,13 +35,24 @@ def simulate_arm(
     *,
     rtol: float = 1e-9,
     method: str = "DOP853",
+    controller: Controller | None = None,
+    period: float | None = None,
+    memory: Any = None,
 ) -> dict[str, Vector]:
     """Arm lifted by the wire against gravity and spring (Elahinia 2004, eqs. 3.7, 3.8); starts at rest at t = 0.
 
-    `voltage_segments`: (end time, volts) in turn; volts may be a smooth function of time. `t_eval`: ascending times, s.
+    `voltage_segments`: (end time, volts) in turn; volts may be a smooth function of time; A or W where the parameters'
+    `drive` says so. `t_eval`: ascending times, s. With a `controller` leave the segments empty: every `period` seconds,
+    from 0 on, it gives (volts, memory) for (time, angle, angular velocity, temperature, stress, martensite fraction,
+    memory), and the volts are held; the first call is given `memory`.
     Returns arrays shaped like `t_eval`: time (s), angle (rad), angular_velocity (rad/s), temperature (degC),
-    stress (Pa), martensite_fraction, strain (of the wire, from its start). Raises ValueError on times out of order.
+    stress (Pa), martensite_fraction, detwinned_fraction, strain (of the wire, from its start), and with a controller
+    volts (from each sample on). Raises ValueError on times out of order.
     """
+    if (controller is None) != (period is None) or (controller is None) != bool(voltage_segments):
+        raise ValueError(
+            "expected either voltage segments, or a controller with a period and no segments; drop one of the two"
+        )
     p = params
     inertia = p.payload_mass * p.arm_length**2 + p.arm_mass * p.arm_length**2 / 3
     moment = (p.payload_mass + p.arm_mass / 2) * GRAVITY * p.arm_length
@@ -52,8 +65,11 @@ def simulate_arm(
         low=p.lowest_angle,
         high=p.highest_angle,
     )
-    segments = [(end, volts, load) for end, volts in voltage_segments]
-    out = _integrate(p, segments, p.initial_stress, p.initial_angle, t_eval, rtol, method)
+    start = (p.initial_stress, p.initial_angle)
+    if controller is None or period is None:
+        out = _integrate(p, [(end, volts, load) for end, volts in voltage_segments], *start, t_eval, rtol, method)
+    else:
+        out = _integrate(p, _Sampled(controller, period, memory, load), *start, t_eval, rtol, method)
     return {"angle": out.pop("q"), "angular_velocity": out.pop("speed"), **out}
 
 
@@ -67,10 +83,11 @@ def simulate_dead_weight(
 ) -> dict[str, Vector]:
     """Weight hung on the wire (Elahinia 2004, eqs. 3.13, 3.14); starts at rest, stress m g/A_w, at t = 0.
 
-    `segments`: (end time, volts, mass in kg) in turn; volts may be a smooth function of time; the mass changes at once,
-    speed and stress continuous. `t_eval`: ascending times, s. Returns arrays shaped like `t_eval`: time (s),
-    position (m, + = lifted), velocity (m/s), temperature (degC), stress (Pa), martensite_fraction, strain (of the wire,
-    from its start). Raises ValueError on times out of order.
+    `segments`: (end time, volts, mass in kg) in turn; volts (A or W where `drive` says so) may be a smooth function of
+    time; the mass changes at once, speed and stress continuous. `t_eval`: ascending times, s. Returns arrays shaped
+    like `t_eval`: time (s), position (m, + = lifted), velocity (m/s), temperature (degC), stress (Pa),
+    martensite_fraction, detwinned_fraction, strain (of the wire, from its start). Raises ValueError on times out of
+    order.
     """
 
     def hung(mass: float) -> Load:
@@ -82,9 +99,24 @@ def simulate_dead_weight(
     return {"position": out.pop("q"), "velocity": out.pop("speed"), **out}
 
 
+class _Sampled:
+    """Pieces of one period each, their volts from a controller that sees the state at the start of each."""
+
+    def __init__(self, controller: Controller, period: float, memory: Any, load: Load) -> None:
+        self.controller, self.period, self.memory, self.load = controller, period, memory, load
+        self.given: list[float] = []
+
+    def volts(self, t: float, s: Vector, xi: float) -> float:
+        """Volts for the period that starts now."""
+        angle, speed, temperature, stress = (float(s[i]) for i in (2, 3, 0, 1))
+        volts, self.memory = self.controller(t, angle, speed, temperature, stress, xi, self.memory)
+        self.given.append(float(volts))
+        return self.given[-1]
+
+
 def _integrate(
     wire: WireParameters,
-    segments: Sequence[tuple[float, Voltage, Load]],
+    drive: Sequence[Piece] | _Sampled,
     stress: float,
     start: float,
     t_eval: ArrayLike,
@@ -93,82 +125,48 @@ def _integrate(
 ) -> dict[str, Vector]:
     """Piece by piece from event to event; arrays at `t_eval`, with q and speed for the load's coordinate."""
     times = np.asarray(t_eval, dtype=float)
-    ends = [end for end, _, _ in segments]
+    if isinstance(drive, _Sampled):
+        count = math.floor(times[-1] / drive.period * (1 + 1e-12)) + 1  # a last sample may fall on the last time
+        ends, load = [(i + 1) * drive.period for i in range(count)], drive.load
+    else:
+        ends, load = [end for end, _, _ in drive], drive[0][2]
     if np.any(np.diff(times) <= 0) or np.any(np.diff([0.0, *ends]) <= 0) or times[0] < 0 or times[-1] > ends[-1]:
         raise ValueError(
             f"times run {times[0]} to {times[-1]} s, segments end at {ends}; "
             "expected both ascending, from 0 and within the last segment; sort them or lengthen the last segment"
         )
-    modes = Modes(wire, segments[0][2], rest_rate=1e3 * rtol)
+    rest = 1e3 * rtol
+    modes = Modes(wire, load, rest_rate=rest) if wire.law is None else LoadedModes(wire, load, rest)
     first = wire.ambient_temperature if wire.initial_temperature is None else wire.initial_temperature
     state = np.array([first, stress, start, 0.0, 0.0])
-    modes.stop = -1 if start <= modes.load.low else 1 if start >= modes.load.high else 0
-    kept = np.empty((6, times.size))
-    done, now, count, step = 0, 0.0, 0, MAX_STEP
-    for end, volts, load in segments:
-        modes.volts, modes.load = volts if callable(volts) else _constant(volts), load
-        state = modes.settle(now, state)
-        while now < end:
-            count += 1
-            if count > MAX_EVENTS:
-                raise RuntimeError(
-                    f"{MAX_EVENTS} events by t = {now:.6g} s; expected far fewer; "
-                    "the modes chatter, so shorten the run or check the parameters"
-                )
-            watched = modes.watch()
-            functions = [_event(function, direction, True) for _, direction, function in watched]
-            functions += [_event(function, direction, False) for direction, function in modes.peaks()]
-            wanted = times[done : np.searchsorted(times, end, side="right")]
-            piece = solve_ivp(
-                lambda t, s: modes.rates(t, s)[:5],
-                (now, end),
-                state,
-                method=method,
-                max_step=step,
-                rtol=rtol,
-                atol=rtol * SCALES,
-                t_eval=np.append(wanted[wanted < end], end),
-                events=functions,
-            )
-            if piece.status < 0:
-                raise RuntimeError(f"integration stopped at t = {now:.6g} s: {piece.message}; loosen rtol")
-            if step > FINEST_STEP and any(modes.passed(s) for at in piece.y_events[len(watched) :] for s in at):
-                step /= 10  # a contact was passed and left within one step: this piece again, closer
-                continue
-            step = MAX_STEP
-            if len(piece.t):
-                got = int(np.searchsorted(wanted, piece.t[-1], side="right"))
-                kept[:5, done : done + got] = piece.y[:, :got]
-                kept[5, done : done + got] = [modes.fraction(s) for s in piece.y.T[:got]]
-                done += got
-            hits = [(at[-1], i) for i, at in enumerate(piece.t_events[: len(watched)]) if at.size]
-            if piece.status == 1 and hits:
-                now, i = max(hits)
-                state = modes.handle(watched[i][0], now, piece.y_events[i][-1].copy())
-            else:
-                now, state = end, piece.y[:, -1].copy()
-    strain = -modes.load.ratio * (kept[2] - start) / wire.length - kept[4]
-    return {
+    if isinstance(modes, LoadedModes):
+        state = np.append(state, modes.first_detwinned(stress))
+    modes.stop = -1 if start <= load.low else 1 if start >= load.high else 0
+
+    def begin(i: int, t: float, s: Vector) -> None:
+        volts: Voltage
+        if isinstance(drive, _Sampled):
+            volts = drive.volts(t, s, modes.fraction(s))
+        else:
+            _, volts, modes.load = drive[i]
+        modes.volts = volts if callable(volts) else _constant(volts)
+
+    segments = [(end, partial(begin, i)) for i, end in enumerate(ends)]
+    kept = march(modes, segments, state, times, rtol * SCALES[: state.size], rtol, method)
+    xi, load = kept[-1], modes.load
+    out = {
         "time": times,
         "q": kept[2],
         "speed": kept[3],
         "temperature": kept[0],
         "stress": np.maximum(kept[1], 0.0),
-        "martensite_fraction": kept[5],
-        "strain": strain,
+        "martensite_fraction": xi,
+        "detwinned_fraction": modes.detwinned(kept, xi) if isinstance(modes, LoadedModes) else xi,
+        "strain": -load.ratio * (kept[2] - start) / wire.length - kept[4],
     }
-
-
-def _event(
-    function: Callable[[float, Vector], float], direction: int, terminal: bool
-) -> Callable[[float, Vector], float]:
-    """A fresh callable with the flags solve_ivp reads."""
-
-    def event(t: float, s: Vector) -> float:
-        return function(t, s)
-
-    event.terminal, event.direction = terminal, direction  # type: ignore[attr-defined]
-    return event
+    if isinstance(drive, _Sampled):
+        out["volts"] = np.array(drive.given)[np.searchsorted(ends, times, side="right")]
+    return out
 
 
 def _constant(value: float) -> Callable[[float], float]:
