@@ -55,8 +55,16 @@ MOVING = {
 }
 
 
-@pytest.mark.parametrize("law", NAMES)
-@pytest.mark.parametrize("load", sorted(MOVING))
+# Every law and every load is in `make test` once; the whole grid is in `make test-all`.
+OFTEN = {("tanaka", "arm"), ("brinson", "dead_weight"), ("liang", "bias_spring"), ("enhanced", "arm")}
+GRID = [
+    pytest.param(law, load, marks=() if (law, load) in OFTEN else pytest.mark.slow)
+    for law in NAMES
+    for load in sorted(MOVING)
+]
+
+
+@pytest.mark.parametrize(("law", "load"), GRID)
 def test_every_parameter_of_a_moving_load(law: str, load: str) -> None:
     wire, name, drive, top, wanted = MOVING[load]
     compare(_under(law, wire, name, drive), _moved(top, wanted))

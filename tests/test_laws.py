@@ -188,7 +188,7 @@ def test_work_of_a_closed_stress_strain_cycle_is_not_negative(at: float, top: fl
     assert np.trapezoid(run.stress, strain) >= -1e-3 * float(run.stress.max()) * top
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(temperature=TEMPERATURES, stress=STRESSES, law=st.sampled_from(NAMES))
 def test_strain_coupon_inverts_the_stress_coupon(temperature: list[float], stress: list[float], law: str) -> None:
     """The strain that a stress path gives, prescribed, gives back the stress path (while the wire is taut)."""
@@ -209,14 +209,14 @@ def test_conditions_as_table_3_3_prints_them_transform_nothing_under_a_constant_
 @pytest.mark.parametrize("law", NAMES)
 def test_zero_voltage_rests_for_a_thousand_seconds(rig: str, law: str) -> None:
     wire = "niti_table_3_1" if rig == "arm" else "flexinol_table_3_2"
-    run = RUN(_with(build(wire, rig, "voltage"), law), {"voltage": jnp.zeros(20_001)}, 0.05)
+    run = RUN(_with(build(wire, rig, "voltage"), law), {"voltage": jnp.zeros(2_001)}, 0.5)
     ambient = 20.0 if rig == "arm" else 23.0
     assert float(np.abs(run.temperature - ambient).max()) < 1e-9
     assert float(np.abs(run.position - run.position[0]).max()) < 1e-12
     assert np.all(np.asarray(run.martensite_fraction) == 1.0)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=8, deadline=None)
 @given(levels=st.lists(st.floats(0.0, 12.0), min_size=4, max_size=4), law=st.sampled_from(NAMES))
 def test_no_wire_gets_colder_than_its_air(levels: list[float], law: str) -> None:
     system = _with(build("flexinol_table_3_2", "dead_weight", "voltage"), law)

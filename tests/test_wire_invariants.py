@@ -91,11 +91,12 @@ def test_fraction_stays_in_range_with_every_effect_on(levels: list[float], share
 
 
 def test_every_effect_at_its_base_value_is_the_base_model() -> None:
+    # One by one on the dead weight, all together on the others: every system is a compilation of its own.
     for rig, (system, channel, top) in RIGS.items():
         inputs = _inputs(channel, top, [0.8, 0.2, 1.0, 0.0])
         plain = RUN(system, inputs, DT)
-        for name in LIBRARY:
-            same = RUN(extended(system, (name,)), inputs, DT)
+        for name in LIBRARY if rig == "dead_weight" else (tuple(LIBRARY),):
+            same = RUN(extended(system, name if isinstance(name, tuple) else (name,)), inputs, DT)
             for which in ("temperature", "martensite_fraction", "stress", "reading"):
                 np.testing.assert_allclose(
                     getattr(same, which),
