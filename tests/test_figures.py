@@ -31,3 +31,26 @@ def test_chapter_three_is_whole() -> None:
 def test_an_unknown_figure_is_answered_with_the_list() -> None:
     with pytest.raises(KeyError, match="M19"):
         rows("M99")
+
+
+def test_the_page_of_parameters_is_that_of_the_presets() -> None:
+    """Every number with its origin; `python -m studies.make_docs` writes it anew."""
+    from studies.make_docs import PAGE, page
+
+    assert PAGE.read_text(encoding="utf-8") == page()
+
+
+def test_geometry_and_convergence_studies_hold_in_their_fast_setting() -> None:
+    from studies.arm_geometry import main as geometry
+    from studies.convergence import LIMITS
+    from studies.convergence import main as convergence
+
+    levers, strains, holds = geometry(fast=True)
+    assert holds[abs(levers - 0.045).argmin(), abs(strains - 0.043).argmin()]
+    assert not holds[:, 0].any(), "the printed eps_L reaches 85 degrees after all"
+    for case, errors in convergence(fast=True).items():
+        for which in (0, 1):
+            at_default = errors[1][which]
+            assert at_default < LIMITS[which], case
+        order = math.log2(errors[0][1] / errors[2][1]) / 2.0
+        assert 1.5 < order < 2.6, f"{case}: order {order}"

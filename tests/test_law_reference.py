@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 from smajax.closed_loop import simulate_closed_loop
-from smajax.controller.stress_sliding import StressSliding
 from smajax.parameters import set_parameters
 from smajax.presets import build, stress_sliding
 from smajax.simulate import DEFAULT_STEP, simulate
@@ -22,6 +21,7 @@ from smajax.wire.laws import LAWS, under_law
 from smajax.wire.renewal import AsPrinted
 from smajax.wire.stiffness import Constant
 from studies.reference.path_reference import simulate_path
+from studies.reference.sliding import sliding_controller
 from studies.reference.wire_parameters import ArmParameters, DeadWeightParameters
 from studies.reference.wire_reference import simulate_arm, simulate_dead_weight
 
@@ -144,38 +144,6 @@ def test_dead_weight_of_voltage_steps_follows_the_reference() -> None:
     assert np.abs(run.position[::EVERY] - reference["position"]).max() < 5e-5
 
 
-def _reference_controller(ours: StressSliding, target: float):
-    """Eq. 4.44, 4.45 and the inner PID once more, in plain Python."""
-    arm = ours.arm
-    mass, link, length = (float(getattr(arm, name)) for name in ("payload_mass", "link_mass", "arm_length"))
-    inertia = (mass + link / 3.0) * length**2
-    spring = float(arm.spring_stiffness) * float(arm.spring_lever) ** 2
-    pull = 2.0 * float(arm.pulley_radius) * float(ours.cross_section)
-    slope, gain, boundary = (float(getattr(ours, name)) for name in ("surface_slope", "gain", "boundary"))
-    period = 0.01
-
-    def wanted(angle: float, rate: float) -> float:
-        error = angle - target
-        surface = min(max((rate + slope * error) / boundary, -1.0), 1.0)
-        torque = (
-            (mass + 0.5 * link) * 9.81 * length * np.cos(angle)
-            + spring * (angle + np.pi / 4)
-            + float(arm.damping) * rate
-        )
-        return max((torque - inertia * slope * rate - gain * surface) / pull, 0.0)
-
-    def controller(
-        time: float, angle: float, rate: float, temperature: float, stress: float, xi: float, memory: float
-    ) -> tuple[float, float]:
-        error = wanted(angle, rate) - stress
-        summed = memory + period * error
-        asked = float(ours.stress_gain) * error + float(ours.stress_integral_gain) * summed
-        volts = min(max(asked, 0.0), float(ours.largest_voltage))
-        return volts, summed if volts == asked else memory
-
-    return controller
-
-
 def test_controlled_arm_follows_the_reference_for_twenty_seconds() -> None:
     """Regulation at 85 degrees, enhanced law, default step, control period 10 ms."""
     law, seconds, period = "enhanced", 20.0, 0.01
@@ -185,7 +153,7 @@ def test_controlled_arm_follows_the_reference_for_twenty_seconds() -> None:
         _arm_parameters(law),
         [],
         times,
-        controller=_reference_controller(ours, np.radians(85.0)),
+        controller=sliding_controller(ours, np.radians(85.0), period),
         period=period,
         memory=0.0,
     )
