@@ -147,9 +147,11 @@ def main(fast: bool = False) -> dict[str, list[Errors]]:
             for case, row in table.items():
                 axes.loglog(steps, [errors[k] for errors in row], "o-", markersize=3, label=case)
             axes.loglog(steps, [0.3 * LIMITS[k] * (dt / 0.01) ** 2 for dt in steps], ":", color=GREY, label="order 2")
+            axes.set_xticks(steps, [f"{1e3 * dt:g}" for dt in steps])
+            axes.minorticks_off()
             axes.axhline(LIMITS[k], linestyle="--", color=GREY)
             axes.axvline(DEFAULT_STEP, linestyle="--", color=GREY)
-            named(axes, "step (s)", f"largest error: {name}")
+            named(axes, "step (ms)", f"largest error: {name}")
         keyed(figure.axes[0])
         figure.savefig(PICTURE, dpi=90)
     return table
