@@ -16,25 +16,24 @@ MEASURED = (0.32, 0.27, 0.28)  # mm, eq. 3.16, 96 g
 
 def work(fast: bool) -> Result:
     """Four ways of taking mass off; all four laws for 96 g."""
-    enhanced = {case: unloaded(case, "enhanced", fast) for case in CASES}
-    net = {case: net_deflection(run, before) for case, (run, before, _) in enhanced.items()}
-    lifted = {}
-    for case, (run, before, mass) in enhanced.items():
-        lightest = np.flatnonzero(mass == mass.min())[-1]
-        lifted[case] = float(1e3 * (run.position[lightest] - run.position[before]))
-    by_law = {law: net_deflection(*unloaded("96 g", law, fast)[:2]) for law in LAWS}
-    at_16 = net_deflection(*unloaded("96 g", "enhanced", fast, 16.0)[:2])
+    lanes = [*((case, VOLTS) for case in CASES), ("96 g", 16.0)]
+    runs, before, mass = unloaded("enhanced", fast, *lanes)
+    shift = 1e3 * (runs.position - runs.position[:, [before]])
+    net = dict(zip(CASES, net_deflection(runs, before).tolist(), strict=False))
+    at_16 = float(net_deflection(runs, before)[-1])
+    lifted = {case: float(shift[k, np.flatnonzero(mass[k] == mass[k].min())[-1]]) for k, case in enumerate(CASES)}
+    laws = {law: unloaded(law, fast, ("96 g", VOLTS))[0] for law in LAWS}
+    by_law = {law: float(net_deflection(run, before)[0]) for law, run in laws.items()}
 
     def draw(figure: Figure) -> None:
-        steps, laws = panels(figure, 1, 2)
-        for case, (run, before, _) in enhanced.items():
-            steps.plot(run.time, 1e3 * (run.position - run.position[before]), label=case, linewidth=1.2)
-        for law in LAWS:
-            run, before, _ = unloaded("96 g", law, fast)
+        left, right = panels(figure, 1, 2)
+        for k, case in enumerate(CASES):
+            left.plot(runs.time[k], shift[k], label=case, linewidth=1.2)
+        for law, run in laws.items():
             style: dict[str, Any] = {"color": LAW_COLOURS[law], "linestyle": LAW_STYLES[law], "label": law}
-            laws.plot(run.time, 1e3 * (run.position - run.position[before]), **style)
-        for axes, title in ((steps, "enhanced, by mass removed"), (laws, "96 g, by law")):
-            axes.set_xlim(35.0, None)
+            right.plot(run.time[0], 1e3 * (run.position[0] - run.position[0, before]), **style)
+        for axes, title, end in ((left, "enhanced, by mass removed", None), (right, "96 g, by law", 100.0)):
+            axes.set_xlim(35.0, end)
             axes.set_ylim(-1.0, None)
             keyed(axes)
             named(axes, "time (s)", "position against before the change (mm)", title)

@@ -8,6 +8,7 @@ from typing import Any
 import equinox as eqx
 import jax
 import numpy as np
+from jaxtyping import Array, Float
 
 from smajax.closed_loop import ClosedLoop, simulate_closed_loop
 from smajax.presets import build, stress_sliding
@@ -17,6 +18,7 @@ from smajax.types import Series, Trajectory
 from smajax.wire.constitutive import AbstractForm, IntegratedForm
 from smajax.wire.laws import under_law
 
+Batched = Float[Array, "runs time"]
 # A Trajectory (or a ClosedLoop of one) whose arrays are numpy's, which the type of a jax array does not say.
 Recorded = Any
 
@@ -63,6 +65,16 @@ def _simulated(system: System, inputs: dict[str, Series], dt: float) -> Trajecto
 def simulated(system: System, inputs: dict[str, Series], dt: float) -> Recorded:
     """One run, compiled, in numpy."""
     return recorded(_simulated(system, inputs, dt))
+
+
+@eqx.filter_jit
+def _batch(system: System, inputs: dict[str, Batched], dt: float) -> Trajectory:
+    return jax.vmap(lambda one: simulate(system, one, dt))(inputs)
+
+
+def batch(system: System, inputs: dict[str, Batched], dt: float) -> Recorded:
+    """Many runs of one system at once: every input, and every array that comes back, of shape (runs, time)."""
+    return recorded(_batch(system, inputs, dt))
 
 
 @eqx.filter_jit

@@ -7,7 +7,7 @@ import functools
 import jax.numpy as jnp
 import numpy as np
 
-from smajax.figures.rigs import LAWS, Recorded, dead_weight, simulated
+from smajax.figures.rigs import LAWS, Recorded, batch, dead_weight
 from smajax.simulate import DEFAULT_STEP
 
 INITIAL_MASS = 0.363  # kg: the captions'; the text says 388 g, eq. 3.23 uses 343 g
@@ -22,26 +22,31 @@ CASES = {
 }
 
 
-def _masses(removed: float, steps: int) -> list[float]:
+PERIODS = 6  # of HELD seconds, enough for three steps down and three up; shorter cases rest at the end
+Lane = tuple[str, float]  # (a key of CASES, volts)
+
+
+def _mass(case: str, first: int, held: int) -> np.ndarray:
+    removed, steps = CASES[case]
     down = [INITIAL_MASS - removed * (k + 1) / steps for k in range(steps)]
-    return [*down, *down[-2::-1], INITIAL_MASS]
+    levels = [*down, *down[-2::-1]]
+    levels += [INITIAL_MASS] * (PERIODS - len(levels))
+    return np.concatenate([np.full(first, INITIAL_MASS), np.repeat(levels, held), [INITIAL_MASS]])
 
 
 @functools.cache
-def unloaded(case: str, law: str, fast: bool, volts: float = VOLTS) -> tuple[Recorded, int, np.ndarray]:
-    """(run, sample just before the first change, mass over time)."""
-    dt = 0.02 if fast else DEFAULT_STEP
-    removed, steps = CASES[case]
+def unloaded(law: str, fast: bool, *lanes: Lane) -> tuple[Recorded, int, np.ndarray]:
+    """(runs, sample just before the first change, masses), arrays of shape (lanes, time): all lanes in one batch."""
+    dt = 0.04 if fast else DEFAULT_STEP
     first, held = round(HEATED / dt), round(HELD / dt)
-    mass = np.concatenate([np.full(first, INITIAL_MASS), np.repeat(_masses(removed, steps), held)])
-    mass = np.append(mass, INITIAL_MASS)
-    run = simulated(dead_weight(law), {"voltage": jnp.full(len(mass), volts), "mass": jnp.asarray(mass)}, dt)
-    return run, first - 1, mass
+    mass = np.stack([_mass(case, first, held) for case, _ in lanes])
+    volts = np.array([volts for _, volts in lanes])[:, None] * np.ones(mass.shape[1])
+    return batch(dead_weight(law), {"voltage": jnp.asarray(volts), "mass": jnp.asarray(mass)}, dt), first - 1, mass
 
 
-def net_deflection(run: Recorded, before: int) -> float:
-    """How much higher the mass hangs after it was taken off and put back, mm."""
-    return float(1e3 * (run.position[-1] - run.position[before]))
+def net_deflection(runs: Recorded, before: int) -> np.ndarray:
+    """How much higher the mass hangs after it was taken off and put back, mm, by lane."""
+    return 1e3 * (runs.position[:, -1] - runs.position[:, before])
 
 
 __all__ = ["CASES", "INITIAL_MASS", "LAWS", "VOLTS", "net_deflection", "unloaded"]
