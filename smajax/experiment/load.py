@@ -198,13 +198,8 @@ def _noise(path: Path, file: ExperimentFile, name: str, unit: str, fit: Sequence
     sensors = [estimate_noise(read.signals[name].values, 0.0) for read in fit]
     sigma = float(np.median(sigmas))
     if sigma <= 0.0:
-<<<<<<< ours
-        raise ExperimentError(path, key, f"no noise can be seen in {name!r}; give it as text like '0.01 {unit}'")
-    return sigma, float(np.median(sensors)), f"estimated from {len(fit)} fit run{'s' if len(fit) > 1 else ''} (median)"
-=======
         raise ExperimentError(path, key, f"no noise can be seen in {name!r}; give it as text like '{example}'")
-    return sigma, float(np.median(sensors)), f"estimated from {len(fit)} fit run(s) on the clock, median"
->>>>>>> theirs
+    return sigma, float(np.median(sensors)), f"estimated from {len(fit)} fit run{'s' if len(fit) > 1 else ''} (median)"
 
 
 def load_experiment(path: str | Path, catalogue: Catalogue) -> Experiment:
