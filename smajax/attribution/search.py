@@ -31,6 +31,7 @@ NEARLY_GAUSS_NEWTON = 1e6  # `start_cost` of a fit that begins close to its opti
 NUDGE = 1e-3  # share of an effect's start at which its score is taken
 INSIDE = 0.03  # a refit starts at least this share of the box away from bounds to which a poorer model was driven
 TOLD = 1.0  # to what share of itself the other runs must tell an effect's size for a left-out run to count
+LOOSE = 1.0  # how far a fold's parameters may stray for nothing, in their unbounded form (a logit of the box)
 JUDGED = 3  # candidates taken to the left-out runs
 MOST_ROUNDS = 3
 
@@ -44,6 +45,7 @@ class Start:
     effects: tuple[str, ...]
     values: np.ndarray  # (P + 1,), in the order of the whole library's problem
     without: int | None = None
+    tie: float = 0.0  # see `Lane.tie`
 
 
 @dataclass(frozen=True)
@@ -133,7 +135,9 @@ class Search:
             weights = np.ones(problem.batch.output.shape[0])
             if start.without is not None:
                 weights[start.without] = 0.0
-            lanes.append(problem.lane(self.free(start.effects), self.bounds, start.values[index], slots, weights))
+            lanes.append(
+                problem.lane(self.free(start.effects), self.bounds, start.values[index], slots, weights, start.tie)
+            )
         solutions = self.solve(problem, lanes, progress=self.progress, what=what, **settings)
         found = misfits(problem, [solution.values for solution in solutions])
         whole = []
@@ -149,26 +153,42 @@ class Search:
     def judged(self, fitted: Sequence[Fitted], present: Model | None = None) -> list[Model]:
         """Leave each fit run out in turn, refit to the others, and predict the one left out.
 
-        A fold starts at the fit to all runs, so that it is this model which is tried and not another optimum of it. In
-        a direction that only the run left out can tell the fold would keep what that run said: where the others do not
+        A fold starts at the fit to all runs and is tied to it, each parameter to within about `LOOSE` of its unbounded
+        form: else a direction that the others hardly tell runs wherever the last iteration happened to take it, and
+        with it the prediction. In such a direction the fold keeps what the run left out said: where the others do not
         tell the size of what is new (`told_without`), `present`'s error stands and the effect is credited with nothing.
         """
         runs = self.problem.batch.output.shape[0]
         # With one run nothing can be left out: the fit itself is all there is, and the report says so.
         folds: list[int | None] = list(range(runs)) if runs > 1 else [None]
-        starts = [Start(entry.effects, entry.solution.values, run) for entry in fitted for run in folds]
+        levels = self.levels(fitted)
+        starts = [
+            Start(entry.effects, entry.solution.values, run, np.sqrt(level) / LOOSE)
+            for entry, level in zip(fitted, levels, strict=True)
+            for run in folds
+        ]
         _, found = self.fit(starts, "predicting runs left out", legs=3, enough=5e-3, start_cost=NEARLY_GAUSS_NEWTON)
         models = []
         for place, entry in enumerate(fitted):
             own = found[place * len(folds) : (place + 1) * len(folds)]
             left_out = np.stack([own[run, run] for run in range(runs)]) if runs > 1 else own[0]
-            if present is not None and runs > 1:
-                told = self.told_without(entry, present)
-                left_out = np.where(told[:, None], left_out, present.left_out)
-            models.append(
-                Model(entry.effects, entry.solution.values, entry.solution.cost, left_out, self.rmse(left_out))
-            )
+            model = Model(entry.effects, entry.solution.values, entry.solution.cost, left_out, self.rmse(left_out))
+            models.append(model if present is None else self.credited(entry, model, present))
         return models
+
+    def levels(self, fitted: Sequence[Fitted]) -> list[float]:
+        """Variance that one effective sample of each fit's residual has, over the noise's: memory counts as noise."""
+        mask = np.asarray(self.problem.batch.mask)
+        found = misfits(self.problem, [entry.solution.values for entry in fitted]) / float(self.problem.noise_sigma)
+        return [float((one**2).sum() / mask.sum()) * correlation_time(split_runs(one, mask)) for one in found]
+
+    def credited(self, entry: Fitted, model: Model, present: Model) -> Model:
+        """`model` with `present`'s error on the runs that alone tell the size of what is new (`told_without`)."""
+        if len(model.left_out) == 1:
+            return model
+        told = self.told_without(entry, present)
+        left_out = np.where(told[:, None], model.left_out, present.left_out)
+        return dataclasses.replace(model, left_out=left_out, left_out_rmse=self.rmse(left_out))
 
     def told_without(self, entry: Fitted, present: Model) -> np.ndarray:
         """Run by run: do the other runs tell the size of what is new against `present`? Shape (R,).
@@ -366,23 +386,22 @@ def pruned(setting: Search, model: Model) -> Model:
                 values[names.index(name)] = float(getattr(base, name.removeprefix(f"{effect}.")))
             starts.append(Start(rest, values))
         solutions, _ = setting.fit(starts, "taking effects out again", legs=3)
-        # All against one another and none with credit withheld, so that like is compared with like.
-        whole = Solution(model.values, model.cost, True, 0)
+        whole = Fitted(model.effects, Solution(model.values, model.cost, True, 0))
         kept, *judged = setting.judged(
-            [
-                Fitted(model.effects, whole),
-                *(Fitted(start.effects, solution) for start, solution in zip(starts, solutions, strict=True)),
-            ]
+            [whole, *(Fitted(begun.effects, solution) for begun, solution in zip(starts, solutions, strict=True))]
         )
+        # The rule by which an effect is added: what only the run left out tells of it counts neither for nor against.
+        credited = [setting.credited(whole, kept, entry) for entry in judged]
         for entry in judged:
             gone = next(name for name in model.effects if name not in entry.effects)
             setting.evidence[gone].without_left_out_rmse = entry.left_out_rmse
-        needless = [entry for entry in judged if not setting.better(kept, entry)[0]]
+        against = {entry.effects: new for entry, new in zip(judged, credited, strict=True)}
+        needless = [entry for entry in judged if not setting.better(against[entry.effects], entry)[0]]
         if not needless:
             break
         best = min(needless, key=lambda m: m.left_out_rmse)
         gone = next(name for name in model.effects if name not in best.effects)
-        why = f"taken out again: {setting.better(kept, best)[1]} with it is not enough"
+        why = f"taken out again: {setting.better(against[best.effects], best)[1]} with it is not enough"
         setting.note(
             Round(len(setting.rounds) + 1, ((" + ".join(best.effects), best.left_out_rmse),), f"without {gone}", why)
         )

@@ -25,6 +25,7 @@ class Lane(NamedTuple):
     high: Float[Array, " slot"]
     values: Float[Array, " parameter"]  # every parameter of the model, and the dummy at the end
     weights: Float[Array, " run"]  # 0 leaves a run out
+    tie: Float[Array, ""]  # pull back to the start, in the residual's unit per unit of the unbounded parameter; 0: none
     scale: Float[Array, ""]  # the residual is divided by this, so that damping of order one means something
 
 
@@ -52,6 +53,7 @@ class Problem(eqx.Module):
         values: np.ndarray,
         slots: int,
         weights: np.ndarray | None = None,
+        tie: float = 0.0,
     ) -> Lane:
         """A lane that frees `free` within `bounds`, starting from `values`; unused slots point at the dummy."""
         if len(free) > slots:
@@ -63,7 +65,7 @@ class Problem(eqx.Module):
         runs = self.batch.output.shape[0]
         full = np.ones(runs) if weights is None else weights
         slot = jnp.asarray(index, dtype=int)
-        return Lane(slot, *(jnp.asarray(part) for part in (low, high, values, full, 1.0)))
+        return Lane(slot, *(jnp.asarray(part) for part in (low, high, values, full, tie, 1.0)))
 
     def system_at(self, values: Float[Array, " parameter"]) -> System:
         return set_vector(self.system, self.names, values[:-1])
@@ -94,7 +96,8 @@ def free_of(lane: Lane) -> Float[Array, " slot"]:
 def _weighted(free: Float[Array, " slot"], lane: Lane, problem: Problem) -> Float[Array, " sample"]:
     misfit = problem.misfit(values_of(free, lane)) / problem.noise_sigma
     finite = jnp.where(jnp.isfinite(misfit), misfit, 1e6)  # a lane that blows up loses; it must not stop the others
-    return (finite * jnp.sqrt(lane.weights)[:, None]).ravel() / lane.scale
+    runs = (finite * jnp.sqrt(lane.weights)[:, None]).ravel()
+    return jnp.concatenate([runs, lane.tie * (free - free_of(lane))]) / lane.scale
 
 
 @eqx.filter_custom_jvp

@@ -88,10 +88,12 @@ def solve(
             scale = np.sqrt(np.maximum(cost, 1e-12) / start_cost)
             new, new_cost, converged = _leg(free, batch._replace(scale=jnp.asarray(scale)), problem)
             new_cost = np.asarray(new_cost) * scale**2
-            better = new_cost < cost
+            better = (new_cost < cost) & ~done  # a lane's result must not depend on what shares its batch
             free = jnp.where(jnp.asarray(better)[:, None], new, free)
-            done |= np.asarray(converged) | (cost - new_cost < enough * cost)
-            cost = np.where(better, new_cost, cost)
+            done, cost = (
+                done | np.asarray(converged) | (cost - new_cost < enough * cost),
+                np.where(better, new_cost, cost),
+            )
             leg += 1
             progress(what, (number + leg / legs) / len(batches))
         values = np.asarray(_values(free, batch))
