@@ -35,6 +35,7 @@ from smajax.wire.constitutive import strain_at, stress_at, young_modulus
 from smajax.wire.heat import cross_section, heat_rate, stored_heat
 from smajax.wire.kinetics import Branch, choose_branch, curves, fraction_on, open_branches, remembered, steepest_slope
 from smajax.wire.resistance import resistance_per_metre
+from smajax.wire.root import root
 
 Tree = TypeVar("Tree")
 
@@ -114,21 +115,17 @@ def _residual(
     Beside them the two curves of the kinetics at `z`, from which the branch is chosen.
     """
     wire, effects, load, old = system.wire, system.effects, system.load, stage.old.wire
-    if isinstance(load, StrainCoupon):
-        heat, motion = z.temperature - inputs["temperature"], z.position + inputs["strain"]
-        strain = -z.position
-    else:
-        assert isinstance(load, AbstractMovingLoad)
-        heating, _, _ = _rates(system, stage, inputs, z)
-        capacity = stored_heat(wire, (), jnp.ones_like(z.temperature), z.fraction)
-        heat = (stored_heat(wire, effects, z.temperature, z.fraction) - stage.heat - stage.step * heating) / capacity
+    assert isinstance(load, AbstractMovingLoad)
+    heating, _, _ = _rates(system, stage, inputs, z)
+    capacity = stored_heat(wire, (), jnp.ones_like(z.temperature), z.fraction)
+    heat = (stored_heat(wire, effects, z.temperature, z.fraction) - stage.heat - stage.step * heating) / capacity
 
-        # Projected on the range between the end stops: at a stop the equation reads "position = stop".
-        free = _free_position(system, stage, inputs, z)
-        lower, upper = load.limits()
-        motion = z.position - jnp.where(free < lower, lower, jnp.where(free > upper, upper, free))
-        strain = -load.contraction(wire) * (z.position - load.start())
+    # Projected on the range between the end stops: at a stop the equation reads "position = stop".
+    free = _free_position(system, stage, inputs, z)
+    lower, upper = load.limits()
+    motion = z.position - jnp.where(free < lower, lower, jnp.where(free > upper, upper, free))
 
+    strain = -load.contraction(wire) * (z.position - load.start())
     asked = stress_at(wire, effects, old, strain, z.temperature, z.stress, z.fraction)
     heated, cooled = curves(wire.kinetics, effects, old, z.temperature, z.stress)
     kinetics = z.fraction - fraction_on(old, branch, heated, cooled)
@@ -194,11 +191,11 @@ def _solved(system: System, stage: Stage, inputs: Inputs) -> _Iterate:
 
     The fraction is held in its bracket, and friction passes through sticking on its way from one slip to the other.
     """
-    law, old = system.wire.kinetics, stage.old.wire
+    load, law, old = system.load, system.wire.kinetics, stage.old.wire
+    assert isinstance(load, AbstractMovingLoad)
     xi = old.martensite_fraction
     stress_scale = 1e-4 * young_modulus(system.wire, xi)
-    contraction = system.load.contraction(system.wire) if isinstance(system.load, AbstractMovingLoad) else 1.0
-    position_scale = 0.01 / contraction
+    position_scale = 0.01 / load.contraction(system.wire)
     slips = _friction_limit(system) > 0.0
     sticks = stage.old.motion.position - PRESLIDING * stage.old.motion.friction
     open_at_start = open_branches(law, system.effects, old)
@@ -349,11 +346,32 @@ def _coupon_step(system: System, state: State, inputs: Inputs, dt: Scalar) -> St
 
 
 def _strain_coupon_step(system: System, state: State, inputs: Inputs, dt: Scalar) -> State:
-    """Temperature and strain at the end of the step are prescribed: stress and fraction are solved for."""
-    zero = jnp.zeros_like(state.wire.temperature)
-    stage = Stage(state, state.time + dt, dt, zero, zero, zero)
-    wire, z = _ended(system, stage, inputs)
-    return State(stage.time, wire, Motion(z.position, zero, zero), state.reading)
+    """Temperature and strain at the end of the step are prescribed: the fraction is the root of one equation.
+
+    For any fraction the strain gives the stress, and with it the curve; fraction less curve rises with the fraction,
+    so the root lies between the present fraction and the end of the branch: Newton's method held in that bracket.
+    """
+    wire, effects, old = system.wire, system.effects, state.wire
+    temperature, strain = inputs["temperature"], inputs["strain"]
+    before = old.martensite_fraction
+
+    def stress_of(xi: Scalar) -> Scalar:
+        return stress_at(wire, effects, old, strain, temperature, old.stress, xi)
+
+    frozen = stress_of(before)
+    curve = curves(wire.kinetics, effects, old, temperature, frozen)
+    branch = choose_branch(wire.kinetics, old, open_branches(wire.kinetics, effects, old), temperature, frozen, *curve)
+
+    def miss(xi: Scalar) -> Scalar:
+        return xi - fraction_on(old, branch, *curves(wire.kinetics, effects, old, temperature, stress_of(xi)))
+
+    low = jnp.where(branch.heating, 0.0, before)
+    high = jnp.where(branch.cooling, 1.0, before)
+    xi = root(miss, before, low, high)
+    stress = stress_of(xi)
+    own = strain_at(wire, effects, old, temperature, stress, xi)
+    new = remembered(wire.kinetics, effects, old, branch, temperature, stress, own, xi)
+    return State(state.time + dt, new, Motion(-strain, jnp.zeros_like(strain), jnp.zeros_like(strain)), state.reading)
 
 
 def step(system: System, state: State, inputs: Inputs, dt: Scalar | float) -> State:

@@ -28,6 +28,7 @@ def work(fast: bool) -> Result:
             "end_temperature_above_finish_C": passed,
         },
         draw=lambda figure: draw_step(figure, run),
+        caveat="rate form of the constitutive law; under the integrated form the arm goes on to its end stop.",
     )
 
 

@@ -23,12 +23,17 @@ def work(fast: bool) -> Result:
         # What the law misses up to the crossing: inside the range the wire cools while the range falls faster.
         warmer, nearer = np.diff(run.temperature), np.diff(run.temperature - run.stress / slope)
         missed = (warmer < 0.0) & (nearer > 0.0) & (run.temperature > start)[1:]
+        dt = float(run.time[1] - run.time[0])
+        after = np.arange(len(warmer)) >= crossing
+        cooling_after = float((after & (warmer < 0.0) & (nearer > 0.0)).sum() * dt)
         missed[crossing:] = False
         numbers |= {
             f"{law}_end_deg": float(np.degrees(run.position[-1])),
             f"{law}_end_fraction": float(run.martensite_fraction[-1]),
             f"{law}_end_temperature_above_finish_C": float(run.temperature[-1] - finish[-1]),
-            f"{law}_missed_seconds": float(missed.sum() * (run.time[1] - run.time[0])),
+            f"{law}_missed_seconds": float(missed.sum() * dt),
+            f"{law}_cooling_seconds_above_finish": cooling_after,
+            f"{law}_warming_above_finish_C": float(run.temperature[-1] - run.temperature[crossing]),
             f"{law}_missed_warming_C": float(warmer[missed].sum()),
             f"{law}_missed_drive_C": float(nearer[missed].sum()),
         }
@@ -41,7 +46,8 @@ def work(fast: bool) -> Result:
         found=f"the arm stalls at {numbers['liang_end_deg']:.1f}° (Liang) and {numbers['brinson_end_deg']:.1f}° (Brinson) "
         f"with xi = {numbers['liang_end_fraction']:.2f} and T above A_f'; on its way there it cools by "
         f"{-numbers['liang_missed_warming_C']:.2f} °C in moments in which T - sigma/C_A rises by "
-        f"{numbers['liang_missed_drive_C']:.1f} °C, the last of them the one in which T passes A_f'",
+        f"{numbers['liang_missed_drive_C']:.1f} °C, the last of them the one in which T passes A_f'; above it the controller heats on, by "
+        f"{numbers['liang_warming_above_finish_C']:.0f} °C, and nothing transforms",
         numbers={**numbers, "tanaka_end_deg": tanaka},
         draw=lambda figure: draw_regulation(figure, loops, "liang"),
         caveat=f"gains chosen here, the source prints none. Tanaka's law (beside the claim) ends at {tanaka:.0f}°: its "
@@ -53,6 +59,6 @@ ROW = Row(
     "M5",
     "Fig. 3.7-3.10",
     "arm, stress-based sliding control to 85°, Liang and Brinson conditions",
-    "the arm does not reach 85°; T exceeds A_f' while xi > 0, with dT/dt < 0 and dT/dt - (dsigma/dt)/C_A > 0",
+    "the arm does not reach 85°; T exceeds A_f' while xi > 0; as it comes to exceed it dT/dt < 0 and dT/dt - (dsigma/dt)/C_A > 0",
     work,
 )

@@ -18,7 +18,7 @@ def work(fast: bool) -> Result:
     return Result(
         holds=error < 0.5 and xi < before,
         found=f"the arm ends at {angle[-1]:.2f}° with xi = {xi:.3f} instead of {before:.3f}; "
-        f"its error after 15 s stays below {error:.2f}°",
+        f"its error after 15 s is {error:.1e}° at most",
         numbers={"end_deg": float(angle[-1]), "error_after_15_s_deg": error, "fraction": xi, "fraction_liang": before},
         draw=lambda figure: draw_regulation(figure, loops, "enhanced"),
     )

@@ -51,6 +51,19 @@ def work(fast: bool) -> Result:
         float(np.abs(one.martensite_fraction - other.martensite_fraction).max())
         for one, other in (shown["isobaric"], (ours, theirs), (ours, table))
     )
+    # The same conditions on martensite that cooling had formed: there Brinson's, as the source tells them, do nothing.
+    formed = {
+        "temperature": jnp.full((1, 401), 75.0),
+        "stress": jnp.asarray(np.interp(np.arange(401), [0, 200, 400], [200e6, 0, 200e6]))[None],
+    }
+    cooled = {
+        name: float(batch(system, formed, 1.0).martensite_fraction[0, 200])
+        for name, system in (
+            ("enhanced", enhanced),
+            ("brinson", with_conditions(Brinson())),
+            ("printed", with_conditions(BrinsonAsPrinted())),
+        )
+    }
     # The trial with the most transformation to and fro is the one to look at.
     busiest = {
         key: int(np.abs(np.diff(pair[0].martensite_fraction)).sum(axis=1).argmax()) for key, pair in shown.items()
@@ -85,8 +98,17 @@ def work(fast: bool) -> Result:
         holds=isobaric == isothermal == printed == 0.0,
         found=f"largest difference in xi over {trials} random paths each: {isobaric:g} at constant stress (Liang), "
         f"{isothermal:g} at constant temperature (Brinson; {printed:g} with the conditions as Table 3.3 prints them)",
-        numbers={"isobaric_difference": isobaric, "isothermal_difference": isothermal, "printed_difference": printed},
+        numbers={
+            "isobaric_difference": isobaric,
+            "isothermal_difference": isothermal,
+            "printed_difference": printed,
+            **{f"unloaded_cooled_martensite_{name}": value for name, value in cooled.items()},
+        },
         draw=draw,
+        caveat="at constant temperature for martensite that loading had formed. The source contradicts itself here: of "
+        "martensite formed by cooling it says (below eq. 3.12, and M7 c) that Brinson's conditions transform nothing on "
+        f"unloading. Unloaded at 75 °C such martensite ends at xi = {cooled['enhanced']:.2f} (enhanced, and Brinson as Table 3.3 "
+        f"prints it: {cooled['printed']:.2f}) and at {cooled['brinson']:.2f} (Brinson as the text has it).",
     )
 
 

@@ -88,6 +88,6 @@ ROW = Row(
     "M10",
     "Fig. 3.34",
     "wire",
-    "every drawn path direction from point a gives M → A, from point g A → M",
+    "every drawn path direction from point a (those of eq. 3.17) gives M → A, from point g (eq. 3.18) A → M",
     work,
 )

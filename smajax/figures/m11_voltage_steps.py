@@ -41,8 +41,10 @@ def work(fast: bool) -> Result:
     open_cycle = float(1e3 * np.abs(rate_form.position[-1]))
     recovered = float(1e3 * system.wire.wire_length * system.wire.constitutive.recoverable_strain)
     rest = float(1e3 * np.abs(end).max())
-    # Voltages between which the steady rise goes from 5 % to 95 % of the stroke.
-    spread = float(VOLTS[millimetres > 0.95 * millimetres.max()][0] - VOLTS[millimetres > 0.05 * millimetres.max()][0])
+    # Volts, of those tried, between the first that transforms 5 % and the first that transforms 95 %.
+    spread = float(
+        VOLTS[run.martensite_fraction[:, half - 1] < 0.05][0] - VOLTS[run.martensite_fraction[:, half - 1] < 0.95][0]
+    )
 
     def draw(figure: Figure) -> None:
         left, right = panels(figure, 1, 2)
@@ -59,9 +61,12 @@ def work(fast: bool) -> Result:
         named(right, "voltage (V)", "rise of the mass (mm)")
 
     return Result(
-        holds=below < 0.05 * 24.75 < 0.5 * 24.75 < above and monotone and rest < 0.01 and abs(recovered - 24.75) < 0.01,
+        holds=below < 0.05 * 24.75 < 0.5 * 24.75 < above
+        and monotone
+        and rest < 0.01
+        and abs(top[VOLTS == 5.0][0] / FULL_STROKE - 1.0) < 0.25,
         found=f"{below:.2f} mm at 4 V, {above:.2f} mm at 5 V; xi never rises with voltage; eps_L l_0 = {recovered:.2f} mm, "
-        f"{millimetres.max():.2f} mm with the elastic and thermal parts; at most {rest:.2f} mm from the start after cooling",
+        f"{millimetres.max():.2f} mm with the elastic and thermal parts; at most {rest:.0e} mm from the start after cooling",
         numbers={
             "rise_4_V_mm": below,
             "rise_5_V_mm": above,

@@ -35,7 +35,7 @@ def work(fast: bool) -> Result:
         named(axes, "change of the simulated fraction", "net deflection / 24.75 mm")
 
     return Result(
-        holds=abs(printed - 0.011) < 5e-4 and off < 0.25 and abs(float(carried[at]) - 0.011) < 0.25 * 0.011,
+        holds=abs(printed - 0.011) < 5e-4 and off < 0.05 and abs(float(carried[at]) - 0.011) < 0.25 * 0.011,
         found=f"0.27/24.75 = {printed:.4f}; simulated: {found[at]:.4f} from the deflection, {carried[at]:.4f} carried; at "
         f"all voltages the two agree within {100 * off:.0f} %",
         numbers={
@@ -45,7 +45,7 @@ def work(fast: bool) -> Result:
             "largest_relative_difference": off,
         },
         draw=draw,
-        caveat="eq. 3.22 prints xi_2 - xi_1 as positive: heating lowers xi, the magnitude is meant. The difference is "
+        caveat="the size is that of M13, chosen there; what is checked is that deflection and fraction agree. Eq. 3.22 prints xi_2 - xi_1 as positive: heating lowers xi, the magnitude is meant. The difference is "
         "elastic: under the same stress a wire of less martensite is stiffer, which eq. 3.21 leaves out.",
     )
 

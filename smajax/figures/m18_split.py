@@ -68,7 +68,7 @@ def work(fast: bool) -> Result:
             "difference_from_liang_under_bias": apart,
         },
         draw=draw,
-        caveat="sigma_s^cr = 10 and sigma_f^cr = 40 MPa are chosen here (not printed; 41.6 MPa detwins fully, sec. 3.5.1). "
+        caveat="a permanent bias above sigma_f^cr, that is: a lower one leaves part of the martensite twinned. sigma_s^cr = 10 and sigma_f^cr = 40 MPa are chosen here (not printed; 41.6 MPa detwins fully, sec. 3.5.1). "
         "The strain left after heating is the printed theta_T on the hot austenite.",
     )
 

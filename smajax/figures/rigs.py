@@ -15,7 +15,7 @@ from smajax.presets import build, stress_sliding
 from smajax.simulate import simulate
 from smajax.system import System
 from smajax.types import Series, Trajectory
-from smajax.wire.constitutive import AbstractForm, IntegratedForm
+from smajax.wire.constitutive import AbstractForm, IntegratedForm, RateForm
 from smajax.wire.laws import under_law
 
 Batched = Float[Array, "runs time"]
@@ -25,9 +25,9 @@ Recorded = Any
 LAWS = ("tanaka", "liang", "brinson", "enhanced")
 
 
-def arm(law: str = "enhanced") -> System:
-    """The rotary arm of section 3.1."""
-    return _under(build("niti_table_3_1", "arm", "amplified_voltage"), law)
+def arm(law: str = "enhanced", form: AbstractForm | None = None) -> System:
+    """The rotary arm of section 3.1, with the rate form (eq. 3.2) of the constitutive law, as section 3.3 has it."""
+    return _formed(_under(build("niti_table_3_1", "arm", "amplified_voltage"), law), form or RateForm())
 
 
 def dead_weight(law: str = "enhanced", form: AbstractForm | None = None) -> System:

@@ -9,14 +9,15 @@ from matplotlib.figure import Figure
 from smajax.figures.drawing import BLUE, GREY, RED, keyed, named, panels
 from smajax.figures.rigs import Recorded, arm, austenite_range, simulated
 from smajax.simulate import DEFAULT_STEP
+from smajax.wire.constitutive import AbstractForm
 
 SECONDS = 30.0
 
 
-def stepped(volts: float, fast: bool) -> Recorded:
+def stepped(volts: float, fast: bool, form: AbstractForm | None = None) -> Recorded:
     """30 s at a constant voltage from rest."""
     dt = 0.02 if fast else DEFAULT_STEP
-    return simulated(arm(), {"voltage": jnp.full(round(SECONDS / dt) + 1, volts)}, dt)
+    return simulated(arm(form=form), {"voltage": jnp.full(round(SECONDS / dt) + 1, volts)}, dt)
 
 
 def draw_step(figure: Figure, run: Recorded) -> None:

@@ -4,25 +4,20 @@ from __future__ import annotations
 
 import abc
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
-from jax import lax
 
 from smajax.effects.base import AbstractEffect
 from smajax.parameters import parameter
 from smajax.types import Scalar, WireState
+from smajax.wire.root import root
 from smajax.wire.stiffness import AbstractStiffness, Mixed
 
 if TYPE_CHECKING:
     from smajax.wire.wire import Wire
-
-ROUNDINGS = 4.0
-MOST_HALVINGS = 60
-Bracket = tuple[Scalar, Scalar, Scalar, Scalar, Scalar]  # iterate, low, high, last change, count
 
 
 class AbstractForm(eqx.Module):
@@ -140,37 +135,11 @@ def stress_at(
 
     if not wire.kinetics.variants.detwins:
         return asked(stress)
-    # What the rounding of a strain makes of the stress.
-    rounding = ROUNDINGS * jnp.finfo(stress.dtype).eps * lax.stop_gradient(young_modulus(wire, xi))
-    return _consistent(asked, jnp.zeros_like(stress), rounding)
-
-
-def _consistent(asked: Callable[[Scalar], Scalar], zero: Scalar, tolerance: Scalar) -> Scalar:
-    """The stress that asks for itself where detwinning answers a stress with far more strain than elasticity does.
-
-    `asked` falls as its guess rises, so the root lies between zero and `asked(0)`: Newton steps held in that bracket.
-    Only the last step is differentiated, which gives the derivative of the root.
-    """
-    high = lax.stop_gradient(asked(zero))
-
-    def newton(at: Scalar) -> tuple[Scalar, Scalar]:
-        value, slope = jax.value_and_grad(lambda guess: guess - asked(guess))(at)
-        return lax.stop_gradient(value), lax.stop_gradient(slope)
-
-    def body(at: Bracket) -> Bracket:
-        here, low, high, _, count = at
-        value, slope = newton(here)
-        low, high = jnp.where(value < 0.0, here, low), jnp.where(value > 0.0, here, high)
-        free = here - value / slope
-        there = jnp.where((value == 0.0) | ((free > low) & (free < high)), free, 0.5 * (low + high))
-        return there, low, high, jnp.abs(there - here), count + 1
-
-    def unfinished(at: Bracket) -> Scalar:
-        return (at[3] > tolerance) & (at[4] < MOST_HALVINGS)
-
-    root, *_ = lax.while_loop(unfinished, body, (high, zero, high, zero + jnp.inf, jnp.zeros_like(high, int)))
-    _, slope = newton(root)
-    return root - (root - asked(root)) / slope
+    # Detwinning answers a stress with far more strain than elasticity does, and `asked` falls as its guess rises: the
+    # stress that asks for itself lies between zero and `asked(0)`.
+    zero = jnp.zeros_like(stress)
+    high = asked(zero)
+    return root(lambda guess: guess - asked(guess), high, zero, high, young_modulus(wire, xi))
 
 
 def strain_at(

@@ -5,7 +5,7 @@ Both branches are closed forms of one driving temperature each, $y_A = T - \sigm
     heating   xi = min(xi, xi_M h(y_A)),            h falls from 1 at A_s to 0 at A_f   (eq. 3.3)
     cooling   xi = max(xi, 1 - (1 - xi_A) k(y_M)),  k rises from 0 at M_f to 1 at M_s   (eq. 3.5)
 
-so a step never leaves [0, 1] and never has to be clipped. A law is a choice of four parts, each a file beside this one
+so no step leaves [0, 1] and no stress has used a rate that a clipped fraction then denies. A law is a choice of four parts, each a file beside this one
 (`laws.py` has the authors' choices): the `shape` of h and k, the `conditions` under which a branch is followed, the
 `renewal` of the carried amplitudes xi_M and xi_A, and the `variants` of martensite.
 """
@@ -22,7 +22,7 @@ from smajax.effects.base import AbstractEffect
 from smajax.parameters import parameter
 from smajax.types import Scalar, WireState
 from smajax.wire.conditions import AbstractConditions
-from smajax.wire.renewal import FINISHED, AbstractRenewal, Corrected
+from smajax.wire.renewal import FINISHED, AbstractRenewal, Corrected, beyond
 from smajax.wire.shape import AbstractShape, Cosine
 from smajax.wire.variants import AbstractVariants, Single
 
@@ -62,7 +62,7 @@ def martensite_left(law: Kinetics, effects: Sequence[AbstractEffect], temperatur
     share = law.shape.martensite_left(z)
     for effect in effects:
         share = effect.heating_shape(z, share)
-    return share
+    return jnp.where(share > FINISHED, share, 0.0)
 
 
 def austenite_left(law: Kinetics, effects: Sequence[AbstractEffect], temperature: Scalar, stress: Scalar) -> Scalar:
@@ -72,7 +72,7 @@ def austenite_left(law: Kinetics, effects: Sequence[AbstractEffect], temperature
     share = law.shape.austenite_left(z)
     for effect in effects:
         share = effect.cooling_shape(z, share)
-    return share
+    return jnp.where(share > FINISHED, share, 0.0)
 
 
 def steepest_slope(law: Kinetics) -> Scalar:
@@ -105,7 +105,7 @@ def curves(
 def open_branches(law: Kinetics, effects: Sequence[AbstractEffect], state: WireState) -> Branch:
     """Branches whose range the wire is in (or before) at `state`: one that is behind it transforms nothing any more."""
     h, k = _shares(law, effects, state)
-    return Branch(h > FINISHED, k > FINISHED)
+    return Branch(h > 0.0, k > 0.0)
 
 
 def choose_branch(
@@ -127,7 +127,7 @@ def choose_branch(
     loaded = state.formed_by_loading > 0.5
     may_heat = law.conditions.heats(warmer, tighter, law.stress_slope_austenite, loaded) & open_at_start.heating
     may_cool = law.conditions.cools(warmer, tighter, law.stress_slope_martensite) & open_at_start.cooling
-    heating, cooling = (loss > 0.0) & may_heat, (gain > 0.0) & may_cool
+    heating, cooling = beyond(loss) & may_heat, beyond(gain) & may_cool
     # Overlapping ranges can ask for both; one step transforms one way only (source, after eq. 3.26).
     return Branch(heating & ~(cooling & (gain > loss)), cooling & ~(heating & (gain <= loss)))
 

@@ -10,8 +10,19 @@ from jaxtyping import Array, Bool
 
 from smajax.types import Scalar, WireState
 
-# Below this share a branch counts as finished: dividing by less would make the renewed amplitude pure rounding.
+# A share below this is none (`kinetics.martensite_left`): dividing by less would make an amplitude pure rounding.
 FINISHED = 1e-9
+
+
+# A curve that lies beyond the present fraction by less does not: where the wire rests on its curve, the rounding of the
+# stress alone would count as a transformation, or as one missed, and renew an amplitude.
+REST = 1e-10
+ROUNDINGS = 64.0
+
+
+def beyond(gap: Scalar) -> Bool[Array, ""]:
+    """Whether a curve lies beyond the present fraction by more than rounding."""
+    return gap > max(REST, ROUNDINGS * float(jnp.finfo(gap.dtype).eps))
 
 
 class Amplitudes(eqx.Module):
@@ -51,8 +62,10 @@ class Corrected(AbstractRenewal):
     """Renewed only while the other branch transforms, scaled so that the curve passes through the present state.
 
     Continuous at a reversal, complete at the end of the range, and blind to a pause. Where the conditions keep the wire
-    from following a curve (Liang's, when the stress falls faster than the temperature) the source, which integrates
-    rates, does not jump when they let it again: from the miss on the curve is laid through the present state.
+    from following a curve (Liang's, when the stress falls faster than the temperature), or it starts beyond one, the
+    curve is laid through the present state from then on. So the fraction does not jump when it may follow again, and
+    what was missed is made up for in what is left of the range: all of it, in a fraction of a degree, if hardly any is
+    left. (The source's rates would lose it instead and never complete.)
     """
 
     def start(self, h: Scalar, k: Scalar, xi: Scalar) -> Amplitudes:
@@ -76,8 +89,8 @@ class Corrected(AbstractRenewal):
         k: Scalar,
         xi: Scalar,
     ) -> Amplitudes:
-        beyond_heating = ~heating & (old.xi_M * h < xi)
-        beyond_cooling = ~cooling & (1.0 - (1.0 - old.xi_A) * k > xi)
+        beyond_heating = ~heating & beyond(xi - old.xi_M * h)
+        beyond_cooling = ~cooling & beyond(1.0 - (1.0 - old.xi_A) * k - xi)
         held = ~heating & ~cooling
         missed_heating = held & (beyond_heating | (old.heating_missed > 0.5))
         missed_cooling = held & (beyond_cooling | (old.cooling_missed > 0.5))
