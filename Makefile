@@ -11,7 +11,7 @@ demo: $(READY)
 	$(BIN)/smajax demo --out demo-report
 
 test: lint
-	$(BIN)/python -m pytest -n 2
+	$(BIN)/python -m pytest -n 2 --dist worksteal
 
 lint: $(READY)
 	$(BIN)/ruff check .

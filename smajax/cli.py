@@ -7,6 +7,8 @@ import os
 import shlex
 import sys
 import webbrowser
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -28,6 +30,17 @@ console = Console(stderr=True)
 DEMOS = ("latent", "complete")
 
 
+@contextmanager
+def _resumable() -> Iterator[None]:
+    """Ctrl-C is answered here: typer would end in silence."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        console.print("\nInterrupted. Finished fits are kept: the same command goes on from there.", soft_wrap=True)
+        # At once: an interpreter that shuts down in the middle of a compilation can crash.
+        os._exit(130)
+
+
 def _loop(experiment: Path, out: Path, command: str) -> tuple[Findings, Path]:
     # Imported here so that `--help` does not wait for JAX; x64 is the caller's choice, and this is the caller.
     import jax
@@ -40,9 +53,12 @@ def _loop(experiment: Path, out: Path, command: str) -> tuple[Findings, Path]:
     from smajax.report.write import write_report
 
     # Before the work, not after it: a folder that cannot be written to is found out at once.
+    for part in (out, *out.parents):
+        if part.exists() and not part.is_dir():
+            raise NotADirectoryError(f"--out: {part} is a file; give the name of a folder.")
     out.mkdir(parents=True, exist_ok=True)
     loaded = load_experiment(experiment, CATALOGUE)
-    with shown(console) as progress:
+    with _resumable(), shown(console) as progress:
         findings = close_loop(loaded, memory=out / "fits", progress=progress, command=command)
     return findings, write_report(findings, out)
 
@@ -117,6 +133,3 @@ def main() -> None:
     except (ExperimentError, MeasuredDataError, OSError) as error:
         console.print(f"error: {error}", style="red", markup=False, highlight=False, soft_wrap=True)
         raise SystemExit(2) from None
-    except KeyboardInterrupt:
-        console.print("Interrupted. Finished fits are kept: run the same command again to go on.", soft_wrap=True)
-        raise SystemExit(130) from None

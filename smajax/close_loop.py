@@ -29,6 +29,7 @@ from smajax.fit.solve import Progress, Solution, quiet
 from smajax.fit.uncertainty import Uncertainty, identifiability, uncertainty
 from smajax.load.coupon import Coupon
 from smajax.parameters import get_parameters, parameters
+from smajax.report.display import digits, display
 from smajax.report.findings import (
     CoefficientFinding,
     EffectFinding,
@@ -165,9 +166,15 @@ def _base_fit(job: _Job, setting: Search, start: np.ndarray, seed: int) -> Solut
     return min(solutions, key=lambda solution: solution.cost)
 
 
-def _preset(job: _Job) -> list[str]:
-    """Parameters of the base model that are not fitted."""
-    return [name for name in parameters(base_model(job.experiment)) if name not in job.unknowns]
+def _preset(job: _Job) -> dict[str, str]:
+    """Parameters of the base model that are not fitted: name -> value and unit as a reader sees them."""
+    model = base_model(job.experiment)
+    table = {name: entry for name, entry in parameters(model).items() if name not in job.unknowns}
+    values = np.asarray(get_parameters(model, list(table))) if table else ()
+    return {
+        name: f"{digits(display(entry.unit, name).of(float(value)))} {display(entry.unit, name).unit}".strip()
+        for (name, entry), value in zip(table.items(), values, strict=True)
+    }
 
 
 @dataclass(frozen=True)
@@ -202,7 +209,7 @@ def _told(job: _Job, setting: Search, model: Model, start: np.ndarray) -> _Told:
 
 
 def _effects(job: _Job, setting: Search, final: Model, after: _Told) -> tuple[EffectFinding, ...]:
-    """Every candidate with its evidence: added ones first, then by score."""
+    """Every candidate with its evidence: added ones first, the strongest of them at the head, then by score."""
     left = [name for name in job.candidates if name not in final.effects]
     last = {score.effects[0]: score for score in scores_at(setting, final, left)[0]} if left else {}
     told = {parameter.name: parameter for parameter in after.parameters}
@@ -236,7 +243,12 @@ def _effects(job: _Job, setting: Search, final: Model, after: _Told) -> tuple[Ef
                 evidence,
             )
         )
-    return tuple(sorted(findings, key=lambda f: (not f.added, -np.nan_to_num(f.evidence["score_gain"]))))
+
+    def strength(one: EffectFinding) -> tuple[bool, float, float]:
+        alone = one.evidence["alone_rmse_fit"] if one.added else np.nan
+        return not one.added, float(np.nan_to_num(alone, nan=np.inf)), -float(np.nan_to_num(one.evidence["score_gain"]))
+
+    return tuple(sorted(findings, key=strength))
 
 
 @eqx.filter_jit

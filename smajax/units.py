@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 from functools import lru_cache
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -18,6 +20,29 @@ _NUMBER = re.compile(r"^\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s
 _DIMENSIONLESS = {"", "1", "-"}
 # Spellings that people write and the unit library does not know, or knows as something else.
 _SPELLINGS = (("°C", "degC"), ("ºC", "degC"), ("℃", "degC"), ("°F", "degF"), ("°", "deg"), ("Ohm", "ohm"), ("·", "*"))
+# Units that people write out, to their symbols; with them goes any prefix.
+_SYMBOLS: Mapping[str, str] = MappingProxyType(
+    {
+        "volt": "V",
+        "ampere": "A",
+        "amp": "A",
+        "watt": "W",
+        "second": "s",
+        "sec": "s",
+        "newton": "N",
+        "pascal": "Pa",
+        "meter": "m",
+        "metre": "m",
+        "gram": "g",
+        "joule": "J",
+        "ohm": "ohm",
+        "kelvin": "K",
+        "celsius": "degC",
+        "fahrenheit": "degF",
+    }
+)
+# Units of measured channels, for text that differs from one of them by its case alone.
+_USUAL = "V mV A mA W mW s ms m mm um g kg N mN Pa kPa MPa GPa K degC degF deg rad ohm J kJ Hz"
 
 
 class UnitError(ValueError):
@@ -32,9 +57,18 @@ def _registry() -> Any:
     return pint.UnitRegistry(cache_folder=None)
 
 
+def _meant(text: str) -> str | None:
+    """The unit that people mean by text such as "mVolt" or "MM", which the unit library does not know; or None."""
+    name = text.strip()
+    named = re.fullmatch(rf"([numkMG\u00b5]?)((?i:{'|'.join(_SYMBOLS)}))(?i:s|es)?", name)
+    if named is not None:
+        return named.group(1) + _SYMBOLS[named.group(2).lower()]
+    return next((unit for unit in _USUAL.split() if unit.lower() == name.lower()), None)
+
+
 @lru_cache(maxsize=512)
-def _unit(text: str) -> Any:
-    """The unit that `text` names; raises UnitError when there is none such."""
+def _unit(text: str, like: str | None = None) -> Any:
+    """The unit that `text` names; raises UnitError when there is none such. like: what was expected, if that is known."""
     name = text.strip()
     if name in _DIMENSIONLESS:
         return _registry().parse_units("dimensionless")
@@ -44,7 +78,14 @@ def _unit(text: str) -> Any:
         # Inside a compound unit ("J/(kg degC)") a degree is a difference: pint's as_delta.
         return _registry().parse_units(name, as_delta=True)
     except Exception as error:  # besides its own errors the unit library lets those of Python's tokenizer through
-        raise UnitError(f"unit {text!r} is not known; write it like 'J/(kg K)', 'W/m^2/K', 'MPa/K', 'degC'") from error
+        guess = _meant(text)
+        if guess is not None:
+            advice = f"did you mean {guess!r}?"
+        elif like is not None and like not in _DIMENSIONLESS:
+            advice = f"expected one like {like!r}"
+        else:
+            advice = "write it like 'J/(kg K)', 'W/m^2/K', 'MPa/K', 'degC'"
+        raise UnitError(f"unit {text!r} is not known; {advice}") from error
 
 
 def _is_absolute(unit: Any) -> bool:
@@ -76,7 +117,7 @@ def _hint(got: str) -> str:
 
 def _factor(got: str, expected: str, difference: bool) -> tuple[Any, Any]:
     """The two units, checked to be of one kind, ready for a conversion from the first to the second."""
-    source, target = _unit(got), _unit(expected)
+    source, target = _unit(got, expected), _unit(expected)
     if source.dimensionality != target.dimensionality:
         raise UnitError(
             f"got unit {got!r} ({source.dimensionality}), expected one like {expected!r} ({target.dimensionality})"

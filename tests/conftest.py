@@ -18,3 +18,8 @@ def measured_data() -> Path:
     if not folder.is_dir():
         pytest.skip(f"no measured data at {folder}: set SMAJAX_DATA to the folder that holds them")
     return folder
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """The whole loops first: begun last, one of them would keep a single worker busy when all else is done."""
+    items.sort(key=lambda item: "test_close_loop" not in item.nodeid)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -79,6 +80,9 @@ ambient_temperature = "297.15 K"
 """
 
 
+ONE_FIT = "only 1 fit run: runs left out in turn tell little; give at least three of different kinds"
+
+
 def write_run(path: Path, count: int = 500, seed: int = 0, header: str = "time,duty,pos") -> None:
     """A run at 100 Hz (time in ms, duty in percent, position in mm with 0.01 mm of noise)."""
     time = 10.0 * np.arange(count)
@@ -124,7 +128,7 @@ def test_a_whole_experiment_in_si(bench: Path) -> None:
     np.testing.assert_allclose(first.output, 0.002 * np.maximum(first.time - 1.0, 0.0), atol=3e-5)
     assert second.parameters == {"ambient_temperature": pytest.approx(24.0)}
     assert first.sha256 == hashlib.sha256((bench / "a.csv").read_bytes()).hexdigest()
-    assert got.warnings == ()
+    assert got.warnings == (ONE_FIT,)
     assert load_experiment(bench, CATALOGUE).name == "bench"
 
 
@@ -220,9 +224,17 @@ def test_the_data_folder_from_the_environment_or_beside_a_parent(bench: Path, mo
 
 
 MISTAKES = [
-    ("offset = true", "ofset = true", r"nuisance.ofset: is not a known key; did you mean 'offset'"),
+    (
+        "offset = true",
+        "ofset = true",
+        r"nuisance.ofset: is not a known key; did you mean 'offset'\? Known here: offset",
+    ),
     ("[sampling]", "[samplng]", r"experiment\.toml: samplng: is not a known key; did you mean 'sampling'"),
-    ('wire = "flexinol"', 'wire = "flexinoll"', r"model.wire: there is no wire 'flexinoll'; did you mean 'flexinol'"),
+    (
+        'wire = "flexinol"',
+        'wire = "flexinoll"',
+        r"model.wire: there is no wire 'flexinoll'; did you mean 'flexinol'\? There are",
+    ),
     ('load = "bias_spring"', 'load = "spring"', r"model.load: there is no load 'spring'"),
     ('load = "bias_spring"', 'load = "coupon"', r"model: a coupon has no drive"),
     ('drive = "duty"', 'drive = "duti"', r"model.drive: .*did you mean 'duty'"),
@@ -241,22 +253,38 @@ MISTAKES = [
     ('low = "300 J/(kg K)"\n', "", r"unknown.specific_heat.low: is missing"),
     ('step = "50 ms"', 'step = "50 mm"', r"sampling.step: got unit 'mm'"),
     ('step = "50 ms"', 'step = "-1 s"', r"sampling.step: got '-1 s', expected a time above zero"),
-    ('step = "50 ms"', 'step = "1 ns"', r"sampling.step: .*cuts run 'A'"),
+    ('step = "50 ms"', 'step = "1 ns"', r"sampling.step: .*cuts run 'A' .*; take a longer step"),
     ('step = "50 ms"', 'step = "1 h"', r"sampling.step: run 'A' lasts 4.99 s"),
     ('column = "time"\n', "", r"time: names no column"),
     ('unit = "%"', 'unit = "V"', r"channels.duty.unit: got unit 'V'.*expected one like '1'"),
     ('role = "input"\n', "", r"channels.duty.role: is missing; expected 'input' or 'output'"),
     ('role = "input"', 'role = "output"', r"channels: got the outputs duty, position; expected exactly one"),
     ("[channels.duty]", "[channels.ambient_temperature]", r"channels.ambient_temperature.unit: got unit '%'"),
-    ("[channels.duty]", "[channels.dutty]", r"channels.dutty: the model has no input 'dutty'; did you mean 'duty'"),
+    (
+        "[channels.duty]",
+        "[channels.dutty]",
+        r"channels.dutty: the model has no input 'dutty'; did you mean 'duty'\? Its inputs are: a",
+    ),
     (
         '[channels.duty]\nrole = "input"\ncolumn = "duty"\nunit = "%"\n',
         "",
         r"channels: the model needs the input 'duty', which no channel gives",
     ),
     ('column = "duty"\n', "", r"channels.duty: has no column or variable and run 'A' gives no constant"),
-    ('column = "duty"', 'column = "dutty"', r"runs.A.file: .*no column 'dutty'; it has: time, duty, pos; did you mean"),
+    (
+        'column = "duty"',
+        'column = "dutty"',
+        r"runs.A.file: .*no column 'dutty'; did you mean 'duty'\? It has: time, duty, pos",
+    ),
+    ('column = "time"', 'column = "posn"', r"runs.A.file: .*no column 'posn'; it has: time, duty, pos$"),
+    ('column = "duty"', 'column = "tim"', r"runs.A.file: .*no column 'tim'; it has: time, duty, pos$"),
+    ('unit = "mm"', 'unit = "mMeter"', r"channels.position.unit: unit 'mMeter' is not known; did you mean 'mm'\?"),
     ('column = "pos"', 'column = "pos"\nvariable = "x"', r"channels.position: got both column and variable"),
+    (
+        'noise = "0.01 mm"',
+        'noise = "auto"',
+        r"channels.position.noise: got 'auto', .*; give a noise like '0.01 mm', or 'estimate'",
+    ),
     ('noise = "0.01 mm"', 'noise = "0.01 s"', r"channels.position.noise: got unit 's'"),
     ('noise = "0.01 mm"', 'noise = "0 mm"', r"channels.position.noise: got '0 mm', expected a noise above zero"),
     ('unit = "%"', 'unit = "%"\nnoise = "1 %"', r"channels.duty: got a noise for an input"),
@@ -298,9 +326,10 @@ def test_a_file_without_runs_or_without_a_file(bench: Path) -> None:
 
 def test_a_bad_sample_is_refused_with_its_run(bench: Path) -> None:
     for cells, words in (
-        ("5000,nan,0", "column 'duty' has 1 value"),
+        ("5000,nan,0", "column 'duty' has 1 value.*, the first is nan in line 502"),
         ("5000,0,zero", "line 502, column 'pos': 'zero' is not a number"),
-        ("-5,0,0", "time does not increase at sample 501"),
+        ("nan,0,0", "column 'time' has 1 value.*, the first is nan in line 502"),
+        ("4990,0,0", r"time column 'time' does not increase at line 502 \(4990 ms then 4990 ms\)"),
     ):
         write_run(bench / "a.csv")
         with (bench / "a.csv").open("a") as file:
@@ -331,7 +360,7 @@ def test_what_looks_wrong_is_a_warning(bench: Path) -> None:
         rewrite(bench / "a.csv", **change)  # type: ignore[arg-type]
         assert any(words in one for one in load(bench).warnings), (words, load(bench).warnings)
     rewrite(bench / "a.csv")
-    assert load(bench).warnings == ()
+    assert load(bench).warnings == (ONE_FIT,)
     assert any("shorter than the sensor's" in one for one in load(changed(bench, '"50 ms"', '"2 ms"')).warnings)
 
 
@@ -345,3 +374,45 @@ def test_a_noise_that_cannot_be_seen_has_to_be_given(bench: Path) -> None:
     rewrite(bench / "a.csv", position=np.zeros(500))
     with pytest.raises(ExperimentError, match=r"channels.position.noise: no noise can be seen"):
         load(changed(bench, 'noise = "0.01 mm"', 'noise = "estimate"'))
+
+
+def test_too_few_samples_for_the_noise_name_the_run_and_the_step(bench: Path) -> None:
+    changed(changed(bench, 'noise = "0.01 mm"', 'noise = "estimate"'), '"50 ms"', '"1 s"')
+    words = r"channels.position.noise: run 'A' has 5 samples at a step of 1 s, .*; take a shorter step or a longer run"
+    with pytest.raises(ExperimentError, match=words):
+        load(bench)
+    write_run(bench / "a.csv", count=6)
+    with pytest.raises(ExperimentError, match=r"run 'A' has 6 samples in its file, .*; take a longer run"):
+        load(changed(bench, '"1 s"', '"5 ms"'))
+
+
+def test_few_runs_and_none_held_out_are_warnings(bench: Path) -> None:
+    warnings = load(changed(bench, 'role = "held-out"', 'role = "fit"')).warnings
+    assert any(one.startswith("only 2 fit runs: ") for one in warnings)
+    assert "no run is held out: the error after is shown on no run that the fit never saw" in warnings
+
+
+def test_a_run_of_hours_is_a_warning(bench: Path) -> None:
+    changed(bench, '"50 ms"', '"50 s"')
+    assert "run 'B' lasts 7150 s; is the time in ms?" not in load(changed(bench, 'unit = "ms"', 'unit = "s"')).warnings
+    write_run(bench / "a.csv", count=2001)
+    assert "run 'A' lasts 20000 s; is the time in ms?" in load(bench).warnings
+    changed(changed(bench, 'unit = "s"', 'unit = "min"'), '"50 s"', '"10 min"')
+    assert "run 'A' lasts 1.2e+06 s; is the time in min, as [time] says?" in load(bench).warnings
+
+
+@pytest.mark.parametrize(
+    ("drive", "unit", "words"),
+    [("voltage", "V", "the voltage reaches 4200 V; is it in mV?"), ("current", "A", "the current reaches 4200 A; is")],
+)
+def test_numbers_too_large_for_a_wire_are_a_warning(bench: Path, drive: str, unit: str, words: str) -> None:
+    def driven(wire: str, load: str, drive: str) -> ModelDescription:
+        return replace(describe(wire, load, drive), inputs_required=frozenset({drive}))
+
+    catalogue = replace(CATALOGUE, drives={drive}, describe=driven)
+    text = BENCH.replace('drive = "duty"', f'drive = "{drive}"').replace("[channels.duty]", f"[channels.{drive}]")
+    (bench / "experiment.toml").write_text(text.replace('unit = "%"', f'unit = "{unit}"'))
+    rewrite(bench / "a.csv", duty=4200.0)
+    assert sum(words in one for one in load_experiment(bench, catalogue).warnings) == 1
+    (bench / "experiment.toml").write_text(text.replace('unit = "%"', f'unit = "m{unit}"'))
+    assert load_experiment(bench, catalogue).warnings == (ONE_FIT,)

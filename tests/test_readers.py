@@ -56,10 +56,14 @@ def test_a_column_of_text_is_an_error_only_when_asked_for(tmp_path: Path) -> Non
 
 def test_a_missing_column_lists_those_there_are(tmp_path: Path) -> None:
     table = read_table(written(tmp_path / "run.csv", "Time,Strain\n0,1\n1,2\n"))
-    with pytest.raises(MeasuredDataError, match="no column 'strian'; it has: Time, Strain; did you mean 'Strain'"):
+    with pytest.raises(MeasuredDataError, match=r"no column 'strian'; did you mean 'Strain'\? It has: Time, Strain$"):
         table.column("strian")
     with pytest.raises(MeasuredDataError, match="no column number 3; it has columns 1 to 2"):
         table.column(3)
+    with pytest.raises(MeasuredDataError, match=r"no column 'strian'; it has: Time, Strain$"):
+        table.column("strian", taken=["Strain"])
+    with pytest.raises(MeasuredDataError, match=r"no column 'strian'; it has: Time, Strain$"):
+        table.column("strian", taken=[2])
 
 
 @pytest.mark.parametrize(
@@ -68,8 +72,14 @@ def test_a_missing_column_lists_those_there_are(tmp_path: Path) -> None:
         ("", "the file is empty"),
         ("\n\n", "holds no data line"),
         ("time,x\n", "a header and no data line"),
-        ("time,x\n0,1\n1,2,3\n", "line 3 has 3 cells, expected 2"),
+        (
+            "time,x\n0,1\n1,2,3\n",
+            "line 3 has 3 cells, expected 2 as in the other lines; complete the line or delete it",
+        ),
         ("time,x,y\n0,1\n", "the header has 3 cells"),
+        ("time,x\n0,1,2\n1,2\n", "line 2 has 3 cells, expected 2"),
+        ("Time [ms];U [mV];Displ [mm]\n0;1;2\n10;1;2\n20;1;2\n30\n", "line 5 has 1 cell, expected 3"),
+        ("T,in x\n0 1\n10 1\n20,\n", "line 4 has 1 cell, expected 2"),
         ("x,x\n0,1\n", "given more than once"),
     ],
 )
@@ -84,14 +94,30 @@ def test_a_text_table_with_a_mistake(tmp_path: Path, text: str, words: str) -> N
         ("oops", "line 3, column 'x': 'oops' is not a number"),
         ("", "line 3, column 'x': the cell is empty"),
         ("1,5", "write a decimal point"),
-        ("nan", "not finite, the first is nan in sample 2"),
-        ("-inf", "not finite, the first is -inf in sample 2"),
+        ("nan", "not finite, the first is nan in line 3"),
+        ("-inf", "not finite, the first is -inf in line 3"),
     ],
 )
 def test_a_cell_that_is_no_number(tmp_path: Path, cell: str, words: str) -> None:
     table = read_table(written(tmp_path / "run.csv", f"time;x\n0;1\n1;{cell}\n2;1\n"))
     with pytest.raises(MeasuredDataError, match=words):
         table.column("x")
+
+
+@pytest.mark.parametrize("units", ["s;V", "[s];[V]", "s;-", "s;1"])
+def test_a_line_of_units_is_named(tmp_path: Path, units: str) -> None:
+    path = written(tmp_path / "run.csv", f"time;x\n{units}\n0;1\n1;2\n")
+    with pytest.raises(
+        MeasuredDataError, match=r"line 2, column 'time': .* is not a number; line 2 looks like units: del"
+    ):
+        read_table(path).column("time")
+
+
+def test_samples_are_placed_by_the_lines_of_their_file(tmp_path: Path) -> None:
+    table = read_table(written(tmp_path / "run.csv", "# made by hand\n\ntime,x\n0,1\n\n1,2\n"))
+    assert [table.place(0), table.place(1)] == ["line 4", "line 6"]
+    scipy.io.savemat(tmp_path / "run.mat", {"x": np.arange(3.0)})
+    assert read_table(tmp_path / "run.mat").place(1) == "sample 2"
 
 
 def test_files_that_are_missing_or_of_another_kind(tmp_path: Path) -> None:
@@ -157,7 +183,7 @@ def test_mat_variables_of_another_structure_or_missing(tmp_path: Path) -> None:
         "Other": r"struct with fields \['t', 'y'\]; expected 'time' and 'signals.values'",
         "Short": "2 times and 3 values",
         "text": "expected real numbers",
-        "othr": "no column 'othr'; it has: x, Other, Short, text; did you mean 'Other'",
+        "othr": r"no column 'othr'; did you mean 'Other'\? It has: x, Other, Short, text",
     }.items():
         with pytest.raises(MeasuredDataError, match=words):
             table.column(name)
@@ -169,10 +195,10 @@ def test_mat_variables_of_another_structure_or_missing(tmp_path: Path) -> None:
 def test_time_must_increase() -> None:
     check_time(np.array([0.0, 1.0, 5.0]), "here")
     with pytest.raises(
-        MeasuredDataError, match=r"here: time does not increase at sample 3 \(1 then 1\) and at 1 other"
+        MeasuredDataError, match=r"here does not increase at sample 3 \(1 ms then 1 ms\) and at 1 other"
     ):
-        check_time(np.array([0.0, 1.0, 1.0, 0.5]), "here")
+        check_time(np.array([0.0, 1.0, 1.0, 0.5]), "here", "ms")
     with pytest.raises(MeasuredDataError, match="expected at least two"):
         check_time(np.array([0.0]), "here")
-    with pytest.raises(MeasuredDataError, match="time is nan in sample 2"):
-        check_time(np.array([0.0, np.nan]), "here")
+    with pytest.raises(MeasuredDataError, match="here is nan in line 9"):
+        check_time(np.array([0.0, np.nan]), "here", place=lambda _: "line 9")

@@ -15,7 +15,7 @@ import pytest
 from PIL import Image
 
 from smajax.report import pictures
-from smajax.report.display import digits, display, with_error
+from smajax.report.display import correlation, digits, display, p_value, share, with_error
 from smajax.report.findings import (
     CoefficientFinding,
     EffectFinding,
@@ -77,7 +77,8 @@ def made_phase(samples: float, share: float, mean: float, rmse: float) -> dict[s
     return {"samples": samples, "share_of_squared_error": share, "mean": mean, "rmse": rmse}
 
 
-def made_portrait(rmse: float, white: bool, sentences: tuple[str, ...]) -> Portrait:
+def made_portrait(rmse: float, white: bool, sentences: tuple[str, ...], moved: float = 0.0) -> Portrait:
+    """`moved` samples go from cooling to rest: each model has its own phases."""
     return Portrait(
         rmse=rmse,
         noise_sigma=NOISE,
@@ -92,12 +93,12 @@ def made_portrait(rmse: float, white: bool, sentences: tuple[str, ...]) -> Portr
                 "rmse": rmse * 1.6,
             },
             "cooling, transforming": {
-                "samples": 420.0,
+                "samples": 420.0 - moved,
                 "share_of_squared_error": 0.25,
                 "mean": -2e-4,
                 "rmse": rmse * 0.8,
             },
-            "not transforming": made_phase(1670.0, 0.04, 0.0, rmse * 0.2),
+            "not transforming": made_phase(1670.0 + moved, 0.04, 0.0, rmse * 0.2),
         },
         correlation={"time": 0.01, "input": 0.34 if not white else 0.02, "martensite_fraction": NAN},
         sentences=sentences,
@@ -114,10 +115,12 @@ def made_effect(name: str, title: str, equation: str, left_out: float, added: bo
         added=added,
         coefficients={"enthalpy": CoefficientFinding(24187.3, 210.6, "J/kg")} if added else {},
         evidence={
+            "score_gain": 0.761 if added else 0.003,
             "score_statistic": 812.4 if added else 3.2,
             "score_p_value": 3.1e-88 if added else 0.21,
             "leave_one_out_rmse": left_out,
             "leave_one_out_gain": 0.95 if added else NAN,
+            "score_p_value_at_the_end": NAN if added else 2.0e-12,
         },
     )
 
@@ -159,7 +162,7 @@ def findings() -> Findings:
             made_effect("sensor_lag", "lag of the sensor", "sensor", NAN),
         ),
         portrait_before=made_portrait(1.1e-3, False, ("71 % of it lies in heating while transforming.",)),
-        portrait_after=made_portrait(2.0e-5, True, ("The residual is white.",)),
+        portrait_after=made_portrait(2.0e-5, True, ("The residual is white.",), moved=60.0),
         rounds=(
             Round(
                 1,
@@ -318,6 +321,52 @@ def test_numbers_in_tables_are_those_of_the_record(page, findings):
     assert (1e6, "1") in page.numbers  # MPa/K, no standard error to show
 
 
+def test_samples_of_a_phase_are_told_for_each_model(page):
+    """420 and 360 of 2400 samples cool: the share that each model's own sentence gives."""
+    texts = [text for _, text in page.numbers]
+    assert "420 (18%)" in texts
+    assert "360 (15%)" in texts
+
+
+def test_a_gain_is_per_cent_and_the_statistic_stays_in_the_record(page, folder):
+    text = " ".join(page.text)
+    assert (0.761, "76.1") in page.numbers
+    assert "% of the mean square" in text
+    assert "score statistic" not in text
+    assert "score_statistic" in (folder / "report.json").read_text()
+
+
+def test_candidates_stand_in_the_order_that_the_page_tells(findings):
+    late = [
+        dataclasses.replace(made_effect(name, name, "heat", NAN), evidence={"score_gain": gain})
+        for name, gain in (("c", 0.1), ("d", 0.2))
+    ]
+    order = [effect.name for effect in pictures.ranked((*late, *findings.effects))]
+    assert order == ["latent_heat", "radiation", "d", "c", "sensor_lag"]
+
+
+def test_detectable_is_told_from_worth_adding(page):
+    assert "not the same as worth adding" in " ".join(page.text)
+
+
+@pytest.mark.parametrize(("offset", "told"), [(1e-4, True), (0.0, False)])
+def test_the_offset_of_held_out_runs_is_told_where_there_is_one(findings, offset, told):
+    runs = tuple(dataclasses.replace(run, offset_before=offset, offset_after=offset) for run in findings.runs)
+    text = findings_to_html(dataclasses.replace(findings, runs=runs))
+    assert ("only their offset is fitted to them" in text) is told
+
+
+def test_a_lone_candidate_is_drawn_beside_the_base_model(findings):
+    def drawing(effects):
+        drawn = pictures.candidates_ranked(dataclasses.replace(findings, effects=effects))
+        return drawn and Image.open(io.BytesIO(drawn)).convert("RGB")
+
+    picture = drawing(findings.effects[:1])
+    red = np.asarray(picture, dtype=int) - [int(pictures.BEFORE[k : k + 2], 16) for k in (1, 3, 5)]
+    assert np.sum(np.all(np.abs(red) < 8, axis=-1)) > 1000
+    assert drawing(findings.effects[2:]) is None
+
+
 def test_a_model_that_lacks_nothing_has_one_column(findings):
     effects = tuple(dataclasses.replace(effect, added=False) for effect in findings.effects)
     runs = tuple(dataclasses.replace(run, after=run.before, rmse_after=run.rmse_before) for run in findings.runs)
@@ -326,6 +375,8 @@ def test_a_model_that_lacks_nothing_has_one_column(findings):
     headings = " ".join(page.text)
     assert "The model is adequate" in headings
     assert "offset after" not in headings
+    assert "had been standing in" not in headings
+    assert "samples before" not in headings
     assert all(image.std() > 5.0 for image in page.images())
 
 
@@ -384,10 +435,27 @@ def test_units_at_the_edge(unit, quantity, value, text):
         (24.1873, 0.2106, "24.19 ± 0.21"),
         (2.0, None, "2"),
         (2.0, NAN, "2"),
-        (71234.0, 512.0, "7.123e4 ± 5.1e2"),
+        (71234.0, 512.0, "71230 ± 510"),
+        (858.2, 112.0, "860 ± 110"),
+        (858.2, 99.7, "860 ± 100"),
+        (7.1234e9, 5.1e6, "7.1234e9 ± 5.1e6"),
+        (0.0, 1.0e-9, "0.0 ± 1.0e-9"),
         (3.2e-9, 1.1e-9, "3.2e-9 ± 1.1e-9"),
         (NAN, 0.1, "–"),
     ],
 )
 def test_an_error_sets_the_decimals_of_its_value(value, error, text):
     assert with_error(value, error) == text
+
+
+def test_numbers_that_round_to_nothing_or_have_underflowed():
+    assert [correlation(value) for value in (1.7e-16, -0.004, 0.126, -0.9, NAN, None)] == [
+        "0",
+        "0",
+        "0.13",
+        "-0.90",
+        "–",
+        "–",
+    ]
+    assert [p_value(value) for value in (0.0, 0.413)] == ["p < 1e-300", "p = 0.41"]
+    assert [share(value) for value in (0.0, 1e-13, 0.7612, NAN)] == ["0.0", "< 0.1", "76.1", "–"]

@@ -77,3 +77,75 @@ def test_a_parameter_on_its_bound_has_no_standard_error() -> None:
     found = uncertainty(at, "ab", {"a": 10.0, "b": 0.0}, BOUNDS)
     assert found.standard_error["a"] is None
     assert found.remark["a"] == "at its upper bound"
+
+
+def _estimates_with(covariance: np.ndarray, seed: int, samples: int = 4000) -> Sensitivity:
+    """Runs in which the estimates of a, b, c, ... have this covariance, with white noise of one left."""
+    rng = np.random.default_rng(seed)
+    basis = np.linalg.qr(rng.normal(size=(samples, len(covariance))))[0]
+    jacobian = basis @ np.linalg.inv(np.linalg.cholesky(covariance))
+    names = tuple("abcdef"[: len(covariance)])
+    return Sensitivity(names, rng.normal(size=(1, samples)), jacobian[None], np.ones((1, samples)))
+
+
+def _told_of(at: Sensitivity) -> tuple[list[str], dict[str, str]]:
+    """(the lines of parameters that move together, remarks)."""
+    bounds = dict.fromkeys(at.names, (-100.0, 100.0))
+    lines = identifiability(at, at.names, bounds)
+    remark = uncertainty(at, at.names, dict.fromkeys(at.names, 1.0), bounds).remark
+    return [line for line in lines if "move together" in line], remark
+
+
+def test_two_pairs_that_move_together_are_two_lines() -> None:
+    covariance = np.eye(5)
+    covariance[0, 1] = covariance[1, 0] = 0.995
+    covariance[3, 4] = covariance[4, 3] = -0.9996
+    lines, remark = _told_of(_estimates_with(covariance, 7))
+    assert [line.split(":")[0] for line in lines] == [
+        "a and b move together in these runs (correlation up to 0.995)",
+        "d and e move together in these runs (correlation up to 0.999)",
+    ]
+    assert remark == {
+        "a": "moves together with b",
+        "b": "moves together with a",
+        "c": "",
+        "d": "moves together with e",
+        "e": "moves together with d",
+    }
+
+
+def test_six_that_move_together_are_one_line_and_short_remarks() -> None:
+    lines, remark = _told_of(_estimates_with(0.01 * np.eye(6) + 0.99, 8))
+    assert lines == [
+        "a, b, c, d, e and f move together in these runs (correlation up to 0.990): fix one of them or measure runs that "
+        "tell them apart."
+    ]
+    assert remark["a"] == "moves together with b and 4 others"
+    assert {remark[name] for name in "bcdef"} == {"moves together with a and 4 others"}
+
+
+def test_a_chain_is_one_cluster_though_its_ends_differ() -> None:
+    """A random walk from a to d: each estimate goes with the next one, a and d less than the limit."""
+    steps = np.tril(np.ones((4, 4))) * [1.0, 0.15, 0.15, 0.15]
+    covariance = steps @ steps.T
+    assert covariance[0, 3] / np.sqrt(covariance[3, 3]) < 0.98
+    lines, _ = _told_of(_estimates_with(covariance, 9))
+    assert len(lines) == 1
+    assert lines[0].startswith("a, b, c and d move together")
+
+
+@pytest.mark.parametrize(
+    ("names", "rank", "told"),
+    [
+        ("a", 0, "No unknown shows in these runs (Jacobian of 500 samples, rank 0)."),
+        ("a", 1, "The one unknown shows in these runs (Jacobian of 500 samples, rank 1)."),
+        ("ab", 2, "All 2 unknowns show in these runs (Jacobian of 500 samples, rank 2)."),
+        ("abc", 2, "Only 2 combinations of the 3 unknowns show in these runs (Jacobian of 500 samples, rank 2)"),
+    ],
+)
+def test_how_many_unknowns_show_is_said_first(names: str, rank: int, told: str) -> None:
+    rng = np.random.default_rng(3)
+    columns = rng.normal(size=(500, rank)) @ np.eye(rank, len(names))
+    columns[:, rank:] = columns[:, :1] if rank else 0.0
+    line = identifiability(_sensitivity(columns, rng.normal(size=500)), names, BOUNDS)[0]
+    assert line.startswith(told)

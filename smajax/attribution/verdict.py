@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -51,7 +51,7 @@ def summary(
     opening = {
         "adequate": "Nothing is missing that the fit runs can show: on them the base model leaves nothing but measurement noise.",
         "explained": f"The base model lacks {_listed(added)}. With it, what is left on the fit runs is measurement noise.",
-        "partly explained": f"The base model lacks {_listed(added)}. That explains part of the misfit; more is missing.",
+        "partly explained": _partly(added, runs, experiment),
         "not in the library": f"Something is missing, and none of the {tried} candidate effects that were tried accounts "
         f"for it: none lowers the error enough, {judged_on}."
         if tried
@@ -89,6 +89,25 @@ def summary(
     return tuple(told)
 
 
+def _partly(added: Sequence[EffectFinding], runs: Sequence[RunFinding], experiment: Experiment) -> str:
+    """The strongest effect by name with what it does alone; the others as what they may be, stand-ins."""
+    if not added:
+        return ""
+    first, others = added[0], added[1:]
+    unit, name = experiment.output_unit, experiment.output_name
+    alone = first.evidence.get("alone_rmse_fit", float("nan"))
+    told = f"The base model lacks {first.title}"
+    if np.isfinite(alone) and others:
+        told += f": alone it takes the fit runs from {shown(pooled(runs, 'fit', 'before'), unit, name)} to {shown(alone, unit, name)}"
+    if not others:
+        return f"{told}. That explains part of the misfit; more is missing."
+    return (
+        f"{told}. The error on runs left out is lowered further by {_listed(others)}. More than noise is still left: "
+        "something that the library does not hold is missing too, and "
+        f"{'these' if len(others) > 1 else 'this'} may in part stand in for it."
+    )
+
+
 def _held_out_warnings(runs: Sequence[RunFinding], experiment: Experiment) -> list[str]:
     """One sentence for each held-out run that the final model predicts clearly worse than it fits."""
     level = max(2.0 * pooled(runs, "fit", "after"), 2.0 * experiment.noise_sigma)
@@ -103,7 +122,8 @@ def _held_out_warnings(runs: Sequence[RunFinding], experiment: Experiment) -> li
 
 def _listed(added: Sequence[EffectFinding]) -> str:
     names = [effect.title for effect in added]
-    return names[0] if len(names) == 1 else ", ".join(names[:-1]) + " and " + names[-1] if names else "nothing"
+    between = "; " if any("," in name for name in names) else ", "
+    return names[0] if len(names) == 1 else between.join(names[:-1]) + " and " + names[-1] if names else "nothing"
 
 
 def unexplained(
@@ -124,12 +144,12 @@ def cannot_know(
     rounds: Sequence[Round],
     fit_runs: int,
     integration: float,
-    preset: Sequence[str],
+    preset: Mapping[str, str],
 ) -> tuple[str, ...]:
     """What these runs cannot tell, whatever the fit says.
 
     `integration` (SI of the output): by how much halving the step changes the model's output. `preset`: parameters
-    of the base model that were not fitted.
+    of the base model that were not fitted, with value and unit.
     """
     titles = {effect.name: effect.title for effect in effects}
 
@@ -168,7 +188,7 @@ def cannot_know(
     rest = sorted(set(preset) - set(declared))
     if rest:
         told.append(
-            f"Nor what the presets {experiment.wire} and {experiment.load} give: {', '.join(rest)}. A fitted value is "
+            f"Nor what the presets {experiment.wire} and {experiment.load} give: {', '.join(f'{name} {preset[name]}'.strip() for name in rest)}. A fitted value is "
             "right as far as these are; a heat capacity, a loss or a latent heat scales with density and resistivity."
         )
     return tuple(told)

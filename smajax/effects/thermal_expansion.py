@@ -23,7 +23,7 @@ class ThermalExpansion(AbstractEffect):
     austenite: Scalar = parameter("1/K", -1.5e-4, 1.5e-4, "alpha_A beyond -theta_T/E_A")
 
     effect_name: ClassVar[str] = "thermal_expansion"
-    title: ClassVar[str] = "thermal expansion, by phase"
+    title: ClassVar[str] = "thermal expansion of each phase"
     equation: ClassVar[str] = "constitutive"
     formula: ClassVar[str] = "strain += [xi alpha_M + (1 - xi) alpha_A] (T - T_inf), beyond theta_T of eq. 3.2"
     sentence: ClassVar[str] = (

@@ -6,7 +6,8 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from smajax.measured.table import MeasuredDataError, listed, nearest
+from smajax.measured.names import instead
+from smajax.measured.table import MeasuredDataError
 from smajax.units import UnitError
 
 
@@ -23,9 +24,7 @@ def check_name(path: Path, key: str, kind: str, name: str, known: Iterable[str])
     """Raises ExperimentError unless `name` is one of the known names of that kind."""
     names = sorted(known)
     if name not in names:
-        raise ExperimentError(
-            path, key, f"there is no {kind} {name!r}{nearest(name, names)}; there are: {listed(names)}"
-        )
+        raise ExperimentError(path, key, f"there is no {kind} {name!r}{instead(name, names, 'there are')}")
 
 
 @contextmanager

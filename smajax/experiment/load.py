@@ -11,16 +11,26 @@ import numpy as np
 from smajax.experiment.catalogue import Catalogue, ModelDescription, ParameterInfo
 from smajax.experiment.errors import ExperimentError, at_key, check_name
 from smajax.experiment.folder import data_folder
-from smajax.experiment.plausibility import constant_warnings, copy_warnings, quantum_warning, run_warnings
+from smajax.experiment.plausibility import (
+    constant_warnings,
+    copy_warnings,
+    length_warnings,
+    quantum_warning,
+    role_warnings,
+    run_warnings,
+    size_warnings,
+)
 from smajax.experiment.record import Experiment, Unknown
 from smajax.experiment.schema import ExperimentFile, Quantity, read_schema
 from smajax.experiment.signals import Reading, ReadRun, read_run
-from smajax.measured.noise import estimate_noise
+from smajax.measured.names import instead, listed
+from smajax.measured.noise import LEAST_SAMPLES, estimate_noise
 from smajax.measured.read import read_table
-from smajax.measured.table import listed, nearest
-from smajax.units import convert, parse_quantity
+from smajax.units import UnitError, convert, parse_quantity
 
 ESTIMATE = "estimate"
+# A noise that a sensor may have, as an example, where the channel's own unit is too large for one or shows none.
+_EXAMPLES = {"m": "0.01 mm", "Pa": "0.1 MPa", "rad": "0.1 deg", "1": "0.01 %", "-": "0.01 %"}
 
 
 def _describe(path: Path, file: ExperimentFile, catalogue: Catalogue) -> ModelDescription:
@@ -96,8 +106,8 @@ def _channel_units(path: Path, file: ExperimentFile, model: ModelDescription) ->
             raise ExperimentError(
                 path,
                 key,
-                f"the model has no {channel.role} {name!r}{nearest(name, known)}; its {channel.role}s are: "
-                f"{listed(known)}; rename the channel, remove it, or choose another load or drive",
+                f"the model has no {channel.role} {name!r}{instead(name, known, f'its {channel.role}s are')}; "
+                "rename the channel, remove it, or choose another load or drive",
             )
         if channel.role == "output":
             units[name] = model.outputs[name]
@@ -147,28 +157,49 @@ def _step(path: Path, file: ExperimentFile) -> float:
     return step
 
 
+def _check_samples(path: Path, key: str, file: ExperimentFile, read: ReadRun, measured: int) -> None:
+    """Raises ExperimentError when the run has too few samples to estimate noise from, as measured or on the clock."""
+    count = min(measured, read.run.output.size)
+    if count >= LEAST_SAMPLES:
+        return
+    # Where the file itself has too few, or one sample is one step, no other step gives more.
+    remedy, where = "take a longer run", " in its file"
+    if measured > count and file.sampling is not None:
+        remedy, where = "take a shorter step or a longer run", f" at a step of {file.sampling.step}"
+    raise ExperimentError(
+        path,
+        key,
+        f"run {read.run.name!r} has {count} samples{where}, expected at least {LEAST_SAMPLES} to estimate noise from; "
+        f"{remedy}, or give the noise",
+    )
+
+
 def _noise(path: Path, file: ExperimentFile, name: str, unit: str, fit: Sequence[ReadRun]) -> tuple[float, float, str]:
     """(sigma on the clock, sigma at the sensor's own rate, where it is from) of the output."""
     key = f"channels.{name}.noise"
     given = file.channels[name].noise
+    example = _EXAMPLES.get(unit, f"0.01 {file.channels[name].unit}")
     gain = float(np.median([read.noise_gain for read in fit]))
     if given is not None and given != ESTIMATE:
-        with at_key(path, key):
+        try:
             sensor = parse_quantity(given, unit, difference=True)
+        except UnitError as error:
+            raise ExperimentError(path, key, f"{error}; give a noise like '{example}', or '{ESTIMATE}'") from error
         if sensor <= 0.0:
-            raise ExperimentError(path, key, f"got {given!r}, expected a noise above zero, or '{ESTIMATE}'")
+            raise ExperimentError(
+                path, key, f"got {given!r}, expected a noise above zero like '{example}', or '{ESTIMATE}'"
+            )
         how = f"given as {given}" + (f", times {gain:.3g} for the average over a step" if gain < 1.0 else "")
         return sensor * gain, sensor, how
-    try:
-        # On the clock, where the residual is; the increment is the sensor's, since averaging hides it.
-        sigmas = [estimate_noise(read.run.output, read.quantum) for read in fit]
-        sensors = [estimate_noise(read.signals[name].values, 0.0) for read in fit]
-    except ValueError as error:
-        raise ExperimentError(path, key, str(error)) from error
+    for read in fit:
+        _check_samples(path, key, file, read, read.signals[name].values.size)
+    # On the clock, where the residual is; the increment is the sensor's, since averaging hides it.
+    sigmas = [estimate_noise(read.run.output, read.quantum) for read in fit]
+    sensors = [estimate_noise(read.signals[name].values, 0.0) for read in fit]
     sigma = float(np.median(sigmas))
     if sigma <= 0.0:
-        raise ExperimentError(path, key, f"no noise can be seen in {name!r}; give it as text like '0.01 {unit}'")
-    return sigma, float(np.median(sensors)), f"estimated from {len(fit)} fit run(s) on the clock, median"
+        raise ExperimentError(path, key, f"no noise can be seen in {name!r}; give it as text like '{example}'")
+    return sigma, float(np.median(sensors)), f"estimated from {len(fit)} fit run{'s' if len(fit) > 1 else ''} (median)"
 
 
 def load_experiment(path: str | Path, catalogue: Catalogue) -> Experiment:
@@ -208,9 +239,13 @@ def load_experiment(path: str | Path, catalogue: Catalogue) -> Experiment:
     fit = [read for read in runs if read.run.role == "fit"]
     sigma, sensor_sigma, how = _noise(path, file, output_name, units[output_name], fit)
     warnings = [text for read in runs for text in run_warnings(read, output_name, reading.step)]
+    if file.time is None or file.time.kind != "sample":
+        warnings += length_warnings(runs, "s" if file.time is None else file.time.unit)
     warnings += constant_warnings(runs, output_name)
     warnings += quantum_warning(fit, sensor_sigma, units[output_name])
     warnings += copy_warnings(runs)
+    warnings += size_warnings(runs)
+    warnings += role_warnings(file.runs)
     return Experiment(
         name=path.resolve().parent.name if path.name == "experiment.toml" else path.stem,
         title=file.title,

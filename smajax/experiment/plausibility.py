@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 import numpy as np
 
+from smajax.experiment.schema import RunSection
 from smajax.experiment.signals import ReadRun, Signal
 from smajax.measured.table import Array
 
 FEW_SAMPLES = 20
 GAP_STEPS = 5.0
 FLAT_SAMPLES = 5
+# Seconds: longer than most runs of a wire; a run of eleven seconds lasts that long when its ms are taken for s.
+LONGEST_RUN = 3.0 * 3600.0
+FEWEST_FIT_RUNS = 3
+# Channel -> (more than a wire takes, the program's own unit, the unit that such numbers usually are in).
+LARGEST: Mapping[str, tuple[float, str, str]] = MappingProxyType(
+    {"voltage": (500.0, "V", "mV"), "current": (100.0, "A", "mA")}
+)
 
 
 def _sticks_at(values: Array, extreme: float) -> bool:
@@ -112,4 +121,38 @@ def copy_warnings(runs: Sequence[ReadRun]) -> list[str]:
         twin = first.setdefault(read.run.sha256, read.run.name)
         if twin != read.run.name:
             found.append(f"runs {twin!r} and {read.run.name!r} have the same data")
+    return found
+
+
+def length_warnings(runs: Sequence[ReadRun], unit: str) -> list[str]:
+    """Runs of hours. unit: what the file says its time is in, or seconds where the signals carry their own time."""
+    question = "is the time in ms?" if unit == "s" else f"is the time in {unit}, as [time] says?"
+    lengths = {read.run.name: read.run.time[-1] - read.run.time[0] for read in runs}
+    return [
+        f"run {name!r} lasts {length:.5g} s; {question}" for name, length in lengths.items() if length > LONGEST_RUN
+    ]
+
+
+def size_warnings(runs: Sequence[ReadRun]) -> list[str]:
+    """Channels whose values no wire stands, which are mostly numbers in a smaller unit; one sentence a channel."""
+    found: list[str] = []
+    for name, (most, own, smaller) in LARGEST.items():
+        sizes = [np.max(np.abs(read.signals[name].values)) for read in runs if name in read.signals]
+        sizes += [np.max(np.abs(read.run.inputs[name])) for read in runs if name in read.run.inputs]
+        if sizes and max(sizes) > most:
+            found.append(f"the {name} reaches {max(sizes):.5g} {own}; is it in {smaller}?")
+    return found
+
+
+def role_warnings(runs: Sequence[RunSection]) -> list[str]:
+    """What cannot be told from so few runs."""
+    found: list[str] = []
+    fit = sum(run.role == "fit" for run in runs)
+    if fit < FEWEST_FIT_RUNS:
+        found.append(
+            f"only {fit} fit {'run' if fit == 1 else 'runs'}: runs left out in turn tell little; "
+            "give at least three of different kinds"
+        )
+    if fit == len(runs):
+        found.append("no run is held out: the error after is shown on no run that the fit never saw")
     return found

@@ -10,7 +10,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from smajax.experiment.errors import ExperimentError
-from smajax.measured.table import listed, nearest
+from smajax.measured.names import instead
 
 Quantity = str | float
 
@@ -186,7 +186,7 @@ def _message(error: Any, content: dict[str, Any]) -> tuple[str, str]:
     match error["type"]:
         case "extra_forbidden":
             known = list(section.model_fields) if section is not None else []
-            return key, f"is not a known key{nearest(str(place[depth - 1]), known)}; known here: {listed(known)}"
+            return key, f"is not a known key{instead(str(place[depth - 1]), known, 'known here')}"
         case "missing":
             return key, f"is missing; {expected}"
         case "value_error":

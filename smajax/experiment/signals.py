@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -73,10 +73,18 @@ def _channel_file(reading: Reading, run: RunSection, name: str) -> tuple[str, Pa
     return f"runs.{run.name}.files.{name}", reading.folder / files[name]
 
 
-def _signal(table: Table, key: str | int, channel: ChannelSection, own_unit: str, time: TimeSection | None) -> Signal:
-    """One channel from its table. Raises MeasuredDataError."""
-    values = convert(table.column(key), channel.unit, own_unit)
+def _signal(
+    table: Table,
+    key: str | int,
+    channel: ChannelSection,
+    own_unit: str,
+    time: TimeSection | None,
+    taken: Collection[str | int],
+) -> Signal:
+    """One channel from its table. taken: the columns of the time and the other channels. Raises MeasuredDataError."""
+    values = convert(table.column(key, taken), channel.unit, own_unit)
     clock = table.clock(key)
+    where, unit = f"{table.path}: the time of {key!r}", "s"
     if time is not None and time.kind == "sample":
         clock = np.arange(values.size, dtype=np.float64)
     elif clock is None:
@@ -84,11 +92,21 @@ def _signal(table: Table, key: str | int, channel: ChannelSection, own_unit: str
             raise MeasuredDataError(
                 f"{table.path}: {key!r} carries no time; add [time] with column = '...', or kind = 'sample'"
             )
-        clock = convert(table.column(time.column), time.unit, "s")
+        clock, unit = table.column(time.column, {*taken, key}), time.unit
+        where = f"{table.path}: time column {table.name_of(time.column)!r}"
     if clock.size != values.size:
         raise MeasuredDataError(f"{table.path}: {key!r} has {values.size} values and its time has {clock.size}")
-    check_time(clock, f"{table.path}: {key!r}")
-    return Signal(time=clock, values=values)
+    # Before the conversion, so that an error shows what is written in the file.
+    check_time(clock, where, unit, table.place)
+    return Signal(time=convert(clock, unit, "s"), values=values)
+
+
+def _taken(reading: Reading, name: str) -> frozenset[str | int]:
+    """The columns and variables that the experiment file gives to the time and to the channels other than `name`."""
+    others = [channel for other, channel in reading.channels.items() if other != name]
+    keys = [key for channel in others for key in (channel.column, channel.variable)]
+    keys.append(reading.time.column if reading.time is not None else None)
+    return frozenset(key for key in keys if key is not None)
 
 
 def _read_signals(reading: Reading, run: RunSection) -> tuple[dict[str, Signal], tuple[Path, ...]]:
@@ -108,7 +126,9 @@ def _read_signals(reading: Reading, run: RunSection) -> tuple[dict[str, Signal],
             )
         where, file = _channel_file(reading, run, name)
         with at_key(reading.path, where):
-            signals[name] = _signal(reading.tables(file), key, channel, reading.units[name], reading.time)
+            signals[name] = _signal(
+                reading.tables(file), key, channel, reading.units[name], reading.time, _taken(reading, name)
+            )
         used[file] = None
     return signals, tuple(used)
 
@@ -133,7 +153,9 @@ def read_run(reading: Reading, run: RunSection, parameters: dict[str, float]) ->
         )
     if (end - start) / reading.step > MOST_SAMPLES:
         raise ExperimentError(
-            reading.path, "sampling.step", f"{reading.step:g} s cuts run {run.name!r} into over {MOST_SAMPLES} samples"
+            reading.path,
+            "sampling.step",
+            f"{reading.step:g} s cuts run {run.name!r} into over {MOST_SAMPLES} samples; take a longer step",
         )
     clock = uniform_clock(start, end, reading.step)
     if clock.size < 2:

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse.csgraph import connected_components
 
 from smajax.fit.bounds import AT_BOUND
 from smajax.fit.sensitivity import Sensitivity
@@ -61,6 +62,37 @@ def _unseen(scaled: np.ndarray) -> np.ndarray:
     return np.asarray(unseen.T @ unseen)
 
 
+def _correlation(covariance: np.ndarray) -> np.ndarray:
+    """Correlation matrix; zero where an estimate has no spread."""
+    error = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    error = np.where(error > 0.0, error, 1.0)
+    return np.asarray(covariance / np.outer(error, error))
+
+
+def _clusters(covariance: np.ndarray) -> list[list[int]]:
+    """Estimates that move together, directly or through another one: the indices of each cluster of two or more.
+
+    Six that move together make fifteen pairs but one remark.
+    """
+    if not len(covariance):
+        return []
+    count, of = connected_components(np.abs(_correlation(covariance)) > TOGETHER, directed=False)
+    clusters = [np.flatnonzero(of == cluster).tolist() for cluster in range(count)]
+    return [cluster for cluster in clusters if len(cluster) > 1]
+
+
+def _listed(names: Sequence[str]) -> str:
+    """`a, b and c`."""
+    return " and ".join([*([", ".join(names[:-1])] if names[1:] else []), *names[-1:]])
+
+
+def _together(name: str, cluster: Sequence[str]) -> str:
+    """The remark of one of a cluster. Of a large one its first other member is named: enough to know it by."""
+    others = [other for other in cluster if other != name]
+    told = others if len(others) < 3 else [others[0], f"{len(others) - 1} others"]
+    return f"moves together with {_listed(told)}"
+
+
 def uncertainty(
     at: Sensitivity, names: Sequence[str], values: Mapping[str, float], bounds: Mapping[str, tuple[float, float]]
 ) -> Uncertainty:
@@ -85,16 +117,30 @@ def uncertainty(
         elif lost:
             others = [loose[k] for k in np.flatnonzero(np.abs(unseen[index]) > SHARE**2) if k != index]
             remark[name] = f"the runs see only a combination of it with {', '.join(others)}"
+    clear = [index for index, name in enumerate(loose) if not remark[name]]
     for index, name in enumerate(loose):
         room = bounds[name][1] - bounds[name][0]
         if not remark[name] and error[index] / scale[index] > room:
             errors[name], remark[name] = None, "the runs leave all of its range open"
-    correlation = covariance / np.outer(np.where(error > 0, error, 1.0), np.where(error > 0, error, 1.0))
-    for index, name in enumerate(loose):
-        partners = [loose[k] for k in np.flatnonzero(np.abs(correlation[index]) > TOGETHER) if k != index]
-        if partners and not remark[name]:
-            remark[name] = f"moves together with {', '.join(partners)}"
+    for cluster in _clusters(covariance[np.ix_(clear, clear)]):
+        members = [loose[clear[index]] for index in cluster]
+        for name in members:
+            remark[name] = remark[name] or _together(name, members)
     return Uncertainty(errors, remark)
+
+
+def _shown(rank: int, unknowns: int, samples: int) -> str:
+    """How many of the unknowns leave a trace of their own in the runs."""
+    how = f"(Jacobian of {samples} samples, rank {rank})"
+    if rank == unknowns:
+        return f"{f'All {unknowns} unknowns show' if unknowns > 1 else 'The one unknown shows'} in these runs {how}."
+    if rank == 0:
+        return f"No unknown shows in these runs {how}."
+    return (
+        f"Only {rank} combination{'' if rank == 1 else 's'} of the {unknowns} unknowns show{'s' if rank == 1 else ''} in "
+        f"these runs {how}: standard errors of the ones that make up the rest mean nothing. "
+        f"Fix {unknowns - rank} of them."
+    )
 
 
 def identifiability(at: Sensitivity, names: Sequence[str], bounds: Mapping[str, tuple[float, float]]) -> list[str]:
@@ -109,12 +155,7 @@ def identifiability(at: Sensitivity, names: Sequence[str], bounds: Mapping[str, 
     boxed = columns * span
     singular = np.linalg.svd(boxed, compute_uv=False)
     rank = int(np.sum(singular > 1e-8 * singular[0])) if singular[0] > 0.0 else 0
-    told = [f"The Jacobian of {len(boxed)} samples by {len(names)} unknowns has rank {rank}."]
-    if rank < len(names):
-        told.append(
-            f"Only {rank} combination(s) of the {len(names)} unknowns show in these runs: standard errors of the ones that "
-            "make up the rest mean nothing. Fix one of them."
-        )
+    told = [_shown(rank, len(names), len(boxed))]
     blind = [name for index, name in enumerate(names) if not np.any(columns[:, index])]
     told += [f"{name}: nothing in these runs depends on it; fix it or measure something else." for name in blind]
     seen = [name for name in names if name not in blind]
@@ -125,13 +166,15 @@ def identifiability(at: Sensitivity, names: Sequence[str], bounds: Mapping[str, 
     error = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     vague = [name for name, value in zip(seen, error, strict=True) if value > VAGUE]
     told += [f"{name}: the noise alone leaves more than a quarter of its box open." for name in vague]
-    correlation = covariance / np.outer(error, error)
-    for i, first in enumerate(seen):
-        for j in range(i + 1, len(seen)):
-            if abs(correlation[i, j]) > TOGETHER:
-                told.append(
-                    f"{first} and {seen[j]} move together (correlation {correlation[i, j]:+.3f}): trust their combination, not each."
-                )
-    if len(told) == 1 and rank == len(names):
-        told.append("Each unknown shows in the runs by itself.")
+    correlation = np.abs(_correlation(covariance))
+    for cluster in _clusters(covariance):
+        pairs = correlation[np.ix_(cluster, cluster)][np.triu_indices(len(cluster), 1)]
+        # Cut and not rounded: 0.9996 is not yet 1.
+        most = np.floor(1e3 * float(pairs.max()) + 1e-6) / 1e3
+        told.append(
+            f"{_listed([seen[index] for index in cluster])} move together in these runs (correlation up to {most:.3f}): "
+            "fix one of them or measure runs that tell them apart."
+        )
+    if len(told) == 1 and 1 < len(names) == rank:
+        told.append("The runs tell each of them from the others.")
     return told

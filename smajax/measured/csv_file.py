@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import csv
+from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +12,8 @@ import numpy as np
 from smajax.measured.table import Array, MeasuredDataError, Table
 
 COMMENT_MARKS = ("#", "%")
+# In this order, because a column may hold decimal commas where another mark separates.
+SEPARATORS = ("\t", ";", ",")
 
 
 def _text(path: Path) -> str:
@@ -26,6 +30,16 @@ def _text(path: Path) -> str:
         return data.decode("latin-1")  # every byte is a character there: a header's degree sign must not stop the run
 
 
+def _separator(lines: Sequence[str]) -> str | None:
+    """The mark that separates the cells; None for whitespace.
+
+    The bulk of the data lines decides: a header may hold commas in a whitespace-separated file, and one line that is
+    cut short holds no mark at all. A header alone is asked when there is nothing else.
+    """
+    asked = lines[1:] or lines
+    return next((mark for mark in SEPARATORS if 2 * sum(mark in line for line in asked) > len(asked)), None)
+
+
 def _rows(text: str) -> list[tuple[int, list[str]]]:
     """(line number from 1, cells) of every line that is neither blank nor a comment."""
     lines = [
@@ -35,8 +49,7 @@ def _rows(text: str) -> list[tuple[int, list[str]]]:
     ]
     if not lines:
         return []
-    # The last line, because a header may hold commas in a whitespace-separated file.
-    separator = next((mark for mark in ("\t", ";", ",") if mark in lines[-1][1]), None)
+    separator = _separator([line for _, line in lines])
     if separator is None:
         return [(number, line.split()) for number, line in lines]
     rows = [(number, next(csv.reader([line], delimiter=separator, skipinitialspace=True))) for number, line in lines]
@@ -49,6 +62,40 @@ def _is_number(cell: str) -> bool:
     except ValueError:
         return False
     return "_" not in cell
+
+
+def _cells(count: int) -> str:
+    return f"{count} cell" if count == 1 else f"{count} cells"
+
+
+def _usual_width(rows: Sequence[tuple[int, list[str]]], header: Sequence[str] | None) -> int:
+    """How many cells most lines have; of two counts that are as frequent, the header's, then the first line's."""
+    counts = Counter(len(cells) for _, cells in rows)
+    most = max(counts.values())
+    usual = [width for width, count in counts.items() if count == most]
+    return len(header) if header is not None and len(header) in usual else usual[0]
+
+
+def _is_units(rows: Sequence[tuple[int, list[str]]]) -> bool:
+    """Whether the first of the lines names units ("ms", "V", "-", "1") and the one after it holds numbers."""
+    if len(rows) < 2:
+        return False
+    first, second = rows[0][1], rows[1][1]
+    words = [cell for cell in first if cell not in ("", "-", "1")]
+    return bool(words) and not any(map(_is_number, words)) and any(map(_is_number, second))
+
+
+def _why_unusable(name: str, place: int, rows: Sequence[tuple[int, list[str]]], units: bool) -> str | None:
+    """What keeps the column at that place from being numbers, or None. units: the first line looks like units."""
+    wrong = next(((number, row[place]) for number, row in rows if not _is_number(row[place])), None)
+    if wrong is None:
+        return None
+    number, cell = wrong
+    got = f"line {number}, column {name!r}: " + (f"{cell!r} is not a number" if cell else "the cell is empty")
+    if units and number == rows[0][0] and all(_is_number(row[place]) for _, row in rows[1:]):
+        return f"{got}; line {number} looks like units: delete it"
+    hint = "; write a decimal point, not a comma" if "," in cell else ""
+    return f"{got}{hint}; expected a number in every line"
 
 
 def read_csv(path: Path) -> Table:
@@ -65,15 +112,19 @@ def read_csv(path: Path) -> Table:
         header, rows = rows[0][1], rows[1:]
         if not rows:
             raise MeasuredDataError(f"{path}: holds a header and no data line")
-    width = len(rows[0][1])
+    width = _usual_width(rows, header)
     if header is not None and len(header) != width:
+        number = next(number for number, cells in rows if len(cells) == width)
         raise MeasuredDataError(
-            f"{path}: the header has {len(header)} cells ({header}) and line {rows[0][0]} has {width}; "
+            f"{path}: the header has {_cells(len(header))} ({header}) and line {number} has {width}; "
             "expected as many names as columns"
         )
     for number, cells in rows:
         if len(cells) != width:
-            raise MeasuredDataError(f"{path}: line {number} has {len(cells)} cells, expected {width} as above")
+            raise MeasuredDataError(
+                f"{path}: line {number} has {_cells(len(cells))}, expected {width} as in the other lines; "
+                "complete the line or delete it"
+            )
 
     names = header if header is not None else [str(number) for number in range(1, width + 1)]
     names = [name or str(number) for number, name in enumerate(names, start=1)]
@@ -82,16 +133,14 @@ def read_csv(path: Path) -> Table:
         raise MeasuredDataError(f"{path}: column name(s) {repeated} given more than once; rename them")
     columns: dict[str, Array] = {}
     unusable: dict[str, str] = {}
+    units = header is not None and _is_units(rows)
     for place, name in enumerate(names):
-        cells = [row[place] for _, row in rows]
-        wrong = next((at for at, cell in enumerate(cells) if not _is_number(cell)), None)
-        if wrong is None:
-            columns[name] = np.array(cells, dtype=np.float64)
-            continue
-        cell = cells[wrong]
-        hint = "; write a decimal point, not a comma" if "," in cell else ""
-        got = f"{cell!r} is not a number" if cell else "the cell is empty"
-        unusable[name] = f"line {rows[wrong][0]}, column {name!r}: {got}{hint}; expected a number in every line"
+        reason = _why_unusable(name, place, rows, units)
+        if reason is None:
+            columns[name] = np.array([row[place] for _, row in rows], dtype=np.float64)
+        else:
+            unusable[name] = reason
     if not columns:
         raise MeasuredDataError(f"{path}: no column of numbers; {unusable[names[0]]}")
-    return Table(path=path, columns=columns, unusable=unusable, order=tuple(names))
+    lines = tuple(number for number, _ in rows)
+    return Table(path=path, columns=columns, unusable=unusable, order=tuple(names), lines=lines)

@@ -8,6 +8,8 @@ from smajax.measured.table import Array
 
 # Sigma of a normal variable over its median absolute value.
 MAD_TO_SIGMA = 1.4826
+# Fewer differences than this leave the estimate to chance.
+LEAST_SAMPLES = 8
 # Sum of squares of the binomial weights of the difference of that order: its variance in white noise of variance 1.
 DIFFERENCE_VARIANCE = {2: 6.0, 3: 20.0}
 
@@ -41,12 +43,12 @@ def estimate_noise(signal: Array, quantum: float | None = None) -> float:
     median absolute value, which jumps and bends do not move, gives sigma, and the lower of the two is taken.
     The result is at least quantum / sqrt(12), the sigma of a rounding to that quantum (`detect_quantum` of the
     signal when not given; give the sensor's own for an averaged signal, in which it cannot be seen any more).
-    Raises ValueError for fewer than 8 samples.
+    Raises ValueError for fewer than LEAST_SAMPLES samples.
     """
     signal = np.asarray(signal, dtype=np.float64)
-    if signal.size < 8:
+    if signal.size < LEAST_SAMPLES:
         raise ValueError(
-            f"got {signal.size} samples, expected at least 8 to estimate noise from; give the noise instead"
+            f"got {signal.size} samples, expected at least {LEAST_SAMPLES} to estimate noise from; give the noise instead"
         )
     floor = (detect_quantum(signal) if quantum is None else quantum) / np.sqrt(12.0)
     estimates = [

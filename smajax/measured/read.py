@@ -8,7 +8,8 @@ from types import MappingProxyType
 
 from smajax.measured.csv_file import read_csv
 from smajax.measured.mat_file import read_mat
-from smajax.measured.table import MeasuredDataError, Table, listed, nearest
+from smajax.measured.names import listed, nearest
+from smajax.measured.table import MeasuredDataError, Table
 
 # A new file kind is one line here.
 READERS: Mapping[str, Callable[[Path], Table]] = MappingProxyType(

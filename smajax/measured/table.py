@@ -2,35 +2,24 @@
 
 from __future__ import annotations
 
-import difflib
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from smajax.measured.names import instead
+
 Array = NDArray[np.float64]
-LISTED = 20
 
 
 class MeasuredDataError(ValueError):
     """A measured file that is missing, is not what it says, or holds what cannot be used."""
 
 
-def nearest(name: str, known: Iterable[str]) -> str:
-    """A sentence part that suggests the known name closest to `name`; empty when none is close."""
-    names = [str(one) for one in known]
-    lower = {one.lower(): one for one in reversed(names)}
-    close = difflib.get_close_matches(name.lower(), lower, n=1, cutoff=0.5)
-    return f"; did you mean {lower[close[0]]!r}?" if close else ""
-
-
-def listed(names: Iterable[str]) -> str:
-    """The names in one line, the first twenty at most."""
-    all_names = [str(name) for name in names]
-    more = f", and {len(all_names) - LISTED} more" if len(all_names) > LISTED else ""
-    return (", ".join(all_names[:LISTED]) + more) or "none"
+def _counted(index: int) -> str:
+    return f"sample {index + 1}"
 
 
 @dataclass(frozen=True)
@@ -40,6 +29,7 @@ class Table:
     columns: name -> (n,) values in the file's own units; lengths may differ in a .mat file.
     clocks: name -> (n,) times of that signal, seconds, for the signals that carry their own.
     unusable: name -> why that column holds no signal; it is an error only when the column is asked for.
+    lines: the line of the file, counted from 1, that each sample is from; empty where samples have no lines.
     """
 
     path: Path
@@ -47,9 +37,17 @@ class Table:
     clocks: Mapping[str, Array] = field(default_factory=dict)
     unusable: Mapping[str, str] = field(default_factory=dict)
     order: tuple[str, ...] = ()
+    lines: tuple[int, ...] = ()
 
-    def name_of(self, key: str | int) -> str:
-        """The column that `key` means: its name, or its number counted from 1. Raises MeasuredDataError."""
+    def place(self, index: int) -> str:
+        """Where in the file the sample with that index, counted from 0, is: what an editor shows, where there is one."""
+        return f"line {self.lines[index]}" if self.lines else _counted(index)
+
+    def name_of(self, key: str | int, taken: Collection[str | int] = ()) -> str:
+        """The column that `key` means: its name, or its number counted from 1. Raises MeasuredDataError.
+
+        taken: columns with another meaning already, which an error does not suggest.
+        """
         names = self.order or (*self.columns, *self.unusable)
         if isinstance(key, int):
             if 1 <= key <= len(names):
@@ -57,11 +55,12 @@ class Table:
             raise MeasuredDataError(f"{self.path}: no column number {key}; it has columns 1 to {len(names)}")
         if key in self.columns or key in self.unusable:
             return key
-        raise MeasuredDataError(f"{self.path}: no column {key!r}; it has: {listed(names)}{nearest(key, names)}")
+        free = [name for number, name in enumerate(names, start=1) if name not in taken and number not in taken]
+        raise MeasuredDataError(f"{self.path}: no column {key!r}{instead(key, names, 'it has', free)}")
 
-    def column(self, key: str | int) -> Array:
-        """The values of one column, shape (n,), all finite. Raises MeasuredDataError."""
-        name = self.name_of(key)
+    def column(self, key: str | int, taken: Collection[str | int] = ()) -> Array:
+        """The values of one column, shape (n,), all finite. taken: see `name_of`. Raises MeasuredDataError."""
+        name = self.name_of(key, taken)
         if name in self.unusable:
             raise MeasuredDataError(f"{self.path}: {self.unusable[name]}")
         values = self.columns[name]
@@ -71,7 +70,7 @@ class Table:
         if bad.size:
             raise MeasuredDataError(
                 f"{self.path}: column {name!r} has {bad.size} value(s) that are not finite, the first is "
-                f"{values[bad[0]]} in sample {bad[0] + 1}; remove or repair those samples"
+                f"{values[bad[0]]} in {self.place(int(bad[0]))}; remove or repair those samples"
             )
         return values
 
@@ -81,18 +80,21 @@ class Table:
         return self.clocks.get(name)
 
 
-def check_time(time: Array, where: str) -> None:
-    """Raises MeasuredDataError unless `time`, shape (n,), is finite and increases from each sample to the next."""
+def check_time(time: Array, where: str, unit: str = "s", place: Callable[[int], str] = _counted) -> None:
+    """Raises MeasuredDataError unless `time`, shape (n,), is finite and increases from each sample to the next.
+
+    where: the file and what in it the time is. unit: of `time`, as its file has it. place: index -> "line 12".
+    """
     if time.size < 2:
         raise MeasuredDataError(f"{where}: {time.size} sample(s); expected at least two")
     if not np.all(np.isfinite(time)):
         at = int(np.flatnonzero(~np.isfinite(time))[0])
-        raise MeasuredDataError(f"{where}: time is {time[at]} in sample {at + 1}; expected finite times")
+        raise MeasuredDataError(f"{where} is {time[at]} in {place(at)}; expected finite times")
     wrong = np.flatnonzero(np.diff(time) <= 0.0)
     if wrong.size:
         at = int(wrong[0]) + 1
         more = f" and at {wrong.size - 1} other place(s)" if wrong.size > 1 else ""
         raise MeasuredDataError(
-            f"{where}: time does not increase at sample {at + 1} ({time[at - 1]:.9g} then {time[at]:.9g}){more}; "
+            f"{where} does not increase at {place(at)} ({time[at - 1]:.9g} {unit} then {time[at]:.9g} {unit}){more}; "
             "sort the samples, remove repeated ones or split the run there"
         )

@@ -38,6 +38,7 @@ _SHOWN = {
     "1": Display("", 1.0),
     "": Display("", 1.0),
 }
+LARGE = 1e6  # from here on numbers are written with a power of ten
 _PERCENT = Display("%", 100.0)
 
 
@@ -67,14 +68,45 @@ def chance(value: float | None) -> str:
     return "< 1e-300" if value is not None and 0.0 <= value < 1e-300 else digits(value, 2)
 
 
+def _exponent(value: float) -> int:
+    """Power of ten of `value` as two significant digits show it."""
+    return int(f"{value:.1e}".split("e")[1])
+
+
 def with_error(value: float, error: float | None) -> str:
-    """`24.19 ± 0.21`: the error with two significant digits, the value to the same decimals. Without one, the value."""
+    """`24.19 ± 0.21`, `860 ± 110`: the error with two significant digits, the value to the same place.
+
+    Without an error, the value.
+    """
     if error is None or not math.isfinite(error) or not math.isfinite(value) or error <= 0.0:
         return digits(value)
-    decimals = 1 - math.floor(math.log10(error))
-    if not 0 <= decimals <= 6:
-        return f"{digits(value)} ± {digits(error, 2)}"
-    return f"{value:.{decimals}f} ± {error:.{decimals}f}"
+    decimals = 1 - _exponent(error)
+    if decimals <= 6 and max(abs(value), error) < LARGE:
+        places = max(decimals, 0)
+        return f"{round(value, decimals):.{places}f} ± {round(error, decimals):.{places}f}"
+    # As many digits as reach the error's second one, and no more than a reader takes in.
+    count = min(max(2 + _exponent(value or error) - _exponent(error), 2), 8)
+    return f"{digits(value, count, zeros=True)} ± {digits(error, 2, zeros=True)}"
+
+
+def correlation(value: float | None) -> str:
+    """Two decimals; one that rounds to nothing is 0, and none is a dash."""
+    if value is None or not math.isfinite(value):
+        return "–"
+    return f"{value:.2f}" if abs(value) >= 0.005 else "0"
+
+
+def share(value: float | None) -> str:
+    """A share as per cent with one decimal; one that is too small to show is not nothing."""
+    if value is None or not math.isfinite(value):
+        return "–"
+    return "< 0.1" if 0.0 < value < 0.0005 else f"{100.0 * value:.1f}"
+
+
+def p_value(value: float | None) -> str:
+    """`p = 0.41`, `p < 1e-300`."""
+    text = chance(value)
+    return f"p {text}" if text.startswith("<") else f"p = {text}"
 
 
 def label(name: str) -> str:

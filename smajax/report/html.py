@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 from smajax.report import pictures
-from smajax.report.display import chance, digits, display, label, with_error
+from smajax.report.display import chance, correlation, digits, display, label, p_value, share, with_error
 from smajax.report.findings import Findings, ParameterFinding
 
 VERDICTS = {
@@ -24,16 +25,19 @@ VERDICTS = {
 # Headings of the evidence in the order of the stages; a number with no heading here is shown under its own name.
 EVIDENCE = {
     "score_gain": "score test: gain foretold",
-    "score_statistic": "score statistic",
     "score_p_value": "score p-value",
     "alone_rmse_fit": "fit runs, with it alone",
-    "leave_one_out_rmse": "left-out runs, with it",
-    "leave_one_out_rmse_without": "left-out runs, without it",
+    "leave_one_out_rmse": "left-out runs, with it alone",
+    "leave_one_out_rmse_without": "left-out runs, final model without it",
     "score_gain_at_the_end": "gain foretold at the end",
     "score_p_value_at_the_end": "p-value at the end",
 }
 # Said of the effects that were added, but no column of the table of all candidates.
-ASIDE = {"score_statistic", "leave_one_out_rmse_without", "score_gain_at_the_end"}
+ASIDE = {"leave_one_out_rmse_without", "score_gain_at_the_end"}
+# In the record only: the p-value says the same to a reader.
+RECORD_ONLY = {"score_statistic"}
+# Shares of the residual's mean square.
+GAINS = {"score_gain", "score_gain_at_the_end"}
 
 
 @dataclass(frozen=True)
@@ -99,28 +103,53 @@ def _remarks(before: ParameterFinding | None, after: ParameterFinding | None) ->
 
 def _evidence(findings: Findings) -> list[str]:
     """The columns of evidence: those known, in a fixed order, then whatever else the record holds."""
-    held = dict.fromkeys(name for effect in findings.effects for name in effect.evidence)
+    held = dict.fromkeys(name for effect in findings.effects for name in effect.evidence if name not in RECORD_ONLY)
     return [name for name in EVIDENCE if name in held] + [name for name in held if name not in EVIDENCE]
 
 
 def _evidence_cell(findings: Findings, name: str, value: float) -> Shown:
     if "rmse" in name:
         return shown(value, findings.output_unit, findings.output_name, 3, zeros=True)
+    if name in GAINS:
+        return Shown(share(value), value)
     return Shown(chance(value) if "p_value" in name else digits(value, 3, zeros=True), value)
+
+
+def _evidence_unit(findings: Findings, name: str) -> str:
+    if name in GAINS:
+        return "% of the mean square"
+    return display(findings.output_unit, findings.output_name).unit if "rmse" in name else ""
 
 
 def _phase_rows(findings: Findings) -> list[dict[str, Any]]:
     before, after = findings.portrait_before.by_phase, findings.portrait_after.by_phase
     return [
-        {"phase": phase, "before": before.get(phase, {}), "after": after.get(phase, {})}
+        {
+            "phase": phase,
+            "before": before.get(phase, {}),
+            "after": after.get(phase, {}),
+            "samples_before": _samples(before, phase),
+            "samples_after": _samples(after, phase),
+        }
         for phase in dict.fromkeys([*before, *after])
     ]
 
 
+def _samples(by_phase: Mapping[str, Mapping[str, float]], phase: str) -> Shown:
+    """Number of samples in a phase and their share, the one that the sentences and the picture give."""
+    count = by_phase.get(phase, {}).get("samples", 0.0)
+    whole = sum(entry["samples"] for entry in by_phase.values())
+    return Shown(f"{count:.0f}" + (f" ({count / whole:.0%})" if whole else ""), count)
+
+
 def _correlations(findings: Findings) -> list[dict[str, Any]]:
     before, after = findings.portrait_before.correlation, findings.portrait_after.correlation
+
+    def cell(held: Mapping[str, float], name: str) -> Shown:
+        return Shown(correlation(held.get(name)), held.get(name))
+
     return [
-        {"with": label(name), "before": before.get(name), "after": after.get(name)}
+        {"with": label(name), "before": cell(before, name), "after": cell(after, name)}
         for name in dict.fromkeys([*before, *after])
     ]
 
@@ -162,16 +191,21 @@ def findings_to_html(findings: Findings) -> str:
         output=output,
         number=lambda value, count=3: Shown(digits(value, count, zeros=True), value),
         estimate=estimate,
-        chance=chance,
+        p_value=p_value,
         unit_of=lambda unit, name="": display(unit, name).unit,
         label=label,
         single=pictures.nothing_added(findings),
+        # Without offsets in the fit they are exactly zero.
+        offsets=any(run.offset_before or run.offset_after for run in findings.runs),
+        held_out=any(run.role == "held-out" for run in findings.runs),
+        left_out=sum(run.role == "fit" for run in findings.runs) > 1,
         added=[effect for effect in findings.effects if effect.added],
         ranked=pictures.ranked(findings.effects),
         evidence=_evidence(findings),
         columns=[name for name in _evidence(findings) if name not in ASIDE],
         known=lambda value: value is not None and math.isfinite(value),
         evidence_title=lambda name: EVIDENCE.get(name, label(name)),
+        evidence_unit=lambda name: _evidence_unit(findings, name),
         evidence_cell=lambda name, value: _evidence_cell(findings, name, value),
         parameters=_parameter_rows(findings),
         runs=_runs(findings),
@@ -179,7 +213,7 @@ def findings_to_html(findings: Findings) -> str:
         correlations=_correlations(findings),
         picture_errors=picture(pictures.errors_by_run(findings), "Error of each run before and after", "narrow"),
         picture_candidates=picture(
-            pictures.candidates_ranked(findings), "Candidates by error on runs left out", "narrow"
+            pictures.candidates_ranked(findings), "Base model and candidates by error", "narrow"
         ),
         picture_phases=picture(pictures.residual_by_phase(findings), "Residual by phase of the wire"),
         picture_correlation=picture(pictures.residual_correlation(findings), "Autocorrelation of the residual"),

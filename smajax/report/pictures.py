@@ -173,19 +173,25 @@ def _literal(text: str) -> str:
 
 
 def candidates_ranked(findings: Findings) -> bytes | None:
-    """The error on runs left out in turn, per candidate, best first; None when no candidate came that far."""
+    """The error on runs left out in turn, per candidate, best first; None when no candidate came that far.
+
+    Above them the base model's. The record has its error on the runs it was fitted to, which is the lower one: a bar
+    that is shorter than it is a gain all the more.
+    """
     scored = ranked(findings.effects)
     scored = [effect for effect in scored if np.isfinite(_left_out(effect))]
     if not scored:
         return None
     shown = display(findings.output_unit, findings.output_name)
-    figure = _figure(0.9 + 0.32 * max(len(scored), 3), NARROW)
+    figure = _figure(1.2 + 0.32 * max(len(scored), 3), NARROW)
     axes = figure.subplots()
-    places = np.arange(len(scored))[::-1]
-    colours = [AFTER if effect.added else QUIET for effect in scored]
-    axes.barh(places, [shown.of(_left_out(effect)) for effect in scored], 0.62, color=colours)
-    axes.set_yticks(places, [label(effect.name) for effect in scored])
-    for tick, effect in zip(axes.get_yticklabels(), scored, strict=True):
+    places = np.arange(len(scored) + 1)[::-1]
+    colours = [BEFORE, *(AFTER if effect.added else QUIET for effect in scored)]
+    errors = [findings.portrait_before.rmse, *(_left_out(effect) for effect in scored)]
+    axes.barh(places, [shown.of(error) for error in errors], 0.62, color=colours)
+    names = [f"{label(effect.name)} alone" for effect in scored]
+    axes.set_yticks(places, ["base model\n(on runs it was fitted to)", *names])
+    for tick, effect in zip(axes.get_yticklabels()[1:], scored, strict=True):
         tick.set_fontweight("bold" if effect.added else "normal")
     axes.axvline(shown.of(findings.noise_sigma), color=MEASURED, linestyle="--", linewidth=1.0, label="noise")
     for name, colour in (("added", AFTER), ("not added", QUIET)):
@@ -193,7 +199,7 @@ def candidates_ranked(findings: Findings) -> bytes | None:
     unit = f" ({shown.unit})" if shown.unit else ""
     axes.set_xlabel(f"rms error on runs left out in turn{unit}", fontsize=9)
     axes.set_xlim(left=0.0)
-    axes.set_ylim(-0.6, len(scored) - 0.4)
+    axes.set_ylim(-0.6, len(scored) + 0.6)
     figure.legend(loc="outside upper center", ncols=3, frameon=False, fontsize=9)
     _tidy(axes)
     axes.grid(False, axis="y")
@@ -205,11 +211,11 @@ def _left_out(effect: EffectFinding) -> float:
 
 
 def ranked(effects: Sequence[EffectFinding]) -> list[EffectFinding]:
-    """The added effects first, then by error on runs left out, then by the score test; those not reached last."""
+    """The added effects first, then by error on runs left out, then by the gain foretold; those not reached last."""
 
     def key(effect: EffectFinding) -> tuple[bool, float, float]:
-        error, chance = _left_out(effect), effect.evidence.get("score_p_value", float("nan"))
-        return not effect.added, error if np.isfinite(error) else np.inf, chance if np.isfinite(chance) else np.inf
+        error, gain = _left_out(effect), effect.evidence.get("score_gain", float("nan"))
+        return not effect.added, error if np.isfinite(error) else np.inf, -gain if np.isfinite(gain) else np.inf
 
     return sorted(effects, key=key)
 
@@ -233,10 +239,13 @@ def residual_by_phase(findings: Findings) -> bytes | None:
     for name, portrait, colour, shift in portraits:
         share.barh(places + shift, 100.0 * column(portrait, "share_of_squared_error"), 0.36, color=colour, label=name)
         error.barh(places + shift, shown.of(1.0) * column(portrait, "rmse"), 0.36, color=colour)
-    samples = column(portraits[-1][1], "samples")
-    share.plot(
-        100.0 * samples / np.nansum(samples), places, "|", color=MEASURED, markersize=18, label="share of the samples"
-    )
+    # A tick on each bar: the phases, and so the samples in one, are each model's own.
+    for _, portrait, _, shift in portraits:
+        samples = column(portrait, "samples")
+        whole = np.nansum(samples)
+        if whole > 0.0:
+            share.plot(100.0 * samples / whole, places + shift, "|", color=MEASURED, markersize=11)
+    share.plot([], [], "|", color=MEASURED, markersize=11, label="share of the samples")
     error.axvline(shown.of(findings.noise_sigma), color=MEASURED, linestyle="--", linewidth=1.0, label="noise")
     share.set_yticks(places, [_literal(phase) for phase in phases])
     share.set_xlabel("share of the squared error (%)", fontsize=9)

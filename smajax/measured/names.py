@@ -1,0 +1,62 @@
+"""What to say about a name that is not known: the nearest one, and all there are."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from difflib import SequenceMatcher
+
+# Above the first, two spellings differ by a slip; below the second, they have letters in common and no more.
+SLIP = 0.85
+ALIKE = 0.65
+# A shorter word is inside too many names by chance.
+SHORTEST_WORD = 3
+
+
+def _core(name: str) -> str:
+    """The name without its unit in brackets, its case and its punctuation, which say nothing about likeness."""
+    bare = re.sub(r"\[[^]]*\]|\([^)]*\)", "", name)
+    return re.sub(r"[\W_]+", "_", bare if bare.strip() else name).strip("_").lower()
+
+
+def _likeness(name: str, candidate: str) -> tuple[int, float, float]:
+    """How near the candidate is, greater is nearer; the first number is 0 when it is not worth suggesting."""
+    one, other = _core(name), _core(candidate)
+    ratio = SequenceMatcher(None, one, other).ratio()
+    whole = SequenceMatcher(None, name.lower(), candidate.lower()).ratio()
+    inside, around = (len(part) >= SHORTEST_WORD and part in full for part, full in ((one, other), (other, one)))
+    if one == other:
+        rank = 4
+    elif ratio >= SLIP:
+        rank = 3
+    elif inside:
+        rank = 2
+    else:
+        rank = 1 if around or ratio >= ALIKE else 0
+    return rank, ratio, whole
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """A sentence part that suggests the known name closest to `name`; empty when none is close.
+
+    A name that contains the word goes before one that only shares letters with it: "friction" is "coulomb_friction"
+    and not "radiation".
+    """
+    names = [str(one) for one in known]
+    best = max(names, key=lambda one: _likeness(name, one), default="")
+    return f"; did you mean {best!r}?" if best and _likeness(name, best)[0] > 0 else ""
+
+
+def instead(name: str, known: Iterable[str], lead: str, suggested: Iterable[str] | None = None) -> str:
+    """`; did you mean 'x'? There are: x, y` with the lead "there are"; `; there are: x, y` when no name is close.
+
+    suggested: the names that may be suggested, when these are not all that are known.
+    """
+    names = [str(one) for one in known]
+    guess = nearest(name, names if suggested is None else suggested)
+    return f"{guess} {lead[:1].upper()}{lead[1:]}: {listed(names)}" if guess else f"; {lead}: {listed(names)}"
+
+
+def listed(names: Iterable[str]) -> str:
+    """The names in one line, all of them: it may be the only list that its reader has."""
+    return ", ".join(str(name) for name in names) or "none"
