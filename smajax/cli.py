@@ -36,7 +36,7 @@ def _resumable() -> Iterator[None]:
     try:
         yield
     except KeyboardInterrupt:
-        console.print("\nInterrupted. What is finished is kept: the same command goes on from there.", soft_wrap=True)
+        console.print("\nInterrupted. Finished fits are kept: the same command goes on from there.", soft_wrap=True)
         # At once: an interpreter that shuts down in the middle of a compilation can crash.
         os._exit(130)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -73,3 +74,23 @@ file = "run.csv"
     assert told.returncode == 2
     assert "convection_coefficient" in told.stderr  # the nearest known name
     assert "Traceback" not in told.stderr
+
+
+def test_ctrl_c_is_answered(tmp_path: Path) -> None:
+    command = [
+        sys.executable,
+        "-c",
+        "from smajax.cli import main; main()",
+        "demo",
+        "--only",
+        "complete",
+        "--out",
+        "out",
+    ]
+    with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True) as run:
+        assert run.stderr is not None
+        assert "checking" in run.stderr.readline()
+        run.send_signal(signal.SIGINT)
+        said = run.stderr.read()
+    assert run.returncode == 130, said
+    assert "goes on from there" in said

@@ -100,6 +100,11 @@ class Search:
         """Every free parameter of a model with `effects`."""
         return [*self.unknowns, *(name for effect in effects for name in self.coefficients(effect))]
 
+    def loose(self, effects: Sequence[str], values: np.ndarray) -> list[str]:
+        """Those of them that no bound holds at `values`."""
+        place = self.problem.names.index
+        return [name for name in self.free(effects) if not held(float(values[place(name)]), *self.bounds[name])]
+
     @property
     def every(self) -> list[str]:
         """Unknowns and all coefficients of all candidates: one Jacobian serves every question."""
@@ -201,13 +206,8 @@ class Search:
         index, values = self.problem.names.index, entry.solution.values
         new = [effect for effect in entry.effects if effect not in present.effects]
         own = [name for effect in new for name in self.coefficients(effect)]
-        bases = [float(getattr(LIBRARY[e].base(), n.removeprefix(f"{e}."))) for e in new for n in self.coefficients(e)]
-        size = np.asarray([values[index(name)] for name in own]) - bases
-        others = [
-            name
-            for name in self.free(entry.effects)
-            if name not in own and not held(float(values[index(name)]), *self.bounds[name])
-        ]
+        size = np.asarray([values[index(name)] - _base(name) for name in own])
+        others = [name for name in self.loose(entry.effects, values) if name not in own]
         level = float(np.mean(at.residual() ** 2)) * correlation_time(split_runs(at.misfit, at.mask))
         told = []
         for run in range(len(at.mask)):
@@ -232,6 +232,12 @@ class Search:
             f"({gain:+.0%} of its mean square, {z:.1f} standard errors)"
         )
         return enough, told
+
+
+def _base(coefficient: str) -> float:
+    """The value at which a coefficient such as `latent_heat.enthalpy` changes nothing."""
+    effect, name = coefficient.split(".", 1)
+    return float(getattr(LIBRARY[effect].base(), name))
 
 
 def _paired(old: np.ndarray, new: np.ndarray, mask: np.ndarray) -> float:
@@ -365,12 +371,7 @@ def scores_at(setting: Search, model: Model, left: Sequence[str]) -> tuple[list[
         for name in switches(effect):
             values[index(name)] += NUDGE * LIBRARY[effect].starts[name.removeprefix(f"{effect}.")]
     at = sensitivity(setting.problem, values, setting.every)
-    loose = [
-        name
-        for name in setting.free(model.effects)
-        if not held(float(model.values[index(name)]), *setting.bounds[name])
-    ]
-    return screen(at, loose, left, setting.bounds)
+    return screen(at, setting.loose(model.effects, model.values), left, setting.bounds)
 
 
 def pruned(setting: Search, model: Model) -> Model:
@@ -381,9 +382,8 @@ def pruned(setting: Search, model: Model) -> Model:
         for effect in model.effects:
             rest = tuple(name for name in model.effects if name != effect)
             values = np.array(model.values)
-            base = LIBRARY[effect].base()
             for name in setting.coefficients(effect):
-                values[names.index(name)] = float(getattr(base, name.removeprefix(f"{effect}.")))
+                values[names.index(name)] = _base(name)
             starts.append(Start(rest, values))
         solutions, _ = setting.fit(starts, "taking effects out again", legs=3)
         whole = Fitted(model.effects, Solution(model.values, model.cost, True, 0))

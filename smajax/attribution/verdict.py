@@ -10,6 +10,7 @@ from smajax.experiment.record import Experiment
 from smajax.report.display import display
 from smajax.report.findings import EffectFinding, ParameterFinding, Portrait, Round, RunFinding, Verdict
 from smajax.residual.portrait import noise_like
+from smajax.words import and_listed
 
 # A residual this many times the declared noise, or the other way round, says that the noise was declared wrongly.
 WRONG_NOISE = 1.2
@@ -121,9 +122,7 @@ def _held_out_warnings(runs: Sequence[RunFinding], experiment: Experiment) -> li
 
 
 def _listed(added: Sequence[EffectFinding]) -> str:
-    names = [effect.title for effect in added]
-    between = "; " if any("," in name for name in names) else ", "
-    return names[0] if len(names) == 1 else between.join(names[:-1]) + " and " + names[-1] if names else "nothing"
+    return and_listed([effect.title for effect in added])
 
 
 def unexplained(

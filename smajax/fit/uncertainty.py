@@ -11,6 +11,7 @@ from scipy.sparse.csgraph import connected_components
 from smajax.fit.bounds import AT_BOUND
 from smajax.fit.sensitivity import Sensitivity
 from smajax.residual.noise_like import correlation_time, split_runs
+from smajax.words import and_listed
 
 # Two parameters whose estimates are correlated more than this move together: the runs see one combination of them.
 TOGETHER = 0.98
@@ -81,16 +82,11 @@ def _clusters(covariance: np.ndarray) -> list[list[int]]:
     return [cluster for cluster in clusters if len(cluster) > 1]
 
 
-def _listed(names: Sequence[str]) -> str:
-    """`a, b and c`."""
-    return " and ".join([*([", ".join(names[:-1])] if names[1:] else []), *names[-1:]])
-
-
 def _together(name: str, cluster: Sequence[str]) -> str:
     """The remark of one of a cluster. Of a large one its first other member is named: enough to know it by."""
     others = [other for other in cluster if other != name]
     told = others if len(others) < 3 else [others[0], f"{len(others) - 1} others"]
-    return f"moves together with {_listed(told)}"
+    return f"moves together with {and_listed(told)}"
 
 
 def uncertainty(
@@ -172,7 +168,7 @@ def identifiability(at: Sensitivity, names: Sequence[str], bounds: Mapping[str, 
         # Cut and not rounded: 0.9996 is not yet 1.
         most = np.floor(1e3 * float(pairs.max()) + 1e-6) / 1e3
         told.append(
-            f"{_listed([seen[index] for index in cluster])} move together in these runs (correlation up to {most:.3f}): "
+            f"{and_listed([seen[index] for index in cluster])} move together in these runs (correlation up to {most:.3f}): "
             "fix one of them or measure runs that tell them apart."
         )
     if len(told) == 1 and 1 < len(names) == rank:

@@ -1,0 +1,13 @@
+"""Sentence parts that several stages write."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+
+def and_listed(names: Sequence[str]) -> str:
+    """`a, b and c`, with semicolons where a name holds a comma itself; `nothing` for no names."""
+    if len(names) < 2:
+        return names[0] if names else "nothing"
+    between = "; " if any("," in name for name in names) else ", "
+    return f"{between.join(names[:-1])} and {names[-1]}"
