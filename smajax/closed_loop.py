@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax import lax
 
 from smajax.controller.base import AbstractController
+from smajax.estimator.base import AbstractEstimator
+from smajax.measured_state import MeasuredState, Sensor, truth
+from smajax.parameters import check_bounds
+from smajax.reference import Reference, resting
 from smajax.simulate import DEFAULT_STEP, trajectory
 from smajax.step import step
 from smajax.system import System, initial_state
@@ -17,52 +23,133 @@ from smajax.types import Scalar, Series, State, Trajectory
 
 
 class ClosedLoop(eqx.Module):
-    """A controlled run: the states at t_0 ... t_{n-1}, and the command from each of them on, arrays of shape (n,)."""
+    """A controlled run: the states at t_0 ... t_{n-1}, and what holds from each of them on, arrays of shape (n,)."""
 
     run: Trajectory
-    target: Series
-    inputs: dict[str, Series]
+    wanted: Reference
+    voltage: Series  # the controller's command, as it reaches the amplifier
+    measured: MeasuredState  # what the controller was told
+    failed_at: (
+        Scalar  # s; when the controller first answered with a number that is none, from where on it gets 0 V; inf
+    )
+
+
+class _Carry(NamedTuple):
+    state: State
+    estimate: Any  # the estimator's memory
+    memory: Any  # the controller's
+    held: Scalar  # V, the command at the amplifier
+    queue: Series  # V, commands on their way to the amplifier, shape (delay,)
+    failed_at: Scalar
 
 
 def simulate_closed_loop(
     system: System,
     controller: AbstractController,
-    target: Series,
+    wanted: Reference | Series,
     dt: Scalar | float = DEFAULT_STEP,
     every: int = 1,
-    at_rest: dict[str, Scalar] | None = None,
+    *,
+    estimator: AbstractEstimator | None = None,
+    sensor: Sensor | None = None,
+    key: jax.Array | None = None,
+    delay: int = 0,
+    disturbance: Mapping[str, Series] | None = None,
 ) -> ClosedLoop:
-    """Simulate over the samples of `target` (rad or m), `dt` seconds apart; the controller is called `every` samples.
+    """Simulate over the samples of `wanted` (rad or m), `dt` seconds apart; the controller is called `every` samples.
 
-    Its command is held in between, as a digital controller holds it. It sees the true state; an estimator gives it
-    another one. `at_rest` are the inputs in which the system rests at the start (default: zero voltage). Raises
-    ValueError when `target` has not a whole number of control periods and one sample more.
+    Its command is held in between, as a digital controller holds it, and reaches the amplifier `delay` control periods
+    later. Without an `estimator` it is told the true state, with the position as `sensor` (with noise drawn from `key`)
+    reads it. `disturbance` are further inputs of the system, such as `load_torque` or `ambient_temperature`, each of
+    shape (n,). A plain array for `wanted` means set points (`reference.resting`).
+
+    Raises ValueError when a gain or parameter lies outside its bounds (where values are known: outside of `jit`),
+    when `wanted` has not a whole number of control periods and one sample more, and when noise has no `key`.
     """
-    count = jnp.shape(target)[0]
+    check_bounds(controller)
+    wanted = wanted if isinstance(wanted, Reference) else resting(wanted)
+    count = jnp.shape(wanted.position)[0]
     if every < 1 or (count - 1) % every:
         raise ValueError(
-            f"`target` has {count} samples and the controller is called every {every}: give a multiple of {every} and "
+            f"`wanted` has {count} samples and the controller is called every {every}: give a multiple of {every} and "
             "one sample more, so that the run ends with a whole control period."
         )
-    target = jnp.asarray(target, dtype=float)
+    if delay < 0:
+        raise ValueError(f"`delay` is a whole number of control periods, 0 or more, not {delay}.")
+    if sensor is not None and key is None:
+        raise ValueError("a sensor draws noise: give `key`, for instance `jax.random.key(0)`.")
+    disturbance = {name: jnp.asarray(series, dtype=float) for name, series in (disturbance or {}).items()}
+    for name, series in disturbance.items():
+        if name not in system.load.inputs_optional | {"ambient_temperature"}:
+            raise ValueError(
+                f"`{name}` is no disturbance of this system; there are "
+                f"{sorted(system.load.inputs_optional | {'ambient_temperature'})}."
+            )
+        if series.shape != (count,):
+            raise ValueError(f"disturbance `{name}` has the shape {series.shape}, `wanted` has {count} samples.")
+
+    periods = (count - 1) // every
     period = jnp.asarray(dt, dtype=float) * every
-    resting = {"voltage": jnp.zeros(())} if at_rest is None else at_rest
-    state = initial_state(system, resting)
+    noise = jnp.zeros(periods) if key is None else jax.random.normal(key, (periods,))
+    # Shape (periods, every): what holds in each step of each period.
+    acting = {name: series[:-1].reshape(periods, every) for name, series in disturbance.items()}
+    first = jax.tree.map(lambda series: series[0], wanted)
+    zero = jnp.zeros(())
+    state = initial_state(system, {**system.drive.from_voltage(zero), **{k: v[0] for k, v in disturbance.items()}})
 
-    def period_of(carry: tuple[State, Any], wanted: Scalar) -> tuple[tuple[State, Any], Any]:
-        state, memory = carry
-        inputs, memory = controller.command(memory, state, wanted, period)
+    def seen(state: State, noise: Scalar) -> Scalar:
+        return state.reading if sensor is None else sensor.reading(state.reading, noise)
 
-        def body(state: State, _: None) -> tuple[State, State]:
-            new = step(system, state, inputs, dt)
+    def told(state: State, reading: Scalar) -> MeasuredState:
+        return eqx.tree_at(lambda measured: measured.position, truth(state), reading)
+
+    def period_of(carry: _Carry, now: tuple[Reference, Scalar, dict[str, Series], Scalar]) -> tuple[_Carry, Any]:
+        now_wanted, now_noise, now_acting, number = now
+        state = carry.state
+        reading = seen(state, now_noise)
+        if estimator is None:
+            estimate, measured = carry.estimate, told(state, reading)
+        else:
+            # The first reading has already been used to begin with.
+            later, after = estimator.step(carry.estimate, reading, carry.held, period)
+            at_start = number == 0
+            pick = lambda one, other: jnp.where(at_start, one, other)  # noqa: E731
+            estimate = jax.tree.map(pick, carry.estimate, later)
+            measured = jax.tree.map(pick, estimator.start(reading)[1], after)
+        memory, asked = controller.step(carry.memory, measured, now_wanted, period)
+        failed_at = jnp.minimum(carry.failed_at, jnp.where(jnp.isfinite(asked), jnp.inf, state.time))
+        asked = jnp.where(jnp.isfinite(failed_at), 0.0, asked)
+        queue = jnp.append(carry.queue, asked)
+        held, queue = queue[0], queue[1:]
+        inputs = system.drive.from_voltage(held)
+
+        def body(state: State, acting: dict[str, Scalar]) -> tuple[State, State]:
+            new = step(system, state, {**inputs, **acting}, dt)
             return new, new
 
-        state, states = lax.scan(body, state, None, length=every)
-        return (state, memory), (states, inputs)
+        state, states = lax.scan(body, state, now_acting, length=every)
+        return _Carry(state, estimate, memory, held, queue, failed_at), (states, held, measured)
 
-    start = state, controller.start(state, target[0])
-    _, (states, inputs) = lax.scan(period_of, start, target[:-1:every])
+    reading = seen(state, noise[0])
+    estimate, measured = (None, told(state, reading)) if estimator is None else estimator.start(reading)
+    start = _Carry(state, estimate, controller.start(measured, first), zero, jnp.zeros(delay), jnp.asarray(jnp.inf))
+    at_calls = jax.tree.map(lambda series: series[:-1:every], wanted)
+    end, (states, held, measured) = lax.scan(period_of, start, (at_calls, noise, acting, jnp.arange(periods)))
     states = jax.tree.map(lambda rest: rest.reshape(-1, *rest.shape[2:]), states)
-    held = {name: jnp.repeat(values, every) for name, values in inputs.items()}
-    held = {name: jnp.append(values, values[-1]) for name, values in held.items()}
-    return ClosedLoop(trajectory(state, states), target, held)
+    spread = lambda series: jnp.append(jnp.repeat(series, every), series[-1])  # noqa: E731
+    return ClosedLoop(trajectory(state, states), wanted, spread(held), jax.tree.map(spread, measured), end.failed_at)
+
+
+def check_answers(loop: ClosedLoop) -> None:
+    """ValueError when a controller answered with a number that is none; for runs that have been computed.
+
+    In a batch the others are not touched: each run has its own `failed_at`.
+    """
+    failed = np.atleast_1d(np.asarray(loop.failed_at))
+    bad = np.flatnonzero(np.isfinite(failed))
+    if bad.size:
+        where = "" if failed.size == 1 else f" (run {bad[0]} of {failed.size}, and {bad.size - 1} others)"
+        raise ValueError(
+            f"the controller's answer at {failed[bad[0]]:.3f} s is not a finite voltage{where}; from there on 0 V was "
+            "applied. Look at its gains, and at `measured`, which it was told."
+        )

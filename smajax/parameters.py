@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 Module = TypeVar("Module", bound=eqx.Module)
@@ -105,3 +106,22 @@ def set_parameters(model: Module, values: Mapping[str, Any]) -> Module:
 def set_vector(model: Module, names: Sequence[str], vector: Float[Array, " names"]) -> Module:
     """`set_parameters` from a vector in the order of `names`: the form that an optimiser differentiates."""
     return set_parameters(model, {name: vector[index] for index, name in enumerate(names)})
+
+
+def check_bounds(model: eqx.Module) -> None:
+    """ValueError that names every parameter outside its bounds, with its value and unit.
+
+    Values under `jit`, `vmap` or `grad` are not known yet and are passed over.
+    """
+    wrong = []
+    for entry in parameters(model).values():
+        value = _lookup(model, entry.path)
+        if isinstance(value, jax.core.Tracer):
+            continue
+        found = np.asarray(value)
+        inside = (found >= entry.low) & (found <= entry.high)  # nan is not
+        if not inside.all():
+            first = found[~inside].ravel()[0]
+            wrong.append(f"`{entry.name}` = {first:g} {entry.unit} (from {entry.low:g} to {entry.high:g})")
+    if wrong:
+        raise ValueError(f"outside of the bounds: {'; '.join(wrong)}.")

@@ -103,7 +103,7 @@ def test_closed_loop_has_the_derivatives_of_its_gains() -> None:
     @jax.jit
     def cost(share: jax.Array) -> jax.Array:
         loop = simulate_closed_loop(arm, set_vector(stress_sliding(arm), gains, at * share), target, 0.02)
-        return jnp.mean((loop.run.position - loop.target) ** 2)
+        return jnp.mean((loop.run.position - loop.wanted.position) ** 2)
 
     one = jnp.ones(len(gains))
     automatic = np.asarray(jax.jit(jax.grad(cost))(one))

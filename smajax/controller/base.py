@@ -1,4 +1,4 @@
-"""The contract of a controller: what it remembers, and what it asks of the drive once every control period."""
+"""The contract of a controller: what it remembers, and what it asks of the amplifier once every control period."""
 
 from __future__ import annotations
 
@@ -6,20 +6,25 @@ import abc
 from typing import Any
 
 import equinox as eqx
+import jax.numpy as jnp
 
-from smajax.types import Inputs, Scalar, State
+from smajax.measured_state import MeasuredState
+from smajax.reference import Reference
+from smajax.types import Scalar
 
 
 class AbstractController(eqx.Module):
     """Sampled: called once a period, its command held until the next call."""
 
     @abc.abstractmethod
-    def start(self, state: State, target: Scalar) -> Any:
+    def start(self, measured: MeasuredState, wanted: Reference) -> Any:
         """The memory before the first call, a pytree of arrays."""
 
     @abc.abstractmethod
-    def command(self, memory: Any, state: State, target: Scalar, period: Scalar) -> tuple[Inputs, Any]:
-        """(inputs of the drive, memory after the call) for the measured or estimated `state`.
+    def step(self, memory: Any, measured: MeasuredState, wanted: Reference, period: Scalar) -> tuple[Any, Scalar]:
+        """(memory after the call, voltage to hold). `period` is the time until the next call, s."""
 
-        `target` is the position wanted (rad, m); `period` the time until the next call, s.
-        """
+
+def limited(value: Scalar, low: Scalar | float, high: Scalar | float) -> Scalar:
+    """`value` held in [low, high]; at the ends themselves the derivative is that of the inside (`clip` halves it)."""
+    return jnp.where(value < low, low, jnp.where(value > high, high, value))

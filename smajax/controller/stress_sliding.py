@@ -1,9 +1,9 @@
 r"""Stress-based sliding control (Elahinia 2004, sec. 4.7): position error -> stress wanted -> voltage.
 
 With $e = \theta - \theta_d$ and $s = \dot e + \lambda e$ (the source writes the error the other way round in eq. 4.42 and
-the derivative for this one in eq. 4.44), a set point that rests and eq. 3.8,
+the derivative for this one in eq. 4.44) and eq. 3.8,
 
-    tau_w = tau_g + tau_s + c theta' - I lambda e' - K sat(s / phi),      sigma_d = tau_w / (2 r A_w)    (eq. 4.44, 4.45)
+    tau_w = tau_g + tau_s + c theta' + I theta_d'' - I lambda e' - K sat(s / phi),      sigma_d = tau_w / (2 r A_w)    (eq. 4.44, 4.45)
 
 and a PID controller on the stress sets the voltage.
 """
@@ -13,10 +13,12 @@ from __future__ import annotations
 import equinox as eqx
 import jax.numpy as jnp
 
-from smajax.controller.base import AbstractController
+from smajax.controller.base import AbstractController, limited
 from smajax.load.arm import Arm
+from smajax.measured_state import MeasuredState
 from smajax.parameters import parameter
-from smajax.types import Inputs, Scalar, State
+from smajax.reference import Reference
+from smajax.types import Scalar
 
 
 class StressSlidingMemory(eqx.Module):
@@ -38,29 +40,32 @@ class StressSliding(AbstractController):
     stress_integral_gain: Scalar = parameter("V/(Pa s)", 0.0, 1.0, "integral gain")
     stress_derivative_gain: Scalar = parameter("V s/Pa", 0.0, 1.0, "derivative gain")
     largest_voltage: Scalar = parameter("V", 0.0, 1e4, "largest command; the smallest is zero")
+    inertia_ratio: Scalar = parameter(
+        "-", 0.01, 1e2, "inertia that the controller believes in over `arm`'s", default=1.0
+    )
 
-    def start(self, state: State, target: Scalar) -> StressSlidingMemory:
-        zero = jnp.zeros_like(state.wire.stress)
-        return StressSlidingMemory(zero, self.stress_wanted(state, target) - state.wire.stress)
+    def start(self, measured: MeasuredState, wanted: Reference) -> StressSlidingMemory:
+        zero = jnp.zeros_like(measured.stress)
+        return StressSlidingMemory(zero, self.stress_wanted(measured, wanted) - measured.stress)
 
-    def stress_wanted(self, state: State, target: Scalar) -> Scalar:
+    def stress_wanted(self, measured: MeasuredState, wanted: Reference) -> Scalar:
         """sigma_d, Pa (eq. 4.44, 4.45); never negative: a wire cannot push."""
-        error, rate = state.motion.position - target, state.motion.velocity
-        surface = (rate + self.surface_slope * error) / self.boundary
-        saturated = jnp.where(surface > 1.0, 1.0, jnp.where(surface < -1.0, -1.0, surface))
-        torque = self.arm.resistance(state.motion.position, rate, {})
-        torque = torque - self.arm.inertia({}) * self.surface_slope * rate - self.gain * saturated
-        wanted = torque / (self.arm.lever() * self.cross_section)
-        return jnp.where(wanted > 0.0, wanted, 0.0)
+        error, rate = measured.position - wanted.position, measured.velocity - wanted.velocity
+        surface = limited((rate + self.surface_slope * error) / self.boundary, -1.0, 1.0)
+        inertia = self.inertia_ratio * self.arm.inertia({})
+        torque = self.arm.resistance(measured.position, measured.velocity, {}) + inertia * wanted.acceleration
+        torque = torque - inertia * self.surface_slope * rate - self.gain * surface
+        stress = torque / (self.arm.lever() * self.cross_section)
+        return jnp.where(stress > 0.0, stress, 0.0)
 
-    def command(
-        self, memory: StressSlidingMemory, state: State, target: Scalar, period: Scalar
-    ) -> tuple[Inputs, StressSlidingMemory]:
-        error = self.stress_wanted(state, target) - state.wire.stress
+    def step(
+        self, memory: StressSlidingMemory, measured: MeasuredState, wanted: Reference, period: Scalar
+    ) -> tuple[StressSlidingMemory, Scalar]:
+        error = self.stress_wanted(measured, wanted) - measured.stress
         integral = memory.integral + period * error
         rate = (error - memory.error) / period
         asked = self.stress_gain * error + self.stress_integral_gain * integral + self.stress_derivative_gain * rate
-        voltage = jnp.where(asked < 0.0, 0.0, jnp.where(asked > self.largest_voltage, self.largest_voltage, asked))
+        voltage = limited(asked, 0.0, self.largest_voltage)
         # Conditional integration: what the amplifier cannot give is not summed up.
         integral = jnp.where(voltage == asked, integral, memory.integral)
-        return {"voltage": voltage}, StressSlidingMemory(integral, error)
+        return StressSlidingMemory(integral, error), voltage

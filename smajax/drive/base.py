@@ -21,3 +21,9 @@ class AbstractDrive(eqx.Module):
     @abc.abstractmethod
     def power(self, resistance: Scalar, length: Scalar, inputs: Inputs) -> Scalar:
         """I^2 R per metre of wire, W/m; `resistance` in ohm/m, `length` in m."""
+
+    def from_voltage(self, voltage: Scalar) -> Inputs:
+        """The inputs by which a controller's voltage (V, 0 or more) reaches the wire. ValueError for a drive of another kind."""
+        raise ValueError(
+            f"a controller asks for a voltage, which {type(self).__name__} does not take: use the voltage or duty drive."
+        )

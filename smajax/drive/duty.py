@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+import jax.numpy as jnp
+
 from smajax.drive.base import AbstractDrive
 from smajax.parameters import parameter
 from smajax.types import Inputs, Scalar
@@ -18,3 +20,8 @@ class Duty(AbstractDrive):
 
     def power(self, resistance: Scalar, length: Scalar, inputs: Inputs) -> Scalar:
         return inputs["duty"] * (self.supply_voltage / length) ** 2 / resistance
+
+    def from_voltage(self, voltage: Scalar) -> Inputs:
+        """The duty that heats as `voltage` would; all of the supply is the most there is."""
+        duty = (voltage / self.supply_voltage) ** 2
+        return {"duty": jnp.where(duty > 1.0, 1.0, duty)}

@@ -28,3 +28,6 @@ class Voltage(AbstractDrive):
         asked = jnp.abs(self.amplifier_gain * inputs["voltage"])
         put = jnp.where(asked < self.amplifier_limit, asked, self.amplifier_limit)
         return (put / length) ** 2 / resistance
+
+    def from_voltage(self, voltage: Scalar) -> Inputs:
+        return {"voltage": voltage}

@@ -32,7 +32,7 @@ def draw_regulation(figure: Figure, loops: dict[str, Recorded], shown: str) -> N
         angle.plot(loop.run.time, np.degrees(loop.run.position), **style)
         fraction.plot(loop.run.time, loop.run.martensite_fraction, **style)
     one = loops[shown]
-    angle.plot(one.run.time, np.degrees(one.target), color="#9aa0a8", linewidth=0.8, label="wanted")
+    angle.plot(one.run.time, np.degrees(one.wanted.position), color="#9aa0a8", linewidth=0.8, label="wanted")
     named(angle, "time (s)", "arm angle (°)")
     named(fraction, "time (s)", "martensite fraction")
     keyed(angle)

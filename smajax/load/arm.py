@@ -33,6 +33,7 @@ class Arm(AbstractMovingLoad):
     lower_stop: Scalar = parameter("rad", -7.0, 7.0, "lower end stop")
     upper_stop: Scalar = parameter("rad", -7.0, 7.0, "upper end stop")
 
+    inputs_optional: ClassVar[frozenset[str]] = frozenset({"load_torque"})
     reading: ClassVar[tuple[str, str]] = ("angle", "rad")
 
     def start(self) -> Scalar:
@@ -47,7 +48,8 @@ class Arm(AbstractMovingLoad):
     def resistance(self, position: Scalar, velocity: Scalar, inputs: Inputs) -> Scalar:
         gravity = (self.payload_mass + 0.5 * self.link_mass) * GRAVITY * self.arm_length * jnp.cos(position)
         spring = self.spring_stiffness * self.spring_lever**2 * (position - self.spring_rest_angle)
-        return gravity + spring + self.damping * velocity
+        # `load_torque`, N m, is a disturbance against +position.
+        return gravity + spring + self.damping * velocity + inputs.get("load_torque", 0.0)
 
     def lever(self) -> Scalar | float:
         return 2.0 * self.pulley_radius
