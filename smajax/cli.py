@@ -162,6 +162,57 @@ def figures(
         raise typer.Exit(1)
 
 
+def _numbers(option: str, text: str) -> tuple[float, ...]:
+    try:
+        return tuple(float(part) for part in text.replace(",", " ").split())
+    except ValueError:
+        raise typer.BadParameter(f"numbers with commas between them, not `{text}`", param_hint=option) from None
+
+
+@app.command()
+def sweep(
+    controllers: Annotated[str, typer.Option(help="names with commas between them, or `all`")] = "all",
+    over: Annotated[str, typer.Option(help="the two mismatches of the maps")] = "convection,damping",
+    points: Annotated[int, typer.Option(min=2, help="mismatches from 0.5 to 2 along each side of a map")] = 15,
+    set_points: Annotated[str, typer.Option(help="degrees, with commas between them")] = "-40,-20,0,10,20,40,50,60,80",
+    gains: Annotated[str, typer.Option(help="shares of the controller's main gain")] = "0.5,0.7,1,1.4,2",
+    seconds: Annotated[float, typer.Option(min=0.1, help="length of each closed loop")] = 10.0,
+    out: Annotated[Path, typer.Option(help="folder for the page, the pictures and the rows")] = Path("sweep"),
+    fast: Annotated[bool, typer.Option("--fast", help="3 x 3 mismatches, 3 set points, the preset's gains")] = False,
+    open_page: Annotated[bool, typer.Option("--open/--no-open", help="open the page in a browser")] = True,
+) -> None:
+    """Run controllers of the arm on plants that are not what they believe, and compare them on every set point.
+
+    Mismatches: inertia, damping, convection, ambient, payload, supply. Ctrl-C loses nothing: the same command goes on.
+
+    Example:  smajax sweep --controllers pid,sld --over convection,ambient --out sweep
+    """
+    from smajax.runtime import prepare
+
+    prepare()
+    from smajax.figures.rigs import arm
+    from smajax.presets import CONTROLLERS
+    from smajax.progress import shown
+    from smajax.sweep_run import SweepSettings, as_text, run_sweep
+
+    names = tuple(CONTROLLERS) if controllers == "all" else tuple(part for part in controllers.split(",") if part)
+    pair = tuple(over.split(","))
+    if len(pair) != 2:
+        raise typer.BadParameter(f"two mismatches with a comma between them, not `{over}`", param_hint="--over")
+    settings = SweepSettings(
+        names, *pair, points, _numbers("--set-points", set_points), _numbers("--gains", gains), seconds
+    )
+    if fast:
+        settings = SweepSettings(names, *pair, 3, (-20.0, 20.0, 60.0), (1.0,), seconds)
+    with _resumable(), shown(console) as progress:
+        rows = run_sweep(arm(), settings, out, progress)
+    typer.echo(as_text(rows))
+    page = out / "index.html"
+    typer.echo(f"Page: {page.resolve()}")
+    if open_page and sys.stdout.isatty() and not os.environ.get("CI"):
+        webbrowser.open(page.resolve().as_uri())
+
+
 def main() -> None:
     """Entry point: errors that a user can mend are said in one paragraph with exit code 2, without a traceback."""
     from smajax.experiment.errors import ExperimentError

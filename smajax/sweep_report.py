@@ -1,0 +1,184 @@
+"""A sweep -> a folder: every closed loop as a row of CSV, maps and lines as pictures, one page that compares controllers."""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import html
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator, FormatStrFormatter
+
+from smajax.figures.drawing import keyed, named, panels
+from smajax.merit import Merit
+from smajax.sweep import Grid
+
+# Figure of merit -> (what it is called, unit shown, factor from SI).
+SHOWN = {
+    "reach_time": ("reach time", "s", 1.0),
+    "settling_time": ("settling time", "s", 1.0),
+    "overshoot": ("overshoot", "°", 180.0 / np.pi),
+    "steady_error": ("steady error", "°", 180.0 / np.pi),
+    "energy": ("energy into the wire", "J", 1.0),
+    "switches_per_second": ("switches a second", "1/s", 1.0),
+    "peak_temperature": ("peak temperature", "°C", 1.0),
+}
+MAPPED = ("settling_time", "overshoot", "steady_error", "energy")
+COLOURS = ("#1f6fb2", "#c8553d", "#d9a441", "#3f8f5b", "#7a5195", "#8a8f98", "#1d1d1f", "#2aa5a0")
+
+
+@dataclass(frozen=True)
+class Swept:
+    """One controller's sweep: figures of merit and failures on the grid, and its lines by mismatch, (ratios, time)."""
+
+    name: str
+    main_gain: str
+    merits: Merit
+    failed_at: np.ndarray
+    lines: Mapping[str, np.ndarray]
+
+
+def _values(one: Merit, name: str) -> np.ndarray:
+    return np.asarray(getattr(one, name)) * SHOWN[name][2]
+
+
+def write_rows(path: Path, grid: Grid, swept: Swept) -> None:
+    """Every closed loop in a row; angles in degrees, an empty cell where a time is infinite."""
+    lanes = grid.lanes()
+    columns = [f"{grid.first}_ratio", f"{grid.second}_ratio", "set_point_deg", f"{swept.main_gain}_ratio"]
+    units = {"°": "deg", "°C": "degC", "1/s": "per_s"}
+    merits = [f"{name}_{units.get(SHOWN[name][1], SHOWN[name][1])}" for name in SHOWN]
+    table = np.stack([_values(swept.merits, name).ravel() for name in SHOWN], axis=1)
+    part = path.with_name(path.name + ".part")
+    with part.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow([*columns, *merits, "failed_at_s"])
+        for lane, row, failed in zip(lanes, table, swept.failed_at.ravel(), strict=True):
+            cells = [*lane[:2], np.degrees(lane[2]), lane[3], *row, failed]
+            writer.writerow([f"{cell:.6g}" if np.isfinite(cell) else "" for cell in cells])
+    part.replace(path)
+
+
+def draw_maps(figure: Figure, grid: Grid, swept: Swept, seconds: float) -> None:
+    """Median over the set points, at the preset's gain, over the two mismatches; dashed: the source's single lines."""
+    at = int(np.argmin(np.abs(grid.gains - 1.0)))
+    for axes, name in zip(panels(figure, 2, 2), MAPPED, strict=True):
+        values = _values(swept.merits, name)[..., at]
+        values = np.median(np.where(np.isfinite(values), values, 2.0 * seconds), axis=2)
+        mesh = axes.pcolormesh(grid.ratios, grid.ratios, values.T, cmap="viridis", shading="nearest")
+        axes.set(xscale="log", yscale="log")
+        for axis in (axes.xaxis, axes.yaxis):
+            axis.set_major_locator(FixedLocator([0.5, 0.7, 1.0, 1.4, 2.0]))
+            axis.set_major_formatter(FormatStrFormatter("%g"))
+            axis.set_minor_locator(FixedLocator([]))
+        axes.axhline(1.0, color="white", linewidth=1.0, linestyle="--")
+        axes.axvline(1.0, color="white", linewidth=1.0, linestyle="--")
+        label, unit, _ = SHOWN[name]
+        never = f"; {2.0 * seconds:g}: not settled" if name == "settling_time" else ""
+        figure.colorbar(mesh, ax=axes).set_label(f"{label} ({unit}{never})", fontsize=8)
+        named(axes, f"{grid.first}, plant / controller", f"{grid.second}, plant / controller", label)
+
+
+def draw_lines(figure: Figure, time: np.ndarray, ratios: Sequence[float], swept: Swept, target: float) -> None:
+    """Angle over time with one mismatch at a time (Elahinia 2004, Fig. 4.23-4.25, for this controller)."""
+    for axes, (mismatch, angles) in zip(panels(figure, 2, 3), swept.lines.items(), strict=True):
+        for colour, ratio, angle in zip(COLOURS, ratios, angles, strict=False):
+            axes.plot(time, np.degrees(angle), color=colour, linewidth=1.2, label=f"{ratio:g}")
+        axes.axhline(np.degrees(target), color="#9aa0a8", linewidth=0.8)
+        named(axes, "time (s)", "arm angle (°)", f"{mismatch}: plant / controller")
+        keyed(axes)
+
+
+def draw_comparison(figure: Figure, targets: np.ndarray, merits: Mapping[str, Merit]) -> None:
+    """Every figure of merit over the set point, one line a controller."""
+    axes_of = panels(figure, 4, 2)
+    for axes, name in zip(axes_of, SHOWN, strict=False):
+        for colour, (controller, one) in zip(COLOURS, merits.items(), strict=False):
+            values = np.where(np.isfinite(_values(one, name)), _values(one, name), np.nan)
+            axes.plot(np.degrees(targets), values, "o-", color=colour, markersize=3, linewidth=1.2, label=controller)
+        label, unit, _ = SHOWN[name]
+        named(axes, "set point (°)", f"{label} ({unit})")
+    last = axes_of[-1]
+    last.axis("off")
+    handles, labels = axes_of[0].get_legend_handles_labels()
+    last.legend(handles, labels, frameon=False, fontsize=9, loc="center", ncols=2)
+
+
+def comparison_rows(targets: np.ndarray, merits: Mapping[str, Merit]) -> list[list[str]]:
+    """A row a controller: set points at which it settles, then median and worst of each figure of merit."""
+    rows = []
+    for name, one in merits.items():
+        settles = int(np.isfinite(_values(one, "settling_time")).sum())
+        cells = [name, f"{settles} of {len(targets)}"]
+        for merit_name in SHOWN:
+            values = _values(one, merit_name)
+            middle, worst = float(np.median(values)), float(np.max(values))
+            cells.append(" / ".join(f"{v:.3g}" if np.isfinite(v) else "never" for v in (middle, worst)))
+        rows.append(cells)
+    return rows
+
+
+def page(targets: np.ndarray, merits: Mapping[str, Merit], grid: Grid, swept: Sequence[Swept], seconds: float) -> str:
+    """One page for a browser; pictures lie beside it."""
+    say = html.escape
+    head = ["controller", "settles at", *(f"{label} ({unit})" for label, unit, _ in SHOWN.values())]
+    body = "".join(
+        f"<tr>{''.join(f'<td>{say(cell)}</td>' for cell in row)}</tr>" for row in comparison_rows(targets, merits)
+    )
+    loops = int(np.prod(grid.shape))
+    parts = "".join(
+        f"<h2>{say(one.name)}</h2><p>{loops:,} closed loops of {seconds:g} s; {failures(one)}. "
+        f'<a href="{one.name}.csv">every loop as CSV</a></p>'
+        f'<img src="{one.name}_maps.png" alt="maps of {say(one.name)}">'
+        f'<img src="{one.name}_lines.png" alt="lines of {say(one.name)}">'
+        for one in swept
+    )
+    return (
+        '<!doctype html><html lang="en"><meta charset="utf-8"><title>Controllers compared</title><style>'
+        "body{font:15px/1.45 system-ui,sans-serif;max-width:1180px;margin:2em auto;padding:0 1em;color:#1d1d1f}"
+        "td,th{text-align:left;vertical-align:top;padding:.35em .6em;border-bottom:1px solid #e3e5e9}"
+        "table{border-collapse:collapse;font-size:14px;display:block;overflow-x:auto}img{max-width:100%}</style>"
+        "<h1>Controllers compared</h1><p>The plant as the controller believes it, "
+        f"{len(targets)} set points from {np.degrees(targets.min()):.0f}° to {np.degrees(targets.max()):.0f}°; "
+        "median / worst over the set points. Within 1° counts as there.</p>"
+        f"<table><tr>{''.join(f'<th>{say(cell)}</th>' for cell in head)}</tr>{body}</table>"
+        '<img src="comparison.png" alt="figures of merit over the set point">'
+        f"<h1>Mismatch of {say(grid.first)} and {say(grid.second)}</h1><p>The plant's value over the one that the "
+        "controller believes, where it believes in one. Maps: median over the set points at the preset's gains.</p>"
+        f"{parts}</html>\n"
+    )
+
+
+def failures(one: Swept) -> str:
+    """How many loops gave no number, in words."""
+    bad = int(np.isfinite(one.failed_at).sum())
+    return "none failed" if bad == 0 else f"{bad} failed: the controller's answer was no finite voltage"
+
+
+def as_json(targets: np.ndarray, merits: Mapping[str, Merit], grid: Grid, swept: Sequence[Swept]) -> str:
+    """The comparison and what the grid was, SI; infinite times are null."""
+
+    def plain(values: np.ndarray) -> list[float | None]:
+        return [float(value) if np.isfinite(value) else None for value in np.asarray(values).ravel()]
+
+    record = {
+        "set_points_rad": plain(targets),
+        "controllers": {
+            name: {field.name: plain(getattr(one, field.name)) for field in dataclasses.fields(one)}
+            for name, one in merits.items()
+        },
+        "sweep": {
+            "mismatches": [grid.first, grid.second],
+            "ratios": plain(grid.ratios),
+            "set_points_rad": plain(grid.targets),
+            "gain_ratios": plain(grid.gains),
+            "loops": int(np.prod(grid.shape)),
+            "failed": {one.name: int(np.isfinite(one.failed_at).sum()) for one in swept},
+        },
+    }
+    return json.dumps(record, indent=2) + "\n"
