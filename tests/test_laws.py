@@ -224,7 +224,7 @@ def test_a_strained_wire_that_goes_slack_comes_back_on_its_law(
     assert np.all(np.asarray(run.strain) >= held - 1e-9)
     np.testing.assert_allclose(np.asarray(run.strain)[~slack], held[~slack], rtol=0.0, atol=1e-9)
     c = system.wire.constitutive
-    modulus = c.stiffness.young_modulus(c.young_modulus_austenite, c.young_modulus_martensite, xi)
+    modulus = c.stiffness.young_modulus(c.young_modulus_austenite, c.young_modulus_martensite, run.martensite_fraction)
     own = np.asarray(run.strain) - float(c.recoverable_strain) * np.asarray(run.detwinned_fraction)
     thermal = float(c.thermal_modulus) * (heat - float(system.wire.heat.ambient_temperature))
     offset = own - (stress - thermal) / modulus
