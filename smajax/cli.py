@@ -43,9 +43,9 @@ def _resumable() -> Iterator[None]:
 
 def _loop(experiment: Path, out: Path, command: str) -> tuple[Findings, Path]:
     # Imported here so that `--help` does not wait for JAX; x64 is the caller's choice, and this is the caller.
-    import jax
+    from smajax.runtime import prepare
 
-    jax.config.update("jax_enable_x64", True)
+    prepare()
     from smajax.catalogue import CATALOGUE
     from smajax.close_loop import close_loop
     from smajax.experiment.load import load_experiment
@@ -138,9 +138,9 @@ def figures(
 
     Example:  smajax figures M7 --out figures
     """
-    import jax
+    from smajax.runtime import prepare
 
-    jax.config.update("jax_enable_x64", True)
+    prepare()
     from smajax.figures.catalogue import rows
     from smajax.figures.write import as_markdown, as_page, as_text, draw
     from smajax.progress import shown

@@ -20,6 +20,7 @@ from matplotlib.figure import Figure
 from smajax.figures.drawing import BLUE, GREY, keyed, named, panels
 from smajax.parameters import set_parameters
 from smajax.presets import build
+from smajax.runtime import prepare
 from smajax.simulate import simulate
 
 PICTURE = Path(__file__).parent / "arm_geometry.png"
@@ -78,5 +79,5 @@ def main(fast: bool = False) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 if __name__ == "__main__":
-    jax.config.update("jax_enable_x64", True)
+    prepare()
     main("--fast" in sys.argv)

@@ -13,7 +13,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from matplotlib.figure import Figure
@@ -21,6 +20,7 @@ from matplotlib.figure import Figure
 from smajax.closed_loop import simulate_closed_loop
 from smajax.figures.drawing import GREY, keyed, named, panels
 from smajax.presets import build, stress_sliding
+from smajax.runtime import prepare
 from smajax.simulate import DEFAULT_STEP, simulate
 from smajax.system import initial_state
 from studies.reference.sliding import sliding_controller
@@ -158,5 +158,5 @@ def main(fast: bool = False) -> dict[str, list[Errors]]:
 
 
 if __name__ == "__main__":
-    jax.config.update("jax_enable_x64", True)
+    prepare()
     main("--fast" in sys.argv)

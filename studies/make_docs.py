@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import jax
-
 from smajax.origins import ORIGINS
 from smajax.parameters import get_parameters, parameters
 from smajax.presets import DRIVES, LOADS, WIRES
 from smajax.report.display import digits
+from smajax.runtime import prepare
 from smajax.wire.laws import LAWS, detwinning
 
 PAGE = Path(__file__).parent / "parameters.md"
@@ -56,5 +55,5 @@ def page() -> str:
 
 
 if __name__ == "__main__":
-    jax.config.update("jax_enable_x64", True)
+    prepare()
     PAGE.write_text(page(), encoding="utf-8")

@@ -5,10 +5,11 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-import jax
 import pytest
 
-jax.config.update("jax_enable_x64", True)
+from smajax.runtime import prepare
+
+prepare()
 
 
 @pytest.fixture(scope="session")

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import json
 import math
+from pathlib import Path
 
 import pytest
 from matplotlib.figure import Figure
 
 from smajax.figures.catalogue import CHAPTERS, rows
 from smajax.figures.row import Row
+from smajax.figures.write import Drawn, as_markdown, as_page
 
 ROWS = [row for chapter in CHAPTERS.values() for row in chapter]
 
@@ -26,6 +29,25 @@ def test_the_claim_holds(row: Row) -> None:
 
 def test_chapter_three_is_whole() -> None:
     assert [row.name for row in CHAPTERS["chapter3"]] == [f"M{k}" for k in range(1, 20)]
+
+
+@pytest.mark.parametrize("chapter", sorted(CHAPTERS))
+def test_the_figures_kept_in_studies_are_those_of_the_rows(chapter: str) -> None:
+    """`smajax figures chapter3 --out studies/chapter3` writes them anew."""
+    folder = Path(__file__).parents[1] / "studies" / chapter
+    drawn = []
+    for row in CHAPTERS[chapter]:
+        kept = json.loads((folder / f"{row.name}.json").read_text(encoding="utf-8"))
+        assert (kept["id"], kept["where"], kept["system"], kept["claim"]) == (
+            row.name,
+            row.where,
+            row.system,
+            row.claim,
+        )
+        assert (folder / f"{row.name}.png").stat().st_size > 10_000
+        drawn.append(Drawn(row, kept["holds"], kept["found"], kept["caveat"]))
+    assert (folder / "README.md").read_text(encoding="utf-8") == as_markdown(drawn)
+    assert (folder / "index.html").read_text(encoding="utf-8") == as_page(drawn)
 
 
 def test_an_unknown_figure_is_answered_with_the_list() -> None:

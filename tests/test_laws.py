@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from smajax.parameters import set_parameters
+from smajax.parameters import get_parameters, set_parameters, set_vector
 from smajax.presets import build
 from smajax.simulate import simulate
 from smajax.system import System
@@ -198,6 +198,60 @@ def test_strain_coupon_inverts_the_stress_coupon(temperature: list[float], stres
     back = RUN(_with(STRAINED, law), {"temperature": jnp.asarray(_path(temperature)), "strain": there.strain}, 1.0)
     np.testing.assert_allclose(back.martensite_fraction, there.martensite_fraction, atol=1e-5)
     np.testing.assert_allclose(back.stress, there.stress, atol=2e4)
+
+
+@settings(max_examples=12, deadline=None)
+@given(
+    temperature=TEMPERATURES,
+    strain=st.lists(st.floats(-0.02, 0.06), min_size=7, max_size=7),
+    law=st.sampled_from(NAMES),
+)
+def test_a_strained_wire_that_goes_slack_comes_back_on_its_law(
+    temperature: list[float], strain: list[float], law: str
+) -> None:
+    """Free or held shorter than it is the wire carries nothing and transforms on; taut it obeys sigma = E (...)."""
+    system = _with(STRAINED, law, form=IntegratedForm(), stiffness=Mixed())
+    held = np.concatenate([np.zeros(1), _path(strain)])
+    heat = np.concatenate([[23.0], _path(temperature)])
+    run = RUN(system, {"temperature": jnp.asarray(heat), "strain": jnp.asarray(held)}, 1.0)
+    xi, stress = np.asarray(run.martensite_fraction), np.asarray(run.stress)
+    assert np.isfinite(stress).all()
+    assert stress.min() >= 0.0
+    assert xi.min() >= 0.0
+    assert xi.max() <= 1.0
+    slack = stress <= 0.0
+    # The wire's own strain is at least the one it is held at, and that one where it is taut.
+    assert np.all(np.asarray(run.strain) >= held - 1e-9)
+    np.testing.assert_allclose(np.asarray(run.strain)[~slack], held[~slack], rtol=0.0, atol=1e-9)
+    c = system.wire.constitutive
+    modulus = c.stiffness.young_modulus(c.young_modulus_austenite, c.young_modulus_martensite, run.martensite_fraction)
+    own = np.asarray(run.strain) - float(c.recoverable_strain) * np.asarray(run.detwinned_fraction)
+    thermal = float(c.thermal_modulus) * (heat - float(system.wire.heat.ambient_temperature))
+    offset = own - (stress - thermal) / modulus
+    np.testing.assert_allclose(offset, offset[0], rtol=0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("rig", ["arm", "dead_weight"])
+def test_a_run_in_a_batch_is_the_run_alone(rig: str) -> None:
+    """Voltage, a parameter of each part and the start differ from lane to lane; the other lanes must not be felt."""
+    wire = "niti_table_3_1" if rig == "arm" else "flexinol_table_3_2"
+    system = build(wire, rig, "amplified_voltage")
+    names = [
+        "convection_coefficient",
+        "stress_slope_austenite",
+        "young_modulus_martensite",
+        "damping",
+        "amplifier_gain",
+    ]
+    at = get_parameters(system, names)
+    rows = at * jnp.asarray(np.random.default_rng(3).uniform(0.8, 1.25, (8, len(names))))
+    volts = jnp.linspace(2.0, 12.0, 8)[:, None] * jnp.where(jnp.arange(301) < 200, 1.0, 0.3)
+    one = eqx.filter_jit(lambda row, volt: simulate(set_vector(system, names, row), {"voltage": volt}, 0.02))
+    many = eqx.filter_jit(jax.vmap(one))(rows, volts)
+    for lane in range(8):
+        alone = one(rows[lane], volts[lane])
+        np.testing.assert_allclose(many.position[lane], alone.position, rtol=0.0, atol=1e-8)
+        np.testing.assert_allclose(many.martensite_fraction[lane], alone.martensite_fraction, rtol=0.0, atol=1e-8)
 
 
 def test_conditions_as_table_3_3_prints_them_transform_nothing_under_a_constant_load() -> None:

@@ -128,12 +128,18 @@ class Search:
         system = dataclasses.replace(self.problem.system, effects=kept)
         return Problem.build(system, self.problem.batch, self.problem.noise_sigma, self.problem.offset)
 
-    def fit(self, starts: Sequence[Start], what: str, **settings: float) -> tuple[list[Solution], np.ndarray]:
-        """Fit every start in one go: (solutions with full parameter vectors, misfit of all runs at each, (S, R, N))."""
-        together = [name for name in self.candidates if any(name in start.effects for start in starts)]
+    def fit(
+        self, starts: Sequence[Start], what: str, within: Sequence[Start] = (), **settings: float
+    ) -> tuple[list[Solution], np.ndarray]:
+        """Fit every start in one go: (solutions with full parameter vectors, misfit of all runs at each, (S, R, N)).
+
+        `within` are fits of before that had room for these: the program compiled for them is used again.
+        """
+        shaping = (*starts, *within)
+        together = [name for name in self.candidates if any(name in start.effects for start in shaping)]
         problem = self.restricted(together)
         # At least one slot: with nothing free it is a dummy, and the fit returns its start.
-        slots = max(1, *(len(self.free(start.effects)) for start in starts))
+        slots = max(1, *(len(self.free(start.effects)) for start in shaping))
         index = [self.problem.names.index(name) for name in problem.names] + [len(self.problem.names)]
         lanes = []
         for start in starts:
@@ -155,7 +161,9 @@ class Search:
     def rmse(self, misfit: np.ndarray) -> float:
         return float(np.sqrt((misfit**2).sum() / np.asarray(self.problem.batch.mask).sum()))
 
-    def judged(self, fitted: Sequence[Fitted], present: Model | None = None) -> list[Model]:
+    def judged(
+        self, fitted: Sequence[Fitted], present: Model | None = None, within: Sequence[Start] = ()
+    ) -> list[Model]:
         """Leave each fit run out in turn, refit to the others, and predict the one left out.
 
         A fold starts at the fit to all runs and is tied to it, each parameter to within about `LOOSE` of its unbounded
@@ -172,7 +180,9 @@ class Search:
             for entry, level in zip(fitted, levels, strict=True)
             for run in folds
         ]
-        _, found = self.fit(starts, "predicting runs left out", legs=3, enough=5e-3, start_cost=NEARLY_GAUSS_NEWTON)
+        _, found = self.fit(
+            starts, "predicting runs left out", within, legs=3, enough=5e-3, start_cost=NEARLY_GAUSS_NEWTON
+        )
         models = []
         for place, entry in enumerate(fitted):
             own = found[place * len(folds) : (place + 1) * len(folds)]
@@ -218,14 +228,14 @@ class Search:
             told.append(float(trace @ trace) * TOLD**2 > level)
         return np.asarray(told)
 
-    def better(self, new: Model, old: Model) -> tuple[bool, str]:
-        """Does `new` predict left-out runs better, beyond its extra coefficients and beyond chance?"""
+    def better(self, new: Model, old: Model, chance: float = CHANCE) -> tuple[bool, str]:
+        """Does `new` predict left-out runs better, beyond its extra coefficients and beyond `chance` standard errors?"""
         extra = len(self.free(new.effects)) - len(self.free(old.effects))
         gain = 1.0 - (new.left_out_rmse / old.left_out_rmse) ** 2
         z = _paired(old.left_out, new.left_out, np.asarray(self.problem.batch.mask))
         # The fit itself must gain as well: a left-out run of its own kind can favour a needless coefficient by luck.
         fitted = 1.0 - new.cost / old.cost if old.cost > 0.0 else 0.0
-        enough = min(gain, fitted) > PENALTY * extra and z > CHANCE
+        enough = min(gain, fitted) > PENALTY * extra and z > chance
         left_out = "left-out runs" if len(old.left_out) > 1 else "the one fit run itself"
         told = (
             f"error on {left_out} {self.shown(old.left_out_rmse)} -> {self.shown(new.left_out_rmse)} "
@@ -308,7 +318,7 @@ def search(setting: Search, base: Solution) -> tuple[Model, Model]:
         alone = next((entry for entry in weighed if len(entry.effects) == len(model.effects) + 1), taken[0])
         if alone not in taken:  # a pair is never added without its best single effect having had its chance
             taken = [*taken[:-1], alone]
-        judged = setting.judged(polished(setting, taken), model)
+        judged = setting.judged(polished(setting, taken, starts), model, starts)
         if number == 1 and problem.batch.output.shape[0] > 1:
             for entry in judged:
                 if len(entry.effects) == 1:
@@ -339,10 +349,12 @@ def refined(setting: Search, model: Model) -> Model:
     return dataclasses.replace(model, values=best.values, cost=best.cost) if best.cost < model.cost else model
 
 
-def polished(setting: Search, fitted: Sequence[Fitted]) -> list[Fitted]:
+def polished(setting: Search, fitted: Sequence[Fitted], within: Sequence[Start]) -> list[Fitted]:
     """The same fits taken to their optimum: a fit stopped short looks worse on left-out runs than its model is."""
     starts = [Start(entry.effects, entry.solution.values) for entry in fitted]
-    solutions, _ = setting.fit(starts, "polishing the best", legs=3, enough=1e-4, start_cost=NEARLY_GAUSS_NEWTON)
+    solutions, _ = setting.fit(
+        starts, "polishing the best", within, legs=3, enough=1e-4, start_cost=NEARLY_GAUSS_NEWTON
+    )
     return [Fitted(entry.effects, new) for entry, new in zip(fitted, solutions, strict=True)]
 
 
@@ -385,18 +397,20 @@ def pruned(setting: Search, model: Model) -> Model:
             for name in setting.coefficients(effect):
                 values[names.index(name)] = _base(name)
             starts.append(Start(rest, values))
-        solutions, _ = setting.fit(starts, "taking effects out again", legs=3)
+        all_of_it = [Start(model.effects, model.values)]
+        solutions, _ = setting.fit(starts, "taking effects out again", all_of_it, legs=3)
         whole = Fitted(model.effects, Solution(model.values, model.cost, True, 0))
         kept, *judged = setting.judged(
             [whole, *(Fitted(begun.effects, solution) for begun, solution in zip(starts, solutions, strict=True))]
         )
-        # The rule by which an effect is added: what only the run left out tells of it counts neither for nor against.
+        # What only the run left out tells of it counts neither for nor against. It has been added beyond chance, alone
+        # or with another: it goes when the left-out runs are predicted as well without it, its coefficients counted.
         credited = [setting.credited(whole, kept, entry) for entry in judged]
         for entry in judged:
             gone = next(name for name in model.effects if name not in entry.effects)
             setting.evidence[gone].without_left_out_rmse = entry.left_out_rmse
         against = {entry.effects: new for entry, new in zip(judged, credited, strict=True)}
-        needless = [entry for entry in judged if not setting.better(against[entry.effects], entry)[0]]
+        needless = [entry for entry in judged if not setting.better(against[entry.effects], entry, chance=0.0)[0]]
         if not needless:
             break
         best = min(needless, key=lambda m: m.left_out_rmse)
