@@ -9,6 +9,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
+from smajax.controller.backstepping_one import BacksteppingOne
+from smajax.controller.backstepping_two import BacksteppingTwo
 from smajax.controller.stress_sliding import StressSliding
 from smajax.drive.base import AbstractDrive
 from smajax.drive.current import Current
@@ -222,12 +224,16 @@ DRIVES: dict[str, Callable[[], AbstractDrive]] = {
 }
 
 
+def _needs_arm(system: System, control: str) -> Arm:
+    if not isinstance(system.load, Arm):
+        raise ValueError(f"{control} control is derived for the arm, not for {type(system.load).__name__}.")
+    return system.load
+
+
 def stress_sliding(system: System) -> StressSliding:
     """Stress-based sliding control of the arm (sec. 4.7) that knows its arm; the source prints no gains."""
-    if not isinstance(system.load, Arm):
-        raise ValueError(f"stress-based sliding control is derived for the arm, not for {type(system.load).__name__}.")
     return StressSliding(
-        arm=system.load,
+        arm=_needs_arm(system, "stress-based sliding"),
         cross_section=cross_section(system.wire),
         surface_slope=3.0,
         gain=8.5e-3,
@@ -237,6 +243,18 @@ def stress_sliding(system: System) -> StressSliding:
         stress_derivative_gain=0.0,
         largest_voltage=8.7,
     )
+
+
+def backstepping_one(system: System) -> BacksteppingOne:
+    """Backstepping, approach I (sec. 4.8.1), that knows its plant; gains from `studies/gains/backstepping_one.py`."""
+    _needs_arm(system, "backstepping")
+    return BacksteppingOne(believed=system, damping_gain=1.8, stress_gain=120.0, largest_voltage=8.7)
+
+
+def backstepping_two(system: System) -> BacksteppingTwo:
+    """Backstepping, approach II (sec. 4.8.2), that knows its plant; gains from `studies/gains/backstepping_two.py`."""
+    _needs_arm(system, "backstepping")
+    return BacksteppingTwo(believed=system, damping_gain=1.7, temperature_gain=99.0, largest_voltage=8.7)
 
 
 def build(wire: str, load: str, drive: str) -> System:
