@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from smajax.figures.backstepping_runs import ON_ITS_PLANT, on_heating_curve, plant, runs, stacked
-from smajax.figures.drawing import BLUE, GREY, RED, keyed, named, panels
+from smajax.figures.drawing import BLUE, GREY, RED, keyed, named, styled
 from smajax.figures.row import Result, Row
 from smajax.parameters import set_parameters
 from smajax.presets import backstepping_two
@@ -48,7 +48,7 @@ def derived(gain: np.ndarray, epsilon: np.ndarray) -> np.ndarray:
 
 def work(fast: bool) -> Result:
     """The two conditions over (K, epsilon); runs from a grid of angles and velocities for each K."""
-    gains, epsilons = np.meshgrid(np.linspace(-1.0, 12.0, 131), np.linspace(-0.985, 0.985, 198))
+    gains, epsilons = np.meshgrid(np.linspace(-1.0, 12.0, 261), np.linspace(-0.9925, 0.9925, 398))
     decays = np.asarray(jax.vmap(smallest_decay)(jnp.asarray(gains.ravel()), jnp.asarray(epsilons.ravel())))
     falls = (decays > 0.0).reshape(gains.shape)
     said, right = printed(gains, epsilons), derived(gains, epsilons)
@@ -77,38 +77,27 @@ def work(fast: bool) -> Result:
     mistaken = float(wrong.sum() / said.sum())
 
     def draw(figure: Figure) -> None:
-        left, right_panel = panels(figure, 1, 2)
-        left.contourf(gains, epsilons, falls, levels=[0.5, 1.5], colors=[BLUE], alpha=0.25)
-        left.contour(gains, epsilons, falls, levels=[0.5], colors=[BLUE])
-        left.contour(gains, epsilons, said, levels=[0.5], colors=[RED], linestyles="--")
-        left.plot([], [], color=BLUE, label="dV/dt < 0 (by derivatives)")
-        left.plot([], [], color=RED, linestyle="--", label="eq. 4.82, 4.84 as printed")
-        keyed(left)
-        named(left, "K (1/s)", "epsilon")
+        figure.set_layout_engine("constrained")
+        grid_of = figure.add_gridspec(2, len(tried))
+        (top,) = styled(figure.add_subplot(grid_of[0, :]))
+        top.contourf(gains, epsilons, falls, levels=[0.5, 1.5], colors=[BLUE], alpha=0.25)
+        top.contour(gains, epsilons, said, levels=[0.5], colors=[RED], linestyles="--")
+        top.plot([], [], color=BLUE, linewidth=6, alpha=0.25, label="dV/dt < 0 (by derivatives)")
+        top.plot([], [], color=RED, linestyle="--", label="within: eq. 4.82, 4.84 as printed")
+        top.axvline(0.0, color=GREY, linewidth=0.8)
+        keyed(top)
+        named(top, "K (1/s)", "epsilon")
         for k, gain in enumerate(tried):
+            (axes,) = styled(figure.add_subplot(grid_of[1, k]))
             for ok, one in zip(there, grid, strict=True):
                 if one[0] == gain:
-                    right_panel.plot(
-                        one[1] + (k - 0.5 * (len(tried) - 1)) * 1.6,
-                        one[2] + (k - 0.5 * (len(tried) - 1)) * 0.05,
-                        "o" if ok else "x",
-                        color=[GREY, BLUE, BLUE, BLUE, BLUE, RED][k]
-                        if len(tried) == 6
-                        else [GREY, BLUE, BLUE, BLUE, RED][k],
-                        markersize=4,
-                    )
-        label = ", ".join(f"{gain:g}" for gain in tried)
-        named(
-            right_panel,
-            "x_1 at the start (°)",
-            "x_2 at the start (rad/s)",
-            f"K = {label} 1/s from left to right; x: does not converge",
-        )
+                    axes.plot(one[1], one[2], "o" if ok else "x", color=BLUE if ok else RED, markersize=4)
+            named(axes, "x_1 (°)", "x_2 (rad/s)" if k == 0 else " ", f"K = {gain:g} 1/s")
 
     return Result(
         holds=agree and bool(min(share[gain] for gain in inside) == 1.0) and share[0.0] < 0.5,
         found=f"dV/dt < 0 over exactly eps < 4 K/(4 + K^2), 0 < eps < 1, so the equation of motion is stable for every K > 0; the printed condition "
-        f"allows {100.0 * mistaken:.0f} % too much of its region. From {len(angles) * len(rates)} starts the loop converges in "
+        f"allows {100.0 * mistaken:.0f} % too much of its region. From {len(angles) * len(rates)} starts the loop converges (o, and x where not) in "
         f"{', '.join(f'{100.0 * value:.0f} % (K = {gain:g})' for gain, value in share.items())} of cases",
         numbers={
             "derived_equals_numeric": float(agree),
@@ -118,9 +107,10 @@ def work(fast: bool) -> Result:
             "damping_over_inertia_1/s": damping_rate,
         },
         draw=draw,
-        caveat=f"{ON_ITS_PLANT}. The matrix of eq. 4.83 has -K eps where -eps belongs, and a factor 1/2 too many; from that matrix the printed "
-        "determinant (4.84) is worked out correctly. The loop adds what the printed analysis leaves out: eq. 4.76 puts the wanted acceleration in the "
-        f"place of the true one, so that above K = c/I = {damping_rate:.0f} 1/s an arm at rest asks for the wrong curve.",
+        caveat=f"{ON_ITS_PLANT}. The matrix of eq. 4.83 has -K eps where -eps belongs, and a factor 1/2 too many. The determinant of "
+        "eq. 4.84 is worked out rightly from that matrix; as it stands the condition allows even K < 0. The loop adds what the analysis leaves out: "
+        f"eq. 4.76 puts the wanted acceleration in the place of the true one, so that above K = c/I = {damping_rate:.0f} 1/s an arm at rest asks "
+        "for the wrong curve, and stays.",
     )
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from smajax.figures import (
+    c12_stress_sliding,
+    c13_stress_follows,
     c14_backstepping_one,
     c15_backstepping_two,
     c16_gain_of_the_rate,
@@ -57,6 +59,8 @@ CHAPTERS: dict[str, tuple[Row, ...]] = {
         m19_stress_strain.ROW,
     ),
     "chapter4": (
+        c12_stress_sliding.ROW,
+        c13_stress_follows.ROW,
         c14_backstepping_one.ROW,
         c15_backstepping_two.ROW,
         c16_gain_of_the_rate.ROW,
