@@ -6,13 +6,13 @@ import jax
 import numpy as np
 from matplotlib.figure import Figure
 
-from smajax.figures.backstepping_runs import degrees, runs
 from smajax.figures.drawing import BLUE, GREY, RED, keyed, named, panels
 from smajax.figures.rigs import arm
 from smajax.figures.row import Result, Row
+from smajax.figures.set_points import at_set_points
 from smajax.presets import quick_stress_sliding
 
-TARGET, SECONDS = 45.0, 10.0
+TARGET = 45.0
 AFTER = 2.5  # s: the arm has arrived
 
 
@@ -20,11 +20,10 @@ def work(fast: bool) -> Result:
     """One run; the stress wanted is worked out again from what the controller was told."""
     system = arm()
     tuned = quick_stress_sliding(system)
-    loops, merits = runs([system], [tuned], [TARGET], fast, SECONDS)
-    one = jax.tree.map(lambda series: series[0], loops)
+    one, judged = at_set_points(tuned, [TARGET], fast)[TARGET]
     wanted = np.asarray(jax.vmap(tuned.stress_wanted)(one.measured, one.wanted)) / 1e6
     stress, time = one.run.stress / 1e6, one.run.time
-    reach = float(merits.reach_time[0])
+    reach = float(judged.reach_time)
     transforming = one.run.martensite_fraction < 0.999
     off = np.abs(stress - wanted)
     moving = transforming & (time < reach)
@@ -33,7 +32,7 @@ def work(fast: bool) -> Result:
     largest = float(off[moving].max())
     late = float(np.abs(stress - wanted)[time > AFTER].max())
     span = float(stress.max() - stress[0])
-    angle = degrees(loops)[0]
+    angle = np.degrees(one.run.position)
 
     def draw(figure: Figure) -> None:
         top, middle, low = panels(figure, 3, 1, share=True)

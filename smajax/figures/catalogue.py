@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from smajax.figures import (
+    c11_sliding_against_pid,
     c12_stress_sliding,
     c13_stress_follows,
     c14_backstepping_one,
@@ -59,6 +60,7 @@ CHAPTERS: dict[str, tuple[Row, ...]] = {
         m19_stress_strain.ROW,
     ),
     "chapter4": (
+        c11_sliding_against_pid.ROW,
         c12_stress_sliding.ROW,
         c13_stress_follows.ROW,
         c14_backstepping_one.ROW,

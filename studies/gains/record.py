@@ -1,49 +1,81 @@
-"""What a search for gains was and what it found -> a JSON file beside its script."""
+"""A search for gains with its record: what was searched, over what, and what came out, as JSON beside the script."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 
-from smajax.gain_search import Found
+from smajax.controller.base import AbstractController
+from smajax.figures.rigs import arm
+from smajax.gain_search import search_gains
+from smajax.merit import Merit
+from smajax.system import System
+from smajax.types import Scalar
 
+Cost = Callable[[Merit, float], Scalar]
 HERE = Path(__file__).parent
 
 
-def rounded(gains: Mapping[str, float]) -> dict[str, float]:
-    """Gains to two digits: what a preset uses."""
-    return {name: float(f"{value:.2g}") for name, value in gains.items()}
+def or_never(time: Scalar, seconds: float) -> Scalar:
+    """A time, or twice the run where it is never."""
+    return jnp.where(jnp.isfinite(time), time, 2.0 * seconds)
 
 
-def write(
-    name: str, found: Found, box: Mapping[str, tuple[float, float]], targets: Sequence[float], **said: Any
-) -> None:
-    """Print the search and write it to `name`.json; `targets` in degrees, `said` is what else belongs to it."""
-    merits = {
-        "settling_time_s": found.merits.settling_time,
-        "overshoot_deg": np.degrees(found.merits.overshoot),
-        "steady_error_deg": np.degrees(found.merits.steady_error),
-    }
+def searched(
+    controller: AbstractController,
+    box: Mapping[str, tuple[float, float]],
+    targets_deg: Sequence[float],
+    cost: Cost,
+    *,
+    system: System | None = None,
+    seconds: float = 10.0,
+    candidates: int = 128,
+    rounds: int = 8,
+    seed: int = 0,
+) -> dict[str, Any]:
+    """The record of one search, on the arm where no `system` is given, gains to three digits as the presets have them."""
+    targets = [float(np.radians(angle)) for angle in targets_deg]
+    found = search_gains(
+        system or arm(),
+        controller,
+        box,
+        targets,
+        seconds=seconds,
+        candidates=candidates,
+        rounds=rounds,
+        seed=seed,
+        cost=cost,
+        dt=0.01,
+    )
     record = {
-        "box": {gain: list(bounds) for gain, bounds in box.items()},
-        "targets_deg": list(targets),
-        **said,
+        "cost_is": (cost.__doc__ or "").strip(),
+        "box": {name: list(bounds) for name, bounds in box.items()},
+        "targets_deg": list(targets_deg),
+        "seconds": seconds,
+        "seed": seed,
         "tried": found.tried,
-        "cost": round(found.cost, 3),
-        "found": found.gains,
-        "gains": rounded(found.gains),
-        "by_target": {key: [round(float(value), 3) for value in values] for key, values in merits.items()},
+        "cost": round(found.cost, 4),
+        "gains": {name: float(f"{value:.3g}") for name, value in found.gains.items()},
+        "reach_time_s": np.round(np.asarray(found.merits.reach_time), 2).tolist(),
+        "settling_time_s": np.round(np.asarray(found.merits.settling_time), 2).tolist(),
+        "overshoot_deg": np.round(np.degrees(np.asarray(found.merits.overshoot)), 2).tolist(),
+        "steady_error_deg": np.round(np.degrees(np.asarray(found.merits.steady_error)), 3).tolist(),
     }
-    text = json.dumps(record, indent=2)
+    return record
+
+
+def main(name: str, searches: Callable[[], dict[str, dict[str, Any]]]) -> None:
+    """Run the searches of one controller, print them, and write `<name>.json`."""
+    jax.config.update("jax_enable_x64", True)
+    # A time that is never has no number in JSON; a list stays on its line.
+    text = json.dumps(searches(), indent=2).replace("Infinity", '"never"')
+    text = re.sub(r"\[[^\[\]]*\]", lambda found: f"[{' '.join(found[0][1:-1].split())}]", text)
     print(text)
     (HERE / f"{name}.json").write_text(text + "\n", encoding="utf-8")
-
-
-def read(name: str) -> dict[str, Any]:
-    """The record of a search. OSError when it was never made."""
-    record: dict[str, Any] = json.loads((HERE / f"{name}.json").read_text(encoding="utf-8"))
-    return record

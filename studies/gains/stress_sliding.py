@@ -1,14 +1,13 @@
-"""Gains of stress-based sliding control: one set for all set points. `python -m studies.gains.stress_sliding`."""
+"""Gains of stress-based sliding control in chapter 4: `python -m studies.gains.stress_sliding` (a minute)."""
 
 from __future__ import annotations
 
-import jax
-import numpy as np
+from typing import Any
 
 from smajax.figures.rigs import arm
-from smajax.gain_search import search_gains
+from smajax.gain_search import regulation_cost
 from smajax.presets import quick_stress_sliding
-from studies.gains.record import write
+from studies.gains.record import main, searched
 
 # A stress known to 1 MPa is what an estimator gives: 1e-6 V/Pa answers that with one volt.
 BOX = {
@@ -19,25 +18,14 @@ BOX = {
     "stress_integral_gain": (1e-8, 5e-6),
     "stress_derivative_gain": (1e-10, 1e-7),
 }
-TARGETS = (-40.0, -20.0, 0.0, 20.0, 40.0, 60.0)
-SECONDS, SEED = 10.0, 0
+TARGETS = [-40.0, -20.0, 0.0, 20.0, 40.0, 60.0]  # degrees
 
 
-def main() -> None:
-    jax.config.update("jax_enable_x64", True)
-    system = arm()
-    found = search_gains(
-        system,
-        quick_stress_sliding(system),
-        BOX,
-        list(np.radians(TARGETS)),
-        seconds=SECONDS,
-        candidates=44,
-        rounds=10,
-        seed=SEED,
-    )
-    write("stress_sliding", found, BOX, TARGETS, seconds=SECONDS, seed=SEED)
+def searches() -> dict[str, dict[str, Any]]:
+    """The one search: one set of gains for all set points."""
+    controller = quick_stress_sliding(arm())
+    return {"tuned_everywhere": searched(controller, BOX, TARGETS, regulation_cost, candidates=44, rounds=10)}
 
 
 if __name__ == "__main__":
-    main()
+    main("stress_sliding", searches)
