@@ -55,13 +55,14 @@ def simulate_closed_loop(
     key: jax.Array | None = None,
     delay: int = 0,
     disturbance: Mapping[str, Series] | None = None,
+    initial: State | None = None,
 ) -> ClosedLoop:
     """Simulate over the samples of `wanted` (rad or m), `dt` seconds apart; the controller is called `every` samples.
 
     Its command is held in between, as a digital controller holds it, and reaches the amplifier `delay` control periods
     later. Without an `estimator` it is told the true state, with the position as `sensor` (with noise drawn from `key`)
     reads it. `disturbance` are further inputs of the system, such as `load_torque` or `ambient_temperature`, each of
-    shape (n,). A plain array for `wanted` means set points (`reference.resting`).
+    shape (n,). A plain array for `wanted` means set points (`reference.resting`). `initial` defaults to rest.
 
     Raises ValueError when a gain or parameter lies outside its bounds (where values are known: outside of `jit`),
     when `wanted` has not a whole number of control periods and one sample more, and when noise has no `key`.
@@ -95,7 +96,8 @@ def simulate_closed_loop(
     acting = {name: series[:-1].reshape(periods, every) for name, series in disturbance.items()}
     first = jax.tree.map(lambda series: series[0], wanted)
     zero = jnp.zeros(())
-    state = initial_state(system, {**system.drive.from_voltage(zero), **{k: v[0] for k, v in disturbance.items()}})
+    at_rest = {**system.drive.from_voltage(zero), **{name: series[0] for name, series in disturbance.items()}}
+    state = initial_state(system, at_rest) if initial is None else initial
 
     def seen(state: State, noise: Scalar) -> Scalar:
         return state.reading if sensor is None else sensor.reading(state.reading, noise)

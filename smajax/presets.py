@@ -9,7 +9,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
+from smajax.controller.backstepping_one import BacksteppingOne
+from smajax.controller.backstepping_two import BacksteppingTwo
+from smajax.controller.pid import Pid
 from smajax.controller.stress_sliding import StressSliding
+from smajax.controller.temperature_vsc import Passing, TemperatureVsc
+from smajax.controller.vsc1 import Vsc1
+from smajax.controller.vsc2 import Vsc2
+from smajax.controller.vsc3 import Vsc3
 from smajax.drive.base import AbstractDrive
 from smajax.drive.current import Current
 from smajax.drive.duty import Duty
@@ -222,12 +229,19 @@ DRIVES: dict[str, Callable[[], AbstractDrive]] = {
 }
 
 
-def stress_sliding(system: System) -> StressSliding:
-    """Stress-based sliding control of the arm (sec. 4.7) that knows its arm; the source prints no gains."""
+def _needs_arm(system: System, control: str) -> Arm:
     if not isinstance(system.load, Arm):
-        raise ValueError(f"stress-based sliding control is derived for the arm, not for {type(system.load).__name__}.")
+        raise ValueError(f"{control} control is derived for the arm, not for {type(system.load).__name__}.")
+    return system.load
+
+
+def stress_sliding(system: System) -> StressSliding:
+    """Stress-based sliding control of the arm (sec. 4.7) as chapter 3 uses it; the source prints no gains.
+
+    Slow enough that the loading below the angle of greatest stress stays simple (M8).
+    """
     return StressSliding(
-        arm=system.load,
+        arm=_needs_arm(system, "stress-based sliding"),
         cross_section=cross_section(system.wire),
         surface_slope=3.0,
         gain=8.5e-3,
@@ -236,6 +250,96 @@ def stress_sliding(system: System) -> StressSliding:
         stress_integral_gain=2.5e-7,
         stress_derivative_gain=0.0,
         largest_voltage=8.7,
+    )
+
+
+def quick_stress_sliding(system: System) -> StressSliding:
+    """The same for chapter 4; gains: studies/gains/stress_sliding.json.
+
+    A preset of its own: with these gains the stress rises and falls within a step to a set point, and the laws, which
+    M8 finds agreeing, come 6 degrees apart.
+    """
+    quick = {
+        "surface_slope": 16.2,
+        "gain": 6.67e-3,
+        "boundary": 0.783,
+        "stress_gain": 5.21e-7,
+        "stress_integral_gain": 3.71e-6,
+        "stress_derivative_gain": 8.35e-10,
+    }
+    return set_parameters(stress_sliding(system), quick)
+
+
+def backstepping_one(system: System) -> BacksteppingOne:
+    """Backstepping, approach I (sec. 4.8.1), that knows its plant; gains: studies/gains/backstepping_one.json."""
+    _needs_arm(system, "backstepping")
+    return BacksteppingOne(believed=system, damping_gain=1.76, stress_gain=121.0, largest_voltage=8.7)
+
+
+def backstepping_two(system: System) -> BacksteppingTwo:
+    """Backstepping, approach II (sec. 4.8.2), that knows its plant; gains: studies/gains/backstepping_two.json."""
+    _needs_arm(system, "backstepping")
+    return BacksteppingTwo(believed=system, damping_gain=1.67, temperature_gain=99.3, largest_voltage=8.7)
+
+
+# By the set point at which they were tuned, deg: studies/gains/pid.json, `tuned_at_...`.
+PID_TUNED_AT: dict[int, dict[str, float]] = {
+    0: {"proportional_gain": 19.2, "integral_gain": 8.56, "derivative_gain": 1.85},
+    10: {"proportional_gain": 16.4, "integral_gain": 6.08, "derivative_gain": 5.39},
+    40: {"proportional_gain": 10.8, "integral_gain": 3.69, "derivative_gain": 3.52},
+}
+
+
+def pid(system: System) -> Pid:
+    """PID with anti-windup for the whole range of the arm: studies/gains/pid.json, `tuned_everywhere`."""
+    return Pid(
+        proportional_gain=21.0, integral_gain=36.8, derivative_gain=2.61, largest_voltage=10.0, unwinding_time=0.02
+    )
+
+
+def pid_tuned_at(system: System, degrees: int) -> Pid:
+    """PID without anti-windup, which the source does not name, tuned at 0, 10 or 40 deg only (Fig. 4.3-4.5)."""
+    if degrees not in PID_TUNED_AT:
+        raise ValueError(f"PID gains were searched at {sorted(PID_TUNED_AT)} deg, not at {degrees}.")
+    return Pid(**PID_TUNED_AT[degrees], largest_voltage=10.0, unwinding_time=1e9)
+
+
+def vsc1(system: System) -> Vsc1:
+    """Simple switch; 10 V and 4 V as printed (sec. 4.4.4)."""
+    return Vsc1(high_voltage=10.0, low_voltage=4.0)
+
+
+def vsc2(system: System) -> Vsc2:
+    """Switch with a layer that settles as nearly in the printed 8 s as any does: studies/gains/vsc.json, `vsc2`."""
+    return Vsc2(high_voltage=10.0, low_voltage=4.0, boundary=0.01)
+
+
+def vsc3(system: System) -> Vsc3:
+    """Modified switch that settles in the printed 3 s at 0 deg: studies/gains/vsc.json, `vsc3`."""
+    return Vsc3(high_voltage=10.0, low_voltage=4.0, surface_slope=0.945, boundary=0.116, rate_filter=0.02)
+
+
+def vsc3_of_section_4_6(system: System) -> Vsc3:
+    """The quicker VSC that overshoots at 50 deg up to A_f', as Fig. 4.14a: studies/gains/vsc.json, `vsc3_of_section_4_6`."""
+    return Vsc3(high_voltage=10.0, low_voltage=4.0, surface_slope=12.6, boundary=0.744, rate_filter=0.02)
+
+
+def temperature_vsc(system: System) -> TemperatureVsc:
+    """NVSC around the VSC of section 4.6, which knows its wire: studies/gains/temperature_vsc.json."""
+    load, law = system.load, system.wire.kinetics
+    if not isinstance(load, Arm):
+        raise ValueError(f"temperature-based VSC is for the arm, not for {type(load).__name__}.")
+    # All austenite: the arm has gone the whole recoverable strain.
+    stroke = system.wire.constitutive.recoverable_strain / load.contraction(system.wire)
+    return TemperatureVsc(
+        vsc=vsc3_of_section_4_6(system),
+        band=Passing(passing_speed=3.64),
+        temperature_band=232.0,
+        temperature_gain=2.17,
+        finish_filter=0.02,
+        finish_temperature=law.austenite_finish,
+        stress_slope=law.stress_slope_austenite,
+        finish_position=load.start_angle + stroke,
     )
 
 

@@ -13,13 +13,16 @@ from smajax.figures.catalogue import CHAPTERS, rows
 from smajax.figures.row import Row
 from smajax.figures.write import Drawn, as_markdown, as_page
 
+# Claims that the source's own equations contradict: the row says so, with numbers.
+CONTRADICTED = {"C19"}
 ROWS = [row for chapter in CHAPTERS.values() for row in chapter]
 
 
 @pytest.mark.parametrize("row", ROWS, ids=[row.name for row in ROWS])
 def test_the_claim_holds(row: Row) -> None:
     result = row.work(True)
-    assert result.holds, f"{row.claim}: {result.found}; {result.numbers}"
+    assert result.holds != (row.name in CONTRADICTED), f"{row.claim}: {result.found}; {result.numbers}"
+    assert result.holds or result.caveat
     assert all(math.isfinite(value) for value in result.numbers.values())
     figure = Figure(figsize=(9.0, 5.6))
     result.draw(figure)

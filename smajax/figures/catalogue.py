@@ -3,6 +3,18 @@
 from __future__ import annotations
 
 from smajax.figures import (
+    c11_sliding_against_pid,
+    c12_stress_sliding,
+    c13_stress_follows,
+    c14_backstepping_one,
+    c15_backstepping_two,
+    c16_gain_of_the_rate,
+    c17_gain_of_the_temperature,
+    c18_wrong_inertia,
+    c19_wrong_damping,
+    c20_wrong_convection,
+    c21_wrong_ambient,
+    c22_stability,
     m01_block_loop,
     m02_partial_transformation,
     m03_full_transformation,
@@ -46,6 +58,20 @@ CHAPTERS: dict[str, tuple[Row, ...]] = {
         m17_four_laws.ROW,
         m18_split.ROW,
         m19_stress_strain.ROW,
+    ),
+    "chapter4": (
+        c11_sliding_against_pid.ROW,
+        c12_stress_sliding.ROW,
+        c13_stress_follows.ROW,
+        c14_backstepping_one.ROW,
+        c15_backstepping_two.ROW,
+        c16_gain_of_the_rate.ROW,
+        c17_gain_of_the_temperature.ROW,
+        c18_wrong_inertia.ROW,
+        c19_wrong_damping.ROW,
+        c20_wrong_convection.ROW,
+        c21_wrong_ambient.ROW,
+        c22_stability.ROW,
     ),
 }
 

@@ -16,13 +16,17 @@ BLUE, RED, GREEN, GREY, BLACK = "#1f6fb2", "#c8553d", "#3f8f5b", "#9aa0a8", "#1d
 def panels(figure: Figure, rows: int, columns: int = 1, share: bool = False) -> list[Axes]:
     """Axes in reading order, in one style; `share` ties the horizontal axes."""
     figure.set_layout_engine("constrained")
-    grid = figure.subplots(rows, columns, sharex=share, squeeze=False)
-    for axes in grid.flat:
+    return styled(*figure.subplots(rows, columns, sharex=share, squeeze=False).flat)
+
+
+def styled(*several: Axes) -> list[Axes]:
+    """The same axes in the one style."""
+    for axes in several:
         axes.spines[["top", "right"]].set_visible(False)
         axes.tick_params(labelsize=9)
         axes.grid(True, color="#eceef1", linewidth=0.7)
         axes.set_axisbelow(True)
-    return list(grid.flat)
+    return list(several)
 
 
 def named(axes: Axes, horizontal: str, vertical: str, title: str = "") -> None:

@@ -1,0 +1,51 @@
+"""C19: approach II that believes in a wrong damping (Fig. 4.24)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from smajax.figures.backstepping_runs import ON_ITS_PLANT, draw_sweep, draw_voltages, plant, runs
+from smajax.figures.row import Result, Row
+from smajax.parameters import set_parameters
+from smajax.presets import backstepping_two
+
+RATIOS = (0.8, 0.9, 0.95, 1.0, 1.05, 1.1)
+TARGET = 20.0
+
+
+def work(fast: bool) -> Result:
+    """One batch over the damping believed in."""
+    system = plant()
+    tuned = backstepping_two(system)
+    damping, inertia = float(system.load.damping), float(system.load.inertia({}))
+    swept = [set_parameters(tuned, {"damping": ratio * damping}) for ratio in RATIOS]
+    loops, merits = runs([system] * len(RATIOS), swept, [TARGET] * len(RATIOS), fast)
+    overshoot, reach = np.degrees(merits.overshoot), merits.reach_time
+    shift = 0.1 * damping / inertia
+    names = [f"{ratio:g} c" for ratio in RATIOS]
+    strong = bool(overshoot[5] > 10.0 + overshoot[3] and reach[1] > 1.5 * reach[3])
+    undamped_when_low = bool(overshoot[1] > overshoot[3] > overshoot[5])
+    return Result(
+        holds=strong and undamped_when_low,
+        found=f"10 % of damping changes the run from {overshoot[3]:.1f}° of overshoot and {reach[3]:.1f} s of reach to {overshoot[5]:.0f}° and "
+        f"{reach[5]:.1f} s when too high, and to {overshoot[1]:.1f}° and {reach[1]:.1f} s when too low: strong, but the other way round than claimed",
+        numbers={
+            **{f"overshoot_{r:g}_c_deg": float(o) for r, o in zip(RATIOS, overshoot, strict=True)},
+            **{f"reach_{r:g}_c_s": float(min(t, 99.0)) for r, t in zip(RATIOS, reach, strict=True)},
+            "strong_effect": float(strong),
+            "undamped_when_too_low": float(undamped_when_low),
+        },
+        draw=lambda figure: draw_sweep(figure, loops, names, TARGET, draw_voltages(loops, names)),
+        caveat=f"{ON_ITS_PLANT}. The direction contradicts the source, and follows from its own equations: with c_b in the place of c, "
+        f"eq. 4.70 in eq. 4.55 gives x_1'' + [K + (c - c_b)/I] x_1' + x_1 = 0, so too small a c_b damps more. Here c/I = {damping / inertia:.0f} 1/s: "
+        f"10 % are worth {shift:.1f} 1/s of K. No pair of K from 1 to 15 and K_1 from 1 to 20 1/s turned it round.",
+    )
+
+
+ROW = Row(
+    "C19",
+    "Fig. 4.24",
+    "arm, approach II, the controller's damping wrong",
+    "strong effect: too low acts undamped, too high acts overdamped",
+    work,
+)

@@ -1,0 +1,122 @@
+"""The arm under a controller of chapter 4 at several set points, or with one gain swept: one batch each."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+from matplotlib.axes import Axes
+
+from smajax.closed_loop import ClosedLoop, simulate_closed_loop
+from smajax.controller.base import AbstractController
+from smajax.figures.drawing import BLACK, BLUE, GREEN, GREY, RED, named
+from smajax.figures.rigs import Recorded, arm, austenite_range, recorded
+from smajax.merit import Merit, merit
+from smajax.parameters import set_vector
+from smajax.reference import clock, constant
+from smajax.simulate import DEFAULT_STEP
+from smajax.system import System
+from smajax.types import Scalar
+
+SECONDS, PERIOD = 10.0, 0.01
+BAND_DEG = 1.0  # that of `merit`: within it the arm counts as there
+SHADES = (GREY, GREEN, BLUE, RED, BLACK, "#d9a441", "#7a5fa8")
+
+
+@eqx.filter_jit
+def _batch(
+    system: System,
+    controller: AbstractController,
+    names: tuple[str, ...],
+    gains: Float[Array, "runs names"],
+    targets: Float[Array, " runs"],
+    seconds: float,
+    dt: float,
+) -> tuple[ClosedLoop, Merit]:
+    time = clock(seconds, dt)
+
+    def one(row: Float[Array, " names"], target: Scalar) -> tuple[ClosedLoop, Merit]:
+        tuned = set_vector(controller, names, row)
+        loop = simulate_closed_loop(system, tuned, constant(time, target), dt, round(PERIOD / dt))
+        return loop, merit(loop, system)
+
+    return jax.vmap(one)(gains, targets)
+
+
+def _unstacked(loops: ClosedLoop, merits: Merit, count: int) -> list[tuple[Recorded, Recorded]]:
+    both = recorded(loops), recorded(merits)  # type: ignore[arg-type]
+    return [jax.tree.map(lambda series, k=k: series[k], both) for k in range(count)]
+
+
+def at_set_points(
+    controller: AbstractController, degrees: Sequence[float], fast: bool, seconds: float = SECONDS
+) -> dict[float, tuple[Recorded, Recorded]]:
+    """(run, figures of merit) at each set point, the controller called every 0.01 s; `fast` steps the arm as seldom."""
+    targets = jnp.radians(jnp.asarray(degrees))
+    none = jnp.zeros((len(degrees), 0))
+    found = _batch(arm(), controller, (), none, targets, seconds, PERIOD if fast else DEFAULT_STEP)
+    return dict(zip(degrees, _unstacked(*found, len(degrees)), strict=True))
+
+
+def swept(
+    controller: AbstractController, gain: str, values: Sequence[float], degrees: float, fast: bool
+) -> dict[float, tuple[Recorded, Recorded]]:
+    """(run, figures of merit) for each value of one gain, at one set point."""
+    targets = jnp.full(len(values), jnp.radians(degrees))
+    gains = jnp.asarray(values)[:, None]
+    found = _batch(arm(), controller, (gain,), gains, targets, SECONDS, PERIOD if fast else DEFAULT_STEP)
+    return dict(zip(values, _unstacked(*found, len(values)), strict=True))
+
+
+def overshoot(one: Recorded) -> float:
+    """Degrees."""
+    return float(np.degrees(one.overshoot))
+
+
+def steady(one: Recorded) -> float:
+    """Degrees, mean absolute error of the last fifth."""
+    return float(np.degrees(one.steady_error))
+
+
+def time_of(value: Recorded) -> float:
+    """Seconds for the table, where `never` must be a number: twice the run."""
+    return float(value) if np.isfinite(value) else 2.0 * SECONDS
+
+
+def measures(runs: Mapping[float, tuple[Recorded, Recorded]], prefix: str = "") -> dict[str, float]:
+    """The checked numbers of a batch of set points."""
+    found: dict[str, float] = {}
+    for angle, (_, one) in runs.items():
+        found |= {
+            f"{prefix}reach_at_{angle:g}_deg_s": time_of(one.reach_time),
+            f"{prefix}settling_at_{angle:g}_deg_s": time_of(one.settling_time),
+            f"{prefix}overshoot_at_{angle:g}_deg_deg": overshoot(one),
+            f"{prefix}steady_error_at_{angle:g}_deg_deg": steady(one),
+        }
+    return found
+
+
+def draw_angles(axes: Axes, runs: Mapping[float, tuple[Recorded, Recorded]], style: str = "-", label: str = "") -> None:
+    """Angle over time, one colour a set point, which is dotted."""
+    for colour, (angle, (loop, _)) in zip(SHADES, runs.items(), strict=False):
+        axes.plot(loop.run.time, np.degrees(loop.run.position), style, color=colour, label=f"{label}{angle:g}°")
+        axes.axhline(angle, color=colour, linewidth=0.7, linestyle=":")
+    named(axes, "time (s)", "arm angle (°)")
+
+
+def draw_range(axes: Axes, loop: Recorded, title: str) -> None:
+    """The wire's temperature between A_s' and A_f'."""
+    start, finish = austenite_range(arm(), loop.run.stress)
+    axes.plot(loop.run.time, loop.run.temperature, color=RED, label="wire")
+    axes.plot(loop.run.time, start, "--", color=GREY, label="A_s'")
+    axes.plot(loop.run.time, finish, "-.", color=BLUE, label="A_f'")
+    named(axes, "time (s)", "temperature (°C)", title)
+
+
+def above_finish(loop: Recorded) -> float:
+    """Largest T - A_f', C."""
+    return float((loop.run.temperature - austenite_range(arm(), loop.run.stress)[1]).max())

@@ -1,0 +1,34 @@
+"""Gains of backstepping, approach II: `python -m studies.gains.backstepping_two` (a minute)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from smajax.figures.backstepping_runs import plant
+from smajax.gain_search import regulation_cost
+from smajax.presets import backstepping_two
+from studies.gains.record import main, searched
+
+BOX = {"damping_gain": (0.2, 10.0), "temperature_gain": (1.0, 150.0)}
+TARGETS = [-20.0, 0.0, 20.0, 40.0]  # degrees
+
+
+def searches() -> dict[str, dict[str, Any]]:
+    """The one search: one set of gains for all set points."""
+    system = plant()
+    return {
+        "tuned_everywhere": searched(
+            backstepping_two(system),
+            BOX,
+            TARGETS,
+            regulation_cost,
+            system=system,
+            seconds=15.0,
+            candidates=40,
+            rounds=6,
+        )
+    }
+
+
+if __name__ == "__main__":
+    main("backstepping_two", searches)

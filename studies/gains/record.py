@@ -1,0 +1,81 @@
+"""A search for gains with its record: what was searched, over what, and what came out, as JSON beside the script."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from smajax.controller.base import AbstractController
+from smajax.figures.rigs import arm
+from smajax.gain_search import search_gains
+from smajax.merit import Merit
+from smajax.system import System
+from smajax.types import Scalar
+
+Cost = Callable[[Merit, float], Scalar]
+HERE = Path(__file__).parent
+
+
+def or_never(time: Scalar, seconds: float) -> Scalar:
+    """A time, or twice the run where it is never."""
+    return jnp.where(jnp.isfinite(time), time, 2.0 * seconds)
+
+
+def searched(
+    controller: AbstractController,
+    box: Mapping[str, tuple[float, float]],
+    targets_deg: Sequence[float],
+    cost: Cost,
+    *,
+    system: System | None = None,
+    seconds: float = 10.0,
+    candidates: int = 128,
+    rounds: int = 8,
+    seed: int = 0,
+) -> dict[str, Any]:
+    """The record of one search, on the arm where no `system` is given, gains to three digits as the presets have them."""
+    targets = [float(np.radians(angle)) for angle in targets_deg]
+    found = search_gains(
+        system or arm(),
+        controller,
+        box,
+        targets,
+        seconds=seconds,
+        candidates=candidates,
+        rounds=rounds,
+        seed=seed,
+        cost=cost,
+        dt=0.01,
+    )
+    record = {
+        "cost_is": (cost.__doc__ or "").strip(),
+        "box": {name: list(bounds) for name, bounds in box.items()},
+        "targets_deg": list(targets_deg),
+        "seconds": seconds,
+        "seed": seed,
+        "tried": found.tried,
+        "cost": round(found.cost, 4),
+        "gains": {name: float(f"{value:.3g}") for name, value in found.gains.items()},
+        "reach_time_s": np.round(np.asarray(found.merits.reach_time), 2).tolist(),
+        "settling_time_s": np.round(np.asarray(found.merits.settling_time), 2).tolist(),
+        "overshoot_deg": np.round(np.degrees(np.asarray(found.merits.overshoot)), 2).tolist(),
+        "steady_error_deg": np.round(np.degrees(np.asarray(found.merits.steady_error)), 3).tolist(),
+    }
+    return record
+
+
+def main(name: str, searches: Callable[[], dict[str, dict[str, Any]]]) -> None:
+    """Run the searches of one controller, print them, and write `<name>.json`."""
+    jax.config.update("jax_enable_x64", True)
+    # A time that is never has no number in JSON; a list stays on its line.
+    text = json.dumps(searches(), indent=2).replace("Infinity", '"never"')
+    text = re.sub(r"\[[^\[\]]*\]", lambda found: f"[{' '.join(found[0][1:-1].split())}]", text)
+    print(text)
+    (HERE / f"{name}.json").write_text(text + "\n", encoding="utf-8")
