@@ -11,6 +11,7 @@ from collections.abc import Callable
 
 from smajax.controller.backstepping_one import BacksteppingOne
 from smajax.controller.backstepping_two import BacksteppingTwo
+from smajax.controller.base import AbstractController
 from smajax.controller.pid import Pid
 from smajax.controller.stress_sliding import StressSliding
 from smajax.controller.temperature_vsc import Passing, TemperatureVsc
@@ -341,6 +342,19 @@ def temperature_vsc(system: System) -> TemperatureVsc:
         stress_slope=law.stress_slope_austenite,
         finish_position=load.start_angle + stroke,
     )
+
+
+# Name on the command line -> (preset, its main gain, which a sweep varies).
+CONTROLLERS: dict[str, tuple[Callable[[System], AbstractController], str]] = {
+    "pid": (pid, "proportional_gain"),
+    "vsc1": (vsc1, "high_voltage"),
+    "vsc2": (vsc2, "boundary"),
+    "vsc3": (vsc3, "surface_slope"),
+    "nvsc": (temperature_vsc, "temperature_gain"),
+    "sld": (quick_stress_sliding, "surface_slope"),
+    "backstepping1": (backstepping_one, "damping_gain"),
+    "backstepping2": (backstepping_two, "damping_gain"),
+}
 
 
 def build(wire: str, load: str, drive: str) -> System:

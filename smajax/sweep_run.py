@@ -7,6 +7,7 @@ import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import jax
 import numpy as np
@@ -101,7 +102,7 @@ def _controller(
         found, failed = sweep(system, controller, gain, grid, progress=told, **timing)
         nominal, _ = sweep(system, controller, gain, alone, **timing)
         drawn = {m: lines(system, controller, m, LINES, float(np.radians(LINE_TARGET)), **timing) for m in MISMATCHES}
-        record = {"failed": failed, "time": next(iter(drawn.values()))[0]}
+        record: dict[str, Any] = {"failed": failed, "time": next(iter(drawn.values()))[0]}
         record |= {f"grid_{field}": np.asarray(getattr(found, field)) for field in fields}
         record |= {f"alone_{field}": np.asarray(getattr(nominal, field)).ravel() for field in fields}
         record |= {f"line_{mismatch}": angles for mismatch, (_, angles) in drawn.items()}
@@ -109,15 +110,15 @@ def _controller(
         part = kept.with_suffix(".part.npz")
         np.savez(part, **record)
         part.replace(kept)
-    with np.load(kept) as record:
+    with np.load(kept) as saved:
         one = Swept(
             name,
             gain,
-            Merit(**{field: record[f"grid_{field}"] for field in fields}),
-            record["failed"],
-            {mismatch: record[f"line_{mismatch}"] for mismatch in MISMATCHES},
+            Merit(**{field: saved[f"grid_{field}"] for field in fields}),
+            saved["failed"],
+            {mismatch: saved[f"line_{mismatch}"] for mismatch in MISMATCHES},
         )
-        return Merit(**{field: record[f"alone_{field}"] for field in fields}), one, record["time"]
+        return Merit(**{field: saved[f"alone_{field}"] for field in fields}), one, saved["time"]
 
 
 def as_text(rows: Sequence[Sequence[str]]) -> str:

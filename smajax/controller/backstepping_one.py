@@ -65,7 +65,6 @@ class BacksteppingOne(AbstractController):
     edge: Scalar = parameter(
         "-", 1e-12, 0.5, "distance from the ends of arccos from where on its slope is held", default=1e-6
     )
-    inertia_ratio: Scalar = parameter("-", 0.01, 1e2, "inertia believed in over `believed`'s", default=1.0)
     rest_torque_share: Scalar = parameter(
         "-", 0.0, 1.0, "share of h_0 taken off h: 1 as in eq. 4.70, which moves the equilibrium", default=0.0
     )
@@ -128,4 +127,4 @@ class BacksteppingOne(AbstractController):
         return BacksteppingOneMemory(measured.stress, asked.heating), voltage
 
     def _inertia(self) -> Scalar:
-        return self.inertia_ratio * moving_load(self.believed).inertia({})
+        return moving_load(self.believed).inertia({})

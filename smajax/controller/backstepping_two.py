@@ -64,7 +64,6 @@ class BacksteppingTwo(AbstractController):
     edge: Scalar = parameter(
         "-", 1e-12, 0.5, "distance from the ends of arccos from where on its slope is held", default=1e-6
     )
-    inertia_ratio: Scalar = parameter("-", 0.01, 1e2, "inertia believed in over `believed`'s", default=1.0)
     rest_torque_share: Scalar = parameter(
         "-", 0.0, 1.0, "share of h_0 taken off h: 1 as eq. 4.70 prints, which moves the equilibrium", default=0.0
     )
@@ -136,7 +135,7 @@ class BacksteppingTwo(AbstractController):
         return BacksteppingTwoMemory(asked.heating), voltage
 
     def _inertia(self) -> Scalar:
-        return self.inertia_ratio * moving_load(self.believed).inertia({})
+        return moving_load(self.believed).inertia({})
 
     def _acceleration(self, position: Scalar, velocity: Scalar, wanted: Reference) -> Scalar:
         """theta'' that the stress wanted gives: theta_d'' - x_1 - K x_2."""

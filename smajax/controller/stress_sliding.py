@@ -40,9 +40,6 @@ class StressSliding(AbstractController):
     stress_integral_gain: Scalar = parameter("V/(Pa s)", 0.0, 1.0, "integral gain")
     stress_derivative_gain: Scalar = parameter("V s/Pa", 0.0, 1.0, "derivative gain")
     largest_voltage: Scalar = parameter("V", 0.0, 1e4, "largest command; the smallest is zero")
-    inertia_ratio: Scalar = parameter(
-        "-", 0.01, 1e2, "inertia that the controller believes in over `arm`'s", default=1.0
-    )
 
     def start(self, measured: MeasuredState, wanted: Reference) -> StressSlidingMemory:
         zero = jnp.zeros_like(measured.stress)
@@ -52,7 +49,7 @@ class StressSliding(AbstractController):
         """sigma_d, Pa (eq. 4.44, 4.45); never negative: a wire cannot push."""
         error, rate = measured.position - wanted.position, measured.velocity - wanted.velocity
         surface = limited((rate + self.surface_slope * error) / self.boundary, -1.0, 1.0)
-        inertia = self.inertia_ratio * self.arm.inertia({})
+        inertia = self.arm.inertia({})
         torque = self.arm.resistance(measured.position, measured.velocity, {}) + inertia * wanted.acceleration
         torque = torque - inertia * self.surface_slope * rate - self.gain * surface
         stress = torque / (self.arm.lever() * self.cross_section)

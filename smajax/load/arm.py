@@ -32,6 +32,13 @@ class Arm(AbstractMovingLoad):
     start_angle: Scalar = parameter("rad", -7.0, 7.0, "angle at which the wire's strain counts as zero")
     lower_stop: Scalar = parameter("rad", -7.0, 7.0, "lower end stop")
     upper_stop: Scalar = parameter("rad", -7.0, 7.0, "upper end stop")
+    inertia_ratio: Scalar = parameter(
+        "-",
+        0.01,
+        1e2,
+        "moment of inertia over that of payload and link: pulleys and shaft add, errors of I_e too",
+        default=1.0,
+    )
 
     inputs_optional: ClassVar[frozenset[str]] = frozenset({"load_torque"})
     reading: ClassVar[tuple[str, str]] = ("angle", "rad")
@@ -43,7 +50,7 @@ class Arm(AbstractMovingLoad):
         return self.lower_stop, self.upper_stop
 
     def inertia(self, inputs: Inputs) -> Scalar:
-        return (self.payload_mass + self.link_mass / 3.0) * self.arm_length**2
+        return self.inertia_ratio * (self.payload_mass + self.link_mass / 3.0) * self.arm_length**2
 
     def resistance(self, position: Scalar, velocity: Scalar, inputs: Inputs) -> Scalar:
         gravity = (self.payload_mass + 0.5 * self.link_mass) * GRAVITY * self.arm_length * jnp.cos(position)
