@@ -96,6 +96,7 @@ ORIGINS: dict[str, dict[str, Origin]] = {
         **_chosen("damping", "a swing dies out in about a second"),
         **_chosen("lower_stop", "the arm rests at -45 deg"),
         **_chosen("upper_stop", "beyond the printed +90 deg"),
+        **_chosen("inertia_ratio", "that of payload and link alone"),
     },
     "dead_weight": {
         **_printed("sec. 3.5: 75 g", "load_mass"),

@@ -94,7 +94,7 @@ def _controller(
     fields = [field.name for field in dataclasses.fields(Merit)]
     if not kept.exists():
         controller = make(system)
-        timing = {"seconds": settings.seconds, "dt": settings.dt}
+        timing: dict[str, Any] = {"seconds": settings.seconds, "dt": settings.dt}
 
         def told(_: str, share: float) -> None:
             progress(f"sweeping {name}", share)
