@@ -3,6 +3,15 @@
 from __future__ import annotations
 
 from smajax.figures import (
+    c01_pid_at_10,
+    c02_pid_at_40,
+    c03_pid_at_0,
+    c04_three_switches,
+    c05_vsc3_everywhere,
+    c07_range_falls,
+    c08_temperature_control,
+    c09_below_the_finish,
+    c10_wider_band,
     m01_block_loop,
     m02_partial_transformation,
     m03_full_transformation,
@@ -46,6 +55,17 @@ CHAPTERS: dict[str, tuple[Row, ...]] = {
         m17_four_laws.ROW,
         m18_split.ROW,
         m19_stress_strain.ROW,
+    ),
+    "chapter4": (
+        c01_pid_at_10.ROW,
+        c02_pid_at_40.ROW,
+        c03_pid_at_0.ROW,
+        c04_three_switches.ROW,
+        c05_vsc3_everywhere.ROW,
+        c07_range_falls.ROW,
+        c08_temperature_control.ROW,
+        c09_below_the_finish.ROW,
+        c10_wider_band.ROW,
     ),
 }
 
