@@ -52,12 +52,12 @@ def work(fast: bool) -> Result:
     lines = [line for limit in (austenite_range, martensite_range) for line in limit(arm(), loop.run.stress)]
     passing = int(np.argmax(np.degrees(loop.run.position) > peak))
     falls = [float((one := _averaged(loop, line))[passing] - one[-1]) for line in lines]
-    holds = numbers["rise_before_C"] > 1.0 and min(falls) > 1.0 and numbers["largest_rise_after_C"] < 0.1
+    holds = numbers["rise_before_C"] > 1.0 and min(falls) > 1.0 and numbers["largest_rise_after_C"] < 0.25 * min(falls)
     holds &= numbers["quick_fall_after_C"] > 1.0
     return Result(
         holds=bool(holds),
         found=f"A_f' has risen by {numbers['rise_before_C']:.1f} °C when the arm passes {peak:.0f}°, where its stress at rest is greatest, and from there on "
-        f"falls by {numbers['fall_after_C']:.1f} °C until it stands at 50°, and so do the other three",
+        f"falls by {numbers['fall_after_C']:.1f} °C until it stands at 50°, never rising by more than {numbers['largest_rise_after_C']:.1f} °C, and so do the other three",
         numbers=numbers,
         draw=lambda figure: _draw(figure, loop, quick),
         caveat=f"gains of C4; averaged over {SWING} s, for the arm swings on its wire as it goes, and its inertia moves A_f' too (highest at "

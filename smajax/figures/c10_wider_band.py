@@ -13,8 +13,8 @@ from smajax.figures.row import Result, Row
 from smajax.figures.set_points import Runs, overshoot, steady, swept, time_of
 from smajax.presets import temperature_vsc
 
-BANDS = (0.0, 10.0, 20.0, 25.0, 30.0, 40.0, 60.0, 100.0, 200.0, 400.0)  # C/s
-SHOWN = (0.0, 20.0, 30.0, 60.0, 400.0)
+BANDS = (0.0, 10.0, 20.0, 25.0, 27.0, 30.0, 40.0, 60.0, 100.0, 200.0, 400.0)  # C/s
+SHOWN = (0.0, 25.0, 30.0, 60.0, 400.0)
 GONE = 0.1  # degrees: less overshoot than this is none
 
 

@@ -119,7 +119,7 @@ def draw_set_points(figure: Figure, runs: Runs) -> None:
     for colour, (loop, _) in zip(SHADES, runs.values(), strict=True):
         voltage.plot(loop.run.time, loop.voltage, color=colour, linewidth=0.7)
     named(voltage, "time (s)", "voltage (V)")
-    angle.legend(frameon=False, fontsize=8, ncols=2, loc="lower right")
+    angle.legend(frameon=False, fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5))
 
 
 def draw_range(axes: Axes, loop: Recorded, title: str) -> None:
