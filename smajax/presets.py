@@ -322,7 +322,7 @@ def vsc3(system: System) -> Vsc3:
 
 def vsc3_of_section_4_6(system: System) -> Vsc3:
     """The quicker VSC that overshoots at 50 deg up to A_f', as Fig. 4.14a: studies/gains/vsc.json, `vsc3_of_section_4_6`."""
-    return Vsc3(high_voltage=10.0, low_voltage=4.0, surface_slope=12.6, boundary=0.744, rate_filter=0.02)
+    return Vsc3(high_voltage=10.0, low_voltage=4.0, surface_slope=12.7, boundary=0.901, rate_filter=0.02)
 
 
 def temperature_vsc(system: System) -> TemperatureVsc:
@@ -334,9 +334,9 @@ def temperature_vsc(system: System) -> TemperatureVsc:
     stroke = system.wire.constitutive.recoverable_strain / load.contraction(system.wire)
     return TemperatureVsc(
         vsc=vsc3_of_section_4_6(system),
-        band=Passing(passing_speed=3.64),
-        temperature_band=232.0,
-        temperature_gain=2.17,
+        band=Passing(passing_speed=3.67),
+        temperature_band=385.0,
+        temperature_gain=2.18,
         finish_filter=0.02,
         finish_temperature=law.austenite_finish,
         stress_slope=law.stress_slope_austenite,

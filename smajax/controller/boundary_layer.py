@@ -43,4 +43,5 @@ class AsPrinted(AbstractLayer):
 
     def voltage(self, surface: Scalar, boundary: Scalar, high: Scalar, low: Scalar) -> Scalar:
         inside = limited(self.layer_gain * surface, 0.0, high)
+        inside = inside + 0.0 * boundary  # nan in, nan out: a comparison alone would hide it
         return jnp.where(surface < -boundary, high, jnp.where(surface > boundary, low, inside))

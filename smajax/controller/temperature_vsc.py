@@ -19,9 +19,8 @@ What is printed, and what is done with it:
   temperature": on the straight line from the present state to the end of the transformation,
   T_d = T + (A_f' - T)(theta_d - theta)/(theta_f - theta), with theta_f the angle at which all is austenite.
 
-The band phi_T = 0 makes NVSC equal to VSC3 exactly, and so does v_p without limit: nothing counts as passing. An
-*infinite* phi_T would do so only if the VSC acted inside of the band and not outside; then the overshoot would grow with
-phi_T, where Fig. 4.15 has it fall.
+The band phi_T = 0 makes NVSC equal to VSC3 exactly. An infinite phi_T would do so only if it were the VSC's band, with
+temperature control where |s_2| > phi_T; the overshoot would then grow with phi_T, where Fig. 4.15 has it fall.
 """
 
 from __future__ import annotations
@@ -57,7 +56,7 @@ class Passing(AbstractBand):
     passing_speed: Scalar = parameter("rad/s", 1e-6, 1e9, "v_p: from here on the arm is passing, below it the less so")
 
     def share(self, range_rate: Scalar, band: Scalar, velocity: Scalar) -> Scalar:
-        wide = band > 0.0
+        wide = ~(band <= 0.0)  # nan is
         near = limited(1.0 - jnp.abs(range_rate) / jnp.where(wide, band, 1.0), 0.0, 1.0)
         return jnp.where(wide, near, 0.0) * limited(velocity / self.passing_speed, 0.0, 1.0)
 
@@ -67,7 +66,7 @@ class AsPrinted(AbstractBand):
 
     def share(self, range_rate: Scalar, band: Scalar, velocity: Scalar) -> Scalar:
         # nan in, nan out: a comparison alone would hide it.
-        return jnp.where(jnp.abs(range_rate) < band, 1.0, 0.0) + 0.0 * (range_rate + velocity)
+        return jnp.where(jnp.abs(range_rate) < band, 1.0, 0.0) + 0.0 * (range_rate + band)
 
 
 class TemperatureVscMemory(eqx.Module):
@@ -96,7 +95,7 @@ class TemperatureVsc(AbstractController):
     def temperature_wanted(self, measured: MeasuredState, wanted: Reference) -> Scalar:
         """T_d, C."""
         left = self.finish_position - measured.position
-        way = jnp.where(left > SHORTEST_WAY, left, SHORTEST_WAY)
+        way = jnp.where(left < SHORTEST_WAY, SHORTEST_WAY, left)
         share = (wanted.position - measured.position) / way
         return measured.temperature + share * (self.finish(measured) - measured.temperature)
 

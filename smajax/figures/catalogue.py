@@ -3,6 +3,15 @@
 from __future__ import annotations
 
 from smajax.figures import (
+    c01_pid_at_10,
+    c02_pid_at_40,
+    c03_pid_at_0,
+    c04_three_switches,
+    c05_vsc3_everywhere,
+    c07_range_falls,
+    c08_temperature_control,
+    c09_below_the_finish,
+    c10_wider_band,
     c11_sliding_against_pid,
     c12_stress_sliding,
     c13_stress_follows,
@@ -60,6 +69,15 @@ CHAPTERS: dict[str, tuple[Row, ...]] = {
         m19_stress_strain.ROW,
     ),
     "chapter4": (
+        c01_pid_at_10.ROW,
+        c02_pid_at_40.ROW,
+        c03_pid_at_0.ROW,
+        c04_three_switches.ROW,
+        c05_vsc3_everywhere.ROW,
+        c07_range_falls.ROW,
+        c08_temperature_control.ROW,
+        c09_below_the_finish.ROW,
+        c10_wider_band.ROW,
         c11_sliding_against_pid.ROW,
         c12_stress_sliding.ROW,
         c13_stress_follows.ROW,

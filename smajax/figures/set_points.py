@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import functools
+from collections.abc import Callable, Sequence
 
 import equinox as eqx
 import jax
@@ -10,11 +11,12 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from smajax.closed_loop import ClosedLoop, simulate_closed_loop
 from smajax.controller.base import AbstractController
-from smajax.figures.drawing import BLACK, BLUE, GREEN, GREY, RED, named
-from smajax.figures.rigs import Recorded, arm, austenite_range, recorded
+from smajax.figures.drawing import BLACK, BLUE, GREEN, GREY, RED, named, panels
+from smajax.figures.rigs import Recorded, arm, austenite_range
 from smajax.merit import Merit, merit
 from smajax.parameters import set_vector
 from smajax.reference import clock, constant
@@ -23,8 +25,9 @@ from smajax.system import System
 from smajax.types import Scalar
 
 SECONDS, PERIOD = 10.0, 0.01
-BAND_DEG = 1.0  # that of `merit`: within it the arm counts as there
-SHADES = (GREY, GREEN, BLUE, RED, BLACK, "#d9a441", "#7a5fa8")
+SET_POINTS = (-30.0, -15.0, 0.0, 10.0, 20.0, 40.0, 50.0, 65.0)  # degrees
+Runs = dict[float, tuple[Recorded, Recorded]]
+SHADES = (GREY, GREEN, BLUE, RED, BLACK, "#d9a441", "#7a5fa8", "#2aa5a0")
 
 
 @eqx.filter_jit
@@ -34,10 +37,9 @@ def _batch(
     names: tuple[str, ...],
     gains: Float[Array, "runs names"],
     targets: Float[Array, " runs"],
-    seconds: float,
     dt: float,
 ) -> tuple[ClosedLoop, Merit]:
-    time = clock(seconds, dt)
+    time = clock(SECONDS, dt)
 
     def one(row: Float[Array, " names"], target: Scalar) -> tuple[ClosedLoop, Merit]:
         tuned = set_vector(controller, names, row)
@@ -47,29 +49,31 @@ def _batch(
     return jax.vmap(one)(gains, targets)
 
 
-def _unstacked(loops: ClosedLoop, merits: Merit, count: int) -> list[tuple[Recorded, Recorded]]:
-    both = recorded(loops), recorded(merits)  # type: ignore[arg-type]
+def _unstacked(both: tuple[ClosedLoop, Merit], count: int) -> list[tuple[Recorded, Recorded]]:
+    both = jax.tree.map(np.asarray, both)
     return [jax.tree.map(lambda series, k=k: series[k], both) for k in range(count)]
 
 
-def at_set_points(
-    controller: AbstractController, degrees: Sequence[float], fast: bool, seconds: float = SECONDS
-) -> dict[float, tuple[Recorded, Recorded]]:
-    """(run, figures of merit) at each set point, the controller called every 0.01 s; `fast` steps the arm as seldom."""
-    targets = jnp.radians(jnp.asarray(degrees))
-    none = jnp.zeros((len(degrees), 0))
-    found = _batch(arm(), controller, (), none, targets, seconds, PERIOD if fast else DEFAULT_STEP)
-    return dict(zip(degrees, _unstacked(*found, len(degrees)), strict=True))
+def at_set_points(controller: AbstractController, fast: bool) -> Runs:
+    """(run, figures of merit) at each of `SET_POINTS`; the controller is called every 0.01 s, `fast` steps the arm as seldom."""
+    targets = jnp.radians(jnp.asarray(SET_POINTS))
+    none = jnp.zeros((len(SET_POINTS), 0))
+    found = _batch(arm(), controller, (), none, targets, PERIOD if fast else DEFAULT_STEP)
+    return dict(zip(SET_POINTS, _unstacked(found, len(SET_POINTS)), strict=True))
 
 
-def swept(
-    controller: AbstractController, gain: str, values: Sequence[float], degrees: float, fast: bool
-) -> dict[float, tuple[Recorded, Recorded]]:
+@functools.cache
+def regulated(preset: Callable[[System], AbstractController], fast: bool) -> Runs:
+    """`at_set_points` for a preset of the arm: several rows look at the same runs."""
+    return at_set_points(preset(arm()), fast)
+
+
+def swept(controller: AbstractController, gain: str, values: Sequence[float], degrees: float, fast: bool) -> Runs:
     """(run, figures of merit) for each value of one gain, at one set point."""
     targets = jnp.full(len(values), jnp.radians(degrees))
     gains = jnp.asarray(values)[:, None]
-    found = _batch(arm(), controller, (gain,), gains, targets, SECONDS, PERIOD if fast else DEFAULT_STEP)
-    return dict(zip(values, _unstacked(*found, len(values)), strict=True))
+    found = _batch(arm(), controller, (gain,), gains, targets, PERIOD if fast else DEFAULT_STEP)
+    return dict(zip(values, _unstacked(found, len(values)), strict=True))
 
 
 def overshoot(one: Recorded) -> float:
@@ -87,7 +91,7 @@ def time_of(value: Recorded) -> float:
     return float(value) if np.isfinite(value) else 2.0 * SECONDS
 
 
-def measures(runs: Mapping[float, tuple[Recorded, Recorded]], prefix: str = "") -> dict[str, float]:
+def measures(runs: Runs, prefix: str = "") -> dict[str, float]:
     """The checked numbers of a batch of set points."""
     found: dict[str, float] = {}
     for angle, (_, one) in runs.items():
@@ -100,12 +104,22 @@ def measures(runs: Mapping[float, tuple[Recorded, Recorded]], prefix: str = "") 
     return found
 
 
-def draw_angles(axes: Axes, runs: Mapping[float, tuple[Recorded, Recorded]], style: str = "-", label: str = "") -> None:
+def draw_angles(axes: Axes, runs: Runs) -> None:
     """Angle over time, one colour a set point, which is dotted."""
-    for colour, (angle, (loop, _)) in zip(SHADES, runs.items(), strict=False):
-        axes.plot(loop.run.time, np.degrees(loop.run.position), style, color=colour, label=f"{label}{angle:g}°")
+    for colour, (angle, (loop, _)) in zip(SHADES, runs.items(), strict=True):
+        axes.plot(loop.run.time, np.degrees(loop.run.position), color=colour, label=f"{angle:g}°")
         axes.axhline(angle, color=colour, linewidth=0.7, linestyle=":")
     named(axes, "time (s)", "arm angle (°)")
+
+
+def draw_set_points(figure: Figure, runs: Runs) -> None:
+    """Angle and voltage."""
+    angle, voltage = panels(figure, 2, share=True)
+    draw_angles(angle, runs)
+    for colour, (loop, _) in zip(SHADES, runs.values(), strict=True):
+        voltage.plot(loop.run.time, loop.voltage, color=colour, linewidth=0.7)
+    named(voltage, "time (s)", "voltage (V)")
+    angle.legend(frameon=False, fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5))
 
 
 def draw_range(axes: Axes, loop: Recorded, title: str) -> None:

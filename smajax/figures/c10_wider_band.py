@@ -1,0 +1,57 @@
+"""C10: the wider the band of NVSC, the smaller the overshoot (Fig. 4.15)."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from smajax.figures.drawing import BLUE, GREY, keyed, named, panels
+from smajax.figures.rigs import arm
+from smajax.figures.row import Result, Row
+from smajax.figures.set_points import Runs, overshoot, steady, swept, time_of
+from smajax.presets import temperature_vsc
+
+BANDS = (0.0, 10.0, 20.0, 25.0, 27.0, 30.0, 40.0, 60.0, 100.0, 200.0, 400.0)  # C/s
+SHOWN = (0.0, 25.0, 30.0, 60.0, 400.0)
+GONE = 0.1  # degrees: less overshoot than this is none
+
+
+def work(fast: bool) -> Result:
+    """The band swept at 50 degrees."""
+    runs = swept(temperature_vsc(arm()), "temperature_band", BANDS, 50.0, fast)
+    over = [overshoot(one) for _, one in runs.values()]
+    numbers = {f"overshoot_at_{band:g}_C_per_s_deg": value for band, value in zip(BANDS, over, strict=True)}
+    numbers |= {f"steady_error_at_{band:g}_C_per_s_deg": steady(one) for band, (_, one) in runs.items()}
+    first, last = runs[BANDS[0]][1], runs[BANDS[-1]][1]
+    numbers |= {"reach_without_band_s": time_of(first.reach_time), "reach_with_widest_s": time_of(last.reach_time)}
+    falls = all(later <= sooner + GONE for sooner, later in itertools.pairwise(over))
+    gone = next((band for band, value in zip(BANDS, over, strict=True) if value < GONE), np.inf)
+    return Result(
+        holds=bool(falls and over[-1] < GONE and over[0] > 5.0),
+        found=f"the overshoot falls from {over[0]:.0f}° without a band over {numbers['overshoot_at_30_C_per_s_deg']:.1f}° at 30 °C/s "
+        + (f"to less than {GONE}° from {gone:g} °C/s on" if np.isfinite(gone) else f"to {over[-1]:.1f}°"),
+        numbers=numbers,
+        draw=lambda figure: _draw(figure, runs, over),
+        caveat=f"the wider band costs time: the arm arrives after {time_of(last.reach_time):.1f} instead of {time_of(first.reach_time):.1f} s.",
+    )
+
+
+def _draw(figure: Figure, runs: Runs, over: list[float]) -> None:
+    angle, sizes = panels(figure, 1, 2)
+    for shade, band in zip(np.linspace(0.75, 0.0, len(SHOWN)), SHOWN, strict=True):
+        loop, _ = runs[band]
+        angle.plot(loop.run.time, np.degrees(loop.run.position), color=(shade, shade, 1.0), label=f"{band:g} °C/s")
+    angle.axhline(50.0, color=GREY, linewidth=0.8, linestyle=":")
+    angle.set_xlim(0.0, 6.0)
+    named(angle, "time (s)", "arm angle (°)")
+    keyed(angle)
+    sizes.plot(BANDS, over, "o-", color=BLUE)
+    sizes.set_xscale("symlog", linthresh=10.0)
+    named(sizes, "band phi_T (°C/s)", "overshoot (°)")
+
+
+ROW = Row(
+    "C10", "Fig. 4.15", "arm, NVSC at 50°, band phi_T swept", "overshoot falls as phi_T grows, and can vanish", work
+)
