@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from smajax.figures import (
+    c06_estimated_states,
     m01_block_loop,
     m02_partial_transformation,
     m03_full_transformation,
@@ -47,6 +48,7 @@ CHAPTERS: dict[str, tuple[Row, ...]] = {
         m18_split.ROW,
         m19_stress_strain.ROW,
     ),
+    "chapter4": (c06_estimated_states.ROW,),
 }
 
 
