@@ -292,10 +292,13 @@ def _ended(system: System, stage: Stage, inputs: Inputs) -> tuple[WireState, Unk
     branch = solved.branch
     # The differentiated Newton steps; the Jacobian of the last iteration is the one at the solution to rounding.
     z = solved.z
-    for _ in range(DIFFERENTIATED):
+    for number in range(DIFFERENTIATED):
         residual, _ = _residual(system, stage, inputs, branch, z)
         rows, right = _eliminated(solved.jacobian, [-value for value in residual])
         step = _back_substituted(rows, right, right[3] / rows[3][3])
+        if number > 0:
+            # Its value is rounding where the curve can be followed; on a cliff it would lead away.
+            step = [change - lax.stop_gradient(change) for change in step]
         z = Unknowns(*(value + change for value, change in zip(z, step, strict=True)))
     # Rounding of the last correction only; not `clip`, which halves the derivative at the ends themselves.
     xi = jnp.where(z.fraction > 1.0, 1.0, jnp.where(z.fraction < 0.0, 0.0, z.fraction))

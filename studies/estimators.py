@@ -158,8 +158,11 @@ def _draw(table: dict[str, dict[str, float]], starts: dict[tuple[str, str], Any]
     named(walks, "random walks over the preset's", "mean squared innovation over its variance", "dotted: unscented")
     for (name, start), told in starts.items():
         off = np.sqrt(((told.temperature - run.true.temperature) ** 2).mean(axis=0))
-        style = {"color": BLUE if name == "extended" else RED, "linestyle": "-" if "cold" in start else "--"}
-        cold.semilogy(run.true.time, off, label=f"{name}, {start}", **style)
+        drawn: dict[str, Any] = {
+            "color": BLUE if name == "extended" else RED,
+            "linestyle": "-" if "cold" in start else "--",
+        }
+        cold.semilogy(run.true.time, off, label=f"{name}, {start}", **drawn)
     cold.set_xlim(0.0, 3.0)
     named(cold, "time (s)", "error of the temperature (°C)", "believed too warm and too cold")
     for axes in figure.axes:
