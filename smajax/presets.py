@@ -24,6 +24,8 @@ from smajax.drive.duty import Duty
 from smajax.drive.none import NoDrive
 from smajax.drive.power import Power
 from smajax.drive.voltage import Voltage
+from smajax.estimator.model_filter import ModelFilter
+from smajax.estimator.printed_filter import PrintedFilter
 from smajax.load.arm import Arm
 from smajax.load.base import AbstractMovingLoad
 from smajax.load.bias_spring import BiasSpring
@@ -355,6 +357,48 @@ CONTROLLERS: dict[str, tuple[Callable[[System], AbstractController], str]] = {
     "backstepping1": (backstepping_one, "damping_gain"),
     "backstepping2": (backstepping_two, "damping_gain"),
 }
+
+
+def printed_filter(system: System) -> PrintedFilter:
+    """The source's filter of the arm (sec. 4.5), first guess, P_0 and Q as printed.
+
+    R is not printed; here it equals Q, so that a reading counts as much as a sample's process noise. A smaller one takes
+    the readings as they are, and their noise, differenced twice, into the stress (studies/estimators.py).
+    """
+    _needs_arm(system, "the printed filter")
+    return PrintedFilter(
+        system=system,
+        reading_variance=1e-2,
+        process_variance=1e-2,
+        start_variance=1.0,
+        start_stress=98.1e6,
+        start_temperature=20.0,
+    )
+
+
+def model_filter(system: System) -> ModelFilter:
+    """Kalman filter over the simulator's own step; lengths as strains of the wire, so that they fit any moving load.
+
+    The walks are the smallest of those tried (studies/estimators.py) with which the innovations are as large as the
+    filter expects (squared 0.7 to 1.2 of their variance) also where the believed h_c is 10 %, the payload 5 % or A_s and
+    A_f 2 C wrong; 3 C of ambient temperature still make them 4.5.
+    """
+    if not isinstance(system.load, AbstractMovingLoad):
+        raise ValueError(f"the filter needs a load that moves, and {type(system.load).__name__} does not.")
+    per_strain = 1.0 / system.load.contraction(system.wire)  # 55 rad for the arm
+    return ModelFilter(
+        system=system,
+        reading_noise=2e-5 * per_strain,
+        position_walk=2e-6 * per_strain,
+        velocity_walk=2e-3 * per_strain,
+        temperature_walk=1.0,
+        fraction_walk=1e-2,
+        start_temperature=system.wire.heat.ambient_temperature,
+        start_position_error=2e-5 * per_strain,
+        start_velocity_error=2e-4 * per_strain,
+        start_temperature_error=2.0,
+        start_fraction_error=1e-3,
+    )
 
 
 def build(wire: str, load: str, drive: str) -> System:

@@ -15,7 +15,8 @@ of it), so the root lies between the present fraction and the end of the branch,
 bracket. Every pivot of the elimination in the order T, x, sigma, xi is positive for the same reason.
 
 Gradients: the iteration itself is not differentiated. One more Newton step at the solution, with the Jacobian held
-fixed, has the derivative that the implicit function theorem gives, in forward and in reverse mode.
+fixed, has the derivative that the implicit function theorem gives, in forward and in reverse mode; a second one has the
+second derivative too.
 """
 
 from __future__ import annotations
@@ -46,6 +47,9 @@ UNDAMPED = 12  # iterations before every second step is halved
 # in float32, by more than what rounding alone moves it.
 TOLERANCE = 1e-8
 ROUNDINGS = 1e3
+# Newton steps at the solution that are differentiated: each makes one more order of derivative right, and a filter whose
+# covariance passes through the first derivative has gains that need the second.
+DIFFERENTIATED = 2
 # Coulomb friction builds up over this much motion (a bristle bends before it slips), in units of position.
 PRESLIDING = 2e-5
 
@@ -286,11 +290,16 @@ def _ended(system: System, stage: Stage, inputs: Inputs) -> tuple[WireState, Unk
     wire, effects, old = system.wire, system.effects, stage.old.wire
     solved = _solved(_held(system), _held(stage), _held(dict(inputs)))
     branch = solved.branch
-    # The one differentiated Newton step; the Jacobian of the last iteration is the one at the solution to rounding.
-    residual, _ = _residual(system, stage, inputs, branch, solved.z)
-    rows, right = _eliminated(solved.jacobian, [-value for value in residual])
-    step = _back_substituted(rows, right, right[3] / rows[3][3])
-    z = Unknowns(*(value + change for value, change in zip(solved.z, step, strict=True)))
+    # The differentiated Newton steps; the Jacobian of the last iteration is the one at the solution to rounding.
+    z = solved.z
+    for number in range(DIFFERENTIATED):
+        residual, _ = _residual(system, stage, inputs, branch, z)
+        rows, right = _eliminated(solved.jacobian, [-value for value in residual])
+        step = _back_substituted(rows, right, right[3] / rows[3][3])
+        if number > 0:
+            # Its value is rounding where the curve can be followed; on a cliff it would lead away.
+            step = [change - lax.stop_gradient(change) for change in step]
+        z = Unknowns(*(value + change for value, change in zip(z, step, strict=True)))
     # Rounding of the last correction only; not `clip`, which halves the derivative at the ends themselves.
     xi = jnp.where(z.fraction > 1.0, 1.0, jnp.where(z.fraction < 0.0, 0.0, z.fraction))
     xi = jnp.where(branch.heating | branch.cooling, xi, old.martensite_fraction)

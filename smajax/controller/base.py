@@ -6,7 +6,6 @@ import abc
 from typing import Any
 
 import equinox as eqx
-import jax.numpy as jnp
 
 from smajax.measured_state import MeasuredState
 from smajax.reference import Reference
@@ -23,12 +22,3 @@ class AbstractController(eqx.Module):
     @abc.abstractmethod
     def step(self, memory: Any, measured: MeasuredState, wanted: Reference, period: Scalar) -> tuple[Any, Scalar]:
         """(memory after the call, voltage to hold). `period` is the time until the next call, s."""
-
-
-def limited(value: Scalar, low: Scalar | float, high: Scalar | float) -> Scalar:
-    """`value` held in [low, high]; at the ends themselves the derivative is that of the inside (`clip` halves it).
-
-    An end that is no number gives none: a comparison with it would pass for "inside".
-    """
-    held = jnp.where(value < low, low, jnp.where(value > high, high, value))
-    return jnp.where(jnp.isnan(low) | jnp.isnan(high), jnp.nan, held)

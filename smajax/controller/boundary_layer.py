@@ -16,7 +16,7 @@ import abc
 import equinox as eqx
 import jax.numpy as jnp
 
-from smajax.controller.base import limited
+from smajax.limited import limited
 from smajax.parameters import parameter
 from smajax.types import Scalar
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import jax.numpy as jnp
 from jaxtyping import Array, Bool
 
-from smajax.controller.base import limited
+from smajax.limited import limited
 from smajax.load.base import AbstractMovingLoad
 from smajax.system import System
 from smajax.types import Scalar

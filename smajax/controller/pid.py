@@ -11,8 +11,9 @@ from __future__ import annotations
 import equinox as eqx
 import jax.numpy as jnp
 
-from smajax.controller.base import AbstractController, limited
+from smajax.controller.base import AbstractController
 from smajax.controller.rate import Rate, at_rest, filtered_rate
+from smajax.limited import limited
 from smajax.measured_state import MeasuredState
 from smajax.parameters import parameter
 from smajax.reference import Reference

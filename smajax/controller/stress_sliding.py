@@ -13,7 +13,8 @@ from __future__ import annotations
 import equinox as eqx
 import jax.numpy as jnp
 
-from smajax.controller.base import AbstractController, limited
+from smajax.controller.base import AbstractController
+from smajax.limited import limited
 from smajax.load.arm import Arm
 from smajax.measured_state import MeasuredState
 from smajax.parameters import parameter

@@ -30,9 +30,10 @@ import abc
 import equinox as eqx
 import jax.numpy as jnp
 
-from smajax.controller.base import AbstractController, limited
+from smajax.controller.base import AbstractController
 from smajax.controller.rate import Rate, at_rest, filtered_rate
 from smajax.controller.vsc3 import Vsc3
+from smajax.limited import limited
 from smajax.measured_state import MeasuredState
 from smajax.parameters import parameter
 from smajax.reference import Reference

@@ -57,6 +57,10 @@ class AbstractRenewal(eqx.Module):
     ) -> Amplitudes:
         """After a step on a branch that ended at the fraction `xi`."""
 
+    @abc.abstractmethod
+    def corrected(self, old: WireState, transforming: Bool[Array, ""], h: Scalar, k: Scalar, xi: Scalar) -> Amplitudes:
+        """After an estimator has put the fraction to `xi`: the next step goes on from there, without a jump."""
+
 
 class Corrected(AbstractRenewal):
     """Renewed only while the other branch transforms, scaled so that the curve passes through the present state.
@@ -102,6 +106,18 @@ class Corrected(AbstractRenewal):
             1.0 * missed_cooling,
         )
 
+    def corrected(self, old: WireState, transforming: Bool[Array, ""], h: Scalar, k: Scalar, xi: Scalar) -> Amplitudes:
+        laid = self.start(h, k, xi)
+        # Off both branches a curve ahead of the wire is its memory of where it turned back: that one stays.
+        heating = transforming | beyond(xi - old.xi_M * h)
+        cooling = transforming | beyond(1.0 - (1.0 - old.xi_A) * k - xi)
+        return Amplitudes(
+            jnp.where(heating, laid.xi_M, old.xi_M),
+            jnp.where(cooling, laid.xi_A, old.xi_A),
+            jnp.where(heating, laid.heating_missed, old.heating_missed),
+            jnp.where(cooling, laid.cooling_missed, old.cooling_missed),
+        )
+
 
 class AsPrinted(AbstractRenewal):
     r"""Eq. 3.26 to the letter with the rates 3.4 and 3.6: $\xi_A = \xi$ while xi falls, $\xi_M = \xi$ whenever not.
@@ -130,3 +146,7 @@ class AsPrinted(AbstractRenewal):
     ) -> Amplitudes:
         never = jnp.zeros_like(xi)
         return Amplitudes(jnp.where(heating, old.xi_M, xi), jnp.where(heating, xi, old.xi_A), never, never)
+
+    def corrected(self, old: WireState, transforming: Bool[Array, ""], h: Scalar, k: Scalar, xi: Scalar) -> Amplitudes:
+        # These curves start from the present fraction, whatever it is.
+        return Amplitudes(old.xi_M, old.xi_A, old.heating_missed, old.cooling_missed)

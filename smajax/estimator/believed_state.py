@@ -1,0 +1,72 @@
+"""The simulator's state as a filter sees it: four numbers that it corrects, and the rest kept consistent with them."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float
+
+from smajax.limited import limited
+from smajax.load.base import AbstractMovingLoad
+from smajax.step import step
+from smajax.system import System
+from smajax.types import Motion, Scalar, State
+from smajax.wire.constitutive import strain_at, stress_at
+from smajax.wire.kinetics import austenite_left, martensite_left
+
+# Position (rad, m), velocity, temperature (C), martensite fraction.
+Corrected = Float[Array, "4"]
+
+
+def vector_of(state: State) -> Corrected:
+    """What a filter corrects."""
+    wire, motion = state.wire, state.motion
+    return jnp.stack([motion.position, motion.velocity, wire.temperature, wire.martensite_fraction])
+
+
+def with_vector(system: System, state: State, vector: Corrected) -> State:
+    """`state` with the four numbers put in, held between the end stops and in [0, 1].
+
+    Strain follows from the position and stress from the constitutive law, which counts from `state`. The curves of the
+    kinetics stay: on a branch the fraction belongs to the temperature, which is how a reading of the position tells it.
+    """
+    load, wire, effects, old = system.load, system.wire, system.effects, state.wire
+    assert isinstance(load, AbstractMovingLoad)
+    position = limited(vector[0], *load.limits())
+    velocity, temperature, fraction = vector[1], vector[2], limited(vector[3], 0.0, 1.0)
+    strain = -load.contraction(wire) * (position - load.start())
+    stress = stress_at(wire, effects, old, strain, temperature, old.stress, fraction)
+    new = dataclasses.replace(
+        old,
+        temperature=temperature,
+        stress=stress,
+        strain=strain_at(wire, effects, old, temperature, stress, fraction),
+        martensite_fraction=fraction,
+        detwinned_fraction=wire.kinetics.variants.detwinned(old, stress, fraction),
+    )
+    return State(state.time, new, Motion(position, velocity, state.motion.friction), state.reading)
+
+
+def with_correction(system: System, state: State, vector: Corrected, transforming: Bool[Array, ""]) -> State:
+    """`with_vector`, and the curves laid so that the corrected fraction does not jump in the next step."""
+    new = with_vector(system, state, vector)
+    law, at = system.wire.kinetics, (new.wire.temperature, new.wire.stress)
+    h, k = martensite_left(law, system.effects, *at), austenite_left(law, system.effects, *at)
+    kept = law.renewal.corrected(state.wire, transforming, h, k, new.wire.martensite_fraction)
+    wire = dataclasses.replace(
+        new.wire,
+        xi_M=kept.xi_M,
+        xi_A=kept.xi_A,
+        heating_missed=kept.heating_missed,
+        cooling_missed=kept.cooling_missed,
+    )
+    return dataclasses.replace(new, wire=wire)
+
+
+def advanced(system: System, state: State, voltage: Scalar, period: Scalar, substeps: int) -> State:
+    """The simulator's own steps through one period with `voltage` held."""
+    inputs = system.drive.from_voltage(voltage)
+    for _ in range(substeps):
+        state = step(system, state, inputs, period / substeps)
+    return state
