@@ -40,7 +40,7 @@ class Found:
 
 
 def regulation_cost(one: Merit, seconds: float) -> Scalar:
-    """Seconds to settle (twice the run where it never does), and as much per degree of overshoot and of steady error."""
+    """Seconds to settle (twice the run where it never does), one more a degree of overshoot, two a degree of steady error."""
     settling = jnp.where(jnp.isfinite(one.settling_time), one.settling_time, 2.0 * seconds)
     return settling + jnp.degrees(one.overshoot) + 2.0 * jnp.degrees(one.steady_error)
 

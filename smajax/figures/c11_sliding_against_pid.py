@@ -23,9 +23,9 @@ def miss(one: Merit) -> float:
 def work(fast: bool) -> Result:
     """Both controllers at the same set points; a PID with anti-windup tuned at all of them beside the claim."""
     system = arm()
-    sliding = at_set_points(quick_stress_sliding(system), TARGETS, fast)
-    plain = at_set_points(pid_tuned_at(system, OWN), TARGETS, fast)
-    best = at_set_points(pid(system), TARGETS, fast)
+    sliding = at_set_points(quick_stress_sliding(system), fast, TARGETS)
+    plain = at_set_points(pid_tuned_at(system, OWN), fast, TARGETS)
+    best = at_set_points(pid(system), fast, TARGETS)
     own = miss(plain[OWN][1])
     elsewhere = {at: miss(one) for at, (_, one) in plain.items() if at != OWN}
     slides = {at: miss(one) for at, (_, one) in sliding.items()}

@@ -30,7 +30,7 @@ def work(fast: bool) -> Result:
     system = arm()
     tuned = quick_stress_sliding(system)
     slack = set_parameters(tuned, SLACK)
-    with_searched, with_slack = at_set_points(tuned, TARGETS, fast), at_set_points(slack, TARGETS, fast)
+    with_searched, with_slack = at_set_points(tuned, fast, TARGETS), at_set_points(slack, fast, TARGETS)
     searched, slacked = list(with_searched.values()), list(with_slack.values())
     reach = np.asarray([one.reach_time for _, one in searched])
     reach_slack = np.asarray([one.reach_time for _, one in slacked])

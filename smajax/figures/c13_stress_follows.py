@@ -20,7 +20,7 @@ def work(fast: bool) -> Result:
     """One run; the stress wanted is worked out again from what the controller was told."""
     system = arm()
     tuned = quick_stress_sliding(system)
-    one, judged = at_set_points(tuned, [TARGET], fast)[TARGET]
+    one, judged = at_set_points(tuned, fast, [TARGET])[TARGET]
     wanted = np.asarray(jax.vmap(tuned.stress_wanted)(one.measured, one.wanted)) / 1e6
     stress, time = one.run.stress / 1e6, one.run.time
     reach = float(judged.reach_time)

@@ -54,12 +54,12 @@ def _unstacked(both: tuple[ClosedLoop, Merit], count: int) -> list[tuple[Recorde
     return [jax.tree.map(lambda series, k=k: series[k], both) for k in range(count)]
 
 
-def at_set_points(controller: AbstractController, fast: bool) -> Runs:
-    """(run, figures of merit) at each of `SET_POINTS`; the controller is called every 0.01 s, `fast` steps the arm as seldom."""
-    targets = jnp.radians(jnp.asarray(SET_POINTS))
-    none = jnp.zeros((len(SET_POINTS), 0))
+def at_set_points(controller: AbstractController, fast: bool, degrees: Sequence[float] = SET_POINTS) -> Runs:
+    """(run, figures of merit) at each set point; the controller is called every 0.01 s, `fast` steps the arm as seldom."""
+    targets = jnp.radians(jnp.asarray(degrees, dtype=float))
+    none = jnp.zeros((len(degrees), 0))
     found = _batch(arm(), controller, (), none, targets, PERIOD if fast else DEFAULT_STEP)
-    return dict(zip(SET_POINTS, _unstacked(found, len(SET_POINTS)), strict=True))
+    return dict(zip(degrees, _unstacked(found, len(degrees)), strict=True))
 
 
 @functools.cache
@@ -106,7 +106,7 @@ def measures(runs: Runs, prefix: str = "") -> dict[str, float]:
 
 def draw_angles(axes: Axes, runs: Runs) -> None:
     """Angle over time, one colour a set point, which is dotted."""
-    for colour, (angle, (loop, _)) in zip(SHADES, runs.items(), strict=True):
+    for colour, (angle, (loop, _)) in zip(SHADES, runs.items(), strict=False):
         axes.plot(loop.run.time, np.degrees(loop.run.position), color=colour, label=f"{angle:g}°")
         axes.axhline(angle, color=colour, linewidth=0.7, linestyle=":")
     named(axes, "time (s)", "arm angle (°)")
