@@ -148,7 +148,7 @@ def _draw(table: dict[str, dict[str, float]], starts: dict[tuple[str, str], Any]
             errors = [
                 table[f"printed, {jacobian}, R = {variance:g}, {kind}"]["stress"] for variance in READING_VARIANCES
             ]
-            printed.loglog(READING_VARIANCES, errors, style, color=colour, label=f"{jacobian}, {kind}")
+            printed.semilogx(READING_VARIANCES, errors, style, color=colour, label=f"{jacobian}, {kind}")
     named(printed, "R of the printed filter (rad²)", "error of the stress (MPa)", "printed filter, Q = 0.01 I")
     for plant, colour in zip(PLANTS, ("#1d1d1f", BLUE, RED, GREEN, GREY), strict=True):
         for name, style in (("extended", "-"), ("unscented", ":")):

@@ -107,7 +107,7 @@ def work(fast: bool) -> Result:
                     factor * getattr(estimates, shown)[0],
                     color=colours[name],
                     linewidth=1.0,
-                    label=f"{name} filter{', noisy readings' if lanes[name] else ''}",
+                    label=f"{name} filter{' (noise)' if lanes[name] else ''}",
                 )
             one.axvspan(turns - AROUND, turns + AROUND, color="#f3e9d8", zorder=0)
             named(one, "time (s)", title)
