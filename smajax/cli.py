@@ -190,8 +190,8 @@ def sweep(
     from smajax.runtime import prepare
 
     prepare()
+    from smajax.control_presets import CONTROLLERS
     from smajax.figures.rigs import arm
-    from smajax.presets import CONTROLLERS
     from smajax.progress import shown
     from smajax.sweep_run import SweepSettings, as_text, run_sweep
 

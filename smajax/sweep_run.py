@@ -13,9 +13,9 @@ import jax
 import numpy as np
 from matplotlib.figure import Figure
 
+from smajax.control_presets import CONTROLLERS
 from smajax.fit.solve import Progress
 from smajax.merit import Merit
-from smajax.presets import CONTROLLERS
 from smajax.source_mark import source_mark
 from smajax.sweep import MISMATCHES, Grid, lines, ratios, sweep
 from smajax.sweep_report import (

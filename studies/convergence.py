@@ -18,8 +18,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from smajax.closed_loop import simulate_closed_loop
+from smajax.control_presets import stress_sliding
 from smajax.figures.drawing import GREY, keyed, named, panels
-from smajax.presets import build, stress_sliding
+from smajax.presets import build
 from smajax.runtime import prepare
 from smajax.simulate import DEFAULT_STEP, simulate
 from smajax.system import initial_state

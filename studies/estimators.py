@@ -21,13 +21,13 @@ import jax.numpy as jnp
 import numpy as np
 from matplotlib.figure import Figure
 
+from smajax.control_presets import model_filter, printed_filter
 from smajax.estimator.printed_filter import PastCarried, PastDropped
 from smajax.estimator.run import estimate
 from smajax.estimator.unscented import Unscented
 from smajax.figures.drawing import BLUE, GREEN, GREY, RED, keyed, named, panels
 from smajax.figures.rigs import arm, recorded, simulated
 from smajax.parameters import get_parameters, set_parameters
-from smajax.presets import model_filter, printed_filter
 from smajax.system import System
 
 PICTURE = Path(__file__).parent / "estimators.png"

@@ -16,6 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from smajax.closed_loop import ClosedLoop, simulate_closed_loop
+from smajax.control_presets import backstepping_one, backstepping_two, quick_stress_sliding
 from smajax.controller.backstepping_two import BacksteppingTwo
 from smajax.controller.inverse_wire import (
     bounded_arccos,
@@ -30,7 +31,7 @@ from smajax.figures.rigs import arm
 from smajax.load.arm import Arm
 from smajax.measured_state import MeasuredState
 from smajax.parameters import get_parameters, set_parameters
-from smajax.presets import backstepping_one, backstepping_two, dead_weight, quick_stress_sliding
+from smajax.presets import dead_weight
 from smajax.reference import Reference, resting
 from smajax.wire.kinetics import austenite_left, martensite_left
 from studies.gains.record import HERE

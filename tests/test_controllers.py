@@ -18,18 +18,8 @@ from jax import lax
 from scipy import signal
 
 from smajax.closed_loop import ClosedLoop, simulate_closed_loop
-from smajax.controller.base import AbstractController
-from smajax.controller.boundary_layer import AsPrinted, Continuous
-from smajax.controller.pid import Pid
-from smajax.controller.temperature_vsc import AsPrinted as AsPrintedBand
-from smajax.controller.temperature_vsc import TemperatureVsc
-from smajax.measured_state import MeasuredState
-from smajax.parameters import get_parameters, parameters, set_parameters, set_vector
-from smajax.presets import (
+from smajax.control_presets import (
     PID_TUNED_AT,
-    amplified_voltage,
-    arm,
-    niti_table_3_1,
     pid,
     pid_tuned_at,
     temperature_vsc,
@@ -38,6 +28,14 @@ from smajax.presets import (
     vsc3,
     vsc3_of_section_4_6,
 )
+from smajax.controller.base import AbstractController
+from smajax.controller.boundary_layer import AsPrinted, Continuous
+from smajax.controller.pid import Pid
+from smajax.controller.temperature_vsc import AsPrinted as AsPrintedBand
+from smajax.controller.temperature_vsc import TemperatureVsc
+from smajax.measured_state import MeasuredState
+from smajax.parameters import get_parameters, parameters, set_parameters, set_vector
+from smajax.presets import amplified_voltage, arm, niti_table_3_1
 from smajax.reference import Reference, clock, constant
 from smajax.system import System
 

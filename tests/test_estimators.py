@@ -15,6 +15,7 @@ from scipy.linalg import solve_discrete_are
 from scipy.stats import chi2
 
 from smajax.closed_loop import simulate_closed_loop
+from smajax.control_presets import model_filter, printed_filter, stress_sliding
 from smajax.estimator.believed_state import advanced, vector_of, with_correction, with_vector
 from smajax.estimator.kalman import AbstractPrediction, Belief, Linearised, corrected
 from smajax.estimator.printed_filter import PastCarried, PastDropped
@@ -23,7 +24,6 @@ from smajax.estimator.unscented import Unscented
 from smajax.figures.rigs import arm, coupon, dead_weight
 from smajax.measured_state import Sensor
 from smajax.parameters import get_parameters, set_parameters, set_vector
-from smajax.presets import model_filter, printed_filter, stress_sliding
 from smajax.simulate import simulate
 from smajax.system import initial_state
 from smajax.types import Motion

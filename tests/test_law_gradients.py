@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from smajax.closed_loop import simulate_closed_loop
+from smajax.control_presets import stress_sliding
 from smajax.parameters import get_parameters, parameters, set_parameters, set_vector
-from smajax.presets import build, stress_sliding
+from smajax.presets import build
 from smajax.simulate import simulate
 from smajax.system import System
 from smajax.wire.laws import LAWS, under_law

@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 
 from smajax.closed_loop import simulate_closed_loop
+from smajax.control_presets import stress_sliding
 from smajax.parameters import set_parameters
-from smajax.presets import build, stress_sliding
+from smajax.presets import build
 from smajax.simulate import DEFAULT_STEP, simulate
 from smajax.system import System, initial_state
 from smajax.wire.constitutive import IntegratedForm

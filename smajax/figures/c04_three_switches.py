@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
+from smajax.control_presets import vsc1, vsc2, vsc3
 from smajax.figures.drawing import BLUE, GREEN, GREY, RED, keyed, named, panels
 from smajax.figures.rigs import Recorded
 from smajax.figures.row import Result, Row
 from smajax.figures.set_points import overshoot, regulated, steady, time_of
-from smajax.presets import vsc1, vsc2, vsc3
 
 COLOURS = {"VSC1": RED, "VSC2": BLUE, "VSC3": GREEN}
 LATE = 7.0  # s: from here on every controller has done what it does

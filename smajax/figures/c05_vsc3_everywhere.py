@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from smajax.control_presets import vsc3
 from smajax.figures.row import Result, Row
 from smajax.figures.set_points import draw_set_points, measures, overshoot, regulated, steady, time_of
-from smajax.presets import vsc3
 
 
 def work(fast: bool) -> Result:

@@ -10,13 +10,13 @@ import jax.numpy as jnp
 import numpy as np
 from matplotlib.figure import Figure
 
+from smajax.control_presets import model_filter, printed_filter
 from smajax.estimator.base import AbstractEstimator
 from smajax.estimator.run import estimate
 from smajax.figures.drawing import BLACK, BLUE, RED, keyed, named, panels
 from smajax.figures.rigs import Batched, Recorded, arm, recorded, simulated
 from smajax.figures.row import Result, Row
 from smajax.measured_state import MeasuredState
-from smajax.presets import model_filter, printed_filter
 from smajax.simulate import DEFAULT_STEP
 from smajax.types import Series
 

@@ -6,12 +6,12 @@ import jax.numpy as jnp
 import numpy as np
 from matplotlib.figure import Figure
 
+from smajax.control_presets import vsc3, vsc3_of_section_4_6
 from smajax.figures.drawing import BLUE, GREY, RED, named, panels
 from smajax.figures.rigs import Recorded, arm, austenite_range, martensite_range
 from smajax.figures.row import Result, Row
 from smajax.figures.set_points import regulated
 from smajax.load.arm import Arm
-from smajax.presets import vsc3, vsc3_of_section_4_6
 
 SWING = 0.5  # s: two swings of the arm on its wire, over which A_f' is averaged
 

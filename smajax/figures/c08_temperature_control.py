@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from matplotlib.figure import Figure
 
+from smajax.control_presets import temperature_vsc, vsc3_of_section_4_6
 from smajax.figures.drawing import keyed, panels
 from smajax.figures.row import Result, Row
 from smajax.figures.set_points import SET_POINTS, Runs, draw_angles, measures, overshoot, regulated, steady, time_of
-from smajax.presets import temperature_vsc, vsc3_of_section_4_6
 
 FROM = 10.0  # degrees: from here on VSC overshoots by more than the degree that counts as there
 

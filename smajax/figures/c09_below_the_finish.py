@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
+from smajax.control_presets import temperature_vsc, vsc3, vsc3_of_section_4_6
 from smajax.figures.drawing import BLUE, RED, keyed, named, panels
 from smajax.figures.rigs import Recorded
 from smajax.figures.row import Result, Row
 from smajax.figures.set_points import above_finish, draw_range, overshoot, regulated
-from smajax.presets import temperature_vsc, vsc3, vsc3_of_section_4_6
 
 
 def work(fast: bool) -> Result:

@@ -7,11 +7,11 @@ import itertools
 import numpy as np
 from matplotlib.figure import Figure
 
+from smajax.control_presets import temperature_vsc
 from smajax.figures.drawing import BLUE, GREY, keyed, named, panels
 from smajax.figures.rigs import arm
 from smajax.figures.row import Result, Row
 from smajax.figures.set_points import Runs, overshoot, steady, swept, time_of
-from smajax.presets import temperature_vsc
 
 BANDS = (0.0, 10.0, 20.0, 25.0, 27.0, 30.0, 40.0, 60.0, 100.0, 200.0, 400.0)  # C/s
 SHOWN = (0.0, 25.0, 30.0, 60.0, 400.0)

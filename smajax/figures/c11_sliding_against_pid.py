@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from matplotlib.figure import Figure
 
+from smajax.control_presets import pid, pid_tuned_at, quick_stress_sliding
 from smajax.figures.drawing import keyed, panels
 from smajax.figures.rigs import arm
 from smajax.figures.row import Result, Row
 from smajax.figures.set_points import at_set_points, draw_angles, measures, overshoot, steady
 from smajax.merit import Merit
-from smajax.presets import pid, pid_tuned_at, quick_stress_sliding
 
 OWN = 10  # degrees, the PID's set point
 TARGETS = (-30.0, 10.0, 40.0, 60.0)

@@ -6,6 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 from matplotlib.figure import Figure
 
+from smajax.control_presets import quick_stress_sliding
 from smajax.controller.inverse_wire import moving_load
 from smajax.figures.backstepping_runs import shades
 from smajax.figures.drawing import GREY, keyed, named, panels
@@ -13,7 +14,6 @@ from smajax.figures.rigs import arm
 from smajax.figures.row import Result, Row
 from smajax.figures.set_points import at_set_points, overshoot, steady
 from smajax.parameters import set_parameters
-from smajax.presets import quick_stress_sliding
 
 TARGETS = tuple(range(-40, 61, 10))  # degrees
 SLACK = {

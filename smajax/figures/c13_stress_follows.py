@@ -6,11 +6,11 @@ import jax
 import numpy as np
 from matplotlib.figure import Figure
 
+from smajax.control_presets import quick_stress_sliding
 from smajax.figures.drawing import BLUE, GREY, RED, keyed, named, panels
 from smajax.figures.rigs import arm
 from smajax.figures.row import Result, Row
 from smajax.figures.set_points import at_set_points
-from smajax.presets import quick_stress_sliding
 
 TARGET = 45.0
 AFTER = 2.5  # s: the arm has arrived

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
+from smajax.control_presets import backstepping_one
 from smajax.figures.backstepping_runs import ON_ITS_PLANT, degrees, plant, runs, shades
 from smajax.figures.drawing import keyed, named, panels
 from smajax.figures.row import Result, Row
 from smajax.parameters import set_parameters
-from smajax.presets import backstepping_one
 
 TARGETS = (-40.0, -20.0, 0.0, 20.0, 40.0, 60.0)
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
+from smajax.control_presets import backstepping_two
 from smajax.controller.inverse_wire import strain_at_angle
 from smajax.figures.backstepping_runs import ON_ITS_PLANT, degrees, plant, runs
 from smajax.figures.drawing import BLACK, BLUE, GREY, RED, keyed, named, panels
 from smajax.figures.rigs import arm, austenite_range, martensite_range
 from smajax.figures.row import Result, Row
 from smajax.parameters import set_parameters
-from smajax.presets import backstepping_two
 from smajax.wire.constitutive import young_modulus
 
 SHOWN = 40.0  # degrees

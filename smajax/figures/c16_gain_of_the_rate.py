@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from smajax.control_presets import backstepping_two
 from smajax.figures.backstepping_runs import ON_ITS_PLANT, degrees, draw_sweep, draw_voltages, plant, runs
 from smajax.figures.row import Result, Row
 from smajax.parameters import set_parameters
-from smajax.presets import backstepping_two
 
 GAINS = (0.0, 0.3, 1.0, 1.7, 4.0, 10.0)  # 1/s
 TARGET = 0.0

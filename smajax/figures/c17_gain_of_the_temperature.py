@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 
+from smajax.control_presets import backstepping_two
 from smajax.figures.backstepping_runs import ON_ITS_PLANT, degrees, draw_sweep, draw_voltages, plant, runs
 from smajax.figures.row import Result, Row
 from smajax.parameters import set_parameters
-from smajax.presets import backstepping_two
 
 GAINS = (0.2, 0.3, 3.0, 20.0, 150.0, 400.0)  # 1/s
 RATE_GAIN = 1.0  # 1/s, K: with an overshoot, so that the wire has to cool

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from smajax.control_presets import backstepping_two
 from smajax.figures.backstepping_runs import ON_ITS_PLANT, draw_sweep, draw_voltages, plant, runs
 from smajax.figures.row import Result, Row
 from smajax.parameters import set_parameters
-from smajax.presets import backstepping_two
 
 RATIOS = (0.5, 0.7, 0.85, 1.0, 1.4, 2.0)
 TARGET = 20.0

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from smajax.control_presets import backstepping_two
 from smajax.figures.backstepping_runs import ON_ITS_PLANT, draw_sweep, draw_voltages, plant, runs
 from smajax.figures.row import Result, Row
 from smajax.parameters import set_parameters
-from smajax.presets import backstepping_two
 
 RATIOS = (0.8, 0.9, 0.95, 1.0, 1.05, 1.1)
 TARGET = 20.0

@@ -7,6 +7,7 @@ import math
 import jax.numpy as jnp
 import numpy as np
 
+from smajax.control_presets import backstepping_two
 from smajax.figures.backstepping_runs import (
     ON_ITS_PLANT,
     degrees,
@@ -18,7 +19,6 @@ from smajax.figures.backstepping_runs import (
 )
 from smajax.figures.row import Result, Row
 from smajax.parameters import set_parameters
-from smajax.presets import backstepping_two
 
 AIR = (15.0, 18.0, 20.0, 22.0, 25.0)  # C
 BELIEVED, TARGET = 20.0, 20.0  # C, degrees

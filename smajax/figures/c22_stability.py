@@ -9,11 +9,11 @@ import jax.numpy as jnp
 import numpy as np
 from matplotlib.figure import Figure
 
+from smajax.control_presets import backstepping_two
 from smajax.figures.backstepping_runs import ON_ITS_PLANT, on_heating_curve, plant, runs, stacked
 from smajax.figures.drawing import BLUE, GREY, RED, keyed, named, styled
 from smajax.figures.row import Result, Row
 from smajax.parameters import set_parameters
-from smajax.presets import backstepping_two
 from smajax.types import Scalar
 
 TARGET = 20.0  # degrees

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from smajax.control_presets import pid, pid_tuned_at
 from smajax.figures.rigs import arm
 from smajax.figures.set_points import Runs, at_set_points, overshoot, regulated, steady, time_of
-from smajax.presets import pid, pid_tuned_at
 
 
 def tuned_at(degrees: int, fast: bool) -> Runs:

@@ -11,7 +11,8 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from smajax.closed_loop import ClosedLoop, simulate_closed_loop
-from smajax.presets import build, stress_sliding
+from smajax.control_presets import stress_sliding
+from smajax.presets import build
 from smajax.simulate import simulate
 from smajax.system import System
 from smajax.types import Series, Trajectory

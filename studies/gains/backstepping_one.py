@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from smajax.control_presets import backstepping_one
 from smajax.figures.backstepping_runs import plant
 from smajax.gain_search import regulation_cost
-from smajax.presets import backstepping_one
 from studies.gains.record import main, searched
 
 BOX = {"damping_gain": (0.2, 10.0), "stress_gain": (1.0, 150.0)}

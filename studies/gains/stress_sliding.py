@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from smajax.control_presets import quick_stress_sliding
 from smajax.figures.rigs import arm
 from smajax.gain_search import regulation_cost
-from smajax.presets import quick_stress_sliding
 from studies.gains.record import main, searched
 
 # A stress known to 1 MPa is what an estimator gives: 1e-6 V/Pa answers that with one volt.

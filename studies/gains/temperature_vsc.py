@@ -6,9 +6,9 @@ from typing import Any
 
 import jax.numpy as jnp
 
+from smajax.control_presets import temperature_vsc
 from smajax.figures.rigs import arm
 from smajax.merit import Merit
-from smajax.presets import temperature_vsc
 from smajax.types import Scalar
 from studies.gains.record import main, or_never, searched
 
