@@ -87,7 +87,15 @@ def test_ctrl_c_is_answered(tmp_path: Path) -> None:
         "--out",
         "out",
     ]
-    with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True) as run:
+    # A shell that runs its tests in the background has them ignore Ctrl-C, and what they start as well.
+    with subprocess.Popen(
+        command,
+        cwd=tmp_path,
+        stderr=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    ) as run:
         assert run.stderr is not None
         assert "checking" in run.stderr.readline()
         run.send_signal(signal.SIGINT)
