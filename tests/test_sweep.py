@@ -1,0 +1,92 @@
+"""The sweep: its lanes are single closed loops, its folder is whole, and what is finished is not computed again."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import equinox as eqx
+import numpy as np
+import pytest
+
+from smajax.closed_loop import simulate_closed_loop
+from smajax.control_presets import CONTROLLERS
+from smajax.figures.rigs import arm
+from smajax.merit import merit
+from smajax.parameters import get_parameters, set_parameters
+from smajax.reference import clock, constant
+from smajax.sweep import Grid, ratios, sweep
+from smajax.sweep_run import SweepSettings, run_sweep
+
+SETTINGS = SweepSettings(("vsc3",), "payload", "supply", 2, (0.0, 30.0), (1.0,), seconds=3.0)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("sweep")
+    run_sweep(arm(), SETTINGS, out, lambda what, share: None)
+    return out
+
+
+def test_a_lane_is_the_single_loop_of_that_plant(folder: Path) -> None:
+    with (folder / "vsc3.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 2 * 2 * 2
+    row = rows[-1]
+    assert (row["payload_ratio"], row["supply_ratio"], row["set_point_deg"]) == ("2", "2", "30")
+    system = arm()
+    names = ["payload_mass", "amplifier_gain"]
+    doubled = dict(zip(names, 2.0 * np.asarray(get_parameters(system, names)), strict=True))
+    plant = set_parameters(system, doubled)
+    controller = CONTROLLERS["vsc3"][0](system)
+    loop = eqx.filter_jit(simulate_closed_loop)(plant, controller, constant(clock(3.0, 0.01), np.radians(30.0)), 0.01)
+    one = merit(loop, plant)
+    assert float(row["energy_J"]) == pytest.approx(float(one.energy), rel=1e-5)
+    assert float(row["overshoot_deg"]) == pytest.approx(float(np.degrees(one.overshoot)), rel=1e-5, abs=1e-6)
+    assert float(row["peak_temperature_degC"]) == pytest.approx(float(one.peak_temperature), rel=1e-5)
+
+
+def test_the_folder_is_whole(folder: Path) -> None:
+    page = (folder / "index.html").read_text(encoding="utf-8")
+    for name in ("comparison.png", "vsc3_maps.png", "vsc3_lines.png", "vsc3.csv"):
+        assert name in page
+        assert (folder / name).stat().st_size > 300
+    record = json.loads((folder / "sweep.json").read_text(encoding="utf-8"))
+    assert record["sweep"]["loops"] == 8
+    assert record["sweep"]["failed"] == {"vsc3": 0}
+    assert not list(folder.rglob("*.part*"))
+
+
+def test_what_is_finished_is_kept(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    before = (folder / "vsc3.csv").read_bytes()
+
+    def never(*_: object, **__: object) -> None:
+        raise AssertionError("computed again")
+
+    monkeypatch.setattr("smajax.sweep_run.sweep", never)
+    run_sweep(arm(), SETTINGS, folder, lambda what, share: None)
+    assert (folder / "vsc3.csv").read_bytes() == before
+    other = SweepSettings(("vsc3",), "payload", "supply", 2, (0.0, 31.0), (1.0,), seconds=3.0)
+    with pytest.raises(AssertionError, match="computed again"):
+        run_sweep(arm(), other, folder, lambda what, share: None)
+
+
+def test_unknown_names_are_answered_with_those_there_are(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="backstepping2"):
+        run_sweep(arm(), SweepSettings(("vsc4",)), tmp_path, lambda what, share: None)
+    controller, gain = CONTROLLERS["vsc3"][0](arm()), CONTROLLERS["vsc3"][1]
+    grid = Grid("payload", "wind", ratios(3), np.zeros(1), np.ones(1))
+    with pytest.raises(ValueError, match="convection"):
+        sweep(arm(), controller, gain, grid)
+
+
+def test_an_odd_grid_has_the_plant_as_believed_in_it() -> None:
+    assert np.min(np.abs(ratios(15) - 1.0)) < 1e-12
+    assert ratios(15)[[0, -1]] == pytest.approx([0.5, 2.0])
+
+
+@pytest.mark.parametrize("name", sorted(CONTROLLERS))
+def test_every_controller_has_its_main_gain(name: str) -> None:
+    make, gain = CONTROLLERS[name]
+    assert float(get_parameters(make(arm()), [gain])[0]) > 0.0
