@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from smajax.control_presets import CONTROLLERS, model_filter, printed_filter
+from smajax.figures.rigs import arm
 from smajax.origins import ORIGINS
 from smajax.parameters import get_parameters, parameters
 from smajax.presets import DRIVES, LOADS, WIRES
@@ -11,6 +13,7 @@ from smajax.report.display import digits
 from smajax.runtime import prepare
 from smajax.wire.laws import LAWS, detwinning
 
+BELIEVED = ("arm", "believed", "system")  # fields that hold a plant
 PAGE = Path(__file__).parent / "parameters.md"
 
 
@@ -40,6 +43,24 @@ def page() -> str:
                     f"| `{entry.name}` | {digits(float(value), 5)} | {entry.unit} | {digits(entry.low)} to "
                     f"{digits(entry.high)} | {origin.kind}: {origin.note} | {entry.about} |"
                 )
+    lines += [
+        "",
+        "## Controllers and filters",
+        "",
+        "Of the arm (`control_presets.py`). The source prints 10 V and 4 V, P_0, Q and the filter's first guess; gains come",
+        "from the searches in `studies/gains`. What a controller believes of its plant is the plant's own table above.",
+    ]
+    system = arm()
+    shown = {name: make for name, (make, _) in CONTROLLERS.items()}
+    for name, make in {**shown, "printed filter": printed_filter, "model filter": model_filter}.items():
+        part = make(system)
+        about = (make.__doc__ or "").strip().split("\n\n")[0]
+        lines += ["", f"### `{name}`", "", " ".join(about.split()), ""]
+        lines += ["| gain | value | unit | bounds | meaning |", "|---|---|---|---|---|"]
+        own = {key: entry for key, entry in parameters(part).items() if entry.path[0] not in BELIEVED}
+        for value, entry in zip(get_parameters(part, list(own)), own.values(), strict=True):
+            bounds = f"{digits(entry.low)} to {digits(entry.high)}"
+            lines.append(f"| `{entry.name}` | {digits(float(value), 3)} | {entry.unit} | {bounds} | {entry.about} |")
     lines += ["", "## Kinetics laws", "", "| law | shape | conditions | variants | source |", "|---|---|---|---|---|"]
     for name, law in LAWS.items():
         parts = (type(law.shape).__name__, type(law.conditions).__name__, type(law.variants()).__name__)

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 from matplotlib.figure import Figure
 
-from smajax.control_presets import quick_stress_sliding
+from smajax.control_presets import printed_filter, quick_stress_sliding
 from smajax.controller.inverse_wire import moving_load
 from smajax.figures.backstepping_runs import shades
 from smajax.figures.drawing import GREY, keyed, named, panels
@@ -31,6 +31,9 @@ def work(fast: bool) -> Result:
     tuned = quick_stress_sliding(system)
     slack = set_parameters(tuned, SLACK)
     with_searched, with_slack = at_set_points(tuned, fast, TARGETS), at_set_points(slack, fast, TARGETS)
+    filtered = [one for _, one in at_set_points(tuned, fast, TARGETS, printed_filter(system)).values()]
+    reach_filtered = max(float(one.reach_time) for one in filtered)
+    error_filtered = max(steady(one) for one in filtered)
     searched, slacked = list(with_searched.values()), list(with_slack.values())
     reach = np.asarray([one.reach_time for _, one in searched])
     reach_slack = np.asarray([one.reach_time for _, one in slacked])
@@ -61,24 +64,29 @@ def work(fast: bool) -> Result:
         holds=bool(
             reach.max() < 4.0
             and reach_slack.max() < 4.0
+            and reach_filtered < 4.0
             and error < 0.2
+            and error_filtered < 0.5
             and loose[~beyond].max() < 0.5
             and loose[-1] > 1.0
             and (np.diff(loose[beyond]) > 0.0).all()
         ),
         found=f"every set point is reached in {reach.min():.1f} to {reach.max():.1f} s; with the searched gains the largest overshoot is "
         f"{largest:.2f}°; with a slacker stress controller ({reach_slack.max():.1f} s at most) the overshoot stays within {loose[~beyond].max():.1f}° up to "
-        f"the angle of greatest stress ({summit:.0f}°) and grows beyond it to {loose[-1]:.1f}° at 60°",
+        f"the angle of greatest stress ({summit:.0f}°) and grows beyond it to {loose[-1]:.1f}° at 60°; on the printed filter's stress in the place of the true one every set point is "
+        f"reached in {reach_filtered:.1f} s at most and held within {error_filtered:.2f}°",
         numbers={
             "slowest_reach_s": float(reach.max()),
             "slowest_reach_slack_s": float(reach_slack.max()),
+            "slowest_reach_with_filter_s": reach_filtered,
+            "largest_steady_error_with_filter_deg": error_filtered,
             "largest_overshoot_deg": largest,
             **{f"overshoot_slack_{at}_deg": float(o) for at, o in zip(TARGETS, loose, strict=True)},
             "largest_steady_error_deg": error,
             "angle_of_greatest_stress_deg": summit,
         },
         draw=draw,
-        caveat="the controller is told the true state. Gains are not printed; the searched ones avoid the overshoot that the source sees, "
+        caveat="drawn with the true state; the filter's readings of the angle are exact. Gains are not printed; the searched ones avoid the overshoot that the source sees, "
         f"those with {', '.join(f'{name} = {value:g}' for name, value in SLACK.items())} show it.",
     )
 

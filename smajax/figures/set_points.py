@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 
 from smajax.closed_loop import ClosedLoop, simulate_closed_loop
 from smajax.controller.base import AbstractController
+from smajax.estimator.base import AbstractEstimator
 from smajax.figures.drawing import BLACK, BLUE, GREEN, GREY, RED, named, panels
 from smajax.figures.rigs import Recorded, arm, austenite_range
 from smajax.merit import Merit, merit
@@ -38,12 +39,14 @@ def _batch(
     gains: Float[Array, "runs names"],
     targets: Float[Array, " runs"],
     dt: float,
+    estimator: AbstractEstimator | None = None,
 ) -> tuple[ClosedLoop, Merit]:
     time = clock(SECONDS, dt)
 
     def one(row: Float[Array, " names"], target: Scalar) -> tuple[ClosedLoop, Merit]:
         tuned = set_vector(controller, names, row)
-        loop = simulate_closed_loop(system, tuned, constant(time, target), dt, round(PERIOD / dt))
+        wanted = constant(time, target)
+        loop = simulate_closed_loop(system, tuned, wanted, dt, round(PERIOD / dt), estimator=estimator)
         return loop, merit(loop, system)
 
     return jax.vmap(one)(gains, targets)
@@ -54,11 +57,19 @@ def _unstacked(both: tuple[ClosedLoop, Merit], count: int) -> list[tuple[Recorde
     return [jax.tree.map(lambda series, k=k: series[k], both) for k in range(count)]
 
 
-def at_set_points(controller: AbstractController, fast: bool, degrees: Sequence[float] = SET_POINTS) -> Runs:
-    """(run, figures of merit) at each set point; the controller is called every 0.01 s, `fast` steps the arm as seldom."""
+def at_set_points(
+    controller: AbstractController,
+    fast: bool,
+    degrees: Sequence[float] = SET_POINTS,
+    estimator: AbstractEstimator | None = None,
+) -> Runs:
+    """(run, figures of merit) at each set point; the controller is called every 0.01 s, `fast` steps the arm as seldom.
+
+    Without an `estimator` it is told the true state.
+    """
     targets = jnp.radians(jnp.asarray(degrees, dtype=float))
     none = jnp.zeros((len(degrees), 0))
-    found = _batch(arm(), controller, (), none, targets, PERIOD if fast else DEFAULT_STEP)
+    found = _batch(arm(), controller, (), none, targets, PERIOD if fast else DEFAULT_STEP, estimator)
     return dict(zip(degrees, _unstacked(found, len(degrees)), strict=True))
 
 

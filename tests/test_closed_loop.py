@@ -1,0 +1,173 @@
+"""The loop around a controller: sample time, delay, sensor, disturbances, references and figures of merit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from smajax.closed_loop import check_answers, simulate_closed_loop
+from smajax.control_presets import pid, quick_stress_sliding
+from smajax.controller.base import AbstractController
+from smajax.drive.duty import Duty
+from smajax.load.base import GRAVITY
+from smajax.measured.table import MeasuredDataError
+from smajax.measured_state import MeasuredState, Sensor
+from smajax.merit import merit
+from smajax.presets import amplified_voltage, arm, niti_table_3_1
+from smajax.reference import Reference, clock, constant, ramp, resting, sampled, sine, steps
+from smajax.reference_file import read_reference
+from smajax.simulate import simulate
+from smajax.system import System
+from smajax.types import Scalar
+from smajax.units import UnitError
+
+ARM = System(niti_table_3_1(), arm(), amplified_voltage())
+DT = 0.01
+RUN = eqx.filter_jit(simulate_closed_loop)
+
+
+class Played(AbstractController):
+    """Says the set point itself, as volts: what it asked for and when can be read off the command."""
+
+    def start(self, measured: MeasuredState, wanted: Reference) -> Scalar:
+        return jnp.zeros(())
+
+    def step(self, memory: Scalar, measured: MeasuredState, wanted: Reference, period: Scalar) -> tuple[Any, Scalar]:
+        return memory, wanted.position
+
+
+VOLTS = jnp.asarray(np.random.default_rng(1).uniform(0.0, 9.0, 201))
+
+
+@pytest.mark.parametrize(("every", "delay"), [(1, 0), (4, 0), (1, 3), (4, 2)])
+def test_a_command_is_held_and_comes_late(every: int, delay: int) -> None:
+    loop = simulate_closed_loop(ARM, Played(), VOLTS, DT, every, delay=delay)
+    asked = np.asarray(VOLTS)[:-1:every]
+    late = np.concatenate([np.zeros(delay), asked])[: len(asked)]
+    held = np.append(np.repeat(late, every), late[-1])
+    np.testing.assert_array_equal(loop.voltage, held)
+    # And the plant is the simulator's own under that command.
+    alone = simulate(ARM, {"voltage": jnp.asarray(held)}, DT)
+    np.testing.assert_allclose(loop.run.position, alone.position, rtol=0.0, atol=1e-12)
+
+
+def test_a_duty_cycle_heats_as_the_voltage_does() -> None:
+    """A supply behind an amplifier of gain 1 gives the same power by its duty, until there is no more of it."""
+    supply = System(ARM.wire, ARM.load, Duty(supply_voltage=16.2))
+    volts = jnp.linspace(0.0, 20.0, 201)
+    by_duty = simulate_closed_loop(supply, Played(), volts, DT)
+    direct = simulate_closed_loop(ARM, Played(), jnp.minimum(volts, 16.2) / 1.8, DT)
+    np.testing.assert_allclose(by_duty.run.temperature, direct.run.temperature, rtol=0.0, atol=1e-9)
+
+
+def test_a_sensor_counts_and_shakes() -> None:
+    target = constant(clock(3.0, DT), 0.2)
+    counted = RUN(ARM, pid(ARM), target, DT, sensor=Sensor(quantum=0.01), key=jax.random.key(0))
+    counts = np.asarray(counted.measured.position) / 0.01
+    np.testing.assert_allclose(counts, np.round(counts), rtol=0.0, atol=1e-9)
+    assert np.abs(counted.measured.position - counted.run.position).max() < 0.0051
+    shaken = RUN(ARM, pid(ARM), target, DT, sensor=Sensor(noise_sigma=1e-3), key=jax.random.key(0))
+    off = np.asarray(shaken.measured.position - shaken.run.position)[:-1]
+    assert 0.9e-3 < off.std() < 1.1e-3
+    assert abs(np.corrcoef(off[1:], off[:-1])[0, 1]) < 0.2
+    with pytest.raises(ValueError, match="key"):
+        simulate_closed_loop(ARM, pid(ARM), target, DT, sensor=Sensor())
+
+
+def test_disturbances_reach_the_plant_and_integral_action_takes_them_out() -> None:
+    time = clock(12.0, DT)
+    target = constant(time, 0.2)
+    pushed = jnp.where(time < 6.0, 0.0, 4e-3)
+    loop = RUN(ARM, pid(ARM), target, DT, disturbance={"load_torque": pushed})
+    before, after = 595, -5
+    assert abs(float(loop.run.position[before]) - 0.2) < 2e-3
+    assert abs(float(loop.run.position[after]) - 0.2) < 1e-2
+    # At rest the wire carries the torque: sigma = tau / (2 r A_w).
+    lever = 2.0 * 8.25e-3 * 0.25 * np.pi * 150e-6**2
+    gravity = (0.05719 + 0.5 * 0.0187) * GRAVITY * 0.04738
+    statics = [
+        (gravity * np.cos(x) + 3.871 * 0.048**2 * (x + np.pi / 4) + torque) / lever
+        for x, torque in ((float(loop.run.position[before]), 0.0), (float(loop.run.position[after]), 4e-3))
+    ]
+    assert float(loop.run.stress[before]) == pytest.approx(statics[0], rel=0.02)
+    assert float(loop.run.stress[after]) == pytest.approx(statics[1], rel=0.02)
+    warmer = RUN(ARM, pid(ARM), target, DT, disturbance={"ambient_temperature": jnp.full_like(time, 40.0)})
+    assert float(warmer.voltage[-1]) < float(loop.voltage[before]) - 0.5
+    with pytest.raises(ValueError, match="wind"):
+        simulate_closed_loop(ARM, pid(ARM), target, DT, disturbance={"wind": pushed})
+    with pytest.raises(ValueError, match="samples"):
+        simulate_closed_loop(ARM, pid(ARM), target, DT, disturbance={"load_torque": pushed[:-1]})
+
+
+def test_sliding_control_follows_a_ramp_and_a_sine() -> None:
+    time = clock(10.0, DT)
+    late = np.asarray(time) > 3.0
+    for wanted in (ramp(time, -0.6, 0.6, 6.0), sine(time, 0.0, 0.25, 0.1)):
+        loop = RUN(ARM, quick_stress_sliding(ARM), wanted, DT)
+        error = np.asarray(loop.run.position - wanted.position)[late]
+        assert np.sqrt(np.mean(error**2)) < np.radians(1.5)
+
+
+def test_references_have_the_derivatives_of_their_positions() -> None:
+    time = clock(4.0, 1e-3)
+    for wanted in (ramp(time, -0.5, 0.5, 5.0), sine(time, 0.1, 0.3, 0.7), sampled(jnp.sin(time), 1e-3)):
+        inside = slice(3, -3)
+        slope = np.gradient(np.asarray(wanted.position), 1e-3)
+        np.testing.assert_allclose(wanted.velocity[inside], slope[inside], atol=1e-5)
+        np.testing.assert_allclose(wanted.acceleration[inside], np.gradient(slope, 1e-3)[inside], atol=1e-3)
+    stairs = steps(clock(1.0, 0.1), [1.0, 2.0, 3.0], 0.3)
+    np.testing.assert_array_equal(stairs.position, [1, 1, 1, 2, 2, 2, 3, 3, 3, 3, 3])
+    np.testing.assert_array_equal(resting(VOLTS).velocity, np.zeros(201))
+
+
+def test_a_reference_from_a_file(tmp_path: Path) -> None:
+    path = tmp_path / "path.csv"
+    path.write_text("time,angle\n0,0\n1,90\n3,-90\n", encoding="utf-8")
+    lines = read_reference(path, "time", "angle", "deg", 0.5)
+    np.testing.assert_allclose(np.degrees(lines.position), [0, 45, 90, 45, 0, -45, -90], atol=1e-9)
+    assert float(lines.velocity[4]) == pytest.approx(-np.pi / 2)
+    held = read_reference(path, "time", "angle", "deg", 0.5, held=True)
+    np.testing.assert_allclose(np.degrees(held.position), [0, 0, 90, 90, 90, 90, -90], atol=1e-9)
+    with pytest.raises(MeasuredDataError, match="angel"):
+        read_reference(path, "time", "angel", "deg", 0.5)
+    with pytest.raises(UnitError):
+        read_reference(path, "time", "angle", "volt", 0.5)
+
+
+def test_figures_of_merit_of_a_known_run() -> None:
+    """A hand-made trajectory: rises to 1.1, back to 1 within the band from 3 s on; the command switches twice."""
+    loop = simulate_closed_loop(ARM, Played(), jnp.ones(501), DT)
+    time = loop.run.time
+    position = jnp.interp(time, jnp.asarray([0.0, 1.0, 2.0, 3.0, 5.0]), jnp.asarray([0.0, 1.0, 1.1, 1.01, 1.01]))
+    voltage = jnp.where((time > 1.0) & (time < 2.0), 10.0, 2.0)
+    made = eqx.tree_at(lambda one: (one.run.position, one.voltage), loop, (position, voltage))
+    one = merit(made, ARM, band=0.02)
+    assert float(one.reach_time) == pytest.approx(0.98, abs=1.5 * DT)
+    assert float(one.settling_time) == pytest.approx(2.0 + 0.08 / 0.09, abs=1.5 * DT)
+    assert float(one.overshoot) == pytest.approx(0.1, abs=1e-9)
+    assert float(one.steady_error) == pytest.approx(0.01, abs=1e-9)
+    assert float(one.switches_per_second) == pytest.approx(2 / 5.0)
+    # R_w = 45 ohm/m times 0.9 m; the amplifier's gain is 1.8.
+    volts = 1.8 * np.asarray(voltage)[:-1]
+    assert float(one.energy) == pytest.approx(float((volts**2).sum() * DT / (45.0 * 0.9)), rel=1e-6)
+    never = eqx.tree_at(lambda one: one.run.position, loop, jnp.zeros_like(position))
+    assert np.isinf(float(merit(never, ARM).settling_time))
+
+
+def test_what_a_loop_refuses() -> None:
+    with pytest.raises(ValueError, match="multiple of 4"):
+        simulate_closed_loop(ARM, Played(), jnp.ones(100), DT, 4)
+    with pytest.raises(ValueError, match="delay"):
+        simulate_closed_loop(ARM, Played(), jnp.ones(101), DT, delay=-1)
+    broken = simulate_closed_loop(ARM, Played(), jnp.where(jnp.arange(101) < 50, 1.0, jnp.nan), DT)
+    assert float(broken.failed_at) == pytest.approx(0.5)
+    assert np.isfinite(broken.run.position).all()
+    np.testing.assert_array_equal(broken.voltage[50:], 0.0)
+    with pytest.raises(ValueError, match=r"0\.500 s"):
+        check_answers(broken)
