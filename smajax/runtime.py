@@ -10,7 +10,6 @@ from pathlib import Path
 # either way. A flag that a later version does not know ends the process: only versions that were tried.
 FLAG = "--xla_cpu_use_fusion_emitters=false"
 TRIED = ((0, 7), (0, 10))
-MOST_KEPT = 1 << 30  # bytes of compiled programs; the oldest go first
 
 
 def kept_programs() -> Path:
@@ -33,4 +32,3 @@ def prepare() -> None:
     # Small ones too: a command has dozens of them.
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
     jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
-    jax.config.update("jax_compilation_cache_max_size", MOST_KEPT)

@@ -53,12 +53,12 @@ def page() -> str:
     system = arm()
     shown = {name: make for name, (make, _) in CONTROLLERS.items()}
     for name, make in {**shown, "printed filter": printed_filter, "model filter": model_filter}.items():
-        part = make(system)
+        one = make(system)
         about = (make.__doc__ or "").strip().split("\n\n")[0]
         lines += ["", f"### `{name}`", "", " ".join(about.split()), ""]
         lines += ["| gain | value | unit | bounds | meaning |", "|---|---|---|---|---|"]
-        own = {key: entry for key, entry in parameters(part).items() if entry.path[0] not in BELIEVED}
-        for value, entry in zip(get_parameters(part, list(own)), own.values(), strict=True):
+        own = {key: entry for key, entry in parameters(one).items() if entry.path[0] not in BELIEVED}
+        for value, entry in zip(get_parameters(one, list(own)), own.values(), strict=True):
             bounds = f"{digits(entry.low)} to {digits(entry.high)}"
             lines.append(f"| `{entry.name}` | {digits(float(value), 3)} | {entry.unit} | {bounds} | {entry.about} |")
     lines += ["", "## Kinetics laws", "", "| law | shape | conditions | variants | source |", "|---|---|---|---|---|"]
