@@ -177,6 +177,7 @@ def sweep(
     set_points: Annotated[str, typer.Option(help="degrees, with commas between them")] = "-40,-20,0,10,20,40,50,60,80",
     gains: Annotated[str, typer.Option(help="shares of the controller's main gain")] = "0.5,0.7,1,1.4,2",
     seconds: Annotated[float, typer.Option(min=0.1, help="length of each closed loop")] = 10.0,
+    estimator: Annotated[str, typer.Option(help="`printed` or `model` filter; none: told the true state")] = "",
     out: Annotated[Path, typer.Option(help="folder for the page, the pictures and the rows")] = Path("sweep"),
     fast: Annotated[bool, typer.Option("--fast", help="3 x 3 mismatches, 3 set points, the preset's gains")] = False,
     open_page: Annotated[bool, typer.Option("--open/--no-open", help="open the page in a browser")] = True,
@@ -200,12 +201,21 @@ def sweep(
     if len(pair) != 2:
         raise typer.BadParameter(f"two mismatches with a comma between them, not `{over}`", param_hint="--over")
     settings = SweepSettings(
-        names, *pair, points, _numbers("--set-points", set_points), _numbers("--gains", gains), seconds
+        names,
+        *pair,
+        points,
+        _numbers("--set-points", set_points),
+        _numbers("--gains", gains),
+        seconds,
+        filtered=estimator,
     )
     if fast:
-        settings = SweepSettings(names, *pair, 3, (-20.0, 20.0, 60.0), (1.0,), seconds)
-    with _resumable(), shown(console) as progress:
-        rows = run_sweep(arm(), settings, out, progress)
+        settings = SweepSettings(names, *pair, 3, (-20.0, 20.0, 60.0), (1.0,), seconds, filtered=estimator)
+    try:
+        with _resumable(), shown(console) as progress:
+            rows = run_sweep(arm(), settings, out, progress)
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from None
     typer.echo(as_text(rows))
     page = out / "index.html"
     typer.echo(f"Page: {page.resolve()}")

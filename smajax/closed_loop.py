@@ -14,7 +14,7 @@ from jax import lax
 from smajax.controller.base import AbstractController
 from smajax.estimator.base import AbstractEstimator
 from smajax.measured_state import MeasuredState, Sensor, truth
-from smajax.parameters import check_bounds
+from smajax.parameters import check_bounds, inside_bounds
 from smajax.reference import Reference, resting
 from smajax.simulate import DEFAULT_STEP, trajectory
 from smajax.step import step
@@ -134,7 +134,14 @@ def simulate_closed_loop(
 
     reading = seen(state, noise[0])
     estimate, measured = (None, told(state, reading)) if estimator is None else estimator.start(reading)
-    start = _Carry(state, estimate, controller.start(measured, first), zero, jnp.zeros(delay), jnp.asarray(jnp.inf))
+    start = _Carry(
+        state,
+        estimate,
+        controller.start(measured, first),
+        zero,
+        jnp.zeros(delay),
+        jnp.where(inside_bounds(controller), jnp.inf, state.time),
+    )
     at_calls = jax.tree.map(lambda series: series[:-1:every], wanted)
     end, (states, held, measured) = lax.scan(period_of, start, (at_calls, noise, acting, jnp.arange(periods)))
     states = jax.tree.map(lambda rest: rest.reshape(-1, *rest.shape[2:]), states)
@@ -152,6 +159,6 @@ def check_answers(loop: ClosedLoop) -> None:
     if bad.size:
         where = "" if failed.size == 1 else f" (run {bad[0]} of {failed.size}, and {bad.size - 1} others)"
         raise ValueError(
-            f"the controller's answer at {failed[bad[0]]:.3f} s is not a finite voltage{where}; from there on 0 V was "
-            "applied. Look at its gains, and at `measured`, which it was told."
+            f"the controller's answer at {failed[bad[0]]:.3f} s is not a finite voltage, or a gain is out of its bounds{where}; "
+            "from there on 0 V was applied. `parameters.check_bounds(controller)` names the gain, its value and its bounds."
         )

@@ -5,6 +5,7 @@ A preset takes the system that the controller is to believe in.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 
 from smajax.controller.backstepping_one import BacksteppingOne
@@ -16,12 +17,14 @@ from smajax.controller.temperature_vsc import Passing, TemperatureVsc
 from smajax.controller.vsc1 import Vsc1
 from smajax.controller.vsc2 import Vsc2
 from smajax.controller.vsc3 import Vsc3
+from smajax.estimator.base import AbstractEstimator
 from smajax.estimator.model_filter import ModelFilter
 from smajax.estimator.printed_filter import PrintedFilter
 from smajax.load.arm import Arm
 from smajax.load.base import AbstractMovingLoad
 from smajax.parameters import set_parameters
 from smajax.system import System
+from smajax.wire.constitutive import IntegratedForm
 from smajax.wire.heat import cross_section
 
 
@@ -137,19 +140,6 @@ def temperature_vsc(system: System) -> TemperatureVsc:
     )
 
 
-# Name on the command line -> (preset, its main gain, which a sweep varies).
-CONTROLLERS: dict[str, tuple[Callable[[System], AbstractController], str]] = {
-    "pid": (pid, "proportional_gain"),
-    "vsc1": (vsc1, "high_voltage"),
-    "vsc2": (vsc2, "boundary"),
-    "vsc3": (vsc3, "surface_slope"),
-    "nvsc": (temperature_vsc, "temperature_gain"),
-    "sld": (quick_stress_sliding, "surface_slope"),
-    "backstepping1": (backstepping_one, "damping_gain"),
-    "backstepping2": (backstepping_two, "damping_gain"),
-}
-
-
 def printed_filter(system: System) -> PrintedFilter:
     """The source's filter of the arm (sec. 4.5), first guess, P_0 and Q as printed.
 
@@ -190,3 +180,37 @@ def model_filter(system: System) -> ModelFilter:
         start_temperature_error=2.0,
         start_fraction_error=1e-3,
     )
+
+
+def with_printed_law(system: System) -> System:
+    """The plant that section 4.8 is written for: the integrated law without a thermal term (eq. 4.51)."""
+    constitutive = dataclasses.replace(system.wire.constitutive, form=IntegratedForm())
+    wire = dataclasses.replace(system.wire, constitutive=constitutive)
+    return set_parameters(dataclasses.replace(system, wire=wire), {"thermal_modulus": 0.0})
+
+
+@dataclasses.dataclass(frozen=True)
+class ControllerPreset:
+    """A controller as a sweep runs it."""
+
+    make: Callable[[System], AbstractController]
+    main_gain: str  # the gain that a sweep varies
+    told: str  # what it reads of the plant
+    plant: Callable[[System], System] = lambda system: system  # the plant that its section is written for
+
+
+ANGLE, STATE = "angle", "angle, rate, stress, temperature, fraction"
+
+# Name on the command line -> controller.
+CONTROLLERS: dict[str, ControllerPreset] = {
+    "pid": ControllerPreset(pid, "proportional_gain", ANGLE),
+    "vsc1": ControllerPreset(vsc1, "high_voltage", ANGLE),
+    "vsc2": ControllerPreset(vsc2, "boundary", ANGLE),
+    "vsc3": ControllerPreset(vsc3, "surface_slope", ANGLE),
+    "nvsc": ControllerPreset(temperature_vsc, "temperature_gain", STATE),
+    "sld": ControllerPreset(quick_stress_sliding, "surface_slope", STATE),
+    "backstepping1": ControllerPreset(backstepping_one, "damping_gain", STATE, with_printed_law),
+    "backstepping2": ControllerPreset(backstepping_two, "damping_gain", STATE, with_printed_law),
+}
+# Name on the command line -> filter.
+FILTERS: dict[str, Callable[[System], AbstractEstimator]] = {"printed": printed_filter, "model": model_filter}

@@ -11,7 +11,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 Module = TypeVar("Module", bound=eqx.Module)
 
@@ -125,3 +125,12 @@ def check_bounds(model: eqx.Module) -> None:
             wrong.append(f"`{entry.name}` = {first:g} {entry.unit} (from {entry.low:g} to {entry.high:g})")
     if wrong:
         raise ValueError(f"outside of the bounds: {'; '.join(wrong)}.")
+
+
+def inside_bounds(model: eqx.Module) -> Bool[Array, ""]:
+    """Whether every parameter lies within its bounds; also of values that are not known yet, lane by lane of a batch."""
+    inside = jnp.asarray(True)
+    for entry in parameters(model).values():
+        value = _lookup(model, entry.path)
+        inside = inside & jnp.all((value >= entry.low) & (value <= entry.high))  # nan is not
+    return inside

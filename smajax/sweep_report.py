@@ -14,6 +14,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FormatStrFormatter
 
+from smajax.control_presets import ANGLE, CONTROLLERS, with_printed_law
 from smajax.figures.drawing import keyed, named, panels
 from smajax.merit import Merit
 from smajax.sweep import Grid
@@ -123,7 +124,9 @@ def comparison_rows(targets: np.ndarray, merits: Mapping[str, Merit]) -> list[li
     return rows
 
 
-def page(targets: np.ndarray, merits: Mapping[str, Merit], grid: Grid, swept: Sequence[Swept], seconds: float) -> str:
+def page(
+    targets: np.ndarray, merits: Mapping[str, Merit], grid: Grid, swept: Sequence[Swept], seconds: float, filtered: str
+) -> str:
     """One page for a browser; pictures lie beside it."""
     say = html.escape
     head = ["controller", "settles at", *(f"{label} ({unit})" for label, unit, _ in SHOWN.values())]
@@ -132,7 +135,7 @@ def page(targets: np.ndarray, merits: Mapping[str, Merit], grid: Grid, swept: Se
     )
     loops = int(np.prod(grid.shape))
     parts = "".join(
-        f"<h2>{say(one.name)}</h2><p>{loops:,} closed loops of {seconds:g} s; {failures(one)}. "
+        f"<h2>{say(one.name)}</h2><p>{loops:,} closed loops of {seconds:g} s; {failures(one)}. {say(told(one.name, filtered))} "
         f'<a href="{one.name}.csv">every loop as CSV</a></p>'
         f'<img src="{one.name}_maps.png" alt="maps of {say(one.name)}">'
         f'<img src="{one.name}_lines.png" alt="lines of {say(one.name)}">'
@@ -152,6 +155,16 @@ def page(targets: np.ndarray, merits: Mapping[str, Merit], grid: Grid, swept: Se
         "controller believes, where it believes in one. Maps: median over the set points at the preset's gains.</p>"
         f"{parts}</html>\n"
     )
+
+
+def told(name: str, filtered: str) -> str:
+    """What a controller reads, from where, and of which plant."""
+    preset = CONTROLLERS[name]
+    source = (
+        f"from the {filtered} filter" if filtered else "without noise or filter" if preset.told == ANGLE else "true"
+    )
+    plant = " Plant: the integrated law without a thermal term (eq. 4.51)." if preset.plant is with_printed_law else ""
+    return f"It is told {preset.told} ({source}).{plant}"
 
 
 def failures(one: Swept) -> str:

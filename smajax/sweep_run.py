@@ -13,7 +13,7 @@ import jax
 import numpy as np
 from matplotlib.figure import Figure
 
-from smajax.control_presets import CONTROLLERS
+from smajax.control_presets import CONTROLLERS, FILTERS
 from smajax.fit.solve import Progress
 from smajax.merit import Merit
 from smajax.source_mark import source_mark
@@ -46,6 +46,7 @@ class SweepSettings:
     gains: tuple[float, ...] = (0.5, 0.7, 1.0, 1.4, 2.0)
     seconds: float = 10.0
     dt: float = 0.01
+    filtered: str = ""  # the filter that tells the controllers the state; none: they are told the true one
 
 
 def run_sweep(system: System, settings: SweepSettings, out: Path, progress: Progress) -> list[list[str]]:
@@ -56,6 +57,8 @@ def run_sweep(system: System, settings: SweepSettings, out: Path, progress: Prog
     unknown = [name for name in settings.controllers if name not in CONTROLLERS]
     if unknown or not settings.controllers:
         raise ValueError(f"no controller {unknown}; there are {', '.join(CONTROLLERS)}.")
+    if settings.filtered and settings.filtered not in FILTERS:
+        raise ValueError(f"no filter `{settings.filtered}`; there are {', '.join(FILTERS)}.")
     out.mkdir(parents=True, exist_ok=True)
     targets = np.radians(settings.set_points)
     grid = Grid(settings.first, settings.second, ratios(settings.points), targets, np.asarray(settings.gains))
@@ -77,7 +80,9 @@ def run_sweep(system: System, settings: SweepSettings, out: Path, progress: Prog
     draw_comparison(comparison, targets, compared)
     comparison.savefig(out / "comparison.png", dpi=90, facecolor="white")
     (out / "sweep.json").write_text(as_json(targets, compared, grid, swept), encoding="utf-8")
-    (out / "index.html").write_text(page(targets, compared, grid, swept, settings.seconds), encoding="utf-8")
+    (out / "index.html").write_text(
+        page(targets, compared, grid, swept, settings.seconds, settings.filtered), encoding="utf-8"
+    )
     return comparison_rows(targets, compared)
 
 
@@ -85,16 +90,21 @@ def _controller(
     system: System, name: str, settings: SweepSettings, grid: Grid, alone: Grid, out: Path, progress: Progress
 ) -> tuple[Merit, Swept, np.ndarray]:
     """One controller, from the folder where an interrupted sweep of this code and setting has finished it."""
-    make, gain = CONTROLLERS[name]
+    preset = CONTROLLERS[name]
+    system, gain = preset.plant(system), preset.main_gain
     own = dataclasses.replace(settings, controllers=(name,))
     mark = hashlib.sha256(f"{source_mark()} {own}".encode())
+    # The laws of the system are its structure, the parameters its leaves.
+    mark.update(repr(jax.tree.structure(system)).encode())
     for leaf in jax.tree.leaves(system):
         mark.update(np.asarray(leaf).tobytes())
     kept = out / "finished" / f"{name}-{mark.hexdigest()[:16]}.npz"
     fields = [field.name for field in dataclasses.fields(Merit)]
     if not kept.exists():
-        controller = make(system)
+        controller = preset.make(system)
         timing: dict[str, Any] = {"seconds": settings.seconds, "dt": settings.dt}
+        if settings.filtered:
+            timing["estimator"] = FILTERS[settings.filtered](system)
 
         def told(_: str, share: float) -> None:
             progress(f"sweeping {name}", share)

@@ -51,7 +51,7 @@ def page() -> str:
         "from the searches in `studies/gains`. What a controller believes of its plant is the plant's own table above.",
     ]
     system = arm()
-    shown = {name: make for name, (make, _) in CONTROLLERS.items()}
+    shown = {name: preset.make for name, preset in CONTROLLERS.items()}
     for name, make in {**shown, "printed filter": printed_filter, "model filter": model_filter}.items():
         one = make(system)
         about = (make.__doc__ or "").strip().split("\n\n")[0]

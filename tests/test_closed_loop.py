@@ -12,14 +12,15 @@ import numpy as np
 import pytest
 
 from smajax.closed_loop import check_answers, simulate_closed_loop
-from smajax.control_presets import pid, quick_stress_sliding
+from smajax.control_presets import CONTROLLERS, pid, quick_stress_sliding
 from smajax.controller.base import AbstractController
 from smajax.drive.duty import Duty
 from smajax.load.base import GRAVITY
 from smajax.measured.table import MeasuredDataError
 from smajax.measured_state import MeasuredState, Sensor
-from smajax.merit import merit
-from smajax.presets import amplified_voltage, arm, niti_table_3_1
+from smajax.merit import band_of, merit
+from smajax.parameters import get_parameters, set_parameters
+from smajax.presets import amplified_voltage, arm, build, niti_table_3_1
 from smajax.reference import Reference, clock, constant, ramp, resting, sampled, sine, steps
 from smajax.reference_file import read_reference
 from smajax.simulate import simulate
@@ -141,7 +142,7 @@ def test_a_reference_from_a_file(tmp_path: Path) -> None:
 
 
 def test_figures_of_merit_of_a_known_run() -> None:
-    """A hand-made trajectory: rises to 1.1, back to 1 within the band from 3 s on; the command switches twice."""
+    """A hand-made trajectory: rises to 1.1, back to 1 within the band from 3 s on; the command turns back once."""
     loop = simulate_closed_loop(ARM, Played(), jnp.ones(501), DT)
     time = loop.run.time
     position = jnp.interp(time, jnp.asarray([0.0, 1.0, 2.0, 3.0, 5.0]), jnp.asarray([0.0, 1.0, 1.1, 1.01, 1.01]))
@@ -152,12 +153,62 @@ def test_figures_of_merit_of_a_known_run() -> None:
     assert float(one.settling_time) == pytest.approx(2.0 + 0.08 / 0.09, abs=1.5 * DT)
     assert float(one.overshoot) == pytest.approx(0.1, abs=1e-9)
     assert float(one.steady_error) == pytest.approx(0.01, abs=1e-9)
-    assert float(one.switches_per_second) == pytest.approx(2 / 5.0)
+    assert float(one.switches_per_second) == pytest.approx(1 / 5.0)
     # R_w = 45 ohm/m times 0.9 m; the amplifier's gain is 1.8.
     volts = 1.8 * np.asarray(voltage)[:-1]
     assert float(one.energy) == pytest.approx(float((volts**2).sum() * DT / (45.0 * 0.9)), rel=1e-6)
     never = eqx.tree_at(lambda one: one.run.position, loop, jnp.zeros_like(position))
     assert np.isinf(float(merit(never, ARM).settling_time))
+
+
+def test_figures_of_merit_in_awkward_cases() -> None:
+    loop = simulate_closed_loop(ARM, Played(), jnp.ones(501), DT)
+    time = loop.run.time
+
+    def judged(position: Any, voltage: Any = 0.0, band: float = 0.02) -> Any:
+        parts = jnp.broadcast_to(position, time.shape), jnp.broadcast_to(voltage, time.shape)
+        return merit(eqx.tree_at(lambda one: (one.run.position, one.voltage), loop, parts), ARM, band=band)
+
+    # A cycle about the set point that is inside the band at the last sample only.
+    cycle = judged(1.0 + 0.3 * jnp.sin(2.0 * jnp.pi * time))
+    assert abs(float(jnp.sin(2.0 * jnp.pi * time[-1]))) < 0.01
+    assert np.isinf(float(cycle.settling_time))
+    # Ten turns up and ten down a second between 6 and 8.5 V, after one long spell at 10 V and one dip to 0 V.
+    chatter = jnp.where(jnp.floor(time * 20.0 + 1e-6) % 2 == 0, 6.0, 8.5)
+    lively = judged(1.0, jnp.where(time < 1.0, 10.0, jnp.where(time < 1.1, 0.0, chatter)))
+    assert float(lively.switches_per_second) == pytest.approx(20.0 * 3.9 / 5.0, rel=0.05)
+    # At its set point from the start: whatever leads away from it is overshoot.
+    assert float(judged(1.0 - 0.2 * jnp.exp(-((time - 2.0) ** 2))).overshoot) == pytest.approx(0.2, rel=1e-6)
+    # From above: beyond is below.
+    fall = judged(1.0 + jnp.where(time < 1.0, 0.5, -0.1))
+    assert float(fall.overshoot) == pytest.approx(0.1)
+    assert float(fall.reach_time) == pytest.approx(1.0, abs=1.5 * DT)
+
+
+def test_the_band_of_a_length_is_a_share_of_its_stroke() -> None:
+    hanging = build("flexinol_table_3_2", "dead_weight", "flexinol_voltage")
+    assert float(band_of(hanging)) == pytest.approx(0.01 * 0.02475)
+    assert float(band_of(ARM)) == pytest.approx(np.radians(1.0))
+
+
+@pytest.mark.parametrize("name", ["sld", "backstepping1", "backstepping2"])
+def test_a_bad_gain_fails_its_own_run_and_no_other(name: str) -> None:
+    """In a batch, where no error can be raised: a gain that is no number, and one out of its bounds."""
+    controller = CONTROLLERS[name].make(ARM)
+    gain = CONTROLLERS[name].main_gain
+    good = float(get_parameters(controller, [gain])[0])
+    values = jnp.asarray([good, jnp.nan, -good, good])
+
+    def run(value: Any) -> Any:
+        return simulate_closed_loop(ARM, set_parameters(controller, {gain: value}), jnp.full(31, 0.3), DT)
+
+    loop = eqx.filter_jit(jax.vmap(run))(values)
+    np.testing.assert_array_equal(np.isfinite(loop.failed_at), [False, True, True, False])
+    np.testing.assert_array_equal(loop.voltage[1:3], 0.0)
+    np.testing.assert_array_equal(loop.run.position[0], loop.run.position[3])
+    assert float(jnp.abs(loop.voltage[0]).max()) > 1.0
+    with pytest.raises(ValueError, match=f"{gain}.*-"):
+        run(-good)
 
 
 def test_what_a_loop_refuses() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import json
 from pathlib import Path
 
@@ -39,7 +40,7 @@ def test_a_lane_is_the_single_loop_of_that_plant(folder: Path) -> None:
     names = ["payload_mass", "amplifier_gain"]
     doubled = dict(zip(names, 2.0 * np.asarray(get_parameters(system, names)), strict=True))
     plant = set_parameters(system, doubled)
-    controller = CONTROLLERS["vsc3"][0](system)
+    controller = CONTROLLERS["vsc3"].make(system)
     loop = eqx.filter_jit(simulate_closed_loop)(plant, controller, constant(clock(3.0, 0.01), np.radians(30.0)), 0.01)
     one = merit(loop, plant)
     assert float(row["energy_J"]) == pytest.approx(float(one.energy), rel=1e-5)
@@ -70,12 +71,17 @@ def test_what_is_finished_is_kept(folder: Path, monkeypatch: pytest.MonkeyPatch)
     other = SweepSettings(("vsc3",), "payload", "supply", 2, (0.0, 31.0), (1.0,), seconds=3.0)
     with pytest.raises(AssertionError, match="computed again"):
         run_sweep(arm(), other, folder, lambda what, share: None)
+    # Another law is another plant, though every parameter is the same.
+    with pytest.raises(AssertionError, match="computed again"):
+        run_sweep(arm("liang"), SETTINGS, folder, lambda what, share: None)
 
 
 def test_unknown_names_are_answered_with_those_there_are(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="backstepping2"):
         run_sweep(arm(), SweepSettings(("vsc4",)), tmp_path, lambda what, share: None)
-    controller, gain = CONTROLLERS["vsc3"][0](arm()), CONTROLLERS["vsc3"][1]
+    with pytest.raises(ValueError, match="printed"):
+        run_sweep(arm(), dataclasses.replace(SETTINGS, filtered="kalman"), tmp_path, lambda what, share: None)
+    controller, gain = CONTROLLERS["vsc3"].make(arm()), CONTROLLERS["vsc3"].main_gain
     grid = Grid("payload", "wind", ratios(3), np.zeros(1), np.ones(1))
     with pytest.raises(ValueError, match="convection"):
         sweep(arm(), controller, gain, grid)
@@ -88,5 +94,5 @@ def test_an_odd_grid_has_the_plant_as_believed_in_it() -> None:
 
 @pytest.mark.parametrize("name", sorted(CONTROLLERS))
 def test_every_controller_has_its_main_gain(name: str) -> None:
-    make, gain = CONTROLLERS[name]
-    assert float(get_parameters(make(arm()), [gain])[0]) > 0.0
+    preset = CONTROLLERS[name]
+    assert float(get_parameters(preset.make(arm()), [preset.main_gain])[0]) > 0.0

@@ -84,7 +84,7 @@ class BacksteppingOne(AbstractController):
         )
         torque = torque + inertia * (wanted.acceleration - off - self.damping_gain * off_rate)
         stress = torque / torque_per_stress(self.believed)
-        return jnp.where(stress > 0.0, stress, 0.0)
+        return jnp.where(stress < 0.0, 0.0, stress)  # so that nan stays nan
 
     def asked(self, memory: BacksteppingOneMemory, measured: MeasuredState, wanted: Reference, period: Scalar) -> Asked:
         """From the state to the power."""

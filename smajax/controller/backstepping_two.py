@@ -90,7 +90,7 @@ class BacksteppingTwo(AbstractController):
         )
         torque = torque + inertia * self._acceleration(position, velocity, wanted)
         stress = torque / torque_per_stress(self.believed)
-        return jnp.where(stress > 0.0, stress, 0.0)
+        return jnp.where(stress < 0.0, 0.0, stress)  # so that nan stays nan
 
     def asked(self, memory: BacksteppingTwoMemory, measured: MeasuredState, wanted: Reference) -> Asked:
         """From the state to the power."""

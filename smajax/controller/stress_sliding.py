@@ -30,7 +30,10 @@ class StressSlidingMemory(eqx.Module):
 
 
 class StressSliding(AbstractController):
-    """Outer sliding surface on the angle, inner PID on the stress; `arm` is the arm that the controller believes in."""
+    """Outer sliding surface on the angle, inner PID on the stress; `arm` is the arm that the controller believes in.
+
+    Continuous in its gains, with a derivative but at the edges of the boundary layer and of the voltage.
+    """
 
     arm: Arm
     cross_section: Scalar = parameter("m^2", 1e-10, 1e-4, "A_w that the controller believes in")
@@ -54,7 +57,7 @@ class StressSliding(AbstractController):
         torque = self.arm.resistance(measured.position, measured.velocity, {}) + inertia * wanted.acceleration
         torque = torque - inertia * self.surface_slope * rate - self.gain * surface
         stress = torque / (self.arm.lever() * self.cross_section)
-        return jnp.where(stress > 0.0, stress, 0.0)
+        return jnp.where(stress < 0.0, 0.0, stress)  # so that nan stays nan
 
     def step(
         self, memory: StressSlidingMemory, measured: MeasuredState, wanted: Reference, period: Scalar

@@ -26,7 +26,7 @@ class Voltage(AbstractDrive):
 
     def power(self, resistance: Scalar, length: Scalar, inputs: Inputs) -> Scalar:
         asked = jnp.abs(self.amplifier_gain * inputs["voltage"])
-        put = jnp.where(asked < self.amplifier_limit, asked, self.amplifier_limit)
+        put = jnp.where(asked >= self.amplifier_limit, self.amplifier_limit, asked)
         return (put / length) ** 2 / resistance
 
     def from_voltage(self, voltage: Scalar) -> Inputs:

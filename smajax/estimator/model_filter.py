@@ -17,6 +17,7 @@ from smajax.measured_state import MeasuredState, truth
 from smajax.parameters import parameter
 from smajax.system import System, initial_state
 from smajax.types import Scalar, State
+from smajax.wire.renewal import beyond
 
 
 class ModelFilterMemory(eqx.Module):
@@ -68,7 +69,8 @@ class ModelFilter(AbstractEstimator):
         walks = jnp.stack([self.position_walk, self.velocity_walk, self.temperature_walk, self.fraction_walk])
         before = Belief(vector_of(memory.state), memory.covariance)
         belief, after = self.prediction.predicted(transition, before, jnp.diag(walks**2) * period)
-        transforming = after.wire.martensite_fraction != memory.state.wire.martensite_fraction
+        # Rounding alone does not transform.
+        transforming = beyond(jnp.abs(after.wire.martensite_fraction - memory.state.wire.martensite_fraction))
         return self._read(after, belief, transforming, reading)
 
     def _read(
