@@ -17,11 +17,13 @@ AFTER = 2.5  # s: the arm has arrived
 
 
 def work(fast: bool) -> Result:
-    """One run on the printed filter's stress; the stress wanted is worked out again from what the controller was told."""
+    """One run; the stress wanted is worked out again from what the controller was told. Beside it, one on the filter."""
     system = arm()
     tuned = quick_stress_sliding(system)
-    one, judged = at_set_points(tuned, fast, [TARGET], printed_filter(system))[TARGET]
-    estimated = float(np.sqrt(np.mean((one.measured.stress - one.run.stress) ** 2)) / 1e6)
+    one, judged = at_set_points(tuned, fast, [TARGET])[TARGET]
+    filtered, _ = at_set_points(tuned, fast, [TARGET], printed_filter(system))[TARGET]
+    estimated = float(np.sqrt(np.mean((filtered.measured.stress - filtered.run.stress) ** 2)) / 1e6)
+    end_filtered = float(np.degrees(filtered.run.position[-1]))
     wanted = np.asarray(jax.vmap(tuned.stress_wanted)(one.measured, one.wanted)) / 1e6
     stress, time = one.run.stress / 1e6, one.run.time
     reach = float(judged.reach_time)
@@ -49,11 +51,14 @@ def work(fast: bool) -> Result:
         named(low, "time (s)", "voltage (V)")
 
     return Result(
-        holds=able < 0.1 * span and typical < 0.2 * span and late < 0.02 * span and abs(angle[-1] - TARGET) < 0.5,
+        holds=able < 0.1 * span
+        and typical < 0.2 * span
+        and late < 0.02 * span
+        and max(abs(angle[-1] - TARGET), abs(end_filtered - TARGET)) < 0.5,
         found=f"from the start of the transformation until the arm arrives ({reach:.1f} s) the stress is {typical:.1f} MPa (root mean square) off "
         f"the stress wanted, and {able:.1f} MPa while the voltage is inside its limits, of a rise of {span:.0f} MPa; after {AFTER:g} s it is "
-        f"{late:.2f} MPa off at most, and the arm ends at {angle[-1]:.2f}°; the filter's stress, which the "
-        f"controller is told, is {estimated:.1f} MPa off the true one",
+        f"{late:.2f} MPa off at most, and the arm ends at {angle[-1]:.2f}°; on the printed filter's stress, which is "
+        f"{estimated:.1f} MPa off the true one, it ends at {end_filtered:.2f}°",
         numbers={
             "stress_error_rms_MPa": typical,
             "stress_error_rms_inside_limits_MPa": able,
@@ -61,11 +66,12 @@ def work(fast: bool) -> Result:
             "stress_error_late_MPa": late,
             "stress_span_MPa": span,
             "estimate_error_rms_MPa": estimated,
+            "end_with_filter_deg": end_filtered,
             "end_deg": float(angle[-1]),
             "reach_s": reach,
         },
         draw=draw,
-        caveat="the filter reads the angle without noise. Before, while the wire warms up, "
+        caveat="drawn and judged with the true stress; the source estimates it. The filter beside it reads the angle without noise. Before, while the wire warms up, "
         "no voltage gives the stress wanted, and the controller holds its limit.",
     )
 
