@@ -41,7 +41,7 @@ def work(fast: bool) -> Result:
         found=f"a small K_1 leaves no steady error: with {GAINS[0]:g} and {GAINS[1]:g} 1/s the arm hangs {hanging[0]:.1f}° and {hanging[1]:.1f}° off from "
         f"{WINDOW[0]:.0f} to {WINDOW[1]:.0f} s, the wire not yet cool enough, is at {at_30[0]:.1f}° and {at_30[1]:.1f}° after 30 s and {offset[0]:.2f}° and "
         f"{offset[1]:.2f}° off over the last 10 s of {SECONDS:.0f}; from {GAINS[2]:g} to {GAINS[4]:g} 1/s it is {offset[2:5].max():.2f}° off at most; a large K_1 alternates: "
-        f"with {GAINS[5]:g} 1/s heating goes on and off {changes[5]} times in those 4 s, and the arm ends {offset[5]:.0f}° off",
+        f"with {GAINS[5]:g} 1/s heating goes on and off {changes[5]} times in those 4 s, and the arm is {hanging[5]:.0f}° off in them and {offset[5]:.0f}° over the last 10 s",
         numbers={
             **{f"offset_K1_{k:g}_deg": float(o) for k, o in zip(GAINS, offset, strict=True)},
             **{f"hanging_K1_{k:g}_deg": float(o) for k, o in zip(GAINS, hanging, strict=True)},
