@@ -26,6 +26,7 @@ def work(fast: bool) -> Result:
     early, late = (time > WINDOW[0]) & (time <= WINDOW[1]), time > 0.9 * SECONDS
     hanging, offset = (np.abs(angle[:, at]).mean(axis=1) for at in (early, late))
     at_30 = angle[:, np.searchsorted(time, 30.0)]
+    wanders = angle[5, time > WINDOW[0]] + TARGET
     heated = loops.voltage > 0.5
     changes = (heated[:, 1:] != heated[:, :-1])[:, early[1:]].sum(axis=1)
     names = [f"K_1 = {gain:g} 1/s" for gain in GAINS]
@@ -41,9 +42,11 @@ def work(fast: bool) -> Result:
         found=f"a small K_1 leaves no steady error: with {GAINS[0]:g} and {GAINS[1]:g} 1/s the arm hangs {hanging[0]:.1f}° and {hanging[1]:.1f}° off from "
         f"{WINDOW[0]:.0f} to {WINDOW[1]:.0f} s, the wire not yet cool enough, is at {at_30[0]:.1f}° and {at_30[1]:.1f}° after 30 s and {offset[0]:.2f}° and "
         f"{offset[1]:.2f}° off over the last 10 s of {SECONDS:.0f}; from {GAINS[2]:g} to {GAINS[4]:g} 1/s it is {offset[2:5].max():.2f}° off at most; a large K_1 alternates: "
-        f"with {GAINS[5]:g} 1/s heating goes on and off {changes[5]} times in those 4 s, and the arm is {hanging[5]:.0f}° off in them and {offset[5]:.0f}° over the last 10 s",
+        f"with {GAINS[5]:g} 1/s heating goes on and off {changes[5]} times in those 4 s, and the arm wanders between {wanders.min():.0f}° and {wanders.max():.0f}° to the end",
         numbers={
             **{f"offset_K1_{k:g}_deg": float(o) for k, o in zip(GAINS, offset, strict=True)},
+            "wanders_low_K1_400_deg": float(wanders.min()),
+            "wanders_high_K1_400_deg": float(wanders.max()),
             **{f"hanging_K1_{k:g}_deg": float(o) for k, o in zip(GAINS, hanging, strict=True)},
             **{f"changes_K1_{k:g}": float(c) for k, c in zip(GAINS, changes, strict=True)},
         },

@@ -110,7 +110,7 @@ def work(fast: bool) -> Result:
 
     return Result(
         holds=bool(min(share[gain] for gain in inside) == 1.0 and share[0.0] < 0.5 and share[30.0] < 0.5),
-        found=f"the equation of motion is stable for every K > 0 (dV/dt < 0 for eps < 4 K/(4 + K^2), 0 < eps < 1), the loop with the wire up to about c/I = {damping_rate:.0f} 1/s: from {len(angles) * len(rates)} starts the loop converges (o, and x where not) in "
+        found=f"the equation of motion is stable for every K > 0 (dV/dt < 0 for eps < 4 K/(4 + K^2), 0 < eps < 1), the loop with the wire at the K tried between 0 and c/I = {damping_rate:.0f} 1/s: from {len(angles) * len(rates)} starts it converges (o, and x where not) in "
         f"{', '.join(f'{100.0 * value:.0f} % (K = {gain:g})' for gain, value in share.items())} of cases",
         numbers={
             "least_decay_beyond": beyond,
