@@ -46,7 +46,7 @@ def work(fast: bool) -> Result:
         },
         draw=lambda figure: draw_sweep(figure, loops, names, TARGET, draw_voltages(loops, names)),
         caveat=f"{ON_ITS_PLANT}. Unstable near K = 0 is read as marginal: at K = 0 eq. 4.70 asks for x_1'' + x_1 = 0, which can do nothing "
-        "else than keep its swing; it does not grow, and every K > 0 damps it.",
+        "else than keep its swing; it does not grow, and every K > 0 damps that equation.",
     )
 
 
