@@ -16,9 +16,11 @@ from matplotlib.figure import Figure
 from smajax.closed_loop import ClosedLoop, simulate_closed_loop
 from smajax.controller.base import AbstractController
 from smajax.controller.inverse_wire import fraction_for, temperature_for
+from smajax.estimator.base import AbstractEstimator
 from smajax.figures.drawing import GREY, keyed, named, panels
 from smajax.figures.rigs import Recorded, arm, recorded
 from smajax.load.base import AbstractMovingLoad
+from smajax.measured_state import Sensor
 from smajax.merit import Merit, merit
 from smajax.parameters import set_parameters
 from smajax.reference import clock, constant
@@ -33,7 +35,7 @@ Tree = TypeVar("Tree")
 PERIOD, SECONDS = 0.01, 20.0
 ON_ITS_PLANT = (
     "plant: the integrated law without a thermal term, which is what the section prints (eq. 4.51) and the controller "
-    "inverts"
+    "inverts; the controller is told the true state"
 )
 
 
@@ -71,16 +73,22 @@ def _runs(
     initial: State | None,
     seconds: float,
     dt: float,
+    estimator: AbstractEstimator | None = None,
+    sensors: Sensor | None = None,
 ) -> tuple[ClosedLoop, Merit]:
     time = clock(seconds, dt)
+    key = None if sensors is None else jax.random.key(0)
 
     def one(
-        system: System, controller: AbstractController, target: Scalar, initial: State | None
+        system: System, controller: AbstractController, target: Scalar, initial: State | None, sensor: Sensor | None
     ) -> tuple[ClosedLoop, Merit]:
-        loop = simulate_closed_loop(system, controller, constant(time, target), dt, round(PERIOD / dt), initial=initial)
+        wanted, every = constant(time, target), round(PERIOD / dt)
+        loop = simulate_closed_loop(
+            system, controller, wanted, dt, every, initial=initial, estimator=estimator, sensor=sensor, key=key
+        )
         return loop, merit(loop, system)
 
-    return jax.vmap(one)(systems, controllers, targets, initial)
+    return jax.vmap(one)(systems, controllers, targets, initial, sensors)
 
 
 def runs(
@@ -90,11 +98,18 @@ def runs(
     fast: bool,
     seconds: float = SECONDS,
     initial: State | None = None,
+    estimator: AbstractEstimator | None = None,
+    noise: Sequence[float] | None = None,
 ) -> tuple[Recorded, Recorded]:
-    """A batch and its figures of merit, one system, controller and set point (degrees) a run; `initial` likewise."""
+    """A batch and its figures of merit, one system, controller and set point (degrees) a run; `initial` likewise.
+
+    Without an `estimator`, one for all, the controllers are told the true state; `noise`, rad, is that of each run's
+    reading of the position.
+    """
     dt = PERIOD if fast else DEFAULT_STEP
     at = jnp.radians(jnp.asarray(targets))
-    loops, merits = _runs(stacked(systems), stacked(controllers), at, initial, seconds, dt)
+    sensors = None if noise is None else stacked([Sensor(noise_sigma=sigma) for sigma in noise])
+    loops, merits = _runs(stacked(systems), stacked(controllers), at, initial, seconds, dt, estimator, sensors)
     return recorded(loops), jax.tree.map(np.asarray, merits)
 
 

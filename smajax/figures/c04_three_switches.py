@@ -12,6 +12,7 @@ from smajax.figures.row import Result, Row
 from smajax.figures.set_points import overshoot, regulated, steady, time_of
 
 COLOURS = {"VSC1": RED, "VSC2": BLUE, "VSC3": GREEN}
+PRINTED = {"VSC2": 8.0, "VSC3": 3.0}  # s, settling
 LATE = 7.0  # s: from here on every controller has done what it does
 
 
@@ -47,18 +48,20 @@ def work(fast: bool) -> Result:
     rests &= numbers["VSC2_late_rate_swing_deg_per_s"] < 0.1 * numbers["VSC1_late_rate_swing_deg_per_s"]
     second, third = numbers["VSC2_settling_s"], numbers["VSC3_settling_s"]
     holds = chatters and rests and numbers["VSC2_overshoot_deg"] > 5.0 and second > 1.5 * third
-    holds &= abs(third / 3.0 - 1.0) < 0.25 and numbers["VSC3_overshoot_deg"] < 0.2
+    holds &= all(abs(numbers[f"{name}_settling_s"] / printed - 1.0) < 0.25 for name, printed in PRINTED.items())
+    holds &= numbers["VSC3_overshoot_deg"] < 0.2
     holds &= numbers["VSC3_steady_error_deg"] < 0.25
     return Result(
         holds=bool(holds),
         found=f"VSC1 still switches {numbers['VSC1_full_switches_per_s']:.0f} times a second between 4 and 10 V after {LATE:.0f} s, on a cycle of "
         f"{numbers['VSC1_late_swing_deg']:.2f}° by {numbers['VSC1_late_rate_swing_deg_per_s']:.0f}°/s; VSC2 comes to rest, but overshoots by "
-        f"{numbers['VSC2_overshoot_deg']:.0f}° and settles in {second:.1f} s; VSC3 settles in {third:.1f} s with {numbers['VSC3_overshoot_deg']:.2f}° of "
+        f"{numbers['VSC2_overshoot_deg']:.0f}° and settles in {second:.1f} s, {100 * (1 - second / PRINTED['VSC2']):.0f} % sooner than the printed {PRINTED['VSC2']:.0f} s; VSC3 settles in {third:.1f} s with {numbers['VSC3_overshoot_deg']:.2f}° of "
         f"overshoot and {numbers['VSC3_steady_error_deg']:.2f}° of steady error",
         numbers=numbers,
         draw=lambda figure: _draw(figure, {name: loop for name, (loop, _) in runs.items()}),
-        caveat=f"layers and surface chosen here: VSC3's for the printed 3 s, VSC2's layer as near to the printed 8 s as any. VSC2 settles {100 * (1 - second / 8.0):.0f} % "
-        "sooner than printed: this arm passes 0° after 1.1 s of 10 V and its wire cools with a time constant of 1.4 s (eq. 3.1 and Table 3.1), so that a cycle of overshoot is short. VSC3's command switches while the arm slides; a layer that keeps it still (1.5 rad/s with lambda = 4.9) leaves 1° of steady error.",
+        caveat=f"not reached: the 8 s of VSC2. Layers and surface are chosen here, VSC3's for the printed 3 s, VSC2's for the printed 8 s: the search over "
+        "layers of 0.01 to 1 rad ends on its edge of 0.01, where VSC2 is VSC1 with hardly a layer, and even there it settles in "
+        f"{second:.1f} s; VSC1, without any, is within a degree after {numbers['VSC1_settling_s']:.1f} s. The rest of the claim is as printed. The reason: this arm passes 0° after 1.1 s of 10 V and its wire cools with a time constant of 1.4 s (eq. 3.1 and Table 3.1), so that a cycle of overshoot is short. VSC3's command switches while the arm slides; a layer that keeps it still (1.5 rad/s with lambda = 4.9) leaves 1° of steady error.",
     )
 
 

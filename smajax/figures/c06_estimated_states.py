@@ -86,11 +86,10 @@ def work(fast: bool) -> Result:
     mechanical = ("position", "velocity", "stress")
     largest = all(peaks["printed", shown][0] > peaks["printed", shown][1] for shown in mechanical)
     loops = {
-        (name, lane, axis): _area(one.temperature[lane], getattr(one, axis)[lane])
-        / _area(true.temperature, getattr(true, axis))
+        (name, lane): _area(one.temperature[lane], one.martensite_fraction[lane])
+        / _area(true.temperature, true.martensite_fraction)
         for name, one in told.items()
         for lane in (0, 1)
-        for axis in ("position", "martensite_fraction")
     }
     landing = {shown: float(errors["printed", shown][time >= lands].max()) for shown in mechanical}
     at_rest = float(errors["printed", "stress"][-1])
@@ -132,23 +131,22 @@ def work(fast: bool) -> Result:
         numbers[f"{name}_{shown}_peak_elsewhere_{units[shown]}"] = other
     numbers |= {f"printed_{shown}_rms_noisy_{units[shown]}": rms("printed", shown, 1) for shown in SHOWN}
     numbers |= {
-        f"{name}_{axis}_loop_{'noisy' if lane else 'exact'}": area for (name, lane, axis), area in loops.items()
+        f"{name}_martensite_fraction_loop_{'noisy' if lane else 'exact'}": area for (name, lane), area in loops.items()
     }
     numbers |= {f"printed_{shown}_peak_landing_{units[shown]}": value for shown, value in landing.items()}
 
     def listed(name: str) -> str:
         return ", ".join(f"{rms(name, shown, lanes[name]):.2g} {unit}" for shown, (_, unit, _) in SHOWN.items())
 
-    exact = {axis: loops["printed", 0, axis] for axis in ("position", "martensite_fraction")}
     return Result(
-        holds=follows and largest and all(abs(ratio - 1.0) < 0.05 for ratio in exact.values()),
+        holds=follows and largest and abs(loops["printed", 0] - 1.0) < 0.05,
         found=f"angle, rate, stress and temperature off by {listed('printed')} (rms while the arm moves one way) with the "
         f"printed filter; where the arm turns round its angle, rate and stress are off by up to "
         f"{peaks['printed', 'position'][0]:.1f}°, {peaks['printed', 'velocity'][0]:.1f} rad/s and "
         f"{peaks['printed', 'stress'][0]:.0f} MPa, elsewhere by {peaks['printed', 'position'][1]:.1f}°, "
-        f"{peaks['printed', 'velocity'][1]:.1f} rad/s and {peaks['printed', 'stress'][1]:.0f} MPa; its loops of angle and of "
-        f"fraction over temperature have {100 * exact['position']:.0f} and {100 * exact['martensite_fraction']:.0f} % of the "
-        f"true areas; the filter over the simulator's step is off by {listed('model')} on readings with {NOISE:g} rad of noise",
+        f"{peaks['printed', 'velocity'][1]:.1f} rad/s and {peaks['printed', 'stress'][1]:.0f} MPa; its loop of the "
+        f"fraction over temperature has {100 * loops['printed', 0]:.0f} % of the true area on exact readings and "
+        f"{100 * loops['printed', 1]:.0f} % with {NOISE:g} rad of noise; the filter over the simulator's step is off by {listed('model')} on readings with {NOISE:g} rad of noise",
         numbers=numbers,
         draw=draw,
         caveat="R is not printed; here it equals Q. The temperature, which no reading corrects in the printed filter, is "
@@ -157,7 +155,8 @@ def work(fast: bool) -> Result:
         f"rate off by {landing['velocity']:.1f} rad/s and the stress by {landing['stress']:.0f} MPa, more than the turn, and "
         f"at rest there the stress stays {at_rest:.0f} MPa too high, which is what the stop carries. With {NOISE:g} rad of "
         f"noise the printed filter's stress is off by {rms('printed', 'stress', 1):.1f} MPa, from differences of "
-        f"differences, and its loop of the fraction has {100 * loops['printed', 1, 'martensite_fraction']:.0f} % of the area.",
+        f"differences: the claim is judged on exact readings, as in the source's simulation, and the loop by its fraction, for the "
+        "angle is read.",
     )
 
 

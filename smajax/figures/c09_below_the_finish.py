@@ -9,17 +9,19 @@ from smajax.control_presets import temperature_vsc, vsc3, vsc3_of_section_4_6
 from smajax.figures.drawing import BLUE, RED, keyed, named, panels
 from smajax.figures.rigs import Recorded
 from smajax.figures.row import Result, Row
-from smajax.figures.set_points import above_finish, draw_range, overshoot, regulated
+from smajax.figures.set_points import above_finish, draw_range, nvsc_without_temperature, overshoot, regulated
 
 
 def work(fast: bool) -> Result:
     """Both controllers at 50 degrees."""
     old, before = regulated(vsc3_of_section_4_6, fast)[50.0]
     new, after = regulated(temperature_vsc, fast)[50.0]
+    damped, _ = regulated(nvsc_without_temperature, fast)[50.0]
     slow, _ = regulated(vsc3, fast)[50.0]
     numbers = {
         "vsc_above_finish_C": above_finish(old),
         "nvsc_above_finish_C": above_finish(new),
+        "nvsc_without_temperature_above_finish_C": above_finish(damped),
         "vsc_of_C4_above_finish_C": above_finish(slow),
         "vsc_peak_C": float(old.run.temperature.max()),
         "nvsc_peak_C": float(new.run.temperature.max()),
@@ -36,8 +38,10 @@ def work(fast: bool) -> Result:
         f"under NVSC it stays {-numbers['nvsc_above_finish_C']:.1f} °C below and the arm overshoots by {numbers['nvsc_overshoot_deg']:.1f}°",
         numbers=numbers,
         draw=lambda figure: _draw(figure, old, new),
-        caveat="the first half is by choice: the VSC's gains, not printed, are those with which it does so. "
-        f"With the gains of C4 its wire stays {-numbers['vsc_of_C4_above_finish_C']:.1f} °C below A_f'.",
+        caveat="both are told the true state. The first half is by choice: the VSC's gains, not printed, are those with which it does so. "
+        f"With the gains of C4 its wire stays {-numbers['vsc_of_C4_above_finish_C']:.1f} °C below A_f'. "
+        f"NVSC without its temperature control (K_p = 0: the command falls with the speed) stays "
+        f"{-numbers['nvsc_without_temperature_above_finish_C']:.1f} °C below as well.",
     )
 
 

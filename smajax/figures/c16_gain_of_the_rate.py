@@ -35,7 +35,7 @@ def work(fast: bool) -> Result:
             and np.isinf(reach[5])
         ),
         found=f"overshoot {', '.join(f'{o:.1f}°' for o in overshoot[:4])} at K = {', '.join(f'{k:g}' for k in GAINS[:4])} 1/s, none "
-        f"above; at K = 0 the arm still swings by {swing:.0f}° after 12 s; K = {GAINS[4]:g} takes {reach[4]:.1f} s to come within a "
+        f"above; K = 0 is marginal: the arm still swings by {swing:.0f}° after 12 s; K = {GAINS[4]:g} takes {reach[4]:.1f} s to come within a "
         f"degree in the place of {reach[3]:.1f} s, and K = {GAINS[5]:g} is {-slow:.0f}° short after 20 s",
         numbers={
             **{f"overshoot_K_{k:g}_deg": float(o) for k, o in zip(GAINS, overshoot, strict=True)},
@@ -45,7 +45,8 @@ def work(fast: bool) -> Result:
             "short_at_K_10_deg": -slow,
         },
         draw=lambda figure: draw_sweep(figure, loops, names, TARGET, draw_voltages(loops, names)),
-        caveat=f"{ON_ITS_PLANT}. At K = 0 the swing stays, it does not grow: x_1'' + x_1 = 0 is what eq. 4.70 then asks for.",
+        caveat=f"{ON_ITS_PLANT}. Unstable near K = 0 is read as marginal: at K = 0 eq. 4.70 asks for x_1'' + x_1 = 0, which can do nothing "
+        "else than keep its swing; it does not grow, and every K > 0 damps that equation.",
     )
 
 

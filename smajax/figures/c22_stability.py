@@ -17,8 +17,29 @@ from smajax.parameters import set_parameters
 from smajax.types import Scalar
 
 TARGET = 20.0  # degrees
-SECONDS = 30.0
-LEFT = 0.1  # of the Lyapunov function at the start: less at the end counts as converging
+SECONDS = 60.0  # the slowest decay that has to be seen, at K = 18 1/s, has a time constant of 18 s
+FROM = 1.0  # s: what the start has of kinetic energy has died by then, also in an arm that goes nowhere
+LAST = 2.0  # s, in which a run is judged
+NEAR = np.radians(1.0)
+# Within eq. 4.82 and 4.84 as printed, and V grows there.
+BEYOND = (-0.2, -0.9)  # (K in 1/s, epsilon)
+
+
+def converging(time: np.ndarray, off: np.ndarray, gain: float) -> bool:
+    """Whether a run comes within a degree, or below a decay by the slower root of x_1'' + K x_1' + x_1 = 0, to a degree.
+
+    The decay starts at the largest |x_1| after `FROM`. At K = 0 it does not fall, and only the degree counts.
+    """
+    last, judged = time >= time[-1] - LAST, time >= FROM
+    left = np.abs(off[last])
+    if left.max() < NEAR:
+        return True
+    slow = -np.roots([1.0, gain, 1.0]).real.max()
+    if slow <= 1e-9:
+        return False
+    peak = int(np.abs(off[judged]).argmax())
+    decay = np.abs(off[judged][peak]) * np.exp(-slow * (time[last] - time[judged][peak]))
+    return bool((left < decay + NEAR).all())
 
 
 def smallest_decay(gain: Scalar, epsilon: Scalar) -> Scalar:
@@ -41,19 +62,14 @@ def printed(gain: np.ndarray, epsilon: np.ndarray) -> np.ndarray:
     )
 
 
-def derived(gain: np.ndarray, epsilon: np.ndarray) -> np.ndarray:
-    """The same from the matrix [[eps, eps K/2], [eps K/2, K - eps]] that eq. 4.81 has."""
-    return (np.abs(epsilon) < 1.0) & (epsilon > 0.0) & (gain - epsilon > epsilon * gain**2 / 4)
-
-
 def work(fast: bool) -> Result:
     """The two conditions over (K, epsilon); runs from a grid of angles and velocities for each K."""
     gains, epsilons = np.meshgrid(np.linspace(-1.0, 12.0, 261), np.linspace(-0.9925, 0.9925, 398))
     decays = np.asarray(jax.vmap(smallest_decay)(jnp.asarray(gains.ravel()), jnp.asarray(epsilons.ravel())))
     falls = (decays > 0.0).reshape(gains.shape)
-    said, right = printed(gains, epsilons), derived(gains, epsilons)
-    wrong = said & ~falls
-    agree = bool((right == falls).all())
+    said = printed(gains, epsilons)
+    beyond = float(smallest_decay(*(jnp.asarray(value) for value in BEYOND)))
+    allowed = bool(printed(*(np.asarray(value) for value in BEYOND)))
 
     system = plant()
     tuned = backstepping_two(system)
@@ -67,14 +83,12 @@ def work(fast: bool) -> Result:
     swept = [set_parameters(tuned, {"damping_gain": gain}) for gain, _, _ in grid]
     loops, _ = runs([system] * len(grid), swept, [TARGET] * len(grid), fast, SECONDS, stacked(starts))
     off = loops.run.position - np.radians(TARGET)
-    level = 0.5 * off**2 + 0.5 * loops.run.velocity**2
-    there = (level[:, -1] < LEFT * level[:, 0]) | (np.abs(off[:, -200:]).max(axis=1) < np.radians(1.0))
+    there = [converging(loops.run.time[0], one, gain) for one, (gain, _, _) in zip(off, grid, strict=True)]
     share = {
         gain: float(np.mean([ok for ok, one in zip(there, grid, strict=True) if one[0] == gain])) for gain in tried
     }
     inside = [gain for gain in tried if 0.0 < gain < 20.0]
     damping_rate = float(system.load.damping) / float(system.load.inertia({}))
-    mistaken = float(wrong.sum() / said.sum())
 
     def draw(figure: Figure) -> None:
         figure.set_layout_engine("constrained")
@@ -95,20 +109,20 @@ def work(fast: bool) -> Result:
             named(axes, "x_1 (°)", "x_2 (rad/s)" if k == 0 else " ", f"K = {gain:g} 1/s")
 
     return Result(
-        holds=agree and bool(min(share[gain] for gain in inside) == 1.0) and share[0.0] < 0.5,
-        found=f"dV/dt < 0 over exactly eps < 4 K/(4 + K^2), 0 < eps < 1, so the equation of motion is stable for every K > 0; the printed condition "
-        f"allows {100.0 * mistaken:.0f} % too much of its region. From {len(angles) * len(rates)} starts the loop converges (o, and x where not) in "
+        holds=bool(min(share[gain] for gain in inside) == 1.0 and share[0.0] < 0.5 and share[30.0] < 0.5),
+        found=f"the equation of motion is stable for every K > 0 (dV/dt < 0 for eps < 4 K/(4 + K^2), 0 < eps < 1), the loop with the wire at the K tried between 0 and c/I = {damping_rate:.0f} 1/s: from {len(angles) * len(rates)} starts it converges (o, and x where not) in "
         f"{', '.join(f'{100.0 * value:.0f} % (K = {gain:g})' for gain, value in share.items())} of cases",
         numbers={
-            "derived_equals_numeric": float(agree),
-            "printed_too_much_share": mistaken,
-            "printed_misses": float((falls & ~said).sum()),
+            "least_decay_beyond": beyond,
+            "printed_allows_beyond": float(allowed),
             **{f"converging_share_K_{gain:g}": value for gain, value in share.items()},
             "damping_over_inertia_1/s": damping_rate,
         },
         draw=draw,
         caveat=f"{ON_ITS_PLANT}. The matrix of eq. 4.83 has -K eps where -eps belongs, and a factor 1/2 too many. The determinant of "
-        "eq. 4.84 is worked out rightly from that matrix; as it stands the condition allows even K < 0. The loop adds what the analysis leaves out: "
+        "eq. 4.84 is worked out rightly from that matrix; as it stands the condition allows even K < 0, such as K = "
+        f"{BEYOND[0]:g}, eps = {BEYOND[1]:g}, where V grows (least eigenvalue of -dV/dt {beyond:.2f}). A run converges when it ends within a degree, or below the decay by the "
+        "slower root of the equation of motion plus a degree, judged from 1 s on; at K = 0 that decay does not fall. The loop adds what the analysis leaves out: "
         f"eq. 4.76 puts the wanted acceleration in the place of the true one, so that above K = c/I = {damping_rate:.0f} 1/s an arm at rest asks "
         "for the wrong curve, and stays.",
     )

@@ -14,12 +14,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from smajax.closed_loop import ClosedLoop, simulate_closed_loop
+from smajax.control_presets import temperature_vsc
 from smajax.controller.base import AbstractController
+from smajax.controller.temperature_vsc import TemperatureVsc
 from smajax.estimator.base import AbstractEstimator
 from smajax.figures.drawing import BLACK, BLUE, GREEN, GREY, RED, named, panels
 from smajax.figures.rigs import Recorded, arm, austenite_range
 from smajax.merit import Merit, merit
-from smajax.parameters import set_vector
+from smajax.parameters import set_parameters, set_vector
 from smajax.reference import clock, constant
 from smajax.simulate import DEFAULT_STEP
 from smajax.system import System
@@ -79,6 +81,11 @@ def regulated(preset: Callable[[System], AbstractController], fast: bool) -> Run
     return at_set_points(preset(arm()), fast)
 
 
+def nvsc_without_temperature(system: System) -> TemperatureVsc:
+    """NVSC with K_p = 0: it takes voltage away while the arm moves up, and controls no temperature."""
+    return set_parameters(temperature_vsc(system), {"temperature_gain": 0.0})
+
+
 def swept(controller: AbstractController, gain: str, values: Sequence[float], degrees: float, fast: bool) -> Runs:
     """(run, figures of merit) for each value of one gain, at one set point."""
     targets = jnp.full(len(values), jnp.radians(degrees))
@@ -95,6 +102,12 @@ def overshoot(one: Recorded) -> float:
 def steady(one: Recorded) -> float:
     """Degrees, mean absolute error of the last fifth."""
     return float(np.degrees(one.steady_error))
+
+
+def largest_finish_rate(runs: Runs) -> float:
+    """Largest |dA_f'/dt| of a batch from the second sample on, C/s, from the states of the runs."""
+    rates = [np.diff(austenite_range(arm(), loop.run.stress)[1]) / np.diff(loop.run.time) for loop, _ in runs.values()]
+    return float(max(np.abs(rate[1:]).max() for rate in rates))
 
 
 def time_of(value: Recorded) -> float:
