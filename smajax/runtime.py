@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from importlib.metadata import version
+from pathlib import Path
 
 # XLA's newer way of compiling loops for a CPU takes two to four times as long for programs like ours, which run as fast
 # either way. A flag that a later version does not know ends the process: only versions that were tried.
@@ -11,8 +12,15 @@ FLAG = "--xla_cpu_use_fusion_emitters=false"
 TRIED = ((0, 7), (0, 10))
 
 
+def kept_programs() -> Path:
+    """Where compiled programs are kept: `JAX_COMPILATION_CACHE_DIR`, or `smajax` in the user's cache. May be deleted."""
+    own = os.environ.get("JAX_COMPILATION_CACHE_DIR")
+    cache = os.environ.get("XDG_CACHE_HOME")
+    return Path(own) if own else (Path(cache) if cache else Path.home() / ".cache") / "smajax" / "programs"
+
+
 def prepare() -> None:
-    """Float64, and programs that compile fast. Before the first array: XLA reads its flags once."""
+    """Float64, and programs that compile fast and once. Before the first array: XLA reads its flags once."""
     import jax
 
     major, minor = (int(part) for part in version("jaxlib").split(".")[:2])
@@ -20,3 +28,7 @@ def prepare() -> None:
     if TRIED[0] <= (major, minor) <= TRIED[1] and FLAG.split("=")[0] not in flags:
         os.environ["XLA_FLAGS"] = f"{flags} {FLAG}".strip()
     jax.config.update("jax_enable_x64", True)
+    jax.config.update("jax_compilation_cache_dir", str(kept_programs()))
+    # Small ones too: a command has dozens of them.
+    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
+    jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)

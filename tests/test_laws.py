@@ -278,11 +278,11 @@ def test_no_wire_gets_colder_than_its_air(levels: list[float], law: str) -> None
     assert float(RUN(system, {"voltage": volts}, 0.02).temperature.min()) >= 23.0 - 1e-9
 
 
-def test_nothing_drifts_in_a_million_steps() -> None:
-    """Taut states satisfy the integrated law to 1e-8 of their stress after 10^6 steps of heating and cooling."""
+@pytest.mark.parametrize("chunks", [2, pytest.param(20, marks=pytest.mark.slow)])
+def test_nothing_drifts_in_a_million_steps(chunks: int) -> None:
+    """Taut states satisfy the integrated law to 1e-8 of their stress after 10^5 (slow: 10^6) steps to and fro."""
     system = _with(build("flexinol_table_3_2", "dead_weight", "voltage"), form=IntegratedForm())
     chunk = jnp.tile(jnp.concatenate([jnp.full(500, 7.0), jnp.full(500, 0.0)]), 50)
-    chunks = 20
 
     @eqx.filter_jit
     def carried_on(system: System, volts: jax.Array):
@@ -300,8 +300,8 @@ def test_nothing_drifts_in_a_million_steps() -> None:
         return state, simulate(system, {"voltage": volts[:2001]}, 0.01, state)
 
     state, run = carried_on(system, chunk)
-    assert len(chunk) * chunks == 1_000_000
-    assert float(state.time) == pytest.approx(1e4)
+    assert len(chunk) * chunks == 50_000 * chunks
+    assert float(state.time) == pytest.approx(500.0 * chunks)
     c = system.wire.constitutive
     xi = run.martensite_fraction
     modulus = c.young_modulus_austenite + xi * (c.young_modulus_martensite - c.young_modulus_austenite)
