@@ -80,7 +80,7 @@ def test_ctrl_c_is_answered(tmp_path: Path) -> None:
     command = [
         sys.executable,
         "-c",
-        "from smajax.cli import main; main()",
+        "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); from smajax.cli import main; main()",
         "demo",
         "--only",
         "complete",
@@ -94,7 +94,6 @@ def test_ctrl_c_is_answered(tmp_path: Path) -> None:
         stderr=subprocess.PIPE,
         stdout=subprocess.DEVNULL,
         text=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     ) as run:
         assert run.stderr is not None
         assert "checking" in run.stderr.readline()
