@@ -1,7 +1,8 @@
-"""The command line: `smajax close-loop experiment.toml --out DIR`, `smajax demo` and `smajax figures`."""
+"""The command line: `smajax close-loop experiment.toml --out DIR`, `smajax demo`, `smajax figures` and `smajax sweep`."""
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import os
 import shlex
@@ -125,7 +126,9 @@ def demo(
 
 @app.command()
 def figures(
-    name: Annotated[str, typer.Argument(help="a chapter (chapter3) or one figure (M7)")] = "chapter3",
+    names: Annotated[
+        list[str] | None, typer.Argument(help="chapters (chapter3, chapter4) and single figures (M7 C12); default all")
+    ] = None,
     out: Annotated[Path, typer.Option(help="folder for the pictures, the numbers (JSON) and the table")] = Path(
         "figures"
     ),
@@ -136,21 +139,21 @@ def figures(
 
     Exit code 1 when one does not. Ctrl-C loses nothing: the same command goes on with the figures that are missing.
 
-    Example:  smajax figures M7 --out figures
+    Example:  smajax figures M7 C12 --out figures
     """
     from smajax.runtime import prepare
 
     prepare()
-    from smajax.figures.catalogue import rows
+    from smajax.figures.catalogue import CHAPTERS, rows
     from smajax.figures.write import as_markdown, as_page, as_text, draw
     from smajax.progress import shown
 
     try:
-        wanted = rows(name)
+        asked = [row for name in names or CHAPTERS for row in rows(name)]
     except KeyError as error:
         raise typer.BadParameter(error.args[0], param_hint="NAME") from None
     with _resumable(), shown(console) as progress:
-        drawn = draw(wanted, out, fast, progress)
+        drawn = draw(list(dict.fromkeys(asked)), out, fast, progress)
     (out / "README.md").write_text(as_markdown(drawn), encoding="utf-8")
     page = out / "index.html"
     page.write_text(as_page(drawn), encoding="utf-8")
@@ -178,6 +181,9 @@ def sweep(
     gains: Annotated[str, typer.Option(help="shares of the controller's main gain")] = "0.5,0.7,1,1.4,2",
     seconds: Annotated[float, typer.Option(min=0.1, help="length of each closed loop")] = 10.0,
     estimator: Annotated[str, typer.Option(help="`printed` or `model` filter; none: told the true state")] = "",
+    noise: Annotated[float, typer.Option(min=0.0, help="noise of the angle's readings, degrees (1 sigma)")] = 0.0,
+    period: Annotated[float, typer.Option(help="sample time of the controller, s, a multiple of 0.01")] = 0.01,
+    delay: Annotated[int, typer.Option(min=0, help="control periods until a command arrives")] = 0,
     out: Annotated[Path, typer.Option(help="folder for the page, the pictures and the rows")] = Path("sweep"),
     fast: Annotated[bool, typer.Option("--fast", help="3 x 3 mismatches, 3 set points, the preset's gains")] = False,
     open_page: Annotated[bool, typer.Option("--open/--no-open", help="open the page in a browser")] = True,
@@ -208,9 +214,12 @@ def sweep(
         _numbers("--gains", gains),
         seconds,
         filtered=estimator,
+        noise=noise,
+        period=period,
+        delay=delay,
     )
     if fast:
-        settings = SweepSettings(names, *pair, 3, (-20.0, 20.0, 60.0), (1.0,), seconds, filtered=estimator)
+        settings = dataclasses.replace(settings, points=3, set_points=(-20.0, 20.0, 60.0), gains=(1.0,))
     try:
         with _resumable(), shown(console) as progress:
             rows = run_sweep(arm(), settings, out, progress)

@@ -130,9 +130,9 @@ def temperature_vsc(system: System) -> TemperatureVsc:
     stroke = system.wire.constitutive.recoverable_strain / load.contraction(system.wire)
     return TemperatureVsc(
         vsc=vsc3_of_section_4_6(system),
-        band=Passing(passing_speed=3.67),
-        temperature_band=385.0,
-        temperature_gain=2.18,
+        band=Passing(passing_speed=1.7),
+        temperature_band=30.8,
+        temperature_gain=1.32,
         finish_filter=0.02,
         finish_temperature=law.austenite_finish,
         stress_slope=law.stress_slope_austenite,

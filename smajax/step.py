@@ -14,13 +14,13 @@ branch xi - xi(T, sigma) rises monotonically with xi (more martensite: warmer by
 of it), so the root lies between the present fraction and the end of the branch, and Newton steps are held in that
 bracket. Every pivot of the elimination in the order T, x, sigma, xi is positive for the same reason.
 
-Gradients: the iteration itself is not differentiated. One more Newton step at the solution, with the Jacobian held
-fixed, has the derivative that the implicit function theorem gives, in forward and in reverse mode; a second one has the
-second derivative too.
+Gradients: the iteration itself is not differentiated. `lax.custom_root` gives the solution the derivatives of the
+implicit function theorem, of any order, in forward and in reverse mode.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple, TypeVar
 
 import equinox as eqx
@@ -47,9 +47,6 @@ UNDAMPED = 12  # iterations before every second step is halved
 # in float32, by more than what rounding alone moves it.
 TOLERANCE = 1e-8
 ROUNDINGS = 1e3
-# Newton steps at the solution that are differentiated: each makes one more order of derivative right, and a filter whose
-# covariance passes through the first derivative has gains that need the second.
-DIFFERENTIATED = 2
 # Coulomb friction builds up over this much motion (a bristle bends before it slips), in units of position.
 PRESLIDING = 2e-5
 
@@ -290,16 +287,23 @@ def _ended(system: System, stage: Stage, inputs: Inputs) -> tuple[WireState, Unk
     wire, effects, old = system.wire, system.effects, stage.old.wire
     solved = _solved(_held(system), _held(stage), _held(dict(inputs)))
     branch = solved.branch
-    # The differentiated Newton steps; the Jacobian of the last iteration is the one at the solution to rounding.
-    z = solved.z
-    for number in range(DIFFERENTIATED):
-        residual, _ = _residual(system, stage, inputs, branch, z)
-        rows, right = _eliminated(solved.jacobian, [-value for value in residual])
+
+    def equations(z: Unknowns) -> Unknowns:
+        return _residual(system, stage, inputs, branch, z)[0]
+
+    def corrected(f: Callable[[Unknowns], Unknowns], z: Unknowns) -> Unknowns:
+        # The Jacobian of the last iteration is the one at the solution to rounding.
+        rows, right = _eliminated(solved.jacobian, [-value for value in f(z)])
         step = _back_substituted(rows, right, right[3] / rows[3][3])
-        if number > 0:
-            # Its value is rounding where the curve can be followed; on a cliff it would lead away.
-            step = [change - lax.stop_gradient(change) for change in step]
-        z = Unknowns(*(value + change for value, change in zip(z, step, strict=True)))
+        return Unknowns(*(value + change for value, change in zip(z, step, strict=True)))
+
+    def linear(g: Callable[[Unknowns], Unknowns], asked: Unknowns) -> Unknowns:
+        one, zero = jnp.ones_like(asked.fraction), jnp.zeros_like(asked.fraction)
+        columns = [g(Unknowns(*(one if k == at else zero for k in range(4)))) for at in range(4)]
+        rows, right = _eliminated([list(row) for row in zip(*columns, strict=True)], list(asked))
+        return Unknowns(*_back_substituted(rows, right, right[3] / rows[3][3]))
+
+    z = lax.custom_root(equations, solved.z, corrected, linear)
     # Rounding of the last correction only; not `clip`, which halves the derivative at the ends themselves.
     xi = jnp.where(z.fraction > 1.0, 1.0, jnp.where(z.fraction < 0.0, 0.0, z.fraction))
     xi = jnp.where(branch.heating | branch.cooling, xi, old.martensite_fraction)

@@ -14,7 +14,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FormatStrFormatter
 
-from smajax.control_presets import ANGLE, CONTROLLERS, with_printed_law
+from smajax.control_presets import CONTROLLERS, with_printed_law
 from smajax.figures.drawing import keyed, named, panels
 from smajax.merit import Merit
 from smajax.sweep import Grid
@@ -50,7 +50,7 @@ def _values(one: Merit, name: str) -> np.ndarray:
 
 def write_rows(path: Path, grid: Grid, swept: Swept) -> None:
     """Every closed loop in a row; angles in degrees, an empty cell where a time is infinite."""
-    lanes = grid.lanes()
+    lanes = np.stack([axis.ravel() for axis in grid.axes()], axis=1)
     columns = [f"{grid.first}_ratio", f"{grid.second}_ratio", "set_point_deg", f"{swept.main_gain}_ratio"]
     units = {"°": "deg", "°C": "degC", "1/s": "per_s"}
     merits = [f"{name}_{units.get(SHOWN[name][1], SHOWN[name][1])}" for name in SHOWN]
@@ -125,7 +125,7 @@ def comparison_rows(targets: np.ndarray, merits: Mapping[str, Merit]) -> list[li
 
 
 def page(
-    targets: np.ndarray, merits: Mapping[str, Merit], grid: Grid, swept: Sequence[Swept], seconds: float, filtered: str
+    targets: np.ndarray, merits: Mapping[str, Merit], grid: Grid, swept: Sequence[Swept], seconds: float, between: str
 ) -> str:
     """One page for a browser; pictures lie beside it."""
     say = html.escape
@@ -133,9 +133,9 @@ def page(
     body = "".join(
         f"<tr>{''.join(f'<td>{say(cell)}</td>' for cell in row)}</tr>" for row in comparison_rows(targets, merits)
     )
-    loops = int(np.prod(grid.shape))
+    loops = grid.size
     parts = "".join(
-        f"<h2>{say(one.name)}</h2><p>{loops:,} closed loops of {seconds:g} s; {failures(one)}. {say(told(one.name, filtered))} "
+        f"<h2>{say(one.name)}</h2><p>{loops:,} closed loops of {seconds:g} s; {failures(one)}. {say(told(one.name))} "
         f'<a href="{one.name}.csv">every loop as CSV</a></p>'
         f'<img src="{one.name}_maps.png" alt="maps of {say(one.name)}">'
         f'<img src="{one.name}_lines.png" alt="lines of {say(one.name)}">'
@@ -148,7 +148,7 @@ def page(
         "table{border-collapse:collapse;font-size:14px;display:block;overflow-x:auto}img{max-width:100%}</style>"
         "<h1>Controllers compared</h1><p>The plant as the controller believes it, "
         f"{len(targets)} set points from {np.degrees(targets.min()):.0f}° to {np.degrees(targets.max()):.0f}°; "
-        "median / worst over the set points. Within 1° counts as there.</p>"
+        f"median / worst over the set points. Within 1° counts as there. {say(between)}</p>"
         f"<table><tr>{''.join(f'<th>{say(cell)}</th>' for cell in head)}</tr>{body}</table>"
         '<img src="comparison.png" alt="figures of merit over the set point">'
         f"<h1>Mismatch of {say(grid.first)} and {say(grid.second)}</h1><p>The plant's value over the one that the "
@@ -157,14 +157,11 @@ def page(
     )
 
 
-def told(name: str, filtered: str) -> str:
-    """What a controller reads, from where, and of which plant."""
+def told(name: str) -> str:
+    """What a controller reads, and of which plant."""
     preset = CONTROLLERS[name]
-    source = (
-        f"from the {filtered} filter" if filtered else "without noise or filter" if preset.told == ANGLE else "true"
-    )
     plant = " Plant: the integrated law without a thermal term (eq. 4.51)." if preset.plant is with_printed_law else ""
-    return f"It is told {preset.told} ({source}).{plant}"
+    return f"It reads {preset.told}.{plant}"
 
 
 def failures(one: Swept) -> str:
@@ -173,13 +170,14 @@ def failures(one: Swept) -> str:
     return "none failed" if bad == 0 else f"{bad} failed: the controller's answer was no finite voltage"
 
 
-def as_json(targets: np.ndarray, merits: Mapping[str, Merit], grid: Grid, swept: Sequence[Swept]) -> str:
+def as_json(targets: np.ndarray, merits: Mapping[str, Merit], grid: Grid, swept: Sequence[Swept], between: str) -> str:
     """The comparison and what the grid was, SI; infinite times are null."""
 
     def plain(values: np.ndarray) -> list[float | None]:
         return [float(value) if np.isfinite(value) else None for value in np.asarray(values).ravel()]
 
     record = {
+        "between": between,
         "set_points_rad": plain(targets),
         "controllers": {
             name: {field.name: plain(getattr(one, field.name)) for field in dataclasses.fields(one)}
@@ -190,7 +188,7 @@ def as_json(targets: np.ndarray, merits: Mapping[str, Merit], grid: Grid, swept:
             "ratios": plain(grid.ratios),
             "set_points_rad": plain(grid.targets),
             "gain_ratios": plain(grid.gains),
-            "loops": int(np.prod(grid.shape)),
+            "loops": grid.size,
             "failed": {one.name: int(np.isfinite(one.failed_at).sum()) for one in swept},
         },
     }

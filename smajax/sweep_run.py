@@ -15,9 +15,11 @@ from matplotlib.figure import Figure
 
 from smajax.control_presets import CONTROLLERS, FILTERS
 from smajax.fit.solve import Progress
+from smajax.measured_state import Sensor
 from smajax.merit import Merit
+from smajax.reference import clock
 from smajax.source_mark import source_mark
-from smajax.sweep import MISMATCHES, Grid, lines, ratios, sweep
+from smajax.sweep import MISMATCHES, Grid, Interface, closed_loops, lanes, ratios
 from smajax.sweep_report import (
     Swept,
     as_json,
@@ -47,6 +49,17 @@ class SweepSettings:
     seconds: float = 10.0
     dt: float = 0.01
     filtered: str = ""  # the filter that tells the controllers the state; none: they are told the true one
+    noise: float = 0.0  # degrees, standard deviation of the angle's readings
+    period: float = 0.01  # s, sample time of the controller, a whole number of `dt`
+    delay: int = 0  # control periods until a command arrives
+
+    @property
+    def between(self) -> str:
+        """What lies between plant and controller, in words."""
+        told = f"their states from the filter `{self.filtered}`" if self.filtered else "the true state"
+        noise = f"the angle with {self.noise:g}° of noise" if self.noise else "the angle without noise"
+        late = f", commands {self.delay} periods late" if self.delay else ""
+        return f"Controllers are called every {1e3 * self.period:g} ms{late} and are told {told}, {noise}."
 
 
 def run_sweep(system: System, settings: SweepSettings, out: Path, progress: Progress) -> list[list[str]]:
@@ -59,15 +72,19 @@ def run_sweep(system: System, settings: SweepSettings, out: Path, progress: Prog
         raise ValueError(f"no controller {unknown}; there are {', '.join(CONTROLLERS)}.")
     if settings.filtered and settings.filtered not in FILTERS:
         raise ValueError(f"no filter `{settings.filtered}`; there are {', '.join(FILTERS)}.")
+    steps = settings.period / settings.dt
+    if steps < 0.5 or abs(steps - round(steps)) > 1e-6:
+        raise ValueError(
+            f"a controller's period is a whole number of simulation steps of {settings.dt:g} s, not {settings.period:g} s."
+        )
     out.mkdir(parents=True, exist_ok=True)
     targets = np.radians(settings.set_points)
     grid = Grid(settings.first, settings.second, ratios(settings.points), targets, np.asarray(settings.gains))
-    alone = Grid(settings.first, settings.second, np.ones(1), targets, np.ones(1))
     compared: dict[str, Merit] = {}
     swept: list[Swept] = []
-    time = np.zeros(0)
+    time = np.asarray(clock(settings.seconds, settings.dt))
     for name in settings.controllers:
-        compared[name], one, time = _controller(system, name, settings, grid, alone, out, progress)
+        compared[name], one = _controller(system, name, settings, grid, out, progress)
         swept.append(one)
         write_rows(out / f"{name}.csv", grid, one)
         maps, over_time = Figure(figsize=(10.0, 7.6)), Figure(figsize=(11.0, 6.2))
@@ -75,20 +92,20 @@ def run_sweep(system: System, settings: SweepSettings, out: Path, progress: Prog
         maps.savefig(out / f"{name}_maps.png", dpi=90, facecolor="white")
         draw_lines(over_time, time, LINES, one, float(np.radians(LINE_TARGET)))
         over_time.savefig(out / f"{name}_lines.png", dpi=90, facecolor="white")
-        progress(f"say: {name}: {int(np.prod(grid.shape)):,} closed loops", 1.0)
+        progress(f"say: {name}: {grid.size:,} closed loops", 1.0)
     comparison = Figure(figsize=(10.0, 11.0))
     draw_comparison(comparison, targets, compared)
     comparison.savefig(out / "comparison.png", dpi=90, facecolor="white")
-    (out / "sweep.json").write_text(as_json(targets, compared, grid, swept), encoding="utf-8")
+    (out / "sweep.json").write_text(as_json(targets, compared, grid, swept, settings.between), encoding="utf-8")
     (out / "index.html").write_text(
-        page(targets, compared, grid, swept, settings.seconds, settings.filtered), encoding="utf-8"
+        page(targets, compared, grid, swept, settings.seconds, settings.between), encoding="utf-8"
     )
     return comparison_rows(targets, compared)
 
 
 def _controller(
-    system: System, name: str, settings: SweepSettings, grid: Grid, alone: Grid, out: Path, progress: Progress
-) -> tuple[Merit, Swept, np.ndarray]:
+    system: System, name: str, settings: SweepSettings, grid: Grid, out: Path, progress: Progress
+) -> tuple[Merit, Swept]:
     """One controller, from the folder where an interrupted sweep of this code and setting has finished it."""
     preset = CONTROLLERS[name]
     system, gain = preset.plant(system), preset.main_gain
@@ -101,21 +118,38 @@ def _controller(
     kept = out / "finished" / f"{name}-{mark.hexdigest()[:16]}.npz"
     fields = [field.name for field in dataclasses.fields(Merit)]
     if not kept.exists():
-        controller = preset.make(system)
-        timing: dict[str, Any] = {"seconds": settings.seconds, "dt": settings.dt}
-        if settings.filtered:
-            timing["estimator"] = FILTERS[settings.filtered](system)
+        interface = Interface(
+            FILTERS[settings.filtered](system) if settings.filtered else None,
+            Sensor(noise_sigma=float(np.radians(settings.noise))) if settings.noise else None,
+            round(settings.period / settings.dt),
+            settings.delay,
+        )
 
         def told(_: str, share: float) -> None:
             progress(f"sweeping {name}", share)
 
-        found, failed = sweep(system, controller, gain, grid, progress=told, **timing)
-        nominal, _ = sweep(system, controller, gain, alone, **timing)
-        drawn = {m: lines(system, controller, m, LINES, float(np.radians(LINE_TARGET)), **timing) for m in MISMATCHES}
-        record: dict[str, Any] = {"failed": failed, "time": next(iter(drawn.values()))[0]}
-        record |= {f"grid_{field}": np.asarray(getattr(found, field)) for field in fields}
-        record |= {f"alone_{field}": np.asarray(getattr(nominal, field)).ravel() for field in fields}
-        record |= {f"line_{mismatch}": angles for mismatch, (_, angles) in drawn.items()}
+        # One batch, one program: the grid, the plant as believed at every set point, and a line a ratio of each mismatch.
+        target = float(np.radians(LINE_TARGET))
+        rows = np.concatenate(
+            [grid.lanes(), lanes({}, grid.targets), *(lanes({one: np.asarray(LINES)}, target) for one in MISMATCHES)]
+        )
+        found = closed_loops(
+            system,
+            preset.make(system),
+            gain,
+            rows,
+            seconds=settings.seconds,
+            dt=settings.dt,
+            interface=interface,
+            progress=told,
+        )
+        inside, alone = slice(grid.size), grid.size + np.arange(len(grid.targets))
+        record: dict[str, Any] = {"failed": found.failed_at[inside].reshape(grid.shape)}
+        for field in fields:
+            values = np.asarray(getattr(found.merits, field))
+            record[f"grid_{field}"], record[f"alone_{field}"] = values[inside].reshape(grid.shape), values[alone]
+        drawn = found.position[grid.size + len(grid.targets) :].reshape(len(MISMATCHES), len(LINES), -1)
+        record |= {f"line_{mismatch}": angles for mismatch, angles in zip(MISMATCHES, drawn, strict=True)}
         kept.parent.mkdir(exist_ok=True)
         part = kept.with_suffix(".part.npz")
         np.savez(part, **record)
@@ -128,7 +162,7 @@ def _controller(
             saved["failed"],
             {mismatch: saved[f"line_{mismatch}"] for mismatch in MISMATCHES},
         )
-        return Merit(**{field: saved[f"alone_{field}"] for field in fields}), one, saved["time"]
+        return Merit(**{field: saved[f"alone_{field}"] for field in fields}), one
 
 
 def as_text(rows: Sequence[Sequence[str]]) -> str:

@@ -8,16 +8,18 @@ import json
 from pathlib import Path
 
 import equinox as eqx
+import jax
 import numpy as np
 import pytest
 
 from smajax.closed_loop import simulate_closed_loop
 from smajax.control_presets import CONTROLLERS
 from smajax.figures.rigs import arm
+from smajax.measured_state import Sensor
 from smajax.merit import merit
 from smajax.parameters import get_parameters, set_parameters
 from smajax.reference import clock, constant
-from smajax.sweep import Grid, ratios, sweep
+from smajax.sweep import CHUNK, Grid, Interface, closed_loops, lanes, ratios
 from smajax.sweep_run import SweepSettings, run_sweep
 
 SETTINGS = SweepSettings(("vsc3",), "payload", "supply", 2, (0.0, 30.0), (1.0,), seconds=3.0)
@@ -65,7 +67,7 @@ def test_what_is_finished_is_kept(folder: Path, monkeypatch: pytest.MonkeyPatch)
     def never(*_: object, **__: object) -> None:
         raise AssertionError("computed again")
 
-    monkeypatch.setattr("smajax.sweep_run.sweep", never)
+    monkeypatch.setattr("smajax.sweep_run.closed_loops", never)
     run_sweep(arm(), SETTINGS, folder, lambda what, share: None)
     assert (folder / "vsc3.csv").read_bytes() == before
     other = SweepSettings(("vsc3",), "payload", "supply", 2, (0.0, 31.0), (1.0,), seconds=3.0)
@@ -81,10 +83,11 @@ def test_unknown_names_are_answered_with_those_there_are(tmp_path: Path) -> None
         run_sweep(arm(), SweepSettings(("vsc4",)), tmp_path, lambda what, share: None)
     with pytest.raises(ValueError, match="printed"):
         run_sweep(arm(), dataclasses.replace(SETTINGS, filtered="kalman"), tmp_path, lambda what, share: None)
-    controller, gain = CONTROLLERS["vsc3"].make(arm()), CONTROLLERS["vsc3"].main_gain
-    grid = Grid("payload", "wind", ratios(3), np.zeros(1), np.ones(1))
+    for pair in (("payload", "wind"), ("payload", "payload")):
+        with pytest.raises(ValueError, match="convection"):
+            Grid(*pair, ratios(3), np.zeros(1), np.ones(1))
     with pytest.raises(ValueError, match="convection"):
-        sweep(arm(), controller, gain, grid)
+        lanes({"wind": 1.2}, 0.0)
 
 
 def test_an_odd_grid_has_the_plant_as_believed_in_it() -> None:
@@ -96,3 +99,25 @@ def test_an_odd_grid_has_the_plant_as_believed_in_it() -> None:
 def test_every_controller_has_its_main_gain(name: str) -> None:
     preset = CONTROLLERS[name]
     assert float(get_parameters(preset.make(arm()), [preset.main_gain])[0]) > 0.0
+
+
+def test_noise_sample_time_and_delay_reach_the_loop() -> None:
+    """A lane with all three is the single loop with them; a period that is no whole number of steps is answered."""
+    system, every = arm(), 2
+    controller, gain = CONTROLLERS["vsc3"].make(system), CONTROLLERS["vsc3"].main_gain
+    rows, sensor = lanes({}, 0.3), Sensor(noise_sigma=0.01)
+    between = Interface(None, sensor, every, 3)
+    found = closed_loops(system, controller, gain, rows, seconds=2.0, interface=between, seed=5).merits
+    plain = closed_loops(system, controller, gain, rows, seconds=2.0).merits
+    key = jax.random.split(jax.random.key(5), 1 + CHUNK)[0]
+    wanted = constant(clock(2.0, 0.01), 0.3)
+    loop = eqx.filter_jit(simulate_closed_loop)(
+        system, controller, wanted, 0.01, every, sensor=sensor, key=key, delay=3
+    )
+    assert float(found.energy[0]) == pytest.approx(float(merit(loop, system).energy), rel=1e-6)
+    assert abs(float(found.energy[0]) / float(plain.energy[0]) - 1.0) > 1e-3
+
+
+def test_a_period_between_two_steps_is_answered(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="whole number"):
+        run_sweep(arm(), dataclasses.replace(SETTINGS, period=0.015), tmp_path, lambda what, share: None)

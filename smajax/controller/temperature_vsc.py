@@ -19,10 +19,11 @@ What is printed, and what is done with it:
   temperature": on the straight line from the present state to the end of the transformation,
   T_d = T + (A_f' - T)(theta_d - theta)/(theta_f - theta), with theta_f the angle at which all is austenite.
 
-What does the work on the arm with the gains of the preset: the damping, not the temperature. A_f' changes by 37 C/s at
-most in steps to set points from -30 to 65 degrees, and the band is 385 C/s, so that w is nearly v / v_p throughout and
-takes voltage away with the speed. With K_p = 0 the overshoot vanishes as well; what u_T adds is an earlier arrival
-(1.74 s in the place of 2.75 s at 50 degrees; figure rows C8 and C10).
+What does the work on the arm: damping and temperature, both. A_f' changes by a few ten C/s at most in steps to set points
+from -30 to 65 degrees; with a band beyond that the weight is nearly v / v_p throughout and takes voltage away with the speed,
+whatever the temperature. The preset's band is searched inside of that range (figure rows C8 and C10 have the numbers).
+With K_p = 0 most of the overshoot vanishes as well; what u_T adds is an earlier arrival at large angles (1.7 s in the
+place of 2.2 s at 50 degrees).
 
 The band phi_T = 0 makes NVSC equal to VSC3 exactly. An infinite phi_T would do so only if it were the VSC's band, with
 temperature control where |s_2| > phi_T; the overshoot would then grow with phi_T, where Fig. 4.15 has it fall.

@@ -64,10 +64,10 @@ def work(fast: bool) -> Result:
             figure, {"VSC": before, "NVSC": after, "NVSC, K_p = 0": damped, "NVSC, printed filter's states": filtered}
         ),
         caveat="less overshoot holds, no slower does not: VSC arrives first because it is on its way to overshoot, and where it hardly overshoots there is no "
-        "time to win back; the steady error differs where VSC has not settled after 10 s. Told the true state. The damping does the work, not the temperature: A_f' changes by "
-        f"{numbers['largest_rate_of_the_finish_C_per_s']:.0f} °C/s at most and the band is {float(nvsc.temperature_band):g} °C/s (by search), so that the switch on "
-        "dA_f'/dt (eq. 4.36) is nearly always inside and the share of temperature control is about the speed over v_p; with K_p = 0 the overshoot is "
-        f"{max(map(overshoot, bare.values())):.1f}° at most as well. What the temperature term adds is an earlier arrival, at 50° after "
+        "time to win back; the steady error differs where VSC has not settled after 10 s. Told the true state. A_f' changes by "
+        f"{numbers['largest_rate_of_the_finish_C_per_s']:.0f} °C/s at most and the band is {float(nvsc.temperature_band):g} °C/s (by search). Part of the work is "
+        "damping: inside the band the command falls with the speed, whatever the temperature, and with K_p = 0 the overshoot is "
+        f"{max(map(overshoot, bare.values())):.1f}° at most. What the temperature term adds to that is the earlier arrival, at 50° after "
         f"{time_of(new[50.0].reach_time):.2f} instead of {time_of(bare[50.0].reach_time):.2f} s. On the printed filter's states (no noise) NVSC overshoots by "
         f"{', '.join(f'{overshoot(told[angle]):.1f}' for angle in SET_POINTS)}° at {', '.join(f'{angle:g}' for angle in SET_POINTS)}°, never settles at {_list(never)}, and has "
         f"{max(map(steady, told.values())):.1f}° of steady error at most. VSC has the quick gains of C9: with those of C4 it overshoots nowhere beyond -15°, and "

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import operator
 import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -14,13 +15,15 @@ import numpy as np
 
 from smajax.controller.base import AbstractController
 from smajax.figures.rigs import arm
-from smajax.gain_search import search_gains
+from smajax.gain_search import merits_of, search_gains
 from smajax.merit import Merit
 from smajax.system import System
 from smajax.types import Scalar
 
 Cost = Callable[[Merit, float], Scalar]
 HERE = Path(__file__).parent
+STEP = 0.01  # s
+EDGE = 0.02  # of the box, by logarithm
 
 
 def or_never(time: Scalar, seconds: float) -> Scalar:
@@ -42,8 +45,9 @@ def searched(
 ) -> dict[str, Any]:
     """The record of one search, on the arm where no `system` is given, gains to three digits as the presets have them."""
     targets = [float(np.radians(angle)) for angle in targets_deg]
+    plant = system or arm()
     found = search_gains(
-        system or arm(),
+        plant,
         controller,
         box,
         targets,
@@ -52,8 +56,22 @@ def searched(
         rounds=rounds,
         seed=seed,
         cost=cost,
-        dt=0.01,
+        dt=STEP,
     )
+    gains = {name: float(f"{value:.3g}") for name, value in found.gains.items()}
+    # What is recorded is what the preset does: the rounded gains, at a finer step than the search's.
+    judged = merits_of(
+        plant,
+        controller,
+        tuple(gains),
+        jnp.asarray([list(gains.values())]),
+        jnp.asarray(targets),
+        seconds,
+        STEP / 2,
+        2,
+    )
+    one = jax.tree.map(operator.itemgetter(0), judged)
+    costs = np.asarray(jax.vmap(lambda each: cost(each, seconds))(one))
     record = {
         "cost_is": (cost.__doc__ or "").strip(),
         "box": {name: list(bounds) for name, bounds in box.items()},
@@ -62,11 +80,17 @@ def searched(
         "seed": seed,
         "tried": found.tried,
         "cost": round(found.cost, 4),
-        "gains": {name: float(f"{value:.3g}") for name, value in found.gains.items()},
-        "reach_time_s": np.round(np.asarray(found.merits.reach_time), 2).tolist(),
-        "settling_time_s": np.round(np.asarray(found.merits.settling_time), 2).tolist(),
-        "overshoot_deg": np.round(np.degrees(np.asarray(found.merits.overshoot)), 2).tolist(),
-        "steady_error_deg": np.round(np.degrees(np.asarray(found.merits.steady_error)), 3).tolist(),
+        "gains": gains,
+        "at_the_edge_of_its_box": sorted(
+            name
+            for name, (low, high) in box.items()
+            if min(gains[name] / low, high / gains[name]) < (high / low) ** EDGE
+        ),
+        "cost_of_the_rounded_gains_at_5_ms": round(float(costs.mean()), 4),
+        "reach_time_s": np.round(np.asarray(one.reach_time), 2).tolist(),
+        "settling_time_s": np.round(np.asarray(one.settling_time), 2).tolist(),
+        "overshoot_deg": np.round(np.degrees(np.asarray(one.overshoot)), 2).tolist(),
+        "steady_error_deg": np.round(np.degrees(np.asarray(one.steady_error)), 3).tolist(),
     }
     return record
 

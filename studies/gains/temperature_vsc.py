@@ -21,7 +21,8 @@ def as_soon_and_no_further(one: Merit, seconds: float) -> Scalar:
 
 def searches() -> dict[str, dict[str, Any]]:
     """Every search of this controller by name."""
-    box = {"temperature_band": (1.0, 1e3), "temperature_gain": (0.1, 30.0), "passing_speed": (0.05, 10.0)}
+    # A_f' changes by 37 C/s at most in these steps: with a band beyond that the temperature is never given back.
+    box = {"temperature_band": (1.0, 37.0), "temperature_gain": (0.1, 30.0), "passing_speed": (0.05, 10.0)}
     targets = [0.0, 25.0, 50.0, 70.0]
     return {"temperature_vsc": searched(temperature_vsc(arm()), box, targets, as_soon_and_no_further, candidates=72)}
 
