@@ -83,7 +83,7 @@ def backstepping_two(system: System) -> BacksteppingTwo:
 
 # By the set point at which they were tuned, deg: studies/gains/pid.json, `tuned_at_...`.
 PID_TUNED_AT: dict[int, dict[str, float]] = {
-    0: {"proportional_gain": 19.2, "integral_gain": 8.56, "derivative_gain": 1.85},
+    0: {"proportional_gain": 50.6, "integral_gain": 9.16, "derivative_gain": 3.94},
     10: {"proportional_gain": 16.4, "integral_gain": 6.08, "derivative_gain": 5.39},
     40: {"proportional_gain": 10.8, "integral_gain": 3.69, "derivative_gain": 3.52},
 }
@@ -92,7 +92,7 @@ PID_TUNED_AT: dict[int, dict[str, float]] = {
 def pid(system: System) -> Pid:
     """PID with anti-windup for the whole range of the arm: studies/gains/pid.json, `tuned_everywhere`."""
     return Pid(
-        proportional_gain=21.0, integral_gain=36.8, derivative_gain=2.61, largest_voltage=10.0, unwinding_time=0.02
+        proportional_gain=12.8, integral_gain=9.72, derivative_gain=2.64, largest_voltage=10.0, unwinding_time=0.997
     )
 
 
@@ -115,7 +115,7 @@ def vsc2(system: System) -> Vsc2:
 
 def vsc3(system: System) -> Vsc3:
     """Modified switch that settles in the printed 3 s at 0 deg: studies/gains/vsc.json, `vsc3`."""
-    return Vsc3(high_voltage=10.0, low_voltage=4.0, surface_slope=0.945, boundary=0.116, rate_filter=0.02)
+    return Vsc3(high_voltage=10.0, low_voltage=4.0, surface_slope=0.927, boundary=0.112, rate_filter=0.02)
 
 
 def vsc3_of_section_4_6(system: System) -> Vsc3:

@@ -187,3 +187,32 @@ def test_a_parameter_walks_across_a_branch_change() -> None:
     total = np.trapezoid(slope, volts)
     assert total == pytest.approx(value[-1] - value[0], rel=0.03)
     assert slope[0] < 0.1 * slope.max()
+
+
+SECOND = {
+    "arm": (_under("brinson", "niti_table_3_1", "arm", "amplified_voltage"), {"voltage": jnp.full(60, 6.5)}),
+    # Both variants, so that the stress is the root of an equation of its own.
+    "strain_coupon": (
+        _under("brinson", "flexinol_table_3_2", "strain_coupon", "none"),
+        {"temperature": jnp.full(40, 40.0), "strain": jnp.linspace(0.0, 0.02, 40)},
+    ),
+}
+
+
+@pytest.mark.parametrize("load", ["arm", pytest.param("strain_coupon", marks=pytest.mark.slow)])
+def test_second_derivatives(load: str) -> None:
+    """A filter's gains are first derivatives, so its own derivative is a second one."""
+    system, inputs = SECOND[load]
+    names = ["young_modulus_austenite", "young_modulus_martensite", "stress_slope_austenite"]
+    at = get_parameters(system, names)
+
+    def mean(share: jax.Array) -> jax.Array:
+        run = simulate(set_vector(system, names, at * share), inputs, DT)
+        return run.stress.mean() / 1e8
+
+    one, step = jnp.ones(3), 1e-5
+    second = np.asarray(jax.jit(jax.hessian(mean))(one))
+    slope = jax.jit(jax.grad(mean))
+    difference = np.stack([(slope(one + step * e) - slope(one - step * e)) / (2 * step) for e in np.eye(3)])
+    assert np.abs(second).max() > 1e-3
+    np.testing.assert_allclose(second, difference, rtol=1e-5, atol=1e-7)

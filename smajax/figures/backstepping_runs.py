@@ -14,6 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from smajax.closed_loop import ClosedLoop, simulate_closed_loop
+from smajax.control_presets import with_printed_law
 from smajax.controller.base import AbstractController
 from smajax.controller.inverse_wire import fraction_for, temperature_for
 from smajax.estimator.base import AbstractEstimator
@@ -22,12 +23,10 @@ from smajax.figures.rigs import Recorded, arm, recorded
 from smajax.load.base import AbstractMovingLoad
 from smajax.measured_state import Sensor
 from smajax.merit import Merit, merit
-from smajax.parameters import set_parameters
 from smajax.reference import clock, constant
 from smajax.simulate import DEFAULT_STEP
 from smajax.system import System, initial_state
 from smajax.types import Motion, Scalar, State
-from smajax.wire.constitutive import IntegratedForm
 from smajax.wire.heat import cross_section
 from smajax.wire.wire import start
 
@@ -41,7 +40,7 @@ ON_ITS_PLANT = (
 
 def plant() -> System:
     """The arm with the constitutive law that the section prints: integrated, and without a thermal term (eq. 4.51)."""
-    return set_parameters(arm(form=IntegratedForm()), {"thermal_modulus": 0.0})
+    return with_printed_law(arm())
 
 
 def on_heating_curve(system: System, position: Scalar, velocity: Scalar) -> State:

@@ -31,7 +31,7 @@ def root(
     """Where `miss` is zero between `low` and `high`; `miss` rises and its root lies there. `scale` is that of the root.
 
     Newton's steps, or halvings of the bracket where those lead out of it or would not shrink it. The iteration itself
-    is not differentiated: one more Newton step at the root, its slope held, has the derivative of the root.
+    is not differentiated: `lax.custom_root` gives the root its derivatives, of any order.
     """
     tolerance = ROUNDINGS * jnp.finfo(jnp.result_type(start)).eps * jnp.asarray(scale)
 
@@ -54,6 +54,6 @@ def root(
     held = lax.stop_gradient
     first = Bracket(held(start), held(low), held(high), jnp.full_like(start, jnp.inf), jnp.zeros_like(start, int))
     found = held(lax.while_loop(unfinished, body, first).here)
-    value, slope = miss(found), at(found)[1]
-    exact = found - value / slope
+    slope = at(found)[1]
+    exact = lax.custom_root(miss, found, lambda f, here: here - f(here) / slope, lambda g, asked: asked / g(1.0))
     return jnp.where(exact > high, high, jnp.where(exact < low, low, exact))

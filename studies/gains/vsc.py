@@ -40,6 +40,7 @@ def searches() -> dict[str, dict[str, Any]]:
     surface = Vsc3(high_voltage=10.0, low_voltage=4.0, surface_slope=5.0, boundary=1.0, rate_filter=0.02)
     box = {"surface_slope": (0.5, 30.0), "boundary": (0.02, 30.0)}
     return {
+        # Ends at the thin edge of its box: thinner than the cycle of VSC1 (0.17 degrees) a layer is none.
         "vsc2": searched(layer, {"boundary": (0.01, 1.0)}, [0.0], settles_in(8.0), candidates=64, rounds=6),
         "vsc3": searched(surface, box, [0.0], settles_in(3.0)),
         "vsc3_of_section_4_6": searched(surface, box, [50.0], overshoots_to_the_finish),
