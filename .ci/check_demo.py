@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import json
 import sys
+import tomllib
 from pathlib import Path
+from typing import Any
+
+DEMO = Path(__file__).parents[1] / "smajax" / "demo"
 
 # The runs of `latent` come from a wire with latent heat, which the base model lacks; those of `complete` lack nothing.
 EXPECTED: dict[str, tuple[str, list[str]]] = {"latent": ("explained", ["latent_heat"]), "complete": ("adequate", [])}
@@ -26,7 +30,27 @@ def problems(folder: Path) -> list[str]:
             found.append(f"{name}: got {report['verdict']!r} with {added}, expected {verdict!r} with {effects}")
         else:
             print(f"{name}: {verdict}{', '.join(['', *added])}")
+        found += [f"{name}: {line}" for line in _off(report, name)]
     return found
+
+
+def _off(report: dict[str, Any], name: str) -> list[str]:
+    """Values more than 3 % from the truth behind the runs, and held-out errors above 1.1 times the noise."""
+    truth = tomllib.loads((DEMO / name / "truth.toml").read_text(encoding="utf-8"))["parameters"]
+    told = {parameter: entry["value"] for parameter, entry in report["after"]["parameters"].items()}
+    told |= {"latent_heat": told.pop("latent_heat.enthalpy")} if "latent_heat.enthalpy" in told else {}
+    wrong = [
+        f"{parameter} is {value:.5g}, the runs were made with {truth[parameter]:.5g}"
+        for parameter, value in told.items()
+        if parameter in truth and abs(value - truth[parameter]) > 0.03 * abs(truth[parameter])
+    ]
+    noise = report["output"]["noise_sigma"]
+    wrong += [
+        f"{run['name']} is off by {run['rmse_after'] / noise:.2f} times the noise"
+        for run in report["runs"]
+        if run["role"] == "held-out" and run["rmse_after"] > 1.1 * noise
+    ]
+    return wrong
 
 
 if __name__ == "__main__":

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import tomllib
 from importlib import resources
 from pathlib import Path
 
+import equinox as eqx
 import numpy as np
 import pytest
 
@@ -13,9 +15,13 @@ from smajax.attribution.verdict import pooled
 from smajax.catalogue import CATALOGUE
 from smajax.close_loop import close_loop
 from smajax.experiment.load import load_experiment
-from smajax.report.findings import Findings, RunFinding
+from smajax.extended import base_model, extended
+from smajax.fit.batch import pack, simulate_batch
+from smajax.parameters import get_parameters, parameters, set_parameters
+from smajax.report.findings import Findings
 
 STUDIES = Path(__file__).parents[1] / "studies"
+BENCH = STUDIES / "bias_spring_bench"
 
 
 def _added(findings: Findings) -> set[str]:
@@ -28,6 +34,8 @@ def _demo(name: str, tmp_path: Path) -> tuple[Findings, dict[str, float]]:
         return findings, tomllib.loads((folder / "truth.toml").read_text())["parameters"]
 
 
+# `.ci/run` runs both demos after these tests, in a fresh clone, and `.ci/check_demo.py` asserts the same of them there.
+@pytest.mark.slow
 def test_demo_names_the_hidden_effect_and_nothing_else(tmp_path: Path) -> None:
     findings, truth = _demo("latent", tmp_path)
     assert findings.verdict == "explained"
@@ -44,6 +52,7 @@ def test_demo_names_the_hidden_effect_and_nothing_else(tmp_path: Path) -> None:
     assert pooled(findings.runs, "fit", "after") < 1.05 * noise
 
 
+@pytest.mark.slow
 def test_demo_with_nothing_missing_is_adequate(tmp_path: Path) -> None:
     findings, truth = _demo("complete", tmp_path)
     assert findings.verdict == "adequate"
@@ -73,33 +82,69 @@ def test_one_run_no_unknown_and_no_candidate_still_give_an_answer(tmp_path: Path
     assert any("Nothing is declared unknown" in line for line in findings.check)
 
 
-def _change(run: RunFinding, which: str, start: float, end: float) -> float:
-    series = getattr(run, which)
-    near = [int(np.argmin(np.abs(run.time - at))) for at in (start, end)]
+def _change(time: np.ndarray, series: np.ndarray, start: float, end: float) -> float:
+    near = [int(np.argmin(np.abs(time - at))) for at in (start, end)]
     # Half a second on either side: the sensor's increment is 0.02 mm.
-    width = max(1, round(0.25 / float(run.time[1] - run.time[0])))
+    width = max(1, round(0.25 / float(time[1] - time[0])))
     return float(np.subtract(*[series[max(0, k - width) : k + width].mean() for k in reversed(near)]))
 
 
+def _events_of_step02(time: np.ndarray, series: dict[str, np.ndarray]) -> None:
+    """Creep back while the current stays on, and a rebound when it is cut: both missed before, both there after."""
+    creep = {which: _change(time, values, 15.0, 29.9) for which, values in series.items()}
+    rebound = {which: _change(time, values, 29.9, 36.5) for which, values in series.items()}
+    assert creep["before"] > 0.0 > creep["measured"]
+    assert -0.6e-3 < creep["after"] < -0.25e-3
+    assert rebound["before"] < 0.5e-3
+    assert rebound["after"] > 0.5e-3
+    assert abs(rebound["after"] - rebound["measured"]) < 0.4e-3
+
+
+@pytest.mark.slow
 def test_bias_spring_bench(measured_data: Path, tmp_path: Path) -> None:
     """Below 0.12 mm on the fit runs and 0.55 mm on the run that was held out, and both events of Step02 right in sign."""
     assert measured_data.is_dir()
-    findings = close_loop(
-        load_experiment(STUDIES / "bias_spring_bench" / "experiment.toml", CATALOGUE), memory=tmp_path
-    )
+    findings = close_loop(load_experiment(BENCH / "experiment.toml", CATALOGUE), memory=tmp_path)
     assert 0.40e-3 < pooled(findings.runs, "fit", "before") < 0.50e-3
     assert pooled(findings.runs, "fit", "after") < 0.12e-3
     assert pooled(findings.runs, "held-out", "after") < 0.55e-3
     assert findings.verdict == "partly explained"
     assert "thermal_expansion" in _added(findings)
     step = next(run for run in findings.runs if run.name == "Step02")
-    creep = {which: _change(step, which, 15.0, 29.9) for which in ("measured", "before", "after")}
-    rebound = {which: _change(step, which, 29.9, 36.5) for which in ("measured", "before", "after")}
-    assert creep["before"] > 0.0 > creep["measured"]
-    assert -0.6e-3 < creep["after"] < -0.25e-3
-    assert rebound["before"] < 0.5e-3
-    assert rebound["after"] > 0.5e-3
-    assert abs(rebound["after"] - rebound["measured"]) < 0.4e-3
+    _events_of_step02(step.time, {"measured": step.measured, "before": step.before, "after": step.after})
+
+
+def test_the_models_told_of_the_bias_spring_bench_do_what_is_told(measured_data: Path) -> None:
+    """The fast setting of the bench: no search, but the base and the extended model of the kept report, simulated anew."""
+    assert measured_data.is_dir()
+    report = json.loads((BENCH / "report.json").read_text(encoding="utf-8"))
+    experiment = load_experiment(BENCH / "experiment.toml", CATALOGUE)
+    added = [effect for effect in report["effects"] if effect["added"]]
+    values = {name: told["value"] for name, told in report["after"]["parameters"].items()}
+    before = {name: told["value"] for name, told in report["before"]["parameters"].items()}
+    base = base_model(experiment)
+    full = set_parameters(extended(base, [effect["name"] for effect in added]), values)
+    readings = {}
+    for which, model in (("before", set_parameters(base, before)), ("after", full)):
+        defaults = {name: float(get_parameters(model, [name])[0]) for name in parameters(model)}
+        batch = pack(experiment.runs, experiment.step, defaults)
+        readings[which] = np.asarray(eqx.filter_jit(simulate_batch)(model, batch).reading)
+    error: dict[str, list[float]] = {}
+    for index, run in enumerate(experiment.runs):
+        told = report["runs"][index]
+        for which, reading in readings.items():
+            miss = run.output - reading[index, : len(run.output)]
+            miss = miss - miss.mean()
+            assert float(np.sqrt(np.mean(miss**2))) == pytest.approx(told[f"rmse_{which}"], rel=1e-3), run.name
+            error.setdefault(f"{told['role']} {which}", []).extend(miss**2)
+    rms = {which: float(np.sqrt(np.mean(squares))) for which, squares in error.items()}
+    assert 0.40e-3 < rms["fit before"] < 0.50e-3
+    assert rms["fit after"] < 0.12e-3
+    assert rms["held-out after"] < 0.55e-3
+    place = [run.name for run in experiment.runs].index("Step02")
+    step = experiment.runs[place]
+    series = {which: reading[place, : len(step.time)] for which, reading in readings.items()}
+    _events_of_step02(step.time, {"measured": step.output, **series})
 
 
 def test_isobaric_flexinol(measured_data: Path, tmp_path: Path) -> None:

@@ -38,8 +38,12 @@ LIBRARY: dict[str, type[AbstractEffect]] = {
 
 
 def at_base(names: Sequence[str]) -> tuple[AbstractEffect, ...]:
-    """The named effects, present and changing nothing. Raises KeyError, listing the library, for an unknown name."""
+    """The named effects, present and changing nothing, in the library's order whatever the order of `names`.
+
+    Two effects on one shape do not commute: the order must not be a matter of who was found first. Raises KeyError,
+    listing the library, for an unknown name.
+    """
     unknown = [name for name in names if name not in LIBRARY]
     if unknown:
         raise KeyError(f"No effect named {unknown} in the library; it has {sorted(LIBRARY)}.")
-    return tuple(LIBRARY[name].base() for name in names)
+    return tuple(effect.base() for name, effect in LIBRARY.items() if name in names)
