@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, ClassVar
 
-import jax.numpy as jnp
-
+from smajax.cosine import cosine
 from smajax.load.base import GRAVITY, AbstractMovingLoad
 from smajax.parameters import parameter
 from smajax.types import Inputs, Scalar
@@ -53,7 +52,7 @@ class Arm(AbstractMovingLoad):
         return self.inertia_ratio * (self.payload_mass + self.link_mass / 3.0) * self.arm_length**2
 
     def resistance(self, position: Scalar, velocity: Scalar, inputs: Inputs) -> Scalar:
-        gravity = (self.payload_mass + 0.5 * self.link_mass) * GRAVITY * self.arm_length * jnp.cos(position)
+        gravity = (self.payload_mass + 0.5 * self.link_mass) * GRAVITY * self.arm_length * cosine(position)
         spring = self.spring_stiffness * self.spring_lever**2 * (position - self.spring_rest_angle)
         # `load_torque`, N m, is a disturbance against +position.
         return gravity + spring + self.damping * velocity + inputs.get("load_torque", 0.0)

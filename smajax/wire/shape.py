@@ -8,6 +8,7 @@ import math
 import equinox as eqx
 import jax.numpy as jnp
 
+from smajax.cosine import quarter_cosine
 from smajax.types import Scalar
 
 # Tanaka's material constants are chosen so that 1 % is left at the far end of the range: A_a = ln(0.01)/(A_f - A_s).
@@ -34,10 +35,10 @@ class Cosine(AbstractShape):
     r"""h = (1 + cos pi z)/2 and k = (1 - cos pi z)/2 for 0 <= z <= 1 (Elahinia 2004, eq. 3.3, 3.5 and 2.14, 2.15)."""
 
     def martensite_left(self, z: Scalar) -> Scalar:
-        return 0.5 * (1.0 + jnp.cos(jnp.pi * jnp.clip(z, 0.0, 1.0)))
+        return quarter_cosine(jnp.clip(z, 0.0, 1.0)) ** 2  # (1 + cos x)/2 = cos^2(x/2)
 
     def austenite_left(self, z: Scalar) -> Scalar:
-        return 0.5 * (1.0 - jnp.cos(jnp.pi * jnp.clip(z, 0.0, 1.0)))
+        return 1.0 - quarter_cosine(jnp.clip(z, 0.0, 1.0)) ** 2
 
     def steepest(self) -> float:
         return 0.5 * math.pi

@@ -8,6 +8,7 @@ from typing import ClassVar
 import equinox as eqx
 import jax.numpy as jnp
 
+from smajax.cosine import quarter_cosine
 from smajax.parameters import parameter
 from smajax.types import Scalar, WireState
 
@@ -59,7 +60,7 @@ class Split(AbstractVariants):
         """d(stress), -."""
         width = jnp.maximum(self.critical_stress_finish - self.critical_stress_start, 1.0)
         z = jnp.clip((stress - self.critical_stress_start) / width, 0.0, 1.0)
-        return 0.5 * (1.0 - jnp.cos(jnp.pi * z))
+        return 1.0 - quarter_cosine(z) ** 2
 
     def detwinned_at_start(self, stress: Scalar, fraction: Scalar) -> Scalar:
         return self.share(stress) * fraction

@@ -1,0 +1,100 @@
+"""What one stage of a step solves: heat, motion and stress at its end, of a moving load."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+
+from smajax.load.base import AbstractMovingLoad
+from smajax.system import System, ambient_temperature
+from smajax.types import Inputs, Scalar, State
+from smajax.wire.constitutive import stress_at
+from smajax.wire.heat import cross_section, heat_rate, stored_heat
+from smajax.wire.resistance import resistance_per_metre
+
+# Coulomb friction builds up over this much motion (a bristle bends before it slips), in units of position.
+PRESLIDING = 2e-5
+
+
+class Unknowns(NamedTuple):
+    """What a stage solves for, in the order of elimination."""
+
+    temperature: Scalar
+    position: Scalar
+    stress: Scalar
+    fraction: Scalar
+
+
+class Stage(eqx.Module):
+    """What a stage starts from: the state before it, and the base values of the scheme."""
+
+    old: State
+    time: Scalar
+    step: Scalar  # g = gamma dt, s
+    heat: Scalar  # H_b, J/m
+    position: Scalar  # x_b
+    velocity: Scalar  # v_b
+
+
+def friction_in_use(stage: Stage, position: Scalar) -> tuple[Scalar, Scalar]:
+    """(share of the Coulomb limit in use, the same before it is held within -1..1)."""
+    raw = stage.old.motion.friction + (position - stage.old.motion.position) / PRESLIDING
+    return jnp.clip(raw, -1.0, 1.0), raw
+
+
+def friction_limit(system: System) -> Scalar | None:
+    """Coulomb's limit in the unit of the load's resistance; None where no effect has friction."""
+    limits = [effect.friction_limit() for effect in system.effects]
+    felt = [limit for limit in limits if not (isinstance(limit, (int, float)) and limit == 0.0)]
+    return jnp.sum(jnp.stack([jnp.asarray(limit) for limit in felt])) if felt else None
+
+
+def _heating(system: System, stage: Stage, inputs: Inputs, temperature: Scalar, fraction: Scalar) -> Scalar:
+    wire, effects = system.wire, system.effects
+    ohms = resistance_per_metre(wire, effects, temperature, fraction)
+    power = system.drive.power(ohms, wire.wire_length, inputs)
+    ambient = ambient_temperature(system, stage.time, inputs)
+    return heat_rate(wire, effects, temperature, ambient, power)
+
+
+def rates(system: System, stage: Stage, inputs: Inputs, z: Unknowns) -> tuple[Scalar, Scalar, Scalar]:
+    """(dH/dt, v, a) at the end of a stage."""
+    velocity = (z.position - stage.position) / stage.step
+    acceleration = (velocity - stage.velocity) / stage.step
+    return _heating(system, stage, inputs, z.temperature, z.fraction), velocity, acceleration
+
+
+def free_position(system: System, stage: Stage, inputs: Inputs, z: Unknowns) -> Scalar:
+    """The position less what the equation of motion is off by, in units of position; `z.position` where it holds."""
+    load = system.load
+    assert isinstance(load, AbstractMovingLoad)
+    _, velocity, acceleration = rates(system, stage, inputs, z)
+    inertia = load.inertia(inputs)
+    limit = friction_limit(system)
+    friction = 0.0 if limit is None else limit * friction_in_use(stage, z.position)[0]
+    pull = load.lever() * cross_section(system.wire) * z.stress
+    resisting = load.resistance(z.position, velocity, inputs) + friction
+    return z.position - (inertia * acceleration + resisting - pull) * stage.step**2 / inertia
+
+
+def equations(system: System, stage: Stage, inputs: Inputs, z: Unknowns) -> tuple[Scalar, Scalar, Scalar]:
+    """Heat, motion and stress of a stage, each scaled to the unknown that it is solved for, zero at the solution.
+
+    The fourth equation, of the kinetics, depends on the branch.
+    """
+    wire, effects, load, old = system.wire, system.effects, system.load, stage.old.wire
+    assert isinstance(load, AbstractMovingLoad)
+    heating, _, _ = rates(system, stage, inputs, z)
+    capacity = stored_heat(wire, (), jnp.ones_like(z.temperature), z.fraction)
+    heat = (stored_heat(wire, effects, z.temperature, z.fraction) - stage.heat - stage.step * heating) / capacity
+
+    # Projected on the range between the end stops: at a stop the equation reads "position = stop".
+    free = free_position(system, stage, inputs, z)
+    lower, upper = load.limits()
+    motion = z.position - jnp.where(free < lower, lower, jnp.where(free > upper, upper, free))
+
+    strain = -load.contraction(wire) * (z.position - load.start())
+    asked = stress_at(wire, effects, old, strain, z.temperature, z.stress, z.fraction)
+    return heat, motion, z.stress - asked

@@ -1,0 +1,218 @@
+r"""Solves a stage: Newton's method for heat, motion and stress, and within each step the one equation of the kinetics.
+
+As in plasticity, a stage is first tried with the fraction frozen; that decides the branch. Linearised, the three equations
+give temperature and stress as straight lines over the fraction, and on the branch
+
+    xi - xi(T(xi), sigma(xi)) = 0
+
+is one equation of one unknown. It rises with xi (more martensite: warmer by latent heat and less stressed, so less of
+it), so its root lies between the present fraction and the end of the branch. The cosine is all that bends much in a
+stage, and it is solved without a new linearisation.
+
+`QUICK` linearisations with `INNER` steps of the inner equation are nearly always enough (`studies/benchmarks` says how
+often), and cost the same for every member of a batch. Where the last of them still moved the solution, more follow, the
+later ones with the inner equation solved to the end in its bracket: a member that needs them makes its batch wait, and
+changes nothing for the others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import reduce
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jax import lax
+
+from smajax.load.base import AbstractMovingLoad
+from smajax.stage_equations import PRESLIDING, Stage, Unknowns, equations, friction_in_use, friction_limit
+from smajax.system import System
+from smajax.types import Inputs, Scalar
+from smajax.wire.constitutive import young_modulus
+from smajax.wire.kinetics import (
+    Branch,
+    choose_branch,
+    cooling_temperature,
+    curves,
+    fraction_on,
+    heating_temperature,
+    open_branches,
+)
+from smajax.wire.root import root
+
+QUICK = 2
+INNER = 3
+MOST_ITERATIONS = 50
+UNDAMPED = 12  # iterations before every second step is halved
+# Enough: when no unknown moves by more than this share of its scale, 1 C, 1 % strain, 1e-4 E, and xi in full; in float32,
+# by more than what rounding alone moves it. The step after would move it by about the square of that.
+TOLERANCE = 1e-4
+MOST_QUICK = 6  # iterations, before the inner equation is solved in its bracket
+ROUNDINGS = 1e3
+DRIVING = (heating_temperature, cooling_temperature)  # both linear in temperature and stress
+Entry = Scalar | None  # of a Jacobian; None: zero whatever the values, and never computed
+
+
+class Solution(NamedTuple):
+    """The unknowns at the end of a stage, and the branch that it is on."""
+
+    z: Unknowns
+    branch: Branch
+
+
+class _Iterate(NamedTuple):
+    z: Unknowns
+    branch: Branch
+    enough: Scalar  # bool
+    iterations: Scalar
+
+
+def _over(value: Scalar, pivot: Entry) -> Scalar:
+    assert pivot is not None, "each equation contains the unknown that it is solved for"
+    return value / pivot
+
+
+def solved_linear(rows: Sequence[Sequence[Entry]], *rights: Sequence[Scalar]) -> list[list[Scalar]]:
+    """Solutions of one small linear system for several right-hand sides, without pivoting.
+
+    In the order T, x, sigma every pivot is positive: heat, inertia and stiffness are.
+    """
+    left, right = [list(row) for row in rows], [list(one) for one in rights]
+    size = len(left)
+    for pivot in range(size - 1):
+        for row in range(pivot + 1, size):
+            entry = left[row][pivot]
+            if entry is None:
+                continue
+            factor = _over(entry, left[pivot][pivot])
+            for column in range(pivot + 1, size):
+                above, here = left[pivot][column], left[row][column]
+                if above is not None:
+                    left[row][column] = -factor * above if here is None else here - factor * above
+            for one in right:
+                one[row] = one[row] - factor * one[pivot]
+    for one in right:
+        for row in range(size - 1, -1, -1):
+            for column in range(row + 1, size):
+                entry = left[row][column]
+                if entry is not None:
+                    one[row] = one[row] - entry * one[column]
+            one[row] = _over(one[row], left[row][row])
+    return right
+
+
+def _linearised(system: System, stage: Stage, inputs: Inputs, z: Unknowns) -> tuple[list[Scalar], list[list[Entry]]]:
+    """(residual of the three equations, their Jacobian by the four unknowns)."""
+    columns = []
+    residual: list[Scalar] = []
+    for field in Unknowns._fields:
+        # One unknown at a time: what does not depend on it is then known to have no derivative and is never computed,
+        # which a batched `jacfwd` cannot know.
+        def along(value: Scalar, field: str = field) -> list[Scalar]:
+            return list(equations(system, stage, inputs, z._replace(**{field: value})))
+
+        here = getattr(z, field)
+        residual, column = eqx.filter_jvp(along, (here,), (jnp.ones_like(here),))
+        columns.append(column)
+    return residual, [[column[row] for column in columns] for row in range(3)]
+
+
+def _largest(system: System, xi: Scalar, change: Sequence[Scalar]) -> Scalar:
+    """Largest change of the four unknowns in units of 1 C, 1 % strain, 1e-4 E and xi in full."""
+    load = system.load
+    assert isinstance(load, AbstractMovingLoad)
+    stiffness = 1e-4 * young_modulus(system.wire, xi)
+    scales: list[Scalar | float] = [1.0, 0.01 / load.contraction(system.wire), stiffness, 1.0]
+    return reduce(jnp.maximum, [jnp.abs(one) / scale for one, scale in zip(change, scales, strict=True)])
+
+
+def _inner(
+    miss: Callable[[Scalar], Scalar], start: Scalar, low: Scalar, high: Scalar, quick: bool
+) -> tuple[Scalar, Scalar]:
+    """(root of the kinetics between its ends, last change): a few Newton steps, or to the end in its bracket."""
+    if not quick:
+        return root(miss, start, low, high), jnp.zeros_like(start)
+    here = before = start
+    for _ in range(INNER):
+        value, slope = jax.jvp(miss, (here,), (jnp.ones_like(here),))
+        free = here - value / slope
+        before, here = here, jnp.where(free > high, high, jnp.where(free < low, low, free))
+    return here, here - before
+
+
+def solve(system: System, stage: Stage, inputs: Inputs) -> Solution:
+    """The end of a stage. Not to be differentiated: its equations are (`stage_equations`)."""
+    law, effects, old = system.wire.kinetics, system.effects, stage.old.wire
+    xi = old.martensite_fraction
+    open_at_start = open_branches(law, effects, old)
+    slips = friction_limit(system)
+    sticks = stage.old.motion.position - PRESLIDING * stage.old.motion.friction
+    tolerance = max(TOLERANCE, ROUNDINGS * float(jnp.finfo(xi.dtype).eps))
+
+    def iterate(at: _Iterate, quick: bool, first: bool = False) -> _Iterate:
+        z = at.z
+        residual, rows = _linearised(system, stage, inputs, z)
+        by_fraction = [jnp.zeros_like(xi) if row[3] is None else -row[3] for row in rows]
+        base, slope = solved_linear([row[:3] for row in rows], [-value for value in residual], by_fraction)
+
+        def along(fraction: Scalar) -> tuple[Scalar, Scalar]:
+            """(T, sigma) that go with a fraction."""
+            moved = fraction - z.fraction
+            return z.temperature + base[0] + slope[0] * moved, z.stress + base[2] + slope[2] * moved
+
+        tried = along(xi)
+        asked = choose_branch(law, old, open_at_start, *tried, *curves(law, effects, old, *tried))
+
+        def miss(fraction: Scalar) -> Scalar:
+            return fraction - fraction_on(old, asked, *curves(law, effects, old, *along(fraction)))
+
+        low, high = jnp.where(asked.heating, 0.0, xi), jnp.where(asked.cooling, 1.0, xi)
+        start = z.fraction
+        if first:
+            # Where the driving temperature is the one before: on a fast way that holds far better than the fraction.
+            drive = jax.tree.map(
+                lambda heated, cooled: jnp.where(asked.cooling, cooled, heated),
+                *(
+                    [of(law, *at) for at in ((old.temperature, old.stress), tried, (slope[0], slope[2]))]
+                    for of in DRIVING
+                ),
+            )
+            start = xi + (drive[0] - drive[1]) / jnp.where(drive[2] > 0.0, drive[2], jnp.inf)
+        inside = jnp.where(start > high, high, jnp.where(start < low, low, start))
+        found, last = _inner(miss, inside, low, high, quick)
+        moved = found - z.fraction
+        step = [base[k] + slope[k] * moved for k in range(3)] + [moved]
+        if not quick:
+            # A stiff-soft-stiff wire (detwinning) can send Newton to and fro between its two stiff ends.
+            late = (at.iterations > UNDAMPED) & (at.iterations % 2 == 0)
+            step = [jnp.where(late, 0.5 * change, change) for change in step]
+        new = Unknowns(*(value + change for value, change in zip(z, step, strict=True)))
+        if slips is not None:
+            # Friction passes through sticking on its way from one slip to the other.
+            before, after = friction_in_use(stage, z.position)[1], friction_in_use(stage, new.position)[1]
+            jumped = (slips > 0.0) & (jnp.abs(before) > 1.0) & (jnp.abs(after) > 1.0) & (before * after < 0.0)
+            new = new._replace(position=jnp.where(jumped, sticks, new.position))
+            step[1] = new.position - z.position
+        # What is no number stays none, and must not keep the others.
+        still = ~(_largest(system, xi, [*step[:3], jnp.abs(moved) + jnp.abs(last)]) > tolerance)
+        same = (asked.heating == at.branch.heating) & (asked.cooling == at.branch.cooling)
+        return _Iterate(new, asked, still & same, at.iterations + 1)
+
+    no = jnp.zeros_like(xi, bool)
+    guess = Unknowns(old.temperature, stage.old.motion.position, old.stress, xi)
+    at = _Iterate(guess, Branch(no, no), no, jnp.zeros_like(xi, int))
+    for number in range(QUICK):
+        at = iterate(at, quick=True, first=number == 0)
+
+    for most, quick in ((MOST_QUICK, True), (MOST_ITERATIONS, False)):
+
+        def unfinished(now: _Iterate, most: int = most) -> Scalar:
+            return ~now.enough & (now.iterations < most)
+
+        def more(now: _Iterate, quick: bool = quick) -> _Iterate:
+            return iterate(now, quick)
+
+        at = lax.while_loop(unfinished, more, at)
+    return Solution(at.z, at.branch)
