@@ -6,9 +6,10 @@ import os
 from importlib.metadata import version
 from pathlib import Path
 
-# XLA's newer way of compiling loops for a CPU takes two to four times as long for programs like ours, which run as fast
-# either way. A flag that a later version does not know ends the process: only versions that were tried.
+# XLA's newer way of compiling loops for a CPU takes two to four times as long for a fit, which runs as fast either way; a
+# batch of many members runs up to three times as fast by it, and a little faster in the widest vectors. A flag that a later version does not know ends the process: only versions that were tried.
 FLAG = "--xla_cpu_use_fusion_emitters=false"
+WIDE = "--xla_cpu_prefer_vector_width=512"
 TRIED = ((0, 7), (0, 10))
 
 
@@ -19,13 +20,20 @@ def kept_programs() -> Path:
     return Path(own) if own else (Path(cache) if cache else Path.home() / ".cache") / "smajax" / "programs"
 
 
-def prepare() -> None:
-    """Float64, and programs that compile fast and once. Before the first array: XLA reads its flags once."""
+def prepare(cores: bool = False) -> None:
+    """Float64, and programs that compile fast and once. Before the first array: XLA reads its flags once.
+
+    `cores` is for large batches: every core is a device of its own, and programs are compiled to run fast instead.
+    """
     import jax
 
     major, minor = (int(part) for part in version("jaxlib").split(".")[:2])
     flags = os.environ.get("XLA_FLAGS", "")
-    if TRIED[0] <= (major, minor) <= TRIED[1] and FLAG.split("=")[0] not in flags:
+    if cores:
+        jax.config.update("jax_num_cpu_devices", os.cpu_count() or 1)
+        if WIDE.split("=")[0] not in flags and TRIED[0] <= (major, minor) <= TRIED[1]:
+            os.environ["XLA_FLAGS"] = f"{flags} {WIDE}".strip()
+    elif TRIED[0] <= (major, minor) <= TRIED[1] and FLAG.split("=")[0] not in flags:
         os.environ["XLA_FLAGS"] = f"{flags} {FLAG}".strip()
     jax.config.update("jax_enable_x64", True)
     jax.config.update("jax_compilation_cache_dir", str(kept_programs()))

@@ -1,0 +1,1 @@
+"""Many simulations as one: named axes -> chunks -> devices and hosts -> a labelled data set, in memory or on disk."""

@@ -1,0 +1,97 @@
+"""One member of a batch: a system with its own values -> what is kept of its run, and whether it went wrong."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jax import lax
+
+from smajax.load.coupon import AbstractCoupon
+from smajax.measure import SHOWN, AbstractMeasure, value_of
+from smajax.parameters import set_parameters
+from smajax.step import step
+from smajax.system import System, initial_state
+from smajax.types import Scalar, Series, State
+
+# Status codes of a member.
+GOOD, NOT_FINITE, RUNAWAY = 0, 1, 2
+HOTTEST = 3000.0  # C: no wire is hotter, it has molten long before
+Values = dict[str, Scalar]
+
+
+class Recipe(eqx.Module):
+    """What the members of a batch have in common. Names that are varied are parameters or input channels."""
+
+    system: System
+    series: dict[str, Series]  # inputs over time, each of shape (steps + 1,)
+    constants: dict[str, Scalar]  # inputs that do not change
+    dt: Scalar
+    measures: tuple[AbstractMeasure, ...]
+    channels: tuple[str, ...] = eqx.field(static=True)  # varied names that are input channels
+    steps: int = eqx.field(static=True)
+    every: int = eqx.field(static=True)  # one state in so many is kept
+    keep: tuple[str, ...] = eqx.field(static=True)  # of `measure.SHOWN`, over time
+
+    def units(self) -> dict[str, str]:
+        """Of everything that a member gives."""
+        own = self.system.load.reading[1]
+        per = {"velocity": f"{own}/s"}
+        found = {name: SHOWN[name] or per.get(name, own) for name in self.keep}
+        found |= {one.name: one.unit or own for one in self.measures}
+        return found | {"status": "-", "first_bad_time": "s"}
+
+
+def _wrong(state: State) -> tuple[Scalar, Scalar]:
+    """(not finite, runaway)."""
+    wire, motion = state.wire, state.motion
+    total = wire.temperature + wire.stress + wire.martensite_fraction + motion.position + motion.velocity
+    return ~jnp.isfinite(total), jnp.abs(wire.temperature) > HOTTEST
+
+
+def member(recipe: Recipe, values: Values) -> dict[str, jax.Array]:
+    """Simulate one member. Kept values are arrays (steps // every + 1,), everything else is a number.
+
+    Pure: `jit`, `vmap` and differentiate it as you like.
+    """
+    own = {name: value for name, value in values.items() if name not in recipe.channels}
+    system = set_parameters(recipe.system, own)
+    constants = recipe.constants | {name: values[name] for name in recipe.channels}
+    ahead = isinstance(system.load, AbstractCoupon)
+    series = {name: run[1:] if ahead else run[:-1] for name, run in recipe.series.items()}
+    first = {**constants, **{name: run[0] for name, run in recipe.series.items()}}
+    state = initial_state(system, first)
+
+    def one(carry: Any, now: dict[str, Scalar]) -> tuple[Any, None]:
+        state, memories, bad, status = carry
+        inputs = {**constants, **now}
+        state = step(system, state, inputs, recipe.dt)
+        memories = [
+            measure.update(memory, state, inputs, recipe.dt)
+            for measure, memory in zip(recipe.measures, memories, strict=True)
+        ]
+        broken, hot = _wrong(state)
+        code = jnp.where(broken, NOT_FINITE, jnp.where(hot, RUNAWAY, GOOD))
+        fresh = (status == GOOD) & (code != GOOD)
+        return (state, memories, jnp.where(fresh, state.time, bad), jnp.where(fresh, code, status)), None
+
+    start = [measure.start(state, first) for measure in recipe.measures]
+    carry: Any = (state, start, jnp.full_like(state.time, jnp.inf), jnp.zeros_like(state.time, int))
+    found: dict[str, jax.Array] = {}
+    if recipe.keep:
+        periods = recipe.steps // recipe.every
+
+        def several(carry: Any, now: dict[str, Series]) -> tuple[Any, dict[str, Scalar]]:
+            carry, _ = lax.scan(one, carry, now, length=recipe.every)
+            return carry, {name: value_of(carry[0], name) for name in recipe.keep}
+
+        grouped = {name: run.reshape(periods, recipe.every) for name, run in series.items()}
+        carry, kept = lax.scan(several, carry, grouped, length=periods)
+        found = {name: jnp.append(value_of(state, name), kept[name]) for name in recipe.keep}
+    else:
+        carry, _ = lax.scan(one, carry, series, length=recipe.steps)
+    _, memories, bad, status = carry
+    found |= {measure.name: measure.result(memory) for measure, memory in zip(recipe.measures, memories, strict=True)}
+    return found | {"status": status.astype("int8"), "first_bad_time": bad}

@@ -1,0 +1,58 @@
+"""Where a result comes from: versions, code state, every parameter of the model, and a digest that tells two apart."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import platform
+import subprocess
+from collections.abc import Sequence
+from importlib import metadata
+from typing import Any
+
+import equinox as eqx
+import jax
+import numpy as np
+
+from smajax.parameters import get_parameters, parameters
+from smajax.source_mark import source_mark
+
+PACKAGES = ("smajax", "jax", "jaxlib", "equinox", "numpy")
+
+
+def git_state() -> str:
+    """Commit of the working folder, with `+changes` where files differ from it; empty outside a repository."""
+
+    def asked(*words: str) -> str:
+        try:
+            return subprocess.run(["git", *words], capture_output=True, text=True, timeout=5, check=True).stdout.strip()
+        except (OSError, subprocess.SubprocessError):
+            return ""
+
+    commit = asked("rev-parse", "HEAD")
+    return commit + ("+changes" if commit and asked("status", "--porcelain", "-uno") else "")
+
+
+def versions() -> dict[str, str]:
+    return {name: metadata.version(name) for name in PACKAGES} | {"python": platform.python_version()}
+
+
+def model_parameters(model: eqx.Module) -> dict[str, float]:
+    """Every parameter by name, SI."""
+    names = list(parameters(model))
+    return dict(zip(names, np.asarray(get_parameters(model, names)).tolist(), strict=True))
+
+
+def digest(model: Any, more: Sequence[str | np.ndarray] = ()) -> str:
+    """Hex digest of the code, of the structure and the numbers of `model`, and of `more`."""
+    mark = hashlib.sha256(f"{source_mark()} {jax.tree.structure(model)}".encode())
+    for leaf in (*jax.tree.leaves(model), *more):
+        mark.update(leaf.encode() if isinstance(leaf, str) else np.ascontiguousarray(leaf).tobytes())
+    return mark.hexdigest()
+
+
+def provenance(model: eqx.Module, **settings: object) -> dict[str, str]:
+    """Attributes of a result: text only, so that every format can hold them."""
+    told = {f"version of {name}": version for name, version in versions().items()}
+    told |= {name: str(value) for name, value in settings.items()}
+    return told | {"git": git_state(), "parameters (SI)": json.dumps(model_parameters(model))}

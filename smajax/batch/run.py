@@ -1,0 +1,232 @@
+"""`run_batch`: a system, its inputs and what varies -> a labelled data set, in memory or streamed to a folder."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import xarray as xr
+
+from smajax.batch.axes import Axes
+from smajax.batch.engine import chunk_size, chunks
+from smajax.batch.member import GOOD, Recipe, member
+from smajax.batch.provenance import digest, provenance
+from smajax.batch.store import DIGEST, Store
+from smajax.fit.solve import Progress, quiet
+from smajax.measure import SHOWN, AbstractMeasure
+from smajax.parameters import parameters
+from smajax.simulate import DEFAULT_STEP
+from smajax.system import System
+from smajax.types import Series
+
+KEPT = ("position", "temperature", "martensite_fraction", "stress")
+BUDGET = 1 << 30  # bytes
+
+
+def recipe_of(
+    system: System,
+    inputs: Mapping[str, Series | float],
+    axes: Axes,
+    *,
+    seconds: float | None = None,
+    dt: float = DEFAULT_STEP,
+    every: int = 1,
+    keep: Sequence[str] = KEPT,
+    measures: Sequence[AbstractMeasure] = (),
+) -> Recipe:
+    """What `run_batch` runs. Raises ValueError naming what does not fit together."""
+    if not axes.names:
+        raise ValueError("`axes` varies nothing: for a single run use `simulate`, or give `grid(voltage=[6.0])`.")
+    drive, load = system.drive, system.load
+    known = drive.inputs_required | load.inputs_required | drive.inputs_optional | load.inputs_optional
+    known = known | {"ambient_temperature"}
+    table = parameters(system)
+    # A name that is both (ambient_temperature) is the parameter, unless it is an input already.
+    channels = tuple(name for name in axes.names if name in known and name not in table)
+    unknown = [name for name in axes.names if name not in table and name not in channels]
+    if unknown:
+        raise ValueError(
+            f"{unknown} are neither parameters ({sorted(table)}) nor inputs ({sorted(known)}) of the system."
+        )
+    twice = sorted(set(channels) & set(inputs))
+    if twice:
+        raise ValueError(f"{twice} are varied by `axes` and given in `inputs` as well: leave them out of one.")
+    given = set(inputs) | set(channels)
+    required = drive.inputs_required | load.inputs_required
+    if not required <= given or not given <= known:
+        raise ValueError(
+            f"the system needs the inputs {sorted(required)} and may have {sorted(known - required)}, but there are "
+            f"{sorted(given)}, from `inputs` and `axes`."
+        )
+    series = {name: jnp.asarray(values, dtype=float) for name, values in inputs.items() if np.ndim(values) == 1}
+    constants = {name: jnp.asarray(values, dtype=float) for name, values in inputs.items() if np.ndim(values) == 0}
+    odd = {name: np.shape(values) for name, values in inputs.items() if np.ndim(values) > 1}
+    if odd:
+        raise ValueError(
+            f"an input is a number or a series of shape (n,), but {odd}. What differs by member is an axis."
+        )
+    lengths = {name: len(values) for name, values in series.items()}
+    if len(set(lengths.values())) > 1:
+        raise ValueError(f"input series must be of one length, but there are {lengths}.")
+    if seconds is None and not lengths:
+        raise ValueError("no input is a series: give `seconds`, the length of the run.")
+    steps = next(iter(lengths.values())) - 1 if lengths else round(float(seconds or 0.0) / dt)
+    if lengths and seconds is not None and steps != round(seconds / dt):
+        raise ValueError(f"series of {steps + 1} samples last {steps * dt:g} s at {dt:g} s, not {seconds:g} s.")
+    if steps < 1 or every < 1 or steps % every:
+        raise ValueError(f"{steps} steps cannot be kept every {every}: give a divisor of the number of steps.")
+    wrong = sorted(set(keep) - set(SHOWN))
+    if wrong:
+        raise ValueError(f"`keep` names what a state shows, {sorted(SHOWN)}, not {wrong}.")
+    names = [one.name for one in measures]
+    if len(set(names)) < len(names):
+        raise ValueError(f"measures must have names of their own, but there are {names}.")
+    return Recipe(
+        system, series, constants, jnp.asarray(dt, dtype=float), tuple(measures), channels, steps, every, tuple(keep)
+    )
+
+
+def run_batch(
+    system: System,
+    inputs: Mapping[str, Series | float],
+    axes: Axes,
+    *,
+    seconds: float | None = None,
+    dt: float = DEFAULT_STEP,
+    every: int = 1,
+    keep: Sequence[str] = KEPT,
+    measures: Sequence[AbstractMeasure] = (),
+    budget: int = BUDGET,
+    out: Path | str | None = None,
+    devices: Sequence[jax.Device] | None = None,
+    progress: Progress = quiet,
+) -> xr.Dataset:
+    """Simulate every member of `axes` and label the results.
+
+    `axes` (`batch.axes`: `grid`, `zipped`, `sampled`, and their products) names parameters of the system or input
+    channels, SI. `inputs` are numbers, or series of shape (n,) shared by all members. Of each run `keep` is kept every
+    `every` steps of `dt` seconds, and `measures`; with `keep=()` no trajectory is stored, whatever the length.
+
+    The result has the dimensions of `axes` and `time`, `status` (0 good, 1 a number that is none, 2 runaway heat) and
+    `first_bad_time`. Results take a quarter of `budget` bytes at a time. With `out` they are streamed to a Zarr group
+    there, and the same call goes on where an earlier one was stopped; the data set returned then reads from disk.
+
+    Raises ValueError for what does not fit together, and when `out` holds another batch.
+    """
+    recipe = recipe_of(system, inputs, axes, seconds=seconds, dt=dt, every=every, keep=keep, measures=measures)
+    several = tuple(devices or jax.local_devices())
+    size = chunk_size(member, recipe, axes, budget, several)
+    if out is not None:
+        store = created_or_opened(Path(out), recipe, axes, size)
+        fill(store, recipe, several, store.missing(), progress)
+        return opened(Path(out))
+    parts: list[dict[str, np.ndarray]] = []
+    count = -(-axes.size // size)
+    for number, found in chunks(member, recipe, axes, size, range(count), several):
+        parts.append(found)
+        progress("simulating", (number + 1) / count)
+    whole = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    return labelled(whole, axes, recipe.units(), np.arange(recipe.steps // every + 1) * every * dt, _told(recipe))
+
+
+def _told(recipe: Recipe) -> dict[str, str]:
+    inputs = {f"input {name}": f"{float(value):.10g}" for name, value in recipe.constants.items()}
+    inputs |= {f"input {name}": f"series of {len(run)} samples" for name, run in recipe.series.items()}
+    settings = {"dt": float(recipe.dt), "every": recipe.every, "steps": recipe.steps, "precision": recipe.dt.dtype}
+    return provenance(recipe.system, **settings, **inputs)
+
+
+def _flat(values: Mapping[str, np.ndarray]) -> list[str | np.ndarray]:
+    return [part for pair in values.items() for part in pair]
+
+
+def created_or_opened(folder: Path, recipe: Recipe, axes: Axes, size: int) -> Store:
+    """The store of this very batch in `folder`, begun if there is nothing. ValueError when there is something else."""
+    mark = digest(recipe, [part for one in axes.dimensions for part in (one.name, *_flat(one.values))])
+    if folder.exists() and any(folder.iterdir()):
+        try:
+            store = Store.opened(folder)
+        except FileNotFoundError:
+            store = None
+        if store is not None and store.digest == mark:
+            return store
+        raise ValueError(
+            f"{folder} holds another batch (other values, inputs, model or code) or something else: give an empty folder, "
+            "or delete that one."
+        )
+    one = {name: jnp.zeros(()) for name in axes.names}
+    shapes = {name: (leaf.shape, leaf.dtype) for name, leaf in eqx.filter_eval_shape(member, recipe, one).items()}
+    times = {"time step": float(recipe.dt) * recipe.every, "samples": recipe.steps // recipe.every + 1}
+    return Store.created(folder, axes, size, shapes, {**_told(recipe), DIGEST: mark, **times}, recipe.units())
+
+
+def fill(
+    store: Store, recipe: Recipe, devices: Sequence[jax.Device], wanted: Sequence[int], progress: Progress = quiet
+) -> None:
+    """Compute the chunks `wanted` of a store."""
+    for done, (number, found) in enumerate(chunks(member, recipe, store.axes, store.chunk, wanted, devices), start=1):
+        store.write(number, found)
+        progress("simulating", done / len(wanted))
+
+
+def labelled(
+    values: Mapping[str, Any], axes: Axes, units: Mapping[str, str], time: np.ndarray, attributes: Mapping[str, Any]
+) -> xr.Dataset:
+    """Arrays of shape (members, ...) as a data set with the dimensions of `axes`, units and provenance."""
+    dims = [one.name for one in axes.dimensions]
+    coordinates: dict[str, Any] = {
+        name: (one.name, np.asarray(series)) for one in axes.dimensions for name, series in one.values.items()
+    }
+    data = {}
+    for name, array in values.items():
+        rest = ["time"] if array.ndim > 1 else []
+        data[name] = ([*dims, *rest], array.reshape(*axes.shape, *array.shape[1:]), {"units": units[name]})
+        if rest:
+            coordinates["time"] = ("time", time, {"units": "s"})
+    # A coordinate that shares its name with a result keeps it apart by a prefix.
+    clash = sorted(set(coordinates) & set(data))
+    coordinates = {f"axis_{name}" if name in clash else name: entry for name, entry in coordinates.items()}
+    found = xr.Dataset(data, coordinates, dict(attributes))
+    return found.set_coords(["status", "first_bad_time"])
+
+
+def opened(folder: Path | str) -> xr.Dataset:
+    """The batch in a folder, finished or not; what is not there yet is NaN. Values are read when they are asked for."""
+    store = Store.opened(Path(folder))
+    group, axes = store.group, store.axes
+    attributes = dict(group.attrs)
+    time = np.arange(int(attributes["samples"])) * float(attributes["time step"])  # type: ignore[arg-type]
+    lazy = xr.open_zarr(Path(folder), consolidated=False, chunks=None, mask_and_scale=False)
+    if len(axes.dimensions) == 1:
+        one = axes.dimensions[0]
+        found = lazy[list(store.names())].rename(member=one.name)
+        found = found.assign_coords({name: (one.name, series) for name, series in one.values.items()})
+        if "time" in found.dims:
+            found = found.assign_coords(time=("time", time, {"units": "s"}))
+        found.attrs = attributes
+        return found.set_coords(["status", "first_bad_time"])
+    units = {name: str(group[name].attrs["units"]) for name in store.names()}
+    return labelled({name: np.asarray(group[name][:]) for name in store.names()}, axes, units, time, attributes)  # type: ignore[index]
+
+
+def good(found: xr.Dataset) -> xr.Dataset:
+    """`found` with members that went wrong as NaN: what statistics are taken of."""
+    return found.where(found["status"] == GOOD)
+
+
+def told_of(found: xr.Dataset) -> str:
+    """How many members went wrong, and when first, in a sentence."""
+    status = np.asarray(found["status"])
+    bad = int((status != GOOD).sum())
+    if not bad:
+        return f"All {status.size:,} members ran to their end."
+    when = float(np.nanmin(np.where(status != GOOD, np.asarray(found["first_bad_time"]), np.nan)))
+    return (
+        f"{bad:,} of {status.size:,} members ({bad / status.size:.2%}) went wrong, the first after {when:g} s: `status` "
+        "says which, and `good` leaves them out."
+    )

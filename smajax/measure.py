@@ -1,0 +1,157 @@
+"""Numbers that are kept up while a run is simulated, so that a sweep that asks for them only stores no trajectory."""
+
+from __future__ import annotations
+
+import abc
+from typing import Any
+
+import equinox as eqx
+import jax.numpy as jnp
+
+from smajax.types import Inputs, Scalar, State
+
+# What a state shows by name, and its unit; a reading has the load's own.
+SHOWN = {
+    "temperature": "degC",
+    "stress": "Pa",
+    "strain": "-",
+    "martensite_fraction": "-",
+    "position": "",
+    "velocity": "",
+    "reading": "",
+}
+
+
+def value_of(state: State, name: str) -> Scalar:
+    """The named value of a state. KeyError lists the names there are."""
+    if name not in SHOWN:
+        raise KeyError(f"a state shows {sorted(SHOWN)}, not `{name}`.")
+    for part in (state, state.motion, state.wire):
+        if hasattr(part, name):
+            return getattr(part, name)
+    raise AssertionError(name)
+
+
+class AbstractMeasure(eqx.Module):
+    """One number of a run. `update` is called once a step, with the state that the step ended in."""
+
+    @property
+    @abc.abstractmethod
+    def name(self) -> str:
+        """What the number is called in a result."""
+
+    @property
+    @abc.abstractmethod
+    def unit(self) -> str:
+        """SI; empty: that of the load's position."""
+
+    @abc.abstractmethod
+    def start(self, state: State, inputs: Inputs) -> Any:
+        """The memory before the first step."""
+
+    @abc.abstractmethod
+    def update(self, memory: Any, state: State, inputs: Inputs, dt: Scalar) -> Any:
+        """The memory after a step of `dt` under `inputs` to `state`."""
+
+    @abc.abstractmethod
+    def result(self, memory: Any) -> Scalar:
+        """The number."""
+
+
+class Last(AbstractMeasure):
+    """The value at the end."""
+
+    of: str = eqx.field(static=True)
+
+    @property
+    def name(self) -> str:
+        return f"last_{self.of}"
+
+    @property
+    def unit(self) -> str:
+        return SHOWN[self.of]
+
+    def start(self, state: State, inputs: Inputs) -> Scalar:
+        return value_of(state, self.of)
+
+    def update(self, memory: Scalar, state: State, inputs: Inputs, dt: Scalar) -> Scalar:
+        return value_of(state, self.of)
+
+    def result(self, memory: Scalar) -> Scalar:
+        return memory
+
+
+class Largest(Last):
+    """The largest value."""
+
+    @property
+    def name(self) -> str:
+        return f"largest_{self.of}"
+
+    def update(self, memory: Scalar, state: State, inputs: Inputs, dt: Scalar) -> Scalar:
+        # Not `maximum` with the memory first or last: a value that is no number must stay one.
+        now = value_of(state, self.of)
+        return jnp.where(memory > now, memory, now)
+
+
+class Smallest(Last):
+    """The smallest value."""
+
+    @property
+    def name(self) -> str:
+        return f"smallest_{self.of}"
+
+    def update(self, memory: Scalar, state: State, inputs: Inputs, dt: Scalar) -> Scalar:
+        now = value_of(state, self.of)
+        return jnp.where(memory < now, memory, now)
+
+
+class Mean(AbstractMeasure):
+    """The mean over time, each step counted with the value that it ended in."""
+
+    of: str = eqx.field(static=True)
+
+    @property
+    def name(self) -> str:
+        return f"mean_{self.of}"
+
+    @property
+    def unit(self) -> str:
+        return SHOWN[self.of]
+
+    def start(self, state: State, inputs: Inputs) -> tuple[Scalar, Scalar]:
+        zero = jnp.zeros_like(state.time)
+        return zero, zero
+
+    def update(self, memory: tuple[Scalar, Scalar], state: State, inputs: Inputs, dt: Scalar) -> tuple[Scalar, Scalar]:
+        total, time = memory
+        return total + dt * value_of(state, self.of), time + dt
+
+    def result(self, memory: tuple[Scalar, Scalar]) -> Scalar:
+        total, time = memory
+        return total / time
+
+
+class TimeAbove(AbstractMeasure):
+    """When the value first is above a threshold, s; infinite where it never is."""
+
+    of: str = eqx.field(static=True)
+    threshold: Scalar = eqx.field(converter=jnp.asarray)
+
+    @property
+    def name(self) -> str:
+        return f"time_above_{self.of}"
+
+    @property
+    def unit(self) -> str:
+        return "s"
+
+    def start(self, state: State, inputs: Inputs) -> Scalar:
+        return jnp.where(value_of(state, self.of) > self.threshold, state.time, jnp.inf)
+
+    def update(self, memory: Scalar, state: State, inputs: Inputs, dt: Scalar) -> Scalar:
+        above = value_of(state, self.of) > self.threshold
+        return jnp.where(above & (memory > state.time), state.time, memory)
+
+    def result(self, memory: Scalar) -> Scalar:
+        return memory

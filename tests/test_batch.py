@@ -1,0 +1,225 @@
+"""The batch engine: members are single runs, chunks and devices change nothing, what is stopped goes on, bad ones are told."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+import xarray as xr
+
+from smajax.batch.axes import Axes, grid, sampled, zipped
+from smajax.batch.member import NOT_FINITE, RUNAWAY
+from smajax.batch.run import good, opened, run_batch, told_of
+from smajax.measure import Largest, Last, Mean, Smallest, TimeAbove
+from smajax.parameters import set_parameters
+from smajax.presets import build
+from smajax.simulate import simulate
+
+ARM = build("niti_table_3_1", "arm", "amplified_voltage")
+DT, SECONDS = 0.02, 2.0
+AXES = grid(voltage=[6.0, 8.0, 9.0]) * grid(payload_mass=[0.05, 0.06])
+
+
+def _batch(axes: Axes = AXES, **more: object) -> xr.Dataset:
+    return run_batch(ARM, {}, axes, seconds=SECONDS, dt=DT, **more)  # type: ignore[arg-type]
+
+
+def test_a_member_is_the_single_run() -> None:
+    found = _batch(every=5)
+    assert found.sizes == {"voltage": 3, "payload_mass": 2, "time": 21}
+    assert found["position"].attrs["units"] == "rad"
+    assert found["stress"].attrs["units"] == "Pa"
+    for volts in (6.0, 9.0):
+        one = simulate(set_parameters(ARM, {"payload_mass": 0.06}), {"voltage": jnp.full(101, volts)}, DT)
+        here = found.sel(voltage=volts, payload_mass=0.06)
+        np.testing.assert_allclose(here["position"], one.position[::5], atol=1e-9)
+        np.testing.assert_allclose(here["stress"], one.stress[::5], rtol=1e-7)
+    np.testing.assert_allclose(found["time"], np.arange(21) * 0.1)
+    assert "All 6 members" in told_of(found)
+
+
+def test_a_shared_series_and_a_varied_parameter() -> None:
+    volts = jnp.concatenate([jnp.full(60, 8.0), jnp.zeros(41)])
+    found = run_batch(ARM, {"voltage": volts}, zipped(convection_coefficient=[60.0, 80.0]), dt=DT)
+    one = simulate(set_parameters(ARM, {"convection_coefficient": 80.0}), {"voltage": volts}, DT)
+    np.testing.assert_allclose(found["temperature"][1], one.temperature, rtol=1e-9)
+
+
+def test_measures_are_those_of_the_trajectory_and_nothing_else_is_kept() -> None:
+    measures = (
+        Last("position"),
+        Largest("stress"),
+        Smallest("martensite_fraction"),
+        Mean("temperature"),
+        TimeAbove("position", -0.7),
+    )
+    found = _batch(keep=(), measures=measures)
+    whole = _batch()
+    assert "time" not in found.dims
+    np.testing.assert_allclose(found["last_position"], whole["position"][..., -1], rtol=1e-12)
+    np.testing.assert_allclose(found["largest_stress"], whole["stress"].max("time"), rtol=1e-12)
+    np.testing.assert_allclose(found["smallest_martensite_fraction"], whole["martensite_fraction"].min("time"))
+    np.testing.assert_allclose(found["mean_temperature"], whole["temperature"][..., 1:].mean("time"), rtol=1e-12)
+    above = whole["position"].values > -0.7
+    first = np.where(above.any(axis=-1), whole["time"].values[np.argmax(above, axis=-1)], np.inf)
+    np.testing.assert_allclose(found["time_above_position"], first, atol=1e-9)
+    assert found["time_above_position"].attrs["units"] == "s"
+
+
+def test_samples_fill_the_box_and_come_again() -> None:
+    box = {"voltage": (5.0, 9.0), "payload_mass": (0.04, 0.07)}
+    for method in ("sobol", "latin-hypercube", "random"):
+        one, other = (sampled(33, box, method=method, seed=3) for _ in range(2))
+        values = one.members(0, 33)
+        for name, (low, high) in box.items():
+            np.testing.assert_array_equal(values[name], other.members(0, 33)[name])
+            assert values[name].min() < low + 0.15 * (high - low)
+            assert values[name].max() > high - 0.15 * (high - low)
+    assert (grid(a=[1, 2]) * sampled(5, b=(0.0, 1.0))).shape == (2, 5)
+
+
+def test_members_of_a_slice_are_those_of_the_whole() -> None:
+    axes = grid(a=[1.0, 2.0, 3.0]) * zipped(b=[4.0, 5.0], c=[6.0, 7.0])
+    whole = axes.members(0, axes.size)
+    assert [*zip(*(whole[name] for name in "abc"), strict=True)][:3] == [(1, 4, 6), (1, 5, 7), (2, 4, 6)]
+    for name, values in axes.members(2, 5).items():
+        np.testing.assert_array_equal(values, whole[name][2:5])
+
+
+def _files(folder: Path) -> dict[str, bytes]:
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def _stop_after(count: int):
+    calls = []
+
+    def progress(what: str, share: float) -> None:
+        calls.append(share)
+        if len(calls) == count:
+            raise KeyboardInterrupt
+
+    return progress
+
+
+@pytest.fixture
+def small_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("smajax.batch.engine.LEAST_BLOCK", 2)
+    monkeypatch.setattr("smajax.batch.run.chunk_size", lambda *_: 4)
+
+
+def test_chunks_change_nothing(small_chunks: None) -> None:
+    axes = grid(voltage=np.linspace(5.0, 9.0, 11))
+    some = _batch(axes)
+    np.testing.assert_allclose(
+        some["position"],
+        np.stack([_batch(grid(voltage=[v]))["position"][0] for v in axes.members(0, 11)["voltage"]]),
+        rtol=1e-12,
+    )
+
+
+def test_what_was_stopped_goes_on_to_the_same_bytes(small_chunks: None, tmp_path: Path) -> None:
+    axes = grid(voltage=np.linspace(5.0, 9.0, 11))
+    whole = _batch(axes, out=tmp_path / "whole")
+    with pytest.raises(KeyboardInterrupt):
+        _batch(axes, out=tmp_path / "stopped", progress=_stop_after(2))
+    half = opened(tmp_path / "stopped")
+    assert np.isnan(half["position"].values).any()
+    told: list[float] = []
+    _batch(axes, out=tmp_path / "stopped", progress=lambda what, share: told.append(share))
+    assert told == [1.0], "one chunk was missing"
+    assert _files(tmp_path / "stopped") == _files(tmp_path / "whole")
+    np.testing.assert_array_equal(whole["position"], _batch(axes)["position"])
+    assert float(whole["voltage"][0]) == 5.0
+
+
+def test_a_grid_comes_back_from_disk_as_a_grid(tmp_path: Path) -> None:
+    kept, held = _batch(out=tmp_path / "grid"), _batch()
+    xr.testing.assert_equal(kept, held)
+    assert kept["stress"].attrs == held["stress"].attrs
+    for name in ("version of smajax", "git", "parameters (SI)", "input voltage"):
+        assert name in kept.attrs or name == "input voltage"
+
+
+def test_another_batch_in_the_folder_is_not_touched(tmp_path: Path) -> None:
+    _batch(out=tmp_path / "batch")
+    before = _files(tmp_path / "batch")
+    with pytest.raises(ValueError, match="another batch"):
+        _batch(grid(voltage=[6.0, 8.0, 9.1]) * grid(payload_mass=[0.05, 0.06]), out=tmp_path / "batch")
+    assert _files(tmp_path / "batch") == before
+
+
+def test_members_that_go_wrong_are_told_and_disturb_nobody() -> None:
+    """A negative loss heats without end; a negative mass of no size at all divides by zero."""
+    axes = zipped(convection_coefficient=[70.0, -3000.0, 90.0])
+    found = run_batch(ARM, {"voltage": 7.0}, axes, seconds=SECONDS, dt=DT)
+    assert found["status"].values.tolist() == [0, RUNAWAY, 0]
+    assert 0.0 < float(found["first_bad_time"][1]) < SECONDS
+    alone = run_batch(ARM, {"voltage": 7.0}, zipped(convection_coefficient=[70.0, 90.0]), seconds=SECONDS, dt=DT)
+    np.testing.assert_array_equal(found["position"][[0, 2]], alone["position"])
+    assert np.isnan(good(found)["position"][1]).all()
+    assert "1 of 3 members (33.33%)" in told_of(found)
+    nothing = run_batch(ARM, {"voltage": 7.0}, zipped(wire_length=[1.0, 0.0]), seconds=SECONDS, dt=DT)
+    assert nothing["status"].values.tolist() == [0, NOT_FINITE]
+
+
+@pytest.mark.parametrize(
+    ("axes", "more", "told"),
+    [
+        (Axes(()), {}, "varies nothing"),
+        (grid(voltage=[6.0]), {"every": 3}, "divisor"),
+        (grid(voltage=[6.0]), {"seconds": None}, "seconds"),
+        (grid(volts=[6.0]), {}, "neither parameters"),
+        (grid(payload_mass=[0.1]), {}, "needs the inputs"),
+        (grid(voltage=[6.0]), {"keep": ("angle",)}, "martensite_fraction"),
+        (grid(voltage=[6.0]), {"measures": (Last("stress"), Last("stress"))}, "names of their own"),
+        (grid(voltage=[6.0]), {"budget": 1000}, "every"),
+    ],
+)
+def test_what_does_not_fit_together_is_told(axes: Axes, more: dict[str, object], told: str) -> None:
+    with pytest.raises(ValueError, match=told):
+        run_batch(ARM, {}, axes, **{"seconds": SECONDS, "dt": DT, **more})  # type: ignore[arg-type]
+
+
+def test_wrong_values_are_told() -> None:
+    with pytest.raises(ValueError, match="one length"):
+        zipped(a=[1.0, 2.0], b=[1.0])
+    with pytest.raises(ValueError, match="value 1 of `a`"):
+        grid(a=[1.0, float("nan")])
+    with pytest.raises(ValueError, match="more than once"):
+        grid(a=[1.0]) * grid(a=[2.0])
+    with pytest.raises(ValueError, match="latin-hypercube"):
+        sampled(4, a=(0.0, 1.0), method="grid")
+
+
+SEVERAL = """
+import sys
+from smajax.runtime import prepare
+prepare()
+import jax
+jax.config.update("jax_num_cpu_devices", int(sys.argv[1]))
+import numpy as np
+from smajax.batch import engine
+engine.LEAST_BLOCK = 4
+from tests.test_batch import _batch, grid
+assert jax.local_device_count() == int(sys.argv[1])
+np.save(sys.argv[2], _batch(grid(voltage=np.linspace(5.0, 9.0, 13)))["position"].values)
+"""
+
+
+def test_devices_change_nothing(tmp_path: Path) -> None:
+    folder = Path(__file__).parents[1]
+    for count in (1, 4):
+        subprocess.run(
+            [sys.executable, "-c", SEVERAL, str(count), str(tmp_path / f"{count}.npy")],
+            cwd=folder,
+            env={**os.environ, "PYTHONPATH": str(folder)},
+            check=True,
+        )
+    one, four = (np.load(tmp_path / f"{count}.npy") for count in (1, 4))
+    # Not the same bits: a loop over two blocks is compiled otherwise than one over four.
+    np.testing.assert_allclose(one, four, rtol=1e-11)
