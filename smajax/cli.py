@@ -196,7 +196,7 @@ def sweep(
     """
     from smajax.runtime import prepare
 
-    prepare()
+    prepare(cores=True)
     from smajax.control_presets import CONTROLLERS
     from smajax.figures.rigs import arm
     from smajax.progress import shown

@@ -9,13 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 
+from smajax.batch.axes import zipped
+from smajax.batch.engine import chunks
 from smajax.closed_loop import simulate_closed_loop
 from smajax.controller.base import AbstractController
 from smajax.estimator.base import AbstractEstimator
@@ -37,6 +39,7 @@ MISMATCHES = {
     "supply": "amplifier_gain",
 }
 LEAST, MOST = 0.5, 2.0  # the mismatches looked at, plant over belief
+TARGET, GAIN, NUMBER = "set point", "share of the gain", "number"
 CHUNK = 1024  # loops at once: their trajectories lie in memory while the figures of merit are taken
 
 
@@ -116,35 +119,35 @@ def ratios(points: int) -> np.ndarray:
     return np.exp(np.linspace(np.log(LEAST), np.log(MOST), points))
 
 
-@eqx.filter_jit
-def _run(
-    system: System,
-    controller: AbstractController,
-    main_gain: str,
-    rows: jax.Array,
-    keys: jax.Array,
-    time: Series,
-    interface: Interface,
-) -> tuple[Merit, Scalar, Series]:
-    names = tuple(MISMATCHES.values())
-    nominal, gain = get_parameters(system, names), get_parameters(controller, [main_gain])
+class _Rig(eqx.Module):
+    """What all closed loops have in common."""
 
-    def one(row: jax.Array, key: jax.Array) -> tuple[Merit, Scalar, Series]:
-        plant = set_vector(system, names, nominal * row[: len(names)])
-        loop = simulate_closed_loop(
-            plant,
-            set_vector(controller, [main_gain], gain * row[-1]),
-            constant(time, row[-2]),
-            time[1] - time[0],
-            interface.every,
-            estimator=interface.estimator,
-            sensor=interface.sensor,
-            key=None if interface.sensor is None else key,
-            delay=interface.delay,
-        )
-        return merit(loop, plant), loop.failed_at, loop.run.position
+    system: System
+    controller: AbstractController
+    time: Series
+    interface: Interface
+    key: jax.Array
+    main_gain: str = eqx.field(static=True)
 
-    return jax.vmap(one)(rows, keys)
+
+def _loop(rig: _Rig, values: dict[str, Scalar]) -> dict[str, Any]:
+    names = tuple(MISMATCHES)
+    own = tuple(MISMATCHES.values())
+    ratios = jnp.stack([values[name] for name in names])
+    plant = set_vector(rig.system, own, get_parameters(rig.system, own) * ratios)
+    gain = get_parameters(rig.controller, [rig.main_gain]) * values[GAIN]
+    loop = simulate_closed_loop(
+        plant,
+        set_vector(rig.controller, [rig.main_gain], gain),
+        constant(rig.time, values[TARGET]),
+        rig.time[1] - rig.time[0],
+        rig.interface.every,
+        estimator=rig.interface.estimator,
+        sensor=rig.interface.sensor,
+        key=None if rig.interface.sensor is None else jax.random.fold_in(rig.key, values[NUMBER].astype(int)),
+        delay=rig.interface.delay,
+    )
+    return {"merits": merit(loop, plant), "failed_at": loop.failed_at, "position": loop.run.position}
 
 
 def closed_loops(
@@ -159,17 +162,14 @@ def closed_loops(
     seed: int = 0,
     progress: Progress = quiet,
 ) -> Outcome:
-    """Run every row of `lanes`. Each draws its own sensor noise, from `seed`."""
-    time = clock(seconds, dt)
-    keys = jax.random.split(jax.random.key(seed), len(rows) + CHUNK)  # some for what fills up the last chunk
+    """Run every row of `lanes`, on all devices. Each draws its own sensor noise, from `seed` and its place."""
+    rig = _Rig(system, controller, clock(seconds, dt), interface, jax.random.key(seed), main_gain)
+    columns = dict(zip((*MISMATCHES, TARGET, GAIN), rows.T, strict=True))
+    axes = zipped({**columns, NUMBER: np.arange(len(rows))})
+    count = -(-len(rows) // CHUNK)
     found = []
-    for start in range(0, len(rows), CHUNK):
-        some = rows[start : start + CHUNK]
-        # Filled up by repeating the last, so that one compilation serves every chunk.
-        filled = np.concatenate([some, np.repeat(some[-1:], CHUNK - len(some), axis=0)]) if start else some
-        own = keys[start : start + len(filled)]
-        answer = _run(system, controller, main_gain, jnp.asarray(filled), own, time, interface)
-        cut = slice(len(some))
-        found.append(jax.tree.map(lambda leaf, cut=cut: np.asarray(leaf)[cut], answer))
-        progress("sweeping", min(1.0, (start + len(some)) / len(rows)))
-    return Outcome(*jax.tree.map(lambda *leaves: np.concatenate(leaves), *found))
+    for number, answer in chunks(_loop, rig, axes, min(CHUNK, len(rows)), range(count)):
+        found.append(answer)
+        progress("sweeping", (number + 1) / count)
+    whole = jax.tree.map(lambda *leaves: np.concatenate(leaves), *found)
+    return Outcome(whole["merits"], whole["failed_at"], whole["position"])
