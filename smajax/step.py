@@ -60,7 +60,13 @@ def _ended(system: System, stage: Stage, inputs: Inputs) -> tuple[WireState, Unk
         columns = [g(Unknowns(*(one if k == at else zero for k in range(4)))) for at in range(4)]
         return Unknowns(*solved_linear(list(zip(*columns, strict=True)), list(asked))[0])
 
-    z = lax.custom_root(all_four, solved.z, lambda _, found: found, linear)
+    def corrected(f: Callable[[Unknowns], Unknowns], found: Unknowns) -> Unknowns:
+        # One step more, in the value as in the derivatives: what the solver leaves is squared away.
+        missed, along = jax.linearize(f, found)
+        change = linear(along, missed)
+        return Unknowns(*(value - step for value, step in zip(found, change, strict=True)))
+
+    z = lax.custom_root(all_four, solved.z, corrected, linear)
     # Rounding only; not `clip`, which halves the derivative at the ends themselves.
     xi = jnp.where(z.fraction > 1.0, 1.0, jnp.where(z.fraction < 0.0, 0.0, z.fraction))
     xi = jnp.where(branch.heating | branch.cooling, xi, old.martensite_fraction)
