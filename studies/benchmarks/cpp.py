@@ -1,0 +1,99 @@
+"""Builds and runs `arm.cpp`, the integrator's scheme for the rotary arm written by hand: the bar that smajax is held to."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from smajax.parameters import get_parameters, parameters
+from smajax.system import System
+
+SOURCE = Path(__file__).with_name("arm.cpp")
+MISSING = "there is no g++ here"
+# Vectors as wide as the machine's: by itself the compiler takes half of that where it has 512 bits.
+FLAGS = ("-O3", "-march=native", "-mprefer-vector-width=512", "-ffast-math", "-fopenmp", "-std=c++17")
+PRECISIONS = ("double", "float")
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a run of the C++ program left: arrays of one number a member, SI, temperatures in C."""
+
+    seconds: float  # of the computation alone, best of the repeats
+    iterations_per_stage: float  # that a block of members needed on average
+    final_angle: np.ndarray  # rad
+    largest_angle: np.ndarray  # rad
+    smallest_fraction: np.ndarray  # -
+    final_temperature: np.ndarray  # C
+    angle: np.ndarray  # rad, (samples, members) of the record; empty without one
+    fraction: np.ndarray  # -, likewise
+
+
+def build(folder: Path, flags: tuple[str, ...] = ()) -> Path | None:
+    """The compiled program in `folder`, with further `flags`; None where there is no g++ (`MISSING` says so).
+
+    RuntimeError with the compiler's words where it refuses.
+    """
+    compiler = shutil.which("g++")
+    if compiler is None:
+        return None
+    program = folder / "arm"
+    done = subprocess.run(
+        [compiler, *FLAGS, *flags, "-o", str(program), str(SOURCE)], capture_output=True, text=True, check=False
+    )
+    if done.returncode != 0:
+        raise RuntimeError(f"g++ does not compile {SOURCE.name}: {done.stderr}")
+    return program
+
+
+def run(
+    program: Path,
+    system: System,
+    members: np.ndarray,
+    dt: float,
+    steps: int,
+    threads: int = 1,
+    precision: str = "double",
+    repeats: int = 1,
+    every: int = 1,
+    recorded: int = 0,
+) -> Result:
+    """Simulate `members`, rows of (voltage in V, payload mass in kg), over `steps` of `dt` s.
+
+    `system` is `smajax.figures.rigs.arm()` with any parameters; `precision` is "double" or "float". Of the first
+    `recorded` members every `every`-th sample comes back, the first one included.
+    """
+    if precision not in PRECISIONS:
+        raise ValueError(f"`precision` must be one of {PRECISIONS}, not {precision!r}.")
+    names = sorted(parameters(system))
+    values = np.asarray(get_parameters(system, names), dtype=float)
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place)
+        lines = [f"{name} {float(value)!r}" for name, value in zip(names, values, strict=True)]
+        (folder / "parameters").write_text("\n".join(lines) + "\n")
+        np.ascontiguousarray(members, dtype=np.float64).tofile(folder / "members")
+        options = {
+            "dt": repr(dt),
+            "steps": steps,
+            "threads": threads,
+            "precision": precision,
+            "repeats": repeats,
+            "record": folder / "record",
+            "every": every,
+            "first": recorded,
+        }
+        words = [str(word) for name, value in options.items() for word in (f"--{name}", value)]
+        files = [str(folder / name) for name in ("parameters", "members", "result")]
+        done = subprocess.run([str(program), *files, *words], capture_output=True, text=True, check=False)
+        if done.returncode != 0:
+            raise RuntimeError(f"{program.name} failed: {done.stderr}")
+        said = json.loads(done.stdout)
+        ends = np.fromfile(folder / "result").reshape(-1, 4)
+        record = np.fromfile(folder / "record").reshape(steps // every + 1, min(recorded, len(members)), 2)
+    return Result(said["seconds"], said["iterations_per_stage"], *ends.T, record[..., 0], record[..., 1])
