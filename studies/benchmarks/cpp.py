@@ -26,6 +26,7 @@ class Result:
     """What a run of the C++ program left: arrays of one number a member, SI, temperatures in C."""
 
     seconds: float  # of the computation alone, best of the repeats
+    processor_seconds: float  # of all threads together: what it takes whatever else the machine is busy with
     iterations_per_stage: float  # that a block of members needed on average
     final_angle: np.ndarray  # rad
     largest_angle: np.ndarray  # rad
@@ -96,4 +97,15 @@ def run(
         said = json.loads(done.stdout)
         ends = np.fromfile(folder / "result").reshape(-1, 4)
         record = np.fromfile(folder / "record").reshape(steps // every + 1, min(recorded, len(members)), 2)
-    return Result(said["seconds"], said["iterations_per_stage"], *ends.T, record[..., 0], record[..., 1])
+    angle, largest, smallest, temperature = ends.T
+    return Result(
+        seconds=said["seconds"],
+        processor_seconds=said["processor_seconds"],
+        iterations_per_stage=said["iterations_per_stage"],
+        final_angle=angle,
+        largest_angle=largest,
+        smallest_fraction=smallest,
+        final_temperature=temperature,
+        angle=record[..., 0],
+        fraction=record[..., 1],
+    )

@@ -1,0 +1,68 @@
+"""The hand-written C++ program solves what smajax solves: it is no bar for the speed of something else."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from smajax.figures.rigs import arm
+from smajax.parameters import get_parameters, set_parameters
+from smajax.simulate import simulate
+from smajax.types import Scalar, Trajectory
+from studies.benchmarks import cpp
+
+DT, STEPS = 0.005, 2000
+
+
+@pytest.fixture(scope="module")
+def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The program, compiled; skips where there is no compiler."""
+    built = cpp.build(tmp_path_factory.mktemp("cpp"))
+    if built is None:
+        pytest.skip(cpp.MISSING)
+    return built
+
+
+def _members(number: int) -> np.ndarray:
+    """Voltages from hardly warm to the upper stop, with payloads 0.8 to 1.2 of the preset's."""
+    mass = float(get_parameters(arm(), ["payload_mass"])[0])
+    return np.stack([np.linspace(5.5, 8.5, number), mass * np.linspace(1.2, 0.8, number)], axis=1)
+
+
+@eqx.filter_jit
+def _simulated(members: np.ndarray) -> Trajectory:
+    def one(voltage: Scalar, mass: Scalar) -> Trajectory:
+        system = set_parameters(arm(), {"payload_mass": mass})
+        return simulate(system, {"voltage": jnp.full(STEPS + 1, voltage)}, DT)
+
+    return jax.vmap(one)(*jnp.asarray(members).T)
+
+
+def test_every_sample_agrees(program: Path):
+    members = _members(8)
+    ours = _simulated(members)
+    theirs = cpp.run(program, arm(), members, DT, STEPS, recorded=len(members))
+    assert np.ptp(theirs.final_angle) > 2.0  # some stay below, some reach the stop
+    assert np.abs(theirs.angle.T - ours.position).max() < 1e-5
+    assert np.abs(theirs.fraction.T - ours.martensite_fraction).max() < 1e-5
+    np.testing.assert_allclose(theirs.final_temperature, ours.temperature[:, -1], atol=1e-5)
+    np.testing.assert_allclose(theirs.largest_angle, ours.position.max(axis=1), atol=1e-5)
+    np.testing.assert_allclose(theirs.smallest_fraction, ours.martensite_fraction.min(axis=1), atol=1e-5)
+
+
+def test_threads_and_precisions_agree(program: Path):
+    members = _members(100)  # no multiple of a block
+    exact = cpp.run(program, arm(), members, DT, STEPS)
+    threads = cpp.run(program, arm(), members, DT, STEPS, threads=2, every=100, recorded=3)
+    single = cpp.run(program, arm(), members, DT, STEPS, precision="float")
+    np.testing.assert_array_equal(threads.final_angle, exact.final_angle)
+    assert threads.angle.shape == (STEPS // 100 + 1, 3)
+    np.testing.assert_array_equal(threads.angle[-1], exact.final_angle[:3])
+    # About the angle of greatest stress the arm hangs on little: single precision shows there.
+    assert np.abs(single.final_angle - exact.final_angle).max() < 0.02
+    assert np.abs(single.smallest_fraction - exact.smallest_fraction).max() < 0.01
