@@ -41,7 +41,8 @@
 
 constexpr double PI = 3.14159265358979323846;
 constexpr double GRAVITY = 9.81;
-constexpr int QUICK = 2, INNER = 3, MOST_QUICK = 6, MOST_ITERATIONS = 50, UNDAMPED = 12, MOST_HALVINGS = 80;
+// The second linearisation starts so near that one inner step leaves nothing for a third.
+constexpr int QUICK = 2, INNER = 3, INNER_LATER = 1, MOST_QUICK = 6, MOST_ITERATIONS = 50, UNDAMPED = 12, MOST_HALVINGS = 80;
 constexpr double TOLERANCE = 1e-4, FINISHED = 1e-9, NARROWEST_RANGE = 0.05;
 constexpr int COLUMNS = 4;
 
@@ -70,10 +71,6 @@ template <class Real> INLINE Real within(Real value, Real low, Real high) {
     const Real floored = value < low ? low : value;
     return floored > high ? high : floored;
 }
-
-// A reciprocal that only scales a Newton step: single precision does.
-INLINE double roughly_inverse(double value) { return double(1.0f / float(value)); }
-INLINE float roughly_inverse(float value) { return 1.0f / value; }
 
 // Share of the vanishing phase left at the distance z through its range: 1 up to 0, 0 from 1 on.
 template <class Real> INLINE Real share_left(Real z) {
@@ -238,7 +235,7 @@ template <bool FIRST, class Real> INLINE void decide(Block<Real>& b, const Rig<R
         // As far as the driving temperature stays: on a fast way that holds far better than the fraction.
         const Real before = cooling ? b.distance_M[i] : b.distance_A[i];
         const Real falling = slope < Real(0) ? slope : Real(-1);
-        const Real ratio = (before - distance) * roughly_inverse(falling);
+        const Real ratio = (before - distance) / falling;
         gone = slope < Real(0) ? ratio : Real(0);
     }
     b.gone[i] = within(gone, Real(0), phase);
@@ -259,7 +256,7 @@ template <class Real> INLINE Line<Real> kinetics(const Block<Real>& b, int i, Re
 // Phase 3: one of Newton's steps on that equation.
 template <class Real> INLINE void newton(Block<Real>& b, int i) {
     const Line<Real> at = kinetics(b, i, b.gone[i]);
-    const Real gone = within(b.gone[i] - at.value * roughly_inverse(at.slope), Real(0), b.phase[i]);
+    const Real gone = within(b.gone[i] - at.value / at.slope, Real(0), b.phase[i]);
     b.gone_last[i] = std::abs(gone - b.gone[i]), b.gone[i] = gone;
 }
 
@@ -358,8 +355,10 @@ template <bool FIRST, class Real> __attribute__((noinline)) void all_decide(Bloc
     OVER_LANES decide<FIRST>(b, r, i);
 }
 template <class Real> __attribute__((noinline)) void all_newton(Block<Real>& b) {
-    for (int step = 0; step < INNER; ++step)
-        OVER_LANES newton(b, i);
+    OVER_LANES newton(b, i);
+}
+template <class Real> void all_inner(Block<Real>& b, int steps) {
+    for (int step = 0; step < steps; ++step) all_newton(b);
 }
 template <bool AGAIN, class Real> __attribute__((noinline)) void all_advance(Block<Real>& b, const Rig<Real>& r) {
     OVER_LANES advance<AGAIN>(b, r, i, Real(1));
@@ -377,12 +376,12 @@ template <class Real> bool finished(const Block<Real>& b) {
 
 // One stage; returns the iterations that its block needed.
 template <bool LAST, class Real> int stage(Block<Real>& b, const Rig<Real>& r) {
-    all_linearise(b, r), all_decide<true>(b, r), all_newton(b), all_advance<false>(b, r);
+    all_linearise(b, r), all_decide<true>(b, r), all_inner(b, INNER), all_advance<false>(b, r);
     int iterations = 1;
     for (; iterations < QUICK; ++iterations)
-        all_linearise(b, r), all_decide<false>(b, r), all_newton(b), all_advance<false>(b, r);
+        all_linearise(b, r), all_decide<false>(b, r), all_inner(b, INNER_LATER), all_advance<false>(b, r);
     for (; iterations < MOST_QUICK && !finished(b); ++iterations)
-        all_linearise(b, r), all_decide<false>(b, r), all_newton(b), all_advance<true>(b, r);
+        all_linearise(b, r), all_decide<false>(b, r), all_inner(b, INNER_LATER), all_advance<true>(b, r);
     if (iterations == MOST_QUICK && !finished(b)) {
         for (int i = 0; i < LANES; ++i)
             for (int k = iterations; k < MOST_ITERATIONS && !(b.enough[i] > 0); ++k) {
