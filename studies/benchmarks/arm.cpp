@@ -152,21 +152,27 @@ template <class Real> struct alignas(64) Block {
     // Unknowns of the stage; branch: 1 heating, -1 cooling, 0 neither; enough: 1 where the last step moved hardly anything.
     Lane z_temperature, z_angle, z_stress, z_fraction, z_free, branch, enough;
     // Steps towards the solution at the present fraction, and more for one unit of it.
+    Lane cosine, sine;
     Lane step_temperature, more_temperature, step_angle, more_angle, step_stress, more_stress, free, more_free;
     // The kinetics as one equation of what vanishes: phase and curve's amplitude, distance and its slope, what has gone.
     Lane chosen, phase, amplitude, distance, slope, gone, gone_last;
 };
 
+// Phase 0: cosine and sine of the angle, a phase of its own so that several vectors are under way.
+template <class Real> INLINE void turn(Block<Real>& b, int i) {
+    const Real x = b.z_angle[i];
+    const Real turns = x * Real(1 / PI), whole = std::rint(turns);
+    const Real sign = Real(1) - Real(2) * (whole - Real(2) * std::floor(Real(0.5) * whole));
+    const Real z = Real(2) * (turns - whole);
+    b.cosine[i] = sign * quarter_cosine(z);
+    b.sine[i] = sign * (Real(-2 / PI) * z * quarter_cosine_slope(z * z));
+}
+
 // Phase 1: heat, motion and stress linearised at the unknowns, solved as straight lines over the fraction.
 template <class Real> INLINE void linearise(Block<Real>& b, const Rig<Real>& r, int i) {
     const Real xi = b.z_fraction[i], x = b.z_angle[i], sigma = b.z_stress[i];
 
-    const Real turns = x * Real(1 / PI), whole = std::rint(turns);
-    const Real sign = Real(1) - Real(2) * (whole - Real(2) * std::floor(Real(0.5) * whole));
-    const Real z = Real(2) * (turns - whole);
-    const Real cosine = sign * quarter_cosine(z);
-    const Real sine = sign * (Real(-2 / PI) * z * quarter_cosine_slope(z * z));
-
+    const Real cosine = b.cosine[i], sine = b.sine[i];
     const Real moved = x - b.base_angle[i];
     const Real miss = moved * (Real(1) + b.damping[i]) - r.step * b.base_velocity[i] + b.gravity[i] * cosine +
                       b.spring[i] * (x - r.rest_angle) - b.pull[i] * sigma;
@@ -351,6 +357,9 @@ template <bool LAST, class Real> INLINE void finish(Block<Real>& b, const Rig<Re
 template <class Real> __attribute__((noinline)) void all_linearise(Block<Real>& b, const Rig<Real>& r) {
     OVER_LANES linearise(b, r, i);
 }
+template <class Real> __attribute__((noinline)) void all_turn(Block<Real>& b) {
+    OVER_LANES turn(b, i);
+}
 template <bool FIRST, class Real> __attribute__((noinline)) void all_decide(Block<Real>& b, const Rig<Real>& r) {
     OVER_LANES decide<FIRST>(b, r, i);
 }
@@ -376,16 +385,16 @@ template <class Real> bool finished(const Block<Real>& b) {
 
 // One stage; returns the iterations that its block needed.
 template <bool LAST, class Real> int stage(Block<Real>& b, const Rig<Real>& r) {
-    all_linearise(b, r), all_decide<true>(b, r), all_inner(b, INNER), all_advance<false>(b, r);
+    all_turn(b), all_linearise(b, r), all_decide<true>(b, r), all_inner(b, INNER), all_advance<false>(b, r);
     int iterations = 1;
     for (; iterations < QUICK; ++iterations)
-        all_linearise(b, r), all_decide<false>(b, r), all_inner(b, INNER_LATER), all_advance<false>(b, r);
+        all_turn(b), all_linearise(b, r), all_decide<false>(b, r), all_inner(b, INNER_LATER), all_advance<false>(b, r);
     for (; iterations < MOST_QUICK && !finished(b); ++iterations)
-        all_linearise(b, r), all_decide<false>(b, r), all_inner(b, INNER_LATER), all_advance<true>(b, r);
+        all_turn(b), all_linearise(b, r), all_decide<false>(b, r), all_inner(b, INNER_LATER), all_advance<true>(b, r);
     if (iterations == MOST_QUICK && !finished(b)) {
         for (int i = 0; i < LANES; ++i)
             for (int k = iterations; k < MOST_ITERATIONS && !(b.enough[i] > 0); ++k) {
-                linearise(b, r, i), decide<false>(b, r, i), bisect(b, i);
+                turn(b, i), linearise(b, r, i), decide<false>(b, r, i), bisect(b, i);
                 advance<false>(b, r, i, k > UNDAMPED && k % 2 == 0 ? Real(0.5) : Real(1));
             }
     }
