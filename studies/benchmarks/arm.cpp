@@ -35,7 +35,7 @@
 #include <vector>
 
 #ifndef LANES
-#define LANES 32
+#define LANES 64
 #endif
 #define INLINE static inline __attribute__((always_inline))
 
@@ -61,10 +61,10 @@ template <class Real> INLINE Real quarter_cosine(Real z) {
     return Real(1) + s * (first + last * (s2 * s2));
 }
 
-// d/dz of it over z, to 1e-5: the slope in Newton's method needs no more.
+// d/dz of it over z to 2e-06: the slope in Newton's method needs no more.
 template <class Real> INLINE Real quarter_cosine_slope(Real s) {
-    const Real s2 = s * s;
-    return (Real(2 * C[0]) + Real(4 * C[1]) * s) + ((Real(6 * C[2]) + Real(8 * C[3]) * s) + Real(10 * C[4]) * s2) * s2;
+    return (Real(-2.467399217797122) + Real(1.0146177496075262) * s) +
+           (Real(-0.1248783185922484) + Real(0.006865300346788672) * s) * (s * s);
 }
 
 template <class Real> INLINE Real within(Real value, Real low, Real high) {
@@ -169,7 +169,7 @@ template <class Real> INLINE void turn(Block<Real>& b, int i) {
 }
 
 // Phase 1: heat, motion and stress linearised at the unknowns, solved as straight lines over the fraction.
-template <class Real> INLINE void linearise(Block<Real>& b, const Rig<Real>& r, int i) {
+template <bool FIRST, class Real> INLINE void linearise(Block<Real>& b, const Rig<Real>& r, int i) {
     const Real xi = b.z_fraction[i], x = b.z_angle[i], sigma = b.z_stress[i];
 
     const Real cosine = b.cosine[i], sine = b.sine[i];
@@ -182,15 +182,15 @@ template <class Real> INLINE void linearise(Block<Real>& b, const Rig<Real>& r, 
     const Real missed = below ? x - r.lower : (above ? x - r.upper : miss);
     const Real by_angle_held = stopped ? Real(1) : by_angle, pull_held = stopped ? Real(0) : b.pull[i];
 
-    const Real grown = xi - b.fraction[i];
-    const Real modulus = r.modulus + r.modulus_more * (b.fraction[i] + Real(0.5) * grown);
+    // The unknowns start from the state before the stage.
+    const Real grown = FIRST ? Real(0) : xi - b.fraction[i], warmer = FIRST ? Real(0) : b.z_temperature[i] - b.temperature[i];
+    const Real modulus = r.modulus + r.modulus_more * (FIRST ? xi : b.fraction[i] + Real(0.5) * grown);
     const Real elastic = -r.contraction * (x - r.start) - b.strain[i] - r.recoverable * grown;
-    const Real asked = modulus * elastic + b.stress[i] + r.thermal * (b.z_temperature[i] - b.temperature[i]);
-    const bool taut = asked > Real(0);
-    const Real by_temperature = taut ? r.thermal : Real(0);
-    const Real stiffness = taut ? modulus * r.contraction : Real(0);
-    const Real by_fraction = taut ? Real(0.5) * r.modulus_more * elastic - modulus * r.recoverable : Real(0);
-    const Real over = (taut ? asked : Real(0)) - sigma;
+    const Real asked = modulus * elastic + b.stress[i] + r.thermal * warmer;
+    const Real taut = asked > Real(0) ? Real(1) : Real(0);  // a number: the compiler would make jumps of a truth value
+    const Real by_temperature = taut * r.thermal, stiffness = taut * (modulus * r.contraction);
+    const Real by_fraction = taut * (Real(0.5) * r.modulus_more * elastic - modulus * r.recoverable);
+    const Real over = taut * asked - sigma;
 
     // 1/R and 1/determinant by one division.
     const Real ohms = r.ohms + r.ohms_more * xi;
@@ -210,14 +210,15 @@ template <class Real> INLINE void linearise(Block<Real>& b, const Rig<Real>& r, 
     b.step_temperature[i] = step_temperature, b.more_temperature[i] = more_temperature;
     b.step_angle[i] = step_angle, b.more_angle[i] = more_angle;
     b.step_stress[i] = step_stress, b.more_stress[i] = more_stress;
-    // Where the arm would be without stops.
-    b.free[i] = free + step_angle - by_angle * step_angle + b.pull[i] * step_stress;
-    b.more_free[i] = more_angle - by_angle * more_angle + b.pull[i] * more_stress;
+    if constexpr (!FIRST) {  // where the arm would be without stops
+        b.free[i] = free + step_angle - by_angle * step_angle + b.pull[i] * step_stress;
+        b.more_free[i] = more_angle - by_angle * more_angle + b.pull[i] * more_stress;
+    }
 }
 
 // Phase 2: the branch, tried with the fraction frozen, and the equation of the kinetics on it.
 template <bool FIRST, class Real> INLINE void decide(Block<Real>& b, const Rig<Real>& r, int i) {
-    const Real xi = b.fraction[i], back = xi - b.z_fraction[i];
+    const Real xi = b.fraction[i], back = FIRST ? Real(0) : xi - b.z_fraction[i];
     const Real temperature = b.z_temperature[i] + b.step_temperature[i] + b.more_temperature[i] * back;
     const Real stress = b.z_stress[i] + b.step_stress[i] + b.more_stress[i] * back;
     const Real distance_A = temperature * r.per_width_A - stress * r.per_slope_A - r.start_A;
@@ -282,28 +283,36 @@ template <class Real> void bisect(Block<Real>& b, int i) {
     b.gone[i] = gone, b.gone_last[i] = 0;
 }
 
-// Phase 4: the unknowns moved, of the lanes that are not done, and whether that was the last of it.
+// Phase 4: the unknowns moved.
+template <class Real> struct Change {
+    Real temperature, angle, stress, fraction;
+};
+template <class Real> INLINE Change<Real> change(const Block<Real>& b, int i) {
+    const Real moved = b.fraction[i] - b.chosen[i] * b.gone[i] - b.z_fraction[i];
+    return {b.step_temperature[i] + b.more_temperature[i] * moved, b.step_angle[i] + b.more_angle[i] * moved,
+            b.step_stress[i] + b.more_stress[i] * moved, moved};
+}
+template <class Real> INLINE void advance_first(Block<Real>& b, int i) {
+    const Change<Real> by = change(b, i);
+    b.z_temperature[i] += by.temperature, b.z_angle[i] += by.angle, b.z_stress[i] += by.stress;
+    b.z_fraction[i] += by.fraction, b.branch[i] = b.chosen[i];
+}
+// Of the lanes that are not done, if some are; and whether that was the last of it.
 template <bool AGAIN, class Real> INLINE void advance(Block<Real>& b, const Rig<Real>& r, int i, Real share) {
-    const Real xi = b.fraction[i] - b.chosen[i] * b.gone[i], moved = xi - b.z_fraction[i];
-    const Real by_temperature = share * (b.step_temperature[i] + b.more_temperature[i] * moved);
-    const Real by_angle = share * (b.step_angle[i] + b.more_angle[i] * moved);
-    const Real by_stress = share * (b.step_stress[i] + b.more_stress[i] * moved);
-    const Real largest = std::max(std::max(std::abs(by_temperature), std::abs(by_angle) * r.angle_scale),
-                                  share * std::abs(moved) + b.gone_last[i]);
+    const Change<Real> by = change(b, i);
+    const Real largest = std::max(std::max(std::abs(by.temperature), std::abs(by.angle) * r.angle_scale),
+                                  std::abs(by.fraction));
     const Real modulus = Real(1e-4) * (r.modulus + r.modulus_more * b.fraction[i]);
-    const bool still = (largest <= r.tolerance) & (std::abs(by_stress) <= r.tolerance * modulus);
+    const bool still = (share * largest + b.gone_last[i] <= r.tolerance) &
+                       (share * std::abs(by.stress) <= r.tolerance * modulus);
     const Real enough = still & (b.chosen[i] == b.branch[i]) ? Real(1) : Real(0);
-    const Real temperature = b.z_temperature[i] + by_temperature, angle = b.z_angle[i] + by_angle;
-    const Real stress = b.z_stress[i] + by_stress, fraction = b.z_fraction[i] + share * moved;
-    const Real free = b.free[i] + b.more_free[i] * moved;
-    const bool done = AGAIN ? b.enough[i] > Real(0) : false;
-    b.z_temperature[i] = done ? b.z_temperature[i] : temperature;
-    b.z_angle[i] = done ? b.z_angle[i] : angle;
-    b.z_stress[i] = done ? b.z_stress[i] : stress;
-    b.z_fraction[i] = done ? b.z_fraction[i] : fraction;
-    b.z_free[i] = done ? b.z_free[i] : free;
-    b.branch[i] = done ? b.branch[i] : b.chosen[i];
-    b.enough[i] = done ? Real(1) : enough;
+    const Real moves = AGAIN ? share * (Real(1) - b.enough[i]) : share;
+    const Real free = b.free[i] + b.more_free[i] * by.fraction;
+    b.z_temperature[i] += moves * by.temperature, b.z_angle[i] += moves * by.angle;
+    b.z_stress[i] += moves * by.stress, b.z_fraction[i] += moves * by.fraction;
+    b.z_free[i] = AGAIN && !(moves > Real(0)) ? b.z_free[i] : free;
+    b.branch[i] = AGAIN && !(moves > Real(0)) ? b.branch[i] : b.chosen[i];
+    b.enough[i] = AGAIN ? std::max(enough, b.enough[i]) : enough;
 }
 
 // Phase 5: the state at the end of the stage, what the kinetics remembers, and the base of the next stage.
@@ -354,8 +363,8 @@ template <bool LAST, class Real> INLINE void finish(Block<Real>& b, const Rig<Re
 
 #define OVER_LANES _Pragma("omp simd") for (int i = 0; i < LANES; ++i)
 
-template <class Real> __attribute__((noinline)) void all_linearise(Block<Real>& b, const Rig<Real>& r) {
-    OVER_LANES linearise(b, r, i);
+template <bool FIRST, class Real> __attribute__((noinline)) void all_linearise(Block<Real>& b, const Rig<Real>& r) {
+    OVER_LANES linearise<FIRST>(b, r, i);
 }
 template <class Real> __attribute__((noinline)) void all_turn(Block<Real>& b) {
     OVER_LANES turn(b, i);
@@ -368,6 +377,9 @@ template <class Real> __attribute__((noinline)) void all_newton(Block<Real>& b) 
 }
 template <class Real> void all_inner(Block<Real>& b, int steps) {
     for (int step = 0; step < steps; ++step) all_newton(b);
+}
+template <class Real> __attribute__((noinline)) void all_advance_first(Block<Real>& b) {
+    OVER_LANES advance_first(b, i);
 }
 template <bool AGAIN, class Real> __attribute__((noinline)) void all_advance(Block<Real>& b, const Rig<Real>& r) {
     OVER_LANES advance<AGAIN>(b, r, i, Real(1));
@@ -385,16 +397,16 @@ template <class Real> bool finished(const Block<Real>& b) {
 
 // One stage; returns the iterations that its block needed.
 template <bool LAST, class Real> int stage(Block<Real>& b, const Rig<Real>& r) {
-    all_turn(b), all_linearise(b, r), all_decide<true>(b, r), all_inner(b, INNER), all_advance<false>(b, r);
+    all_turn(b), all_linearise<true>(b, r), all_decide<true>(b, r), all_inner(b, INNER), all_advance_first(b);
     int iterations = 1;
     for (; iterations < QUICK; ++iterations)
-        all_turn(b), all_linearise(b, r), all_decide<false>(b, r), all_inner(b, INNER_LATER), all_advance<false>(b, r);
+        all_turn(b), all_linearise<false>(b, r), all_decide<false>(b, r), all_inner(b, INNER_LATER), all_advance<false>(b, r);
     for (; iterations < MOST_QUICK && !finished(b); ++iterations)
-        all_turn(b), all_linearise(b, r), all_decide<false>(b, r), all_inner(b, INNER_LATER), all_advance<true>(b, r);
+        all_turn(b), all_linearise<false>(b, r), all_decide<false>(b, r), all_inner(b, INNER_LATER), all_advance<true>(b, r);
     if (iterations == MOST_QUICK && !finished(b)) {
         for (int i = 0; i < LANES; ++i)
             for (int k = iterations; k < MOST_ITERATIONS && !(b.enough[i] > 0); ++k) {
-                turn(b, i), linearise(b, r, i), decide<false>(b, r, i), bisect(b, i);
+                turn(b, i), linearise<false>(b, r, i), decide<false>(b, r, i), bisect(b, i);
                 advance<false>(b, r, i, k > UNDAMPED && k % 2 == 0 ? Real(0.5) : Real(1));
             }
     }
