@@ -227,20 +227,23 @@ template <bool FIRST, class Real> INLINE void decide(Block<Real>& b, const Rig<R
     const Real gap_M = Real(1) - xi - b.amplitude_M[i] * share_left(distance_M);
     const bool heats = (gap_A > r.resting) & (distance_A > b.distance_A[i]) & (b.share_A[i] > Real(0));
     const bool cools = (gap_M > r.resting) & (distance_M > b.distance_M[i]) & (b.share_M[i] > Real(0));
-    const bool heating = heats & !(cools & (gap_M > gap_A)), cooling = cools & !(heats & (gap_M <= gap_A));
+    // How far each curve lies beyond the present fraction, where it may be followed; the farther one is.
+    const Real loss = heats ? gap_A : Real(0), gain = cools ? gap_M : Real(0);
+    const Real cooling = gain > loss ? Real(1) : Real(0);
+    const Real heating = std::max(loss, gain) > Real(0) ? Real(1) - cooling : Real(0);
 
     const Real slope_A = b.more_stress[i] * r.per_slope_A - b.more_temperature[i] * r.per_width_A;
     const Real slope_M = b.more_stress[i] * r.per_slope_M - b.more_temperature[i] * r.per_width_M;
-    const Real distance = cooling ? distance_M : distance_A, slope = cooling ? slope_M : slope_A;
-    const Real phase = heating ? xi : (cooling ? Real(1) - xi : Real(0));
-    b.chosen[i] = heating ? Real(1) : (cooling ? Real(-1) : Real(0));
-    b.phase[i] = phase;
-    b.amplitude[i] = heating ? b.amplitude_A[i] : (cooling ? b.amplitude_M[i] : Real(0));
+    const bool of_cooling = cooling > Real(0);
+    const Real distance = of_cooling ? distance_M : distance_A, slope = of_cooling ? slope_M : slope_A;
+    const Real phase = heating * xi + cooling * (Real(1) - xi);
+    b.chosen[i] = heating - cooling, b.phase[i] = phase;
+    b.amplitude[i] = heating * b.amplitude_A[i] + cooling * b.amplitude_M[i];
     b.distance[i] = distance, b.slope[i] = slope;
-    Real gone = cooling ? -back : back;
+    Real gone = (heating - cooling) * back;
     if constexpr (FIRST) {
         // As far as the driving temperature stays: on a fast way that holds far better than the fraction.
-        const Real before = cooling ? b.distance_M[i] : b.distance_A[i];
+        const Real before = of_cooling ? b.distance_M[i] : b.distance_A[i];
         const Real falling = slope < Real(0) ? slope : Real(-1);
         const Real ratio = (before - distance) / falling;
         gone = slope < Real(0) ? ratio : Real(0);
@@ -315,7 +318,16 @@ template <bool AGAIN, class Real> INLINE void advance(Block<Real>& b, const Rig<
     b.enough[i] = AGAIN ? std::max(enough, b.enough[i]) : enough;
 }
 
-// Phase 5: the state at the end of the stage, what the kinetics remembers, and the base of the next stage.
+// Phase 5: how far through the ranges the stage ended.
+template <class Real> INLINE void locate(Block<Real>& b, const Rig<Real>& r, int i) {
+    const Real temperature = b.z_temperature[i], stress = std::max(b.z_stress[i], Real(0));
+    const Real distance_A = temperature * r.per_width_A - stress * r.per_slope_A - r.start_A;
+    const Real distance_M = r.start_M - temperature * r.per_width_M + stress * r.per_slope_M;
+    b.distance_A[i] = distance_A, b.distance_M[i] = distance_M;
+    b.share_A[i] = share_left(distance_A), b.share_M[i] = share_left(distance_M);
+}
+
+// Phase 6: the state at the end of the stage, what the kinetics remembers, and the base of the next stage.
 template <bool LAST, class Real> INLINE void finish(Block<Real>& b, const Rig<Real>& r, int i) {
     // Numbers in the place of truth values: of a longer expression of those the compiler makes jumps, and no vectors.
     const Real heating = std::max(b.branch[i], Real(0)), cooling = std::max(-b.branch[i], Real(0));
@@ -325,9 +337,7 @@ template <bool LAST, class Real> INLINE void finish(Block<Real>& b, const Rig<Re
     const Real grown = xi - b.fraction[i];
     const Real modulus = r.modulus + r.modulus_more * (b.fraction[i] + Real(0.5) * grown);
 
-    const Real distance_A = temperature * r.per_width_A - stress * r.per_slope_A - r.start_A;
-    const Real distance_M = r.start_M - temperature * r.per_width_M + stress * r.per_slope_M;
-    const Real share_A = share_left(distance_A), share_M = share_left(distance_M);
+    const Real share_A = b.share_A[i], share_M = b.share_M[i];
     const Real some_A = std::max(share_A, Real(FINISHED)), some_M = std::max(share_M, Real(FINISHED));
     // Three reciprocals by one division.
     const Real shares = some_A * some_M, all = Real(1) / (shares * modulus), per_shares = all * modulus;
@@ -341,7 +351,6 @@ template <bool LAST, class Real> INLINE void finish(Block<Real>& b, const Rig<Re
     b.amplitude_A[i] = cooling + beyond_A + missed_A > Real(0) ? laid_A : b.amplitude_A[i];
     b.amplitude_M[i] = heating + beyond_M + missed_M > Real(0) ? laid_M : b.amplitude_M[i];
     b.missed_A[i] = missed_A, b.missed_M[i] = missed_M;
-    b.distance_A[i] = distance_A, b.distance_M[i] = distance_M, b.share_A[i] = share_A, b.share_M[i] = share_M;
 
     const bool below = b.z_free[i] < r.lower, above = b.z_free[i] > r.upper, stopped = below | above;
     const Real angle = below ? r.lower : (above ? r.upper : b.z_angle[i]);
@@ -384,6 +393,9 @@ template <class Real> __attribute__((noinline)) void all_advance_first(Block<Rea
 template <bool AGAIN, class Real> __attribute__((noinline)) void all_advance(Block<Real>& b, const Rig<Real>& r) {
     OVER_LANES advance<AGAIN>(b, r, i, Real(1));
 }
+template <class Real> __attribute__((noinline)) void all_locate(Block<Real>& b, const Rig<Real>& r) {
+    OVER_LANES locate(b, r, i);
+}
 template <bool LAST, class Real> __attribute__((noinline)) void all_finish(Block<Real>& b, const Rig<Real>& r) {
     OVER_LANES finish<LAST>(b, r, i);
 }
@@ -410,7 +422,7 @@ template <bool LAST, class Real> int stage(Block<Real>& b, const Rig<Real>& r) {
                 advance<false>(b, r, i, k > UNDAMPED && k % 2 == 0 ? Real(0.5) : Real(1));
             }
     }
-    all_finish<LAST>(b, r);
+    all_locate(b, r), all_finish<LAST>(b, r);
     return iterations;
 }
 

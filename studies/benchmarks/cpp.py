@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import platform
 import shutil
 import subprocess
 import tempfile
@@ -15,9 +16,10 @@ from smajax.parameters import get_parameters, parameters
 from smajax.system import System
 
 SOURCE = Path(__file__).with_name("arm.cpp")
-MISSING = "there is no g++ here"
+MISSING = "there is no g++ here (clang under its name does not count: its OpenMP is a matter of luck)"
+FLAGS = ("-O3", "-march=native", "-ffast-math", "-fopenmp", "-std=c++17")
 # Vectors as wide as the machine's: by itself the compiler takes half of that where it has 512 bits.
-FLAGS = ("-O3", "-march=native", "-mprefer-vector-width=512", "-ffast-math", "-fopenmp", "-std=c++17")
+WIDE = ("-mprefer-vector-width=512",)
 PRECISIONS = ("double", "float")
 
 
@@ -42,11 +44,12 @@ def build(folder: Path, flags: tuple[str, ...] = ()) -> Path | None:
     RuntimeError with the compiler's words where it refuses.
     """
     compiler = shutil.which("g++")
-    if compiler is None:
+    if compiler is None or "clang" in subprocess.run([compiler, "--version"], capture_output=True, text=True).stdout:
         return None
     program = folder / "arm"
+    wide = WIDE if platform.machine() in ("x86_64", "AMD64") else ()
     done = subprocess.run(
-        [compiler, *FLAGS, *flags, "-o", str(program), str(SOURCE)], capture_output=True, text=True, check=False
+        [compiler, *FLAGS, *wide, *flags, "-o", str(program), str(SOURCE)], capture_output=True, text=True, check=False
     )
     if done.returncode != 0:
         raise RuntimeError(f"g++ does not compile {SOURCE.name}: {done.stderr}")
