@@ -1,23 +1,24 @@
-// The rotary arm by hand: the scheme of smajax/step.py and smajax/stage_solver.py for one system, as the machine's limit.
+// The rotary arm by hand: the scheme of smajax/step.py and smajax/stage_solver.py for one system.
 //
-// Wire under the `enhanced` law with the rate form (eq. 3.2), arm with end stops, amplified voltage held over the run. SI,
-// temperatures in C. A block of members goes through each phase of a stage together: short loops over the lanes that a
-// compiler turns into vector instructions, several of them under way at a time. Members that need more iterations than
+// Wire under the `enhanced` law with the rate form (eq. 3.2), arm with end stops, amplified voltage held over the run.
+// SI, temperatures in C. A block of members goes through each phase of a stage together: short loops over the lanes that
+// a compiler turns into vector instructions, several of them under way at a time. Members that need more iterations than
 // the others repeat with their block, and nothing is changed for the lanes that are done.
 //
 // What differs from the Python program, none of it in the equations:
-//   - a transformation is told by what is left of the vanishing phase: p = xi, amplitude xi_M, on heating, and p = 1 - xi,
-//     amplitude 1 - xi_A, on cooling. With the distance through the range counted from its start, 1 - cos^2(pi z/2)
-//     = cos^2(pi (1 - z)/2) makes both branches the same formula;
-//   - cos^2 and slopes of the state before a step are kept, not computed again;
+//   - a transformation is told by what is left of the vanishing phase: p = xi with the amplitude xi_M on heating,
+//     p = 1 - xi with 1 - xi_A on cooling. With the distance through the range counted from its start,
+//     1 - cos^2(pi z/2) = cos^2(pi (1 - z)/2) makes both branches the same formula, worked out once;
+//   - after the first linearisation of a stage one inner step is enough: its start is nearly the solution;
+//   - cos^2 and distances of the state before a step are kept, not computed again;
 //   - an end stop is recognised by the last linearised equation of motion;
 //   - slopes within Newton's method use shorter polynomials than values.
 //
 // arm PARAMETERS MEMBERS RESULT --dt S --steps N [--threads N] [--precision double|float] [--repeats N]
 //     [--record FILE --every K --first M]
-// PARAMETERS: lines of `name value`; MEMBERS: float64 (voltage, payload_mass) a member; RESULT: float64 (final angle, largest
-// angle, smallest fraction, final temperature) a member; the record: float64 (angle, fraction) of the first M members at
-// every K-th sample, the first included. The seconds of the best repeat are printed as JSON.
+// PARAMETERS: lines of `name value`. MEMBERS: float64 (voltage, payload_mass) a member. RESULT: float64 (final angle,
+// largest angle, smallest fraction, final temperature) a member. The record: float64 (angle, fraction) of the first M
+// members at every K-th sample, the first included. Printed as JSON: the seconds of the best repeat.
 
 #include <omp.h>
 
@@ -42,15 +43,17 @@
 constexpr double PI = 3.14159265358979323846;
 constexpr double GRAVITY = 9.81;
 // The second linearisation starts so near that one inner step leaves nothing for a third.
-constexpr int QUICK = 2, INNER = 3, INNER_LATER = 1, MOST_QUICK = 6, MOST_ITERATIONS = 50, UNDAMPED = 12, MOST_HALVINGS = 80;
+constexpr int QUICK = 2, INNER = 3, INNER_LATER = 1;
+constexpr int MOST_QUICK = 6, MOST_ITERATIONS = 50, UNDAMPED = 12, MOST_HALVINGS = 80;
 constexpr double TOLERANCE = 1e-4, FINISHED = 1e-9, NARROWEST_RANGE = 0.05;
 constexpr int COLUMNS = 4;
 
 using Parameters = std::map<std::string, double>;
 
 // smajax/cosine.py; terms below the rounding of single precision are left out there.
-constexpr double C[8] = {-1.2337005501361697,     0.253669507901046,      -0.02086348076331063,   0.0009192602745006437,
-                         -2.5202041041025108e-05, 4.710846321668482e-07, -6.3832315751919636e-09, 6.357424822347121e-11};
+constexpr double C[8] = {-1.2337005501361697,     0.253669507901046,     -0.02086348076331063,
+                         0.0009192602745006437,   -2.5202041041025108e-05, 4.710846321668482e-07,
+                         -6.3832315751919636e-09, 6.357424822347121e-11};
 
 // cos(pi z/2) for |z| <= 1, its terms paired: a shorter chain of dependent instructions than Horner's.
 template <class Real> INLINE Real quarter_cosine(Real z) {
@@ -82,7 +85,7 @@ template <class Real> INLINE Real share_left(Real z) {
 // What all members share.
 template <class Real> struct Rig {
     Real step, per_step, ahead;              // g = gamma dt, 1/g, (1 - gamma) dt / g
-    Real keeps, ambient;                     // 1/(1 + g h_c A_c/(m c_p)), and that share's rest of the ambient temperature
+    Real keeps, ambient;                     // 1/(1 + g h_c A_c/(m c_p)), and what the air adds to a temperature
     Real ohms, ohms_more;                    // per metre, of austenite and from there to martensite
     Real modulus, modulus_more;              // of austenite and from there to martensite
     Real recoverable, thermal, contraction;  // eps_L, theta_T, strain per angle
@@ -149,12 +152,12 @@ template <class Real> struct alignas(64) Block {
     Lane largest_angle, smallest_fraction;
     // Base values of the stage.
     Lane base_temperature, base_angle, base_velocity;
-    // Unknowns of the stage; branch: 1 heating, -1 cooling, 0 neither; enough: 1 where the last step moved hardly anything.
+    // Unknowns of the stage. branch: 1 heating, -1 cooling, 0 neither. enough: 1 where the last step hardly moved.
     Lane z_temperature, z_angle, z_stress, z_fraction, z_free, branch, enough;
     // Steps towards the solution at the present fraction, and more for one unit of it.
     Lane cosine, sine;
     Lane step_temperature, more_temperature, step_angle, more_angle, step_stress, more_stress, free, more_free;
-    // The kinetics as one equation of what vanishes: phase and curve's amplitude, distance and its slope, what has gone.
+    // The kinetics as one equation of what vanishes: phase, amplitude of its curve, distance and its slope, what has gone.
     Lane chosen, phase, amplitude, distance, slope, gone, gone_last;
 };
 
@@ -183,7 +186,8 @@ template <bool FIRST, class Real> INLINE void linearise(Block<Real>& b, const Ri
     const Real by_angle_held = stopped ? Real(1) : by_angle, pull_held = stopped ? Real(0) : b.pull[i];
 
     // The unknowns start from the state before the stage.
-    const Real grown = FIRST ? Real(0) : xi - b.fraction[i], warmer = FIRST ? Real(0) : b.z_temperature[i] - b.temperature[i];
+    const Real grown = FIRST ? Real(0) : xi - b.fraction[i];
+    const Real warmer = FIRST ? Real(0) : b.z_temperature[i] - b.temperature[i];
     const Real modulus = r.modulus + r.modulus_more * (FIRST ? xi : b.fraction[i] + Real(0.5) * grown);
     const Real elastic = -r.contraction * (x - r.start) - b.strain[i] - r.recoverable * grown;
     const Real asked = modulus * elastic + b.stress[i] + r.thermal * warmer;
@@ -201,7 +205,8 @@ template <bool FIRST, class Real> INLINE void linearise(Block<Real>& b, const Ri
     const Real heated = b.heating[i] * per_ohm;
     const Real more_temperature = -heated * per_ohm * r.ohms_more;
     const Real step_temperature = heated + r.keeps * b.base_temperature[i] + r.ambient - b.z_temperature[i];
-    const Real right = over + by_temperature * step_temperature, right_more = by_fraction + by_temperature * more_temperature;
+    const Real right = over + by_temperature * step_temperature;
+    const Real right_more = by_fraction + by_temperature * more_temperature;
     const Real step_stress = (by_angle_held * right + stiffness * missed) * per_determinant;
     const Real more_stress = by_angle_held * right_more * per_determinant;
     const Real step_angle = (pull_held * right - missed) * per_determinant;
@@ -364,7 +369,8 @@ template <bool LAST, class Real> INLINE void finish(Block<Real>& b, const Rig<Re
         b.smallest_fraction[i] = std::min(b.smallest_fraction[i], xi);
     } else {
         b.base_temperature[i] += r.ahead * (temperature - b.base_temperature[i]);
-        b.base_angle[i] += r.ahead * r.step * velocity, b.base_velocity[i] += moves * (r.ahead * (velocity - b.base_velocity[i]));
+        b.base_angle[i] += r.ahead * r.step * velocity;
+        b.base_velocity[i] += moves * (r.ahead * (velocity - b.base_velocity[i]));
     }
     b.z_temperature[i] = temperature, b.z_angle[i] = angle, b.z_stress[i] = stress, b.z_fraction[i] = xi;
     b.branch[i] = 0;
@@ -400,6 +406,10 @@ template <bool LAST, class Real> __attribute__((noinline)) void all_finish(Block
     OVER_LANES finish<LAST>(b, r, i);
 }
 
+template <class Real> void all_again(Block<Real>& b, const Rig<Real>& r) {
+    all_turn(b), all_linearise<false>(b, r), all_decide<false>(b, r), all_inner(b, INNER_LATER);
+}
+
 template <class Real> bool finished(const Block<Real>& b) {
     Real count = 0;
 #pragma omp simd reduction(+ : count)
@@ -411,10 +421,8 @@ template <class Real> bool finished(const Block<Real>& b) {
 template <bool LAST, class Real> int stage(Block<Real>& b, const Rig<Real>& r) {
     all_turn(b), all_linearise<true>(b, r), all_decide<true>(b, r), all_inner(b, INNER), all_advance_first(b);
     int iterations = 1;
-    for (; iterations < QUICK; ++iterations)
-        all_turn(b), all_linearise<false>(b, r), all_decide<false>(b, r), all_inner(b, INNER_LATER), all_advance<false>(b, r);
-    for (; iterations < MOST_QUICK && !finished(b); ++iterations)
-        all_turn(b), all_linearise<false>(b, r), all_decide<false>(b, r), all_inner(b, INNER_LATER), all_advance<true>(b, r);
+    for (; iterations < QUICK; ++iterations) all_again(b, r), all_advance<false>(b, r);
+    for (; iterations < MOST_QUICK && !finished(b); ++iterations) all_again(b, r), all_advance<true>(b, r);
     if (iterations == MOST_QUICK && !finished(b)) {
         for (int i = 0; i < LANES; ++i)
             for (int k = iterations; k < MOST_ITERATIONS && !(b.enough[i] > 0); ++k) {
@@ -488,7 +496,8 @@ template <class Real> void simulate(Task& task, const Parameters& parameters) {
             }
             for (int i = 0; i < LANES && block * LANES + i < count; ++i) {
                 double* at = &task.result[COLUMNS * (block * LANES + i)];
-                at[0] = b.angle[i], at[1] = b.largest_angle[i], at[2] = b.smallest_fraction[i], at[3] = b.temperature[i];
+                at[0] = b.angle[i], at[1] = b.largest_angle[i];
+                at[2] = b.smallest_fraction[i], at[3] = b.temperature[i];
             }
         }
         const double processor = double(std::clock() - begin_processor) / CLOCKS_PER_SEC;
@@ -537,7 +546,7 @@ int run(int count, char** words) {
     write_numbers(words[3], task.result);
     if (!options["--record"].empty()) write_numbers(options["--record"], task.record);
     std::printf("{\"seconds\": %.9g, \"processor_seconds\": %.9g, \"lanes\": %d, \"iterations_per_stage\": %.6g}\n",
-                task.seconds, task.processor_seconds, LANES, double(task.iterations) / double(std::max(task.stages, 1L)));
+                task.seconds, task.processor_seconds, LANES, double(task.iterations) / std::max(task.stages, 1L));
     return 0;
 }
 
