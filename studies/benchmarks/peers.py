@@ -1,0 +1,46 @@
+"""Starts a peer as a user would: a process of its own, in an environment of its own."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).parents[2]
+DIFFRAX_PYTHON = "SMAJAX_DIFFRAX_PYTHON"
+LONGEST = 1200.0  # s
+
+
+def run_peer(name: str, python: str, file: Path, *options: str, longest: float = LONGEST) -> dict[str, Any]:
+    """What `studies.benchmarks.<name>` prints of a problem's file; or {"peer", "reason"} where it could not run."""
+    command = [python, "-m", f"studies.benchmarks.{name}", str(file.resolve()), *options]
+    # Our own search path and XLA's flags are not the peer's.
+    environment = {key: value for key, value in os.environ.items() if key not in ("PYTHONPATH", "XLA_FLAGS")}
+    try:
+        done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=longest)
+    except (OSError, subprocess.TimeoutExpired) as error:
+        return {"peer": name, "reason": str(error)}
+    lines = (done.stdout if done.returncode == 0 else done.stderr).strip().splitlines()
+    if done.returncode != 0:
+        return {"peer": name, "reason": lines[-1] if lines else f"exit status {done.returncode}"}
+    try:
+        return dict(json.loads(lines[-1]))
+    except (IndexError, ValueError):
+        return {"peer": name, "reason": "printed no result"}
+
+
+def scipy(file: Path, count: int = 64) -> dict[str, Any]:
+    """scipy on one core, in our own environment; `count` members are timed."""
+    return run_peer("scipy_peer", sys.executable, file, "--count", str(count))
+
+
+def diffrax(file: Path, python: str | None = None, cores: int | None = None, count: int = 4096) -> dict[str, Any]:
+    """diffrax by the interpreter `python`, or the one that SMAJAX_DIFFRAX_PYTHON names: one that can import diffrax."""
+    python = python or os.environ.get(DIFFRAX_PYTHON)
+    if not python:
+        return {"peer": "diffrax", "reason": f"no interpreter: set {DIFFRAX_PYTHON} to one that can import diffrax"}
+    several = () if cores is None else ("--cores", str(cores))
+    return run_peer("diffrax_peer", python, file, "--count", str(count), *several)
