@@ -35,15 +35,15 @@ from smajax.wire.kinetics import (
     Branch,
     choose_branch,
     cooling_temperature,
+    curve_on,
     curves,
-    fraction_on,
     heating_temperature,
     open_branches,
 )
 from smajax.wire.root import root
 
 QUICK = 2
-INNER = 3
+INNER = (3, 1)  # steps of the inner equation, after the first linearisation and after later ones
 MOST_ITERATIONS = 50
 UNDAMPED = 12  # iterations before every second step is halved
 # Enough: when no unknown moves by more than this share of its scale, 1 C, 1 % strain, 1e-4 E, and xi in full; in float32,
@@ -129,13 +129,13 @@ def _largest(system: System, xi: Scalar, change: Sequence[Scalar]) -> Scalar:
 
 
 def _inner(
-    miss: Callable[[Scalar], Scalar], start: Scalar, low: Scalar, high: Scalar, quick: bool
+    miss: Callable[[Scalar], Scalar], start: Scalar, low: Scalar, high: Scalar, steps: int
 ) -> tuple[Scalar, Scalar]:
-    """(root of the kinetics between its ends, last change): a few Newton steps, or to the end in its bracket."""
-    if not quick:
+    """(root of the kinetics between its ends, last change): `steps` of Newton, or with none to the end in its bracket."""
+    if not steps:
         return root(miss, start, low, high), jnp.zeros_like(start)
     here = before = start
-    for _ in range(INNER):
+    for _ in range(steps):
         value, slope = jax.jvp(miss, (here,), (jnp.ones_like(here),))
         free = here - value / slope
         before, here = here, jnp.where(free > high, high, jnp.where(free < low, low, free))
@@ -166,7 +166,7 @@ def solve(system: System, stage: Stage, inputs: Inputs) -> Solution:
         asked = choose_branch(law, old, open_at_start, *tried, *curves(law, effects, old, *tried))
 
         def miss(fraction: Scalar) -> Scalar:
-            return fraction - fraction_on(old, asked, *curves(law, effects, old, *along(fraction)))
+            return fraction - curve_on(law, effects, old, asked, *along(fraction))
 
         low, high = jnp.where(asked.heating, 0.0, xi), jnp.where(asked.cooling, 1.0, xi)
         start = z.fraction
@@ -181,7 +181,7 @@ def solve(system: System, stage: Stage, inputs: Inputs) -> Solution:
             )
             start = xi + (drive[0] - drive[1]) / jnp.where(drive[2] > 0.0, drive[2], jnp.inf)
         inside = jnp.where(start > high, high, jnp.where(start < low, low, start))
-        found, last = _inner(miss, inside, low, high, quick)
+        found, last = _inner(miss, inside, low, high, INNER[0 if first else 1] if quick else 0)
         moved = found - z.fraction
         step = [base[k] + slope[k] * moved for k in range(3)] + [moved]
         if not quick:

@@ -62,6 +62,11 @@ class AbstractEffect(eqx.Module):
         """Share of austenite left at the reduced distance z = (y_M - M_f)/(M_s - M_f); 0 far below, 1 far above."""
         return remaining
 
+    def shapes(self) -> bool:
+        """Whether it changes the shape of a branch: then the two are no mirror images."""
+        own, base = type(self), AbstractEffect
+        return own.heating_shape is not base.heating_shape or own.cooling_shape is not base.cooling_shape
+
     def strain(
         self, wire: Wire, temperature: Scalar, stress: Scalar, fraction: Scalar, detwinned: Scalar
     ) -> Scalar | float:

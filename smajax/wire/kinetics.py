@@ -55,24 +55,38 @@ def cooling_temperature(law: Kinetics, temperature: Scalar, stress: Scalar) -> S
     return temperature - stress / law.stress_slope_martensite
 
 
+def heating_distance(law: Kinetics, temperature: Scalar, stress: Scalar) -> Scalar:
+    """z = (y_A - A_s)/(A_f - A_s)."""
+    width = jnp.maximum(law.austenite_finish - law.austenite_start, NARROWEST_RANGE)
+    return (heating_temperature(law, temperature, stress) - law.austenite_start) / width
+
+
+def cooling_distance(law: Kinetics, temperature: Scalar, stress: Scalar) -> Scalar:
+    """z = (y_M - M_f)/(M_s - M_f)."""
+    width = jnp.maximum(law.martensite_start - law.martensite_finish, NARROWEST_RANGE)
+    return (cooling_temperature(law, temperature, stress) - law.martensite_finish) / width
+
+
+def _or_none(share: Scalar) -> Scalar:
+    return jnp.where(share > FINISHED, share, 0.0)
+
+
 def martensite_left(law: Kinetics, effects: Sequence[AbstractEffect], temperature: Scalar, stress: Scalar) -> Scalar:
     r"""h((y_A - A_s)/(A_f - A_s)) of the law's shape and the effects: 1 below the range (Elahinia 2004, eq. 3.10)."""
-    width = jnp.maximum(law.austenite_finish - law.austenite_start, NARROWEST_RANGE)
-    z = (heating_temperature(law, temperature, stress) - law.austenite_start) / width
+    z = heating_distance(law, temperature, stress)
     share = law.shape.martensite_left(z)
     for effect in effects:
         share = effect.heating_shape(z, share)
-    return jnp.where(share > FINISHED, share, 0.0)
+    return _or_none(share)
 
 
 def austenite_left(law: Kinetics, effects: Sequence[AbstractEffect], temperature: Scalar, stress: Scalar) -> Scalar:
     r"""k((y_M - M_f)/(M_s - M_f)) of the law's shape and the effects: 1 above the range (Elahinia 2004, eq. 3.5)."""
-    width = jnp.maximum(law.martensite_start - law.martensite_finish, NARROWEST_RANGE)
-    z = (cooling_temperature(law, temperature, stress) - law.martensite_finish) / width
+    z = cooling_distance(law, temperature, stress)
     share = law.shape.austenite_left(z)
     for effect in effects:
         share = effect.cooling_shape(z, share)
-    return jnp.where(share > FINISHED, share, 0.0)
+    return _or_none(share)
 
 
 def steepest_slope(law: Kinetics) -> Scalar:
@@ -100,6 +114,23 @@ def curves(
     """xi on the heating curve (eq. 3.3) and on the cooling curve (eq. 3.5) that belong to `state`."""
     h, k = martensite_left(law, effects, temperature, stress), austenite_left(law, effects, temperature, stress)
     return law.renewal.curves(state, *_shares(law, effects, state), h, k)
+
+
+def curve_on(
+    law: Kinetics,
+    effects: Sequence[AbstractEffect],
+    state: WireState,
+    branch: Branch,
+    temperature: Scalar,
+    stress: Scalar,
+) -> Scalar:
+    """`fraction_on` of `curves`, with the one shape of the branch computed, where no effect shapes the two apart."""
+    if any(effect.shapes() for effect in effects):
+        return fraction_on(state, branch, *curves(law, effects, state, temperature, stress))
+    mirrored = 1.0 - cooling_distance(law, temperature, stress)
+    z = jnp.where(branch.cooling, mirrored, heating_distance(law, temperature, stress))
+    share = _or_none(law.shape.martensite_left(z))
+    return fraction_on(state, branch, *law.renewal.curves(state, *_shares(law, effects, state), share, share))
 
 
 def open_branches(law: Kinetics, effects: Sequence[AbstractEffect], state: WireState) -> Branch:

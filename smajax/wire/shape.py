@@ -22,9 +22,9 @@ class AbstractShape(eqx.Module):
     def martensite_left(self, z: Scalar) -> Scalar:
         """h(z), z = (y_A - A_s)/(A_f - A_s): 1 up to z = 0, falling after it."""
 
-    @abc.abstractmethod
     def austenite_left(self, z: Scalar) -> Scalar:
-        """k(z), z = (y_M - M_f)/(M_s - M_f): 1 from z = 1 on, falling as z falls."""
+        """k(z), z = (y_M - M_f)/(M_s - M_f): 1 from z = 1 on, falling as z falls. k(z) = h(1 - z) under every law."""
+        return self.martensite_left(1.0 - z)
 
     @abc.abstractmethod
     def steepest(self) -> float:
@@ -36,9 +36,6 @@ class Cosine(AbstractShape):
 
     def martensite_left(self, z: Scalar) -> Scalar:
         return quarter_cosine(jnp.clip(z, 0.0, 1.0)) ** 2  # (1 + cos x)/2 = cos^2(x/2)
-
-    def austenite_left(self, z: Scalar) -> Scalar:
-        return 1.0 - quarter_cosine(jnp.clip(z, 0.0, 1.0)) ** 2
 
     def steepest(self) -> float:
         return 0.5 * math.pi
@@ -53,9 +50,6 @@ class Exponential(AbstractShape):
 
     def martensite_left(self, z: Scalar) -> Scalar:
         return jnp.exp(-LEFT_AT_THE_END * jnp.where(z > 0.0, z, 0.0))
-
-    def austenite_left(self, z: Scalar) -> Scalar:
-        return jnp.exp(-LEFT_AT_THE_END * jnp.where(z < 1.0, 1.0 - z, 0.0))
 
     def steepest(self) -> float:
         return LEFT_AT_THE_END
