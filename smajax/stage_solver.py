@@ -9,10 +9,9 @@ is one equation of one unknown. It rises with xi (more martensite: warmer by lat
 it), so its root lies between the present fraction and the end of the branch. The cosine is all that bends much in a
 stage, and it is solved without a new linearisation.
 
-`QUICK` linearisations with `INNER` steps of the inner equation are nearly always enough (`studies/benchmarks` says how
-often), and cost the same for every member of a batch. Where the last of them still moved the solution, more follow, the
-later ones with the inner equation solved to the end in its bracket: a member that needs them makes its batch wait, and
-changes nothing for the others.
+The first linearisation starts from the driving temperature before, and does nearly all. More follow until one no longer
+moves the solution by `TOLERANCE`, the next of them nearly always; there the inner equation is solved to the end in its
+bracket. A member that needs many makes its batch wait, and changes nothing for the others.
 """
 
 from __future__ import annotations
@@ -40,16 +39,15 @@ from smajax.wire.kinetics import (
     heating_temperature,
     open_branches,
 )
-from smajax.wire.root import root
+from smajax.wire.root import bracketed
 
-QUICK = 2
-INNER = (3, 1)  # steps of the inner equation, after the first linearisation and after later ones
+INNER = 3  # steps of the inner equation after the first linearisation
+CLOSE = 1e-6  # last step of it after later ones
 MOST_ITERATIONS = 50
 UNDAMPED = 12  # iterations before every second step is halved
 # Enough: when no unknown moves by more than this share of its scale, 1 C, 1 % strain, 1e-4 E, and xi in full; in float32,
 # by more than what rounding alone moves it. The step after would move it by about the square of that.
 TOLERANCE = 1e-4
-MOST_QUICK = 6  # iterations, before the inner equation is solved in its bracket
 ROUNDINGS = 1e3
 DRIVING = (heating_temperature, cooling_temperature)  # both linear in temperature and stress
 Entry = Scalar | None  # of a Jacobian; None: zero whatever the values, and never computed
@@ -128,18 +126,14 @@ def _largest(system: System, xi: Scalar, change: Sequence[Scalar]) -> Scalar:
     return reduce(jnp.maximum, [jnp.abs(one) / scale for one, scale in zip(change, scales, strict=True)])
 
 
-def _inner(
-    miss: Callable[[Scalar], Scalar], start: Scalar, low: Scalar, high: Scalar, steps: int
-) -> tuple[Scalar, Scalar]:
-    """(root of the kinetics between its ends, last change): `steps` of Newton, or with none to the end in its bracket."""
-    if not steps:
-        return root(miss, start, low, high), jnp.zeros_like(start)
-    here = before = start
-    for _ in range(steps):
+def _nearly(miss: Callable[[Scalar], Scalar], start: Scalar, low: Scalar, high: Scalar) -> Scalar:
+    """The root of `miss` after a few steps of Newton, held between its ends."""
+    here = start
+    for _ in range(INNER):
         value, slope = jax.jvp(miss, (here,), (jnp.ones_like(here),))
         free = here - value / slope
-        before, here = here, jnp.where(free > high, high, jnp.where(free < low, low, free))
-    return here, here - before
+        here = jnp.where(free > high, high, jnp.where(free < low, low, free))
+    return here
 
 
 def solve(system: System, stage: Stage, inputs: Inputs) -> Solution:
@@ -151,7 +145,7 @@ def solve(system: System, stage: Stage, inputs: Inputs) -> Solution:
     sticks = stage.old.motion.position - PRESLIDING * stage.old.motion.friction
     tolerance = max(TOLERANCE, ROUNDINGS * float(jnp.finfo(xi.dtype).eps))
 
-    def iterate(at: _Iterate, quick: bool, first: bool = False) -> _Iterate:
+    def iterate(at: _Iterate, first: bool) -> _Iterate:
         z = at.z
         residual, rows = _linearised(system, stage, inputs, z)
         by_fraction = [jnp.zeros_like(xi) if row[3] is None else -row[3] for row in rows]
@@ -181,10 +175,10 @@ def solve(system: System, stage: Stage, inputs: Inputs) -> Solution:
             )
             start = xi + (drive[0] - drive[1]) / jnp.where(drive[2] > 0.0, drive[2], jnp.inf)
         inside = jnp.where(start > high, high, jnp.where(start < low, low, start))
-        found, last = _inner(miss, inside, low, high, INNER[0 if first else 1] if quick else 0)
+        found = _nearly(miss, inside, low, high) if first else bracketed(miss, inside, low, high, CLOSE)
         moved = found - z.fraction
         step = [base[k] + slope[k] * moved for k in range(3)] + [moved]
-        if not quick:
+        if not first:
             # A stiff-soft-stiff wire (detwinning) can send Newton to and fro between its two stiff ends.
             late = (at.iterations > UNDAMPED) & (at.iterations % 2 == 0)
             step = [jnp.where(late, 0.5 * change, change) for change in step]
@@ -195,24 +189,15 @@ def solve(system: System, stage: Stage, inputs: Inputs) -> Solution:
             jumped = (slips > 0.0) & (jnp.abs(before) > 1.0) & (jnp.abs(after) > 1.0) & (before * after < 0.0)
             new = new._replace(position=jnp.where(jumped, sticks, new.position))
             step[1] = new.position - z.position
-        # What is no number stays none, and must not keep the others.
-        still = ~(_largest(system, xi, [*step[:3], jnp.abs(moved) + jnp.abs(last)]) > tolerance)
+        # What is no number stays none, and must not keep the others. The first solves the inner equation roughly only.
+        still = ~(_largest(system, xi, step) > tolerance)
         same = (asked.heating == at.branch.heating) & (asked.cooling == at.branch.cooling)
-        return _Iterate(new, asked, still & same, at.iterations + 1)
+        return _Iterate(new, asked, still & same & (not first), at.iterations + 1)
 
     no = jnp.zeros_like(xi, bool)
     guess = Unknowns(old.temperature, stage.old.motion.position, old.stress, xi)
-    at = _Iterate(guess, Branch(no, no), no, jnp.zeros_like(xi, int))
-    for number in range(QUICK):
-        at = iterate(at, quick=True, first=number == 0)
-
-    for most, quick in ((MOST_QUICK, True), (MOST_ITERATIONS, False)):
-
-        def unfinished(now: _Iterate, most: int = most) -> Scalar:
-            return ~now.enough & (now.iterations < most)
-
-        def more(now: _Iterate, quick: bool = quick) -> _Iterate:
-            return iterate(now, quick)
-
-        at = lax.while_loop(unfinished, more, at)
+    at = iterate(_Iterate(guess, Branch(no, no), no, jnp.zeros_like(xi, int)), first=True)
+    at = lax.while_loop(
+        lambda now: ~now.enough & (now.iterations < MOST_ITERATIONS), lambda now: iterate(now, first=False), at
+    )
     return Solution(at.z, at.branch)
