@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 
 import equinox as eqx
 import jax
@@ -199,18 +200,36 @@ SECOND = {
 }
 
 
-@pytest.mark.parametrize("load", ["arm", pytest.param("strain_coupon", marks=pytest.mark.slow)])
-def test_second_derivatives(load: str) -> None:
-    """A filter's gains are first derivatives, so its own derivative is a second one."""
+def _mean_stress(load: str) -> Callable[[jax.Array], jax.Array]:
+    """Of shares of three moduli and slopes."""
     system, inputs = SECOND[load]
     names = ["young_modulus_austenite", "young_modulus_martensite", "stress_slope_austenite"]
     at = get_parameters(system, names)
 
     def mean(share: jax.Array) -> jax.Array:
-        run = simulate(set_vector(system, names, at * share), inputs, DT)
-        return run.stress.mean() / 1e8
+        return simulate(set_vector(system, names, at * share), inputs, DT).stress.mean() / 1e8
 
-    one, step = jnp.ones(3), 1e-5
+    return mean
+
+
+def test_a_second_derivative_along_a_line() -> None:
+    """A filter's gains are first derivatives, so its own derivative is a second one."""
+    mean, along, step = _mean_stress("arm"), jnp.asarray([1.0, -0.7, 0.4]), 1e-5
+
+    def slope(s: jax.Array | float) -> jax.Array:
+        return jax.jvp(lambda t: mean(1.0 + t * along), (jnp.asarray(s),), (jnp.asarray(1.0),))[1]
+
+    first = jax.jit(slope)
+    second = jax.jit(lambda s: jax.jvp(slope, (s,), (jnp.asarray(1.0),))[1])(jnp.asarray(0.0))
+    assert abs(second) > 1e-3
+    np.testing.assert_allclose(second, (first(step) - first(-step)) / (2 * step), rtol=1e-5, atol=1e-7)
+
+
+@pytest.mark.slow  # a minute to compile
+@pytest.mark.parametrize("load", list(SECOND))
+def test_second_derivatives(load: str) -> None:
+    """All of them, forward over reverse."""
+    mean, one, step = _mean_stress(load), jnp.ones(3), 1e-5
     second = np.asarray(jax.jit(jax.hessian(mean))(one))
     slope = jax.jit(jax.grad(mean))
     difference = np.stack([(slope(one + step * e) - slope(one - step * e)) / (2 * step) for e in np.eye(3)])
