@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import abc
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -34,6 +35,33 @@ class ClosedLoop(eqx.Module):
     )
 
 
+class AbstractWatch(eqx.Module):
+    """What looks on while a loop runs, so that a sweep stores no trajectory. `see` is called once a sample."""
+
+    @abc.abstractmethod
+    def start(self, state: State) -> Any:
+        """The memory before the first sample, which is `state`."""
+
+    @abc.abstractmethod
+    def see(self, memory: Any, state: State, command: Scalar, dt: Scalar) -> Any:
+        """The memory after a sample; `command` (V) holds from it on for `dt` seconds, 0 at the last one."""
+
+    @abc.abstractmethod
+    def result(self, memory: Any) -> Any:
+        """What it has seen, any pytree."""
+
+
+class _Nobody(AbstractWatch):
+    def start(self, state: State) -> None:
+        return None
+
+    def see(self, memory: None, state: State, command: Scalar, dt: Scalar) -> None:
+        return None
+
+    def result(self, memory: None) -> None:
+        return None
+
+
 class _Carry(NamedTuple):
     state: State
     estimate: Any  # the estimator's memory
@@ -41,6 +69,7 @@ class _Carry(NamedTuple):
     held: Scalar  # V, the command at the amplifier
     queue: Series  # V, commands on their way to the amplifier, shape (delay,)
     failed_at: Scalar
+    seen: Any  # the watch's memory
 
 
 def simulate_closed_loop(
@@ -67,6 +96,52 @@ def simulate_closed_loop(
     Raises ValueError when a gain or parameter lies outside its bounds (where values are known: outside of `jit`),
     when `wanted` has not a whole number of control periods and one sample more, and when noise has no `key`.
     """
+    first, end, (states, held, measured), wanted = _run(
+        system, controller, wanted, dt, every, _Nobody(), True, estimator, sensor, key, delay, disturbance, initial
+    )
+    states = jax.tree.map(lambda rest: rest.reshape(-1, *rest.shape[2:]), states)
+    spread = lambda series: jnp.append(jnp.repeat(series, every), series[-1])  # noqa: E731
+    return ClosedLoop(trajectory(first, states), wanted, spread(held), jax.tree.map(spread, measured), end.failed_at)
+
+
+def watch_closed_loop(
+    watch: AbstractWatch,
+    system: System,
+    controller: AbstractController,
+    wanted: Reference | Series,
+    dt: Scalar | float = DEFAULT_STEP,
+    every: int = 1,
+    *,
+    estimator: AbstractEstimator | None = None,
+    sensor: Sensor | None = None,
+    key: jax.Array | None = None,
+    delay: int = 0,
+    disturbance: Mapping[str, Series] | None = None,
+    initial: State | None = None,
+) -> tuple[Any, Scalar]:
+    """(what `watch` has seen, `failed_at`) of the loop that `simulate_closed_loop` simulates: nothing else is stored."""
+    _, end, _, _ = _run(
+        system, controller, wanted, dt, every, watch, False, estimator, sensor, key, delay, disturbance, initial
+    )
+    return watch.result(watch.see(end.seen, end.state, end.held, jnp.zeros_like(end.held))), end.failed_at
+
+
+def _run(
+    system: System,
+    controller: AbstractController,
+    wanted: Reference | Series,
+    dt: Scalar | float,
+    every: int,
+    watch: AbstractWatch,
+    kept: bool,
+    estimator: AbstractEstimator | None,
+    sensor: Sensor | None,
+    key: jax.Array | None,
+    delay: int,
+    disturbance: Mapping[str, Series] | None,
+    initial: State | None,
+) -> tuple[State, _Carry, Any, Reference]:
+    """(first state, end, (states, commands, measured) of every period where they are `kept`, what was wanted)."""
     check_bounds(controller)
     wanted = wanted if isinstance(wanted, Reference) else resting(wanted)
     count = jnp.shape(wanted.position)[0]
@@ -125,12 +200,15 @@ def simulate_closed_loop(
         held, queue = queue[0], queue[1:]
         inputs = system.drive.from_voltage(held)
 
-        def body(state: State, acting: dict[str, Scalar]) -> tuple[State, State]:
+        def body(carry: tuple[State, Any], acting: dict[str, Scalar]) -> tuple[tuple[State, Any], State | None]:
+            state, seen = carry
+            seen = watch.see(seen, state, held, jnp.asarray(dt, dtype=float))
             new = step(system, state, {**inputs, **acting}, dt)
-            return new, new
+            return (new, seen), new if kept else None
 
-        state, states = lax.scan(body, state, now_acting, length=every)
-        return _Carry(state, estimate, memory, held, queue, failed_at), (states, held, measured)
+        (state, seen_now), states = lax.scan(body, (state, carry.seen), now_acting, length=every)
+        shown = (states, held, measured) if kept else None
+        return _Carry(state, estimate, memory, held, queue, failed_at, seen_now), shown
 
     reading = seen(state, noise[0])
     estimate, measured = (None, told(state, reading)) if estimator is None else estimator.start(reading)
@@ -141,12 +219,11 @@ def simulate_closed_loop(
         zero,
         jnp.zeros(delay),
         jnp.where(inside_bounds(controller), jnp.inf, state.time),
+        watch.start(state),
     )
     at_calls = jax.tree.map(lambda series: series[:-1:every], wanted)
-    end, (states, held, measured) = lax.scan(period_of, start, (at_calls, noise, acting, jnp.arange(periods)))
-    states = jax.tree.map(lambda rest: rest.reshape(-1, *rest.shape[2:]), states)
-    spread = lambda series: jnp.append(jnp.repeat(series, every), series[-1])  # noqa: E731
-    return ClosedLoop(trajectory(state, states), wanted, spread(held), jax.tree.map(spread, measured), end.failed_at)
+    end, shown = lax.scan(period_of, start, (at_calls, noise, acting, jnp.arange(periods)))
+    return state, end, shown if kept else (None, None, None), wanted
 
 
 def check_answers(loop: ClosedLoop) -> None:

@@ -15,11 +15,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from smajax.closed_loop import simulate_closed_loop
 from smajax.controller.base import AbstractController
 from smajax.estimator.base import AbstractEstimator
 from smajax.fit.solve import Progress, quiet
-from smajax.merit import Merit, merit
+from smajax.merit import Merit, judged_loop
 from smajax.parameters import set_vector
 from smajax.reference import clock, constant
 from smajax.system import System
@@ -62,8 +61,7 @@ def merits_of(
 
     def one(row: jax.Array, target: Scalar) -> Merit:
         tuned = set_vector(controller, names, row)
-        loop = simulate_closed_loop(system, tuned, constant(time, target), dt, every, estimator=estimator)
-        return merit(loop, system)
+        return judged_loop(system, tuned, constant(time, target), dt, every, estimator=estimator)[0]
 
     return jax.vmap(lambda row: jax.vmap(lambda target: one(row, target))(targets))(gains)
 

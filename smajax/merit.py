@@ -1,16 +1,19 @@
-"""What a control engineer asks of a closed loop, from its trajectory: times, overshoot, error, energy, chatter, heat."""
+"""What a control engineer asks of a closed loop, while it runs or of its trajectory: times, overshoot, error, energy."""
 
 from __future__ import annotations
 
+from typing import Any, NamedTuple
+
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 from jax import lax
 
-from smajax.closed_loop import ClosedLoop
+from smajax.closed_loop import AbstractWatch, ClosedLoop, watch_closed_loop
+from smajax.controller.base import AbstractController
 from smajax.load.base import AbstractMovingLoad
+from smajax.reference import Reference
 from smajax.system import System
-from smajax.types import Scalar, Series
+from smajax.types import Scalar, State
 from smajax.wire.resistance import resistance_per_metre
 
 BAND_DEGREES = 1.0  # an angle this near the set point counts as there
@@ -43,55 +46,153 @@ def band_of(system: System) -> Scalar:
     return BAND_SHARE * system.wire.constitutive.recoverable_strain / load.contraction(system.wire)
 
 
-def switches(command: Series) -> Scalar:
-    """How often a command turns back by more than `LIVELY` from its last extreme."""
+class _Seen(NamedTuple):
+    """What `Judge` remembers from sample to sample."""
 
-    def follow(carry: tuple[Scalar, Scalar], now: Scalar) -> tuple[tuple[Scalar, Scalar], Scalar]:
-        extreme, rising = carry  # the highest (lowest) value since the last turn; 1 up, -1 down
-        further = jnp.where(rising * (now - extreme) > 0.0, now, extreme)
-        turned = rising * (further - now) > LIVELY
-        return (jnp.where(turned, now, further), jnp.where(turned, -rising, rising)), turned
+    number: Scalar  # samples seen
+    began: Scalar  # s
+    time: Scalar  # s, of the last sample
+    side: Scalar  # 1 where the set point is approached from below, -1 from above
+    starts_there: Scalar  # bool
+    reached: Scalar  # s
+    inside_since: Scalar  # s, infinite while outside of the band
+    unsettled: Scalar  # bool: outside of it in the steady part
+    beyond: Scalar
+    steady: Scalar  # samples in the steady part
+    error: Scalar  # sum of its absolute errors there
+    offset: Scalar  # sum of its errors there
+    energy: Scalar
+    extreme: Scalar  # V, the highest (lowest) command since the last turn
+    rising: Scalar  # 1 up, -1 down, 0 before the first command
+    turns: Scalar
+    hottest: Scalar
 
-    _, turns = lax.scan(follow, (command[0], jnp.ones_like(command[0])), command)
-    return turns.sum()
+
+class _Sample(NamedTuple):
+    """What is judged of a run at one moment."""
+
+    time: Scalar
+    position: Scalar
+    temperature: Scalar
+    fraction: Scalar
+    command: Scalar
+    dt: Scalar  # s that the command holds, 0 at the last sample
 
 
-def merit(loop: ClosedLoop, system: System, band: Scalar | float | None = None) -> Merit:
-    """Judge a run against its last set point; `system` is the plant that ran. Pure: `vmap` it with the loop.
+class Judge(AbstractWatch):
+    """Figures of merit while a loop runs, against its last set point."""
+
+    system: System  # the plant that runs
+    target: Scalar  # rad or m
+    band: Scalar  # rad or m
+    samples: int = eqx.field(static=True)
+
+    def begun(self, position: Scalar, time: Scalar) -> _Seen:
+        """Before the first sample, which lies at `position`."""
+        error = position - self.target
+        zero, never = jnp.zeros_like(error), jnp.full_like(error, jnp.inf)
+        no, nothing = jnp.zeros_like(error, bool), jnp.zeros_like(error, int)
+        return _Seen(
+            number=nothing,
+            began=time,
+            time=time,
+            side=jnp.where(error < 0.0, 1.0, -1.0),
+            starts_there=jnp.abs(error) <= self.band,
+            reached=never,
+            inside_since=never,
+            unsettled=no,
+            beyond=zero,
+            steady=zero,
+            error=zero,
+            offset=zero,
+            energy=zero,
+            extreme=zero,
+            rising=zero,
+            turns=nothing,
+            hottest=-never,
+        )
+
+    def judged(self, seen: _Seen, now: _Sample) -> _Seen:
+        """One sample more."""
+        error = now.position - self.target
+        outside = ~(jnp.abs(error) <= self.band)  # what is no number is not there
+        there = seen.side * error >= -self.band
+        beyond = jnp.where(seen.starts_there, jnp.abs(error), seen.side * error)
+        steady = seen.number >= (1.0 - STEADY) * (self.samples - 1) - 1e-9
+        weight = jnp.where(steady, 1.0, 0.0)
+        # The highest (lowest) command since it last turned back; the first one counts as on its way up.
+        rising = jnp.where(seen.rising == 0.0, 1.0, seen.rising)
+        fresh = (seen.rising == 0.0) | (rising * (now.command - seen.extreme) > 0.0)
+        extreme = jnp.where(fresh, now.command, seen.extreme)
+        turned = rising * (extreme - now.command) > LIVELY
+        system = self.system
+        ohms = resistance_per_metre(system.wire, system.effects, now.temperature, now.fraction)
+        power = system.drive.power(ohms, system.wire.wire_length, system.drive.from_voltage(now.command))
+        return _Seen(
+            number=seen.number + 1,
+            began=seen.began,
+            time=now.time,
+            side=seen.side,
+            starts_there=seen.starts_there,
+            reached=jnp.where(there & ~(seen.reached < jnp.inf), now.time, seen.reached),
+            inside_since=jnp.where(outside, jnp.inf, jnp.minimum(seen.inside_since, now.time)),
+            unsettled=seen.unsettled | (outside & steady),
+            beyond=jnp.maximum(seen.beyond, beyond),
+            steady=seen.steady + weight,
+            error=seen.error + weight * jnp.abs(error),
+            offset=seen.offset + weight * error,
+            energy=seen.energy + power * system.wire.wire_length * now.dt,
+            extreme=jnp.where(turned, now.command, extreme),
+            rising=jnp.where(turned, -rising, rising),
+            turns=seen.turns + turned,
+            hottest=jnp.maximum(seen.hottest, now.temperature),
+        )
+
+    def start(self, state: State) -> _Seen:
+        return self.begun(state.motion.position, state.time)
+
+    def see(self, memory: _Seen, state: State, command: Scalar, dt: Scalar) -> _Seen:
+        wire = state.wire
+        now = _Sample(state.time, state.motion.position, wire.temperature, wire.martensite_fraction, command, dt)
+        return self.judged(memory, now)
+
+    def result(self, memory: _Seen) -> Merit:
+        # A run that is inside at its last sample by chance has not settled.
+        return Merit(
+            reach_time=memory.reached,
+            settling_time=jnp.where(memory.unsettled, jnp.inf, memory.inside_since),
+            overshoot=memory.beyond,
+            steady_error=memory.error / memory.steady,
+            steady_offset=memory.offset / memory.steady,
+            energy=memory.energy,
+            switches_per_second=memory.turns / (memory.time - memory.began),
+            peak_temperature=memory.hottest,
+        )
+
+
+def judge_of(system: System, wanted: Reference, band: Scalar | float | None = None) -> Judge:
+    """What judges a run of the plant `system` against the last set point of `wanted`.
 
     `band`, rad or m, is how near counts as there; default `band_of` the system.
     """
-    band = band_of(system) if band is None else band
-    run, target = loop.run, loop.wanted.position[-1]
-    error = run.position - target
-    side = jnp.where(error[0] < 0.0, 1.0, -1.0)
-    there = side * error >= -band
-    beyond = jnp.where(jnp.abs(error[0]) <= band, jnp.abs(error), side * error)
-    outside = jnp.abs(error) > band
-    last_outside = jnp.max(jnp.where(outside, jnp.arange(outside.size), -1))
-    after = jnp.minimum(last_outside + 1, outside.size - 1)
-    steady = run.time >= run.time[-1] - STEADY * (run.time[-1] - run.time[0])
-    # A run that is inside at its last sample by chance has not settled.
-    unsettled = (outside & steady).any()
-    settling = jnp.where(unsettled, jnp.inf, jnp.where(last_outside < 0, 0.0, run.time[after]))
-    weight = steady / steady.sum()
-    return Merit(
-        reach_time=jnp.where(there.any(), run.time[jnp.argmax(there)], jnp.inf),
-        settling_time=settling,
-        overshoot=jnp.maximum(jnp.max(beyond), 0.0),
-        steady_error=(weight * jnp.abs(error)).sum(),
-        steady_offset=(weight * error).sum(),
-        energy=(power(loop, system)[:-1] * jnp.diff(run.time)).sum(),
-        switches_per_second=switches(loop.voltage) / (run.time[-1] - run.time[0]),
-        peak_temperature=run.temperature.max(),
+    held = band_of(system) if band is None else jnp.asarray(band, dtype=float)
+    return Judge(system, wanted.position[-1], held, jnp.shape(wanted.position)[0])
+
+
+def merit(loop: ClosedLoop, system: System, band: Scalar | float | None = None) -> Merit:
+    """Judge a run that was simulated; `system` is the plant that ran. Pure: `vmap` it with the loop."""
+    judge, run = judge_of(system, loop.wanted, band), loop.run
+    held = jnp.append(jnp.diff(run.time), 0.0)
+    samples = _Sample(run.time, run.position, run.temperature, run.martensite_fraction, loop.voltage, held)
+    seen, _ = lax.scan(
+        lambda seen, now: (judge.judged(seen, now), None), judge.begun(run.position[0], run.time[0]), samples
     )
+    return judge.result(seen)
 
 
-def power(loop: ClosedLoop, system: System) -> Series:
-    """Electrical power into the wire, W."""
-
-    def at(temperature: Scalar, fraction: Scalar, voltage: Scalar) -> Scalar:
-        ohms = resistance_per_metre(system.wire, system.effects, temperature, fraction)
-        return system.drive.power(ohms, system.wire.wire_length, system.drive.from_voltage(voltage))
-
-    return jax.vmap(at)(loop.run.temperature, loop.run.martensite_fraction, loop.voltage) * system.wire.wire_length
+def judged_loop(
+    system: System, controller: AbstractController, wanted: Reference, *settings: Any, **interface: Any
+) -> tuple[Merit, Scalar]:
+    """(figures of merit, `failed_at`) of a loop, of which nothing else is stored; arguments as `simulate_closed_loop`'s."""
+    found, failed = watch_closed_loop(judge_of(system, wanted), system, controller, wanted, *settings, **interface)
+    return found, failed

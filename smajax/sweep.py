@@ -17,15 +17,15 @@ import jax.numpy as jnp
 import numpy as np
 
 from smajax.batch.axes import zipped
-from smajax.batch.engine import chunks
+from smajax.batch.engine import Function, chunks
 from smajax.closed_loop import simulate_closed_loop
 from smajax.controller.base import AbstractController
 from smajax.estimator.base import AbstractEstimator
 from smajax.fit.solve import Progress, quiet
 from smajax.measured_state import Sensor
-from smajax.merit import Merit, merit
+from smajax.merit import Merit, judged_loop
 from smajax.parameters import get_parameters, set_vector
-from smajax.reference import clock, constant
+from smajax.reference import Reference, clock, constant
 from smajax.system import System
 from smajax.types import Scalar, Series
 
@@ -40,7 +40,7 @@ MISMATCHES = {
 }
 LEAST, MOST = 0.5, 2.0  # the mismatches looked at, plant over belief
 TARGET, GAIN, NUMBER = "set point", "share of the gain", "number"
-CHUNK = 1024  # loops at once: their trajectories lie in memory while the figures of merit are taken
+CHUNK = 1024  # loops between two marks of progress
 
 
 def lanes(
@@ -107,11 +107,10 @@ NOTHING_BETWEEN = Interface()
 
 
 class Outcome(NamedTuple):
-    """What came of closed loops: arrays of shape (L,), and their positions over time."""
+    """What came of closed loops: arrays of shape (L,)."""
 
     merits: Merit
     failed_at: np.ndarray  # s; infinity where the controller always answered
-    position: np.ndarray  # rad or m, (L, time)
 
 
 def ratios(points: int) -> np.ndarray:
@@ -130,24 +129,57 @@ class _Rig(eqx.Module):
     main_gain: str = eqx.field(static=True)
 
 
-def _loop(rig: _Rig, values: dict[str, Scalar]) -> dict[str, Any]:
+def _setting(rig: _Rig, values: dict[str, Scalar]) -> tuple[System, AbstractController, Reference, dict[str, Any]]:
+    """Plant, controller, set point and interface of one closed loop."""
     names = tuple(MISMATCHES)
     own = tuple(MISMATCHES.values())
     ratios = jnp.stack([values[name] for name in names])
     plant = set_vector(rig.system, own, get_parameters(rig.system, own) * ratios)
     gain = get_parameters(rig.controller, [rig.main_gain]) * values[GAIN]
-    loop = simulate_closed_loop(
-        plant,
-        set_vector(rig.controller, [rig.main_gain], gain),
-        constant(rig.time, values[TARGET]),
-        rig.time[1] - rig.time[0],
-        rig.interface.every,
-        estimator=rig.interface.estimator,
-        sensor=rig.interface.sensor,
-        key=None if rig.interface.sensor is None else jax.random.fold_in(rig.key, values[NUMBER].astype(int)),
-        delay=rig.interface.delay,
-    )
-    return {"merits": merit(loop, plant), "failed_at": loop.failed_at, "position": loop.run.position}
+    interface = {
+        "dt": rig.time[1] - rig.time[0],
+        "every": rig.interface.every,
+        "estimator": rig.interface.estimator,
+        "sensor": rig.interface.sensor,
+        "key": None if rig.interface.sensor is None else jax.random.fold_in(rig.key, values[NUMBER].astype(int)),
+        "delay": rig.interface.delay,
+    }
+    controller = set_vector(rig.controller, [rig.main_gain], gain)
+    return plant, controller, constant(rig.time, values[TARGET]), interface
+
+
+def _judged(rig: _Rig, values: dict[str, Scalar]) -> dict[str, Any]:
+    plant, controller, wanted, interface = _setting(rig, values)
+    merits, failed_at = judged_loop(plant, controller, wanted, **interface)
+    return {"merits": merits, "failed_at": failed_at}
+
+
+def _drawn(rig: _Rig, values: dict[str, Scalar]) -> dict[str, Any]:
+    plant, controller, wanted, interface = _setting(rig, values)
+    return {"position": simulate_closed_loop(plant, controller, wanted, **interface).run.position}
+
+
+def _run(
+    function: Function,
+    system: System,
+    controller: AbstractController,
+    main_gain: str,
+    rows: np.ndarray,
+    seconds: float,
+    dt: float,
+    interface: Interface,
+    seed: int,
+    progress: Progress,
+) -> Any:
+    rig = _Rig(system, controller, clock(seconds, dt), interface, jax.random.key(seed), main_gain)
+    columns = dict(zip((*MISMATCHES, TARGET, GAIN), rows.T, strict=True))
+    axes = zipped({**columns, NUMBER: np.arange(len(rows))})
+    count = -(-len(rows) // CHUNK)
+    found = []
+    for number, answer in chunks(function, rig, axes, min(CHUNK, len(rows)), range(count)):
+        found.append(answer)
+        progress("sweeping", (number + 1) / count)
+    return jax.tree.map(lambda *leaves: np.concatenate(leaves), *found)
 
 
 def closed_loops(
@@ -162,14 +194,21 @@ def closed_loops(
     seed: int = 0,
     progress: Progress = quiet,
 ) -> Outcome:
-    """Run every row of `lanes`, on all devices. Each draws its own sensor noise, from `seed` and its place."""
-    rig = _Rig(system, controller, clock(seconds, dt), interface, jax.random.key(seed), main_gain)
-    columns = dict(zip((*MISMATCHES, TARGET, GAIN), rows.T, strict=True))
-    axes = zipped({**columns, NUMBER: np.arange(len(rows))})
-    count = -(-len(rows) // CHUNK)
-    found = []
-    for number, answer in chunks(_loop, rig, axes, min(CHUNK, len(rows)), range(count)):
-        found.append(answer)
-        progress("sweeping", (number + 1) / count)
-    whole = jax.tree.map(lambda *leaves: np.concatenate(leaves), *found)
-    return Outcome(whole["merits"], whole["failed_at"], whole["position"])
+    """Run every row of `lanes`, on all devices; trajectories are not stored. Each draws its own noise, from `seed`."""
+    whole = _run(_judged, system, controller, main_gain, rows, seconds, dt, interface, seed, progress)
+    return Outcome(whole["merits"], whole["failed_at"])
+
+
+def positions(
+    system: System,
+    controller: AbstractController,
+    main_gain: str,
+    rows: np.ndarray,
+    *,
+    seconds: float = 10.0,
+    dt: float = 0.01,
+    interface: Interface = NOTHING_BETWEEN,
+    seed: int = 0,
+) -> np.ndarray:
+    """Positions over time of every row of `lanes`, (L, time), rad or m: for the few that are drawn."""
+    return _run(_drawn, system, controller, main_gain, rows, seconds, dt, interface, seed, quiet)["position"]

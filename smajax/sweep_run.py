@@ -3,23 +3,21 @@
 from __future__ import annotations
 
 import dataclasses
-import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import jax
 import numpy as np
 from matplotlib.figure import Figure
 
+from smajax.batch.provenance import digest
 from smajax.control_presets import CONTROLLERS, FILTERS
 from smajax.fit.solve import Progress
 from smajax.measured_state import Sensor
 from smajax.merit import Merit
 from smajax.reference import clock
-from smajax.source_mark import source_mark
-from smajax.sweep import MISMATCHES, Grid, Interface, closed_loops, lanes, ratios
+from smajax.sweep import MISMATCHES, Grid, Interface, closed_loops, lanes, positions, ratios
 from smajax.sweep_report import (
     Swept,
     as_json,
@@ -110,12 +108,7 @@ def _controller(
     preset = CONTROLLERS[name]
     system, gain = preset.plant(system), preset.main_gain
     own = dataclasses.replace(settings, controllers=(name,))
-    mark = hashlib.sha256(f"{source_mark()} {own}".encode())
-    # The laws of the system are its structure, the parameters its leaves.
-    mark.update(repr(jax.tree.structure(system)).encode())
-    for leaf in jax.tree.leaves(system):
-        mark.update(np.asarray(leaf).tobytes())
-    kept = out / "finished" / f"{name}-{mark.hexdigest()[:16]}.npz"
+    kept = out / "finished" / f"{name}-{digest(system, [str(own)])[:16]}.npz"
     fields = [field.name for field in dataclasses.fields(Merit)]
     if not kept.exists():
         interface = Interface(
@@ -128,27 +121,19 @@ def _controller(
         def told(_: str, share: float) -> None:
             progress(f"sweeping {name}", share)
 
-        # One batch, one program: the grid, the plant as believed at every set point, and a line a ratio of each mismatch.
+        # One batch, one program: the grid, and the plant as believed at every set point.
+        rows = np.concatenate([grid.lanes(), lanes({}, grid.targets)])
         target = float(np.radians(LINE_TARGET))
-        rows = np.concatenate(
-            [grid.lanes(), lanes({}, grid.targets), *(lanes({one: np.asarray(LINES)}, target) for one in MISMATCHES)]
-        )
-        found = closed_loops(
-            system,
-            preset.make(system),
-            gain,
-            rows,
-            seconds=settings.seconds,
-            dt=settings.dt,
-            interface=interface,
-            progress=told,
-        )
+        lines = np.concatenate([lanes({one: np.asarray(LINES)}, target) for one in MISMATCHES])
+        controller = preset.make(system)
+        asked: dict[str, Any] = {"seconds": settings.seconds, "dt": settings.dt, "interface": interface}
+        found = closed_loops(system, controller, gain, rows, **asked, progress=told)
+        drawn = positions(system, controller, gain, lines, **asked).reshape(len(MISMATCHES), len(LINES), -1)
         inside, alone = slice(grid.size), grid.size + np.arange(len(grid.targets))
         record: dict[str, Any] = {"failed": found.failed_at[inside].reshape(grid.shape)}
         for field in fields:
             values = np.asarray(getattr(found.merits, field))
             record[f"grid_{field}"], record[f"alone_{field}"] = values[inside].reshape(grid.shape), values[alone]
-        drawn = found.position[grid.size + len(grid.targets) :].reshape(len(MISMATCHES), len(LINES), -1)
         record |= {f"line_{mismatch}": angles for mismatch, angles in zip(MISMATCHES, drawn, strict=True)}
         kept.parent.mkdir(exist_ok=True)
         part = kept.with_suffix(".part.npz")
