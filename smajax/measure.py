@@ -8,7 +8,7 @@ from typing import Any
 import equinox as eqx
 import jax.numpy as jnp
 
-from smajax.types import Inputs, Scalar, State
+from smajax.types import Inputs, Scalar, Series, State
 
 # What a state shows by name, and its unit; a reading has the load's own.
 SHOWN = {
@@ -130,6 +130,34 @@ class Mean(AbstractMeasure):
     def result(self, memory: tuple[Scalar, Scalar]) -> Scalar:
         total, time = memory
         return total / time
+
+
+class MeanSquare(AbstractMeasure):
+    """The mean square of the distance from a series, in units of `scale`: a cost of tracking, or of a fit, to differentiate."""
+
+    of: str = eqx.field(static=True)
+    wanted: Series = eqx.field(converter=jnp.asarray)  # (steps + 1,), or a number
+    scale: Scalar = eqx.field(converter=jnp.asarray, default=1.0)
+
+    @property
+    def name(self) -> str:
+        return f"mean_square_{self.of}"
+
+    @property
+    def unit(self) -> str:
+        return "-"
+
+    def start(self, state: State, inputs: Inputs) -> tuple[Scalar, Scalar]:
+        return jnp.zeros_like(state.time, int), jnp.zeros_like(state.time)
+
+    def update(self, memory: tuple[Scalar, Scalar], state: State, inputs: Inputs, dt: Scalar) -> tuple[Scalar, Scalar]:
+        number, total = memory
+        wanted = self.wanted if self.wanted.ndim == 0 else self.wanted[number + 1]
+        return number + 1, total + ((value_of(state, self.of) - wanted) / self.scale) ** 2
+
+    def result(self, memory: tuple[Scalar, Scalar]) -> Scalar:
+        number, total = memory
+        return total / number
 
 
 class TimeAbove(AbstractMeasure):

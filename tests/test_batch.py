@@ -5,18 +5,24 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
+from typing import Any
 
+import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 import xarray as xr
 
 from smajax.batch.axes import Axes, grid, sampled, zipped
-from smajax.batch.member import NOT_FINITE, RUNAWAY
-from smajax.batch.run import good, opened, run_batch, told_of
-from smajax.measure import Largest, Last, Mean, Smallest, TimeAbove
-from smajax.parameters import set_parameters
+from smajax.batch.member import NOT_FINITE, RUNAWAY, member
+from smajax.batch.run import good, opened, recipe_of, run_batch, told_of
+from smajax.checkpointed import checkpointed_scan
+from smajax.measure import Largest, Last, Mean, MeanSquare, Smallest, TimeAbove
+from smajax.parameters import get_parameters, parameters, set_parameters, set_vector
 from smajax.presets import build
 from smajax.simulate import simulate
 
@@ -69,6 +75,42 @@ def test_measures_are_those_of_the_trajectory_and_nothing_else_is_kept() -> None
     first = np.where(above.any(axis=-1), whole["time"].values[np.argmax(above, axis=-1)], np.inf)
     np.testing.assert_allclose(found["time_above_position"], first, atol=1e-9)
     assert found["time_above_position"].attrs["units"] == "s"
+
+
+@pytest.mark.parametrize(("length", "weight"), [(100, 1), (97, 1), (12, 9), (3, 1), (1, 1)])
+def test_a_checkpointed_scan_is_the_scan_and_has_its_derivatives(length: int, weight: int) -> None:
+    xs = jnp.sin(jnp.arange(float(length)))
+
+    def of(scan: Callable[..., Any], gain: jax.Array) -> jax.Array:
+        end, out = scan(lambda c, x: (jnp.tanh(gain * c + x), c * x), gain * 0.1, xs, length)
+        return end + (out * xs).sum()
+
+    own = partial(of, partial(checkpointed_scan, weight=weight))
+    plain = partial(of, lambda body, carry, xs, length: jax.lax.scan(body, carry, xs, length))
+    for one, other in ((own, plain), (jax.grad(own), jax.grad(plain)), (jax.jacfwd(own), jax.jacfwd(plain))):
+        np.testing.assert_allclose(one(jnp.asarray(0.9)), other(jnp.asarray(0.9)), rtol=1e-13)
+
+
+def test_a_cost_is_differentiated_in_reverse_with_memory_that_grows_as_the_root() -> None:
+    """The gradient of a batch's cost by every parameter is the forward one, and four times the steps keep twice as much."""
+    names = tuple(parameters(ARM))
+    at = get_parameters(ARM, names)
+
+    def cost(share: jax.Array, steps: int) -> jax.Array:
+        measures = (MeanSquare("position", jnp.linspace(-0.7, 0.2, steps + 1), 0.1),)
+        recipe = recipe_of(ARM, {}, AXES, seconds=steps * DT, dt=DT, keep=(), measures=measures)
+        changed = eqx.tree_at(lambda one: one.system, recipe, set_vector(ARM, names, at * share))
+        volts = {"voltage": jnp.asarray(8.0), "payload_mass": jnp.asarray(0.05)}
+        return member(changed, volts)["mean_square_position"]
+
+    one = jnp.ones(len(names))
+    reverse = {steps: jax.jit(jax.grad(partial(cost, steps=steps))).lower(one).compile() for steps in (400, 1600)}
+    slopes = np.asarray(reverse[400](one))
+    along = jnp.asarray(np.random.default_rng(0).standard_normal(len(names)))
+    forward = jax.jit(lambda: jax.jvp(partial(cost, steps=400), (one,), (along,))[1])()
+    assert float(slopes @ along) == pytest.approx(float(forward), rel=1e-9)
+    room = {steps: made.memory_analysis().temp_size_in_bytes for steps, made in reverse.items()}  # type: ignore[union-attr]
+    assert room[1600] < 2.3 * room[400]
 
 
 def test_samples_fill_the_box_and_come_again() -> None:

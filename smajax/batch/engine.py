@@ -21,6 +21,7 @@ from smajax.batch.axes import Axes
 BLOCK = 512  # members at once on a core: about 100 numbers each fit its second-level cache
 LEAST_BLOCK = 8
 SMALL = 8  # a small batch is cut into so many blocks
+MOST = 1 << 15  # members a chunk, however little is kept of each: what an interruption loses
 ON_CARD = 1 << 17  # on a graphics card everything runs at once
 Results = Any  # arrays by name: a dictionary, or one of records
 Function = Callable[[Any, dict[str, jax.Array]], Results]
@@ -70,7 +71,7 @@ def member_bytes(function: Function, model: Any, axes: Axes) -> int:
 
 
 def chunk_size(function: Function, model: Any, axes: Axes, budget: int, devices: Sequence[jax.Device]) -> int:
-    """Members a chunk, so that its results take at most a quarter of `budget` bytes, and no more than there are.
+    """Members a chunk, so that its results take at most a quarter of `budget` bytes, and `MOST` at most; chunks are even.
 
     A quarter: blocks and their concatenation on the device, and the copy that is written while the next chunk runs.
     Raises ValueError when not even one block fits.
@@ -83,7 +84,9 @@ def chunk_size(function: Function, model: Any, axes: Axes, budget: int, devices:
             f"one member keeps {each:,} bytes, and {budget:,} bytes have no room for {whole} at once (4 copies): keep "
             "fewer values, every so many steps only (`every`), or measures in the place of trajectories."
         )
-    return whole * min(-(-axes.size // whole), most // whole)
+    wholes = -(-axes.size // whole)
+    count = -(-wholes // max(1, min(most, MOST) // whole))
+    return whole * -(-wholes // count)
 
 
 def chunks(

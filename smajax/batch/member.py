@@ -9,6 +9,7 @@ import jax
 import jax.numpy as jnp
 from jax import lax
 
+from smajax.checkpointed import checkpointed_scan
 from smajax.load.coupon import AbstractCoupon
 from smajax.measure import SHOWN, AbstractMeasure, value_of
 from smajax.parameters import set_parameters
@@ -82,16 +83,19 @@ def member(recipe: Recipe, values: Values) -> dict[str, jax.Array]:
     found: dict[str, jax.Array] = {}
     if recipe.keep:
         periods = recipe.steps // recipe.every
+        long = recipe.every**2 > recipe.steps  # then a period is more than a segment by itself
 
         def several(carry: Any, now: dict[str, Series]) -> tuple[Any, dict[str, Scalar]]:
-            carry, _ = lax.scan(one, carry, now, length=recipe.every)
+            carry, _ = (
+                checkpointed_scan(one, carry, now, recipe.every) if long else lax.scan(one, carry, now, recipe.every)
+            )
             return carry, {name: value_of(carry[0], name) for name in recipe.keep}
 
         grouped = {name: run.reshape(periods, recipe.every) for name, run in series.items()}
-        carry, kept = lax.scan(several, carry, grouped, length=periods)
+        carry, kept = checkpointed_scan(several, carry, grouped, periods, weight=1 if long else recipe.every)
         found = {name: jnp.append(value_of(state, name), kept[name]) for name in recipe.keep}
     else:
-        carry, _ = lax.scan(one, carry, series, length=recipe.steps)
+        carry, _ = checkpointed_scan(one, carry, series, recipe.steps)
     _, memories, bad, status = carry
     found |= {measure.name: measure.result(memory) for measure, memory in zip(recipe.measures, memories, strict=True)}
     return found | {"status": status.astype("int8"), "first_bad_time": bad}
