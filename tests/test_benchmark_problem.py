@@ -66,4 +66,4 @@ def test_fewer_members_are_the_first_of_more() -> None:
 def test_a_peer_that_cannot_run_says_why(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv(peers.DIFFRAX_PYTHON, raising=False)
     assert peers.DIFFRAX_PYTHON in peers.diffrax(tmp_path / "none.npz")["reason"]
-    assert "none.npz" in peers.run_peer("scipy_peer", sys.executable, tmp_path / "none.npz")["reason"]
+    assert "none.npz" in peers.run_peer("scipy_peer", sys.executable, str(tmp_path / "none.npz"))["reason"]

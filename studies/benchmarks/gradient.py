@@ -1,0 +1,83 @@
+"""The gradient of a tracking cost by every parameter of the arm: `python -m studies.benchmarks.gradient --steps N`.
+
+Prints JSON: the time of the cost, of its reverse-mode gradient, of its forward-mode Jacobian, each as a program of its
+own for a batch of `--members`, and the memory that each needs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from collections.abc import Callable
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from smajax.batch.axes import grid
+from smajax.batch.member import member
+from smajax.batch.run import recipe_of
+from smajax.figures.rigs import arm
+from smajax.measure import MeanSquare
+from smajax.parameters import get_parameters, parameters, set_vector
+from smajax.runtime import prepare
+from smajax.simulate import DEFAULT_STEP
+
+REPEATS = 3
+LONGEST_REPEATED = 20000  # steps
+
+
+def _timed(name: str, function: Callable[..., Any], repeats: int, *given: Any) -> dict[str, float]:
+    begin = time.perf_counter()
+    made = jax.jit(function).lower(*given).compile()
+    compiled = time.perf_counter() - begin
+    times = []
+    for _ in range(repeats):
+        begin = time.perf_counter()
+        jax.block_until_ready(made(*given))
+        times.append(time.perf_counter() - begin)
+    room = made.memory_analysis()
+    used = room.temp_size_in_bytes / 1e6 if room else float("nan")
+    return {f"{name}_s": min(times), f"{name}_compile_s": compiled, f"{name}_memory_MB": used}
+
+
+def run(steps: int, members: int, forward: bool) -> dict[str, Any]:
+    """Cost, gradient and, when asked for, Jacobian over `steps` of `members` arms of different voltages."""
+    system = arm()
+    names = tuple(parameters(system))
+    dt = DEFAULT_STEP
+    wanted = jnp.linspace(float(system.load.start()), 0.5, steps + 1)
+    measures = (MeanSquare("position", wanted, 0.1),)
+    recipe = recipe_of(system, {}, grid(voltage=[8.0]), seconds=steps * dt, dt=dt, keep=(), measures=measures)
+
+    def cost(vector: jax.Array, volts: jax.Array) -> jax.Array:
+        changed = eqx.tree_at(lambda one: one.system, recipe, set_vector(system, names, vector))
+        return member(changed, {"voltage": volts})["mean_square_position"]
+
+    at, volts = get_parameters(system, names), jnp.linspace(5.5, 8.5, members)
+    repeats = REPEATS if steps <= LONGEST_REPEATED else 1
+    told: dict[str, Any] = {"peer": "gradient", "steps": steps, "members": members, "parameters": len(names)}
+    told |= _timed("cost", jax.vmap(cost, (None, 0)), repeats, at, volts)
+    told |= _timed("gradient", jax.vmap(jax.grad(cost), (None, 0)), repeats, at, volts)
+    told["gradient_over_cost"] = told["gradient_s"] / told["cost_s"]
+    if forward:
+        told |= _timed("jacobian", jax.vmap(jax.jacfwd(cost), (None, 0)), repeats, at, volts)
+        told["jacobian_over_cost"] = told["jacobian_s"] / told["cost_s"]
+    return told
+
+
+def main() -> None:
+    asked = argparse.ArgumentParser(description=__doc__)
+    asked.add_argument("--steps", type=int, default=2000)
+    asked.add_argument("--members", type=int, default=512)
+    asked.add_argument("--forward", action="store_true", help="the forward-mode Jacobian too")
+    options = asked.parse_args()
+    prepare(cores=True)
+    jax.config.update("jax_enable_compilation_cache", False)
+    print(json.dumps(run(options.steps, options.members, options.forward)))
+
+
+if __name__ == "__main__":
+    main()

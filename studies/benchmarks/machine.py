@@ -1,0 +1,49 @@
+"""The machine and the versions that numbers were measured with."""
+
+from __future__ import annotations
+
+import os
+import platform
+import resource
+import shutil
+import subprocess
+from importlib import metadata
+from pathlib import Path
+
+PACKAGES = ("smajax", "jax", "jaxlib", "numpy", "scipy")
+
+
+def _processor() -> str:
+    """As the system names it."""
+    file = Path("/proc/cpuinfo")
+    if file.exists():
+        named = [
+            line.split(":", 1)[1].strip() for line in file.read_text().splitlines() if line.startswith("model name")
+        ]
+        if named:
+            return named[0]
+    return platform.processor() or platform.machine()
+
+
+def _compiler() -> str:
+    found = shutil.which("g++")
+    return subprocess.run([found, "--version"], capture_output=True, text=True).stdout.splitlines()[0] if found else ""
+
+
+def machine() -> dict[str, object]:
+    """In words, for a table of results."""
+    return {
+        "processor": _processor(),
+        "cores": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count(),
+        "load at the start": round(os.getloadavg()[0], 2),
+        "system": platform.platform(terse=True),
+        "python": platform.python_version(),
+        "compiler": _compiler(),
+        "versions": {name: metadata.version(name) for name in PACKAGES},
+    }
+
+
+def peak_memory() -> int:
+    """Most bytes that this process has had in memory so far."""
+    unit = 1 if platform.system() == "Darwin" else 1024
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit

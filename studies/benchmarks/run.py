@@ -1,0 +1,131 @@
+"""Every benchmark in one run: `python -m studies.benchmarks.run [PART ...] [--fast] [--out FOLDER]`.
+
+Parts are written one by one to FOLDER (default `studies/benchmarks/results/<processor>`), and the table of ratios is made
+of those that are there. Give parts by name to measure them again. diffrax is timed by the interpreter that
+`SMAJAX_DIFFRAX_PYTHON` names. Nothing else should run beside it; ratios are of one run on one machine.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from smajax.runtime import prepare
+from smajax.simulate import DEFAULT_STEP
+from studies.benchmarks import cpp, peers
+from studies.benchmarks.machine import machine
+from studies.benchmarks.table import told
+
+RESULTS = Path(__file__).parent / "results"
+SOLVED = 64
+Part = dict[str, Any]
+
+
+class Plan:
+    """How much is measured."""
+
+    def __init__(self, fast: bool) -> None:
+        self.fast = fast
+        self.members = 4096 if fast else 65536
+        self.scipy_members = 16 if fast else 64
+        self.diffrax_members = 2048 if fast else 8192
+        self.steps = (1000, 4000) if fast else (1000, 10_000, 100_000, 1_000_000)
+        self.counts = (10**3, 10**4) if fast else (10**4, 10**5, 10**6)
+
+    def file(self) -> Path:
+        """The problem, solved once and kept beside the results."""
+        from studies.benchmarks.problem import given
+
+        return given(8 if self.fast else SOLVED, self.members, RESULTS / "problems")[0]
+
+    def own(self, name: str, *options: object) -> Part:
+        """One of our own parts in a fresh process."""
+        return peers.run_peer(name, sys.executable, *map(str, options))
+
+
+def _cpp(plan: Plan) -> Part:
+    import os
+
+    from smajax.figures.rigs import arm
+    from studies.benchmarks.problem import members
+
+    box = members(plan.members)
+    rows = np.stack([box["voltage"], box["payload_mass"]], axis=1)
+    steps = round(10.0 / DEFAULT_STEP)
+    found: Part = {"peer": "cpp"}
+    with TemporaryDirectory() as place:
+        program = cpp.build(Path(place))
+        if program is None:
+            return {**found, "reason": cpp.MISSING}
+        for precision in cpp.PRECISIONS:
+            one = cpp.run(program, arm(), rows, DEFAULT_STEP, steps, os.cpu_count() or 1, precision, 3)
+            found[precision] = {
+                "ms_per_trajectory": 1e3 * one.seconds / plan.members,
+                "iterations_per_stage": one.iterations_per_stage,
+            }
+    return found
+
+
+PARTS: dict[str, Callable[[Plan], Part]] = {
+    "smajax": lambda plan: plan.own("throughput", plan.file(), "--count", plan.members),
+    "cpp": _cpp,
+    "smajax_float32": lambda plan: plan.own("throughput", plan.file(), "--count", plan.members, "--single-precision"),
+    "scipy": lambda plan: peers.scipy(plan.file(), plan.scipy_members),
+    "diffrax": lambda plan: peers.diffrax(plan.file(), count=plan.diffrax_members),
+    "single": lambda plan: plan.own("single", plan.file()),
+    "gradient": lambda plan: plan.own("gradient", "--steps", 2000, "--members", 64 if plan.fast else 512, "--forward"),
+    "gradient_memory": lambda plan: {
+        "peer": "gradient_memory",
+        "runs": [plan.own("gradient", "--steps", steps, "--members", 1) for steps in plan.steps],
+    },
+    "scale": lambda plan: {
+        "peer": "scale",
+        "runs": [plan.own("scale", "--count", count) for count in plan.counts],
+    },
+}
+
+
+def main() -> None:
+    asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    asked.add_argument(
+        "parts", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)}; default: what is not there yet"
+    )
+    asked.add_argument("--fast", action="store_true", help="small: to see that it runs")
+    asked.add_argument("--out", type=Path)
+    options = asked.parse_args()
+    unknown = sorted(set(options.parts) - set(PARTS))
+    if unknown:
+        asked.error(f"no part {unknown}; there are {', '.join(PARTS)}")
+    prepare()
+    here = machine()
+    slug = re.sub(r"[^a-z0-9]+", "-", str(here["processor"]).lower()).strip("-")
+    out = options.out or RESULTS / (f"{slug}-{here['cores']}-cores" + ("-fast" if options.fast else ""))
+    out.mkdir(parents=True, exist_ok=True)
+    plan = Plan(options.fast)
+    for name, part in PARTS.items():
+        file = out / f"{name}.json"
+        if file.exists() and name not in options.parts:
+            continue
+        if options.parts and name not in options.parts:
+            continue
+        print(f"measuring {name} ...", flush=True)
+        whole = out / f".{name}.json"
+        whole.write_text(json.dumps({"machine": machine(), **part(plan)}, indent=1) + "\n", encoding="utf-8")
+        whole.replace(file)
+    found = {name: json.loads((out / f"{name}.json").read_text()) for name in PARTS if (out / f"{name}.json").exists()}
+    text = told(here, found)
+    (out / "README.md").write_text(text, encoding="utf-8")
+    print(text)
+    print(f"written to {out}")
+
+
+if __name__ == "__main__":
+    main()

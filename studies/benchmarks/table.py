@@ -1,0 +1,138 @@
+"""What was measured, as a page: each bar with the number beside it, missed ones as well."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+Found = Mapping[str, Mapping[str, Any]]
+
+
+def _each(found: Found, name: str, *way: str) -> float | None:
+    """Milliseconds a trajectory of a part, or None where it could not run."""
+    at: Any = found.get(name, {})
+    for key in (*way, "ms_per_trajectory"):
+        at = at.get(key) if isinstance(at, Mapping) else None
+    return float(at) if at is not None else None
+
+
+def _ratio(other: float | None, own: float | None) -> float | None:
+    return other / own if other and own else None
+
+
+def _row(what: str, bar: str, value: float | None, holds: bool | None, form: str = "{:.2f}") -> str:
+    shown = "not measured" if value is None else form.format(value)
+    return f"| {what} | {bar} | {shown} | {'' if value is None or holds is None else 'yes' if holds else '**no**'} |"
+
+
+def _at_least(what: str, least: float, value: float | None) -> str:
+    return _row(what, f">= {least:g}", value, value is not None and value >= least)
+
+
+def _at_most(what: str, most: float, value: float | None, unit: str = "") -> str:
+    return _row(what, f"<= {most:g}{unit}", value, value is not None and value <= most)
+
+
+def _ratios(found: Found) -> list[str]:
+    own, single = _each(found, "smajax"), found.get("single", {})
+    scipy = _each(found, "scipy", "best")
+    gradient = found.get("gradient", {})
+    rows = [
+        _at_least("throughput over the C++ program, float64", 0.7, _ratio(_each(found, "cpp", "double"), own)),
+        _at_least(
+            "throughput over the C++ program, float32",
+            0.7,
+            _ratio(_each(found, "cpp", "float"), _each(found, "smajax_float32")),
+        ),
+        _at_least("throughput over diffrax at its best", 5.0, _ratio(_each(found, "diffrax", "best"), own)),
+        _at_least("throughput over scipy's LSODA", 200.0, _ratio(scipy, own)),
+        _at_least("one trajectory: scipy's time over ours", 1.0, _ratio(scipy, single.get("ms"))),
+        _at_most("first call of a process, nothing kept, s", 3.0, single.get("first_call_s")),
+        _at_most("reverse-mode gradient by all parameters over one run", 4.0, gradient.get("gradient_over_cost")),
+    ]
+    if "jacobian_over_cost" in gradient:
+        most = 1.0 + float(gradient["parameters"])
+        rows.append(
+            _at_most(
+                f"forward Jacobian by {most - 1:.0f} parameters over one run", most, gradient["jacobian_over_cost"]
+            )
+        )
+    return ["| | bar | measured | holds |", "|---|---|---|---|", *rows]
+
+
+def _times(found: Found) -> list[str]:
+    rows = [
+        "| | ms a trajectory | error of the angle, degrees | of the fraction | compiling, s | peak memory, MB |",
+        "|---|---|---|---|---|---|",
+    ]
+    named = {
+        "smajax, float64": found.get("smajax", {}),
+        "smajax, float32": found.get("smajax_float32", {}),
+        "diffrax": found.get("diffrax", {}).get("best", found.get("diffrax", {})),
+        "scipy LSODA, one core": found.get("scipy", {}).get("best", found.get("scipy", {})),
+        "C++, float64": found.get("cpp", {}).get("double", found.get("cpp", {})),
+        "C++, float32": found.get("cpp", {}).get("float", found.get("cpp", {})),
+    }
+    keys = ("ms_per_trajectory", "angle_error", "fraction_error", "compile_s", "peak_memory_MB")
+    for name, one in named.items():
+        if one.get("ms_per_trajectory") is None:
+            rows.append(f"| {name} | {one.get('reason', 'not measured')} | | | | |")
+        else:
+            rows.append(f"| {name} | " + " | ".join(f"{one[key]:.3g}" if key in one else "" for key in keys) + " |")
+    best = found.get("diffrax", {}).get("best")
+    if best:
+        way = "adaptive" if best["adaptive"] else "fixed steps"
+        rows += ["", f"diffrax's best: {best['solver']}, {way}, {best['setting']:g}, blocks of {best['block']}."]
+    return rows
+
+
+def _growth(found: Found) -> list[str]:
+    lines = []
+    if runs := [one for one in found.get("gradient_memory", {}).get("runs", []) if "steps" in one]:
+        lines += [
+            "## Memory of a gradient",
+            "",
+            "| steps | program of the run, MB | of its gradient, MB | gradient over run, time |",
+            "|---|---|---|---|",
+        ]
+        lines += [
+            f"| {one['steps']:,} | {one['cost_memory_MB']:.3g} | {one['gradient_memory_MB']:.3g} | {one['gradient_over_cost']:.2f} |"
+            for one in runs
+        ]
+        lines.append("")
+    if runs := [one for one in found.get("scale", {}).get("runs", []) if "members" in one]:
+        lines += [
+            "## Many members, streamed to a store",
+            "",
+            "| members | s, compiling included | ms each | peak memory, MB | of it imports | store, MB |",
+            "|---|---|---|---|---|---|",
+        ]
+        lines += [
+            f"| {one['members']:,} | {one['s']:.1f} | {one['ms_per_trajectory']:.3g} | {one['peak_memory_MB']:.0f} | {one['imports_MB']:.0f} | {one['store_MB']:.1f} |"
+            for one in runs
+        ]
+        lines.append("")
+    return lines
+
+
+def told(machine: Mapping[str, Any], found: Found) -> str:
+    """The page, Markdown."""
+    versions = ", ".join(f"{name} {version}" for name, version in machine["versions"].items())
+    lines = [
+        "# Benchmarks",
+        "",
+        f"{machine['processor']}, {machine['cores']} cores, {machine['system']}, Python {machine['python']}, "
+        f"{machine['compiler']}; {versions}.",
+        "",
+        "Rotary arm, 10 s, constant voltage; accurate to 0.05 degrees and 1e-3 of the fraction against a tight solution "
+        "(`studies/benchmarks/problem.py`). Every ratio is of one run of `python -m studies.benchmarks.run` on this machine.",
+        "",
+        *_ratios(found),
+        "",
+        "## Times",
+        "",
+        *_times(found),
+        "",
+        *_growth(found),
+    ]
+    return "\n".join(lines)

@@ -1,0 +1,83 @@
+"""smajax on the problem of the peers, every core: `python -m studies.benchmarks.throughput FILE`; prints JSON.
+
+The step is the default one; that it is accurate enough is checked on the solved members. What is timed is `run_batch`
+as a user calls it, measures of each run and no trajectory, the compilation apart.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from pathlib import Path
+from typing import Any
+
+import jax
+import numpy as np
+
+from smajax.batch.axes import zipped
+from smajax.batch.run import run_batch
+from smajax.figures.rigs import arm
+from smajax.measure import Last
+from smajax.runtime import prepare
+from smajax.simulate import DEFAULT_STEP
+from studies.benchmarks import problem
+from studies.benchmarks.given import Given, load
+from studies.benchmarks.machine import peak_memory
+
+MEASURES = (Last("position"), Last("martensite_fraction"))
+REPEATS = 3
+
+
+def _errors(given: Given, dt: float) -> tuple[float, float]:
+    axes = problem.axes(len(given.voltage))
+    box = axes.members(0, given.solved)
+    every = round(problem.EVERY / dt)
+    keep = ("position", "martensite_fraction")
+    found = run_batch(arm(), {}, zipped(box), seconds=given.seconds, dt=dt, every=every, keep=keep)
+    return given.errors(np.degrees(found["position"].to_numpy()), found["martensite_fraction"].to_numpy())
+
+
+def run(given: Given, dt: float, count: int) -> dict[str, Any]:
+    """Errors at a step of `dt`, and the time of `count` members."""
+    off = _errors(given, dt)
+    axes = problem.axes(count)
+
+    def once() -> float:
+        begin = time.perf_counter()
+        run_batch(arm(), {}, axes, seconds=given.seconds, dt=dt, keep=(), measures=MEASURES)
+        return time.perf_counter() - begin
+
+    first, times = once(), [once() for _ in range(REPEATS)]
+    best = min(times)
+    return {
+        "peer": "smajax",
+        "precision": str(jax.numpy.zeros(()).dtype),
+        "dt": dt,
+        "angle_error": off[0],
+        "fraction_error": off[1],
+        "accurate": given.meets(off),
+        "members": count,
+        "cores": jax.local_device_count(),
+        "ms_per_trajectory": 1e3 * best / count,
+        "compile_s": first - best,
+        "peak_memory_MB": peak_memory() / 1e6,
+    }
+
+
+def main() -> None:
+    asked = argparse.ArgumentParser(description=__doc__)
+    asked.add_argument("file", type=Path)
+    asked.add_argument("--count", type=int, default=65536)
+    asked.add_argument("--dt", type=float, default=DEFAULT_STEP)
+    asked.add_argument("--single-precision", action="store_true")
+    options = asked.parse_args()
+    prepare(cores=True)
+    jax.config.update("jax_enable_compilation_cache", False)  # so that compiling is seen
+    if options.single_precision:
+        jax.config.update("jax_enable_x64", False)
+    print(json.dumps(run(load(options.file), options.dt, options.count)))
+
+
+if __name__ == "__main__":
+    main()
