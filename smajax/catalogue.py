@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from smajax.effects.library import LIBRARY
 from smajax.experiment.catalogue import Catalogue, ModelDescription, ParameterInfo
+from smajax.extended import extended
 from smajax.load.coupon import AbstractCoupon
 from smajax.parameters import parameters
 from smajax.presets import DRIVES, LOADS, WIRES, build
@@ -19,9 +20,11 @@ def describe(wire: str, load: str, drive: str) -> ModelDescription:
             f"every other load is heated and takes one of {sorted(set(DRIVES) - {'none'})}."
         )
     name, unit = system.load.reading
+    # An effect is part of the base model when the experiment names a parameter of it.
+    whole = extended(system, candidates(system, None, ()))
     return ModelDescription(
         parameters={
-            entry.name: ParameterInfo(entry.unit, entry.low, entry.high) for entry in parameters(system).values()
+            entry.name: ParameterInfo(entry.unit, entry.low, entry.high) for entry in parameters(whole).values()
         },
         inputs_required=system.load.inputs_required | system.drive.inputs_required,
         inputs_optional=system.load.inputs_optional | system.drive.inputs_optional | {"ambient_temperature"},

@@ -7,7 +7,6 @@ import json
 import os
 import shlex
 import sys
-import webbrowser
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import resources
@@ -15,9 +14,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from smajax.report.findings import Findings
 
 app = typer.Typer(
@@ -26,20 +26,41 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     add_completion=True,
+    rich_markup_mode=None,  # the plain help is there at once
 )
-console = Console(stderr=True)
 DEMOS = ("latent", "complete")
 
 
+def console() -> Console:
+    """Where progress and errors are said."""
+    from rich.console import Console
+
+    return Console(stderr=True)
+
+
+def _browse(page: Path) -> None:
+    import webbrowser
+
+    webbrowser.open(page.resolve().as_uri())
+
+
 @contextmanager
-def _resumable() -> Iterator[None]:
+def _resumable(kept: str = "Finished fits are kept: the same command goes on from there.") -> Iterator[None]:
     """Ctrl-C is answered here: typer would end in silence."""
     try:
         yield
     except KeyboardInterrupt:
-        console.print("\nInterrupted. Finished fits are kept: the same command goes on from there.", soft_wrap=True)
+        console().print(f"\nInterrupted. {kept}", soft_wrap=True)
         # At once: an interpreter that shuts down in the middle of a compilation can crash.
         os._exit(130)
+
+
+def _folder(out: Path) -> None:
+    """Before the work, not after it: a folder that cannot be written to is found out at once."""
+    for part in (out, *out.parents):
+        if part.exists() and not part.is_dir():
+            raise NotADirectoryError(f"--out: {part} is a file; give the name of a folder.")
+    out.mkdir(parents=True, exist_ok=True)
 
 
 def _loop(experiment: Path, out: Path, command: str) -> tuple[Findings, Path]:
@@ -53,13 +74,9 @@ def _loop(experiment: Path, out: Path, command: str) -> tuple[Findings, Path]:
     from smajax.progress import shown
     from smajax.report.write import write_report
 
-    # Before the work, not after it: a folder that cannot be written to is found out at once.
-    for part in (out, *out.parents):
-        if part.exists() and not part.is_dir():
-            raise NotADirectoryError(f"--out: {part} is a file; give the name of a folder.")
-    out.mkdir(parents=True, exist_ok=True)
+    _folder(out)
     loaded = load_experiment(experiment, CATALOGUE)
-    with _resumable(), shown(console) as progress:
+    with _resumable(), shown(console()) as progress:
         findings = close_loop(loaded, memory=out / "fits", progress=progress, command=command)
     return findings, write_report(findings, out)
 
@@ -94,7 +111,109 @@ def close_loop_command(
     else:
         _say(findings, page)
     if open_page:
-        webbrowser.open(page.resolve().as_uri())
+        _browse(page)
+
+
+@app.command("identify")
+def identify_command(
+    experiment: Annotated[Path, typer.Argument(help="experiment.toml, or the folder that holds it")],
+    out: Annotated[Path, typer.Option(help="folder for identify.html and identify.json")],
+    starts: Annotated[int, typer.Option(min=0, help="points of the box that fits may start from; 0: as declared")] = 64,
+    profile: Annotated[str, typer.Option(help="parameters to draw a profile of, with commas, or `all`")] = "",
+    robust: Annotated[bool, typer.Option("--robust", help="Huber's loss: samples far off count less")] = False,
+    design: Annotated[bool, typer.Option("--design", help="say which run to do next")] = False,
+    json_out: Annotated[bool, typer.Option("--json", help="print identify.json on stdout instead of words")] = False,
+    open_page: Annotated[bool, typer.Option("--open", help="open the page in a browser")] = False,
+) -> None:
+    """Fit the unknowns of an experiment to its runs, with error bars, and say what the runs cannot tell.
+
+    An effect is part of the model when the experiment names one of its parameters ("latent_heat.enthalpy").
+
+    Example:  smajax identify experiment.toml --out identified --profile all --design
+    """
+    from smajax.runtime import prepare
+
+    prepare()
+    from smajax.catalogue import CATALOGUE
+    from smajax.experiment.load import load_experiment
+    from smajax.identify import identify
+    from smajax.progress import shown
+    from smajax.report.identify_page import conclusions, estimate_rows, record, write_identified
+
+    _folder(out)
+    loaded = load_experiment(experiment, CATALOGUE)
+    unknowns = [unknown.name for unknown in loaded.unknowns]
+    profiled = unknowns if profile == "all" else [part.strip() for part in profile.split(",") if part.strip()]
+    command = f"smajax identify {shlex.quote(str(experiment))} --out {shlex.quote(str(out))}"
+    try:
+        with _resumable("Nothing is kept of a fit that is not finished."), shown(console()) as progress:
+            found = identify(
+                loaded,
+                starts=starts,
+                profiled=profiled,
+                robust=robust,
+                design=design,
+                progress=progress,
+                command=command,
+            )
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from None
+    page = write_identified(found, out)
+    if json_out:
+        typer.echo(json.dumps(record(found), allow_nan=False))
+    else:
+        typer.echo(f"\n{found.title or found.experiment}")
+        for sentence in [*conclusions(found), *found.weak]:
+            typer.echo(f"  {sentence}")
+        for row in estimate_rows(found):
+            typer.echo(f"  {row[0]:<28} {row[1]} {row[2]}" + (f"  ({row[-1]})" if row[-1] else ""))
+        for one in found.suggestions[:1]:
+            typer.echo(f"  Next run: {one.what}")
+        typer.echo(f"Report: {page.resolve()}")
+    if open_page:
+        _browse(page)
+
+
+@app.command()
+def effects(json_out: Annotated[bool, typer.Option("--json", help="for machines")] = False) -> None:
+    """List the effects that `close-loop` may add: equation, formula, and what each means for a wire."""
+    from smajax.effects.library import LIBRARY
+    from smajax.parameters import parameters
+
+    told = {
+        name: {
+            "title": effect.title,
+            "equation": effect.equation,
+            "formula": effect.formula,
+            "meaning": effect.sentence,
+            "parameters": {
+                entry.name: {"unit": entry.unit, "bounds": [entry.low, entry.high]}
+                for entry in parameters(effect.base()).values()
+            },
+        }
+        for name, effect in LIBRARY.items()
+    }
+    if json_out:
+        typer.echo(json.dumps(told))
+        return
+    for name, one in told.items():
+        typer.echo(f"{name}  [{one['equation']}]\n  {one['title']}: {one['formula']}\n  {one['meaning']}")
+        for full, entry in one["parameters"].items():  # type: ignore[attr-defined]
+            typer.echo(f"    {full}: {entry['bounds'][0]:g} to {entry['bounds'][1]:g} {entry['unit']}")
+
+
+@app.command()
+def presets(json_out: Annotated[bool, typer.Option("--json", help="for machines")] = False) -> None:
+    """List the wires, loads and drives that an experiment file may name, and the controllers of the arm."""
+    from smajax.control_presets import CONTROLLERS
+    from smajax.presets import DRIVES, LOADS, WIRES
+
+    told = {"wires": list(WIRES), "loads": list(LOADS), "drives": list(DRIVES), "controllers": list(CONTROLLERS)}
+    if json_out:
+        typer.echo(json.dumps(told))
+        return
+    for kind, names in told.items():
+        typer.echo(f"{kind}: {', '.join(names)}")
 
 
 @app.command()
@@ -121,7 +240,7 @@ def demo(
                 typer.echo(f"  {line}")
         pages.append(page)
     if open_page and sys.stdout.isatty() and not os.environ.get("CI"):
-        webbrowser.open(pages[0].resolve().as_uri())
+        _browse(pages[0])
 
 
 @app.command()
@@ -152,7 +271,7 @@ def figures(
         asked = [row for name in names or CHAPTERS for row in rows(name)]
     except KeyError as error:
         raise typer.BadParameter(error.args[0], param_hint="NAME") from None
-    with _resumable(), shown(console) as progress:
+    with _resumable(), shown(console()) as progress:
         drawn = draw(list(dict.fromkeys(asked)), out, fast, progress)
     (out / "README.md").write_text(as_markdown(drawn), encoding="utf-8")
     page = out / "index.html"
@@ -160,7 +279,7 @@ def figures(
     typer.echo(as_text(drawn))
     typer.echo(f"Page: {page.resolve()}")
     if open_page and sys.stdout.isatty() and not os.environ.get("CI"):
-        webbrowser.open(page.resolve().as_uri())
+        _browse(page)
     if not all(one.holds for one in drawn):
         raise typer.Exit(1)
 
@@ -221,7 +340,7 @@ def sweep(
     if fast:
         settings = dataclasses.replace(settings, points=3, set_points=(-20.0, 20.0, 60.0), gains=(1.0,))
     try:
-        with _resumable(), shown(console) as progress:
+        with _resumable(), shown(console()) as progress:
             rows = run_sweep(arm(), settings, out, progress)
     except ValueError as error:
         raise typer.BadParameter(str(error)) from None
@@ -229,16 +348,19 @@ def sweep(
     page = out / "index.html"
     typer.echo(f"Page: {page.resolve()}")
     if open_page and sys.stdout.isatty() and not os.environ.get("CI"):
-        webbrowser.open(page.resolve().as_uri())
+        _browse(page)
 
 
 def main() -> None:
     """Entry point: errors that a user can mend are said in one paragraph with exit code 2, without a traceback."""
-    from smajax.experiment.errors import ExperimentError
-    from smajax.measured.table import MeasuredDataError
-
     try:
         app()
-    except (ExperimentError, MeasuredDataError, OSError) as error:
-        console.print(f"error: {error}", style="red", markup=False, highlight=False, soft_wrap=True)
+    except Exception as error:
+        # Imported when there is an error: `--help` does not wait for them.
+        from smajax.experiment.errors import ExperimentError
+        from smajax.measured.table import MeasuredDataError
+
+        if not isinstance(error, (ExperimentError, MeasuredDataError, OSError)):
+            raise
+        console().print(f"error: {error}", style="red", markup=False, highlight=False, soft_wrap=True)
         raise SystemExit(2) from None

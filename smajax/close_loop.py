@@ -68,8 +68,10 @@ def _defaults(system: System) -> dict[str, float]:
 
 def _job(experiment: Experiment) -> _Job:
     base = base_model(experiment)
-    names = candidates(base, experiment.effects_only, experiment.effects_excluded)
-    full = extended(base, names, {n: v for n, v in experiment.parameters.items() if "." in n})
+    declared = experiment.declared_effects
+    names = candidates(base, experiment.effects_only, (*experiment.effects_excluded, *declared))
+    known = {**experiment.parameters, **{unknown.name: unknown.start for unknown in experiment.unknowns}}
+    full = extended(base, (*declared, *names), {name: value for name, value in known.items() if "." in name})
     runs = tuple(run for run in experiment.runs if run.role == "fit")
     batch = pack(runs, experiment.step, _defaults(full))
     problem = Problem.build(full, batch, experiment.noise_sigma, experiment.offset)

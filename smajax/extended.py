@@ -13,11 +13,13 @@ from smajax.system import System
 
 
 def base_model(experiment: Experiment) -> System:
-    """The preset with the experiment's known values and the starts of its unknowns; no effects."""
-    system = build(experiment.wire, experiment.load, experiment.drive)
-    known = {name: value for name, value in experiment.parameters.items() if "." not in name}
+    """The preset with the experiment's known values and the starts of its unknowns.
+
+    It has the effects of which the experiment names a parameter (`latent_heat.enthalpy`), and no others.
+    """
+    system = extended(build(experiment.wire, experiment.load, experiment.drive), experiment.declared_effects)
     starts = {unknown.name: unknown.start for unknown in experiment.unknowns}
-    return set_parameters(system, {**known, **starts})
+    return set_parameters(system, {**experiment.parameters, **starts})
 
 
 def extended(system: System, effects: Sequence[str], coefficients: Mapping[str, float] | None = None) -> System:

@@ -65,3 +65,9 @@ class Experiment:
     effects_excluded: tuple[str, ...]
     runs: tuple[Run, ...]
     warnings: tuple[str, ...]
+
+    @property
+    def declared_effects(self) -> tuple[str, ...]:
+        """Effects that the base model has already: those of which a parameter is given or unknown."""
+        named = [*self.parameters, *(unknown.name for unknown in self.unknowns)]
+        return tuple(dict.fromkeys(name.split(".", 1)[0] for name in named if "." in name))

@@ -76,11 +76,12 @@ class Problem(eqx.Module):
         The offset enters linearly, so its best value for any model is the mean misfit: it needs no slot.
         """
         batch = self.batch
-        misfit = (batch.output - simulate_batch(self.system_at(values), batch).reading) * batch.mask
+        raw = batch.output - simulate_batch(self.system_at(values), batch).reading
         if self.offset:
-            mean = misfit.sum(axis=1) / batch.mask.sum(axis=1)
-            misfit = (misfit - mean[:, None]) * batch.mask
-        return misfit
+            # The mask may hold square roots of weights between 0 and 1 (`fit.robust`).
+            weight = batch.mask**2
+            raw = raw - ((raw * weight).sum(axis=1) / weight.sum(axis=1))[:, None]
+        return raw * batch.mask
 
 
 def values_of(free: Float[Array, " slot"], lane: Lane) -> Float[Array, " parameter"]:

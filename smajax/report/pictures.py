@@ -26,17 +26,17 @@ SAMPLES_DRAWN = 3000  # per curve: more than the pixels across
 STRIPS = 3  # input channels drawn under one run
 
 
-def _png(figure: Figure) -> bytes:
+def as_png(figure: Figure) -> bytes:
     stream = io.BytesIO()
     figure.savefig(stream, format="png", dpi=DPI, facecolor="white", metadata={"Software": None})
     return stream.getvalue()
 
 
-def _figure(height: float, width: float = WIDTH) -> Figure:
+def new_figure(height: float, width: float = WIDTH) -> Figure:
     return Figure(figsize=(width, height), layout="constrained")
 
 
-def _tidy(axes: Axes) -> None:
+def tidy(axes: Axes) -> None:
     axes.spines[["top", "right"]].set_visible(False)
     axes.tick_params(labelsize=9, color=QUIET)
     axes.grid(True, color="#eceef1", linewidth=0.7)
@@ -47,7 +47,7 @@ def _thinned(samples: int) -> slice:
     return slice(None, None, max(1, samples // SAMPLES_DRAWN))
 
 
-def _extremes(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def extremes(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """A long series by the lowest and highest sample of each bucket, so that no peak is lost; short ones unchanged."""
     size = -(-2 * len(time) // SAMPLES_DRAWN)
     if size <= 2:
@@ -80,15 +80,15 @@ def run_over_time(findings: Findings, run: RunFinding) -> bytes:
     """Output measured, before and after; the residuals with the noise band; the varying inputs on thin strips."""
     shown = display(findings.output_unit, findings.output_name)
     models, strips = _models(findings, run), _varying(run.inputs)
-    figure = _figure(4.7 + 0.75 * max(len(strips) - 1, 0))
+    figure = new_figure(4.7 + 0.75 * max(len(strips) - 1, 0))
     rows = figure.subplots(2 + len(strips), 1, sharex=True, height_ratios=[3.0, 1.5, *[0.7] * len(strips)])
     output, residual = rows[0], rows[1]
     output.plot(
-        *_extremes(run.time, shown.of(run.measured)), color=MEASURED, linewidth=2.2, alpha=0.55, label="measured"
+        *extremes(run.time, shown.of(run.measured)), color=MEASURED, linewidth=2.2, alpha=0.55, label="measured"
     )
     for name, values, colour in models:
-        output.plot(*_extremes(run.time, shown.of(values)), color=colour, linewidth=1.2, label=name)
-        residual.plot(*_extremes(run.time, shown.of(run.measured - values)), color=colour, linewidth=0.9)
+        output.plot(*extremes(run.time, shown.of(values)), color=colour, linewidth=1.2, label=name)
+        residual.plot(*extremes(run.time, shown.of(run.measured - values)), color=colour, linewidth=0.9)
     output.set_ylabel(axis_label(findings.output_name, shown), fontsize=9)
     band = 2.0 * shown.of(findings.noise_sigma)
     residual.axhspan(-band, band, color=NOISE, zorder=0, label="noise, ± 2 σ")
@@ -96,15 +96,15 @@ def run_over_time(findings: Findings, run: RunFinding) -> bytes:
     residual.set_ylabel("measured\n− model" + (f" ({shown.unit})" if shown.unit else ""), fontsize=9)
     for axes, name in zip(rows[2:], strips, strict=True):
         unit = channel(name)
-        axes.plot(*_extremes(run.time, unit.of(run.inputs[name])), color="#5b6470", linewidth=0.9)
+        axes.plot(*extremes(run.time, unit.of(run.inputs[name])), color="#5b6470", linewidth=0.9)
         axes.set_ylabel(f"{label(name)}\n({unit.unit})" if unit.unit else label(name), fontsize=8)
     rows[-1].set_xlabel("time (s)", fontsize=9)
     for axes in rows:
-        _tidy(axes)
+        tidy(axes)
         axes.margins(x=0.01)
     figure.legend(loc="outside upper center", ncols=4, frameon=False, fontsize=9)
     figure.align_ylabels(list(rows))
-    return _png(figure)
+    return as_png(figure)
 
 
 def run_hysteresis(findings: Findings, run: RunFinding) -> bytes | None:
@@ -115,7 +115,7 @@ def run_hysteresis(findings: Findings, run: RunFinding) -> bytes | None:
     thin = _thinned(len(run.time))
     temperature = run.states["temperature"][thin]
     fraction = run.states.get("martensite_fraction")
-    figure = _figure(4.7, width=4.6)
+    figure = new_figure(4.7, width=4.6)
     heights = [2.2] if fraction is None else [2.2, 1.0]
     rows = figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
     rows[0].plot(temperature, shown.of(run.measured[thin]), color=MEASURED, linewidth=2.2, alpha=0.55, label="measured")
@@ -130,8 +130,8 @@ def run_hysteresis(findings: Findings, run: RunFinding) -> bytes | None:
         rows[1].set_ylabel("martensite\nfraction", fontsize=9)
     rows[-1].set_xlabel("wire temperature of the model (°C)", fontsize=9)
     for axes in rows:
-        _tidy(axes)
-    return _png(figure)
+        tidy(axes)
+    return as_png(figure)
 
 
 def errors_by_run(findings: Findings) -> bytes:
@@ -139,7 +139,7 @@ def errors_by_run(findings: Findings) -> bytes:
     shown = display(findings.output_unit, findings.output_name)
     runs = findings.runs
     single = nothing_added(findings)
-    figure = _figure(0.9 + 0.42 * max(len(runs), 2), NARROW)
+    figure = new_figure(0.9 + 0.42 * max(len(runs), 2), NARROW)
     axes = figure.subplots()
     places = np.arange(len(runs))[::-1]
     for row, run in zip(places, runs, strict=True):
@@ -158,9 +158,9 @@ def errors_by_run(findings: Findings) -> bytes:
     axes.set_xlim(left=0.0)
     axes.set_ylim(-0.6, len(runs) - 0.4)
     figure.legend(loc="outside upper center", ncols=3, frameon=False, fontsize=9)
-    _tidy(axes)
+    tidy(axes)
     axes.grid(False, axis="y")
-    return _png(figure)
+    return as_png(figure)
 
 
 def _short(name: str, width: int = 26) -> str:
@@ -183,7 +183,7 @@ def candidates_ranked(findings: Findings) -> bytes | None:
     if not scored:
         return None
     shown = display(findings.output_unit, findings.output_name)
-    figure = _figure(1.2 + 0.32 * max(len(scored), 3), NARROW)
+    figure = new_figure(1.2 + 0.32 * max(len(scored), 3), NARROW)
     axes = figure.subplots()
     places = np.arange(len(scored) + 1)[::-1]
     colours = [BEFORE, *(AFTER if effect.added else QUIET for effect in scored)]
@@ -201,9 +201,9 @@ def candidates_ranked(findings: Findings) -> bytes | None:
     axes.set_xlim(left=0.0)
     axes.set_ylim(-0.6, len(scored) + 0.6)
     figure.legend(loc="outside upper center", ncols=3, frameon=False, fontsize=9)
-    _tidy(axes)
+    tidy(axes)
     axes.grid(False, axis="y")
-    return _png(figure)
+    return as_png(figure)
 
 
 def _left_out(effect: EffectFinding) -> float:
@@ -229,7 +229,7 @@ def residual_by_phase(findings: Findings) -> bytes | None:
     if not phases:
         return None
     shown = display(findings.output_unit, findings.output_name)
-    figure = _figure(0.95 + 0.42 * max(len(phases), 2))
+    figure = new_figure(0.95 + 0.42 * max(len(phases), 2))
     share, error = figure.subplots(1, 2, sharey=True)
     places = np.arange(len(phases))[::-1]
 
@@ -253,9 +253,9 @@ def residual_by_phase(findings: Findings) -> bytes | None:
     figure.legend(loc="outside upper center", ncols=4, frameon=False, fontsize=9)
     for axes in (share, error):
         axes.set_xlim(left=0.0)
-        _tidy(axes)
+        tidy(axes)
         axes.grid(False, axis="y")
-    return _png(figure)
+    return as_png(figure)
 
 
 def autocorrelation(series: Sequence[np.ndarray], lags: int) -> np.ndarray:
@@ -277,7 +277,7 @@ def residual_correlation(findings: Findings) -> bytes | None:
         return None
     lags = min(200, min(len(run.time) for run in runs) // 4)
     step = float(np.median(np.diff(runs[0].time)))
-    figure = _figure(2.6)
+    figure = new_figure(2.6)
     axes = figure.subplots()
     band = 1.96 / np.sqrt(sum(len(run.time) for run in runs))
     axes.axhspan(-band, band, color=NOISE, zorder=0, label="95 % of white noise")
@@ -289,5 +289,5 @@ def residual_correlation(findings: Findings) -> bytes | None:
     axes.set_xlabel("lag (s)", fontsize=9)
     axes.set_ylabel("autocorrelation\nof the residual", fontsize=9)
     figure.legend(loc="outside upper center", ncols=3, frameon=False, fontsize=9)
-    _tidy(axes)
-    return _png(figure)
+    tidy(axes)
+    return as_png(figure)

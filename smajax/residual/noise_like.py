@@ -8,6 +8,7 @@ import numpy as np
 from scipy import stats
 
 LAGS = 20
+WHITE = 0.01  # a residual whose whiteness has a smaller p-value has structure
 
 
 def autocorrelation(series: np.ndarray, lags: int) -> np.ndarray:

@@ -7,9 +7,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from smajax.report.findings import Portrait
-from smajax.residual.noise_like import whiteness_p_value
+from smajax.residual.noise_like import WHITE, whiteness_p_value
 
-WHITE = 0.01  # a residual whose whiteness has a smaller p-value has structure
 # A residual may miss the noise level by this share of its mean square and still be called noise: a noise sigma is
 # rarely known better, and no effect worth a name hides in 2 %.
 LEFT_OVER = 0.02

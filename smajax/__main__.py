@@ -1,0 +1,5 @@
+"""`python -m smajax` is `smajax`."""
+
+from smajax.cli import main
+
+main()

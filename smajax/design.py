@@ -1,0 +1,111 @@
+"""Which run to do next: candidate inputs within what was applied already, ranked by what they would tell."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+
+from smajax.experiment.record import Run
+from smajax.fit.batch import RunBatch
+from smajax.fit.problem import Problem
+from smajax.fit.sensitivity import sensitivity
+
+LEVELS = (0.4, 0.6, 0.8, 1.0)  # of the range that was applied
+HELD = 3  # values at most of an input that is held
+SEEN = 1e-12
+
+
+@dataclass(frozen=True)
+class Suggestion:
+    """A run that was not done: what it applies, and what it would tell."""
+
+    what: str
+    inputs: dict[str, np.ndarray]  # channel -> (n,)
+    information: float  # nats: half the rise of the logarithm of the information's determinant
+    shrinks: dict[str, float]  # parameter -> its standard error afterwards over the present one
+
+
+def _shapes(count: int) -> dict[str, np.ndarray]:
+    """Courses between 0 and 1, each of shape (count,)."""
+    t = np.linspace(0.0, 1.0, count)
+    staircase = np.concatenate([np.linspace(0.25, 1.0, 4), np.linspace(0.75, 0.0, 4)])
+    return {
+        "held for 60 % of the run, then off": np.where(t < 0.6, 1.0, 0.0),
+        "three equal pulses": np.where((6.0 * t).astype(int) % 2 == 0, 1.0, 0.0),
+        "ramped up and down once": 1.0 - np.abs(2.0 * t - 1.0),
+        "ramped up and down three times": 1.0 - np.abs(2.0 * ((3.0 * t) % 1.0) - 1.0),
+        "in stairs up and down": staircase[np.minimum((8.0 * t).astype(int), 7)],
+    }
+
+
+def _held(runs: Sequence[Run], channel: str) -> list[float]:
+    values = sorted({round(float(np.median(run.inputs[channel])), 12) for run in runs})
+    return values if len(values) <= HELD else [values[0], values[len(values) // 2], values[-1]]
+
+
+def candidate_runs(runs: Sequence[Run]) -> dict[str, dict[str, np.ndarray]]:
+    """Inputs by what they are in words: the channel that varies most takes each course, the others the values they had.
+
+    Empty where nothing varies within a run.
+    """
+    swing = {
+        name: max(float(np.ptp(run.inputs[name])) for run in runs)
+        / (max(float(np.abs(run.inputs[name]).max()) for run in runs) or 1.0)
+        for name in runs[0].inputs
+    }
+    main = max(swing, key=lambda name: swing[name])
+    if swing[main] == 0.0:
+        return {}
+    count = int(np.median([len(run.time) for run in runs]))
+    low = min(float(run.inputs[main].min()) for run in runs)
+    high = max(float(run.inputs[main].max()) for run in runs)
+    others = [name for name in runs[0].inputs if name != main]
+    found = {}
+    for (shape, course), level in itertools.product(_shapes(count).items(), LEVELS):
+        for values in itertools.product(*(_held(runs, name) for name in others)):
+            top = low + level * (high - low)
+            said = "".join(f", {name} {value:.4g}" for name, value in zip(others, values, strict=True))
+            series = {name: np.full(count, value) for name, value in zip(others, values, strict=True)}
+            found[f"{main} {shape}, up to {top:.4g}{said}"] = {main: low + course * (top - low), **series}
+    return found
+
+
+def suggestions(
+    problem: Problem, values: np.ndarray, names: Sequence[str], runs: Sequence[Run], inflation: float, count: int = 5
+) -> tuple[Suggestion, ...]:
+    """The `count` best candidates for the parameters `names` at the fit `values` (P + 1,), best first; D-optimal.
+
+    The information of a run is that of its Jacobian at the fit, each run's offset taken off where the experiment has
+    one: it holds for the model as fitted, and knows nothing of an effect that the model lacks.
+    """
+    candidates = candidate_runs(runs)
+    if not candidates or not names:
+        return ()
+    batch = problem.batch
+    series = list(candidates.values())
+    length = len(next(iter(series[0].values())))
+    blank = jnp.zeros((len(series), length))
+    # Parameters that a run overrides: as they were in the first one.
+    overrides = jnp.repeat(batch.overrides[:1], len(series), axis=0)
+    inputs = {name: jnp.asarray(np.stack([one[name] for one in series])) for name in batch.inputs}
+    trial = RunBatch(inputs, blank, jnp.ones_like(blank), overrides, batch.override_names, batch.dt)
+    scale = np.asarray([abs(values[problem.names.index(name)]) or 1.0 for name in names])
+    here = sensitivity(problem, values, names).columns(names) * scale
+    there = sensitivity(eqx.tree_at(lambda one: one.batch, problem, trial), values, names)
+    known = here.T @ here / inflation + SEEN * np.eye(len(names))
+    before = np.sqrt(np.diag(np.linalg.inv(known)))
+    found = []
+    for (what, one), jacobian in zip(candidates.items(), there.jacobian, strict=True):
+        own = jacobian * scale
+        if not np.isfinite(own).all():
+            continue
+        after = known + own.T @ own / inflation
+        gain = 0.5 * float(np.linalg.slogdet(after)[1] - np.linalg.slogdet(known)[1])
+        errors = np.sqrt(np.diag(np.linalg.inv(after))) / before
+        found.append(Suggestion(what, one, gain, dict(zip(names, errors.tolist(), strict=True))))
+    return tuple(sorted(found, key=lambda one: -one.information)[:count])

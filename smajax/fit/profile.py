@@ -1,0 +1,75 @@
+"""Profile likelihood: a parameter held at values beside its estimate, all others fitted again at each."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from smajax.fit.problem import Problem
+from smajax.fit.solve import Progress, Solution, quiet, solve
+
+ERRORS = (-2.8, -2.1, -1.4, -0.7, 0.7, 1.4, 2.1, 2.8)  # standard errors from the estimate
+SPARE = 0.1  # share of the box, for a parameter that has no standard error
+WITHIN = 1.959964  # square root of the 95 % point of chi-square with one degree of freedom
+
+
+@dataclass(frozen=True)
+class Profile:
+    """One parameter: values (K,) in order, the estimate among them, and the rise of the cost there."""
+
+    name: str
+    values: np.ndarray
+    rise: np.ndarray  # over the least, in units of the variance of an independent sample
+    low: float | None  # 95 % interval; None: not reached before the bound
+    high: float | None
+
+
+def _crossing(values: np.ndarray, root: np.ndarray) -> float | None:
+    """Where the root of the rise reaches `WITHIN`, going outwards from the estimate, by straight lines."""
+    beyond = np.flatnonzero(root >= WITHIN)
+    if not len(beyond) or beyond[0] == 0:
+        return None
+    k = beyond[0]
+    return float(np.interp(WITHIN, root[k - 1 : k + 1], values[k - 1 : k + 1]))
+
+
+def profiles(
+    problem: Problem,
+    asked: Sequence[str],
+    names: Sequence[str],
+    bounds: Mapping[str, tuple[float, float]],
+    best: Solution,
+    errors: Mapping[str, float | None],
+    inflation: float,
+    progress: Progress = quiet,
+) -> tuple[Profile, ...]:
+    """Profiles of the parameters `asked`, which are among the fitted `names`; `best` is their fit."""
+    index = problem.names.index
+    lanes, points = [], []
+    for name in asked:
+        low, high = bounds[name]
+        error = errors[name] or SPARE * (high - low)
+        others = [other for other in names if other != name]
+        for share in ERRORS:
+            value = float(best.values[index(name)] + share * error)
+            if not low <= value <= high:
+                continue
+            start = np.array(best.values)
+            start[index(name)] = value
+            lanes.append(problem.lane(others, bounds, start, len(names)))
+            points.append((name, value))
+    solved = solve(problem, lanes, legs=4, progress=progress, what="profiles") if lanes else []
+    found = []
+    for name in asked:
+        here = [(value, one.cost) for (of, value), one in zip(points, solved, strict=True) if of == name]
+        here = sorted([*here, (float(best.values[index(name)]), best.cost)])
+        values, cost = (np.asarray(column) for column in zip(*here, strict=True))
+        rise = np.maximum(cost - best.cost, 0.0) / inflation
+        middle = int(np.argmin(np.abs(values - best.values[index(name)])))
+        root = np.sqrt(rise)
+        down = _crossing(values[middle::-1], root[middle::-1])
+        up = _crossing(values[middle:], root[middle:])
+        found.append(Profile(name, values, rise, down, up))
+    return tuple(found)

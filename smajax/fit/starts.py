@@ -1,0 +1,53 @@
+"""Where fits start: the best of many points of the box, so that no fit ends in the valley that it happened to start in."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from scipy.stats import qmc
+
+from smajax.fit.problem import Lane, Problem
+from smajax.fit.solve import Progress, Solution, misfits, quiet, solve
+
+MARGIN = 0.02  # share of the box that is kept from its bounds
+TRIED = 64
+BEGUN = 8  # fits that are begun
+KEPT = 4  # and that are carried to their end
+
+
+def box_points(start: np.ndarray, columns: Sequence[int], box: np.ndarray, count: int, seed: int) -> np.ndarray:
+    """`start` (P + 1,) with its `columns` at Sobol points of `box` (C, 2): shape (count, P + 1)."""
+    sobol = qmc.Sobol(len(columns), seed=seed).random(count)
+    points = np.tile(start, (count, 1))
+    points[:, columns] = box[:, 0] + (MARGIN + (1.0 - 2.0 * MARGIN) * sobol) * (box[:, 1] - box[:, 0])
+    return points
+
+
+def from_many_starts(
+    problem: Problem,
+    names: Sequence[str],
+    bounds: Mapping[str, tuple[float, float]],
+    seed: int,
+    tried: int = TRIED,
+    progress: Progress = quiet,
+) -> list[Solution]:
+    """Fits of `names`, best first: of `tried` points the best are begun, and the best of those carried to their end."""
+    start = problem.start_values()
+    points = [start]
+    if tried:
+        box = np.asarray([bounds[name] for name in names])
+        drawn = box_points(start, [problem.names.index(name) for name in names], box, tried, seed)
+        progress(f"simulating at {tried} points of the box", 0.0)
+        squares = (misfits(problem, drawn) / float(problem.noise_sigma)) ** 2
+        cost = np.nan_to_num(squares.sum(axis=(1, 2)), nan=np.inf)
+        points += list(drawn[np.argsort(cost)[: BEGUN - 1]])
+        progress(f"simulating at {tried} points of the box", 1.0)
+
+    def lanes(values: Sequence[np.ndarray]) -> list[Lane]:
+        return [problem.lane(names, bounds, one, len(names)) for one in values]
+
+    begun = solve(problem, lanes(points), legs=1, progress=progress, what="beginning fits")
+    best = sorted(begun, key=lambda one: one.cost)[:KEPT]
+    ended = solve(problem, lanes([one.values for one in best]), progress=progress, what="fitting")
+    return sorted(ended, key=lambda one: one.cost)

@@ -1,0 +1,258 @@
+"""Measured runs -> parameters with error bars: fit from many starts, what the runs tell, and what they do not."""
+
+from __future__ import annotations
+
+import platform
+import time as clock
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib import metadata
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from scipy import stats
+
+from smajax.design import Suggestion, suggestions
+from smajax.experiment.record import Experiment, Run
+from smajax.extended import base_model
+from smajax.fit.batch import pack, simulate_batch
+from smajax.fit.directions import Direction, directions, weak_ones
+from smajax.fit.problem import Problem
+from smajax.fit.profile import Profile, profiles
+from smajax.fit.robust import robust_fit
+from smajax.fit.sensitivity import sensitivity
+from smajax.fit.solve import Progress, Solution, quiet, solve
+from smajax.fit.starts import TRIED, from_many_starts
+from smajax.fit.uncertainty import covariance_of, identifiability, uncertainty
+from smajax.parameters import get_parameters, parameters
+from smajax.residual.noise_like import LAGS, WHITE, correlation_time, split_runs, whiteness_p_value
+from smajax.types import Trajectory
+
+SEED = 2004
+ALIKE = 0.01  # fits whose cost differs by less than this share have found the same
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """One parameter, in the program's own unit."""
+
+    name: str
+    unit: str
+    value: float
+    standard_error: float | None  # None: not told by the runs
+    lower: float
+    upper: float
+    start: float
+    remark: str
+
+
+@dataclass(frozen=True)
+class IdentifiedRun:
+    """One run as the fitted model simulates it."""
+
+    name: str
+    role: str
+    time: np.ndarray  # (n,)
+    inputs: dict[str, np.ndarray]
+    measured: np.ndarray
+    simulated: np.ndarray  # with the run's offset
+    spread: np.ndarray  # standard error of the simulation that the parameters' make
+    rmse: float
+
+
+@dataclass(frozen=True)
+class Identified:
+    """What the runs told. `correlation` is that of the estimates `correlated`, (K, K)."""
+
+    experiment: str
+    title: str
+    source: str
+    output_name: str
+    output_unit: str
+    noise_sigma: float
+    noise_how: str
+    stopped: str
+    check: tuple[str, ...]
+    estimates: tuple[Estimate, ...]
+    correlated: tuple[str, ...]
+    correlation: np.ndarray
+    weak: tuple[str, ...]
+    directions: tuple[Direction, ...]
+    profiles: tuple[Profile, ...]
+    start_costs: tuple[float, ...]  # mean square over the noise's, of every fit carried to its end
+    ratio: float  # rms of the fit runs' residual over the noise
+    whiteness_p: float
+    normality_p: float
+    independent: float  # samples an independent one
+    robust: bool
+    runs: tuple[IdentifiedRun, ...]
+    suggestions: tuple[Suggestion, ...]
+    provenance: dict[str, str]
+
+
+@eqx.filter_jit
+def _simulated(problem: Problem, values: jax.Array) -> Trajectory:
+    return simulate_batch(problem.system_at(values), problem.batch)
+
+
+def _stopped(best: Solution, fits: Sequence[Solution]) -> str:
+    """Why the fit ended, and how many starts came to the same."""
+    end = (
+        "the last iterations lowered the cost by less than a thousandth"
+        if best.converged
+        else f"the iterations ran out ({best.legs} times ten): it may not be the best fit yet"
+    )
+    same = sum(one.cost <= (1.0 + ALIKE) * best.cost for one in fits)
+    return (
+        f"The fit stopped because {end}. {same} of the {len(fits)} fits carried to their end found the same least cost."
+    )
+
+
+def _whitened(runs: Sequence[np.ndarray], step: float) -> np.ndarray:
+    """Samples so far apart that they are nearly independent, over their own spread."""
+    apart = max(1, round(step))
+    return np.concatenate([(run[::apart] - run.mean()) / (run.std() or 1.0) for run in runs])
+
+
+def _problem(experiment: Experiment, runs: Sequence[Run]) -> Problem:
+    model = base_model(experiment)
+    names = list(parameters(model))
+    defaults = dict(zip(names, np.asarray(get_parameters(model, names)).tolist(), strict=True))
+    return Problem.build(model, pack(runs, experiment.step, defaults), experiment.noise_sigma, experiment.offset)
+
+
+def identify(
+    experiment: Experiment,
+    *,
+    starts: int = TRIED,
+    profiled: Sequence[str] = (),
+    robust: bool = False,
+    design: bool = False,
+    progress: Progress = quiet,
+    command: str = "",
+    seed: int = SEED,
+) -> Identified:
+    """Fit the experiment's unknowns to its fit runs and say how well each is known; held-out runs are only simulated.
+
+    `starts`: points of the box that the fit may start from, beside the declared one. `profiled`: parameters to draw a
+    profile likelihood of. `robust`: Huber's loss. `design`: rank runs that could be done next. Raises ValueError when
+    there is nothing to fit, for a profile of what is not fitted, and in float32.
+    """
+    if jnp.zeros(()).dtype != jnp.float64:
+        raise ValueError("identify needs float64: call `jax.config.update('jax_enable_x64', True)` first.")
+    names = tuple(unknown.name for unknown in experiment.unknowns)
+    if not names:
+        raise ValueError(f"{experiment.path}: nothing is declared unknown; add a section [unknown.NAME].")
+    odd = [name for name in profiled if name not in names]
+    if odd:
+        raise ValueError(f"no profile of {odd}, which are not fitted; fitted are {', '.join(names)}.")
+    began = clock.monotonic()
+    fit_runs = [run for run in experiment.runs if run.role == "fit"]
+    problem = _problem(experiment, fit_runs)
+    bounds = {unknown.name: (unknown.low, unknown.high) for unknown in experiment.unknowns}
+    start = problem.start_values()
+    check = [*experiment.warnings, *identifiability(sensitivity(problem, start, names), names, bounds)]
+    for line in check:
+        progress(f"say: check: {line}", 1.0)
+    fits = from_many_starts(problem, names, bounds, seed, starts, progress)
+    best, weighted = fits[0], problem
+    if robust:
+
+        def again(changed: Problem, values: np.ndarray) -> Solution:
+            lane = changed.lane(names, bounds, values, len(names))
+            return solve(changed, [lane], legs=3, progress=progress, what="fitting by Huber's loss")[0]
+
+        weighted, best = robust_fit(problem, best, again)
+
+    index = problem.names.index
+    values = {name: float(best.values[index(name)]) for name in names}
+    at = sensitivity(weighted, best.values, names)
+    known = uncertainty(at, names, values, bounds)
+    residual = split_runs(at.misfit, at.mask)
+    white = whiteness_p_value(residual, LAGS)
+    memory = 1.0 if white > WHITE else correlation_time(residual)
+    ratio = float(np.sqrt(np.mean(np.concatenate(residual) ** 2)))
+    inflation = max(ratio**2, 1e-300) * memory
+    correlated, covariance = covariance_of(at, names, known)
+    spread = np.sqrt(np.diag(covariance)) if len(correlated) else np.ones(0)
+    seen = [name for name in names if np.any(at.columns([name]))]
+    weak = directions(at, seen, values, inflation) if seen else ()
+    drawn = profiles(weighted, profiled, names, bounds, best, known.standard_error, inflation, progress)
+    progress("simulating every run", 0.0)
+    runs = _runs(experiment, best.values, correlated, covariance)
+    progress("simulating every run", 1.0)
+    ideas = suggestions(weighted, best.values, correlated, fit_runs, inflation) if design else ()
+    table = parameters(problem.system)
+    return Identified(
+        experiment=experiment.name,
+        title=experiment.title,
+        source=experiment.path.name,
+        output_name=experiment.output_name,
+        output_unit=experiment.output_unit,
+        noise_sigma=experiment.noise_sigma,
+        noise_how=experiment.noise_how,
+        stopped=_stopped(fits[0], fits),
+        check=tuple(check),
+        estimates=tuple(
+            Estimate(
+                name,
+                table[name].unit,
+                values[name],
+                known.standard_error[name],
+                *bounds[name],
+                float(start[index(name)]),
+                known.remark[name],
+            )
+            for name in names
+        ),
+        correlated=correlated,
+        correlation=covariance / np.outer(spread, spread),
+        weak=tuple(weak_ones(weak)),
+        directions=weak,
+        profiles=drawn,
+        start_costs=tuple(one.cost / float(problem.batch.mask.sum()) for one in fits),
+        ratio=ratio,
+        whiteness_p=white,
+        normality_p=float(stats.normaltest(_whitened(residual, memory)).pvalue),
+        independent=memory,
+        robust=robust,
+        runs=runs,
+        suggestions=ideas,
+        provenance=_provenance(command, seed, starts, clock.monotonic() - began),
+    )
+
+
+def _runs(
+    experiment: Experiment, values: np.ndarray, names: Sequence[str], covariance: np.ndarray
+) -> tuple[IdentifiedRun, ...]:
+    """Every run, held-out ones included, simulated at the fit."""
+    problem = _problem(experiment, experiment.runs)
+    reading = np.asarray(_simulated(problem, jnp.asarray(values)).reading)
+    moved = sensitivity(problem, values, names).jacobian * experiment.noise_sigma if names else None
+    found = []
+    for number, run in enumerate(experiment.runs):
+        n = len(run.time)
+        own = reading[number, :n]
+        own = own + (float(np.mean(run.output - own)) if experiment.offset else 0.0)
+        spread = np.zeros(n)
+        if moved is not None:
+            here = moved[number, :n]
+            spread = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", here, covariance, here), 0.0))
+        rmse = float(np.sqrt(np.mean((run.output - own) ** 2)))
+        found.append(IdentifiedRun(run.name, run.role, run.time, run.inputs, run.output, own, spread, rmse))
+    return tuple(found)
+
+
+def _provenance(command: str, seed: int, starts: int, seconds: float) -> dict[str, str]:
+    versions = {name: metadata.version(name) for name in ("smajax", "jax", "equinox", "optimistix", "numpy", "scipy")}
+    return {
+        **{f"version of {name}": version for name, version in versions.items()},
+        "python": platform.python_version(),
+        "machine": f"{platform.system()} {platform.machine()}, {jax.default_backend()}",
+        "command": command,
+        "seed": str(seed),
+        "points of the box that were tried": str(starts),
+        "seconds": f"{seconds:.0f}",
+    }

@@ -1,0 +1,219 @@
+"""An identification as one self-contained page, and as a record for machines."""
+
+from __future__ import annotations
+
+import base64
+import html
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from smajax.identify import Estimate, Identified
+from smajax.report import identify_pictures as draw
+from smajax.report.display import digits, display, label, p_value, with_error
+from smajax.report.files import json_text, replace
+from smajax.residual.noise_like import WHITE
+
+STYLE = (
+    "body{font:15px/1.5 system-ui,sans-serif;max-width:1080px;margin:2em auto;padding:0 1em;color:#1d1d1f;background:#fff}"
+    "td,th{text-align:left;vertical-align:top;padding:.35em .7em;border-bottom:1px solid #e3e5e9}"
+    "table{border-collapse:collapse;font-size:14px;display:block;overflow-x:auto;margin:0 0 1em}"
+    "td.n,th.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}"
+    "img{max-width:100%;display:block;margin:0 0 1em}.quiet{color:#626973}h2{margin-top:1.6em}"
+    "p,ul{max-width:62em}"
+)
+
+
+def conclusions(found: Identified) -> list[str]:
+    """What was found, in sentences that say no more than the numbers."""
+    unit = display(found.output_unit, found.output_name)
+    told = [found.stopped]
+    by_role = {
+        role: [one.rmse for one in found.runs if one.role == role] for role in dict.fromkeys(r.role for r in found.runs)
+    }
+    errors = "; ".join(
+        f"{role} runs {digits(unit.of(float(np.sqrt(np.mean(np.square(values))))), 3)} {unit.unit}".strip()
+        for role, values in by_role.items()
+    )
+    told.append(
+        f"Error (rms): {errors}; noise {digits(unit.of(found.noise_sigma), 3)} {unit.unit}, {found.noise_how}.".replace(
+            " ,", ","
+        )
+    )
+    if found.whiteness_p < WHITE:
+        told.append(
+            f"The residual is {found.ratio:.2g} times the noise and has a memory ({p_value(found.whiteness_p)}; one "
+            f"sample in {found.independent:.0f} is independent): the model lacks something, and the standard errors allow "
+            "for the memory but not for what that does to the values. `smajax close-loop` looks for what it is."
+        )
+    else:
+        told.append(
+            f"The residual is {found.ratio:.2g} times the noise and has no memory ({p_value(found.whiteness_p)}): the "
+            "model says all that these runs show."
+        )
+    if found.normality_p < WHITE and not found.robust:
+        told.append(
+            f"It is not normally distributed ({p_value(found.normality_p)}): if single samples are far off, fit by Huber's "
+            "loss (`--robust`)."
+        )
+    silent = [one.name for one in found.estimates if one.standard_error is None]
+    if silent:
+        told.append(f"The runs do not tell {', '.join(silent)}: see the remarks.")
+    return told
+
+
+def _table(head: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequence[int] = ()) -> str:
+    def cells(kind: str, row: Sequence[str]) -> str:
+        return "".join(
+            f"<{kind}{' class=n' if k in numbers else ''}>{html.escape(cell)}</{kind}>" for k, cell in enumerate(row)
+        )
+
+    body = "".join(f"<tr>{cells('td', row)}</tr>" for row in rows)
+    return f"<table><tr>{cells('th', head)}</tr>{body}</table>"
+
+
+def _picture(png: bytes | None, alt: str) -> str:
+    if png is None:
+        return ""
+    return f'<img src="data:image/png;base64,{base64.b64encode(png).decode("ascii")}" alt="{html.escape(alt)}">'
+
+
+def _bullets(sentences: Sequence[str]) -> str:
+    return f"<ul>{''.join(f'<li>{html.escape(one)}</li>' for one in sentences)}</ul>" if sentences else ""
+
+
+def estimate_rows(found: Identified) -> list[list[str]]:
+    """Parameter, estimate with standard error, unit, bounds, start, 95 % interval of the profile, remark."""
+    profiled = {one.name: one for one in found.profiles}
+
+    def interval(one: Estimate) -> str:
+        if one.name not in profiled:
+            return ""
+        unit, known = display(one.unit, one.name), profiled[one.name]
+        ends = [digits(unit.of(end)) if end is not None else "open" for end in (known.low, known.high)]
+        return " … ".join(ends)
+
+    rows = []
+    for one in found.estimates:
+        unit = display(one.unit, one.name)
+        error = None if one.standard_error is None else unit.of(one.standard_error)
+        bounds = f"{digits(unit.of(one.lower))} … {digits(unit.of(one.upper))}"
+        rows.append(
+            [
+                one.name,
+                with_error(unit.of(one.value), error),
+                unit.unit,
+                interval(one),
+                bounds,
+                digits(unit.of(one.start)),
+                one.remark,
+            ]
+        )
+    return rows
+
+
+def page(found: Identified) -> str:
+    """The whole page."""
+    unit = display(found.output_unit, found.output_name)
+    say = html.escape
+    runs = [[one.name, one.role, str(len(one.time)), digits(unit.of(one.rmse), 3)] for one in found.runs]
+    head = ["parameter", "estimate ± standard error", "unit", "95 % (profile)", "bounds", "start", "remark"]
+    parts = [
+        f"<h1>{say(found.title or found.experiment)}: parameters</h1>",
+        _bullets(conclusions(found)),
+        "<h2>Parameters</h2>",
+        _table(head, estimate_rows(found), (1,)),
+        "<h2>What the runs tell apart</h2>",
+        _bullets(found.weak) or "<p>Every combination of the parameters is known to 5 % or better.</p>",
+        _picture(draw.correlations(found), "correlations of the estimates"),
+    ]
+    if found.profiles:
+        parts += [
+            "<h2>Profile likelihood</h2><p class=quiet>Each parameter held, all others fitted again: the rise of the cost "
+            "(blue), what the standard error stands for (grey), the 95 % line (red).</p>",
+            _picture(draw.profile_curves(found), "profiles"),
+        ]
+    if found.suggestions:
+        rows = [
+            [
+                str(number),
+                one.what,
+                digits(one.information, 3),
+                ", ".join(f"{name} × {digits(share, 2)}" for name, share in one.shrinks.items()),
+            ]
+            for number, one in enumerate(found.suggestions, start=1)
+        ]
+        parts += [
+            "<h2>What to measure next</h2><p class=quiet>Courses of the input within what was applied already, ranked by "
+            "what one such run would tell (D-optimal, at the fit).</p>",
+            _table(["", "run", "information, nats", "standard errors become"], rows, (2,)),
+            _picture(draw.suggested_inputs(found), "suggested inputs"),
+        ]
+    parts += ["<h2>Runs</h2>", _table(["run", "role", "samples", f"rms error ({unit.unit or '-'})"], runs, (2, 3))]
+    for one in found.runs:
+        parts.append(
+            f"<h3>{say(one.name)} ({say(one.role)})</h3>{_picture(draw.run_with_band(found, one), label(one.name))}"
+        )
+    parts += [
+        "<h2>Checks and provenance</h2>",
+        _bullets(found.check),
+        _table(["", ""], list(map(list, found.provenance.items()))),
+    ]
+    return (
+        '<!doctype html><html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width, '
+        f'initial-scale=1"><link rel="icon" href="data:,"><title>{say(found.title or found.experiment)}</title>'
+        f"<style>{STYLE}</style>{''.join(parts)}</html>\n"
+    )
+
+
+def record(found: Identified) -> dict[str, Any]:
+    """Everything but the series, in the program's own units; a number that is none is null."""
+    profiled = {one.name: one for one in found.profiles}
+    return {
+        "experiment": found.experiment,
+        "title": found.title,
+        "conclusions": conclusions(found),
+        "parameters": {
+            one.name: {
+                "value": one.value,
+                "standard_error": one.standard_error,
+                "unit": one.unit,
+                "bounds": [one.lower, one.upper],
+                "start": one.start,
+                "remark": one.remark,
+                **(
+                    {"profile": {"values": k.values.tolist(), "rise": k.rise.tolist(), "interval": [k.low, k.high]}}
+                    if (k := profiled.get(one.name))
+                    else {}
+                ),
+            }
+            for one in found.estimates
+        },
+        "correlation": {"parameters": list(found.correlated), "matrix": found.correlation.tolist()},
+        "weak_combinations": list(found.weak),
+        "fits": {"mean_square_over_noise": list(found.start_costs), "stopped": found.stopped, "robust": found.robust},
+        "residual": {
+            "rms_over_noise": found.ratio,
+            "whiteness_p_value": found.whiteness_p,
+            "normality_p_value": found.normality_p,
+            "samples_an_independent_one": found.independent,
+        },
+        "noise_sigma": found.noise_sigma,
+        "output": {"name": found.output_name, "unit": found.output_unit},
+        "runs": {one.name: {"role": one.role, "rmse": one.rmse, "samples": len(one.time)} for one in found.runs},
+        "suggestions": [
+            {"run": one.what, "information_nats": one.information, "standard_errors_become": one.shrinks}
+            for one in found.suggestions
+        ],
+        "check": list(found.check),
+        "provenance": found.provenance,
+    }
+
+
+def write_identified(found: Identified, folder: Path) -> Path:
+    """`identify.html` and `identify.json` in `folder`, each whole or not at all; the path of the page."""
+    folder.mkdir(parents=True, exist_ok=True)
+    replace(folder / "identify.json", json_text(record(found)))
+    return replace(folder / "identify.html", page(found))

@@ -1,0 +1,113 @@
+"""Pictures of an identification, each a function from the record to a PNG."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from smajax.identify import Identified, IdentifiedRun
+from smajax.report.display import axis_label, channel, digits, display, label
+from smajax.report.pictures import (
+    AFTER,
+    NOISE,
+    QUIET,
+    STRIPS,
+    THICK,
+    as_png,
+    extremes,
+    new_figure,
+    tidy,
+)
+
+
+def run_with_band(found: Identified, run: IdentifiedRun) -> bytes:
+    """Measured and simulated, the residual with the noise's band and the parameters', and the varying inputs."""
+    shown = display(found.output_unit, found.output_name)
+    strips = [name for name, values in run.inputs.items() if np.ptp(values) > 0.0][:STRIPS]
+    figure = new_figure(4.7 + 0.75 * max(len(strips) - 1, 0))
+    rows = figure.subplots(2 + len(strips), 1, sharex=True, height_ratios=[3.0, 1.5, *[0.7] * len(strips)])
+    output, residual = rows[0], rows[1]
+    output.plot(*extremes(run.time, shown.of(run.measured)), **THICK, label="measured")
+    output.plot(*extremes(run.time, shown.of(run.simulated)), color=AFTER, linewidth=1.2, label="simulated")
+    output.set_ylabel(axis_label(found.output_name, shown), fontsize=9)
+    both = 1.96 * np.hypot(run.spread, found.noise_sigma)
+    residual.fill_between(
+        run.time, shown.of(-both), shown.of(both), color=NOISE, zorder=0, label="95 %: noise and parameters"
+    )
+    residual.plot(*extremes(run.time, shown.of(run.measured - run.simulated)), color=AFTER, linewidth=0.9)
+    residual.axhline(0.0, color=QUIET, linewidth=0.6)
+    residual.set_ylabel("measured\n− model" + (f" ({shown.unit})" if shown.unit else ""), fontsize=9)
+    for axes, name in zip(rows[2:], strips, strict=True):
+        unit = channel(name)
+        axes.plot(*extremes(run.time, unit.of(run.inputs[name])), color="#5b6470", linewidth=0.9)
+        axes.set_ylabel(f"{label(name)}\n({unit.unit})" if unit.unit else label(name), fontsize=8)
+    rows[-1].set_xlabel("time (s)", fontsize=9)
+    for axes in rows:
+        tidy(axes)
+        axes.margins(x=0.01)
+    figure.legend(loc="outside upper center", ncols=3, frameon=False, fontsize=9)
+    figure.align_ylabels(list(rows))
+    return as_png(figure)
+
+
+def correlations(found: Identified) -> bytes | None:
+    """The correlation matrix of the estimates; None for fewer than two."""
+    count = len(found.correlated)
+    if count < 2:
+        return None
+    figure = new_figure(1.6 + 0.42 * count, width=2.9 + 0.45 * count)
+    axes = figure.subplots()
+    axes.imshow(found.correlation, cmap="RdBu_r", vmin=-1.0, vmax=1.0)
+    for row in range(count):
+        for column in range(count):
+            value = float(found.correlation[row, column])
+            colour = "white" if abs(value) > 0.6 else "black"
+            axes.text(column, row, f"{value:.2f}", ha="center", va="center", fontsize=7, color=colour)
+    names = [label(name) for name in found.correlated]
+    axes.set_yticks(range(count), names, fontsize=8)
+    axes.set_xticks(range(count), names, fontsize=8, rotation=40, ha="right")
+    return as_png(figure)
+
+
+def profile_curves(found: Identified) -> bytes | None:
+    """Rise of the cost over each profiled parameter, with the parabola that its standard error stands for."""
+    if not found.profiles:
+        return None
+    columns = min(3, len(found.profiles))
+    rows = -(-len(found.profiles) // columns)
+    figure = new_figure(2.5 * rows + 0.5, width=2.4 * columns + 0.6)
+    panels = figure.subplots(rows, columns, squeeze=False).ravel()
+    estimates = {one.name: one for one in found.estimates}
+    for axes, one in zip(panels, found.profiles, strict=False):
+        estimate = estimates[one.name]
+        unit = display(estimate.unit, one.name)
+        axes.plot(unit.of(one.values), one.rise, "o-", color=AFTER, markersize=3.5, linewidth=1.2)
+        if estimate.standard_error:
+            fine = np.linspace(one.values.min(), one.values.max(), 100)
+            axes.plot(
+                unit.of(fine), ((fine - estimate.value) / estimate.standard_error) ** 2, color=QUIET, linewidth=0.9
+            )
+        axes.axhline(3.84, color="#c8553d", linewidth=0.8)
+        axes.set_ylim(0.0, 9.0)
+        axes.set_xlabel(axis_label(one.name, unit), fontsize=8)
+        tidy(axes)
+    for axes in panels[len(found.profiles) :]:
+        axes.set_visible(False)
+    panels[0].set_ylabel("rise of the cost", fontsize=8)
+    return as_png(figure)
+
+
+def suggested_inputs(found: Identified) -> bytes | None:
+    """The inputs of the suggested runs, best first."""
+    if not found.suggestions:
+        return None
+    figure = new_figure(1.25 * len(found.suggestions) + 0.4)
+    panels = figure.subplots(len(found.suggestions), 1, sharex=True, squeeze=False)[:, 0]
+    for number, (axes, one) in enumerate(zip(panels, found.suggestions, strict=True), start=1):
+        name = max(one.inputs, key=lambda channel_: float(np.ptp(one.inputs[channel_])))
+        unit = channel(name)
+        axes.plot(unit.of(one.inputs[name]), color="#5b6470", linewidth=1.1)
+        axes.set_title(f"{number}. {digits(one.information, 3)} nats", fontsize=8, loc="left", pad=2)
+        axes.set_ylabel(f"{label(name)}" + (f"\n({unit.unit})" if unit.unit else ""), fontsize=7)
+        tidy(axes)
+    panels[-1].set_xlabel("sample", fontsize=8)
+    return as_png(figure)
