@@ -9,9 +9,9 @@ is one equation of one unknown. It rises with xi (more martensite: warmer by lat
 it), so its root lies between the present fraction and the end of the branch. The cosine is all that bends much in a
 stage, and it is solved without a new linearisation.
 
-The first linearisation starts from the driving temperature before, and does nearly all. More follow until one no longer
-moves the solution by `TOLERANCE`, the next of them nearly always; there the inner equation is solved to the end in its
-bracket. A member that needs many makes its batch wait, and changes nothing for the others.
+Two linearisations are nearly always enough (`studies/benchmarks` says how often), and cost the same for every member of a
+batch. Where the second still moved the solution by `TOLERANCE`, more follow, with the inner equation solved to the end in
+its bracket: a member that needs them makes its batch wait, and changes nothing for the others.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ from smajax.wire.kinetics import (
 )
 from smajax.wire.root import bracketed
 
-INNER = 3  # steps of the inner equation after the first linearisation
+INNER = (3, 1)  # steps of the inner equation after the first two linearisations
 CLOSE = 1e-6  # last step of it after later ones
 MOST_ITERATIONS = 50
 UNDAMPED = 12  # iterations before every second step is halved
@@ -126,10 +126,10 @@ def _largest(system: System, xi: Scalar, change: Sequence[Scalar]) -> Scalar:
     return reduce(jnp.maximum, [jnp.abs(one) / scale for one, scale in zip(change, scales, strict=True)])
 
 
-def _nearly(miss: Callable[[Scalar], Scalar], start: Scalar, low: Scalar, high: Scalar) -> Scalar:
+def _nearly(miss: Callable[[Scalar], Scalar], start: Scalar, low: Scalar, high: Scalar, steps: int) -> Scalar:
     """The root of `miss` after a few steps of Newton, held between its ends."""
     here = start
-    for _ in range(INNER):
+    for _ in range(steps):
         value, slope = jax.jvp(miss, (here,), (jnp.ones_like(here),))
         free = here - value / slope
         here = jnp.where(free > high, high, jnp.where(free < low, low, free))
@@ -145,7 +145,8 @@ def solve(system: System, stage: Stage, inputs: Inputs) -> Solution:
     sticks = stage.old.motion.position - PRESLIDING * stage.old.motion.friction
     tolerance = max(TOLERANCE, ROUNDINGS * float(jnp.finfo(xi.dtype).eps))
 
-    def iterate(at: _Iterate, first: bool) -> _Iterate:
+    def iterate(at: _Iterate, number: int | None) -> _Iterate:
+        """One linearisation more; `number` of the first two, None for later ones."""
         z = at.z
         residual, rows = _linearised(system, stage, inputs, z)
         by_fraction = [jnp.zeros_like(xi) if row[3] is None else -row[3] for row in rows]
@@ -164,7 +165,7 @@ def solve(system: System, stage: Stage, inputs: Inputs) -> Solution:
 
         low, high = jnp.where(asked.heating, 0.0, xi), jnp.where(asked.cooling, 1.0, xi)
         start = z.fraction
-        if first:
+        if number == 0:
             # Where the driving temperature is the one before: on a fast way that holds far better than the fraction.
             drive = jax.tree.map(
                 lambda heated, cooled: jnp.where(asked.cooling, cooled, heated),
@@ -175,10 +176,13 @@ def solve(system: System, stage: Stage, inputs: Inputs) -> Solution:
             )
             start = xi + (drive[0] - drive[1]) / jnp.where(drive[2] > 0.0, drive[2], jnp.inf)
         inside = jnp.where(start > high, high, jnp.where(start < low, low, start))
-        found = _nearly(miss, inside, low, high) if first else bracketed(miss, inside, low, high, CLOSE)
+        if number is None:
+            found = bracketed(miss, inside, low, high, CLOSE)
+        else:
+            found = _nearly(miss, inside, low, high, INNER[number])
         moved = found - z.fraction
         step = [base[k] + slope[k] * moved for k in range(3)] + [moved]
-        if not first:
+        if number is None:
             # A stiff-soft-stiff wire (detwinning) can send Newton to and fro between its two stiff ends.
             late = (at.iterations > UNDAMPED) & (at.iterations % 2 == 0)
             step = [jnp.where(late, 0.5 * change, change) for change in step]
@@ -192,12 +196,14 @@ def solve(system: System, stage: Stage, inputs: Inputs) -> Solution:
         # What is no number stays none, and must not keep the others. The first solves the inner equation roughly only.
         still = ~(_largest(system, xi, step) > tolerance)
         same = (asked.heating == at.branch.heating) & (asked.cooling == at.branch.cooling)
-        return _Iterate(new, asked, still & same & (not first), at.iterations + 1)
+        return _Iterate(new, asked, still & same & (number != 0), at.iterations + 1)
 
     no = jnp.zeros_like(xi, bool)
     guess = Unknowns(old.temperature, stage.old.motion.position, old.stress, xi)
-    at = iterate(_Iterate(guess, Branch(no, no), no, jnp.zeros_like(xi, int)), first=True)
+    at = _Iterate(guess, Branch(no, no), no, jnp.zeros_like(xi, int))
+    for number in range(len(INNER)):
+        at = iterate(at, number)
     at = lax.while_loop(
-        lambda now: ~now.enough & (now.iterations < MOST_ITERATIONS), lambda now: iterate(now, first=False), at
+        lambda now: ~now.enough & (now.iterations < MOST_ITERATIONS), lambda now: iterate(now, None), at
     )
     return Solution(at.z, at.branch)

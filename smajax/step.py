@@ -20,6 +20,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TypeVar
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jax import lax
@@ -27,7 +28,7 @@ from jax import lax
 from smajax.load.base import AbstractMovingLoad
 from smajax.load.coupon import Coupon, StrainCoupon
 from smajax.stage_equations import Stage, Unknowns, equations, free_position, friction_in_use, rates
-from smajax.stage_solver import solve, solved_linear
+from smajax.stage_solver import Solution, solve, solved_linear
 from smajax.system import System
 from smajax.types import Inputs, Motion, Scalar, State, WireState
 from smajax.wire.constitutive import strain_at, stress_at
@@ -44,29 +45,48 @@ def _held(tree: Tree) -> Tree:
     return jax.tree.map(lax.stop_gradient, tree)
 
 
-def _ended(system: System, stage: Stage, inputs: Inputs) -> tuple[WireState, Unknowns]:
-    """Solve one stage: the wire at its end, and the unknowns there."""
+@eqx.filter_custom_jvp
+def _solved(given: tuple[System, Stage, Inputs]) -> Solution:
+    """The end of a stage."""
+    return solve(*given)
+
+
+@_solved.def_jvp
+def _solved_jvp(primals, tangents):  # type: ignore[no-untyped-def]  # the signature is equinox's
+    return eqx.filter_jvp(_differentiable, primals, tangents)
+
+
+def _differentiable(given: tuple[System, Stage, Inputs]) -> Solution:
+    """The same, and one linear correction: its derivatives, the second too, are then those of the equations' root.
+
+    Only where a derivative is asked for: what the solver leaves is of the size of its tolerance squared.
+    """
+    system, stage, inputs = given
     wire, effects, old = system.wire, system.effects, stage.old.wire
-    solved = solve(_held(system), _held(stage), _held(dict(inputs)))
-    branch = solved.branch
+    found = solve(_held(system), _held(stage), _held(dict(inputs)))
 
     def all_four(z: Unknowns) -> Unknowns:
         heat, motion, stress = equations(system, stage, inputs, z)
         asked = curves(wire.kinetics, effects, old, z.temperature, z.stress)
-        return Unknowns(heat, motion, stress, z.fraction - fraction_on(old, branch, *asked))
+        return Unknowns(heat, motion, stress, z.fraction - fraction_on(old, found.branch, *asked))
 
     def linear(g: Callable[[Unknowns], Unknowns], asked: Unknowns) -> Unknowns:
         one, zero = jnp.ones_like(asked.fraction), jnp.zeros_like(asked.fraction)
         columns = [g(Unknowns(*(one if k == at else zero for k in range(4)))) for at in range(4)]
         return Unknowns(*solved_linear(list(zip(*columns, strict=True)), list(asked))[0])
 
-    def corrected(f: Callable[[Unknowns], Unknowns], found: Unknowns) -> Unknowns:
-        # One step more, in the value as in the derivatives: what the solver leaves is squared away.
-        missed, along = jax.linearize(f, found)
+    def corrected(f: Callable[[Unknowns], Unknowns], rough: Unknowns) -> Unknowns:
+        missed, along = jax.linearize(f, rough)
         change = linear(along, missed)
-        return Unknowns(*(value - step for value, step in zip(found, change, strict=True)))
+        return Unknowns(*(value - step for value, step in zip(rough, change, strict=True)))
 
-    z = lax.custom_root(all_four, solved.z, corrected, linear)
+    return Solution(lax.custom_root(all_four, found.z, corrected, linear), found.branch)
+
+
+def _ended(system: System, stage: Stage, inputs: Inputs) -> tuple[WireState, Unknowns]:
+    """Solve one stage: the wire at its end, and the unknowns there."""
+    wire, effects, old = system.wire, system.effects, stage.old.wire
+    z, branch = _solved((system, stage, dict(inputs)))
     # Rounding only; not `clip`, which halves the derivative at the ends themselves.
     xi = jnp.where(z.fraction > 1.0, 1.0, jnp.where(z.fraction < 0.0, 0.0, z.fraction))
     xi = jnp.where(branch.heating | branch.cooling, xi, old.martensite_fraction)
