@@ -24,8 +24,9 @@ from smajax.experiment.record import Experiment, Run
 from smajax.extended import base_model, extended
 from smajax.fit.batch import RunBatch, halved, pack, simulate_batch
 from smajax.fit.problem import Problem
+from smajax.fit.progress import Progress, quiet
 from smajax.fit.sensitivity import Sensitivity, sensitivity
-from smajax.fit.solve import Progress, Solution, quiet
+from smajax.fit.solve import Solution
 from smajax.fit.uncertainty import Uncertainty, identifiability, uncertainty
 from smajax.load.coupon import AbstractCoupon
 from smajax.parameters import get_parameters, parameters

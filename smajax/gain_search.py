@@ -17,7 +17,7 @@ import numpy as np
 
 from smajax.controller.base import AbstractController
 from smajax.estimator.base import AbstractEstimator
-from smajax.fit.solve import Progress, quiet
+from smajax.fit.progress import Progress, quiet
 from smajax.merit import Merit, judged_loop
 from smajax.parameters import set_vector
 from smajax.reference import clock, constant

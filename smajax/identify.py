@@ -18,12 +18,13 @@ from smajax.design import Suggestion, suggestions
 from smajax.experiment.record import Experiment, Run
 from smajax.extended import base_model
 from smajax.fit.batch import pack, simulate_batch
+from smajax.fit.box import Fit, fit_in_box
 from smajax.fit.directions import Direction, directions, weak_ones
 from smajax.fit.problem import Problem
 from smajax.fit.profile import Profile, profiles
+from smajax.fit.progress import Progress, quiet
 from smajax.fit.robust import robust_fit
 from smajax.fit.sensitivity import sensitivity
-from smajax.fit.solve import Progress, Solution, quiet, solve
 from smajax.fit.starts import TRIED, from_many_starts
 from smajax.fit.uncertainty import covariance_of, identifiability, uncertainty
 from smajax.parameters import get_parameters, parameters
@@ -97,16 +98,12 @@ def _simulated(problem: Problem, values: jax.Array) -> Trajectory:
     return simulate_batch(problem.system_at(values), problem.batch)
 
 
-def _stopped(best: Solution, fits: Sequence[Solution]) -> str:
+def _stopped(best: Fit, fits: Sequence[Fit]) -> str:
     """Why the fit ended, and how many starts came to the same."""
-    end = (
-        "the last iterations lowered the cost by less than a thousandth"
-        if best.converged
-        else f"the iterations ran out ({best.legs} times ten): it may not be the best fit yet"
-    )
     same = sum(one.cost <= (1.0 + ALIKE) * best.cost for one in fits)
     return (
-        f"The fit stopped because {end}. {same} of the {len(fits)} fits carried to their end found the same least cost."
+        f"The fit stopped after {best.steps} steps: {best.reason}. {same} of the {len(fits)} fits carried to their end "
+        "found the same least cost."
     )
 
 
@@ -160,9 +157,9 @@ def identify(
     best, weighted = fits[0], problem
     if robust:
 
-        def again(changed: Problem, values: np.ndarray) -> Solution:
+        def again(changed: Problem, values: np.ndarray) -> Fit:
             lane = changed.lane(names, bounds, values, len(names))
-            return solve(changed, [lane], legs=3, progress=progress, what="fitting by Huber's loss")[0]
+            return fit_in_box(changed, [lane], progress=progress, what="fitting by Huber's loss")[0]
 
         weighted, best = robust_fit(problem, best, again)
 

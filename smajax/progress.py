@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from smajax.fit.solve import Progress as Report
+from smajax.fit.progress import Progress as Report
 
 
 @contextmanager

@@ -21,7 +21,7 @@ from smajax.batch.engine import Function, chunks
 from smajax.closed_loop import simulate_closed_loop
 from smajax.controller.base import AbstractController
 from smajax.estimator.base import AbstractEstimator
-from smajax.fit.solve import Progress, quiet
+from smajax.fit.progress import Progress, quiet
 from smajax.measured_state import Sensor
 from smajax.merit import Merit, judged_loop
 from smajax.parameters import get_parameters, set_vector

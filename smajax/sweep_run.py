@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from smajax.batch.provenance import digest
 from smajax.control_presets import CONTROLLERS, FILTERS
-from smajax.fit.solve import Progress
+from smajax.fit.progress import Progress
 from smajax.measured_state import Sensor
 from smajax.merit import Merit
 from smajax.reference import clock

@@ -12,7 +12,8 @@ import jax
 import numpy as np
 
 from smajax.fit.problem import Lane, Problem
-from smajax.fit.solve import Progress, Solution, quiet, solve
+from smajax.fit.progress import Progress, quiet
+from smajax.fit.solve import Solution, solve
 from smajax.source_mark import source_mark
 
 

@@ -17,8 +17,9 @@ import numpy as np
 from smajax.attribution.screen import Score, scaled, screen, significant, switches
 from smajax.effects.library import LIBRARY
 from smajax.fit.problem import Problem
+from smajax.fit.progress import Progress, quiet
 from smajax.fit.sensitivity import sensitivity
-from smajax.fit.solve import Progress, Solution, misfits, quiet
+from smajax.fit.solve import Solution, misfits
 from smajax.fit.uncertainty import held
 from smajax.report.findings import Round
 from smajax.residual.noise_like import correlation_time, split_runs

@@ -19,7 +19,7 @@ from smajax.batch.engine import chunk_size
 from smajax.batch.member import member
 from smajax.batch.run import BUDGET, created_or_opened, fill, opened, recipe_of
 from smajax.batch.store import Store
-from smajax.fit.solve import Progress, quiet
+from smajax.fit.progress import Progress, quiet
 from smajax.simulate import DEFAULT_STEP
 from smajax.system import System
 from smajax.types import Series

@@ -17,7 +17,7 @@ from smajax.batch.engine import chunk_size, chunks
 from smajax.batch.member import GOOD, Recipe, member
 from smajax.batch.provenance import digest, provenance
 from smajax.batch.store import DIGEST, Store
-from smajax.fit.solve import Progress, quiet
+from smajax.fit.progress import Progress, quiet
 from smajax.measure import SHOWN, AbstractMeasure
 from smajax.parameters import parameters
 from smajax.simulate import DEFAULT_STEP

@@ -11,7 +11,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from smajax.figures.row import Row
-from smajax.fit.solve import Progress
+from smajax.fit.progress import Progress
 from smajax.source_mark import source_mark
 
 SIZE = (9.0, 5.6)  # inches

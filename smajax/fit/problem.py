@@ -67,6 +67,10 @@ class Problem(eqx.Module):
         slot = jnp.asarray(index, dtype=int)
         return Lane(slot, *(jnp.asarray(part) for part in (low, high, values, full, tie, 1.0)))
 
+    def with_output(self, output: Float[Array, "run time"] | None) -> Problem:
+        """The same with other measured outputs; None: its own."""
+        return self if output is None else eqx.tree_at(lambda one: one.batch.output, self, output)
+
     def system_at(self, values: Float[Array, " parameter"]) -> System:
         return set_vector(self.system, self.names, values[:-1])
 

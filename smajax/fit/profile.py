@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from smajax.fit.box import Fit, fit_in_box
 from smajax.fit.problem import Problem
-from smajax.fit.solve import Progress, Solution, quiet, solve
+from smajax.fit.progress import Progress, quiet
 
 ERRORS = (-2.8, -2.1, -1.4, -0.7, 0.7, 1.4, 2.1, 2.8)  # standard errors from the estimate
 SPARE = 0.1  # share of the box, for a parameter that has no standard error
@@ -40,7 +41,7 @@ def profiles(
     asked: Sequence[str],
     names: Sequence[str],
     bounds: Mapping[str, tuple[float, float]],
-    best: Solution,
+    best: Fit,
     errors: Mapping[str, float | None],
     inflation: float,
     progress: Progress = quiet,
@@ -60,7 +61,7 @@ def profiles(
             start[index(name)] = value
             lanes.append(problem.lane(others, bounds, start, len(names)))
             points.append((name, value))
-    solved = solve(problem, lanes, legs=4, progress=progress, what="profiles") if lanes else []
+    solved = fit_in_box(problem, lanes, progress=progress, what="profiles") if lanes else []
     found = []
     for name in asked:
         here = [(value, one.cost) for (of, value), one in zip(points, solved, strict=True) if of == name]

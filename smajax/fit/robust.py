@@ -8,8 +8,9 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
+from smajax.fit.box import Fit
 from smajax.fit.problem import Problem
-from smajax.fit.solve import Solution, misfits
+from smajax.fit.solve import misfits
 
 BEND = 1.345  # deviations from where on a sample counts less: 95 % as good as least squares where the noise is normal
 ROUNDS = 4
@@ -23,9 +24,7 @@ def huber_weights(misfit: np.ndarray, mask: np.ndarray) -> np.ndarray:
     return np.where(mask > 0, 1.0 / np.maximum(far, 1.0), 0.0)
 
 
-def robust_fit(
-    problem: Problem, first: Solution, fit: Callable[[Problem, np.ndarray], Solution]
-) -> tuple[Problem, Solution]:
+def robust_fit(problem: Problem, first: Fit, fit: Callable[[Problem, np.ndarray], Fit]) -> tuple[Problem, Fit]:
     """(problem with the weights in its mask, fit): `fit` is called with a problem and the values to start from."""
     mask, weighted, found = np.asarray(problem.batch.mask), problem, first
     for _ in range(ROUNDS):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +13,7 @@ import numpy as np
 import optimistix as optx
 
 from smajax.fit.problem import Lane, Problem, free_of, residual, values_of
+from smajax.fit.progress import Progress, quiet
 
 STEPS_PER_LEG = 10
 # The residual's square at the start of a leg. The solver damps with the identity and starts at one: with this cost a
@@ -20,12 +21,6 @@ STEPS_PER_LEG = 10
 # the damping next to nothing, and a fit far from its optimum rejects every step.
 START_COST = 1e3
 LANES = 4  # lanes solved at once: larger batches cost as much per lane on a CPU, and every size compiles anew
-
-Progress = Callable[[str, float], None]  # (what, share done 0..1)
-
-
-def quiet(what: str, share: float) -> None:
-    """Progress for nobody."""
 
 
 @dataclass(frozen=True)
@@ -42,26 +37,18 @@ def stacked(lanes: Sequence[Lane]) -> Lane:
     return jax.tree.map(lambda *leaves: jnp.stack(leaves), *lanes)
 
 
-def with_output(problem: Problem, output: jax.Array | None) -> Problem:
-    """The same problem with other measured outputs, (R, N); None: its own."""
-    return problem if output is None else eqx.tree_at(lambda one: one.batch.output, problem, output)
-
-
 @eqx.filter_jit
-def _leg(
-    free: jax.Array, lanes: Lane, problem: Problem, outputs: jax.Array | None
-) -> tuple[jax.Array, jax.Array, jax.Array]:
+def _leg(free: jax.Array, lanes: Lane, problem: Problem) -> tuple[jax.Array, jax.Array, jax.Array]:
     solver: Any = optx.LevenbergMarquardt(rtol=1e-5, atol=1e-5)
 
-    def one(free: jax.Array, lane: Lane, output: jax.Array | None) -> tuple[jax.Array, jax.Array, jax.Array]:
-        given = (lane, with_output(problem, output))
+    def one(free: jax.Array, lane: Lane) -> tuple[jax.Array, jax.Array, jax.Array]:
         solution = optx.least_squares(
-            residual, solver, free, args=given, has_aux=True, max_steps=STEPS_PER_LEG, throw=False
+            residual, solver, free, args=(lane, problem), has_aux=True, max_steps=STEPS_PER_LEG, throw=False
         )
         # The auxiliary output is the cost at the accepted point: without it the model would be compiled once more.
         return solution.value, solution.aux, solution.result == optx.RESULTS.successful
 
-    return eqx.filter_vmap(one)(free, lanes, outputs)
+    return eqx.filter_vmap(one)(free, lanes)
 
 
 @eqx.filter_jit
@@ -73,8 +60,6 @@ def solve(
     problem: Problem,
     lanes: Sequence[Lane],
     *,
-    outputs: np.ndarray | None = None,
-    at_once: int = LANES,
     legs: int = 6,
     enough: float = 1e-3,
     start_cost: float = START_COST,
@@ -83,22 +68,20 @@ def solve(
 ) -> list[Solution]:
     """Solve every lane; a lane stops when the solver says so or a leg lowers its cost by less than `enough` of it.
 
-    Lanes go `at_once` at a time (the last batch is filled up by repeating its first lane), so one compilation serves
-    any number of them. `outputs`, (lanes, R, N), are measured outputs of each lane's own, as in repeated experiments.
+    Lanes go `LANES` at a time (the last batch is filled up by repeating its first lane), so one compilation serves
+    any number of them.
     """
     solutions: list[Solution] = []
-    batches = [range(start, min(start + at_once, len(lanes))) for start in range(0, len(lanes), at_once)]
+    batches = [lanes[start : start + LANES] for start in range(0, len(lanes), LANES)]
     for number, some in enumerate(batches):
-        filled = [*some, *[some[0]] * (at_once - len(some))]
-        batch = stacked([lanes[lane] for lane in filled])
-        own = None if outputs is None else jnp.asarray(outputs[np.asarray(filled)])
+        batch = stacked([*some, *[some[0]] * (LANES - len(some))])
         free = jax.vmap(free_of)(batch)
-        cost = _costs(problem, np.asarray(_values(free, batch)), np.asarray(batch.weights), own)
-        done = np.zeros(at_once, bool)
+        cost = _costs(problem, np.asarray(_values(free, batch)), np.asarray(batch.weights))
+        done = np.zeros(LANES, bool)
         leg = 0
         while leg < legs and not done[: len(some)].all():
             scale = np.sqrt(np.maximum(cost, 1e-12) / start_cost)
-            new, new_cost, converged = _leg(free, batch._replace(scale=jnp.asarray(scale)), problem, own)
+            new, new_cost, converged = _leg(free, batch._replace(scale=jnp.asarray(scale)), problem)
             new_cost = np.asarray(new_cost) * scale**2
             better = (new_cost < cost) & ~done  # a lane's result must not depend on what shares its batch
             free = jnp.where(jnp.asarray(better)[:, None], new, free)
@@ -115,8 +98,8 @@ def solve(
 
 
 @eqx.filter_jit
-def _misfits(problem: Problem, values: jax.Array, outputs: jax.Array | None) -> jax.Array:
-    return eqx.filter_vmap(lambda one, output: with_output(problem, output).misfit(one))(values, outputs)
+def _misfits(problem: Problem, values: jax.Array) -> jax.Array:
+    return jax.vmap(problem.misfit)(values)
 
 
 def misfits(problem: Problem, points: Sequence[np.ndarray] | np.ndarray) -> np.ndarray:
@@ -125,11 +108,10 @@ def misfits(problem: Problem, points: Sequence[np.ndarray] | np.ndarray) -> np.n
     for start in range(0, len(points), LANES):
         some = list(points[start : start + LANES])
         batch = jnp.asarray(np.stack([*some, *[some[0]] * (LANES - len(some))]))
-        found += list(np.asarray(_misfits(problem, batch, None))[: len(some)])
+        found += list(np.asarray(_misfits(problem, batch))[: len(some)])
     return np.stack(found)
 
 
-def _costs(problem: Problem, points: np.ndarray, weights: np.ndarray, outputs: jax.Array | None) -> np.ndarray:
-    """Of a batch of lanes: what the solver makes small, without ties."""
-    squares = (np.asarray(_misfits(problem, jnp.asarray(points), outputs)) / float(problem.noise_sigma)) ** 2
+def _costs(problem: Problem, points: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    squares = (misfits(problem, points) / float(problem.noise_sigma)) ** 2
     return np.nan_to_num((squares.sum(axis=2) * weights).sum(axis=1), nan=1e30, posinf=1e30)

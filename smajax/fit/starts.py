@@ -7,12 +7,15 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from scipy.stats import qmc
 
+from smajax.fit.box import Fit, fit_in_box
 from smajax.fit.problem import Lane, Problem
-from smajax.fit.solve import Progress, Solution, misfits, quiet, solve
+from smajax.fit.progress import Progress, quiet
+from smajax.fit.solve import misfits
 
 MARGIN = 0.02  # share of the box that is kept from its bounds
 TRIED = 64
 BEGUN = 8  # fits that are begun
+FIRST = 6  # steps, before the worse ones are dropped
 KEPT = 4  # and that are carried to their end
 
 
@@ -31,7 +34,7 @@ def from_many_starts(
     seed: int,
     tried: int = TRIED,
     progress: Progress = quiet,
-) -> list[Solution]:
+) -> list[Fit]:
     """Fits of `names`, best first: of `tried` points the best are begun, and the best of those carried to their end."""
     start = problem.start_values()
     points = [start]
@@ -47,7 +50,7 @@ def from_many_starts(
     def lanes(values: Sequence[np.ndarray]) -> list[Lane]:
         return [problem.lane(names, bounds, one, len(names)) for one in values]
 
-    begun = solve(problem, lanes(points), legs=1, progress=progress, what="beginning fits")
+    begun = fit_in_box(problem, lanes(points), most=FIRST, progress=progress, what="beginning fits")
     best = sorted(begun, key=lambda one: one.cost)[:KEPT]
-    ended = solve(problem, lanes([one.values for one in best]), progress=progress, what="fitting")
+    ended = fit_in_box(problem, lanes([one.values for one in best]), progress=progress, what="fitting")
     return sorted(ended, key=lambda one: one.cost)

@@ -19,9 +19,9 @@ import jax.numpy as jnp
 import numpy as np
 from scipy.optimize import least_squares
 
+from smajax.fit.box import Fit, fit_in_box
 from smajax.fit.problem import Problem
 from smajax.fit.sensitivity import Sensitivity
-from smajax.fit.solve import Solution, solve, with_output
 from smajax.fit.uncertainty import uncertainty
 from smajax.runtime import prepare
 from studies.coverage.rig import BOUNDS, NOISE, Rig, rig
@@ -32,26 +32,26 @@ AT_ONCE = 50
 WITHIN = 1.959964
 
 
-def repeated(rig: Rig, count: int, dt: float) -> tuple[list[Solution], np.ndarray]:
+def repeated(rig: Rig, count: int, dt: float) -> tuple[list[Fit], np.ndarray]:
     """Fits of `count` noisy repetitions, and their outputs (count, R, N)."""
     exact = np.asarray(rig.problem.batch.output)
     noise = NOISE * np.random.default_rng(SEED).standard_normal((count, *exact.shape))
     outputs = exact + noise
     lane = rig.problem.lane(rig.names, BOUNDS, rig.start, len(rig.names))
-    return solve(rig.problem, [lane] * count, outputs=outputs, at_once=min(AT_ONCE, count)), outputs
+    return fit_in_box(rig.problem, [lane] * count, outputs=outputs, at_once=min(AT_ONCE, count)), outputs
 
 
 @eqx.filter_jit
 def _jacobian(problem: Problem, values: jax.Array, slots: jax.Array, output: jax.Array) -> tuple[jax.Array, jax.Array]:
     def at(chosen: jax.Array) -> tuple[jax.Array, jax.Array]:
-        misfit = with_output(problem, output).misfit(values.at[slots].set(chosen)) / problem.noise_sigma
+        misfit = problem.with_output(output).misfit(values.at[slots].set(chosen)) / problem.noise_sigma
         return misfit, misfit
 
     jacobian, misfit = jax.jacfwd(at, has_aux=True)(values[slots])
     return misfit, jacobian
 
 
-def errors(rig: Rig, solutions: list[Solution], outputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def errors(rig: Rig, solutions: list[Fit], outputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(estimate - truth, standard error), each (count, parameters); the errors are those that `identify` tells."""
     problem = rig.problem
     slots = jnp.asarray([problem.names.index(name) for name in rig.names])
@@ -74,7 +74,7 @@ def by_scipy(rig: Rig, outputs: np.ndarray) -> tuple[list[float], float]:
 
     @eqx.filter_jit
     def misfit(values: jax.Array, output: jax.Array) -> jax.Array:
-        return with_output(problem, output).misfit(values).ravel() / problem.noise_sigma
+        return problem.with_output(output).misfit(values).ravel() / problem.noise_sigma
 
     def residual(chosen: np.ndarray, output: jax.Array) -> np.ndarray:
         values = np.array(rig.start)
@@ -97,12 +97,12 @@ def study(fast: bool) -> dict[str, Any]:
     """Everything as numbers."""
     dt, count, peers = (0.02, 40, 2) if fast else (0.01, 200, 20)
     here = rig(dt)
-    exact = solve(here.problem, [here.problem.lane(here.names, BOUNDS, here.start, len(here.names))], at_once=1, legs=8)
+    exact = fit_in_box(here.problem, [here.problem.lane(here.names, BOUNDS, here.start, len(here.names))], at_once=1)
     index = here.problem.names.index
     without = {name: float(exact[0].values[index(name)] / here.truth[name] - 1.0) for name in here.names}
     solutions, outputs = repeated(here, count, dt)
     began = clock.perf_counter()
-    solve(
+    fit_in_box(
         here.problem,
         [here.problem.lane(here.names, BOUNDS, here.start, len(here.names))] * len(solutions),
         outputs=outputs,

@@ -1,0 +1,177 @@
+"""Levenberg-Marquardt within a box, many fits at once: derivatives in one batched program, the small algebra here.
+
+The box is kept by holding what a step would carry beyond its bound, not by a map onto the whole line: on such a map a
+bound is infinitely far away and a narrow valley bends, and a fit that takes 20 steps here took 150 there
+(`studies/coverage`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from smajax.fit.problem import Lane, Problem
+from smajax.fit.progress import Progress, quiet
+
+MOST_STEPS = 80
+ENOUGH = 1e-6  # of the cost: what a step that is the last one may still lower it by, and promise to
+STILL = 1e-9  # of the box: a step that is none
+DAMPED = 1e-3  # share of the squared columns that damping begins with
+HOPELESS = 1e10  # damping at which no step is a better one
+BLIND = 1e-14  # of the largest squared column: a parameter that nothing depends on
+
+
+@dataclass(frozen=True)
+class Fit:
+    """One fit ended."""
+
+    values: np.ndarray  # every parameter, and the dummy: shape (P + 1,)
+    cost: float  # sum of squared residuals, misfit over noise
+    converged: bool
+    reason: str
+    steps: int
+
+
+@dataclass
+class _Walk:
+    """Where one fit is; places are shares of the box."""
+
+    place: np.ndarray
+    cost: float
+    slope: np.ndarray  # J^T r
+    square: np.ndarray  # J^T J
+    scale: np.ndarray  # largest squared columns so far
+    damping: float = DAMPED
+    growth: float = 2.0
+    steps: int = 0
+    reason: str = ""
+
+
+@eqx.filter_jit
+def _normal_equations(
+    problem: Problem, lanes: Lane, places: jax.Array, outputs: jax.Array | None
+) -> tuple[jax.Array, jax.Array, jax.Array]:
+    """(r^T r, J^T r, J^T J) of every lane at its place, by shares of its box."""
+
+    def one(lane: Lane, place: jax.Array, output: jax.Array | None) -> tuple[jax.Array, jax.Array, jax.Array]:
+        here = problem.with_output(output)
+
+        def residual(place: jax.Array) -> tuple[jax.Array, jax.Array]:
+            values = lane.values.at[lane.slots].set(lane.low + place * (lane.high - lane.low))
+            misfit = here.misfit(values) / problem.noise_sigma * jnp.sqrt(lane.weights)[:, None]
+            return misfit.ravel(), misfit.ravel()
+
+        jacobian, value = jax.jacfwd(residual, has_aux=True)(place)
+        return value @ value, value @ jacobian, jacobian.T @ jacobian
+
+    return eqx.filter_vmap(one)(lanes, places, outputs)
+
+
+def _step(walk: _Walk) -> np.ndarray:
+    """The damped step; what it would carry beyond a bound goes to the bound, and the others are solved again."""
+    size = len(walk.place)
+    step = np.zeros(size)
+    # At a bound, with the cost falling outwards: held.
+    fixed = ((walk.place <= 0.0) & (walk.slope > 0.0)) | ((walk.place >= 1.0) & (walk.slope < 0.0))
+    least = BLIND * max(float(walk.scale.max()), 1e-300)
+    left = walk.square + walk.damping * np.diag(np.maximum(walk.scale, least))
+    for _ in range(size + 1):
+        loose = ~fixed
+        if not loose.any():
+            break
+        right = -(walk.slope[loose] + left[np.ix_(loose, fixed)] @ step[fixed])
+        step[loose] = np.linalg.lstsq(left[np.ix_(loose, loose)], right, rcond=None)[0]
+        beyond = loose & ((walk.place + step < 0.0) | (walk.place + step > 1.0))
+        if not beyond.any():
+            break
+        step[beyond] = np.clip(walk.place + step, 0.0, 1.0)[beyond] - walk.place[beyond]
+        fixed |= beyond
+    return step
+
+
+def _judged(walk: _Walk, step: np.ndarray, cost: float, slope: np.ndarray, square: np.ndarray) -> None:
+    """Take the step or not, and say so when it was the last."""
+    promised = -(2.0 * walk.slope @ step + step @ walk.square @ step)
+    gained = walk.cost - cost if np.isfinite(cost) else -np.inf
+    walk.steps += 1
+    small = promised < ENOUGH * walk.cost
+    if gained > 0.0:
+        share = gained / max(promised, 1e-300)
+        walk.place, walk.cost = np.clip(walk.place + step, 0.0, 1.0), cost
+        walk.slope, walk.square = slope, square
+        walk.scale = np.maximum(walk.scale, np.diag(square))
+        walk.damping *= max(0.1, 1.0 - (2.0 * min(share, 1.0) - 1.0) ** 3)
+        walk.growth = 2.0
+        if small and gained < ENOUGH * walk.cost:
+            walk.reason = "no step lowers the cost by more than a millionth"
+    else:
+        walk.damping *= walk.growth
+        walk.growth *= 2.0
+        if small or float(np.abs(step).max()) < STILL or walk.damping > HOPELESS:
+            walk.reason = "no step lowers the cost any more"
+
+
+def fit_in_box(
+    problem: Problem,
+    lanes: Sequence[Lane],
+    *,
+    outputs: np.ndarray | None = None,
+    at_once: int = 8,
+    most: int = MOST_STEPS,
+    progress: Progress = quiet,
+    what: str = "fitting",
+) -> list[Fit]:
+    """Fit every lane from its own values; all lanes have the same number of slots.
+
+    `outputs`, (lanes, R, N): measured outputs of each lane's own, as in repeated experiments. Lanes that are not ended
+    go `at_once` at a time, so one compilation serves any number of them, and none waits for another.
+    """
+
+    def place_of(lane: Lane) -> np.ndarray:
+        low, high = np.asarray(lane.low), np.asarray(lane.high)
+        return np.clip((np.asarray(lane.values)[np.asarray(lane.slots)] - low) / (high - low), 0.0, 1.0)
+
+    def evaluated(some: Sequence[int], places: Sequence[np.ndarray]) -> list[tuple[float, np.ndarray, np.ndarray]]:
+        found: list[tuple[float, np.ndarray, np.ndarray]] = []
+        for start in range(0, len(some), at_once):
+            part = list(some[start : start + at_once])
+            filled = part + [part[0]] * (at_once - len(part))
+            at = list(places[start : start + at_once])
+            at += [at[0]] * (at_once - len(part))
+            batch = jax.tree.map(lambda *leaves: jnp.stack(leaves), *(lanes[lane] for lane in filled))
+            own = None if outputs is None else jnp.asarray(outputs[np.asarray(filled)])
+            answers = [np.asarray(each) for each in _normal_equations(problem, batch, jnp.asarray(np.stack(at)), own)]
+            found += [(float(cost), slope, square) for cost, slope, square in zip(*answers, strict=True)][: len(part)]
+        return found
+
+    everyone = range(len(lanes))
+    places = [place_of(lane) for lane in lanes]
+    walks = []
+    for place, (cost, slope, square) in zip(places, evaluated(everyone, places), strict=True):
+        lost = not np.isfinite(cost)
+        walk = _Walk(place, cost if not lost else np.inf, slope, square, np.diag(square).copy())
+        walk.reason = "the model gives no number at the start" if lost else ""
+        walks.append(walk)
+    for number in range(most):
+        going = [lane for lane in everyone if not walks[lane].reason]
+        progress(what, max(1.0 - len(going) / len(lanes), number / most))
+        if not going:
+            break
+        steps = [_step(walks[lane]) for lane in going]
+        tried = [np.clip(walks[lane].place + step, 0.0, 1.0) for lane, step in zip(going, steps, strict=True)]
+        for lane, step, answer in zip(going, steps, evaluated(going, tried), strict=True):
+            _judged(walks[lane], step, *answer)
+    progress(what, 1.0)
+    ended = []
+    for own, walk in zip(lanes, walks, strict=True):
+        values = np.array(own.values)
+        low, high = np.asarray(own.low), np.asarray(own.high)
+        values[np.asarray(own.slots)] = low + walk.place * (high - low)
+        done = bool(walk.reason) and np.isfinite(walk.cost)
+        ended.append(Fit(values, walk.cost, done, walk.reason or f"{most} steps were not enough", walk.steps))
+    return ended
