@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import signal
 import subprocess
 import sys
@@ -20,6 +21,22 @@ def test_help_names_the_commands(tmp_path: Path) -> None:
     assert told.returncode == 0
     assert "close-loop" in told.stdout
     assert "demo" in told.stdout
+
+
+def test_help_waits_for_nothing_heavy(tmp_path: Path) -> None:
+    code = (
+        "import sys\nfrom smajax.cli import app\ntry:\n    app(['--help'])\nexcept SystemExit:\n    pass\n"
+        "print(sorted({'jax', 'numpy', 'matplotlib', 'pydantic', 'scipy', 'xarray'} & set(sys.modules)))"
+    )
+    told = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=60)
+    assert told.stdout.strip().endswith("[]")
+
+
+def test_effects_and_presets_are_listed_for_machines(tmp_path: Path) -> None:
+    effects = json.loads(_run("effects", "--json", cwd=tmp_path).stdout)
+    assert effects["latent_heat"]["parameters"]["latent_heat.enthalpy"]["unit"] == "J/kg"
+    presets = json.loads(_run("presets", "--json", cwd=tmp_path).stdout)
+    assert {"arm", "dead_weight", "bias_spring"} <= set(presets["loads"])
 
 
 def test_missing_experiment_file(tmp_path: Path) -> None:

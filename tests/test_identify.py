@@ -198,6 +198,19 @@ def test_an_effect_is_part_of_the_model_when_a_parameter_of_it_is_named(tmp_path
     assert abs(expansion.value) < 4.0 * expansion.standard_error
 
 
+def test_a_box_without_the_truth_is_said(tmp_path: Path) -> None:
+    path = _written(tmp_path, NOISE)
+    path.write_text(path.read_text().replace('high = "8 %"', 'high = "4 %"'))
+    strain = next(
+        one
+        for one in identify(load_experiment(path, CATALOGUE), starts=0).estimates
+        if one.name == "recoverable_strain"
+    )
+    assert strain.value == pytest.approx(0.04, rel=1e-3)
+    assert strain.standard_error is None
+    assert "upper bound" in strain.remark
+
+
 def test_the_command_says_what_is_wrong(tmp_path: Path) -> None:
     path = _written(tmp_path, NOISE)
 

@@ -212,6 +212,7 @@ def _mean_stress(load: str) -> Callable[[jax.Array], jax.Array]:
     return mean
 
 
+@pytest.mark.slow  # a filter's derivative, one of second order too, is in test_estimators
 def test_a_second_derivative_along_a_line() -> None:
     """A filter's gains are first derivatives, so its own derivative is a second one."""
     mean, along, step = _mean_stress("arm"), jnp.asarray([1.0, -0.7, 0.4]), 1e-5

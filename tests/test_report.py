@@ -394,7 +394,7 @@ def test_long_runs_keep_their_peaks(findings):
     time = np.linspace(0.0, 1.0, 100_003)
     values = np.zeros_like(time)
     values[77_777], values[100_002] = 5.0, -3.0
-    thin_time, thin_values = pictures._extremes(time, values)
+    thin_time, thin_values = pictures.extremes(time, values)
     assert len(thin_time) < 2 * pictures.SAMPLES_DRAWN
     assert (thin_values.max(), thin_values.min()) == (5.0, -3.0)
     assert thin_time[thin_values.argmax()] == time[77_777]

@@ -21,8 +21,10 @@ from smajax.fit.progress import Progress, quiet
 MOST_STEPS = 80
 ENOUGH = 1e-6  # of the cost: what a step that is the last one may still lower it by, and promise to
 STILL = 1e-9  # of the box: a step that is none
-DAMPED = 1e-3  # share of the squared columns that damping begins with
+DAMPED = 1e-2  # share of the squared columns that damping begins with
 HOPELESS = 1e10  # damping at which no step is a better one
+AT_MOST = 0.7  # of the way to a bound
+NEAR = 1e-3  # of the box: from here on the bound itself may be reached
 BLIND = 1e-14  # of the largest squared column: a parameter that nothing depends on
 
 
@@ -76,6 +78,9 @@ def _step(walk: _Walk) -> np.ndarray:
     """The damped step; what it would carry beyond a bound goes to the bound, and the others are solved again."""
     size = len(walk.place)
     step = np.zeros(size)
+    # Most of the way to a bound at a time: a first long step must not end in a corner that no later one leads out of.
+    low = np.where(walk.place < NEAR, 0.0, (1.0 - AT_MOST) * walk.place)
+    high = np.where(walk.place > 1.0 - NEAR, 1.0, 1.0 - (1.0 - AT_MOST) * (1.0 - walk.place))
     # At a bound, with the cost falling outwards: held.
     fixed = ((walk.place <= 0.0) & (walk.slope > 0.0)) | ((walk.place >= 1.0) & (walk.slope < 0.0))
     least = BLIND * max(float(walk.scale.max()), 1e-300)
@@ -86,10 +91,10 @@ def _step(walk: _Walk) -> np.ndarray:
             break
         right = -(walk.slope[loose] + left[np.ix_(loose, fixed)] @ step[fixed])
         step[loose] = np.linalg.lstsq(left[np.ix_(loose, loose)], right, rcond=None)[0]
-        beyond = loose & ((walk.place + step < 0.0) | (walk.place + step > 1.0))
+        beyond = loose & ((walk.place + step < low) | (walk.place + step > high))
         if not beyond.any():
             break
-        step[beyond] = np.clip(walk.place + step, 0.0, 1.0)[beyond] - walk.place[beyond]
+        step[beyond] = np.clip(walk.place + step, low, high)[beyond] - walk.place[beyond]
         fixed |= beyond
     return step
 
