@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import os
 import shlex
@@ -29,6 +28,7 @@ app = typer.Typer(
     rich_markup_mode=None,  # the plain help is there at once
 )
 DEMOS = ("latent", "complete")
+SET_POINTS, GAINS = "-40,-20,0,10,20,40,50,60,80", "0.5,0.7,1,1.4,2"
 
 
 def console() -> Console:
@@ -144,7 +144,8 @@ def identify_command(
     loaded = load_experiment(experiment, CATALOGUE)
     unknowns = [unknown.name for unknown in loaded.unknowns]
     profiled = unknowns if profile == "all" else [part.strip() for part in profile.split(",") if part.strip()]
-    command = f"smajax identify {shlex.quote(str(experiment))} --out {shlex.quote(str(out))}"
+    command = f"smajax identify {shlex.quote(str(experiment))} --out {shlex.quote(str(out))} --starts {starts}"
+    command += f" --profile {','.join(profiled)}" * bool(profiled) + " --robust" * robust + " --design" * design
     try:
         with _resumable("Nothing is kept of a fit that is not finished."), shown(console()) as progress:
             found = identify(
@@ -271,7 +272,7 @@ def figures(
         asked = [row for name in names or CHAPTERS for row in rows(name)]
     except KeyError as error:
         raise typer.BadParameter(error.args[0], param_hint="NAME") from None
-    with _resumable(), shown(console()) as progress:
+    with _resumable("Finished figures are kept: the same command goes on."), shown(console()) as progress:
         drawn = draw(list(dict.fromkeys(asked)), out, fast, progress)
     (out / "README.md").write_text(as_markdown(drawn), encoding="utf-8")
     page = out / "index.html"
@@ -293,18 +294,28 @@ def _numbers(option: str, text: str) -> tuple[float, ...]:
 
 @app.command()
 def sweep(
-    controllers: Annotated[str, typer.Option(help="names with commas between them, or `all`")] = "all",
+    controllers: Annotated[
+        str, typer.Option(help="pid, vsc1, vsc2, vsc3, nvsc, sld, backstepping1, backstepping2 (with commas), or `all`")
+    ] = "all",
     over: Annotated[str, typer.Option(help="the two mismatches of the maps")] = "convection,damping",
-    points: Annotated[int, typer.Option(min=2, help="mismatches from 0.5 to 2 along each side of a map")] = 15,
-    set_points: Annotated[str, typer.Option(help="degrees, with commas between them")] = "-40,-20,0,10,20,40,50,60,80",
-    gains: Annotated[str, typer.Option(help="shares of the controller's main gain")] = "0.5,0.7,1,1.4,2",
+    points: Annotated[
+        int | None, typer.Option(min=2, help="mismatches from 0.5 to 2 along each side of a map; default 15")
+    ] = None,
+    set_points: Annotated[
+        str | None, typer.Option(help="degrees, with commas; default -40,-20,0,10,20,40,50,60,80")
+    ] = None,
+    gains: Annotated[
+        str | None, typer.Option(help="shares of the controller's main gain; default 0.5,0.7,1,1.4,2")
+    ] = None,
     seconds: Annotated[float, typer.Option(min=0.1, help="length of each closed loop")] = 10.0,
     estimator: Annotated[str, typer.Option(help="`printed` or `model` filter; none: told the true state")] = "",
     noise: Annotated[float, typer.Option(min=0.0, help="noise of the angle's readings, degrees (1 sigma)")] = 0.0,
     period: Annotated[float, typer.Option(help="sample time of the controller, s, a multiple of 0.01")] = 0.01,
     delay: Annotated[int, typer.Option(min=0, help="control periods until a command arrives")] = 0,
     out: Annotated[Path, typer.Option(help="folder for the page, the pictures and the rows")] = Path("sweep"),
-    fast: Annotated[bool, typer.Option("--fast", help="3 x 3 mismatches, 3 set points, the preset's gains")] = False,
+    fast: Annotated[
+        bool, typer.Option("--fast", help="by default 3 x 3 mismatches, set points -20,20,60, gain 1")
+    ] = False,
     open_page: Annotated[bool, typer.Option("--open/--no-open", help="open the page in a browser")] = True,
 ) -> None:
     """Run controllers of the arm on plants that are not what they believe, and compare them on every set point.
@@ -328,19 +339,17 @@ def sweep(
     settings = SweepSettings(
         names,
         *pair,
-        points,
-        _numbers("--set-points", set_points),
-        _numbers("--gains", gains),
+        points or (3 if fast else 15),
+        _numbers("--set-points", set_points if set_points is not None else "-20,20,60" if fast else SET_POINTS),
+        _numbers("--gains", gains if gains is not None else "1" if fast else GAINS),
         seconds,
         filtered=estimator,
         noise=noise,
         period=period,
         delay=delay,
     )
-    if fast:
-        settings = dataclasses.replace(settings, points=3, set_points=(-20.0, 20.0, 60.0), gains=(1.0,))
     try:
-        with _resumable(), shown(console()) as progress:
+        with _resumable("Finished controllers are kept: the same command goes on."), shown(console()) as progress:
             rows = run_sweep(arm(), settings, out, progress)
     except ValueError as error:
         raise typer.BadParameter(str(error)) from None

@@ -32,7 +32,7 @@ class Suggestion:
 
 def _shapes(count: int) -> dict[str, np.ndarray]:
     """Courses between 0 and 1, each of shape (count,)."""
-    t = np.linspace(0.0, 1.0, count)
+    t = np.arange(count) / count
     staircase = np.concatenate([np.linspace(0.25, 1.0, 4), np.linspace(0.75, 0.0, 4)])
     return {
         "held for 60 % of the run, then off": np.where(t < 0.6, 1.0, 0.0),

@@ -21,18 +21,18 @@ from smajax.fit.batch import pack, simulate_batch
 from smajax.fit.box import Fit, fit_in_box
 from smajax.fit.directions import Direction, directions, weak_ones
 from smajax.fit.problem import Problem
-from smajax.fit.profile import Profile, profiles
+from smajax.fit.profile import ALIKE, Profile, profiles
 from smajax.fit.progress import Progress, quiet
-from smajax.fit.robust import robust_fit
+from smajax.fit.robust import NORMAL, robust_fit, robust_variance, unweighted_misfit
 from smajax.fit.sensitivity import sensitivity
 from smajax.fit.starts import TRIED, from_many_starts
-from smajax.fit.uncertainty import covariance_of, identifiability, uncertainty
+from smajax.fit.uncertainty import covariance_of, held, identifiability, uncertainty
 from smajax.parameters import get_parameters, parameters
 from smajax.residual.noise_like import LAGS, WHITE, correlation_time, split_runs, whiteness_p_value
 from smajax.types import Trajectory
 
 SEED = 2004
-ALIKE = 0.01  # fits whose cost differs by less than this share have found the same
+EDGE = 1e-6  # of the box: a fit in a box comes to a bound itself
 
 
 @dataclass(frozen=True)
@@ -80,6 +80,7 @@ class Identified:
     correlated: tuple[str, ...]
     correlation: np.ndarray
     weak: tuple[str, ...]
+    all_took_part: bool  # whether no parameter is left out of `weak`: held by a bound, or without any effect
     directions: tuple[Direction, ...]
     profiles: tuple[Profile, ...]
     start_costs: tuple[float, ...]  # mean square over the noise's, of every fit carried to its end
@@ -98,12 +99,12 @@ def _simulated(problem: Problem, values: jax.Array) -> Trajectory:
     return simulate_batch(problem.system_at(values), problem.batch)
 
 
-def _stopped(best: Fit, fits: Sequence[Fit]) -> str:
+def _stopped(best: Fit, fits: Sequence[Fit], inflation: float) -> str:
     """Why the fit ended, and how many starts came to the same."""
-    same = sum(one.cost <= (1.0 + ALIKE) * best.cost for one in fits)
+    same = sum(one.cost - fits[0].cost <= ALIKE * inflation for one in fits)
     return (
         f"The fit stopped after {best.steps} steps: {best.reason}. {same} of the {len(fits)} fits carried to their end "
-        "found the same least cost."
+        f"found the same least cost{'' if same == len(fits) else ', the others a higher one'}."
     )
 
 
@@ -143,6 +144,8 @@ def identify(
     if not names:
         raise ValueError(f"{experiment.path}: nothing is declared unknown; add a section [unknown.NAME].")
     odd = [name for name in profiled if name not in names]
+    if profiled and robust:
+        raise ValueError("a profile is that of least squares: ask for it without Huber's loss.")
     if odd:
         raise ValueError(f"no profile of {odd}, which are not fitted; fitted are {', '.join(names)}.")
     began = clock.monotonic()
@@ -150,7 +153,9 @@ def identify(
     problem = _problem(experiment, fit_runs)
     bounds = {unknown.name: (unknown.low, unknown.high) for unknown in experiment.unknowns}
     start = problem.start_values()
-    check = [*experiment.warnings, *identifiability(sensitivity(problem, start, names), names, bounds)]
+    # Of what the runs can tell: what is told at the start already. What moves together is told at the fit, by how much.
+    can_tell = identifiability(sensitivity(problem, start, names), names, bounds)
+    check = [*experiment.warnings, *(line for line in can_tell if "move together" not in line)]
     for line in check:
         progress(f"say: check: {line}", 1.0)
     fits = from_many_starts(problem, names, bounds, seed, starts, progress)
@@ -165,16 +170,20 @@ def identify(
 
     index = problem.names.index
     values = {name: float(best.values[index(name)]) for name in names}
-    at = sensitivity(weighted, best.values, names)
-    known = uncertainty(at, names, values, bounds)
-    residual = split_runs(at.misfit, at.mask)
+    at = sensitivity(problem, best.values, names)
+    misfit = unweighted_misfit(weighted, best.values) if robust else at.misfit
+    residual = split_runs(misfit, at.mask)
     white = whiteness_p_value(residual, LAGS)
     memory = 1.0 if white > WHITE else correlation_time(residual)
-    ratio = float(np.sqrt(np.mean(np.concatenate(residual) ** 2)))
-    inflation = max(ratio**2, 1e-300) * memory
-    correlated, covariance = covariance_of(at, names, known)
+    together = np.concatenate(residual)
+    # Of a sample over the noise's: what counts of samples far off is what Huber's loss makes of them.
+    variance = robust_variance(together) * memory if robust else None
+    ratio = NORMAL * float(np.median(np.abs(together))) if robust else float(np.sqrt(np.mean(together**2)))
+    known = uncertainty(at, names, values, bounds, variance, EDGE)
+    inflation = variance or max(ratio**2, 1e-300) * memory
+    correlated, covariance = covariance_of(at, names, known, variance)
     spread = np.sqrt(np.diag(covariance)) if len(correlated) else np.ones(0)
-    seen = [name for name in names if np.any(at.columns([name]))]
+    seen = [name for name in names if np.any(at.columns([name])) and not held(values[name], *bounds[name], EDGE)]
     weak = directions(at, seen, values, inflation) if seen else ()
     drawn = profiles(weighted, profiled, names, bounds, best, known.standard_error, inflation, progress)
     progress("simulating every run", 0.0)
@@ -190,7 +199,7 @@ def identify(
         output_unit=experiment.output_unit,
         noise_sigma=experiment.noise_sigma,
         noise_how=experiment.noise_how,
-        stopped=_stopped(fits[0], fits),
+        stopped=_stopped(best, fits, inflation),
         check=tuple(check),
         estimates=tuple(
             Estimate(
@@ -207,6 +216,7 @@ def identify(
         correlated=correlated,
         correlation=covariance / np.outer(spread, spread),
         weak=tuple(weak_ones(weak)),
+        all_took_part=len(seen) == len(names),
         directions=weak,
         profiles=drawn,
         start_costs=tuple(one.cost / float(problem.batch.mask.sum()) for one in fits),

@@ -159,8 +159,8 @@ class Judge(AbstractWatch):
     def result(self, memory: _Seen) -> Merit:
         # A run that is inside at its last sample by chance has not settled.
         return Merit(
-            reach_time=memory.reached,
-            settling_time=jnp.where(memory.unsettled, jnp.inf, memory.inside_since),
+            reach_time=memory.reached - memory.began,
+            settling_time=jnp.where(memory.unsettled, jnp.inf, memory.inside_since - memory.began),
             overshoot=memory.beyond,
             steady_error=memory.error / memory.steady,
             steady_offset=memory.offset / memory.steady,

@@ -52,7 +52,7 @@ def lanes(
     """
     unknown = [name for name in mismatches if name not in MISMATCHES]
     if unknown:
-        raise ValueError(f"no mismatch {unknown}; there are {sorted(MISMATCHES)}.")
+        raise ValueError(f"no mismatch `{', '.join(unknown)}`; there are {', '.join(sorted(MISMATCHES))}.")
     columns = [mismatches.get(name, 1.0) for name in MISMATCHES]
     return np.stack([np.ravel(column) for column in np.broadcast_arrays(*columns, target, gain)], axis=1)
 
@@ -73,7 +73,7 @@ class Grid:
     def __post_init__(self) -> None:
         if self.first == self.second or not {self.first, self.second} <= set(MISMATCHES):
             raise ValueError(
-                f"two different mismatches of {sorted(MISMATCHES)}, not `{self.first}` and `{self.second}`."
+                f"two different mismatches of {', '.join(sorted(MISMATCHES))}, not `{self.first}` and `{self.second}`."
             )
 
     @property

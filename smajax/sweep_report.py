@@ -65,13 +65,34 @@ def write_rows(path: Path, grid: Grid, swept: Swept) -> None:
     part.replace(path)
 
 
+def _edges(ratios: np.ndarray) -> np.ndarray:
+    """Of cells that have the ratios in their middle on a logarithmic axis."""
+    steps = np.log(ratios)
+    middle = 0.5 * (steps[1:] + steps[:-1])
+    return np.exp(np.concatenate([[2.0 * steps[0] - middle[0]], middle, [2.0 * steps[-1] - middle[-1]]]))
+
+
+# What is no number where a run never gets there, or says nothing where it does not.
+GREY = {"settling_time": ("settling_time", "never settles"), "overshoot": ("reach_time", "never arrives")}
+
+
 def draw_maps(figure: Figure, grid: Grid, swept: Swept, seconds: float) -> None:
-    """Median over the set points, at the preset's gain, over the two mismatches; dashed: the source's single lines."""
+    """Median over the set points, at the share of the gain nearest to 1, over the two mismatches.
+
+    Dashed: the source's single lines. Grey: where more than half of the set points are never reached or settled at.
+    """
     at = int(np.argmin(np.abs(grid.gains - 1.0)))
+    edges = _edges(grid.ratios)
     for axes, name in zip(panels(figure, 2, 2), MAPPED, strict=True):
-        values = _values(swept.merits, name)[..., at]
-        values = np.median(np.where(np.isfinite(values), values, 2.0 * seconds), axis=2)
-        mesh = axes.pcolormesh(grid.ratios, grid.ratios, values.T, cmap="viridis", shading="nearest")
+        label, unit, _ = SHOWN[name]
+        values = np.median(_values(swept.merits, name)[..., at], axis=2)
+        never = ""
+        if name in GREY:
+            deciding, why = GREY[name]
+            values = np.where(np.isfinite(np.median(_values(swept.merits, deciding)[..., at], axis=2)), values, np.nan)
+            never = f"; grey: {why}" if np.isnan(values).any() else ""
+        axes.set_facecolor("#c9ccd1")
+        mesh = axes.pcolormesh(edges, edges, np.ma.masked_invalid(values).T, cmap="viridis")
         axes.set(xscale="log", yscale="log")
         for axis in (axes.xaxis, axes.yaxis):
             axis.set_major_locator(FixedLocator([0.5, 0.7, 1.0, 1.4, 2.0]))
@@ -79,10 +100,19 @@ def draw_maps(figure: Figure, grid: Grid, swept: Swept, seconds: float) -> None:
             axis.set_minor_locator(FixedLocator([]))
         axes.axhline(1.0, color="white", linewidth=1.0, linestyle="--")
         axes.axvline(1.0, color="white", linewidth=1.0, linestyle="--")
-        label, unit, _ = SHOWN[name]
-        never = f"; {2.0 * seconds:g}: not settled" if name == "settling_time" else ""
         figure.colorbar(mesh, ax=axes).set_label(f"{label} ({unit}{never})", fontsize=8)
         named(axes, f"{grid.first}, plant / controller", f"{grid.second}, plant / controller", label)
+
+
+def over_mismatches(grid: Grid, swept: Swept) -> str:
+    """How a controller does on all the plants of the grid, in a sentence."""
+    at = int(np.argmin(np.abs(grid.gains - 1.0)))
+    settles = float(np.isfinite(_values(swept.merits, "settling_time")[..., at]).mean())
+    beyond = float(np.nanmax(_values(swept.merits, "overshoot")[..., at]))
+    return (
+        f"On all mismatches of {grid.first} and {grid.second} it settles in {100 * settles:.0f} % of the runs at "
+        f"{grid.gains[at]:g} times its main gain; overshoot up to {beyond:.3g}°."
+    )
 
 
 def draw_lines(figure: Figure, time: np.ndarray, ratios: Sequence[float], swept: Swept, target: float) -> None:
@@ -110,6 +140,12 @@ def draw_comparison(figure: Figure, targets: np.ndarray, merits: Mapping[str, Me
     last.legend(handles, labels, frameon=False, fontsize=9, loc="center", ncols=2)
 
 
+def _cell(value: float) -> str:
+    if np.isnan(value):
+        return "no number"
+    return "never" if np.isinf(value) else f"{value if abs(value) > 1e-6 else 0.0:.3g}"
+
+
 def comparison_rows(targets: np.ndarray, merits: Mapping[str, Merit]) -> list[list[str]]:
     """A row a controller: set points at which it settles, then median and worst of each figure of merit."""
     rows = []
@@ -119,7 +155,7 @@ def comparison_rows(targets: np.ndarray, merits: Mapping[str, Merit]) -> list[li
         for merit_name in SHOWN:
             values = _values(one, merit_name)
             middle, worst = float(np.median(values)), float(np.max(values))
-            cells.append(" / ".join(f"{v:.3g}" if np.isfinite(v) else "never" for v in (middle, worst)))
+            cells.append(" / ".join(_cell(v) for v in (middle, worst)))
         rows.append(cells)
     return rows
 
@@ -135,7 +171,7 @@ def page(
     )
     loops = grid.size
     parts = "".join(
-        f"<h2>{say(one.name)}</h2><p>{loops:,} closed loops of {seconds:g} s; {failures(one)}. {say(told(one.name))} "
+        f"<h2>{say(one.name)}</h2><p>{loops:,} closed loops of {seconds:g} s; {failures(one)}. {say(over_mismatches(grid, one))} {say(told(one.name))} "
         f'<a href="{one.name}.csv">every loop as CSV</a></p>'
         f'<img src="{one.name}_maps.png" alt="maps of {say(one.name)}">'
         f'<img src="{one.name}_lines.png" alt="lines of {say(one.name)}">'
@@ -167,7 +203,11 @@ def told(name: str) -> str:
 def failures(one: Swept) -> str:
     """How many loops gave no number, in words."""
     bad = int(np.isfinite(one.failed_at).sum())
-    return "none failed" if bad == 0 else f"{bad} failed: the controller's answer was no finite voltage"
+    return (
+        "none failed"
+        if bad == 0
+        else f"{bad} failed: the controller's answer was no finite voltage, or a gain is out of its bounds"
+    )
 
 
 def as_json(targets: np.ndarray, merits: Mapping[str, Merit], grid: Grid, swept: Sequence[Swept], between: str) -> str:

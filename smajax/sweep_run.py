@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from smajax.batch.provenance import digest
 from smajax.control_presets import CONTROLLERS, FILTERS
 from smajax.fit.progress import Progress
+from smajax.load.base import AbstractMovingLoad
 from smajax.measured_state import Sensor
 from smajax.merit import Merit
 from smajax.reference import clock
@@ -25,6 +26,8 @@ from smajax.sweep_report import (
     draw_comparison,
     draw_lines,
     draw_maps,
+    failures,
+    over_mismatches,
     page,
     write_rows,
 )
@@ -67,9 +70,22 @@ def run_sweep(system: System, settings: SweepSettings, out: Path, progress: Prog
     """
     unknown = [name for name in settings.controllers if name not in CONTROLLERS]
     if unknown or not settings.controllers:
-        raise ValueError(f"no controller {unknown}; there are {', '.join(CONTROLLERS)}.")
+        raise ValueError(f"no controller `{', '.join(unknown)}`; there are {', '.join(CONTROLLERS)}.")
     if settings.filtered and settings.filtered not in FILTERS:
         raise ValueError(f"no filter `{settings.filtered}`; there are {', '.join(FILTERS)}.")
+    limits = (
+        np.degrees([float(end) for end in system.load.limits()])
+        if isinstance(system.load, AbstractMovingLoad)
+        else (-np.inf, np.inf)
+    )
+    odd = [angle for angle in settings.set_points if not limits[0] <= angle <= limits[1]]
+    if odd or not settings.set_points:
+        raise ValueError(
+            f"set points are angles between the arm's stops, {limits[0]:g} to {limits[1]:g} degrees, at least one; not "
+            f"{', '.join(f'{angle:g}' for angle in odd) or 'none'}."
+        )
+    if not settings.gains or min(settings.gains) <= 0.0:
+        raise ValueError(f"gains are shares of the preset's, above 0, at least one; not {settings.gains}.")
     steps = settings.period / settings.dt
     if steps < 0.5 or abs(steps - round(steps)) > 1e-6:
         raise ValueError(
@@ -90,7 +106,7 @@ def run_sweep(system: System, settings: SweepSettings, out: Path, progress: Prog
         maps.savefig(out / f"{name}_maps.png", dpi=90, facecolor="white")
         draw_lines(over_time, time, LINES, one, float(np.radians(LINE_TARGET)))
         over_time.savefig(out / f"{name}_lines.png", dpi=90, facecolor="white")
-        progress(f"say: {name}: {grid.size:,} closed loops", 1.0)
+        progress(f"say: {name}: {grid.size:,} closed loops; {failures(one)}. {over_mismatches(grid, one)}", 1.0)
     comparison = Figure(figsize=(10.0, 11.0))
     draw_comparison(comparison, targets, compared)
     comparison.savefig(out / "comparison.png", dpi=90, facecolor="white")

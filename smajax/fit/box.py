@@ -14,13 +14,14 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from scipy.optimize import lsq_linear
 
 from smajax.fit.problem import Lane, Problem
 from smajax.fit.progress import Progress, quiet
 
 MOST_STEPS = 80
 ENOUGH = 1e-6  # of the cost: what a step that is the last one may still lower it by, and promise to
-STILL = 1e-9  # of the box: a step that is none
+STILL = 1e-12  # of the box
 DAMPED = 1e-2  # share of the squared columns that damping begins with
 HOPELESS = 1e10  # damping at which no step is a better one
 AT_MOST = 0.7  # of the way to a bound
@@ -75,36 +76,31 @@ def _normal_equations(
 
 
 def _step(walk: _Walk) -> np.ndarray:
-    """The damped step; what it would carry beyond a bound goes to the bound, and the others are solved again."""
-    size = len(walk.place)
-    step = np.zeros(size)
-    # Most of the way to a bound at a time: a first long step must not end in a corner that no later one leads out of.
-    low = np.where(walk.place < NEAR, 0.0, (1.0 - AT_MOST) * walk.place)
-    high = np.where(walk.place > 1.0 - NEAR, 1.0, 1.0 - (1.0 - AT_MOST) * (1.0 - walk.place))
-    # At a bound, with the cost falling outwards: held.
-    fixed = ((walk.place <= 0.0) & (walk.slope > 0.0)) | ((walk.place >= 1.0) & (walk.slope < 0.0))
+    """The damped step within its bounds, solved exactly: least squares by the Cholesky factor of the damped equations."""
     least = BLIND * max(float(walk.scale.max()), 1e-300)
-    left = walk.square + walk.damping * np.diag(np.maximum(walk.scale, least))
-    for _ in range(size + 1):
-        loose = ~fixed
-        if not loose.any():
-            break
-        right = -(walk.slope[loose] + left[np.ix_(loose, fixed)] @ step[fixed])
-        step[loose] = np.linalg.lstsq(left[np.ix_(loose, loose)], right, rcond=None)[0]
-        beyond = loose & ((walk.place + step < low) | (walk.place + step > high))
-        if not beyond.any():
-            break
-        step[beyond] = np.clip(walk.place + step, low, high)[beyond] - walk.place[beyond]
-        fixed |= beyond
-    return step
+    damped = walk.square + walk.damping * np.diag(np.maximum(walk.scale, least))
+    # Most of the way to a bound at a time: a first long step must not end in a corner that no later one leads out of.
+    low = np.where(walk.place < NEAR, 0.0, (1.0 - AT_MOST) * walk.place) - walk.place
+    high = np.where(walk.place > 1.0 - NEAR, 1.0, 1.0 - (1.0 - AT_MOST) * (1.0 - walk.place)) - walk.place
+    try:
+        factor = np.linalg.cholesky(damped)
+    except np.linalg.LinAlgError:
+        return np.zeros_like(walk.place)  # to rounding: more damping makes it positive
+    free = -np.linalg.solve(damped, walk.slope)
+    if np.all((low <= free) & (free <= high)):
+        return free
+    # Without a point between them a bound is no choice.
+    wide = np.where(high > low, high, low + STILL)
+    return np.clip(lsq_linear(factor.T, -np.linalg.solve(factor, walk.slope), (low, wide), method="bvls").x, low, high)
 
 
 def _judged(walk: _Walk, step: np.ndarray, cost: float, slope: np.ndarray, square: np.ndarray) -> None:
     """Take the step or not, and say so when it was the last."""
     promised = -(2.0 * walk.slope @ step + step @ walk.square @ step)
-    gained = walk.cost - cost if np.isfinite(cost) else -np.inf
+    known = np.isfinite(cost) and np.isfinite(slope).all() and np.isfinite(square).all()
+    gained = walk.cost - cost if known else -np.inf
     walk.steps += 1
-    small = promised < ENOUGH * walk.cost
+    small = 0.0 < promised < ENOUGH * walk.cost
     if gained > 0.0:
         share = gained / max(promised, 1e-300)
         walk.place, walk.cost = np.clip(walk.place + step, 0.0, 1.0), cost
@@ -113,12 +109,12 @@ def _judged(walk: _Walk, step: np.ndarray, cost: float, slope: np.ndarray, squar
         walk.damping *= max(0.1, 1.0 - (2.0 * min(share, 1.0) - 1.0) ** 3)
         walk.growth = 2.0
         if small and gained < ENOUGH * walk.cost:
-            walk.reason = "no step lowers the cost by more than a millionth"
+            walk.reason = "it has converged, no step lowers the cost by more than a millionth"
     else:
         walk.damping *= walk.growth
         walk.growth *= 2.0
-        if small or float(np.abs(step).max()) < STILL or walk.damping > HOPELESS:
-            walk.reason = "no step lowers the cost any more"
+        if small or walk.damping > HOPELESS:
+            walk.reason = "it has converged, no step lowers the cost any more"
 
 
 def fit_in_box(
@@ -158,7 +154,7 @@ def fit_in_box(
     places = [place_of(lane) for lane in lanes]
     walks = []
     for place, (cost, slope, square) in zip(places, evaluated(everyone, places), strict=True):
-        lost = not np.isfinite(cost)
+        lost = not (np.isfinite(cost) and np.isfinite(slope).all() and np.isfinite(square).all())
         walk = _Walk(place, cost if not lost else np.inf, slope, square, np.diag(square).copy())
         walk.reason = "the model gives no number at the start" if lost else ""
         walks.append(walk)

@@ -26,7 +26,9 @@ class Direction:
         """For an engineer."""
         named = {name: share for name, share in self.shares.items() if abs(share) >= NAMED}
         if self.relative_error >= UNBOUND:
-            return f"Nothing in these runs depends on {and_listed(list(named))}."
+            if len(named) == 1:
+                return f"Nothing in these runs depends on {next(iter(named))}."
+            return f"The runs show {and_listed(list(named))} in one combination only: no one of them by itself."
         size = 100.0 * self.relative_error
         if len(named) == 1:
             return f"{next(iter(named))} is known to {size:.2g} % only."

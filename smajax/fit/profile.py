@@ -13,6 +13,7 @@ from smajax.fit.progress import Progress, quiet
 
 ERRORS = (-2.8, -2.1, -1.4, -0.7, 0.7, 1.4, 2.1, 2.8)  # standard errors from the estimate
 SPARE = 0.1  # share of the box, for a parameter that has no standard error
+ALIKE = 0.1  # rise of the cost that tells nothing apart
 WITHIN = 1.959964  # square root of the 95 % point of chi-square with one degree of freedom
 
 
@@ -23,8 +24,9 @@ class Profile:
     name: str
     values: np.ndarray
     rise: np.ndarray  # over the least, in units of the variance of an independent sample
-    low: float | None  # 95 % interval; None: not reached before the bound
+    low: float | None  # 95 % interval; None: not reached by the last value, which may be the bound
     high: float | None
+    better: bool  # whether a lower cost was found on the way than the fit's
 
 
 def _crossing(values: np.ndarray, root: np.ndarray) -> float | None:
@@ -53,10 +55,8 @@ def profiles(
         low, high = bounds[name]
         error = errors[name] or SPARE * (high - low)
         others = [other for other in names if other != name]
-        for share in ERRORS:
-            value = float(best.values[index(name)] + share * error)
-            if not low <= value <= high:
-                continue
+        here = float(best.values[index(name)])
+        for value in sorted({min(max(here + share * error, low), high) for share in ERRORS} - {here}):
             start = np.array(best.values)
             start[index(name)] = value
             lanes.append(problem.lane(others, bounds, start, len(names)))
@@ -64,13 +64,13 @@ def profiles(
     solved = fit_in_box(problem, lanes, progress=progress, what="profiles") if lanes else []
     found = []
     for name in asked:
-        here = [(value, one.cost) for (of, value), one in zip(points, solved, strict=True) if of == name]
-        here = sorted([*here, (float(best.values[index(name)]), best.cost)])
-        values, cost = (np.asarray(column) for column in zip(*here, strict=True))
-        rise = np.maximum(cost - best.cost, 0.0) / inflation
+        tried = [(value, one.cost) for (of, value), one in zip(points, solved, strict=True) if of == name]
+        tried = sorted([*tried, (float(best.values[index(name)]), best.cost)])
+        values, cost = np.asarray(tried).T
+        rise = (cost - best.cost) / inflation
         middle = int(np.argmin(np.abs(values - best.values[index(name)])))
-        root = np.sqrt(rise)
+        root = np.sqrt(np.maximum(rise, 0.0))
         down = _crossing(values[middle::-1], root[middle::-1])
         up = _crossing(values[middle:], root[middle:])
-        found.append(Profile(name, values, rise, down, up))
+        found.append(Profile(name, values, rise, down, up, bool(rise.min() < -ALIKE)))
     return tuple(found)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -53,4 +54,5 @@ def from_many_starts(
     begun = fit_in_box(problem, lanes(points), most=FIRST, progress=progress, what="beginning fits")
     best = sorted(begun, key=lambda one: one.cost)[:KEPT]
     ended = fit_in_box(problem, lanes([one.values for one in best]), progress=progress, what="fitting")
-    return sorted(ended, key=lambda one: one.cost)
+    whole = [dataclasses.replace(one, steps=one.steps + before.steps) for one, before in zip(ended, best, strict=True)]
+    return sorted(whole, key=lambda one: one.cost)

@@ -31,13 +31,15 @@ class Uncertainty:
     remark: dict[str, str]
 
 
-def held(value: float, low: float, high: float) -> str:
+def held(value: float, low: float, high: float, edge: float = AT_BOUND) -> str:
     """`"at its lower bound"`, `"at its upper bound"`, or nothing."""
-    span = AT_BOUND * (high - low)
+    span = edge * (high - low)
     return "at its lower bound" if value - low < span else "at its upper bound" if high - value < span else ""
 
 
-def _covariance(columns: np.ndarray, runs: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+def _covariance(
+    columns: np.ndarray, runs: Sequence[np.ndarray], variance: float | None = None
+) -> tuple[np.ndarray, np.ndarray]:
     """(covariance, scale of each column).
 
     That of least squares where the residual is white. Where it has a memory, Newey-West's over each run, no variance of
@@ -48,6 +50,8 @@ def _covariance(columns: np.ndarray, runs: Sequence[np.ndarray]) -> tuple[np.nda
     scale = np.where(scale > 0.0, scale, 1.0)
     scaled = columns / scale
     bread = np.linalg.pinv(scaled.T @ scaled, rcond=1e-12, hermitian=True)
+    if variance is not None:
+        return bread * variance, scale
     plain = bread * float(np.mean(np.concatenate(runs) ** 2))
     if whiteness_p_value(runs) > WHITE:
         return plain, scale
@@ -101,16 +105,24 @@ def _together(name: str, cluster: Sequence[str]) -> str:
 
 
 def uncertainty(
-    at: Sensitivity, names: Sequence[str], values: Mapping[str, float], bounds: Mapping[str, tuple[float, float]]
+    at: Sensitivity,
+    names: Sequence[str],
+    values: Mapping[str, float],
+    bounds: Mapping[str, tuple[float, float]],
+    variance: float | None = None,
+    edge: float = AT_BOUND,
 ) -> Uncertainty:
-    """Standard errors at a fit. A parameter held by its bound gets none, and the others are told with it fixed."""
-    remark = {name: held(values[name], *bounds[name]) for name in names}
+    """Standard errors at a fit. A parameter held by its bound gets none, and the others are told with it fixed.
+
+    `variance` of a sample, over the noise's, in the place of what the residual says; `edge`: how near is at a bound.
+    """
+    remark = {name: held(values[name], *bounds[name], edge) for name in names}
     loose = [name for name in names if not remark[name]]
     errors: dict[str, float | None] = dict.fromkeys(names)
     if not loose:
         return Uncertainty(errors, remark)
     columns = at.columns(loose)
-    covariance, scale = _covariance(columns, split_runs(at.misfit, at.mask))
+    covariance, scale = _covariance(columns, split_runs(at.misfit, at.mask), variance)
     seen = np.any(columns, axis=0)
     unseen = np.zeros((len(loose), len(loose)))
     unseen[np.ix_(seen, seen)] = _unseen(columns[:, seen] / scale[seen])
@@ -136,12 +148,14 @@ def uncertainty(
     return Uncertainty(errors, remark)
 
 
-def covariance_of(at: Sensitivity, names: Sequence[str], known: Uncertainty) -> tuple[tuple[str, ...], np.ndarray]:
+def covariance_of(
+    at: Sensitivity, names: Sequence[str], known: Uncertainty, variance: float | None = None
+) -> tuple[tuple[str, ...], np.ndarray]:
     """(parameters that have a standard error, their covariance, SI): the others are held at their values."""
     told = tuple(name for name in names if known.standard_error[name] is not None)
     if not told:
         return told, np.zeros((0, 0))
-    covariance, scale = _covariance(at.columns(told), split_runs(at.misfit, at.mask))
+    covariance, scale = _covariance(at.columns(told), split_runs(at.misfit, at.mask), variance)
     return told, covariance / np.outer(scale, scale)
 
 

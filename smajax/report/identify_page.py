@@ -16,6 +16,11 @@ from smajax.report.display import digits, display, label, p_value, with_error
 from smajax.report.files import json_text, replace
 from smajax.residual.noise_like import WHITE
 
+OFF = 1.25  # ratio of residual to noise that is worth a sentence
+KNOWN = "Every combination of the parameters is known to 5 % or better."
+KNOWN_OF_THE_REST = (
+    "Of the parameters that are neither at a bound nor without effect, every combination is known to 5 %."
+)
 STYLE = (
     "body{font:15px/1.5 system-ui,sans-serif;max-width:1080px;margin:2em auto;padding:0 1em;color:#1d1d1f;background:#fff}"
     "td,th{text-align:left;vertical-align:top;padding:.35em .7em;border-bottom:1px solid #e3e5e9}"
@@ -50,17 +55,28 @@ def conclusions(found: Identified) -> list[str]:
         )
     else:
         told.append(
-            f"The residual is {found.ratio:.2g} times the noise and has no memory ({p_value(found.whiteness_p)}): the "
-            "model says all that these runs show."
+            f"The residual is {found.ratio:.2g} times the noise, and no memory was found in it "
+            f"({p_value(found.whiteness_p)}): nothing in these runs speaks against the model."
         )
+        if not 1.0 / OFF < found.ratio < OFF:
+            told.append("The noise is not what was declared: errors were taken from the residual.")
     if found.normality_p < WHITE and not found.robust:
         told.append(
             f"It is not normally distributed ({p_value(found.normality_p)}): if single samples are far off, fit by Huber's "
             "loss (`--robust`)."
         )
-    silent = [one.name for one in found.estimates if one.standard_error is None]
+    edge = [one.name for one in found.estimates if "bound" in one.remark and one.standard_error is None]
+    silent = [one.name for one in found.estimates if one.standard_error is None and one.name not in edge]
+    if edge:
+        told.append(
+            f"Held by a bound, which the truth may lie beyond: {', '.join(edge)}; the others are told with it held."
+        )
     if silent:
         told.append(f"The runs do not tell {', '.join(silent)}: see the remarks.")
+    if better := [one.name for one in found.profiles if one.better]:
+        told.append(f"The profile of {', '.join(better)} found a better fit than this one: ask for more `--starts`.")
+    if found.robust:
+        told.append("Huber's loss: samples far off count less, and errors are those of that estimate.")
     return told
 
 
@@ -92,7 +108,11 @@ def estimate_rows(found: Identified) -> list[list[str]]:
         if one.name not in profiled:
             return ""
         unit, known = display(one.unit, one.name), profiled[one.name]
-        ends = [digits(unit.of(end)) if end is not None else "open" for end in (known.low, known.high)]
+        last = (known.values[0], known.values[-1])
+        ends = [
+            digits(unit.of(end)) if end is not None else f"beyond {digits(unit.of(float(reached)))}"
+            for end, reached in zip((known.low, known.high), last, strict=True)
+        ]
         return " … ".join(ends)
 
     rows = []
@@ -126,7 +146,7 @@ def page(found: Identified) -> str:
         "<h2>Parameters</h2>",
         _table(head, estimate_rows(found), (1,)),
         "<h2>What the runs tell apart</h2>",
-        _bullets(found.weak) or "<p>Every combination of the parameters is known to 5 % or better.</p>",
+        _bullets(found.weak) or f"<p>{KNOWN if found.all_took_part else KNOWN_OF_THE_REST}</p>",
         _picture(draw.correlations(found), "correlations of the estimates"),
     ]
     if found.profiles:
