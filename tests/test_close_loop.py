@@ -65,6 +65,7 @@ def test_demo_with_nothing_missing_is_adequate(tmp_path: Path) -> None:
         assert abs(parameter.value - truth[parameter.name]) < 4 * parameter.standard_error + 2e-3 * abs(parameter.value)
 
 
+@pytest.mark.slow  # two minutes, nearly all of it compilation
 def test_one_run_no_unknown_and_no_candidate_still_give_an_answer(tmp_path: Path) -> None:
     """The base model taken as it is, on one run: said to be off, and that nothing could be tried or left out."""
     with resources.as_file(resources.files("smajax") / "demo" / "complete") as folder:

@@ -5,9 +5,12 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import pytest
+
 from studies.coverage import run
 
 
+@pytest.mark.slow  # two minutes; the kept study is tested always
 def test_intervals_hold_the_truth_as_often_as_they_say() -> None:
     """Forty repeated experiments by scipy's integration: within what chance allows of 95 %."""
     found = run.study(fast=True)
