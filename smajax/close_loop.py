@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-import platform
 import time as clock
 from dataclasses import dataclass
-from importlib import metadata
 from pathlib import Path
 
 import equinox as eqx
@@ -29,7 +27,8 @@ from smajax.fit.sensitivity import Sensitivity, sensitivity
 from smajax.fit.solve import Solution
 from smajax.fit.uncertainty import Uncertainty, identifiability, uncertainty
 from smajax.load.coupon import AbstractCoupon
-from smajax.parameters import get_parameters, parameters
+from smajax.made_with import made_with
+from smajax.parameters import get_parameters, parameter_values, parameters
 from smajax.report.display import digits, display
 from smajax.report.findings import (
     CoefficientFinding,
@@ -40,7 +39,6 @@ from smajax.report.findings import (
     RunFinding,
 )
 from smajax.residual.portrait import portrait
-from smajax.system import System
 from smajax.types import Trajectory
 
 SEED = 2004
@@ -61,12 +59,6 @@ class _Job:
     candidates: tuple[str, ...]
 
 
-def _defaults(system: System) -> dict[str, float]:
-    """The model's own value of every parameter: what holds in a run that does not override it."""
-    names = list(parameters(system))
-    return dict(zip(names, np.asarray(get_parameters(system, names)).tolist(), strict=True))
-
-
 def _job(experiment: Experiment) -> _Job:
     base = base_model(experiment)
     declared = experiment.declared_effects
@@ -74,7 +66,7 @@ def _job(experiment: Experiment) -> _Job:
     known = {**experiment.parameters, **{unknown.name: unknown.start for unknown in experiment.unknowns}}
     full = extended(base, (*declared, *names), {name: value for name, value in known.items() if "." in name})
     runs = tuple(run for run in experiment.runs if run.role == "fit")
-    batch = pack(runs, experiment.step, _defaults(full))
+    batch = pack(runs, experiment.step, parameter_values(full))
     problem = Problem.build(full, batch, experiment.noise_sigma, experiment.offset)
     bounds = {entry.name: (entry.low, entry.high) for entry in parameters(full).values()}
     bounds |= {unknown.name: (unknown.low, unknown.high) for unknown in experiment.unknowns}
@@ -262,7 +254,7 @@ def _simulated(problem: Problem, values: jax.Array, batch: RunBatch) -> Trajecto
 def _compare(job: _Job, first: Model, final: Model) -> tuple[tuple[RunFinding, ...], Portrait, Portrait]:
     """Every run, held-out ones included, by both models; and the portraits of the fit runs' residuals."""
     experiment = job.experiment
-    batch = pack(experiment.runs, experiment.step, _defaults(job.problem.system))
+    batch = pack(experiment.runs, experiment.step, parameter_values(job.problem.system))
     before = _simulated(job.problem, jnp.asarray(first.values), batch)
     after = _simulated(job.problem, jnp.asarray(final.values), batch)
     runs = []
@@ -334,11 +326,8 @@ def _series(run: Run, trajectory: Trajectory, index: int) -> dict[str, np.ndarra
 
 
 def _provenance(experiment: Experiment, kept: Memory, command: str, seed: int, seconds: float) -> dict[str, str]:
-    versions = {name: metadata.version(name) for name in ("smajax", "jax", "equinox", "optimistix", "numpy", "scipy")}
     return {
-        **{f"version of {name}": version for name, version in versions.items()},
-        "python": platform.python_version(),
-        "machine": f"{platform.system()} {platform.machine()}, {jax.default_backend()}",
+        **made_with(),
         "command": command,
         "seed": str(seed),
         "step": f"{experiment.step} s",

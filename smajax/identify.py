@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import platform
 import time as clock
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib import metadata
 
 import equinox as eqx
 import jax
@@ -27,7 +25,8 @@ from smajax.fit.robust import NORMAL, robust_fit, robust_variance, unweighted_mi
 from smajax.fit.sensitivity import sensitivity
 from smajax.fit.starts import TRIED, from_many_starts
 from smajax.fit.uncertainty import covariance_of, held, identifiability, uncertainty
-from smajax.parameters import get_parameters, parameters
+from smajax.made_with import made_with
+from smajax.parameters import parameter_values, parameters
 from smajax.residual.noise_like import LAGS, WHITE, correlation_time, split_runs, whiteness_p_value
 from smajax.types import Trajectory
 
@@ -116,9 +115,8 @@ def _whitened(runs: Sequence[np.ndarray], step: float) -> np.ndarray:
 
 def _problem(experiment: Experiment, runs: Sequence[Run]) -> Problem:
     model = base_model(experiment)
-    names = list(parameters(model))
-    defaults = dict(zip(names, np.asarray(get_parameters(model, names)).tolist(), strict=True))
-    return Problem.build(model, pack(runs, experiment.step, defaults), experiment.noise_sigma, experiment.offset)
+    batch = pack(runs, experiment.step, parameter_values(model))
+    return Problem.build(model, batch, experiment.noise_sigma, experiment.offset)
 
 
 def identify(
@@ -253,11 +251,8 @@ def _runs(
 
 
 def _provenance(command: str, seed: int, starts: int, seconds: float) -> dict[str, str]:
-    versions = {name: metadata.version(name) for name in ("smajax", "jax", "equinox", "optimistix", "numpy", "scipy")}
     return {
-        **{f"version of {name}": version for name, version in versions.items()},
-        "python": platform.python_version(),
-        "machine": f"{platform.system()} {platform.machine()}, {jax.default_backend()}",
+        **made_with(),
         "command": command,
         "seed": str(seed),
         "points of the box that were tried": str(starts),

@@ -91,6 +91,12 @@ def get_parameters(model: eqx.Module, names: Sequence[str]) -> Float[Array, " na
     return jnp.stack([jnp.asarray(_lookup(model, entry.path), dtype=float) for entry in _select(model, names)])
 
 
+def parameter_values(model: eqx.Module) -> dict[str, float]:
+    """Every parameter's value by name, SI."""
+    names = list(parameters(model))
+    return dict(zip(names, np.asarray(get_parameters(model, names), dtype=float).tolist(), strict=True))
+
+
 def set_parameters(model: Module, values: Mapping[str, Any]) -> Module:
     """`model` with the named values put in; everything else is shared.
 

@@ -76,7 +76,7 @@ def _edges(ratios: np.ndarray) -> np.ndarray:
 GREY = {"settling_time": ("settling_time", "never settles"), "overshoot": ("reach_time", "never arrives")}
 
 
-def draw_maps(figure: Figure, grid: Grid, swept: Swept, seconds: float) -> None:
+def draw_maps(figure: Figure, grid: Grid, swept: Swept) -> None:
     """Median over the set points, at the share of the gain nearest to 1, over the two mismatches.
 
     Dashed: the source's single lines. Grey: where more than half of the set points are never reached or settled at.

@@ -102,7 +102,7 @@ def run_sweep(system: System, settings: SweepSettings, out: Path, progress: Prog
         swept.append(one)
         write_rows(out / f"{name}.csv", grid, one)
         maps, over_time = Figure(figsize=(10.0, 7.6)), Figure(figsize=(11.0, 6.2))
-        draw_maps(maps, grid, one, settings.seconds)
+        draw_maps(maps, grid, one)
         maps.savefig(out / f"{name}_maps.png", dpi=90, facecolor="white")
         draw_lines(over_time, time, LINES, one, float(np.radians(LINE_TARGET)))
         over_time.savefig(out / f"{name}_lines.png", dpi=90, facecolor="white")

@@ -14,7 +14,7 @@ import equinox as eqx
 import jax
 import numpy as np
 
-from smajax.parameters import get_parameters, parameters
+from smajax.parameters import parameter_values
 from smajax.source_mark import source_mark
 
 PACKAGES = ("smajax", "jax", "jaxlib", "equinox", "numpy")
@@ -37,12 +37,6 @@ def versions() -> dict[str, str]:
     return {name: metadata.version(name) for name in PACKAGES} | {"python": platform.python_version()}
 
 
-def model_parameters(model: eqx.Module) -> dict[str, float]:
-    """Every parameter by name, SI."""
-    names = list(parameters(model))
-    return dict(zip(names, np.asarray(get_parameters(model, names)).tolist(), strict=True))
-
-
 def digest(model: Any, more: Sequence[str | np.ndarray] = ()) -> str:
     """Hex digest of the code, of the structure and the numbers of `model`, and of `more`."""
     mark = hashlib.sha256(f"{source_mark()} {jax.tree.structure(model)}".encode())
@@ -55,4 +49,4 @@ def provenance(model: eqx.Module, **settings: object) -> dict[str, str]:
     """Attributes of a result: text only, so that every format can hold them."""
     told = {f"version of {name}": version for name, version in versions().items()}
     told |= {name: str(value) for name, value in settings.items()}
-    return told | {"git": git_state(), "parameters (SI)": json.dumps(model_parameters(model))}
+    return told | {"git": git_state(), "parameters (SI)": json.dumps(parameter_values(model))}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import html
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,6 +13,7 @@ from smajax.identify import Estimate, Identified
 from smajax.report import identify_pictures as draw
 from smajax.report.display import digits, display, label, p_value, with_error
 from smajax.report.files import json_text, replace
+from smajax.report.html import picture
 from smajax.residual.noise_like import WHITE
 
 OFF = 1.25  # ratio of residual to noise that is worth a sentence
@@ -90,12 +90,6 @@ def _table(head: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequence
     return f"<table><tr>{cells('th', head)}</tr>{body}</table>"
 
 
-def _picture(png: bytes | None, alt: str) -> str:
-    if png is None:
-        return ""
-    return f'<img src="data:image/png;base64,{base64.b64encode(png).decode("ascii")}" alt="{html.escape(alt)}">'
-
-
 def _bullets(sentences: Sequence[str]) -> str:
     return f"<ul>{''.join(f'<li>{html.escape(one)}</li>' for one in sentences)}</ul>" if sentences else ""
 
@@ -147,13 +141,13 @@ def page(found: Identified) -> str:
         _table(head, estimate_rows(found), (1,)),
         "<h2>What the runs tell apart</h2>",
         _bullets(found.weak) or f"<p>{KNOWN if found.all_took_part else KNOWN_OF_THE_REST}</p>",
-        _picture(draw.correlations(found), "correlations of the estimates"),
+        picture(draw.correlations(found), "correlations of the estimates"),
     ]
     if found.profiles:
         parts += [
             "<h2>Profile likelihood</h2><p class=quiet>Each parameter held, all others fitted again: the rise of the cost "
             "(blue), what the standard error stands for (grey), the 95 % line (red).</p>",
-            _picture(draw.profile_curves(found), "profiles"),
+            picture(draw.profile_curves(found), "profiles"),
         ]
     if found.suggestions:
         rows = [
@@ -169,12 +163,12 @@ def page(found: Identified) -> str:
             "<h2>What to measure next</h2><p class=quiet>Courses of the input within what was applied already, ranked by "
             "what one such run would tell (D-optimal, at the fit).</p>",
             _table(["", "run", "information, nats", "standard errors become"], rows, (2,)),
-            _picture(draw.suggested_inputs(found), "suggested inputs"),
+            picture(draw.suggested_inputs(found), "suggested inputs"),
         ]
     parts += ["<h2>Runs</h2>", _table(["run", "role", "samples", f"rms error ({unit.unit or '-'})"], runs, (2, 3))]
     for one in found.runs:
         parts.append(
-            f"<h3>{say(one.name)} ({say(one.role)})</h3>{_picture(draw.run_with_band(found, one), label(one.name))}"
+            f"<h3>{say(one.name)} ({say(one.role)})</h3>{picture(draw.run_with_band(found, one), label(one.name))}"
         )
     parts += [
         "<h2>Checks and provenance</h2>",

@@ -10,11 +10,12 @@ from smajax.report.pictures import (
     AFTER,
     NOISE,
     QUIET,
-    STRIPS,
     THICK,
     as_png,
     extremes,
     new_figure,
+    panels_done,
+    run_panels,
     tidy,
 )
 
@@ -22,31 +23,16 @@ from smajax.report.pictures import (
 def run_with_band(found: Identified, run: IdentifiedRun) -> bytes:
     """Measured and simulated, the residual with the noise's band and the parameters', and the varying inputs."""
     shown = display(found.output_unit, found.output_name)
-    strips = [name for name, values in run.inputs.items() if np.ptp(values) > 0.0][:STRIPS]
-    figure = new_figure(4.7 + 0.75 * max(len(strips) - 1, 0))
-    rows = figure.subplots(2 + len(strips), 1, sharex=True, height_ratios=[3.0, 1.5, *[0.7] * len(strips)])
-    output, residual = rows[0], rows[1]
+    figure, rows = run_panels(run.time, run.inputs, found.output_name, shown)
+    output, residual = rows[:2]
     output.plot(*extremes(run.time, shown.of(run.measured)), **THICK, label="measured")
     output.plot(*extremes(run.time, shown.of(run.simulated)), color=AFTER, linewidth=1.2, label="simulated")
-    output.set_ylabel(axis_label(found.output_name, shown), fontsize=9)
     both = 1.96 * np.hypot(run.spread, found.noise_sigma)
     residual.fill_between(
         run.time, shown.of(-both), shown.of(both), color=NOISE, zorder=0, label="95 %: noise and parameters"
     )
     residual.plot(*extremes(run.time, shown.of(run.measured - run.simulated)), color=AFTER, linewidth=0.9)
-    residual.axhline(0.0, color=QUIET, linewidth=0.6)
-    residual.set_ylabel("measured\n− model" + (f" ({shown.unit})" if shown.unit else ""), fontsize=9)
-    for axes, name in zip(rows[2:], strips, strict=True):
-        unit = channel(name)
-        axes.plot(*extremes(run.time, unit.of(run.inputs[name])), color="#5b6470", linewidth=0.9)
-        axes.set_ylabel(f"{label(name)}\n({unit.unit})" if unit.unit else label(name), fontsize=8)
-    rows[-1].set_xlabel("time (s)", fontsize=9)
-    for axes in rows:
-        tidy(axes)
-        axes.margins(x=0.01)
-    figure.legend(loc="outside upper center", ncols=3, frameon=False, fontsize=9)
-    figure.align_ylabels(list(rows))
-    return as_png(figure)
+    return panels_done(figure, rows, 3)
 
 
 def correlations(found: Identified) -> bytes | None:

@@ -14,7 +14,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from smajax.report.display import axis_label, channel, display, label
+from smajax.report.display import Display, axis_label, channel, display, label
 from smajax.report.findings import EffectFinding, Findings, Portrait, RunFinding
 
 MEASURED, BEFORE, AFTER, NOISE, QUIET = "#1d1d1f", "#c8553d", "#1f6fb2", "#d9dce1", "#9aa0a8"
@@ -76,35 +76,44 @@ def _varying(inputs: dict[str, np.ndarray]) -> list[str]:
     return [name for name, values in inputs.items() if np.ptp(values) > 0.0][:STRIPS]
 
 
-def run_over_time(findings: Findings, run: RunFinding) -> bytes:
-    """Output measured, before and after; the residuals with the noise band; the varying inputs on thin strips."""
-    shown = display(findings.output_unit, findings.output_name)
-    models, strips = _models(findings, run), _varying(run.inputs)
+def run_panels(time: np.ndarray, inputs: dict[str, np.ndarray], name: str, shown: Display) -> tuple[Figure, list[Axes]]:
+    """A figure of one run: output, residual, and the varying inputs, already drawn, on thin strips."""
+    strips = _varying(inputs)
     figure = new_figure(4.7 + 0.75 * max(len(strips) - 1, 0))
-    rows = figure.subplots(2 + len(strips), 1, sharex=True, height_ratios=[3.0, 1.5, *[0.7] * len(strips)])
-    output, residual = rows[0], rows[1]
-    output.plot(
-        *extremes(run.time, shown.of(run.measured)), color=MEASURED, linewidth=2.2, alpha=0.55, label="measured"
-    )
-    for name, values, colour in models:
-        output.plot(*extremes(run.time, shown.of(values)), color=colour, linewidth=1.2, label=name)
-        residual.plot(*extremes(run.time, shown.of(run.measured - values)), color=colour, linewidth=0.9)
-    output.set_ylabel(axis_label(findings.output_name, shown), fontsize=9)
-    band = 2.0 * shown.of(findings.noise_sigma)
-    residual.axhspan(-band, band, color=NOISE, zorder=0, label="noise, ± 2 σ")
-    residual.axhline(0.0, color=QUIET, linewidth=0.6)
-    residual.set_ylabel("measured\n− model" + (f" ({shown.unit})" if shown.unit else ""), fontsize=9)
-    for axes, name in zip(rows[2:], strips, strict=True):
-        unit = channel(name)
-        axes.plot(*extremes(run.time, unit.of(run.inputs[name])), color="#5b6470", linewidth=0.9)
-        axes.set_ylabel(f"{label(name)}\n({unit.unit})" if unit.unit else label(name), fontsize=8)
+    rows = list(figure.subplots(2 + len(strips), 1, sharex=True, height_ratios=[3.0, 1.5, *[0.7] * len(strips)]))
+    rows[0].set_ylabel(axis_label(name, shown), fontsize=9)
+    rows[1].set_ylabel("measured\n− model" + (f" ({shown.unit})" if shown.unit else ""), fontsize=9)
+    for axes, strip in zip(rows[2:], strips, strict=True):
+        unit = channel(strip)
+        axes.plot(*extremes(time, unit.of(inputs[strip])), color="#5b6470", linewidth=0.9)
+        axes.set_ylabel(f"{label(strip)}\n({unit.unit})" if unit.unit else label(strip), fontsize=8)
     rows[-1].set_xlabel("time (s)", fontsize=9)
+    return figure, rows
+
+
+def panels_done(figure: Figure, rows: list[Axes], columns: int) -> bytes:
+    """The picture of `run_panels`, its legend in so many columns."""
+    rows[1].axhline(0.0, color=QUIET, linewidth=0.6)
     for axes in rows:
         tidy(axes)
         axes.margins(x=0.01)
-    figure.legend(loc="outside upper center", ncols=4, frameon=False, fontsize=9)
-    figure.align_ylabels(list(rows))
+    figure.legend(loc="outside upper center", ncols=columns, frameon=False, fontsize=9)
+    figure.align_ylabels(rows)
     return as_png(figure)
+
+
+def run_over_time(findings: Findings, run: RunFinding) -> bytes:
+    """Output measured, before and after; the residuals with the noise band; the varying inputs on thin strips."""
+    shown = display(findings.output_unit, findings.output_name)
+    figure, rows = run_panels(run.time, run.inputs, findings.output_name, shown)
+    output, residual = rows[:2]
+    output.plot(*extremes(run.time, shown.of(run.measured)), **THICK, label="measured")
+    for name, values, colour in _models(findings, run):
+        output.plot(*extremes(run.time, shown.of(values)), color=colour, linewidth=1.2, label=name)
+        residual.plot(*extremes(run.time, shown.of(run.measured - values)), color=colour, linewidth=0.9)
+    band = 2.0 * shown.of(findings.noise_sigma)
+    residual.axhspan(-band, band, color=NOISE, zorder=0, label="noise, ± 2 σ")
+    return panels_done(figure, rows, 4)
 
 
 def run_hysteresis(findings: Findings, run: RunFinding) -> bytes | None:

@@ -14,7 +14,7 @@ import numpy as np
 
 from smajax.batch.axes import Axes, sampled
 from smajax.figures.rigs import arm
-from smajax.parameters import get_parameters, parameters
+from smajax.parameters import parameter_values
 from studies.benchmarks import equations
 from studies.benchmarks.given import Given, load, save
 from studies.reference.wire_parameters import ArmParameters
@@ -38,9 +38,7 @@ def sample_times() -> np.ndarray:
 
 def constants() -> dict[str, float]:
     """Every parameter of the arm by smajax's name, SI, temperatures in C."""
-    system = arm()
-    names = list(parameters(system))
-    return dict(zip(names, np.asarray(get_parameters(system, names), dtype=float).tolist(), strict=True))
+    return parameter_values(arm())
 
 
 def axes(count: int) -> Axes:

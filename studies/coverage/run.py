@@ -20,8 +20,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from smajax.fit.box import MOST_STEPS, Fit, fit_in_box
-from smajax.fit.problem import Problem
-from smajax.fit.sensitivity import Sensitivity
+from smajax.fit.sensitivity import sensitivity
 from smajax.fit.uncertainty import uncertainty
 from smajax.runtime import prepare
 from studies.coverage.rig import BOUNDS, NOISE, Rig, rig
@@ -41,24 +40,12 @@ def repeated(rig: Rig, count: int, most: int = MOST_STEPS) -> tuple[list[Fit], n
     return fit_in_box(rig.problem, [lane] * count, outputs=outputs, at_once=min(AT_ONCE, count), most=most), outputs
 
 
-@eqx.filter_jit
-def _jacobian(problem: Problem, values: jax.Array, slots: jax.Array, output: jax.Array) -> tuple[jax.Array, jax.Array]:
-    def at(chosen: jax.Array) -> tuple[jax.Array, jax.Array]:
-        misfit = problem.with_output(output).misfit(values.at[slots].set(chosen)) / problem.noise_sigma
-        return misfit, misfit
-
-    jacobian, misfit = jax.jacfwd(at, has_aux=True)(values[slots])
-    return misfit, jacobian
-
-
 def errors(rig: Rig, solutions: list[Fit], outputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(estimate - truth, standard error), each (count, parameters); the errors are those that `identify` tells."""
     problem = rig.problem
-    slots = jnp.asarray([problem.names.index(name) for name in rig.names])
     off, spread = [], []
     for one, output in zip(solutions, outputs, strict=True):
-        misfit, jacobian = _jacobian(problem, jnp.asarray(one.values), slots, jnp.asarray(output))
-        at = Sensitivity(rig.names, np.asarray(misfit), np.asarray(jacobian), np.asarray(problem.batch.mask))
+        at = sensitivity(problem.with_output(jnp.asarray(output)), one.values, rig.names)
         values = {name: float(one.values[problem.names.index(name)]) for name in rig.names}
         known = uncertainty(at, rig.names, values, BOUNDS)
         off.append([values[name] - rig.truth[name] for name in rig.names])
