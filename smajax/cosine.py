@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 
+import jax
 import jax.numpy as jnp
 
 from smajax.types import Scalar
@@ -23,15 +24,40 @@ COEFFICIENTS = (
     -6.3832315751919636e-09,
     6.357424822347121e-11,
 )
+# Of $-(\pi/2) \sin(\pi\sqrt s/2)/\sqrt s$, to 4e-16: the slope over z. By its own polynomial it costs half of what
+# differentiating the other term by term does.
+SLOPE_COEFFICIENTS = (
+    -2.4674011002723395,
+    1.014678031604156,
+    -0.125180884579358,
+    0.007354082192633877,
+    -0.00025202039981640453,
+    5.652998638307676e-06,
+    -8.93518912060021e-08,
+    1.0130805730119923e-09,
+)
 
 
+def _polynomial(c: tuple[float, ...], s: Scalar) -> Scalar:
+    """Of degree 7. In pairs (Estrin's way): the processor need not wait for one multiplication before the next."""
+    square = s * s
+    fourth = square * square
+    low = (c[0] + c[1] * s) + (c[2] + c[3] * s) * square
+    high = (c[4] + c[5] * s) + (c[6] + c[7] * s) * square
+    return low + high * fourth
+
+
+@jax.custom_jvp
 def quarter_cosine(z: Scalar) -> Scalar:
     """cos(pi z / 2) for |z| <= 1."""
     s = z * z
-    total = jnp.full_like(s, COEFFICIENTS[-1])
-    for coefficient in reversed(COEFFICIENTS[:-1]):
-        total = total * s + coefficient
-    return 1.0 + s * total
+    return 1.0 + s * _polynomial(COEFFICIENTS, s)
+
+
+@quarter_cosine.defjvp
+def _quarter_cosine_jvp(given: tuple[Scalar], along: tuple[Scalar]) -> tuple[Scalar, Scalar]:
+    (z,), (moved,) = given, along
+    return quarter_cosine(z), z * _polynomial(SLOPE_COEFFICIENTS, z * z) * moved
 
 
 def cosine(angle: Scalar) -> Scalar:

@@ -59,18 +59,17 @@ def _heating(system: System, stage: Stage, inputs: Inputs, temperature: Scalar, 
     return heat_rate(wire, effects, temperature, ambient, power)
 
 
-def rates(system: System, stage: Stage, inputs: Inputs, z: Unknowns) -> tuple[Scalar, Scalar, Scalar]:
-    """(dH/dt, v, a) at the end of a stage."""
-    velocity = (z.position - stage.position) / stage.step
-    acceleration = (velocity - stage.velocity) / stage.step
-    return _heating(system, stage, inputs, z.temperature, z.fraction), velocity, acceleration
+def motion_rates(stage: Stage, position: Scalar) -> tuple[Scalar, Scalar]:
+    """(v, a) at the end of a stage that ends at `position`."""
+    velocity = (position - stage.position) / stage.step
+    return velocity, (velocity - stage.velocity) / stage.step
 
 
-def free_position(system: System, stage: Stage, inputs: Inputs, z: Unknowns) -> Scalar:
+def _free_position(system: System, stage: Stage, inputs: Inputs, z: Unknowns) -> Scalar:
     """The position less what the equation of motion is off by, in units of position; `z.position` where it holds."""
     load = system.load
     assert isinstance(load, AbstractMovingLoad)
-    _, velocity, acceleration = rates(system, stage, inputs, z)
+    velocity, acceleration = motion_rates(stage, z.position)
     inertia = load.inertia(inputs)
     limit = friction_limit(system)
     friction = 0.0 if limit is None else limit * friction_in_use(stage, z.position)[0]
@@ -79,22 +78,31 @@ def free_position(system: System, stage: Stage, inputs: Inputs, z: Unknowns) -> 
     return z.position - (inertia * acceleration + resisting - pull) * stage.step**2 / inertia
 
 
-def equations(system: System, stage: Stage, inputs: Inputs, z: Unknowns) -> tuple[Scalar, Scalar, Scalar]:
-    """Heat, motion and stress of a stage, each scaled to the unknown that it is solved for, zero at the solution.
+class Missed(NamedTuple):
+    """By how much three equations of a stage are missed, each in the unit of the unknown that it is solved for.
 
     The fourth equation, of the kinetics, depends on the branch.
     """
+
+    heat: Scalar
+    motion: Scalar
+    stress: Scalar
+    free: Scalar  # not an equation: where the load would be without end stops
+
+
+def equations(system: System, stage: Stage, inputs: Inputs, z: Unknowns) -> Missed:
+    """Heat, motion and stress of a stage, zero at the solution."""
     wire, effects, load, old = system.wire, system.effects, system.load, stage.old.wire
     assert isinstance(load, AbstractMovingLoad)
-    heating, _, _ = rates(system, stage, inputs, z)
+    heating = _heating(system, stage, inputs, z.temperature, z.fraction)
     capacity = stored_heat(wire, (), jnp.ones_like(z.temperature), z.fraction)
     heat = (stored_heat(wire, effects, z.temperature, z.fraction) - stage.heat - stage.step * heating) / capacity
 
     # Projected on the range between the end stops: at a stop the equation reads "position = stop".
-    free = free_position(system, stage, inputs, z)
+    free = _free_position(system, stage, inputs, z)
     lower, upper = load.limits()
     motion = z.position - jnp.where(free < lower, lower, jnp.where(free > upper, upper, free))
 
     strain = -load.contraction(wire) * (z.position - load.start())
     asked = stress_at(wire, effects, old, strain, z.temperature, z.stress, z.fraction)
-    return heat, motion, z.stress - asked
+    return Missed(heat, motion, z.stress - asked, free)

@@ -16,6 +16,7 @@ its bracket: a member that needs them makes its batch wait, and changes nothing 
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Callable, Sequence
 from functools import reduce
 from typing import NamedTuple
@@ -24,6 +25,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jax import lax
+from jaxtyping import Array, Bool
 
 from smajax.load.base import AbstractMovingLoad
 from smajax.stage_equations import PRESLIDING, Stage, Unknowns, equations, friction_in_use, friction_limit
@@ -58,11 +60,13 @@ class Solution(NamedTuple):
 
     z: Unknowns
     branch: Branch
+    free: Scalar  # position without end stops
 
 
 class _Iterate(NamedTuple):
     z: Unknowns
     branch: Branch
+    free: Scalar
     enough: Scalar  # bool
     iterations: Scalar
 
@@ -72,8 +76,15 @@ def _over(value: Scalar, pivot: Entry) -> Scalar:
     return value / pivot
 
 
-def solved_linear(rows: Sequence[Sequence[Entry]], *rights: Sequence[Scalar]) -> list[list[Scalar]]:
-    """Solutions of one small linear system for several right-hand sides, without pivoting.
+def _less(value: Entry, factor: Entry, other: Entry) -> Entry:
+    """value - factor * other."""
+    if factor is None or other is None:
+        return value
+    return -factor * other if value is None else value - factor * other
+
+
+def solved_linear(rows: Sequence[Sequence[Entry]], *rights: Sequence[Entry]) -> list[list[Scalar]]:
+    """Solutions of one small linear system for several right-hand sides, none of them zero throughout, without pivoting.
 
     In the order T, x, sigma every pivot is positive: heat, inertia and stiffness are.
     """
@@ -86,25 +97,23 @@ def solved_linear(rows: Sequence[Sequence[Entry]], *rights: Sequence[Scalar]) ->
                 continue
             factor = _over(entry, left[pivot][pivot])
             for column in range(pivot + 1, size):
-                above, here = left[pivot][column], left[row][column]
-                if above is not None:
-                    left[row][column] = -factor * above if here is None else here - factor * above
+                left[row][column] = _less(left[row][column], factor, left[pivot][column])
             for one in right:
-                one[row] = one[row] - factor * one[pivot]
+                one[row] = _less(one[row], factor, one[pivot])
     for one in right:
         for row in range(size - 1, -1, -1):
             for column in range(row + 1, size):
-                entry = left[row][column]
-                if entry is not None:
-                    one[row] = one[row] - entry * one[column]
-            one[row] = _over(one[row], left[row][row])
-    return right
+                one[row] = _less(one[row], left[row][column], one[column])
+            own = one[row]
+            one[row] = None if own is None else _over(own, left[row][row])
+    some = next(entry for one in right for entry in one if entry is not None)
+    return [[jnp.zeros_like(some) if entry is None else entry for entry in one] for one in right]
 
 
 def _linearised(system: System, stage: Stage, inputs: Inputs, z: Unknowns) -> tuple[list[Scalar], list[list[Entry]]]:
-    """(residual of the three equations, their Jacobian by the four unknowns)."""
+    """(what `equations` says, its derivatives by the four unknowns)."""
     columns = []
-    residual: list[Scalar] = []
+    missed: list[Scalar] = []
     for field in Unknowns._fields:
         # One unknown at a time: what does not depend on it is then known to have no derivative and is never computed,
         # which a batched `jacfwd` cannot know.
@@ -112,18 +121,19 @@ def _linearised(system: System, stage: Stage, inputs: Inputs, z: Unknowns) -> tu
             return list(equations(system, stage, inputs, z._replace(**{field: value})))
 
         here = getattr(z, field)
-        residual, column = eqx.filter_jvp(along, (here,), (jnp.ones_like(here),))
+        missed, column = eqx.filter_jvp(along, (here,), (jnp.ones_like(here),))
         columns.append(column)
-    return residual, [[column[row] for column in columns] for row in range(3)]
+    return missed, [list(row) for row in zip(*columns, strict=True)]
 
 
-def _largest(system: System, xi: Scalar, change: Sequence[Scalar]) -> Scalar:
-    """Largest change of the four unknowns in units of 1 C, 1 % strain, 1e-4 E and xi in full."""
+def _moves(system: System, change: Sequence[Scalar], tolerance: float) -> Bool[Array, ""]:
+    """Whether any unknown changes by more than this share of 1 C, 1 % strain, 1e-4 E of the softer phase, xi in full."""
     load = system.load
     assert isinstance(load, AbstractMovingLoad)
-    stiffness = 1e-4 * young_modulus(system.wire, xi)
-    scales: list[Scalar | float] = [1.0, 0.01 / load.contraction(system.wire), stiffness, 1.0]
-    return reduce(jnp.maximum, [jnp.abs(one) / scale for one, scale in zip(change, scales, strict=True)])
+    softer = jnp.minimum(*(young_modulus(system.wire, jnp.full_like(change[0], phase)) for phase in (0.0, 1.0)))
+    scales: list[Scalar | float] = [1.0, 0.01 / load.contraction(system.wire), 1e-4 * softer, 1.0]
+    # What is no number does not move: it stays none, and must not keep the others.
+    return reduce(operator.or_, [jnp.abs(one) > tolerance * scale for one, scale in zip(change, scales, strict=True)])
 
 
 def _nearly(miss: Callable[[Scalar], Scalar], start: Scalar, low: Scalar, high: Scalar, steps: int) -> Scalar:
@@ -148,9 +158,9 @@ def solve(system: System, stage: Stage, inputs: Inputs) -> Solution:
     def iterate(at: _Iterate, number: int | None) -> _Iterate:
         """One linearisation more; `number` of the first two, None for later ones."""
         z = at.z
-        residual, rows = _linearised(system, stage, inputs, z)
-        by_fraction = [jnp.zeros_like(xi) if row[3] is None else -row[3] for row in rows]
-        base, slope = solved_linear([row[:3] for row in rows], [-value for value in residual], by_fraction)
+        (*missed, free), (*rows, free_row) = _linearised(system, stage, inputs, z)
+        by_fraction = [None if row[3] is None else -row[3] for row in rows]
+        base, slope = solved_linear([row[:3] for row in rows], [-value for value in missed], by_fraction)
 
         def along(fraction: Scalar) -> tuple[Scalar, Scalar]:
             """(T, sigma) that go with a fraction."""
@@ -193,17 +203,18 @@ def solve(system: System, stage: Stage, inputs: Inputs) -> Solution:
             jumped = (slips > 0.0) & (jnp.abs(before) > 1.0) & (jnp.abs(after) > 1.0) & (before * after < 0.0)
             new = new._replace(position=jnp.where(jumped, sticks, new.position))
             step[1] = new.position - z.position
-        # What is no number stays none, and must not keep the others. The first solves the inner equation roughly only.
-        still = ~(_largest(system, xi, step) > tolerance)
+        free = free + sum(entry * change for entry, change in zip(free_row, step, strict=True) if entry is not None)
+        if number == 0:  # it solves the inner equation roughly only
+            return _Iterate(new, asked, free, no, at.iterations + 1)
         same = (asked.heating == at.branch.heating) & (asked.cooling == at.branch.cooling)
-        return _Iterate(new, asked, still & same & (number != 0), at.iterations + 1)
+        return _Iterate(new, asked, free, ~_moves(system, step, tolerance) & same, at.iterations + 1)
 
     no = jnp.zeros_like(xi, bool)
     guess = Unknowns(old.temperature, stage.old.motion.position, old.stress, xi)
-    at = _Iterate(guess, Branch(no, no), no, jnp.zeros_like(xi, int))
+    at = _Iterate(guess, Branch(no, no), guess.position, no, jnp.zeros_like(xi, int))
     for number in range(len(INNER)):
         at = iterate(at, number)
     at = lax.while_loop(
         lambda now: ~now.enough & (now.iterations < MOST_ITERATIONS), lambda now: iterate(now, None), at
     )
-    return Solution(at.z, at.branch)
+    return Solution(at.z, at.branch, at.free)

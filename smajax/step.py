@@ -27,7 +27,7 @@ from jax import lax
 
 from smajax.load.base import AbstractMovingLoad
 from smajax.load.coupon import Coupon, StrainCoupon
-from smajax.stage_equations import Stage, Unknowns, equations, free_position, friction_in_use, rates
+from smajax.stage_equations import Stage, Unknowns, equations, friction_in_use, motion_rates
 from smajax.stage_solver import Solution, solve, solved_linear
 from smajax.system import System
 from smajax.types import Inputs, Motion, Scalar, State, WireState
@@ -66,9 +66,9 @@ def _differentiable(given: tuple[System, Stage, Inputs]) -> Solution:
     found = solve(_held(system), _held(stage), _held(dict(inputs)))
 
     def all_four(z: Unknowns) -> Unknowns:
-        heat, motion, stress = equations(system, stage, inputs, z)
+        missed = equations(system, stage, inputs, z)
         asked = curves(wire.kinetics, effects, old, z.temperature, z.stress)
-        return Unknowns(heat, motion, stress, z.fraction - fraction_on(old, found.branch, *asked))
+        return Unknowns(missed.heat, missed.motion, missed.stress, z.fraction - fraction_on(old, found.branch, *asked))
 
     def linear(g: Callable[[Unknowns], Unknowns], asked: Unknowns) -> Unknowns:
         one, zero = jnp.ones_like(asked.fraction), jnp.zeros_like(asked.fraction)
@@ -80,33 +80,36 @@ def _differentiable(given: tuple[System, Stage, Inputs]) -> Solution:
         change = linear(along, missed)
         return Unknowns(*(value - step for value, step in zip(rough, change, strict=True)))
 
-    return Solution(lax.custom_root(all_four, found.z, corrected, linear), found.branch)
+    return Solution(lax.custom_root(all_four, found.z, corrected, linear), found.branch, found.free)
 
 
-def _ended(system: System, stage: Stage, inputs: Inputs) -> tuple[WireState, Unknowns]:
-    """Solve one stage: the wire at its end, and the unknowns there."""
+def _ended(system: System, stage: Stage, inputs: Inputs) -> tuple[WireState, Scalar, Scalar]:
+    """Solve one stage: (the wire at its end, the position, the position without end stops)."""
     wire, effects, old = system.wire, system.effects, stage.old.wire
-    z, branch = _solved((system, stage, dict(inputs)))
+    z, branch, free = _solved((system, stage, dict(inputs)))
     # Rounding only; not `clip`, which halves the derivative at the ends themselves.
     xi = jnp.where(z.fraction > 1.0, 1.0, jnp.where(z.fraction < 0.0, 0.0, z.fraction))
     xi = jnp.where(branch.heating | branch.cooling, xi, old.martensite_fraction)
     stress = jnp.maximum(z.stress, 0.0)
     strain = strain_at(wire, effects, old, z.temperature, stress, xi)
-    return remembered(wire.kinetics, effects, old, branch, z.temperature, stress, strain, xi), z
+    return remembered(wire.kinetics, effects, old, branch, z.temperature, stress, strain, xi), z.position, free
 
 
 def _stage(system: System, stage: Stage, inputs: Inputs) -> tuple[State, Scalar, Scalar, Scalar]:
     """One stage of a moving load: (state at its end, dH/dt, v, a)."""
     load = system.load
     assert isinstance(load, AbstractMovingLoad)
-    wire, z = _ended(system, stage, inputs)
-    heating, velocity, acceleration = rates(system, stage, inputs, z)
+    wire, position, free = _ended(system, stage, inputs)
     lower, upper = load.limits()
-    free = free_position(system, stage, inputs, z)
     below, above = free < lower, free > upper
-    position = jnp.where(below, lower, jnp.where(above, upper, z.position))
+    velocity, acceleration = motion_rates(stage, position)
+    position = jnp.where(below, lower, jnp.where(above, upper, position))
     velocity = jnp.where(below | above, 0.0, velocity)  # inelastic
     acceleration = jnp.where(below | above, 0.0, acceleration)
+    # What the heat equation says where it is solved, at the cost of a difference.
+    heating = (
+        stored_heat(system.wire, system.effects, wire.temperature, wire.martensite_fraction) - stage.heat
+    ) / stage.step
     friction, _ = friction_in_use(stage, position)
     new = State(stage.time, wire, Motion(position, velocity, friction), stage.old.reading)
     return new, heating, velocity, acceleration

@@ -1,13 +1,16 @@
-"""Members in chunks over all devices: the same numbers on one core, on several, and on a graphics card.
+"""Members in chunks over all cores or devices.
 
-A chunk is divided over the devices, and a device's part into blocks whose state fits the cache of a core: one block
-after the other runs to its end.
+On a processor a chunk runs through `smajax.lanes`, in as many threads as there are cores: a member's numbers are then the
+same to the last bit whatever runs beside it. What cannot be translated, and everything on a graphics card, is XLA's: a
+chunk is divided over the devices, and a device's part into blocks whose state fits the cache of a core.
 """
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, Literal
 
 import equinox as eqx
 import jax
@@ -17,6 +20,8 @@ from jax import lax
 from jax.sharding import Mesh, PartitionSpec
 
 from smajax.batch.axes import Axes
+from smajax.lanes.evaluate import Evaluator, evaluator
+from smajax.lanes.text import Unsupported
 
 BLOCK = 512  # members at once on a core: about 100 numbers each fit its second-level cache
 LEAST_BLOCK = 8
@@ -25,6 +30,7 @@ MOST = 1 << 15  # members a chunk, however little is kept of each: what an inter
 ON_CARD = 1 << 17  # on a graphics card everything runs at once
 Results = Any  # arrays by name: a dictionary, or one of records
 Function = Callable[[Any, dict[str, jax.Array]], Results]
+Engine = Literal["auto", "lanes", "xla"]
 
 
 def block_size(members: int, devices: Sequence[jax.Device]) -> int:
@@ -96,29 +102,69 @@ def chunks(
     size: int,
     wanted: Sequence[int],
     devices: Sequence[jax.Device] | None = None,
+    engine: Engine = "auto",
 ) -> Iterator[tuple[int, Results]]:
     """(number, results) of the chunks `wanted`, each of `size` members but for the last, arrays of shape (members, ...).
 
-    A chunk is filled up by repeating its last member, so that one compilation serves all. While the caller writes
-    one chunk the devices work on the next.
+    While the caller writes one chunk the next is on its way. `devices` are those of XLA, and as many threads otherwise;
+    all that there are where they are not given. ValueError where `engine` is "lanes" and the function is not for it.
     """
     several = tuple(devices or jax.local_devices())
-    block = block_size(axes.size, several)
-    room = rounded(size, block, several)
-    ahead: tuple[int, int, Results] | None = None
-    for number in wanted:
-        start, stop = number * size, min((number + 1) * size, axes.size)
-        values = {
-            name: jnp.asarray(np.concatenate([own, np.full(room - len(own), own[-1])]), dtype=float)
-            for name, own in axes.members(start, stop).items()
-        }
-        running = number, stop - start, _evaluated(function, model, values, several, block)
+    found = _translated(function, model, axes, several, engine)
+    threads = len(several) if devices else available_cores()
+    with ThreadPoolExecutor(1) as pool:
+        ahead: tuple[int, int, Callable[[], Results]] | None = None
+        for number in wanted:
+            start, stop = number * size, min((number + 1) * size, axes.size)
+            values = axes.members(start, stop)
+            if found is None:
+                coming = _dispatched(function, model, values, several, size, axes.size)
+            else:
+                coming = pool.submit(found, model, values, threads).result
+            if ahead is not None:
+                yield _fetched(*ahead)
+            ahead = number, stop - start, coming
         if ahead is not None:
             yield _fetched(*ahead)
-        ahead = running
-    if ahead is not None:
-        yield _fetched(*ahead)
 
 
-def _fetched(number: int, count: int, found: Results) -> tuple[int, Results]:
-    return number, jax.tree.map(lambda leaf: np.asarray(leaf)[:count], found)
+def available_cores() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _translated(
+    function: Function, model: Any, axes: Axes, devices: Sequence[jax.Device], engine: Engine
+) -> Evaluator | None:
+    """The function for `smajax.lanes`; None where it is XLA's."""
+    if engine == "xla" or (engine == "auto" and devices[0].platform != "cpu"):
+        return None
+    try:
+        return evaluator(function, model, tuple(axes.names))
+    except Unsupported as reason:
+        if engine == "lanes":
+            raise ValueError(f"the engine `lanes` has no translation for {reason}: leave `engine` at `auto`.") from None
+        return None
+
+
+def _dispatched(
+    function: Function,
+    model: Any,
+    values: dict[str, np.ndarray],
+    devices: tuple[jax.Device, ...],
+    size: int,
+    members: int,
+) -> Callable[[], Results]:
+    """One chunk given to XLA, filled up by repeating its last member, so that one compilation serves all."""
+    block = block_size(members, devices)
+    room = rounded(size, block, devices)
+    filled = {
+        name: jnp.asarray(np.concatenate([own, np.full(room - len(own), own[-1])]), dtype=float)
+        for name, own in values.items()
+    }
+    running = _evaluated(function, model, filled, devices, block)
+    return lambda: running
+
+
+def _fetched(number: int, count: int, coming: Callable[[], Results]) -> tuple[int, Results]:
+    return number, jax.tree.map(lambda leaf: np.asarray(leaf)[:count], coming())

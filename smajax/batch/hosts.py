@@ -64,7 +64,7 @@ def run_batch_here(
     size = min(size, max(1, -(-axes.size // (CHUNKS * processes))))
     store = created_or_opened(folder, recipe, axes, size) if process == 0 else _awaited(folder)
     wanted = [number for number in store.missing() if number % processes == process]
-    fill(store, recipe, devices, wanted, progress)
+    fill(store, recipe, None, wanted, progress)
     return opened(folder)
 
 

@@ -24,10 +24,13 @@ class AbstractForm(eqx.Module):
     """How eq. 3.2 is carried from one state to the next."""
 
     @abc.abstractmethod
-    def unloaded_strain(
+    def elastic_line(
         self, wire: Wire, effects: Sequence[AbstractEffect], old: WireState, new: WireState
-    ) -> tuple[Scalar, Scalar]:
-        """(strain at which the stress would be zero, modulus) at `new`; its own stress and strain are guesses."""
+    ) -> tuple[Scalar, Scalar, Scalar]:
+        """(strain, stress at it, modulus): a point of the straight line of stress over strain at `new`, and its slope.
+
+        The stress and strain of `new` itself are guesses.
+        """
 
 
 class RateForm(AbstractForm):
@@ -37,16 +40,15 @@ class RateForm(AbstractForm):
     at another does not close. With a constant E it is, and agrees with the integrated form.
     """
 
-    def unloaded_strain(
+    def elastic_line(
         self, wire: Wire, effects: Sequence[AbstractEffect], old: WireState, new: WireState
-    ) -> tuple[Scalar, Scalar]:
+    ) -> tuple[Scalar, Scalar, Scalar]:
         law = wire.constitutive
         middle = 0.5 * (old.martensite_fraction + new.martensite_fraction)
-        modulus = young_modulus(wire, middle)
         grown = transformation_strain(wire, middle) * (new.detwinned_fraction - old.detwinned_fraction)
         grown = grown + effect_strain(wire, effects, new) - effect_strain(wire, effects, old)
         thermal = law.thermal_modulus * (new.temperature - old.temperature)
-        return old.strain + grown - (old.stress + thermal) / modulus, modulus
+        return old.strain + grown, old.stress + thermal, young_modulus(wire, middle)
 
 
 class IntegratedForm(AbstractForm):
@@ -55,17 +57,19 @@ class IntegratedForm(AbstractForm):
     A function of state: every closed cycle closes. The strain counts from the wire's start, as everywhere.
     """
 
-    def unloaded_strain(
+    def elastic_line(
         self, wire: Wire, effects: Sequence[AbstractEffect], old: WireState, new: WireState
-    ) -> tuple[Scalar, Scalar]:
-        def at_no_stress(at: WireState) -> Scalar:
-            thermal = wire.constitutive.thermal_modulus * (at.temperature - wire.heat.ambient_temperature)
-            own = transformation_strain(wire, at.martensite_fraction) * at.detwinned_fraction
-            return own + effect_strain(wire, effects, at) - thermal / young_modulus(wire, at.martensite_fraction)
+    ) -> tuple[Scalar, Scalar, Scalar]:
+        def thermal(at: WireState) -> Scalar:
+            return wire.constitutive.thermal_modulus * (at.temperature - wire.heat.ambient_temperature)
 
-        elastic = old.stress / young_modulus(wire, old.martensite_fraction)
-        modulus = young_modulus(wire, new.martensite_fraction)
-        return old.strain - elastic + at_no_stress(new) - at_no_stress(old), modulus
+        def own(at: WireState) -> Scalar:
+            grown = transformation_strain(wire, at.martensite_fraction) * at.detwinned_fraction
+            return grown + effect_strain(wire, effects, at)
+
+        elastic = (old.stress - thermal(old)) / young_modulus(wire, old.martensite_fraction)
+        strain = old.strain - elastic + own(new) - own(old)
+        return strain, thermal(new), young_modulus(wire, new.martensite_fraction)
 
 
 class Constitutive(eqx.Module):
@@ -130,8 +134,9 @@ def stress_at(
 
     def asked(guess: Scalar) -> Scalar:
         new = _tried(wire, old, temperature, guess, xi)
-        free, modulus = wire.constitutive.form.unloaded_strain(wire, effects, old, new)
-        return modulus * jnp.maximum(strain - free, 0.0)
+        at, stress_there, modulus = wire.constitutive.form.elastic_line(wire, effects, old, new)
+        pulled = stress_there + modulus * (strain - at)
+        return jnp.where(pulled < 0.0, 0.0, pulled)
 
     if not wire.kinetics.variants.detwins:
         return asked(stress)
@@ -147,5 +152,5 @@ def strain_at(
 ) -> Scalar:
     """The wire's own strain at a given stress, -: the same law read the other way round."""
     new = _tried(wire, old, temperature, stress, xi)
-    free, modulus = wire.constitutive.form.unloaded_strain(wire, effects, old, new)
-    return free + stress / modulus
+    at, stress_there, modulus = wire.constitutive.form.elastic_line(wire, effects, old, new)
+    return at + (stress - stress_there) / modulus

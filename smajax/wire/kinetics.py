@@ -135,8 +135,12 @@ def curve_on(
 
 def open_branches(law: Kinetics, effects: Sequence[AbstractEffect], state: WireState) -> Branch:
     """Branches whose range the wire is in (or before) at `state`: one that is behind it transforms nothing any more."""
-    h, k = _shares(law, effects, state)
-    return Branch(h > 0.0, k > 0.0)
+    if any(effect.shapes() for effect in effects):
+        h, k = _shares(law, effects, state)
+        return Branch(h > 0.0, k > 0.0)
+    at = state.temperature, state.stress
+    left = law.shape.anything_left
+    return Branch(left(heating_distance(law, *at)), left(1.0 - cooling_distance(law, *at)))
 
 
 def choose_branch(

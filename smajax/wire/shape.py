@@ -7,12 +7,15 @@ import math
 
 import equinox as eqx
 import jax.numpy as jnp
+from jaxtyping import Array, Bool
 
 from smajax.cosine import quarter_cosine
 from smajax.types import Scalar
+from smajax.wire.renewal import FINISHED
 
 # Tanaka's material constants are chosen so that 1 % is left at the far end of the range: A_a = ln(0.01)/(A_f - A_s).
 LEFT_AT_THE_END = math.log(100.0)
+COSINE_FINISHED = 1.0 - 2.0 / math.pi * math.asin(math.sqrt(FINISHED))  # where cos^2(pi z / 2) is `FINISHED`
 
 
 class AbstractShape(eqx.Module):
@@ -26,6 +29,10 @@ class AbstractShape(eqx.Module):
         """k(z), z = (y_M - M_f)/(M_s - M_f): 1 from z = 1 on, falling as z falls. k(z) = h(1 - z) under every law."""
         return self.martensite_left(1.0 - z)
 
+    def anything_left(self, z: Scalar) -> Bool[Array, ""]:
+        """Whether more than `FINISHED` is left at z."""
+        return self.martensite_left(z) > FINISHED
+
     @abc.abstractmethod
     def steepest(self) -> float:
         """Largest |dh/dz|, -."""
@@ -35,7 +42,12 @@ class Cosine(AbstractShape):
     r"""h = (1 + cos pi z)/2 and k = (1 - cos pi z)/2 for 0 <= z <= 1 (Elahinia 2004, eq. 3.3, 3.5 and 2.14, 2.15)."""
 
     def martensite_left(self, z: Scalar) -> Scalar:
-        return quarter_cosine(jnp.clip(z, 0.0, 1.0)) ** 2  # (1 + cos x)/2 = cos^2(x/2)
+        # Not `clip`: it asks at every end whether it is met exactly, and the slope there is zero anyway.
+        within = jnp.where(z < 0.0, 0.0, jnp.where(z > 1.0, 1.0, z))
+        return quarter_cosine(within) ** 2  # (1 + cos x)/2 = cos^2(x/2)
+
+    def anything_left(self, z: Scalar) -> Bool[Array, ""]:
+        return z < COSINE_FINISHED
 
     def steepest(self) -> float:
         return 0.5 * math.pi

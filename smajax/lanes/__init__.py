@@ -1,0 +1,8 @@
+"""Batches of scalar programs as one machine-code loop: a member to each lane of the processor's vectors.
+
+A batched JAX program on a CPU runs one small loop over all members after another, and every number between two of them
+goes through the cache: a step of a wire is some hundred such loops. Here the same program, traced by JAX for *one* member,
+becomes one loop over groups of members that stays in the processor's registers from the first step to the last.
+
+jaxpr (`translate`) -> LLVM's language (`text`, `arithmetic`) -> machine code, and threads that run it (`kernel`).
+"""

@@ -1,0 +1,310 @@
+"""JAX's elementwise primitives on lanes. Numbers that are none stay so, as everywhere in JAX."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from smajax.lanes.text import Lane, Text, Unsupported, scalar_type
+
+Operation = Callable[..., Lane]
+
+# Multiply-and-add in one rounding, x/d as x (1/d), no care for the sign of zero: nothing that takes anything for a number.
+FLAGS = "contract arcp nsz "
+NORMAL = 0x108  # LLVM's class of numbers that are neither zero, tiny, infinite nor none
+
+
+def _floating(dtype: str) -> bool:
+    return dtype.startswith("float")
+
+
+def _signed(dtype: str) -> bool:
+    return not dtype.startswith("uint")
+
+
+def _binary(floating: str | None, whole: str | None) -> Operation:
+    def put(text: Text, out: str, left: Lane, right: Lane, **_: Any) -> Lane:
+        name = floating if _floating(left.dtype) else whole
+        if name is None:
+            raise Unsupported(f"an operation on {left.dtype}")
+        flags = FLAGS if _floating(left.dtype) else ""
+        return text.lane(f"{name} {flags}{text.vector(left.dtype)} {left.name}, {right.name}", out)
+
+    return put
+
+
+def _extreme(larger: bool) -> Operation:
+    sign = "gt" if larger else "lt"
+
+    def put(text: Text, out: str, left: Lane, right: Lane, **_: Any) -> Lane:
+        kind = text.vector(left.dtype)
+        if not _floating(left.dtype):
+            how = "or" if larger else "and"
+            if left.dtype == "bool":
+                return text.lane(f"{how} {kind} {left.name}, {right.name}", out)
+            order = ("s" if _signed(left.dtype) else "u") + sign
+            first = text.assign(f"icmp {order} {kind} {left.name}, {right.name}")
+            return _chosen(text, first, left, right)
+        if right.constant:
+            left, right = right, left
+        # The second where one is no number: enough where the first is a constant.
+        found = _chosen(text, text.assign(f"fcmp o{sign} {kind} {left.name}, {right.name}"), left, right)
+        if left.constant:
+            return found
+        return _chosen(text, text.assign(f"fcmp uno {kind} {left.name}, {left.name}"), left, found)
+
+    return put
+
+
+def _chosen(text: Text, mask: str, yes: Lane, no: Lane) -> Lane:
+    kind = text.vector(yes.dtype)
+    found = text.lane(f"select {text.vector('bool')} {mask}, {kind} {yes.name}, {kind} {no.name}", yes.dtype)
+    if yes.number is not None and no.number is not None:
+        text.either[found.name] = mask, yes.number, no.number
+    return found
+
+
+def _compare(floating: str, whole: str) -> Operation:
+    def put(text: Text, out: str, left: Lane, right: Lane, **_: Any) -> Lane:
+        kind = text.vector(left.dtype)
+        if _floating(left.dtype):
+            return text.lane(f"fcmp {floating} {kind} {left.name}, {right.name}", out)
+        signed = "s" if _signed(left.dtype) and left.dtype != "bool" else "u"
+        name = whole if whole in ("eq", "ne") else signed + whole
+        return text.lane(f"icmp {name} {kind} {left.name}, {right.name}", out)
+
+    return put
+
+
+def _function(name: str) -> Operation:
+    def put(text: Text, out: str, *given: Lane, **_: Any) -> Lane:
+        return text.call(f"llvm.{name}", out, *(one.name for one in given))
+
+    return put
+
+
+def _negative(text: Text, out: str, one: Lane, **_: Any) -> Lane:
+    kind = text.vector(out)
+    return text.lane(f"fneg {kind} {one.name}" if _floating(out) else f"sub {kind} zeroinitializer, {one.name}", out)
+
+
+def _absolute(text: Text, out: str, one: Lane, **_: Any) -> Lane:
+    if _floating(out):
+        return text.call("llvm.fabs", out, one.name)
+    return _extreme(True)(text, out, one, _negative(text, out, one))
+
+
+def _sign(text: Text, out: str, one: Lane, **_: Any) -> Lane:
+    kind, zero = text.vector(out), text.constant(0, out)
+    above, below = ("fcmp ogt", "fcmp olt") if _floating(out) else ("icmp sgt", "icmp slt")
+    positive = text.assign(f"{above} {kind} {one.name}, {zero.name}")
+    negative = text.assign(f"{below} {kind} {one.name}, {zero.name}")
+    found = _chosen(text, positive, text.constant(1, out), one)
+    return _chosen(text, negative, text.constant(-1, out), found)
+
+
+def _finite(text: Text, out: str, one: Lane, **_: Any) -> Lane:
+    size = text.call("llvm.fabs", one.dtype, one.name)
+    most = text.constant(np.inf, one.dtype)
+    return text.lane(f"fcmp olt {text.vector(one.dtype)} {size.name}, {most.name}", out)
+
+
+def _not(text: Text, out: str, one: Lane, **_: Any) -> Lane:
+    return text.lane(f"xor {text.vector(out)} {one.name}, {text.constant(-1 if out != 'bool' else 1, out).name}", out)
+
+
+def _times(text: Text, left: Lane, right: Lane) -> Lane:
+    return _binary("fmul", "mul")(text, left.dtype, left, right)
+
+
+def reciprocal(text: Text, one: Lane) -> Lane:
+    """1/x. The processor's divider is slow for vectors: where there is an estimate, that and Newton's steps, to an ulp."""
+    dtype = one.dtype
+    parts = {"float64": ("pd", 8, 2), "float32": ("ps", 16, 1)}[dtype]
+    if not text.wide or one.constant or text.lanes % parts[1]:
+        return _binary("fdiv", None)(text, dtype, text.constant(1, dtype), one)
+    rough = _estimated(text, one, *parts[:2])
+    found, unit = rough, text.constant(1, dtype)
+    for _ in range(parts[2]):
+        missed = _binary("fsub", None)(text, dtype, unit, _times(text, one, found))
+        found = _binary("fadd", None)(text, dtype, found, _times(text, found, missed))
+    name, mask = f"llvm.is.fpclass.v{text.lanes}{text.suffix(dtype)}", text.vector("bool")
+    text.declare(name, mask, [text.vector(dtype), "i32"])
+    ordinary = text.assign(f"call {mask} @{name}({text.vector(dtype)} {rough.name}, i32 {NORMAL})")
+    return _chosen(text, ordinary, found, rough)  # of infinity the estimate is exact, and so it is of zero
+
+
+def _estimated(text: Text, one: Lane, kind: str, width: int) -> Lane:
+    """1/x to 14 bits, by so many lanes at a time."""
+    whole, part = text.vector(one.dtype), f"<{width} x {scalar_type(one.dtype)}>"
+    name = text.declare(f"llvm.x86.avx512.rcp14.{kind}.512", part, [part, part, f"i{width}"])
+    found = []
+    for first in range(0, text.lanes, width):
+        numbers = ", ".join(f"i32 {first + k}" for k in range(width))
+        mine = text.assign(f"shufflevector {whole} {one.name}, {whole} poison, <{width} x i32> <{numbers}>")
+        found.append(text.assign(f"call {part} @{name}({part} {mine}, {part} zeroinitializer, i{width} -1)"))
+    size = width
+    while len(found) > 1:
+        numbers = ", ".join(f"i32 {k}" for k in range(2 * size))
+        kind = f"<{size} x {scalar_type(one.dtype)}>"
+        found = [
+            text.assign(f"shufflevector {kind} {left}, {kind} {right}, <{2 * size} x i32> <{numbers}>")
+            for left, right in zip(found[::2], found[1::2], strict=True)
+        ]
+        size *= 2
+    return Lane(found[0], one.dtype)
+
+
+def _whole_power(text: Text, out: str, one: Lane, *, y: int, **_: Any) -> Lane:
+    found: Lane | None = None
+    square, left = reciprocal(text, one) if y < 0 else one, abs(y)
+    while left:
+        if left & 1:
+            found = square if found is None else _times(text, found, square)
+        left >>= 1
+        square = _times(text, square, square) if left else square
+    return found or text.constant(1, out)
+
+
+def _square(text: Text, out: str, one: Lane, **_: Any) -> Lane:
+    return _times(text, one, one)
+
+
+def _inverse_root(text: Text, out: str, one: Lane, **_: Any) -> Lane:
+    return reciprocal(text, text.call("llvm.sqrt", out, one.name))
+
+
+def _sigmoid(text: Text, out: str, one: Lane, **_: Any) -> Lane:
+    grown = text.call("llvm.exp", out, _negative(text, out, one).name)
+    below = _binary("fadd", None)(text, out, text.constant(1, out), grown)
+    return reciprocal(text, below)
+
+
+def _rounded(text: Text, out: str, one: Lane, *, rounding_method: Any, **_: Any) -> Lane:
+    even = int(rounding_method) == 1
+    return text.call("llvm.roundeven" if even else "llvm.round", out, one.name)
+
+
+def _remainder(text: Text, out: str, left: Lane, right: Lane, **_: Any) -> Lane:
+    if not _floating(out) and not right.constant:
+        raise Unsupported("a remainder by a number that is not known before")  # by zero it would stop the program
+    return _binary("frem", "srem" if _signed(out) else "urem")(text, out, left, right)
+
+
+def _divided(text: Text, out: str, left: Lane, right: Lane, **_: Any) -> Lane:
+    if not _floating(out) and not right.constant:
+        raise Unsupported("a whole division by a number that is not known before")
+    if not _floating(out):
+        return _binary(None, "sdiv" if _signed(out) else "udiv")(text, out, left, right)
+    if right.name in text.either:
+        # A derivative where two ends are equal: half of each.
+        mask, yes, no = text.either[right.name]
+        if yes != 0.0 and no != 0.0:
+            return _times(text, left, _chosen(text, mask, text.constant(1.0 / yes, out), text.constant(1.0 / no, out)))
+    if right.constant:
+        return _binary("fdiv", None)(text, out, left, right)
+    inverse = reciprocal(text, right)
+    return inverse if left.number == 1.0 else _times(text, left, inverse)
+
+
+def _converted(text: Text, out: str, one: Lane, **_: Any) -> Lane:
+    if scalar_type(one.dtype) == scalar_type(out):
+        return Lane(one.name, out, one.constant)
+    source, target = text.vector(one.dtype), text.vector(out)
+    if out == "bool":
+        test = "fcmp une" if _floating(one.dtype) else "icmp ne"
+        return text.lane(f"{test} {source} {one.name}, zeroinitializer", out)
+    if one.dtype == "bool":
+        return _chosen(text, one.name, text.constant(1, out), text.constant(0, out))
+    if _floating(one.dtype) and _floating(out):
+        how = "fpext" if out == "float64" else "fptrunc"
+    elif _floating(out):
+        how = "sitofp" if _signed(one.dtype) else "uitofp"
+    elif _floating(one.dtype):
+        # Out of range: the nearest, as XLA does, in the place of anything.
+        name = f"llvm.fpto{'s' if _signed(out) else 'u'}i.sat.v{text.lanes}{scalar_type(out)}"
+        name += f".v{text.lanes}{'f64' if one.dtype == 'float64' else 'f32'}"
+        text.declare(name, target, [source])
+        return text.lane(f"call {target} @{name}({source} {one.name})", out)
+    else:
+        wider = np.dtype(out).itemsize > np.dtype(one.dtype).itemsize
+        how = ("sext" if _signed(one.dtype) else "zext") if wider else "trunc"
+    return text.lane(f"{how} {source} {one.name} to {target}", out)
+
+
+def select(text: Text, out: str, which: Lane, *cases: Lane, **_: Any) -> Lane:
+    """JAX's `select_n`: the case with the number `which`; the first for false, the second for true."""
+    if which.dtype == "bool":
+        return _chosen(text, which.name, cases[1], cases[0])
+    found = cases[0]
+    for number, case in enumerate(cases[1:], start=1):
+        is_it = text.assign(
+            f"icmp sge {text.vector(which.dtype)} {which.name}, {text.constant(number, which.dtype).name}"
+        )
+        found = _chosen(text, is_it, case, found)
+    return found
+
+
+def _clamped(text: Text, out: str, low: Lane, one: Lane, high: Lane, **_: Any) -> Lane:
+    return _extreme(False)(text, out, _extreme(True)(text, out, one, low), high)
+
+
+def _same(text: Text, out: str, one: Lane, **_: Any) -> Lane:
+    return one
+
+
+ELEMENTWISE: Mapping[str, Operation] = {
+    "add": _binary("fadd", "add"),
+    "add_any": _binary("fadd", "add"),
+    "sub": _binary("fsub", "sub"),
+    "mul": _binary("fmul", "mul"),
+    "div": _divided,
+    "rem": _remainder,
+    "max": _extreme(True),
+    "min": _extreme(False),
+    "neg": _negative,
+    "abs": _absolute,
+    "sign": _sign,
+    "floor": _function("floor"),
+    "ceil": _function("ceil"),
+    "round": _rounded,
+    "sqrt": _function("sqrt"),
+    "rsqrt": _inverse_root,
+    "exp": _function("exp"),
+    "exp2": _function("exp2"),
+    "log": _function("log"),
+    "sin": _function("sin"),
+    "cos": _function("cos"),
+    "tan": _function("tan"),
+    "acos": _function("acos"),
+    "asin": _function("asin"),
+    "atan": _function("atan"),
+    "sinh": _function("sinh"),
+    "cosh": _function("cosh"),
+    "tanh": _function("tanh"),
+    "pow": _function("pow"),
+    "atan2": _function("atan2"),
+    "logistic": _sigmoid,
+    "integer_pow": _whole_power,
+    "square": _square,
+    "is_finite": _finite,
+    "eq": _compare("oeq", "eq"),
+    "ne": _compare("une", "ne"),
+    "lt": _compare("olt", "lt"),
+    "le": _compare("ole", "le"),
+    "gt": _compare("ogt", "gt"),
+    "ge": _compare("oge", "ge"),
+    "and": _binary(None, "and"),
+    "or": _binary(None, "or"),
+    "xor": _binary(None, "xor"),
+    "not": _not,
+    "select_n": select,
+    "clamp": _clamped,
+    "convert_element_type": _converted,
+    "stop_gradient": _same,
+    "copy": _same,
+    "copy_p": _same,
+    "optimization_barrier": _same,
+}

@@ -1,0 +1,95 @@
+"""A function of one member, evaluated for many: traced, translated and compiled once for each kind of arguments."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from smajax.lanes.kernel import Kernel, has_wide_vectors, vector_bits
+from smajax.lanes.text import Unsupported
+from smajax.lanes.translate import translate
+
+VECTORS = 2  # of members under way at once: while one waits for a result the other goes on
+KEPT = 32  # compiled functions
+
+_kept: dict[Hashable, Evaluator | Unsupported] = {}
+
+
+class Evaluator:
+    """`function(model, own)` of one member as a function of whole arrays, for models with arrays of the same shapes."""
+
+    def __init__(self, kernel: Kernel, tree: Any, names: tuple[str, ...], dtype: np.dtype) -> None:
+        self._kernel, self._tree, self._names, self._dtype = kernel, tree, names, dtype
+
+    def __call__(self, model: Any, own: dict[str, np.ndarray], threads: int) -> Any:
+        """What the function gives, every leaf with one row a member; `own` are arrays of shape (members,)."""
+        shared = [np.asarray(_plain(leaf)) for leaf in jax.tree.leaves(eqx.filter(model, eqx.is_array))]
+        values = [np.ascontiguousarray(own[name], dtype=self._dtype) for name in self._names]
+        return jax.tree.unflatten(self._tree, self._kernel(shared, values, threads))
+
+
+def _is_key(leaf: Any) -> bool:
+    return jnp.issubdtype(leaf.dtype, jax.dtypes.prng_key)
+
+
+def _plain(leaf: Any) -> Any:
+    """The numbers of a random key; anything else as it is."""
+    return jax.random.key_data(leaf) if _is_key(leaf) else leaf
+
+
+def _like(leaf: Any, plain: Any) -> Any:
+    return jax.random.wrap_key_data(plain) if _is_key(leaf) else plain
+
+
+def lanes_of(dtypes: set[str]) -> int:
+    """Members side by side for a program of these kinds of numbers, of which the floating ones fill the vectors."""
+    size = max((np.dtype(dtype).itemsize for dtype in dtypes if dtype.startswith("float")), default=8)
+    return VECTORS * vector_bits() // (8 * size)
+
+
+def evaluator(function: Callable[[Any, Any], Any], model: Any, names: tuple[str, ...]) -> Evaluator:
+    """`function` compiled; `names` are those of the numbers that a member has of its own.
+
+    Raises Unsupported, which says what of the function cannot be translated.
+    """
+    arrays, static = eqx.partition(model, eqx.is_array)
+    leaves, tree = jax.tree.flatten(arrays)
+    settled, settled_tree = jax.tree.flatten(static)
+    kinds = tuple((leaf.shape, str(leaf.dtype), getattr(leaf, "weak_type", False)) for leaf in leaves)
+    key = (function, tree, settled_tree, tuple(settled), kinds, names, str(jnp.zeros(()).dtype))
+    if key not in _kept:
+        while len(_kept) >= KEPT:
+            del _kept[next(iter(_kept))]
+        try:
+            _kept[key] = _compiled(function, arrays, static, names)
+        except Unsupported as reason:
+            _kept[key] = reason
+    found = _kept[key]
+    if isinstance(found, Unsupported):
+        raise found
+    return found
+
+
+def _compiled(function: Callable[[Any, Any], Any], arrays: Any, static: Any, names: tuple[str, ...]) -> Evaluator:
+    leaves, tree = jax.tree.flatten(arrays)
+    none = jnp.zeros(())
+    shape: list[Any] = []
+
+    def member(*flat: jax.Array) -> list[jax.Array]:
+        given = [_like(leaf, one) for leaf, one in zip(leaves, flat, strict=False)]
+        whole = eqx.combine(jax.tree.unflatten(tree, given), static)
+        found = function(whole, dict(zip(names, flat[len(leaves) :], strict=True)))
+        results, out = jax.tree.flatten(found)
+        shape[:] = [out]
+        return results
+
+    program = jax.make_jaxpr(member)(*map(_plain, leaves), *(none for _ in names))
+    dtypes = {str(aval.dtype) for aval in (*program.in_avals, *program.out_avals)}
+    own = [False] * len(leaves) + [True] * len(names)
+    kernel = Kernel(translate(program, own, lanes_of(dtypes), has_wide_vectors()))
+    return Evaluator(kernel, shape[0], names, np.dtype(none.dtype))

@@ -1,0 +1,98 @@
+"""Machine code of a translated program, and threads that run it."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from smajax.lanes.text import NAME
+from smajax.lanes.translate import Translated
+
+ALIGNED = 64  # bytes
+
+
+def _machine() -> Any:
+    """A new one for every program: what runs a program takes it over."""
+    import llvmlite.binding as llvm
+
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    features = llvm.get_host_cpu_features().flatten()
+    return llvm.Target.from_default_triple().create_target_machine(
+        cpu=llvm.get_host_cpu_name(), features=features, opt=3, jit=True
+    )
+
+
+@cache
+def vector_bits() -> int:
+    """Of the processor's widest vectors."""
+    import llvmlite.binding as llvm
+
+    features = llvm.get_host_cpu_features()
+    return 512 if has_wide_vectors() else 256 if features.get("avx") else 128
+
+
+@cache
+def has_wide_vectors() -> bool:
+    """Whether it has AVX-512, with the instructions on 64-bit numbers."""
+    import llvmlite.binding as llvm
+
+    features = llvm.get_host_cpu_features()
+    return all(bool(features.get(name)) for name in ("avx512f", "avx512dq", "avx512vl"))
+
+
+def _aligned(count: int) -> np.ndarray:
+    raw = np.empty(count + ALIGNED, np.uint8)
+    start = -raw.ctypes.data % ALIGNED
+    return raw[start : start + count]
+
+
+class Kernel:
+    """A translated program as a function of whole arrays. Threads share nothing but what they read."""
+
+    def __init__(self, translated: Translated) -> None:
+        import llvmlite.binding as llvm
+
+        self.translated = translated
+        machine = _machine()
+        module = llvm.parse_assembly(translated.text)
+        module.triple, module.data_layout = machine.triple, str(machine.target_data)
+        module.verify()
+        # Every instruction is on a whole vector already, and a step is long enough as it is.
+        options = llvm.create_pipeline_tuning_options(speed_level=3)
+        options.loop_vectorization = options.slp_vectorization = options.loop_unrolling = False
+        builder = llvm.create_pass_builder(machine, options)
+        builder.getModulePassManager().run(module, builder)
+        self._engine = llvm.create_mcjit_compiler(module, machine)
+        self._engine.finalize_object()
+        pointer, number = ctypes.c_void_p, ctypes.c_int64
+        kind = ctypes.CFUNCTYPE(None, pointer, pointer, pointer, pointer, number, number)
+        self._call = kind(self._engine.get_function_address(NAME))
+
+    def __call__(self, shared: Sequence[np.ndarray], own: Sequence[np.ndarray], threads: int) -> list[np.ndarray]:
+        """`own` are arrays of shape (members,), `shared` of the shapes traced; results have shape (members, ...)."""
+        lanes = self.translated.lanes
+        members = len(own[0])
+        groups = -(-members // lanes)
+        room = groups * lanes
+        filled = [np.concatenate([one, np.full(room - members, one[-1])]) for one in own]
+        results = [np.empty((room, *one.shape), one.dtype) for one in self.translated.results]
+        tables = [self._pointers(arrays) for arrays in (shared, filled, results)]
+        edges = np.linspace(0, groups, min(threads, groups) + 1).astype(int)
+
+        def part(first: int, last: int) -> None:
+            scratch = _aligned(self.translated.scratch)
+            self._call(*tables, scratch.ctypes.data, first, last)
+
+        with ThreadPoolExecutor(len(edges) - 1) as pool:
+            list(pool.map(part, edges[:-1].tolist(), edges[1:].tolist()))
+        return [one[:members] for one in results]
+
+    @staticmethod
+    def _pointers(arrays: Sequence[np.ndarray]) -> Any:
+        return (ctypes.c_void_p * len(arrays))(*(one.ctypes.data for one in arrays))

@@ -1,0 +1,557 @@
+"""A traced program of one member -> the text of a loop over groups of members, a lane each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import jax
+import jax.extend as jex
+import numpy as np
+from jax.interpreters import partial_eval
+
+from smajax.lanes.arithmetic import ELEMENTWISE, select
+from smajax.lanes.text import NAME, Lane, Text, Unsupported, scalar_type
+from smajax.lanes.values import (
+    SMALL,
+    Filled,
+    Held,
+    Stored,
+    Value,
+    copy,
+    held,
+    in_memory,
+    in_registers,
+    is_known,
+    row,
+    size_of,
+    write,
+)
+
+CALLS = {  # primitives that stand for a program of their own, and where it is kept
+    "jit": "jaxpr",
+    "pjit": "jaxpr",
+    "closed_call": "call_jaxpr",
+    "core_call": "call_jaxpr",
+    "remat2": "jaxpr",
+    "checkpoint": "jaxpr",
+    "custom_jvp_call": "call_jaxpr",
+    "custom_vjp_call": "call_jaxpr",
+    "custom_vjp_call_jaxpr": "fun_jaxpr",
+}
+# What only moves numbers about, and which of the arguments are the numbers; the others say where to. None: all are.
+MOVES: dict[str, tuple[int, ...] | None] = {
+    "broadcast_in_dim": None,
+    "concatenate": None,
+    "dynamic_slice": (0,),
+    "dynamic_update_slice": (0, 1),
+    "expand_dims": None,
+    "gather": (0,),
+    "pad": None,
+    "reshape": None,
+    "rev": None,
+    "scatter": (0, 2),
+    "slice": None,
+    "split": None,
+    "squeeze": None,
+    "stack": None,
+    "transpose": None,
+}
+
+
+@dataclass(frozen=True)
+class Array:
+    """An argument or a result: shape of one member's, and numpy's kind of number."""
+
+    shape: tuple[int, ...]
+    dtype: str
+
+
+@dataclass(frozen=True)
+class Translated:
+    """The text of `void members(ptr shared, ptr own, ptr results, ptr scratch, i64 first, i64 last)`, over groups of members."""
+
+    text: str
+    lanes: int
+    results: tuple[Array, ...]
+    scratch: int  # bytes a thread needs
+
+
+def _array(aval: Any) -> Array:
+    return Array(tuple(aval.shape), str(aval.dtype))
+
+
+def _only_lane(value: Value) -> Lane | None:
+    """The one number that a large array is full of."""
+    return value.lane if isinstance(value, Filled) else None
+
+
+def _filled(lane: Lane, shape: tuple[int, ...]) -> Value:
+    size = int(np.prod(shape))
+    return held([lane] * size, shape) if size <= SMALL else Filled(lane, shape)
+
+
+def _whole(known: Value) -> int:
+    return int(np.asarray(known))
+
+
+def _open(program: Any) -> tuple[Any, Sequence[Any]]:
+    return (program.jaxpr, program.consts) if hasattr(program, "consts") else (program, ())
+
+
+class _Translation:
+    def __init__(self, text: Text) -> None:
+        self.text = text
+
+    def program(self, jaxpr: Any, consts: Sequence[Value], given: Sequence[Value]) -> list[Value]:
+        """The results of a program of which the arguments are `given`."""
+        names: dict[Any, Value] = {}
+
+        def read(atom: Any) -> Value:
+            if isinstance(atom, jex.core.Literal):
+                return np.asarray(atom.val, dtype=_array(atom.aval).dtype)
+            return names[atom]
+
+        for variable, value in zip([*jaxpr.constvars, *jaxpr.invars], [*consts, *given], strict=True):
+            names[variable] = value
+        for equation in jaxpr.eqns:
+            found = self.equation(equation, [read(one) for one in equation.invars])
+            for variable, value in zip(equation.outvars, found, strict=True):
+                names[variable] = value
+        return [read(one) for one in jaxpr.outvars]
+
+    def closed(self, program: Any, given: Sequence[Value]) -> list[Value]:
+        jaxpr, consts = _open(program)
+        return self.program(jaxpr, [np.asarray(one) for one in consts], given)
+
+    def equation(self, equation: Any, given: list[Value]) -> list[Value]:
+        name, params = equation.primitive.name, equation.params
+        if name in CALLS:
+            return self.closed(params[CALLS[name]], given)
+        if name == "scan":
+            return self.scan(params, given, [_array(one.aval) for one in equation.outvars])
+        if name == "while":
+            return self.repeat(params, given)
+        if name == "cond":
+            return self.choice(params, given)
+        if all(is_known(one) for one in given):
+            with jax.ensure_compile_time_eval():
+                found = equation.primitive.bind(*given, **params)
+            return [np.asarray(one) for one in (found if equation.primitive.multiple_results else [found])]
+        out = _array(equation.outvars[0].aval)
+        kinds = [str(one.aval.dtype) for one in equation.invars]
+        if name in ELEMENTWISE:
+            return [self.elementwise(name, params, given, out)]
+        small = all(size_of(one) <= SMALL for one in given)
+        small &= all(int(np.prod(one.aval.shape)) <= SMALL for one in equation.outvars)
+        if name in MOVES and small and self.at_known_places(name, given):
+            return self.moved(equation, given)
+        if name in MOVES and len(set(map(_only_lane, given[: 1 if MOVES[name] else None]))) == 1:
+            lane = _only_lane(given[0])
+            if lane is not None and name not in ("dynamic_update_slice", "scatter", "split"):
+                return [_filled(lane, out.shape)]
+        method: Callable[..., Value] | None = getattr(self, f"put_{name}", None)
+        if method is None:
+            raise Unsupported(f"the operation `{name}`")
+        return [method(params, given, out, kinds)]
+
+    # Arithmetic, and the shapes of arrays.
+
+    def elementwise(self, name: str, params: dict[str, Any], given: list[Value], out: Array) -> Value:
+        size = int(np.prod(out.shape))
+        scalar_type(out.dtype)
+
+        def put(*lanes: Lane) -> Lane:
+            return ELEMENTWISE[name](self.text, out.dtype, *lanes, **params)
+
+        if size > SMALL:
+            if all(isinstance(one, Filled) or (is_known(one) and size_of(one) == 1) for one in given):
+                lanes = [
+                    one.lane if isinstance(one, Filled) else in_registers(self.text, one).ravel()[0] for one in given
+                ]
+                return Filled(put(*lanes), out.shape)
+            raise Unsupported(f"`{name}` of arrays of the shape {out.shape}")
+        # A predicate, the ends of `clamp` and axes of length one may stand for all.
+        flat = [np.broadcast_to(np.asarray(in_registers(self.text, one)), out.shape).ravel() for one in given]
+        return held([put(*(one[k] for one in flat)) for k in range(size)], out.shape)
+
+    @staticmethod
+    def at_known_places(name: str, given: list[Value]) -> bool:
+        data = MOVES[name]
+        return data is None or all(is_known(one) for number, one in enumerate(given) if number not in data)
+
+    def moved(self, equation: Any, given: list[Value]) -> list[Value]:
+        """What only moves numbers of small arrays about: done with their numbers in the place of themselves."""
+        primitive = equation.primitive
+        data = MOVES[primitive.name]
+        lanes: list[Lane] = []
+        named = []
+        for number, one in enumerate(given):
+            if data is not None and number not in data:
+                named.append(np.asarray(one))
+                continue
+            own = in_registers(self.text, one)
+            named.append(np.arange(len(lanes), len(lanes) + own.size, dtype="int32").reshape(own.shape))
+            lanes += list(own.ravel())
+        with jax.ensure_compile_time_eval():
+            found = primitive.bind(*named, **equation.params)
+        results = found if primitive.multiple_results else [found]
+        places = [np.asarray(one) for one in results]
+        if any(((one < 0) | (one >= len(lanes))).any() for one in places):
+            raise Unsupported(f"the operation `{primitive.name}` beyond the ends of an array")
+        return [held([lanes[k] for k in one.ravel()], one.shape) for one in places]
+
+    def put_reshape(self, params: Any, given: list[Value], out: Array, kinds: Any) -> Value:
+        one = given[0]
+        if isinstance(one, Stored):
+            return Stored(one.address, out.shape, one.dtype, one.own)
+        return held(list(in_registers(self.text, one).ravel()), out.shape)
+
+    def put_squeeze(self, params: Any, given: list[Value], out: Array, kinds: Any) -> Value:
+        return self.put_reshape(params, given, out, kinds)
+
+    def put_expand_dims(self, params: Any, given: list[Value], out: Array, kinds: Any) -> Value:
+        return self.put_reshape(params, given, out, kinds)
+
+    def put_broadcast_in_dim(self, params: Any, given: list[Value], out: Array, kinds: Any) -> Value:
+        one, dims = given[0], params["broadcast_dimensions"]
+        if size_of(one) == int(np.prod(out.shape)) and list(dims) == sorted(dims):
+            return self.put_reshape(params, given, out, kinds)
+        lanes = in_registers(self.text, one)
+        if int(np.prod(out.shape)) > SMALL:
+            if lanes.size == 1:
+                return Filled(lanes.ravel()[0], out.shape)
+            raise Unsupported(f"an array spread to the shape {out.shape}")
+
+        raise AssertionError("a small array is moved")
+
+    def put_slice(self, params: Any, given: list[Value], out: Array, kinds: Any) -> Value:
+        one, starts = given[0], params["start_indices"]
+        if isinstance(one, Stored):
+            rest_whole = tuple(out.shape[1:]) == tuple(one.shape[1:])
+            if not rest_whole or (params["strides"] or (1,))[0] != 1:
+                raise Unsupported("a part of a large array that is not a run of whole rows")
+            first = starts[0] * int(np.prod(one.shape[1:])) * (self.text.lanes if one.own else 1)
+            part = Stored(self.text.address(one.address, str(first), one.dtype), out.shape, one.dtype, one.own)
+            return in_registers(self.text, part) if part.size <= SMALL else part
+        raise AssertionError("a small array is moved")
+
+    def put_dynamic_slice(self, params: Any, given: list[Value], out: Array, kinds: Any) -> Value:
+        one, starts = given[0], given[1:]
+        shape = self.shape_of(one)
+        if all(is_known(start) for start in starts):
+            begin = [min(max(_whole(s), 0), n - m) for s, n, m in zip(starts, shape, out.shape, strict=True)]
+            limits = [b + m for b, m in zip(begin, out.shape, strict=True)]
+            return self.put_slice({"start_indices": begin, "limit_indices": limits, "strides": None}, [one], out, kinds)
+        if len(shape) != 1 or int(np.prod(out.shape)) != 1:
+            raise Unsupported("a part of an array that begins where each member says")
+        return held(self.looked_up(one, in_registers(self.text, starts[0]).ravel()[0], kinds[0]), out.shape)
+
+    def put_gather(self, params: Any, given: list[Value], out: Array, kinds: Any) -> Value:
+        one, index = given
+        numbers = params["dimension_numbers"]
+        one_of_a_row = (
+            len(self.shape_of(one)) == 1
+            and tuple(params["slice_sizes"]) == (1,)
+            and tuple(numbers.start_index_map) == (0,)
+            and out.shape == ()
+        )
+        if not one_of_a_row:
+            raise Unsupported("a gathering of more than one number")
+        return held(self.looked_up(one, in_registers(self.text, index).ravel()[0], kinds[0]))
+
+    def looked_up(self, array: Value, index: Lane, dtype: str) -> Lane:
+        """Of a row of numbers the one that each lane asks for; the nearest end where there is none."""
+        text, shape = self.text, self.shape_of(array)
+        most = text.constant(shape[0] - 1, index.dtype)
+        low = ELEMENTWISE["max"](text, index.dtype, index, text.constant(0, index.dtype))
+        low = ELEMENTWISE["min"](text, index.dtype, low, most)
+        if isinstance(array, Held) and array.size <= 8:
+            return select(text, dtype, low, *array.ravel()) if array.size > 1 else array.ravel()[0]
+        low = ELEMENTWISE["convert_element_type"](text, "int64", low)
+        stored = in_memory(text, array, shape, dtype)
+        kind = scalar_type(dtype)
+        if dtype == "bool":
+            raise Unsupported("truth values looked up in a table")
+        offsets = low.name
+        if stored.own:
+            # Lane k's own number lies at index * lanes + k.
+            own = ", ".join(f"i64 {k}" for k in range(text.lanes))
+            scaled = text.assign(f"mul {text.vector('int64')} {offsets}, {text.constant(text.lanes, 'int64').name}")
+            offsets = text.assign(f"add {text.vector('int64')} {scaled}, <{own}>")
+        places = text.assign(f"getelementptr {kind}, ptr {stored.address}, {text.vector('int64')} {offsets}")
+        suffix = {"double": "f64", "float": "f32"}.get(kind, kind)
+        name = f"llvm.masked.gather.v{text.lanes}{suffix}.v{text.lanes}p0"
+        pointers = f"<{text.lanes} x ptr>"
+        text.declare(name, text.vector(dtype), [pointers, text.vector("bool"), text.vector(dtype)])
+        arguments = (
+            f"{pointers} align {text.bytes(dtype)} {places}, {text.vector('bool')} splat (i1 true), "
+            f"{text.vector(dtype)} poison"
+        )
+        return text.lane(f"call {text.vector(dtype)} @{name}({arguments})", dtype)
+
+    def put_concatenate(self, params: Any, given: list[Value], out: Array, kinds: Any) -> Value:
+        axis = params["dimension"]
+        if axis != 0:
+            raise Unsupported("large arrays put together along another axis than the first")
+        room = Stored(self.text.reserve(int(np.prod(out.shape)), out.dtype), out.shape, out.dtype, own=True)
+        start = 0
+        for one in given:
+            copy(self.text, room, start, one)
+            start += size_of(one)
+        return room
+
+    def reduced(self, name: str, given: list[Value], axes: Sequence[int], out: Array) -> Value:
+        lanes = np.asarray(in_registers(self.text, given[0]))
+        moved = np.moveaxis(lanes, axes, range(len(axes))).reshape(-1, *out.shape)
+        total = moved[0]
+        operation = ELEMENTWISE[name]
+        for more in moved[1:]:
+            flat = [
+                operation(self.text, out.dtype, one, other)
+                for one, other in zip(np.ravel(total), np.ravel(more), strict=True)
+            ]
+            total = np.asarray(held(flat, out.shape))
+        return held(list(np.ravel(total)), out.shape)
+
+    def put_reduce_sum(self, params: Any, given: list[Value], out: Array, kinds: Any) -> Value:
+        return self.reduced("add", given, params["axes"], out)
+
+    def put_reduce_prod(self, params: Any, given: list[Value], out: Array, kinds: Any) -> Value:
+        return self.reduced("mul", given, params["axes"], out)
+
+    def put_reduce_max(self, params: Any, given: list[Value], out: Array, kinds: Any) -> Value:
+        return self.reduced("max", given, params["axes"], out)
+
+    def put_reduce_min(self, params: Any, given: list[Value], out: Array, kinds: Any) -> Value:
+        return self.reduced("min", given, params["axes"], out)
+
+    def put_reduce_and(self, params: Any, given: list[Value], out: Array, kinds: Any) -> Value:
+        return self.reduced("and", given, params["axes"], out)
+
+    def put_reduce_or(self, params: Any, given: list[Value], out: Array, kinds: Any) -> Value:
+        return self.reduced("or", given, params["axes"], out)
+
+    def put_dot_general(self, params: Any, given: list[Value], out: Array, kinds: Any) -> Value:
+        (left_axes, right_axes), (left_batch, right_batch) = params["dimension_numbers"]
+        if left_batch or right_batch:
+            raise Unsupported("products of batches of matrices")
+        left, right = (np.asarray(in_registers(self.text, one)) for one in given)
+        count = int(np.prod([left.shape[axis] for axis in left_axes]))
+        rows = np.moveaxis(left, left_axes, range(-len(left_axes), 0)).reshape(-1, count)
+        columns = np.moveaxis(right, right_axes, range(len(right_axes))).reshape(count, -1)
+        put = ELEMENTWISE
+        found = []
+        for one in rows:
+            for other in columns.T:
+                total = put["mul"](self.text, out.dtype, one[0], other[0])
+                for k in range(1, count):
+                    product = put["mul"](self.text, out.dtype, one[k], other[k])
+                    total = put["add"](self.text, out.dtype, total, product)
+                found.append(total)
+        return held(found, out.shape)
+
+    @staticmethod
+    def shape_of(value: Value) -> tuple[int, ...]:
+        return tuple(value.shape)
+
+    # Loops.
+
+    def carried(self, value: Value) -> Held:
+        if isinstance(value, Stored) or size_of(value) > SMALL:
+            raise Unsupported(f"an array of the shape {value.shape} carried from step to step")
+        return in_registers(self.text, value)
+
+    def begin(self, start: Sequence[Held], stem: str) -> _Loop:
+        return _Loop(self.text, start, stem)
+
+    def scan(self, params: dict[str, Any], given: list[Value], out: Sequence[Array]) -> list[Value]:
+        text = self.text
+        fixed, carry = params["num_consts"], params["num_carry"]
+        length, backward = params["length"], params["reverse"]
+        jaxpr, consts = _open(params["jaxpr"])
+        known = [np.asarray(one) for one in consts]
+        start = [self.carried(one) for one in given[fixed : fixed + carry]]
+        series = given[fixed + carry :]
+        kinds = [_array(one.aval) for one in jaxpr.invars[fixed + carry :]]
+        kept = out[carry:]
+        if length == 0:
+            raise Unsupported("a loop of no steps")
+        series = [
+            one if isinstance(one, Filled) else in_memory(text, one, (length, *kind.shape), kind.dtype)
+            for one, kind in zip(series, kinds, strict=True)
+        ]
+        rooms = [Stored(text.reserve(int(np.prod(one.shape)), one.dtype), one.shape, one.dtype, True) for one in kept]
+        loop = self.begin(start, "scan")
+        index = loop.count
+        if backward:
+            index = text.assign(f"sub i64 {length - 1}, {index}")
+        now = [row(text, one, index, kind.shape, kind.dtype) for one, kind in zip(series, kinds, strict=True)]
+        found = self.program(jaxpr, known, [*given[:fixed], *loop.carry, *now])
+        for room, one in zip(rooms, found[carry:], strict=True):
+            write(text, room, index, one)
+        end = [self.carried(one) for one in found[:carry]]
+        loop.end_after(length, end)
+        return [*end, *rooms]
+
+    def repeat(self, params: dict[str, Any], given: list[Value]) -> list[Value]:
+        text = self.text
+        cond_fixed, body_fixed = params["cond_nconsts"], params["body_nconsts"]
+        tests, bodies = given[:cond_fixed], given[cond_fixed : cond_fixed + body_fixed]
+        start = [self.carried(one) for one in given[cond_fixed + body_fixed :]]
+        loop = self.begin(start, "while")
+        going = in_registers(text, self.closed(params["cond_jaxpr"], [*tests, *loop.carry])[0]).ravel()[0]
+        inside, after = text.new_label("body"), text.new_label("end")
+        # A lane that is done keeps what it has while others go on.
+        text.branch(text.any(going), inside, after)
+        text.label(inside)
+        found = self.closed(params["body_jaxpr"], [*bodies, *loop.carry])
+        new = [
+            held(
+                [
+                    select(text, one.dtype, going, was, one)
+                    for was, one in zip(old.ravel(), self.carried(value).ravel(), strict=True)
+                ],
+                old.shape,
+            )
+            for old, value in zip(loop.carry, found, strict=True)
+        ]
+        loop.again(new)
+        text.label(after)
+        return list(loop.carry)
+
+    def choice(self, params: dict[str, Any], given: list[Value]) -> list[Value]:
+        which, rest = given[0], given[1:]
+        branches = params["branches"]
+        if is_known(which):
+            return self.closed(branches[min(max(_whole(which), 0), len(branches) - 1)], rest)
+        number = in_registers(self.text, which).ravel()[0]
+        found = [[self.carried(one) for one in self.closed(branch, rest)] for branch in branches]
+        return [
+            held(
+                [
+                    select(self.text, each[0].dtype, number, *each)
+                    for each in zip(*(o.ravel() for o in of), strict=True)
+                ],
+                of[0].shape,
+            )
+            for of in zip(*found, strict=True)
+        ]
+
+
+class _Loop:
+    """A loop whose carry are lanes; its first lines wait for what the last ones bring."""
+
+    def __init__(self, text: Text, start: Sequence[Held], stem: str) -> None:
+        self.text, self.start, self.before = text, start, text.block
+        self.top = text.new_label(stem)
+        text.jump(self.top)
+        text.label(self.top)
+        self.count, self.next = text.fresh("i"), text.fresh("i")
+        self.carry = [held([Lane(text.fresh("c"), one.dtype) for one in array.ravel()], array.shape) for array in start]
+        self.at = len(text.lines)
+        text.lines += [""] * (1 + sum(array.size for array in start))
+
+    def again(self, end: Sequence[Held]) -> None:
+        """Back to the top with `end` as the carry."""
+        text = self.text
+        text.put(f"{self.next} = add i64 {self.count}, 1")
+        lines = [f"  {self.count} = phi i64 [ 0, %{self.before} ], [ {self.next}, %{text.block} ]"]
+        for start, here, new in zip(self.start, self.carry, end, strict=True):
+            for one, name, other in zip(start.ravel(), here.ravel(), new.ravel(), strict=True):
+                kind = text.vector(name.dtype)
+                lines.append(
+                    f"  {name.name} = phi {kind} [ {one.name}, %{self.before} ], [ {other.name}, %{text.block} ]"
+                )
+        text.lines[self.at : self.at + len(lines)] = lines
+        text.jump(self.top)
+
+    def end_after(self, rounds: int, end: Sequence[Held]) -> None:
+        text = self.text
+        more, done = text.new_label("more"), text.new_label("done")
+        following = text.assign(f"add i64 {self.count}, 1")
+        text.branch(text.assign(f"icmp slt i64 {following}, {rounds}"), more, done)
+        text.label(more)
+        self.again(end)
+        text.label(done)
+
+
+def translate(program: Any, own: Sequence[bool], lanes: int, wide: bool = False) -> Translated:
+    """`program` is `jax.make_jaxpr` of one member; `own[k]` says whether argument k differs from member to member.
+
+    Such an argument is a number. `wide`: for a processor with AVX-512. Raises Unsupported with what cannot be translated.
+    """
+    text = Text(lanes, wide)
+    put = _Translation(text)
+    arguments = [_array(aval) for aval in program.in_avals]
+    shared: list[Value | None] = []
+    places = {True: 0, False: 0}
+    pointers = []
+    for number, (argument, mine) in enumerate(zip(arguments, own, strict=True)):
+        of = "own" if mine else "shared"
+        slot = text.assign(f"getelementptr inbounds ptr, ptr %{of}, i64 {places[mine]}")
+        pointers.append(text.assign(f"load ptr, ptr {slot}"))
+        places[mine] += 1
+        if mine:
+            if argument.shape != ():
+                raise Unsupported("a member's own argument that is an array")
+            shared.append(None)
+            continue
+        whole = Stored(pointers[number], argument.shape, argument.dtype, own=False)
+        shared.append(in_registers(text, whole) if whole.size <= SMALL else whole)
+    outputs = []
+    for number in range(len(program.out_avals)):
+        slot = text.assign(f"getelementptr inbounds ptr, ptr %results, i64 {number}")
+        outputs.append(text.assign(f"load ptr, ptr {slot}"))
+    text.jump("groups")
+    text.label("groups")
+    place = len(text.lines)
+    text.put("")
+    first = text.assign(f"mul i64 %group, {lanes}")
+    given: list[Value] = []
+    for pointer, argument, value in zip(pointers, arguments, shared, strict=True):
+        if value is None:
+            value = held(text.load_lanes(text.address(pointer, first, argument.dtype), argument.dtype))
+        given.append(value)
+    results = tuple(_array(aval) for aval in program.out_avals)
+    # What no result asks for may well be what has no translation.
+    asked, _ = partial_eval.dce_jaxpr(program.jaxpr, [True] * len(results), instantiate=True)
+    found = put.program(asked, [np.asarray(one) for one in program.consts], given)
+    for pointer, result, answer in zip(outputs, results, found, strict=True):
+        _leave(text, pointer, first, result, answer)
+    following = text.assign("add i64 %group, 1")
+    text.lines[place] = f"  %group = phi i64 [ %first, %entry ], [ {following}, %{text.block} ]"
+    text.branch(text.assign(f"icmp slt i64 {following}, %last"), "groups", "finished")
+    text.label("finished")
+    text.put("ret void")
+    head = (
+        f"define void @{NAME}(ptr noalias %shared, ptr noalias %own, ptr noalias %results, ptr noalias %scratch, "
+        "i64 %first, i64 %last) #0 {\nentry:"
+    )
+    # The processor takes what it has of 512 bits. Without the alignment what does not fit its registers would lie across
+    # cache lines.
+    attributes = 'attributes #0 = { nounwind alignstack=64 "prefer-vector-width"="512" "min-legal-vector-width"="512" }'
+    lines = [*text.globals, *sorted(text.declared.values()), head, *text.lines, "}", attributes]
+    return Translated("\n".join(lines) + "\n", lanes, results, text.scratch)
+
+
+def _leave(text: Text, pointer: str, first: str, result: Array, value: Value) -> None:
+    """A result where the caller finds it: members one after the other."""
+    size = int(np.prod(result.shape))
+    if size == 1:
+        text.store_lanes(in_registers(text, value).ravel()[0], text.address(pointer, first, result.dtype))
+        return
+    kept = "int8" if result.dtype == "bool" else result.dtype
+    rows = in_memory(text, value, result.shape, result.dtype) if not isinstance(value, Filled) else value
+    base = text.address(pointer, text.assign(f"mul i64 {first}, {size}"), result.dtype)
+    loop = _Loop(text, [], "leave")
+    lane = in_registers(text, row(text, rows, loop.count, (), result.dtype)).ravel()[0]
+    if result.dtype == "bool":
+        lane = ELEMENTWISE["convert_element_type"](text, kept, lane)
+    kind = scalar_type(kept)
+    for k in range(text.lanes):
+        one = text.assign(f"extractelement {text.vector(kept)} {lane.name}, i64 {k}")
+        at = text.assign(f"add i64 {loop.count}, {k * size}")
+        text.put(f"store {kind} {one}, ptr {text.address(base, at, kept)}")
+    loop.end_after(size, [])

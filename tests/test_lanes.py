@@ -1,0 +1,220 @@
+"""Programs of one member as machine code over lanes: the same numbers as XLA's, for arithmetic, loops, and whole runs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from jax import lax
+
+from smajax.batch.axes import sampled, zipped
+from smajax.batch.engine import Engine, chunks
+from smajax.batch.run import run_batch
+from smajax.figures.rigs import arm
+from smajax.lanes.evaluate import evaluator
+from smajax.lanes.kernel import Kernel
+from smajax.lanes.text import Unsupported
+from smajax.lanes.translate import translate
+from smajax.measure import Largest, Last, Mean, MeanSquare
+
+Function = Callable[..., jax.Array]
+ODD = [0.0, -0.0, 1.0, -1.0, 0.5, 2.5, -2.5, 1e-300, -1e300, 1e308, np.inf, -np.inf, np.nan, 3.0, 1e-9, 7.1]
+
+
+def by_lanes(function: Function, *own: np.ndarray, lanes: int = 8, wide: bool = False) -> np.ndarray:
+    """`function` of every member by the translator."""
+    program = jax.make_jaxpr(function)(*(jnp.zeros((), one.dtype) for one in own))
+    kernel = Kernel(translate(program, [True] * len(own), lanes, wide))
+    return kernel([], [np.ascontiguousarray(one) for one in own], threads=1)[0]
+
+
+def by_xla(function: Function, *own: np.ndarray) -> np.ndarray:
+    return np.asarray(jax.jit(jax.vmap(function))(*own))
+
+
+ELEMENTWISE: dict[str, Function] = {
+    "sum": lambda a, b: a + b,
+    "difference": lambda a, b: a - b,
+    "product": lambda a, b: a * b,
+    "larger": jnp.maximum,
+    "smaller": jnp.minimum,
+    "larger than a constant": lambda a, b: jnp.maximum(a, 0.3) + jnp.minimum(0.2, b),
+    "sign": lambda a, b: jnp.sign(a),
+    "size": lambda a, b: jnp.abs(a) - jnp.abs(b),
+    "below": lambda a, b: a < b,
+    "not equal": lambda a, b: a != b,
+    "at least": lambda a, b: a >= b,
+    "finite": lambda a, b: jnp.isfinite(a) & ~jnp.isnan(b),
+    "floor and ceiling": lambda a, b: jnp.floor(a) + jnp.ceil(b),
+    "round": lambda a, b: jnp.round(a),
+    "chosen": lambda a, b: jnp.where(a > b, a, b),
+    "clipped": lambda a, b: jnp.clip(a, -1.0, 2.0),
+    "power": lambda a, b: a**3 + b**2,
+    "whole number": lambda a, b: jnp.clip(a, -50.0, 50.0).astype(int) % 3,
+    "truth as number": lambda a, b: 1.0 * (a > 0.0) + (b > 0.0),
+}
+
+
+@pytest.mark.parametrize("name", ELEMENTWISE)
+def test_arithmetic_agrees_to_the_bit_also_for_what_is_no_number(name):
+    a, b = (np.ravel(one) for one in np.meshgrid(ODD, ODD))
+    found, wanted = by_lanes(ELEMENTWISE[name], a, b), by_xla(ELEMENTWISE[name], a, b)
+    assert found.dtype == wanted.dtype or wanted.dtype == bool
+    # A NaN is equal to a NaN here; XLA takes numbers below the normal ones for zero.
+    np.testing.assert_allclose(found, wanted, rtol=0.0, atol=np.finfo(float).tiny)
+
+
+@pytest.mark.parametrize("wide", [False, True])
+@pytest.mark.parametrize("dtype", ["float64", "float32"])
+def test_division_by_anything_is_right_to_two_roundings(wide, dtype):
+    if wide and not _wide():
+        pytest.skip("this processor has no AVX-512")
+    with np.errstate(all="ignore"):
+        a, b = (np.ravel(one).astype(dtype) for one in np.meshgrid(ODD, [*ODD, 1 / 3, 1e5, 123.456]))
+        wanted = a / b
+        inverse = np.asarray(1.0, dtype) / b
+    found = by_lanes(lambda a, b: a / b, a, b, lanes=16, wide=wide)
+    ordinary = np.isfinite(wanted) & np.isfinite(inverse) & (np.abs(inverse) > np.finfo(dtype).tiny)
+    ordinary &= (np.abs(wanted) > np.finfo(dtype).tiny) | (a == 0.0)
+    np.testing.assert_allclose(found[ordinary], wanted[ordinary], rtol=4 * np.finfo(dtype).eps)
+    by_zero = (b == 0.0) & (a != 0.0) & np.isfinite(a)
+    np.testing.assert_array_equal(np.abs(found[by_zero]), np.inf)
+    assert np.isnan(found[np.isnan(a) | np.isnan(b)]).all()
+    assert (found[np.isinf(b) & np.isfinite(a)] == 0.0).all()
+
+
+def _wide() -> bool:
+    from smajax.lanes.kernel import has_wide_vectors
+
+    return has_wide_vectors()
+
+
+@pytest.mark.parametrize("function", [jnp.exp, jnp.log, jnp.sqrt, jnp.tanh, jnp.sin], ids=lambda one: one.__name__)
+def test_functions_agree(function):
+    x = np.linspace(0.01, 3.0, 16)
+    np.testing.assert_allclose(by_lanes(function, x), by_xla(function, x), rtol=1e-14)
+
+
+def _newton(a: jax.Array) -> jax.Array:
+    """The square root, by as many iterations as each member needs."""
+
+    def going(at: tuple[jax.Array, jax.Array]) -> jax.Array:
+        return jnp.abs(at[0] ** 2 - a) > 1e-12 * a
+
+    def body(at: tuple[jax.Array, jax.Array]) -> tuple[jax.Array, jax.Array]:
+        return 0.5 * (at[0] + a / at[0]), at[1] + 1
+
+    root, count = lax.while_loop(going, body, (a, jnp.zeros((), int)))
+    return root + 1000.0 * count
+
+
+def _nested(a: jax.Array) -> jax.Array:
+    """Loops in loops, of which each keeps what the inner one gave; the second goes backwards."""
+
+    def inner(carry: jax.Array, x: jax.Array) -> tuple[jax.Array, jax.Array]:
+        carry = 0.9 * carry + x
+        return carry, carry * a
+
+    def outer(carry: jax.Array, row: jax.Array) -> tuple[jax.Array, jax.Array]:
+        carry, kept = lax.scan(inner, carry, row)
+        return carry, jnp.concatenate([kept[1:], carry[None]])
+
+    end, kept = lax.scan(outer, a, jnp.arange(300.0).reshape(3, 100) / 300.0)
+    later, back = lax.scan(lambda total, row: (total + row, total), jnp.zeros(100), kept[:2], reverse=True)
+    return end + later.sum() + back[0, 7]
+
+
+def _long(a: jax.Array) -> jax.Array:
+    end, kept = lax.scan(lambda c, x: (jnp.sin(c) + x, c * a), a, jnp.arange(200.0) / 100.0)
+    return jnp.append(end, kept)
+
+
+def _looked_up(a: jax.Array) -> jax.Array:
+    table = jnp.arange(100.0) ** 2
+    index = jnp.clip(a * 10.0, -20.0, 120.0).astype(int)
+    return table[index] + lax.switch(jnp.clip(index, 0, 2), [lambda: a, lambda: 2.0 * a, lambda: -a])
+
+
+@pytest.mark.parametrize("function", [_newton, _long, _looked_up], ids=lambda one: one.__name__)
+def test_loops_and_tables_agree(function):
+    a = np.array([0.3, 2.0, 1e-8, 1e8, 4.0, 9.0, 1.0, 5.5, -0.7 if function is not _newton else 0.7])
+    np.testing.assert_allclose(by_lanes(function, a), by_xla(function, a), rtol=1e-13)
+
+
+def test_what_is_too_large_for_registers_and_no_plain_series_is_named():
+    with pytest.raises(Unsupported, match=r"\(100,\)"):
+        by_lanes(_nested, np.ones(8))
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=40), st.sampled_from([2, 4, 8, 16, 32]))
+def test_any_number_of_members_in_any_number_of_lanes(values, lanes):
+    own = np.array(values)
+    found = by_lanes(lambda a: jnp.where(a > 1.0, a * a, -a), own, lanes=lanes)
+    np.testing.assert_array_equal(found, np.where(own > 1.0, own * own, -own))
+
+
+def _runs(engine: Engine):
+    axes = sampled(37, voltage=(5.5, 8.5), payload_mass=(0.05, 0.09), seed=1)
+    keep = ("position", "temperature", "martensite_fraction", "stress")
+    measures = (
+        Last("position"),
+        Largest("stress"),
+        Mean("temperature"),
+        MeanSquare("position", jnp.linspace(0, 1, 401)),
+    )
+    return run_batch(arm(), {}, axes, seconds=2.0, every=8, keep=keep, measures=measures, engine=engine)
+
+
+def test_a_batch_of_arms_is_that_of_xla():
+    ours, theirs = _runs("lanes"), _runs("xla")
+    assert set(ours) == set(theirs)
+    for name in ours:
+        scale = float(np.abs(theirs[name]).max())
+        np.testing.assert_allclose(ours[name], theirs[name], rtol=0.0, atol=1e-10 * scale, err_msg=str(name))
+    np.testing.assert_array_equal(ours["status"], theirs["status"])
+
+
+def test_a_member_is_the_same_to_the_bit_whatever_runs_beside_it():
+    axes = sampled(50, voltage=(5.5, 8.5), payload_mass=(0.05, 0.09), seed=2)
+    box = axes.members(0, 50)
+
+    def run(first: int, last: int, threads: int) -> np.ndarray:
+        part = zipped({name: series[first:last] for name, series in box.items()})
+        devices = jax.local_devices() * threads
+        return run_batch(arm(), {}, part, seconds=1.0, keep=(), measures=(Last("stress"),), devices=devices)[
+            "last_stress"
+        ].to_numpy()
+
+    whole = run(0, 50, 1)
+    np.testing.assert_array_equal(run(0, 50, 3), whole)
+    np.testing.assert_array_equal(run(17, 18, 1), whole[17:18])
+    np.testing.assert_array_equal(run(31, 50, 2), whole[31:])
+
+
+def test_a_member_that_is_no_number_does_not_disturb_the_others():
+    load = np.linspace(0.0, 0.1, 20)  # N m
+    good = run_batch(arm(), {"voltage": 7.0}, zipped({"load_torque": load}), seconds=1.0, keep=("stress",), every=20)
+    load[3] = 1e300
+    mixed = run_batch(arm(), {"voltage": 7.0}, zipped({"load_torque": load}), seconds=1.0, keep=("stress",), every=20)
+    others = np.arange(20) != 3
+    assert mixed["status"].to_numpy()[3] == 1
+    np.testing.assert_array_equal(mixed["stress"].to_numpy()[others], good["stress"].to_numpy()[others])
+
+
+def test_a_function_with_no_translation_runs_by_xla_or_says_why():
+    def sorted_pair(model, own):
+        return {"least": jnp.sort(jnp.stack([own["a"], own["b"]]))[0]}
+
+    axes = zipped({"a": np.array([1.0, 2.0, 3.0]), "b": np.array([3.0, 1.0, 2.0])})
+    with pytest.raises(Unsupported, match="sort"):
+        evaluator(sorted_pair, None, ("a", "b"))
+    ((_, found),) = chunks(sorted_pair, None, axes, 3, [0])
+    np.testing.assert_array_equal(found["least"], [1.0, 1.0, 2.0])
+    with pytest.raises(ValueError, match="`sort`"):
+        list(chunks(sorted_pair, None, axes, 3, [0], engine="lanes"))
