@@ -18,7 +18,7 @@ implicit function theorem, of any order, in forward and in reverse mode.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import equinox as eqx
 import jax
@@ -38,7 +38,39 @@ from smajax.wire.root import root
 
 Tree = TypeVar("Tree")
 
-GAMMA = 1.0 - 0.5**0.5
+
+class Scheme(NamedTuple):
+    """A diagonally implicit Runge-Kutta scheme whose last stage is its result, in the order in which stages need it.
+
+    Shares of dt. Stage i + 1 starts from `later` moved by `moved[i]` of the slopes of stage i; `later` is then moved by
+    `later_moved[i]` of them.
+    """
+
+    gamma: float
+    ends: tuple[float, ...]  # of the stages
+    moved: tuple[float, ...]
+    later_moved: tuple[float, ...]
+    compared: tuple[float, ...]  # weights less those of a scheme of one order less
+
+
+_TWO, _THREE = 1.0 - 0.5**0.5, 0.435866521508459
+# Alexander 1977: order 2 and 3, L-stable; the stages go forward in time, as a wire with a memory has to.
+ORDER_TWO = Scheme(_TWO, (_TWO, 1.0), (1.0 - _TWO, 0.0), (0.0, 0.0), (0.0, 0.0))
+ORDER_THREE = Scheme(
+    gamma=_THREE,
+    ends=(_THREE, 0.5 * (1.0 + _THREE), 1.0),
+    moved=(0.5 * (1.0 - _THREE), 1.5 * _THREE**2 - 5.0 * _THREE + 1.25, 0.0),
+    later_moved=(-1.5 * _THREE**2 + 4.0 * _THREE - 0.25, 0.0, 0.0),
+    compared=(_THREE, -2.0 * _THREE, _THREE),
+)
+
+
+class _Bases(NamedTuple):
+    """What a scheme carries from stage to stage: three numbers each, of H, position and velocity."""
+
+    stage: Stage
+    later: list[Scalar]
+    error: list[Scalar]
 
 
 def _held(tree: Tree) -> Tree:
@@ -115,20 +147,37 @@ def _stage(system: System, stage: Stage, inputs: Inputs) -> tuple[State, Scalar,
     return new, heating, velocity, acceleration
 
 
-def _moving_step(system: System, state: State, inputs: Inputs, dt: Scalar) -> State:
-    """SDIRK2: both stages are backward-Euler solves over gamma dt, the second from a base moved on by the first."""
-    heat = stored_heat(system.wire, system.effects, state.wire.temperature, state.wire.martensite_fraction)
-    rest = (1.0 - GAMMA) * dt
+def _moving_step(
+    system: System, state: State, inputs: Inputs, dt: Scalar, scheme: Scheme
+) -> tuple[State, tuple[Scalar, Scalar, Scalar]]:
+    """(state at the end, estimated error of H, position and velocity): every stage a backward-Euler solve over gamma dt.
 
-    def body(at: Stage, time: Scalar) -> tuple[Stage, None]:
-        new, heating, velocity, acceleration = _stage(system, at, inputs)
-        base = (at.heat + rest * heating, at.position + rest * velocity, at.velocity + rest * acceleration)
-        return Stage(new, time, at.step, *base), None
+    A stage starts from a base that those before it have moved on.
+    """
+    start = (
+        stored_heat(system.wire, system.effects, state.wire.temperature, state.wire.martensite_fraction),
+        state.motion.position,
+        state.motion.velocity,
+    )
 
-    first = Stage(state, state.time + GAMMA * dt, GAMMA * dt, heat, state.motion.position, state.motion.velocity)
-    # The scanned value is the time at which the *next* stage ends.
-    end, _ = lax.scan(body, first, jnp.stack([state.time + dt, state.time + dt]))
-    return State(end.time, end.old.wire, end.old.motion, end.old.reading)
+    def body(carry: _Bases, now: tuple[Scalar, ...]) -> tuple[_Bases, None]:
+        ends, moved, later_moved, compared = now
+        new, *slopes = _stage(system, carry.stage, inputs)
+        bases = [base + moved * slope for base, slope in zip(carry.later, slopes, strict=True)]
+        later = [base + later_moved * slope for base, slope in zip(carry.later, slopes, strict=True)]
+        error = [total + compared * slope for total, slope in zip(carry.error, slopes, strict=True)]
+        return _Bases(Stage(new, ends, carry.stage.step, *bases), later, error), None
+
+    gamma = scheme.gamma * dt
+    first = Stage(state, state.time + scheme.ends[0] * dt, gamma, *start)
+    # The time scanned over is that at which the *next* stage ends.
+    times = jnp.stack([state.time + share * dt for share in (*scheme.ends[1:], 1.0)])
+    shares = [jnp.stack([share * dt for share in row]) for row in (scheme.moved, scheme.later_moved, scheme.compared)]
+    none = [jnp.zeros_like(one) for one in start]
+    end, _ = lax.scan(body, _Bases(first, list(start), none), (times, *shares))
+    old = end.stage.old
+    heat, position, velocity = end.error
+    return State(end.stage.time, old.wire, old.motion, old.reading), (heat, position, velocity)
 
 
 def _coupon_step(system: System, state: State, inputs: Inputs, dt: Scalar) -> State:
@@ -182,14 +231,28 @@ def step(system: System, state: State, inputs: Inputs, dt: Scalar | float) -> St
     dt = jnp.asarray(dt, dtype=float)
     if isinstance(system.load, Coupon):
         new = _coupon_step(system, state, inputs, dt)
-        shown = new.wire.strain
-    elif isinstance(system.load, StrainCoupon):
+        return _read(system, state, new, new.wire.strain, dt)
+    if isinstance(system.load, StrainCoupon):
         new = _strain_coupon_step(system, state, inputs, dt)
-        shown = new.wire.stress
-    else:
-        new = _moving_step(system, state, inputs, dt)
-        shown = new.motion.position
-    # Backward Euler in the reading: unlike exp(-dt/tau) it has a slope at tau = 0, which a score test needs.
+        return _read(system, state, new, new.wire.stress, dt)
+    new, _ = _moving_step(system, state, inputs, dt, ORDER_TWO)
+    return _read(system, state, new, new.motion.position, dt)
+
+
+def step_and_error(
+    system: System, state: State, inputs: Inputs, dt: Scalar
+) -> tuple[State, tuple[Scalar, Scalar, Scalar]]:
+    """The same of a moving load by the scheme of order 3, and what it may be off by: (C, m or rad, m/s or rad/s)."""
+    new, (heat, position, velocity) = _moving_step(system, state, inputs, dt, ORDER_THREE)
+    capacity = stored_heat(system.wire, (), jnp.ones_like(heat), new.wire.martensite_fraction)
+    return _read(system, state, new, new.motion.position, dt), (heat / capacity, position, velocity)
+
+
+def _read(system: System, old: State, new: State, shown: Scalar, dt: Scalar) -> State:
+    """`new` with what the sensor reads of `shown`.
+
+    Backward Euler in the reading: unlike exp(-dt/tau) it has a slope at tau = 0, which a score test needs.
+    """
     lag = sum(effect.sensor_time_constant() for effect in system.effects)
-    reading = shown if isinstance(lag, (int, float)) and lag == 0 else (lag * state.reading + dt * shown) / (lag + dt)
+    reading = shown if isinstance(lag, (int, float)) and lag == 0 else (lag * old.reading + dt * shown) / (lag + dt)
     return State(new.time, new.wire, new.motion, reading)

@@ -8,7 +8,7 @@ chunk is divided over the devices, and a device's part into blocks whose state f
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Literal
 
@@ -20,7 +20,7 @@ from jax import lax
 from jax.sharding import Mesh, PartitionSpec
 
 from smajax.batch.axes import Axes
-from smajax.lanes.evaluate import Evaluator, evaluator
+from smajax.lanes.evaluate import KEPT, Evaluator, evaluator, kind_of
 from smajax.lanes.text import Unsupported
 
 BLOCK = 512  # members at once on a core: about 100 numbers each fit its second-level cache
@@ -69,11 +69,23 @@ def rounded(count: int, block: int, devices: Sequence[jax.Device]) -> int:
     return whole * -(-count // whole)
 
 
+_shapes: dict[Hashable, Any] = {}
+
+
+def result_shapes(function: Function, model: Any, axes: Axes) -> Any:
+    """Shapes and kinds of what one member gives; traced once for each kind of arguments."""
+    key = kind_of(function, model, tuple(axes.names))
+    if key not in _shapes:
+        while len(_shapes) >= KEPT:
+            del _shapes[next(iter(_shapes))]
+        _shapes[key] = eqx.filter_eval_shape(function, model, {name: jnp.zeros(()) for name in axes.names})
+    return _shapes[key]
+
+
 def member_bytes(function: Function, model: Any, axes: Axes) -> int:
     """What is kept of one member, bytes."""
-    one = {name: jnp.zeros(()) for name in axes.names}
-    shapes = eqx.filter_eval_shape(function, model, one)
-    return sum(int(np.prod(leaf.shape, dtype=np.int64)) * leaf.dtype.itemsize for leaf in jax.tree.leaves(shapes))
+    leaves = jax.tree.leaves(result_shapes(function, model, axes))
+    return sum(int(np.prod(leaf.shape, dtype=np.int64)) * leaf.dtype.itemsize for leaf in leaves)
 
 
 def chunk_size(function: Function, model: Any, axes: Axes, budget: int, devices: Sequence[jax.Device]) -> int:

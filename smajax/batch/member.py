@@ -9,6 +9,7 @@ import jax
 import jax.numpy as jnp
 from jax import lax
 
+from smajax.adaptive import advance
 from smajax.checkpointed import checkpointed_scan
 from smajax.load.coupon import AbstractCoupon
 from smajax.measure import SHOWN, AbstractMeasure, value_of
@@ -31,6 +32,7 @@ class Recipe(eqx.Module):
     constants: dict[str, Scalar]  # inputs that do not change
     dt: Scalar
     measures: tuple[AbstractMeasure, ...]
+    tolerance: Scalar | None  # of `adaptive.advance`; None: one step of `dt` each
     channels: tuple[str, ...] = eqx.field(static=True)  # varied names that are input channels
     steps: int = eqx.field(static=True)
     every: int = eqx.field(static=True)  # one state in so many is kept
@@ -66,9 +68,12 @@ def member(recipe: Recipe, values: Values) -> dict[str, jax.Array]:
     state = initial_state(system, first)
 
     def one(carry: Any, now: dict[str, Scalar]) -> tuple[Any, None]:
-        state, memories, bad, status = carry
+        state, tried, memories, bad, status = carry
         inputs = {**constants, **now}
-        state = step(system, state, inputs, recipe.dt)
+        if recipe.tolerance is None:
+            state = step(system, state, inputs, recipe.dt)
+        else:
+            state, tried, _ = advance(system, state, inputs, recipe.dt, tried, recipe.tolerance)
         memories = [
             measure.update(memory, state, inputs, recipe.dt)
             for measure, memory in zip(recipe.measures, memories, strict=True)
@@ -76,10 +81,10 @@ def member(recipe: Recipe, values: Values) -> dict[str, jax.Array]:
         broken, hot = _wrong(state)
         code = jnp.where(broken, NOT_FINITE, jnp.where(hot, RUNAWAY, GOOD))
         fresh = (status == GOOD) & (code != GOOD)
-        return (state, memories, jnp.where(fresh, state.time, bad), jnp.where(fresh, code, status)), None
+        return (state, tried, memories, jnp.where(fresh, state.time, bad), jnp.where(fresh, code, status)), None
 
     start = [measure.start(state, first) for measure in recipe.measures]
-    carry: Any = (state, start, jnp.full_like(state.time, jnp.inf), jnp.zeros_like(state.time, int))
+    carry: Any = (state, recipe.dt, start, jnp.full_like(state.time, jnp.inf), jnp.zeros_like(state.time, int))
     found: dict[str, jax.Array] = {}
     if recipe.keep:
         periods = recipe.steps // recipe.every
@@ -96,6 +101,6 @@ def member(recipe: Recipe, values: Values) -> dict[str, jax.Array]:
         found = {name: jnp.append(value_of(state, name), kept[name]) for name in recipe.keep}
     else:
         carry, _ = checkpointed_scan(one, carry, series, recipe.steps)
-    _, memories, bad, status = carry
+    _, _, memories, bad, status = carry
     found |= {measure.name: measure.result(memory) for measure, memory in zip(recipe.measures, memories, strict=True)}
     return found | {"status": status.astype("int8"), "first_bad_time": bad}

@@ -1,6 +1,7 @@
 """smajax on the problem of the peers, every core: `python -m studies.benchmarks.throughput FILE`; prints JSON.
 
-The step is the default one; that it is accurate enough is checked on the solved members. What is timed is `run_batch`
+With the default step, or with `--tolerance` and samples of 50 ms; that it is accurate enough is checked on the solved
+members. What is timed is `run_batch`
 as a user calls it, measures of each run and no trajectory, the compilation apart.
 """
 
@@ -16,6 +17,7 @@ import jax
 import numpy as np
 
 from smajax.batch.axes import zipped
+from smajax.batch.engine import available_cores
 from smajax.batch.run import run_batch
 from smajax.figures.rigs import arm
 from smajax.measure import Last
@@ -29,36 +31,36 @@ MEASURES = (Last("position"), Last("martensite_fraction"))
 REPEATS = 3
 
 
-def _errors(given: Given, dt: float) -> tuple[float, float]:
-    axes = problem.axes(len(given.voltage))
-    box = axes.members(0, given.solved)
+def _errors(given: Given, dt: float, tolerance: float | None) -> tuple[float, float]:
+    axes = zipped(problem.axes(len(given.voltage)).members(0, given.solved))
     every = round(problem.EVERY / dt)
     keep = ("position", "martensite_fraction")
-    found = run_batch(arm(), {}, zipped(box), seconds=given.seconds, dt=dt, every=every, keep=keep)
+    found = run_batch(arm(), {}, axes, seconds=given.seconds, dt=dt, every=every, keep=keep, tolerance=tolerance)
     return given.errors(np.degrees(found["position"].to_numpy()), found["martensite_fraction"].to_numpy())
 
 
-def run(given: Given, dt: float, count: int) -> dict[str, Any]:
-    """Errors at a step of `dt`, and the time of `count` members."""
-    off = _errors(given, dt)
+def run(given: Given, dt: float, tolerance: float | None, count: int) -> dict[str, Any]:
+    """Errors at a step of `dt`, or at a tolerance, and the time of `count` members."""
+    off = _errors(given, dt, tolerance)
     axes = problem.axes(count)
 
     def once() -> float:
         begin = time.perf_counter()
-        run_batch(arm(), {}, axes, seconds=given.seconds, dt=dt, keep=(), measures=MEASURES)
+        run_batch(arm(), {}, axes, seconds=given.seconds, dt=dt, keep=(), measures=MEASURES, tolerance=tolerance)
         return time.perf_counter() - begin
 
     first, times = once(), [once() for _ in range(REPEATS)]
     best = min(times)
     return {
-        "peer": "smajax",
+        "peer": "smajax" if tolerance is None else "smajax, own steps",
         "precision": str(jax.numpy.zeros(()).dtype),
         "dt": dt,
+        "tolerance": tolerance,
         "angle_error": off[0],
         "fraction_error": off[1],
         "accurate": given.meets(off),
         "members": count,
-        "cores": jax.local_device_count(),
+        "cores": available_cores(),
         "ms_per_trajectory": 1e3 * best / count,
         "compile_s": first - best,
         "peak_memory_MB": peak_memory() / 1e6,
@@ -70,13 +72,14 @@ def main() -> None:
     asked.add_argument("file", type=Path)
     asked.add_argument("--count", type=int, default=65536)
     asked.add_argument("--dt", type=float, default=DEFAULT_STEP)
+    asked.add_argument("--tolerance", type=float)
     asked.add_argument("--single-precision", action="store_true")
     options = asked.parse_args()
     prepare(cores=True)
     jax.config.update("jax_enable_compilation_cache", False)  # so that compiling is seen
     if options.single_precision:
         jax.config.update("jax_enable_x64", False)
-    print(json.dumps(run(load(options.file), options.dt, options.count)))
+    print(json.dumps(run(load(options.file), options.dt, options.tolerance, options.count)))
 
 
 if __name__ == "__main__":
