@@ -24,6 +24,7 @@ from smajax.lanes.values import (
     in_memory,
     in_registers,
     is_known,
+    mapped,
     row,
     size_of,
     write,
@@ -161,6 +162,8 @@ class _Translation:
     def elementwise(self, name: str, params: dict[str, Any], given: list[Value], out: Array) -> Value:
         size = int(np.prod(out.shape))
         scalar_type(out.dtype)
+        if name == "convert_element_type" and isinstance(given[0], Stored) and given[0].dtype == out.dtype:
+            return given[0]
 
         def put(*lanes: Lane) -> Lane:
             return ELEMENTWISE[name](self.text, out.dtype, *lanes, **params)
@@ -171,7 +174,11 @@ class _Translation:
                     one.lane if isinstance(one, Filled) else in_registers(self.text, one).ravel()[0] for one in given
                 ]
                 return Filled(put(*lanes), out.shape)
-            raise Unsupported(f"`{name}` of arrays of the shape {out.shape}")
+            if any(size_of(one) not in (1, size) for one in given):
+                raise Unsupported(f"`{name}` of arrays of the shapes {[self.shape_of(one) for one in given]}")
+            room = Stored(self.text.reserve(size, out.dtype), out.shape, out.dtype, own=True)
+            mapped(self.text, room, 0, put, given)
+            return room
         # A predicate, the ends of `clamp` and axes of length one may stand for all.
         flat = [np.broadcast_to(np.asarray(in_registers(self.text, one)), out.shape).ravel() for one in given]
         return held([put(*(one[k] for one in flat)) for k in range(size)], out.shape)

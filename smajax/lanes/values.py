@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -141,15 +142,25 @@ def copy(text: Text, room: Stored, start: int, value: Value) -> None:
         for number, lane in enumerate(in_registers(text, value).ravel()):
             text.store_lanes(lane, text.address(room.address, str((start + number) * text.lanes), room.dtype))
         return
-    with_index = _Count(text, size)
-    if isinstance(value, Filled):
-        lane = value.lane
-    else:
-        lane = _element(text, in_memory(text, value, value.shape, room.dtype), with_index.name)
-    at = text.assign(f"add i64 {with_index.name}, {start}")
+    mapped(text, room, start, lambda lane: lane, [value])
+
+
+def mapped(text: Text, room: Stored, start: int, operation: Callable[..., Lane], given: Sequence[Value]) -> None:
+    """`operation` of the numbers of large arrays of one shape, each with each, into `room` from its number `start` on."""
+    size = max(map(size_of, given))
+    sources = [table(text, np.asarray(one)) if is_known(one) and size_of(one) > 1 else one for one in given]
+    loop = _Count(text, size)
+
+    def now(one: Value) -> Lane:
+        if isinstance(one, Filled):
+            return one.lane
+        return _element(text, one, loop.name) if isinstance(one, Stored) else in_registers(text, one).ravel()[0]
+
+    lane = operation(*(now(one) for one in sources))
+    at = text.assign(f"add i64 {loop.name}, {start}")
     at = text.assign(f"mul i64 {at}, {text.lanes}")
     text.store_lanes(lane, text.address(room.address, at, room.dtype))
-    with_index.end()
+    loop.end()
 
 
 class _Count:

@@ -74,10 +74,17 @@ def _cpp(plan: Plan) -> Part:
     return found
 
 
+# Samples of 50 ms, and a tolerance a step at which the angle is right to 0.03 degrees.
+OWN_STEPS = ("--dt", "0.05", "--tolerance", "2e-4")
+
 PARTS: dict[str, Callable[[Plan], Part]] = {
     "smajax": lambda plan: plan.own("throughput", plan.file(), "--count", plan.members),
     "cpp": _cpp,
     "smajax_float32": lambda plan: plan.own("throughput", plan.file(), "--count", plan.members, "--single-precision"),
+    "smajax_own_steps": lambda plan: plan.own("throughput", plan.file(), "--count", plan.members, *OWN_STEPS),
+    "smajax_own_steps_float32": lambda plan: plan.own(
+        "throughput", plan.file(), "--count", plan.members, *OWN_STEPS, "--single-precision"
+    ),
     "scipy": lambda plan: peers.scipy(plan.file(), plan.scipy_members),
     "diffrax": lambda plan: peers.diffrax(plan.file(), count=plan.diffrax_members),
     "single": lambda plan: plan.own("single", plan.file()),

@@ -13,6 +13,7 @@ from smajax.figures.rigs import arm
 from smajax.runtime import prepare
 from studies.benchmarks import problem
 from studies.benchmarks.machine import peak_memory
+from studies.benchmarks.single import TOLERANCE
 from studies.benchmarks.throughput import MEASURES
 
 
@@ -30,6 +31,8 @@ def main() -> None:
             {},
             problem.axes(options.count),
             seconds=options.seconds,
+            dt=problem.EVERY,
+            tolerance=TOLERANCE,
             keep=(),
             measures=MEASURES,
             out=Path(place) / "batch",

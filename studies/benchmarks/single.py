@@ -1,22 +1,29 @@
-"""One trajectory, and the first call of a fresh process: `python -m studies.benchmarks.single FILE`; prints JSON."""
+"""One trajectory, and the first call of a fresh process: `python -m studies.benchmarks.single FILE`; prints JSON.
+
+`simulate_compiled` with steps of its own, its trajectory at samples of 50 ms; `xla_ms` is `jit` of `simulate` with fixed ones.
+"""
 
 from __future__ import annotations
 
 import argparse
 import json
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import equinox as eqx
 import jax
 
+from smajax.compiled import simulate_compiled
 from smajax.figures.rigs import arm
 from smajax.runtime import prepare
 from smajax.simulate import DEFAULT_STEP, simulate
+from smajax.types import Trajectory
 from studies.benchmarks import problem
 from studies.benchmarks.given import load
 
 REPEATS = 10
+TOLERANCE = 2e-4
 
 
 def main() -> None:
@@ -25,16 +32,22 @@ def main() -> None:
     given = load(asked.parse_args().file)
     prepare()
     jax.config.update("jax_enable_compilation_cache", False)
-    run = eqx.filter_jit(simulate)
-    inputs = {"voltage": problem.held(float(given.voltage[0]), DEFAULT_STEP)}
+    run, system, volts = eqx.filter_jit(simulate), arm(), float(given.voltage[0])
+    few, many = ({"voltage": problem.held(volts, dt)} for dt in (problem.EVERY, DEFAULT_STEP))
 
-    def once() -> float:
+    def timed(simulated: Callable[[], Trajectory]) -> float:
         begin = time.perf_counter()
-        jax.block_until_ready(run(arm(), inputs, DEFAULT_STEP).position)
+        jax.block_until_ready(simulated().position)
         return time.perf_counter() - begin
 
-    first = once()
-    print(json.dumps({"peer": "single", "first_call_s": first, "ms": 1e3 * min(once() for _ in range(REPEATS))}))
+    own, fixed = (
+        (lambda: simulate_compiled(system, few, problem.EVERY, TOLERANCE)),
+        (lambda: run(system, many, DEFAULT_STEP)),
+    )
+    first, first_xla = timed(own), timed(fixed)
+    told = {"peer": "single", "first_call_s": first, "ms": 1e3 * min(timed(own) for _ in range(REPEATS))}
+    told |= {"xla_first_call_s": first_xla, "xla_ms": 1e3 * min(timed(fixed) for _ in range(REPEATS))}
+    print(json.dumps(told))
 
 
 if __name__ == "__main__":

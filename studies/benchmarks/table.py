@@ -34,15 +34,27 @@ def _at_most(what: str, most: float, value: float | None, unit: str = "") -> str
 
 
 def _ratios(found: Found) -> list[str]:
-    own, single = _each(found, "smajax"), found.get("single", {})
+    fixed, own, single = _each(found, "smajax"), _each(found, "smajax_own_steps"), found.get("single", {})
     scipy = _each(found, "scipy", "best")
     gradient = found.get("gradient", {})
     rows = [
-        _at_least("throughput over the C++ program, float64", 0.7, _ratio(_each(found, "cpp", "double"), own)),
         _at_least(
-            "throughput over the C++ program, float32",
+            "throughput over the C++ program, the same fixed steps, float64",
+            0.7,
+            _ratio(_each(found, "cpp", "double"), fixed),
+        ),
+        _at_least(
+            "throughput over the C++ program, the same fixed steps, float32",
             0.7,
             _ratio(_each(found, "cpp", "float"), _each(found, "smajax_float32")),
+        ),
+        _at_least(
+            "throughput over the C++ program, own steps, float64", 0.7, _ratio(_each(found, "cpp", "double"), own)
+        ),
+        _at_least(
+            "throughput over the C++ program, own steps, float32",
+            0.7,
+            _ratio(_each(found, "cpp", "float"), _each(found, "smajax_own_steps_float32")),
         ),
         _at_least("throughput over diffrax at its best", 5.0, _ratio(_each(found, "diffrax", "best"), own)),
         _at_least("throughput over scipy's LSODA", 200.0, _ratio(scipy, own)),
@@ -66,8 +78,10 @@ def _times(found: Found) -> list[str]:
         "|---|---|---|---|---|---|",
     ]
     named = {
-        "smajax, float64": found.get("smajax", {}),
-        "smajax, float32": found.get("smajax_float32", {}),
+        "smajax, own steps, float64": found.get("smajax_own_steps", {}),
+        "smajax, own steps, float32": found.get("smajax_own_steps_float32", {}),
+        "smajax, fixed steps, float64": found.get("smajax", {}),
+        "smajax, fixed steps, float32": found.get("smajax_float32", {}),
         "diffrax": found.get("diffrax", {}).get("best", found.get("diffrax", {})),
         "scipy LSODA, one core": found.get("scipy", {}).get("best", found.get("scipy", {})),
         "C++, float64": found.get("cpp", {}).get("double", found.get("cpp", {})),
