@@ -117,7 +117,9 @@ def close_loop_command(
 @app.command("identify")
 def identify_command(
     experiment: Annotated[Path, typer.Argument(help="experiment.toml, or the folder that holds it")],
-    out: Annotated[Path, typer.Option(help="folder for identify.html and identify.json")],
+    out: Annotated[
+        Path, typer.Option(help="folder for identify.html and identify.json; fits are kept there as they go")
+    ],
     starts: Annotated[int, typer.Option(min=0, help="points of the box that fits may start from; 0: as declared")] = 64,
     profile: Annotated[str, typer.Option(help="parameters to draw a profile of, with commas, or `all`")] = "",
     robust: Annotated[bool, typer.Option("--robust", help="Huber's loss: samples far off count less")] = False,
@@ -127,7 +129,8 @@ def identify_command(
 ) -> None:
     """Fit the unknowns of an experiment to its runs, with error bars, and say what the runs cannot tell.
 
-    An effect is part of the model when the experiment names one of its parameters ("latent_heat.enthalpy").
+    An effect is part of the model when the experiment names one of its parameters ("latent_heat.enthalpy"). Ctrl-C loses
+    nothing: the same command with the same --out goes on from the fits as they were.
 
     Example:  smajax identify experiment.toml --out identified --profile all --design
     """
@@ -135,6 +138,7 @@ def identify_command(
 
     prepare()
     from smajax.catalogue import CATALOGUE
+    from smajax.declared import free_by_name
     from smajax.experiment.load import load_experiment
     from smajax.identify import identify
     from smajax.progress import shown
@@ -142,18 +146,19 @@ def identify_command(
 
     _folder(out)
     loaded = load_experiment(experiment, CATALOGUE)
-    unknowns = [unknown.name for unknown in loaded.unknowns]
+    unknowns = list(free_by_name(loaded, [run for run in loaded.runs if run.role == "fit"]))
     profiled = unknowns if profile == "all" else [part.strip() for part in profile.split(",") if part.strip()]
     command = f"smajax identify {shlex.quote(str(experiment))} --out {shlex.quote(str(out))} --starts {starts}"
     command += f" --profile {','.join(profiled)}" * bool(profiled) + " --robust" * robust + " --design" * design
     try:
-        with _resumable("Nothing is kept of a fit that is not finished."), shown(console()) as progress:
+        with _resumable("Fits are kept as they go: the same command goes on from there."), shown(console()) as progress:
             found = identify(
                 loaded,
                 starts=starts,
                 profiled=profiled,
                 robust=robust,
                 design=design,
+                memory=out / "fits",
                 progress=progress,
                 command=command,
             )

@@ -258,7 +258,11 @@ MISTAKES = [
     ('column = "time"\n', "", r"time: names no column"),
     ('unit = "%"', 'unit = "V"', r"channels.duty.unit: got unit 'V'.*expected one like '1'"),
     ('role = "input"\n', "", r"channels.duty.role: is missing; expected 'input' or 'output'"),
-    ('role = "input"', 'role = "output"', r"channels: got the outputs duty, position; expected exactly one"),
+    (
+        'role = "input"',
+        'role = "output"',
+        r"channels.duty: the model has no output 'duty'; its outputs are: position, t",
+    ),
     ("[channels.duty]", "[channels.ambient_temperature]", r"channels.ambient_temperature.unit: got unit '%'"),
     (
         "[channels.duty]",

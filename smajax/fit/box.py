@@ -7,8 +7,9 @@ bound is infinitely far away and a narrow valley bends, and a fit that takes 20 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from dataclasses import fields as fields_of
 
 import equinox as eqx
 import jax
@@ -16,6 +17,7 @@ import jax.numpy as jnp
 import numpy as np
 from scipy.optimize import lsq_linear
 
+from smajax.fit.kept import Kept
 from smajax.fit.problem import Lane, Problem
 from smajax.fit.progress import Progress, quiet
 
@@ -66,8 +68,8 @@ def _normal_equations(
 
         def residual(place: jax.Array) -> tuple[jax.Array, jax.Array]:
             values = lane.values.at[lane.slots].set(lane.low + place * (lane.high - lane.low))
-            misfit = here.misfit(values) / problem.noise_sigma * jnp.sqrt(lane.weights)[:, None]
-            return misfit.ravel(), misfit.ravel()
+            value = here.residual(values, lane.weights)
+            return value, value
 
         jacobian, value = jax.jacfwd(residual, has_aux=True)(place)
         return value @ value, value @ jacobian, jacobian.T @ jacobian
@@ -117,6 +119,18 @@ def _judged(walk: _Walk, step: np.ndarray, cost: float, slope: np.ndarray, squar
             walk.reason = "it has converged, no step lowers the cost any more"
 
 
+def _packed(walks: Sequence[_Walk], rounds: int) -> dict[str, np.ndarray]:
+    """Where all fits are, as arrays."""
+    fields = {field.name: np.asarray([getattr(walk, field.name) for walk in walks]) for field in fields_of(_Walk)}
+    return {**fields, "rounds": np.asarray(rounds)}
+
+
+def _unpacked(record: Mapping[str, np.ndarray]) -> list[_Walk]:
+    names = [field.name for field in fields_of(_Walk)]
+    rows = zip(*(record[name] for name in names), strict=True)
+    return [_Walk(*(value if np.ndim(value) else value.item() for value in row)) for row in rows]
+
+
 def fit_in_box(
     problem: Problem,
     lanes: Sequence[Lane],
@@ -124,10 +138,13 @@ def fit_in_box(
     outputs: np.ndarray | None = None,
     at_once: int = 8,
     most: int = MOST_STEPS,
+    kept: Kept | None = None,
     progress: Progress = quiet,
     what: str = "fitting",
 ) -> list[Fit]:
     """Fit every lane from its own values; all lanes have the same number of slots.
+
+    With `kept`, where every fit is is written as it goes, and the same call goes on from there to the same end.
 
     `outputs`, (lanes, R, N): measured outputs of each lane's own, as in repeated experiments. Lanes that are not ended
     go `at_once` at a time, so one compilation serves any number of them, and none waits for another.
@@ -151,14 +168,21 @@ def fit_in_box(
         return found
 
     everyone = range(len(lanes))
-    places = [place_of(lane) for lane in lanes]
-    walks = []
-    for place, (cost, slope, square) in zip(places, evaluated(everyone, places), strict=True):
-        lost = not (np.isfinite(cost) and np.isfinite(slope).all() and np.isfinite(square).all())
-        walk = _Walk(place, cost if not lost else np.inf, slope, square, np.diag(square).copy())
-        walk.reason = "the model gives no number at the start" if lost else ""
-        walks.append(walk)
-    for number in range(most):
+    kept = kept or Kept()
+    key = kept.key((problem, list(lanes)), "fit in box", outputs if outputs is not None else "", at_once, most)
+    known = kept.load(key)
+    if known is not None:
+        walks, begun = _unpacked(known), int(known["rounds"])
+    else:
+        walks, begun = [], 0
+        places = [place_of(lane) for lane in lanes]
+        for place, (cost, slope, square) in zip(places, evaluated(everyone, places), strict=True):
+            lost = not (np.isfinite(cost) and np.isfinite(slope).all() and np.isfinite(square).all())
+            walk = _Walk(place, cost if not lost else np.inf, slope, square, np.diag(square).copy())
+            walk.reason = "the model gives no number at the start" if lost else ""
+            walks.append(walk)
+    for number in range(begun, most):
+        kept.save(key, _packed(walks, number), last=False)
         going = [lane for lane in everyone if not walks[lane].reason]
         progress(what, max(1.0 - len(going) / len(lanes), number / most))
         if not going:
@@ -167,6 +191,7 @@ def fit_in_box(
         tried = [np.clip(walks[lane].place + step, 0.0, 1.0) for lane, step in zip(going, steps, strict=True)]
         for lane, step, answer in zip(going, steps, evaluated(going, tried), strict=True):
             _judged(walks[lane], step, *answer)
+    kept.save(key, _packed(walks, most))
     progress(what, 1.0)
     ended = []
     for own, walk in zip(lanes, walks, strict=True):

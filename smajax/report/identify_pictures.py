@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from smajax.identify import Identified, IdentifiedRun
+from smajax.identified import Identified, IdentifiedRun
 from smajax.report.display import axis_label, channel, digits, display, label
 from smajax.report.pictures import (
     AFTER,
@@ -20,18 +20,19 @@ from smajax.report.pictures import (
 )
 
 
-def run_with_band(found: Identified, run: IdentifiedRun) -> bytes:
-    """Measured and simulated, the residual with the noise's band and the parameters', and the varying inputs."""
-    shown = display(found.output_unit, found.output_name)
-    figure, rows = run_panels(run.time, run.inputs, found.output_name, shown)
+def run_with_band(found: Identified, run: IdentifiedRun, k: int = 0) -> bytes:
+    """Of the k-th output: measured, simulated, residual with the noise's band and the parameters', varying inputs."""
+    sensor, one = found.outputs[k], run.series[k]
+    shown = display(sensor.unit, sensor.name)
+    figure, rows = run_panels(run.time, run.inputs, sensor.name, shown)
     output, residual = rows[:2]
-    output.plot(*extremes(run.time, shown.of(run.measured)), **THICK, label="measured")
-    output.plot(*extremes(run.time, shown.of(run.simulated)), color=AFTER, linewidth=1.2, label="simulated")
-    both = 1.96 * np.hypot(run.spread, found.noise_sigma)
+    output.plot(*extremes(run.time, shown.of(one.measured)), **THICK, label="measured")
+    output.plot(*extremes(run.time, shown.of(one.simulated)), color=AFTER, linewidth=1.2, label="simulated")
+    both = 1.96 * np.hypot(one.spread, sensor.noise_sigma)
     residual.fill_between(
         run.time, shown.of(-both), shown.of(both), color=NOISE, zorder=0, label="95 %: noise and parameters"
     )
-    residual.plot(*extremes(run.time, shown.of(run.measured - run.simulated)), color=AFTER, linewidth=0.9)
+    residual.plot(*extremes(run.time, shown.of(one.measured - one.simulated)), color=AFTER, linewidth=0.9)
     return panels_done(figure, rows, 3)
 
 
