@@ -5,9 +5,9 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from scipy import stats
@@ -23,7 +23,7 @@ from smajax.fit.problem import Problem
 from smajax.fit.profile import ALIKE, profiles
 from smajax.fit.progress import Progress, quiet
 from smajax.fit.robust import NORMAL, robust_fit, robust_variance, unweighted_misfit
-from smajax.fit.sensitivity import sensitivity
+from smajax.fit.sensitivity import Sensitivity, sensitivity
 from smajax.fit.starts import TRIED, from_many_starts
 from smajax.fit.uncertainty import covariance_of, held, identifiability, uncertainty
 from smajax.identified import Estimate, Identified, IdentifiedOutput, IdentifiedRun, IdentifiedSeries
@@ -32,11 +32,6 @@ from smajax.residual.noise_like import LAGS, WHITE, correlation_time, split_runs
 
 SEED = 2004
 EDGE = 1e-6  # of the box: a fit in a box comes to a bound itself
-
-
-@eqx.filter_jit
-def _shown(problem: Problem, values: jax.Array) -> jax.Array:
-    return problem.shown(values)
 
 
 def _stopped(best: Fit, fits: Sequence[Fit], inflation: float) -> str:
@@ -87,11 +82,12 @@ def identify(
         raise ValueError(f"no profile of {odd}, which are not fitted; fitted are {', '.join(names)}.")
     began = clock.monotonic()
     kept = Kept(memory)
-    problem = declared_problem(experiment, fit_runs)
+    problem, everything = declared_problem(experiment, fit_runs), declared_problem(experiment, experiment.runs)
     bounds = {name: (unknown.low, unknown.high) for name, unknown in unknowns.items()}
     start = problem.start_values()
     # Of what the runs can tell: what is told at the start already. What moves together is told at the fit, by how much.
-    can_tell = identifiability(sensitivity(problem, start, names), names, bounds)
+    at_start = sensitivity(everything, _in_full(everything, problem, start), names)
+    can_tell = identifiability(_of_fit_runs(at_start, experiment, problem), names, bounds)
     check = [*experiment.warnings, *(line for line in can_tell if "move together" not in line)]
     for line in check:
         progress(f"say: check: {line}", 1.0)
@@ -117,7 +113,10 @@ def identify(
 
     index = problem.names.index
     values = {name: float(best.values[index(name)]) for name in names}
-    at = sensitivity(problem, best.values, names)
+    own = _own_of_held_out(experiment, problem, best.values, bounds, kept, progress)
+    everything = eqx.tree_at(lambda one: one.noise_sigma, everything, problem.noise_sigma)
+    everywhere = sensitivity(everything, _in_full(everything, problem, best.values, own), names)
+    at = _of_fit_runs(everywhere, experiment, problem)
     misfit = unweighted_misfit(weighted, best.values) if robust else at.misfit
     residual = split_runs(misfit, at.mask)
     white = whiteness_p_value(residual, LAGS)
@@ -134,10 +133,6 @@ def identify(
     seen = [name for k, name in enumerate(names) if told[:, k].any() and not held(values[name], *bounds[name], EDGE)]
     weak = directions(at, seen, values, inflation) if seen else ()
     drawn = profiles(weighted, profiled, names, bounds, best, known.standard_error, inflation, progress, kept)
-    progress("simulating every run", 0.0)
-    everything, full, own = _with_held_out(experiment, problem, best.values, bounds, kept, progress)
-    runs = _runs(experiment, everything, full, correlated, covariance)
-    progress("simulating every run", 1.0)
     ideas = suggestions(weighted, best.values, correlated, fit_runs, inflation) if design else ()
     return Identified(
         experiment=experiment.name,
@@ -172,10 +167,28 @@ def identify(
         normality_p=float(stats.normaltest(_whitened(residual, independent)).pvalue),
         independent=independent,
         robust=robust,
-        runs=runs,
+        runs=_runs(experiment, everywhere, np.asarray(everything.noise), correlated, covariance),
         suggestions=ideas,
         provenance=_provenance(command, seed, starts, clock.monotonic() - began, kept),
     )
+
+
+def _in_full(
+    everything: Problem, problem: Problem, values: np.ndarray, own: Mapping[str, float] = MappingProxyType({})
+) -> np.ndarray:
+    """Parameters of the problem of every run from those of the fit runs'; held-out runs' own at their start, or `own`."""
+    start = dict(zip(everything.names, everything.start_values()[:-1].tolist(), strict=True))
+    known = {**start, **dict(zip(problem.names, values[:-1].tolist(), strict=True)), **own}
+    return np.asarray([*(known[name] for name in everything.names), 0.0])
+
+
+def _of_fit_runs(everywhere: Sensitivity, experiment: Experiment, problem: Problem) -> Sensitivity:
+    """One program serves the fit and the pictures: that of every run. What the fit is told is its own runs'."""
+    count = len(experiment.outputs)
+    series = [
+        number * count + k for number, run in enumerate(experiment.runs) if run.role == "fit" for k in range(count)
+    ]
+    return everywhere.of_series(series, problem.batch.output.shape[1])
 
 
 def _size(misfit: np.ndarray, robust: bool) -> float:
@@ -203,58 +216,46 @@ def _outputs(
     return tuple(found)
 
 
-def _with_held_out(
+def _own_of_held_out(
     experiment: Experiment,
     problem: Problem,
     values: np.ndarray,
     bounds: Mapping[str, tuple[float, float]],
     kept: Kept,
     progress: Progress,
-) -> tuple[Problem, np.ndarray, dict[str, float]]:
-    """(the problem of every run, its parameters, what is the held-out runs' own).
-
-    No other run tells what is a run's own: as its offset is, it is found from the held-out run, all else held.
-    """
-
-    def noise_of(one: Problem) -> Problem:
-        return eqx.tree_at(lambda tree: tree.noise_sigma, one, problem.noise_sigma)
-
-    everything = noise_of(declared_problem(experiment, experiment.runs))
-    known = dict(zip(problem.names, values[:-1], strict=True))
-    outside = [run for run in experiment.runs if run.role != "fit"]
-    own: dict[str, float] = {}
-    if outside and problem.own.names:
-        held_out = noise_of(declared_problem(experiment, outside))
-        start = held_out.start_values()
-        start[: len(held_out.shared)] = values[: len(held_out.shared)]
-        free = held_out.own.in_full
-        boxes = {name: bounds[f"{name.split('[')[0]}[{problem.own.runs[0]}]"] for name in free}
-        lane = held_out.lane(free, boxes, start, len(free))
-        found = fit_in_box(held_out, [lane], kept=kept, progress=progress, what="what is the held-out runs' own")[0]
-        own = {name: float(found.values[held_out.names.index(name)]) for name in free}
-    known |= own
-    return everything, np.asarray([*(known[name] for name in everything.names), 0.0]), own
+) -> dict[str, float]:
+    """What is the held-out runs' own: no other run tells it, so, as an offset is, it is found from them, all else held."""
+    runs = [run for run in experiment.runs if run.role != "fit"]
+    if not runs or not problem.own.names:
+        return {}
+    held_out = eqx.tree_at(lambda one: one.noise_sigma, declared_problem(experiment, runs), problem.noise_sigma)
+    start = held_out.start_values()
+    start[: len(held_out.shared)] = values[: len(held_out.shared)]
+    free = held_out.own.in_full
+    boxes = {name: bounds[f"{name.split('[')[0]}[{problem.own.runs[0]}]"] for name in free}
+    lane = held_out.lane(free, boxes, start, len(free))
+    found = fit_in_box(held_out, [lane], kept=kept, progress=progress, what="what is the held-out runs' own")[0]
+    return {name: float(found.values[held_out.names.index(name)]) for name in free}
 
 
 def _runs(
-    experiment: Experiment, problem: Problem, values: np.ndarray, names: Sequence[str], covariance: np.ndarray
+    experiment: Experiment, at: Sensitivity, noise: np.ndarray, names: Sequence[str], covariance: np.ndarray
 ) -> tuple[IdentifiedRun, ...]:
-    """Every run, held-out ones included, at the parameters `values` of the problem of all."""
-    reading = np.asarray(_shown(problem, jnp.asarray(values)))
-    moved = sensitivity(problem, values, names).jacobian * np.asarray(problem.noise)[..., None] if names else None
+    """Every run, held-out ones included, at the fit."""
+    assert at.shown is not None
+    picked = [at.names.index(name) for name in names]
     count = len(experiment.outputs)
     found = []
     for number, run in enumerate(experiment.runs):
         n = len(run.time)
         series = []
         for k, (output, measured) in enumerate(zip(experiment.outputs, run.outputs.values(), strict=True)):
-            own, there = reading[number * count + k, :n], np.isfinite(measured)
+            row = number * count + k
+            own, there = at.shown[row, :n], np.isfinite(measured)
             if output.offset and there.any():
                 own = own + float(np.mean(measured[there] - own[there]))
-            spread = np.zeros(n)
-            if moved is not None:
-                here = moved[number * count + k, :n]
-                spread = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", here, covariance, here), 0.0))
+            moved = at.jacobian[row, :n][:, picked] * noise[row]
+            spread = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", moved, covariance, moved), 0.0))
             rmse = float(np.sqrt(np.mean((measured[there] - own[there]) ** 2))) if there.any() else np.nan
             series.append(IdentifiedSeries(output.name, measured, own, spread, rmse))
         found.append(IdentifiedRun(run.name, run.role, run.time, run.inputs, tuple(series)))

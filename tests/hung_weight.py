@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -64,7 +64,7 @@ PULSED = HungRun("pulsed", ((2.0, 7.6), (3.5, 3.0), (5.5, 7.0), (SECONDS, 2.0)),
 STAIRS = HungRun("stairs", ((2.0, 5.0), (4.5, 7.0), (SECONDS, 4.0)), 0.15, "held-out")
 
 
-@lru_cache(maxsize=None)
+@cache
 def exact(run: HungRun) -> dict[str, np.ndarray]:
     """What ideal sensors show."""
     time = STEP * np.arange(round(SECONDS / STEP) + 1)

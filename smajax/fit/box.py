@@ -28,6 +28,9 @@ DAMPED = 1e-2  # share of the squared columns that damping begins with
 HOPELESS = 1e10  # damping at which no step is a better one
 AT_MOST = 0.7  # of the way to a bound
 NEAR = 1e-3  # of the box: from here on the bound itself may be reached
+WIDE = 24  # lanes at once from which on a second, narrower program is worth its compilation
+NARROWER = 6  # a batch as narrow by this takes a third of the time
+STRAGGLERS = 3  # narrow batches at most
 BLIND = 1e-14  # of the largest squared column: a parameter that nothing depends on
 
 
@@ -119,6 +122,17 @@ def _judged(walk: _Walk, step: np.ndarray, cost: float, slope: np.ndarray, squar
             walk.reason = "it has converged, no step lowers the cost any more"
 
 
+def _cut(lanes: int, at_once: int) -> list[tuple[int, int]]:
+    """(first lane, width) of each batch. A few stragglers do not pay for a wide batch that is filled up."""
+    narrow = max(at_once // NARROWER, 1)
+    widths, start = [], 0
+    while start < lanes:
+        few = at_once >= WIDE and lanes - start <= STRAGGLERS * narrow
+        widths.append((start, narrow if few else at_once))
+        start += widths[-1][1]
+    return widths
+
+
 def _packed(walks: Sequence[_Walk], rounds: int) -> dict[str, np.ndarray]:
     """Where all fits are, as arrays."""
     fields = {field.name: np.asarray([getattr(walk, field.name) for walk in walks]) for field in fields_of(_Walk)}
@@ -147,7 +161,8 @@ def fit_in_box(
     With `kept`, where every fit is is written as it goes, and the same call goes on from there to the same end.
 
     `outputs`, (lanes, R, N): measured outputs of each lane's own, as in repeated experiments. Lanes that are not ended
-    go `at_once` at a time, so one compilation serves any number of them, and none waits for another.
+    go `at_once` at a time, so one compilation serves any number of them, and none waits for another; the last ones of
+    many go fewer at a time, by a second compilation.
     """
 
     def place_of(lane: Lane) -> np.ndarray:
@@ -156,11 +171,11 @@ def fit_in_box(
 
     def evaluated(some: Sequence[int], places: Sequence[np.ndarray]) -> list[tuple[float, np.ndarray, np.ndarray]]:
         found: list[tuple[float, np.ndarray, np.ndarray]] = []
-        for start in range(0, len(some), at_once):
-            part = list(some[start : start + at_once])
-            filled = part + [part[0]] * (at_once - len(part))
-            at = list(places[start : start + at_once])
-            at += [at[0]] * (at_once - len(part))
+        for start, width in _cut(len(some), at_once):
+            part = list(some[start : start + width])
+            filled = part + [part[0]] * (width - len(part))
+            at = list(places[start : start + width])
+            at += [at[0]] * (width - len(part))
             batch = jax.tree.map(lambda *leaves: jnp.stack(leaves), *(lanes[lane] for lane in filled))
             own = None if outputs is None else jnp.asarray(outputs[np.asarray(filled)])
             answers = [np.asarray(each) for each in _normal_equations(problem, batch, jnp.asarray(np.stack(at)), own)]

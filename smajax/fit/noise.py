@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Sequence
 
 import equinox as eqx
@@ -55,5 +56,6 @@ def fit_with_noise(
         if float(np.abs(sigmas / before - 1.0).max()) < SETTLED:
             break
         problem = eqx.tree_at(lambda one: one.noise_sigma, problem, jnp.asarray(sigmas))
-        found = fit(problem, found.values)
+        new = fit(problem, found.values)
+        found = dataclasses.replace(new, steps=new.steps + found.steps)
     return problem, found

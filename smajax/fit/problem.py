@@ -127,12 +127,16 @@ class Problem(eqx.Module):
         return shown_batch(self.system_at(values), self.batch, self.own.names, self.own_at(values))
 
     def misfit(self, values: Float[Array, " parameter"]) -> Float[Array, "series time"]:
-        """Measured minus simulated, each run's best offset taken off where the experiment declares one; 0 in padding.
+        """Measured minus simulated, each run's best offset taken off where the experiment declares one; 0 in padding."""
+        return self.misfit_of(self.shown(values))
+
+    def misfit_of(self, shown: Float[Array, "series time"]) -> Float[Array, "series time"]:
+        """`misfit` of what the sensors show.
 
         The offset enters linearly, so its best value for any model is the mean misfit: it needs no slot.
         """
         batch = self.batch
-        raw = batch.output - self.shown(values)
+        raw = batch.output - shown
         if any(self.offset):
             # The mask may hold square roots of weights between 0 and 1 (`fit.robust`).
             weight = batch.mask**2

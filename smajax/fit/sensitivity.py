@@ -17,7 +17,8 @@ from smajax.fit.problem import Problem
 class Sensitivity:
     """At one point: the misfit (series, N) and its derivative by each of `names` (series, N, A), both over the noise.
 
-    priors: the derivative of the priors' residuals (K, A); None where nothing is known before the runs.
+    priors: the derivative of the priors' residuals (K, A); None where nothing is known before the runs. shown: what the
+    sensors show there (series, N), SI, without offsets.
     """
 
     names: tuple[str, ...]
@@ -25,6 +26,7 @@ class Sensitivity:
     jacobian: np.ndarray
     mask: np.ndarray  # (series, N)
     priors: np.ndarray | None = None
+    shown: np.ndarray | None = None
 
     def columns(self, names: Sequence[str]) -> np.ndarray:
         """Jacobian columns of `names` on the measured samples, shape (samples, len(names))."""
@@ -37,6 +39,13 @@ class Sensitivity:
         picked = self.priors[:, self._index(names)]
         return picked[np.any(picked != 0.0, axis=1)]
 
+    def of_series(self, series: Sequence[int], samples: int) -> Sensitivity:
+        """The same of some series only, their first `samples`."""
+        rows = np.asarray(series, dtype=int)
+        misfit, jacobian, mask = (part[rows, :samples] for part in (self.misfit, self.jacobian, self.mask))
+        shown = None if self.shown is None else self.shown[rows, :samples]
+        return Sensitivity(self.names, misfit, jacobian, mask, self.priors, shown)
+
     def _index(self, names: Sequence[str]) -> list[int]:
         return [self.names.index(name) for name in names]
 
@@ -46,20 +55,21 @@ class Sensitivity:
 
 
 @eqx.filter_jit
-def _evaluate(problem: Problem, values: jax.Array, slots: jax.Array) -> tuple[jax.Array, jax.Array, jax.Array]:
-    def at(chosen: jax.Array) -> tuple[tuple[jax.Array, jax.Array], jax.Array]:
+def _evaluate(problem: Problem, values: jax.Array, slots: jax.Array) -> tuple[jax.Array, ...]:
+    def at(chosen: jax.Array) -> tuple[tuple[jax.Array, jax.Array], tuple[jax.Array, jax.Array]]:
         here = values.at[slots].set(chosen)
-        misfit = problem.misfit(here) / problem.noise
-        return (misfit, problem.priors.rows(here)), misfit
+        shown = problem.shown(here)
+        misfit = problem.misfit_of(shown) / problem.noise
+        return (misfit, problem.priors.rows(here)), (misfit, shown)
 
-    (jacobian, priors), misfit = jax.jacfwd(at, has_aux=True)(values[slots])
-    return misfit, jacobian, priors
+    (jacobian, priors), (misfit, shown) = jax.jacfwd(at, has_aux=True)(values[slots])
+    return misfit, jacobian, priors, shown
 
 
 def sensitivity(problem: Problem, values: np.ndarray, names: Sequence[str]) -> Sensitivity:
     """Misfit and Jacobian at `values` (P + 1,), by `names`. One forward-mode pass over all runs."""
     slots = jnp.asarray([problem.names.index(name) for name in names], dtype=int)
     found = (np.asarray(part) for part in _evaluate(problem, jnp.asarray(values), slots))
-    misfit, jacobian, priors = found
+    misfit, jacobian, priors, shown = found
     mask = np.asarray(problem.batch.mask)
-    return Sensitivity(tuple(names), misfit, jacobian, mask, priors if len(priors) else None)
+    return Sensitivity(tuple(names), misfit, jacobian, mask, priors if len(priors) else None, shown)
