@@ -124,6 +124,9 @@ def identify_command(
     profile: Annotated[str, typer.Option(help="parameters to draw a profile of, with commas, or `all`")] = "",
     robust: Annotated[bool, typer.Option("--robust", help="Huber's loss: samples far off count less")] = False,
     design: Annotated[bool, typer.Option("--design", help="say which run to do next")] = False,
+    posterior: Annotated[
+        int, typer.Option(min=0, help="draws of each of 8 Markov chains, 1000 or so; needs the extra `bayes`")
+    ] = 0,
     json_out: Annotated[bool, typer.Option("--json", help="print identify.json on stdout instead of words")] = False,
     open_page: Annotated[bool, typer.Option("--open", help="open the page in a browser")] = False,
 ) -> None:
@@ -142,7 +145,9 @@ def identify_command(
     from smajax.experiment.load import load_experiment
     from smajax.identify import identify
     from smajax.progress import shown
-    from smajax.report.identify_page import conclusions, estimate_rows, record, write_identified
+    from smajax.report.identify_page import write_identified
+    from smajax.report.identify_record import record
+    from smajax.report.identify_words import conclusions, estimate_rows, posterior_rows
 
     _folder(out)
     loaded = load_experiment(experiment, CATALOGUE)
@@ -150,6 +155,7 @@ def identify_command(
     profiled = unknowns if profile == "all" else [part.strip() for part in profile.split(",") if part.strip()]
     command = f"smajax identify {shlex.quote(str(experiment))} --out {shlex.quote(str(out))} --starts {starts}"
     command += f" --profile {','.join(profiled)}" * bool(profiled) + " --robust" * robust + " --design" * design
+    command += f" --posterior {posterior}" * bool(posterior)
     try:
         with _resumable("Fits are kept as they go: the same command goes on from there."), shown(console()) as progress:
             found = identify(
@@ -158,6 +164,7 @@ def identify_command(
                 profiled=profiled,
                 robust=robust,
                 design=design,
+                draws=posterior,
                 memory=out / "fits",
                 progress=progress,
                 command=command,
@@ -173,6 +180,10 @@ def identify_command(
             typer.echo(f"  {sentence}")
         for row in estimate_rows(found):
             typer.echo(f"  {row[0]:<28} {row[1]} {row[2]}" + (f"  ({row[-1]})" if row[-1] else ""))
+        for row in posterior_rows(found):
+            typer.echo(
+                f"  posterior: {row[0]:<17} {row[1]} {row[2]}, 95 % {row[3]}, R-hat {row[4]}, {row[5]} independent"
+            )
         for one in found.suggestions[:1]:
             typer.echo(f"  Next run: {one.what}")
         typer.echo(f"Report: {page.resolve()}")

@@ -9,6 +9,7 @@ import numpy as np
 from smajax.design import Suggestion
 from smajax.experiment.record import Prior
 from smajax.fit.directions import Direction
+from smajax.fit.posterior import Posterior
 from smajax.fit.profile import Profile
 
 
@@ -84,6 +85,7 @@ class Identified:
     all_took_part: bool  # whether no parameter is left out of `weak`: held by a bound, or without any effect
     directions: tuple[Direction, ...]
     profiles: tuple[Profile, ...]
+    posterior: Posterior | None
     start_costs: tuple[float, ...]  # mean square over the noise's, of every fit carried to its end
     ratio: float  # rms of the fit runs' residual over the noise
     whiteness_p: float

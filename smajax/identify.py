@@ -6,6 +6,7 @@ import time as clock
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -19,6 +20,7 @@ from smajax.fit.box import Fit, fit_in_box
 from smajax.fit.directions import directions, weak_ones
 from smajax.fit.kept import Kept
 from smajax.fit.noise import fit_with_noise
+from smajax.fit.posterior import library, posterior
 from smajax.fit.problem import Problem
 from smajax.fit.profile import ALIKE, profiles
 from smajax.fit.progress import Progress, quiet
@@ -56,6 +58,7 @@ def identify(
     profiled: Sequence[str] = (),
     robust: bool = False,
     design: bool = False,
+    draws: int = 0,
     memory: Path | None = None,
     progress: Progress = quiet,
     command: str = "",
@@ -64,7 +67,8 @@ def identify(
     """Fit the experiment's unknowns to its fit runs and say how well each is known; held-out runs are only simulated.
 
     `starts`: points of the box that the fit may start from, beside the declared one. `profiled`: parameters to draw a
-    profile likelihood of. `robust`: Huber's loss. `design`: rank runs that could be done next. `memory`: a folder for
+    profile likelihood of. `robust`: Huber's loss. `design`: rank runs that could be done next. `draws`: of the
+    posterior, of each chain (extra `bayes`). `memory`: a folder for
     fits, finished or not: an identification that was interrupted goes on from there, to the same result. Raises
     ValueError when there is nothing to fit, for a profile of what is not fitted, and in float32.
     """
@@ -80,6 +84,10 @@ def identify(
         raise ValueError("a profile is that of least squares: ask for it without Huber's loss.")
     if odd:
         raise ValueError(f"no profile of {odd}, which are not fitted; fitted are {', '.join(names)}.")
+    if draws:
+        if robust:
+            raise ValueError("a posterior is that of normal noise: ask for it without Huber's loss.")
+        library()  # before the work, not after it
     began = clock.monotonic()
     kept = Kept(memory)
     problem, everything = declared_problem(experiment, fit_runs), declared_problem(experiment, experiment.runs)
@@ -133,6 +141,10 @@ def identify(
     seen = [name for k, name in enumerate(names) if told[:, k].any() and not held(values[name], *bounds[name], EDGE)]
     weak = directions(at, seen, values, inflation) if seen else ()
     drawn = profiles(weighted, profiled, names, bounds, best, known.standard_error, inflation, progress, kept)
+    drawn_from = None
+    if draws and correlated:
+        chains: dict[str, Any] = {"seed": seed, "kept": kept, "progress": progress}
+        drawn_from = posterior(problem, best.values, correlated, covariance, bounds, inflation, draws, **chains)
     ideas = suggestions(weighted, best.values, correlated, fit_runs, inflation) if design else ()
     return Identified(
         experiment=experiment.name,
@@ -161,6 +173,7 @@ def identify(
         all_took_part=len(seen) == len(names),
         directions=weak,
         profiles=drawn,
+        posterior=drawn_from,
         start_costs=tuple(one.cost / float(problem.batch.mask.sum()) for one in fits),
         ratio=ratio,
         whiteness_p=white,

@@ -25,7 +25,9 @@ from smajax.identified import Identified
 from smajax.identify import identify
 from smajax.parameters import set_parameters
 from smajax.presets import build
-from smajax.report.identify_page import conclusions, page, record, write_identified
+from smajax.report.identify_page import page, write_identified
+from smajax.report.identify_record import record
+from smajax.report.identify_words import conclusions
 from smajax.simulate import simulate
 
 TRUTH = {"austenite_start": 70.0, "austenite_finish": 82.0, "martensite_start": 55.0, "recoverable_strain": 0.044}

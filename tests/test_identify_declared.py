@@ -22,7 +22,9 @@ from smajax.identified import Estimate, Identified
 from smajax.identify import identify
 from smajax.parameters import set_parameters
 from smajax.presets import build
-from smajax.report.identify_page import conclusions, page, record
+from smajax.report.identify_page import page
+from smajax.report.identify_record import record
+from smajax.report.identify_words import conclusions
 from smajax.sensors import shown_by
 from smajax.simulate import simulate
 from tests import hung_weight
@@ -59,12 +61,12 @@ BOX = {
 }
 
 
-def _unknown(**more: str) -> str:
+def unknown_section(**more: str) -> str:
     """A section [unknown] with `more` at the end of each table."""
     return "[unknown]\n" + "".join(f"{name} = {{ {box}{more.get(name, '')} }}\n" for name, box in BOX.items())
 
 
-def _written(
+def coupon_file(
     folder: Path,
     more: str,
     *,
@@ -111,7 +113,7 @@ def _loaded(path: Path) -> Experiment:
 def _found(
     folder: Path, more: str, progress: Progress = quiet, memory: Path | None = None, **data: object
 ) -> Identified:
-    path = _written(folder, more, **data)  # type: ignore[arg-type]
+    path = coupon_file(folder, more, **data)  # type: ignore[arg-type]
     return identify(_loaded(path), starts=0, progress=progress, memory=memory)
 
 
@@ -127,8 +129,8 @@ def _error(found: Identified, name: str) -> float:
 
 def test_a_second_sensor_tells_more_and_the_noise_of_each_is_found(tmp_path: Path) -> None:
     estimate = 'noise = "estimate"\n'
-    alone = _found(tmp_path, _unknown() + STRAIN + estimate)
-    both = _found(tmp_path, _unknown() + STRAIN + estimate + OHMS + estimate)
+    alone = _found(tmp_path, unknown_section() + STRAIN + estimate)
+    both = _found(tmp_path, unknown_section() + STRAIN + estimate + OHMS + estimate)
     assert len(both.outputs) == 2
     for output in both.outputs:
         assert output.noise_sigma == pytest.approx(NOISE[output.name], rel=0.1)
@@ -151,8 +153,8 @@ def test_a_second_sensor_tells_more_and_the_noise_of_each_is_found(tmp_path: Pat
 
 def test_a_sensor_counts_by_its_noise(tmp_path: Path) -> None:
     """Resistance whose noise is declared a hundred times too large tells nothing beside the strain."""
-    alone = _found(tmp_path, _unknown() + STRAIN + KNOWN)
-    both = _found(tmp_path, _unknown() + STRAIN + KNOWN + OHMS + 'noise = "2 ohm"\n')
+    alone = _found(tmp_path, unknown_section() + STRAIN + KNOWN)
+    both = _found(tmp_path, unknown_section() + STRAIN + KNOWN + OHMS + 'noise = "2 ohm"\n')
     for name in TRUTH:
         assert abs(_by_name(both)[name].value - _by_name(alone)[name].value) < 0.1 * _error(alone, name)
     assert "The noise of resistance is not what was declared" in " ".join(conclusions(both))
@@ -160,7 +162,7 @@ def test_a_sensor_counts_by_its_noise(tmp_path: Path) -> None:
 
 def test_missing_samples_are_left_out(tmp_path: Path) -> None:
     skip = STRAIN + KNOWN + 'missing = "skip"\n'
-    found = _found(tmp_path, _unknown() + skip + OHMS + 'noise = "0.01 ohm"\n', lost=0.3)
+    found = _found(tmp_path, unknown_section() + skip + OHMS + 'noise = "0.01 ohm"\n', lost=0.3)
     loaded = _loaded(tmp_path / "experiment.toml")
     for run, one in zip(loaded.runs, found.runs, strict=True):
         measured = np.isfinite(run.outputs["strain"])
@@ -179,11 +181,11 @@ def test_missing_samples_are_left_out(tmp_path: Path) -> None:
 
 def test_a_prior_pulls_by_what_it_knows(tmp_path: Path) -> None:
     """Bayes's rule for normal distributions: means weighed by one over the variance, and the variances' sum of inverses."""
-    plain = _found(tmp_path, _unknown() + STRAIN + KNOWN)
+    plain = _found(tmp_path, unknown_section() + STRAIN + KNOWN)
     value, error = _by_name(plain)["recoverable_strain"].value, _error(plain, "recoverable_strain")
     mean, sigma = value + 6.0 * error, 2.0 * error
     known = f', prior = {{ mean = "{mean!r} 1", sigma = "{sigma!r} 1" }}'
-    found = _found(tmp_path, _unknown(recoverable_strain=known) + STRAIN + KNOWN)
+    found = _found(tmp_path, unknown_section(recoverable_strain=known) + STRAIN + KNOWN)
     pulled = _by_name(found)["recoverable_strain"]
     expected = (value / error**2 + mean / sigma**2) / (1.0 / error**2 + 1.0 / sigma**2)
     assert pulled.value - value == pytest.approx(expected - value, rel=0.05)
@@ -192,14 +194,14 @@ def test_a_prior_pulls_by_what_it_knows(tmp_path: Path) -> None:
     assert record(found)["parameters"]["recoverable_strain"]["prior"]["mean"] == mean
     # The same on the logarithm: narrow, so nearly the same pull.
     known = f', prior = {{ mean = "{mean!r} 1", log_sigma = {sigma / mean!r} }}'
-    logarithmic = _found(tmp_path, _unknown(recoverable_strain=known) + STRAIN + KNOWN)
+    logarithmic = _found(tmp_path, unknown_section(recoverable_strain=known) + STRAIN + KNOWN)
     assert _by_name(logarithmic)["recoverable_strain"].value - value == pytest.approx(expected - value, rel=0.05)
 
 
 def test_what_no_run_shows_is_known_from_its_prior(tmp_path: Path) -> None:
     box = 'convection_coefficient = { low = "50 W/m^2/K", high = "400 W/m^2/K", start = "80 W/m^2/K", '
     silent = box + 'prior = { mean = "120 W/m^2/K", log_sigma = 0.2 } }\n'
-    found = _by_name(_found(tmp_path, _unknown() + silent + STRAIN + KNOWN))["convection_coefficient"]
+    found = _by_name(_found(tmp_path, unknown_section() + silent + STRAIN + KNOWN))["convection_coefficient"]
     assert found.value == pytest.approx(120.0, rel=1e-3)
     assert found.standard_error == pytest.approx(24.0, rel=0.02)
     assert "prior" in found.remark
@@ -208,7 +210,7 @@ def test_what_no_run_shows_is_known_from_its_prior(tmp_path: Path) -> None:
 def test_a_value_of_each_run_and_one_that_is_held(tmp_path: Path) -> None:
     own = {"a": {"start_fraction": 0.8}, "b": {"start_fraction": 0.55}, "c": {"start_fraction": 0.7}}
     start = '[nuisance]\ninitial_martensite_fraction = { low = "0.1", high = "1", start = "0.9" }\n'
-    held = _unknown(austenite_start=", fixed = true").replace('"60 degC"', '"70 degC"')
+    held = unknown_section(austenite_start=", fixed = true").replace('"60 degC"', '"70 degC"')
     found = _found(tmp_path, held + start + BOTH, own=own)
     estimates = _by_name(found)
     assert set(estimates) == {"recoverable_strain", *(f"initial_martensite_fraction[{run}]" for run in "ab")}
@@ -220,7 +222,7 @@ def test_a_value_of_each_run_and_one_that_is_held(tmp_path: Path) -> None:
     # A held-out run's own is found from itself, and said; nothing else is.
     assert found.own_of_held_out["initial_martensite_fraction[c]"] == pytest.approx(0.7, abs=0.02)
     assert "found for the held-out runs from themselves" in page(found)
-    per_run = _unknown(austenite_start=", per_run = true")
+    per_run = unknown_section(austenite_start=", per_run = true")
     apart = {"a": {"austenite_start": 70.0}, "b": {"austenite_start": 64.0}, "c": {"austenite_start": 66.0}}
     estimates = _by_name(_found(tmp_path, per_run + BOTH, own=apart))
     for run in "ab":
@@ -234,7 +236,7 @@ class Stopped(Exception):
 
 
 def test_a_killed_identification_goes_on_to_the_same_end(tmp_path: Path) -> None:
-    path = _written(tmp_path, _unknown() + BOTH)
+    path = coupon_file(tmp_path, unknown_section() + BOTH)
     experiment = _loaded(path)
     seen: list[str] = []
 
@@ -260,21 +262,23 @@ def test_a_killed_identification_goes_on_to_the_same_end(tmp_path: Path) -> None
     assert numbers(resumed) == numbers(undisturbed)
     assert "stages taken from an earlier run of the same" in resumed.provenance
     # Other data are other work.
-    other = identify(_loaded(_written(tmp_path, _unknown() + BOTH, seed=6)), starts=4, memory=tmp_path / "fits")
+    other = identify(
+        _loaded(coupon_file(tmp_path, unknown_section() + BOTH, seed=6)), starts=4, memory=tmp_path / "fits"
+    )
     assert "stages taken from an earlier run of the same" not in other.provenance
 
 
 @pytest.mark.parametrize(
     ("more", "words"),
     [
-        (_unknown() + BOTH, r"channels: close-loop fits one output and got 2 \(also resistance\)"),
-        (_unknown() + OHMS, r"channels.resistance: close-loop fits the load's own sensor, 'strain'"),
+        (unknown_section() + BOTH, r"channels: close-loop fits one output and got 2 \(also resistance\)"),
+        (unknown_section() + OHMS, r"channels.resistance: close-loop fits the load's own sensor, 'strain'"),
         (
-            _unknown(austenite_start=", per_run = true") + STRAIN,
+            unknown_section(austenite_start=", per_run = true") + STRAIN,
             r"unknown.austenite_start: close-loop knows no value of",
         ),
         (
-            _unknown(austenite_start=', prior = { mean = "70 degC", sigma = "1 K" }') + STRAIN,
+            unknown_section(austenite_start=', prior = { mean = "70 degC", sigma = "1 K" }') + STRAIN,
             r"unknown.austenite_start.prior: close-loop takes no prior; `smajax identify` does",
         ),
     ],
@@ -282,7 +286,7 @@ def test_a_killed_identification_goes_on_to_the_same_end(tmp_path: Path) -> None
 def test_what_close_loop_would_pass_over_it_refuses(tmp_path: Path, more: str, words: str) -> None:
     noise = "" if "noise" in more else 'noise = "estimate"\n'
     with pytest.raises(ExperimentError, match=words):
-        close_loop(_loaded(_written(tmp_path, more + noise)), memory=tmp_path / "fits")
+        close_loop(_loaded(coupon_file(tmp_path, more + noise)), memory=tmp_path / "fits")
 
 
 def test_sensors_and_starts_are_those_of_scipys_integration(tmp_path: Path) -> None:

@@ -10,21 +10,23 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from dataclasses import fields as fields_of
+from functools import partial
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.sharding import Mesh, PartitionSpec
 from scipy.optimize import lsq_linear
 
 from smajax.fit.kept import Kept
 from smajax.fit.problem import Lane, Problem
 from smajax.fit.progress import Progress, quiet
 
-MOST_STEPS = 80
-ENOUGH = 1e-6  # of the cost: what a step that is the last one may still lower it by, and promise to
+MOST_STEPS = 120
+ENOUGH = 1e-8  # of the cost: what a step that is the last one may still lower it by, and promise to; scipy's too
 STILL = 1e-12  # of the box
-DAMPED = 1e-2  # share of the squared columns that damping begins with
+DAMPED = 1e-1  # share of the squared columns that damping begins with
 HOPELESS = 1e10  # damping at which no step is a better one
 AT_MOST = 0.7  # of the way to a bound
 NEAR = 1e-3  # of the box: from here on the bound itself may be reached
@@ -64,10 +66,12 @@ class _Walk:
 def _normal_equations(
     problem: Problem, lanes: Lane, places: jax.Array, outputs: jax.Array | None
 ) -> tuple[jax.Array, jax.Array, jax.Array]:
-    """(r^T r, J^T r, J^T J) of every lane at its place, by shares of its box."""
+    """(r^T r, J^T r, J^T J) of every lane at its place, by shares of its box; each local device takes its share of lanes."""
 
-    def one(lane: Lane, place: jax.Array, output: jax.Array | None) -> tuple[jax.Array, jax.Array, jax.Array]:
-        here = problem.with_output(output)
+    def one(
+        known: Problem, lane: Lane, place: jax.Array, output: jax.Array | None
+    ) -> tuple[jax.Array, jax.Array, jax.Array]:
+        here = known.with_output(output)
 
         def residual(place: jax.Array) -> tuple[jax.Array, jax.Array]:
             values = lane.values.at[lane.slots].set(lane.low + place * (lane.high - lane.low))
@@ -77,7 +81,18 @@ def _normal_equations(
         jacobian, value = jax.jacfwd(residual, has_aux=True)(place)
         return value @ value, value @ jacobian, jacobian.T @ jacobian
 
-    return eqx.filter_vmap(one)(lanes, places, outputs)
+    def every(known: Problem, some: tuple[Lane, jax.Array, jax.Array | None]) -> tuple[jax.Array, jax.Array, jax.Array]:
+        return eqx.filter_vmap(partial(one, known))(*some)
+
+    devices = np.asarray(jax.local_devices())
+    if len(devices) == 1 or len(places) % len(devices):
+        return every(problem, (lanes, places, outputs))
+    over = PartitionSpec("lane")
+    # Not by the compiler's own partitioning: the devices would wait for each other in every iteration of every step.
+    spread = jax.shard_map(
+        every, mesh=Mesh(devices, ("lane",)), in_specs=(PartitionSpec(), over), out_specs=over, check_vma=False
+    )
+    return spread(problem, (lanes, places, outputs))
 
 
 def _step(walk: _Walk) -> np.ndarray:
@@ -114,7 +129,7 @@ def _judged(walk: _Walk, step: np.ndarray, cost: float, slope: np.ndarray, squar
         walk.damping *= max(0.1, 1.0 - (2.0 * min(share, 1.0) - 1.0) ** 3)
         walk.growth = 2.0
         if small and gained < ENOUGH * walk.cost:
-            walk.reason = "it has converged, no step lowers the cost by more than a millionth"
+            walk.reason = "it has converged, no step lowers the cost by more than 1e-8 of it"
     else:
         walk.damping *= walk.growth
         walk.growth *= 2.0

@@ -83,6 +83,34 @@ def profile_curves(found: Identified) -> bytes | None:
     return as_png(figure)
 
 
+def posterior_histograms(found: Identified) -> bytes | None:
+    """Each parameter's draws beside the Gaussian of its standard error."""
+    drawn = found.posterior
+    if drawn is None:
+        return None
+    columns = min(3, len(drawn.names))
+    rows = -(-len(drawn.names) // columns)
+    figure = new_figure(2.2 * rows + 0.5, width=2.4 * columns + 0.6)
+    panels = figure.subplots(rows, columns, squeeze=False).ravel()
+    estimates = {one.name: one for one in found.estimates}
+    for axes, name, draws in zip(panels, drawn.names, drawn.flat.T, strict=False):
+        estimate = estimates[name]
+        unit = display(estimate.unit, name)
+        axes.hist(unit.of(draws), bins=40, density=True, color=AFTER, alpha=0.55)
+        if estimate.standard_error:
+            error = unit.of(estimate.standard_error)
+            left, right = axes.get_xlim()
+            fine = np.linspace(left, right, 200)
+            height = np.exp(-0.5 * ((fine - unit.of(estimate.value)) / error) ** 2) / (error * np.sqrt(2.0 * np.pi))
+            axes.plot(fine, height, color=QUIET, linewidth=1.1)
+        axes.set_xlabel(axis_label(name, unit), fontsize=8)
+        axes.set_yticks([])
+        tidy(axes)
+    for axes in panels[len(drawn.names) :]:
+        axes.set_visible(False)
+    return as_png(figure)
+
+
 def suggested_inputs(found: Identified) -> bytes | None:
     """The inputs of the suggested runs, best first."""
     if not found.suggestions:

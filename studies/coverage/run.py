@@ -116,6 +116,7 @@ def study(fast: bool) -> dict[str, Any]:
             name: float(spread[:, k].mean() / abs(here.truth[name])) for k, name in enumerate(here.names)
         },
         "seconds_a_fit": each,
+        "devices": jax.local_device_count(),
         "scipy": {
             "fits": peers,
             "seconds_a_fit": seconds,
@@ -151,7 +152,7 @@ def page(found: dict[str, Any]) -> str:
             "|---|---|---|---|---|---|",
             *rows,
             "",
-            f"A fit takes {found['seconds_a_fit']:.2f} s in the batch of all. scipy's `least_squares` with differences on the same "
+            f"A fit takes {found['seconds_a_fit']:.2f} s in the batch of all, which goes over all {found['devices']} cores. scipy's `least_squares` with differences on the same "
             f"compiled simulator takes {scipy['seconds_a_fit']:.1f} s, {scipy['ratio']:.1f} times as long ({scipy['fits']} fits), and "
             f"ends at {worst[1]:.4f} to {worst[0]:.4f} times the cost. Noise with a memory, profiles and Huber's loss are not in here.",
             "",
