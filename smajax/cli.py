@@ -178,11 +178,14 @@ def identify_command(
         typer.echo(f"\n{found.title or found.experiment}")
         for sentence in [*conclusions(found), *found.weak]:
             typer.echo(f"  {sentence}")
-        for row in estimate_rows(found):
-            typer.echo(f"  {row[0]:<28} {row[1]} {row[2]}" + (f"  ({row[-1]})" if row[-1] else ""))
+        rows = estimate_rows(found)
+        wide = max(28, *(len(row[0]) for row in rows))
+        for row in rows:
+            typer.echo(f"  {row[0]:<{wide}} {row[1]} {row[2]}" + (f"  ({row[-1]})" if row[-1] else ""))
         for row in posterior_rows(found):
+            value = f"{row[1]} {row[2]}".strip()
             typer.echo(
-                f"  posterior: {row[0]:<17} {row[1]} {row[2]}, 95 % {row[3]}, R-hat {row[4]}, {row[5]} independent"
+                f"  posterior: {row[0]:<{wide}} {value}, 95 % {row[3]}, R-hat {row[4]}, {row[5]} independent draws"
             )
         for one in found.suggestions[:1]:
             typer.echo(f"  Next run: {one.what}")

@@ -103,6 +103,7 @@ def coupon_file(
     return folder / "experiment.toml"
 
 
+STUDIES = Path(__file__).parents[1] / "studies"
 SIMULATED = eqx.filter_jit(simulate)
 
 
@@ -222,6 +223,9 @@ def test_a_value_of_each_run_and_one_that_is_held(tmp_path: Path) -> None:
     # A held-out run's own is found from itself, and said; nothing else is.
     assert found.own_of_held_out["initial_martensite_fraction[c]"] == pytest.approx(0.7, abs=0.02)
     assert "found for the held-out runs from themselves" in page(found)
+
+
+def test_a_parameter_of_each_run(tmp_path: Path) -> None:
     per_run = unknown_section(austenite_start=", per_run = true")
     apart = {"a": {"austenite_start": 70.0}, "b": {"austenite_start": 64.0}, "c": {"austenite_start": 66.0}}
     estimates = _by_name(_found(tmp_path, per_run + BOTH, own=apart))
@@ -325,3 +329,22 @@ def test_a_hung_weight_with_three_sensors_of_another_codes_making(tmp_path: Path
         assert abs(_by_name(found["all"])[name].value - value) < 4.0 * _error(found["all"], name)
         assert _error(found["all"], name) < 0.8 * _error(found["position"], name)
     assert found["all"].own_of_held_out["initial_temperature[held]"] == pytest.approx(40.0, abs=1.0)
+
+
+@pytest.mark.parametrize(("study", "unknowns"), [("flexinol_isobaric", 16), ("bias_spring_bench", 15)])
+def test_the_kept_files_for_measured_runs_are_whole(measured_data: Path, study: str, unknowns: int) -> None:
+    assert measured_data.is_dir()
+    experiment = _loaded(STUDIES / study / "identify.toml")
+    assert len(experiment.unknowns) == unknowns
+    assert "thermal_expansion" in experiment.declared_effects
+    assert {run.role for run in experiment.runs} == {"fit", "held-out"}
+
+
+@pytest.mark.slow  # a minute
+def test_flexinol_at_constant_stress_is_predicted(measured_data: Path) -> None:
+    """At most 0.06 % strain off at the stress that was held out, and the slopes that every good fit gives."""
+    assert measured_data.is_dir()
+    found = identify(_loaded(STUDIES / "flexinol_isobaric" / "identify.toml"))
+    assert max(run.rmse for run in found.runs if run.role == "held-out") < 6e-4
+    assert 7.9e6 < _by_name(found)["stress_slope_austenite"].value < 8.3e6
+    assert 7.2e6 < _by_name(found)["stress_slope_martensite"].value < 7.6e6

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from smajax.identified import Identified, IdentifiedRun
@@ -26,13 +28,15 @@ def run_with_band(found: Identified, run: IdentifiedRun, k: int = 0) -> bytes:
     shown = display(sensor.unit, sensor.name)
     figure, rows = run_panels(run.time, run.inputs, sensor.name, shown)
     output, residual = rows[:2]
-    output.plot(*extremes(run.time, shown.of(one.measured)), **THICK, label="measured")
+    # A sample whose neighbours are missing is on no line.
+    dots: dict[str, Any] = {"marker": ".", "markersize": 3.0} if np.isnan(one.measured).any() else {}
+    output.plot(*extremes(run.time, shown.of(one.measured)), **THICK, **dots, label="measured")
     output.plot(*extremes(run.time, shown.of(one.simulated)), color=AFTER, linewidth=1.2, label="simulated")
     both = 1.96 * np.hypot(one.spread, sensor.noise_sigma)
     residual.fill_between(
         run.time, shown.of(-both), shown.of(both), color=NOISE, zorder=0, label="95 %: noise and parameters"
     )
-    residual.plot(*extremes(run.time, shown.of(one.measured - one.simulated)), color=AFTER, linewidth=0.9)
+    residual.plot(*extremes(run.time, shown.of(one.measured - one.simulated)), color=AFTER, linewidth=0.9, **dots)
     return panels_done(figure, rows, 3)
 
 
