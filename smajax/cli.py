@@ -156,6 +156,10 @@ def identify_command(
     command = f"smajax identify {shlex.quote(str(experiment))} --out {shlex.quote(str(out))} --starts {starts}"
     command += f" --profile {','.join(profiled)}" * bool(profiled) + " --robust" * robust + " --design" * design
     command += f" --posterior {posterior}" * bool(posterior)
+    if any((out / "fits").glob("*.npz")):
+        console().print(
+            f"Fits kept in {out / 'fits'} are gone on with where they are of the same work.", soft_wrap=True
+        )
     try:
         with _resumable("Fits are kept as they go: the same command goes on from there."), shown(console()) as progress:
             found = identify(
