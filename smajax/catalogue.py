@@ -8,6 +8,7 @@ from smajax.extended import extended
 from smajax.load.coupon import AbstractCoupon
 from smajax.parameters import parameters
 from smajax.presets import DRIVES, LOADS, WIRES, build
+from smajax.sensors import sensors_of
 from smajax.system import System
 
 
@@ -19,7 +20,6 @@ def describe(wire: str, load: str, drive: str) -> ModelDescription:
             f"load `{load}` with drive `{drive}`: a coupon's temperature is prescribed, so it takes the drive `none`; "
             f"every other load is heated and takes one of {sorted(set(DRIVES) - {'none'})}."
         )
-    name, unit = system.load.reading
     # An effect is part of the base model when the experiment names a parameter of it.
     whole = extended(system, candidates(system, None, ()))
     return ModelDescription(
@@ -28,7 +28,7 @@ def describe(wire: str, load: str, drive: str) -> ModelDescription:
         },
         inputs_required=system.load.inputs_required | system.drive.inputs_required,
         inputs_optional=system.load.inputs_optional | system.drive.inputs_optional | {"ambient_temperature"},
-        outputs={name: unit},
+        outputs=sensors_of(system),
         inputs_squared=system.drive.inputs_squared,
         inputs_sampled=system.load.inputs_required if isinstance(system.load, AbstractCoupon) else frozenset(),
     )

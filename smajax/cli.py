@@ -117,17 +117,23 @@ def close_loop_command(
 @app.command("identify")
 def identify_command(
     experiment: Annotated[Path, typer.Argument(help="experiment.toml, or the folder that holds it")],
-    out: Annotated[Path, typer.Option(help="folder for identify.html and identify.json")],
+    out: Annotated[
+        Path, typer.Option(help="folder for identify.html and identify.json; fits are kept there as they go")
+    ],
     starts: Annotated[int, typer.Option(min=0, help="points of the box that fits may start from; 0: as declared")] = 64,
     profile: Annotated[str, typer.Option(help="parameters to draw a profile of, with commas, or `all`")] = "",
     robust: Annotated[bool, typer.Option("--robust", help="Huber's loss: samples far off count less")] = False,
     design: Annotated[bool, typer.Option("--design", help="say which run to do next")] = False,
+    posterior: Annotated[
+        int, typer.Option(min=0, help="draws of each of 8 Markov chains, 1000 or so; needs the extra `bayes`")
+    ] = 0,
     json_out: Annotated[bool, typer.Option("--json", help="print identify.json on stdout instead of words")] = False,
     open_page: Annotated[bool, typer.Option("--open", help="open the page in a browser")] = False,
 ) -> None:
     """Fit the unknowns of an experiment to its runs, with error bars, and say what the runs cannot tell.
 
-    An effect is part of the model when the experiment names one of its parameters ("latent_heat.enthalpy").
+    An effect is part of the model when the experiment names one of its parameters ("latent_heat.enthalpy"). Ctrl-C loses
+    nothing: the same command with the same --out goes on from the fits as they were.
 
     Example:  smajax identify experiment.toml --out identified --profile all --design
     """
@@ -135,25 +141,35 @@ def identify_command(
 
     prepare()
     from smajax.catalogue import CATALOGUE
+    from smajax.declared import free_by_name
     from smajax.experiment.load import load_experiment
     from smajax.identify import identify
     from smajax.progress import shown
-    from smajax.report.identify_page import conclusions, estimate_rows, record, write_identified
+    from smajax.report.identify_page import write_identified
+    from smajax.report.identify_record import record
+    from smajax.report.identify_words import conclusions, estimate_rows, posterior_rows
 
     _folder(out)
     loaded = load_experiment(experiment, CATALOGUE)
-    unknowns = [unknown.name for unknown in loaded.unknowns]
+    unknowns = list(free_by_name(loaded, [run for run in loaded.runs if run.role == "fit"]))
     profiled = unknowns if profile == "all" else [part.strip() for part in profile.split(",") if part.strip()]
     command = f"smajax identify {shlex.quote(str(experiment))} --out {shlex.quote(str(out))} --starts {starts}"
     command += f" --profile {','.join(profiled)}" * bool(profiled) + " --robust" * robust + " --design" * design
+    command += f" --posterior {posterior}" * bool(posterior)
+    if any((out / "fits").glob("*.npz")):
+        console().print(
+            f"Fits kept in {out / 'fits'} are gone on with where they are of the same work.", soft_wrap=True
+        )
     try:
-        with _resumable("Nothing is kept of a fit that is not finished."), shown(console()) as progress:
+        with _resumable("Fits are kept as they go: the same command goes on from there."), shown(console()) as progress:
             found = identify(
                 loaded,
                 starts=starts,
                 profiled=profiled,
                 robust=robust,
                 design=design,
+                draws=posterior,
+                memory=out / "fits",
                 progress=progress,
                 command=command,
             )
@@ -166,8 +182,15 @@ def identify_command(
         typer.echo(f"\n{found.title or found.experiment}")
         for sentence in [*conclusions(found), *found.weak]:
             typer.echo(f"  {sentence}")
-        for row in estimate_rows(found):
-            typer.echo(f"  {row[0]:<28} {row[1]} {row[2]}" + (f"  ({row[-1]})" if row[-1] else ""))
+        rows = estimate_rows(found)
+        wide = max(28, *(len(row[0]) for row in rows))
+        for row in rows:
+            typer.echo(f"  {row[0]:<{wide}} {row[1]} {row[2]}" + (f"  ({row[-1]})" if row[-1] else ""))
+        for row in posterior_rows(found):
+            value = f"{row[1]} {row[2]}".strip()
+            typer.echo(
+                f"  posterior: {row[0]:<{wide}} {value}, 95 % {row[3]}, R-hat {row[4]}, {row[5]} independent draws"
+            )
         for one in found.suggestions[:1]:
             typer.echo(f"  Next run: {one.what}")
         typer.echo(f"Report: {page.resolve()}")

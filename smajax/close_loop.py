@@ -18,7 +18,8 @@ from smajax.attribution.search import Evidence, Model, Search, Start, scores_at,
 from smajax.attribution.verdict import cannot_know, shown, summary, unexplained, verdict
 from smajax.catalogue import candidates
 from smajax.effects.library import LIBRARY
-from smajax.experiment.record import Experiment, Run
+from smajax.experiment.errors import ExperimentError
+from smajax.experiment.record import RUN_STARTS, Experiment, Run
 from smajax.extended import base_model, extended
 from smajax.fit.batch import RunBatch, halved, pack, simulate_batch
 from smajax.fit.problem import Problem
@@ -29,6 +30,7 @@ from smajax.fit.uncertainty import Uncertainty, identifiability, uncertainty
 from smajax.load.coupon import AbstractCoupon
 from smajax.made_with import made_with
 from smajax.parameters import get_parameters, parameter_values, parameters
+from smajax.presets import build
 from smajax.report.display import digits, display
 from smajax.report.findings import (
     CoefficientFinding,
@@ -86,6 +88,7 @@ def close_loop(
         raise ValueError(
             "close_loop needs float64, but JAX runs in float32. Call `jax.config.update('jax_enable_x64', True)` first."
         )
+    _refuse_what_only_identify_does(experiment)
     began = clock.monotonic()
     job = _job(experiment)
     kept = Memory(memory)
@@ -141,6 +144,31 @@ def close_loop(
         rounds=tuple(setting.rounds),
         provenance=_provenance(experiment, kept, command, seed, clock.monotonic() - began),
     )
+
+
+def _refuse_what_only_identify_does(experiment: Experiment) -> None:
+    """ExperimentError for the keys of an experiment file that this loop would otherwise pass over in silence."""
+
+    def refuse(key: str, what: str) -> None:
+        raise ExperimentError(experiment.path, key, f"close-loop {what}; `smajax identify` does, or remove it")
+
+    if len(experiment.outputs) > 1:
+        others = ", ".join(output.name for output in experiment.outputs[1:])
+        refuse("channels", f"fits one output and got {len(experiment.outputs)} (also {others})")
+    own = build(experiment.wire, experiment.load, experiment.drive).load.reading[0]
+    if experiment.output_name != own:
+        refuse(f"channels.{experiment.output_name}", f"fits the load's own sensor, {own!r}, and no other")
+    for unknown in experiment.unknowns:
+        place = "nuisance" if unknown.name in RUN_STARTS else "unknown"
+        if unknown.per_run:
+            refuse(f"{place}.{unknown.name}", "knows no value of each run's own but the offset")
+        if unknown.prior is not None:
+            refuse(f"{place}.{unknown.name}.prior", "takes no prior")
+    for run in experiment.runs:
+        if not np.isfinite(run.output).all():
+            refuse(
+                f"channels.{experiment.output_name}.missing", f"leaves out no sample, and run {run.name!r} lacks some"
+            )
 
 
 def _base_fit(job: _Job, setting: Search, start: np.ndarray, seed: int) -> Solution:

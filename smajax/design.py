@@ -6,7 +6,6 @@ import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
@@ -89,23 +88,31 @@ def suggestions(
     batch = problem.batch
     series = list(candidates.values())
     length = len(next(iter(series[0].values())))
-    blank = jnp.zeros((len(series), length))
-    # Parameters that a run overrides: as they were in the first one.
-    overrides = jnp.repeat(batch.overrides[:1], len(series), axis=0)
+    blank = jnp.zeros((len(series) * len(batch.outputs), length))
+    # Parameters that a run overrides: as they were in the first one; what is each run's own: as in the mean of them.
+    own = problem.own_at(jnp.asarray(values)).mean(axis=0, keepdims=True)
+    overrides = jnp.repeat(jnp.concatenate([batch.overrides[:1], own], axis=1), len(series), axis=0)
     inputs = {name: jnp.asarray(np.stack([one[name] for one in series])) for name in batch.inputs}
-    trial = RunBatch(inputs, blank, jnp.ones_like(blank), overrides, batch.override_names, batch.dt)
+    overridden = (*batch.override_names, *problem.own.names)
+    runs_to_try = RunBatch(inputs, blank, jnp.ones_like(blank), overrides, overridden, batch.dt, outputs=batch.outputs)
+    trial = Problem.build(problem.system_at(jnp.asarray(values)), runs_to_try, problem.noise_sigma, problem.offset)
     scale = np.asarray([abs(values[problem.names.index(name)]) or 1.0 for name in names])
-    here = sensitivity(problem, values, names).columns(names) * scale
-    there = sensitivity(eqx.tree_at(lambda one: one.batch, problem, trial), values, names)
-    known = here.T @ here / inflation + SEEN * np.eye(len(names))
+    at = sensitivity(problem, values, names)
+    here, priors = at.columns(names) * scale, at.prior_columns(names) * scale
+    shared = [name for name in names if name in trial.names]
+    there = sensitivity(trial, trial.start_values(), shared)
+    known = here.T @ here / inflation + priors.T @ priors + SEEN * np.eye(len(names))
     before = np.sqrt(np.diag(np.linalg.inv(known)))
     found = []
-    for (what, one), jacobian in zip(candidates.items(), there.jacobian, strict=True):
-        own = jacobian * scale
-        if not np.isfinite(own).all():
+    by_run = np.zeros((len(series), blank.size // len(series), len(names)))
+    by_run[..., [list(names).index(name) for name in shared]] = there.jacobian.reshape(len(series), -1, len(shared))
+    for (what, one), jacobian in zip(candidates.items(), by_run, strict=True):
+        tells = jacobian * scale
+        if not np.isfinite(tells).all():
             continue
-        after = known + own.T @ own / inflation
+        after = known + tells.T @ tells / inflation
         gain = 0.5 * float(np.linalg.slogdet(after)[1] - np.linalg.slogdet(known)[1])
         errors = np.sqrt(np.diag(np.linalg.inv(after))) / before
-        found.append(Suggestion(what, one, gain, dict(zip(names, errors.tolist(), strict=True))))
+        shrinks = {name: float(error) for name, error in zip(names, errors, strict=True) if name in shared}
+        found.append(Suggestion(what, one, gain, shrinks))
     return tuple(sorted(found, key=lambda one: -one.information)[:count])

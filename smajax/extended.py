@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 
 from smajax.effects.library import at_base
-from smajax.experiment.record import Experiment
+from smajax.experiment.record import RUN_STARTS, Experiment
 from smajax.parameters import set_parameters
 from smajax.presets import build
 from smajax.system import System
@@ -18,7 +18,7 @@ def base_model(experiment: Experiment) -> System:
     It has the effects of which the experiment names a parameter (`latent_heat.enthalpy`), and no others.
     """
     system = extended(build(experiment.wire, experiment.load, experiment.drive), experiment.declared_effects)
-    starts = {unknown.name: unknown.start for unknown in experiment.unknowns}
+    starts = {unknown.name: unknown.start for unknown in experiment.unknowns if unknown.name not in RUN_STARTS}
     return set_parameters(system, {**experiment.parameters, **starts})
 
 

@@ -258,7 +258,11 @@ MISTAKES = [
     ('column = "time"\n', "", r"time: names no column"),
     ('unit = "%"', 'unit = "V"', r"channels.duty.unit: got unit 'V'.*expected one like '1'"),
     ('role = "input"\n', "", r"channels.duty.role: is missing; expected 'input' or 'output'"),
-    ('role = "input"', 'role = "output"', r"channels: got the outputs duty, position; expected exactly one"),
+    (
+        'role = "input"',
+        'role = "output"',
+        r"channels.duty: the model has no output 'duty'; its outputs are: position, t",
+    ),
     ("[channels.duty]", "[channels.ambient_temperature]", r"channels.ambient_temperature.unit: got unit '%'"),
     (
         "[channels.duty]",
@@ -304,6 +308,42 @@ MISTAKES = [
     ('"297.15 K"', '"297.15 V"', r"runs.B.parameters.ambient_temperature: got unit 'V'"),
     ("[[runs]]", '[effects]\nonly = ["latent"]\n[[runs]]', r"effects.only: .*did you mean 'latent_heat'"),
     ("[[runs]]", '[data]\nfolder = "${HOME}"\n[[runs]]', r"data.folder: got \$\{HOME\}; only"),
+    (
+        "offset = true",
+        'offset = true\ninitial_temprature = { low = "0 degC", high = "1 degC", start = "0 degC" }',
+        r"nuisance.initial_temprature: is not a known key; did you mean 'initial_temperature'",
+    ),
+    (
+        "offset = true",
+        'initial_temperature = { low = "0 degC", high = "1 degC" }',
+        r"nuisance.initial_temperature.start: is missing",
+    ),
+    ("[nuisance]", "prior = { mean = '1 J/(kg K)' }\n[nuisance]", r"prior: got neither sigma nor log_sigma; give"),
+    (
+        "[nuisance]",
+        "prior = { mean = '900 J/(kg K)', sigma = '1 s' }\n[nuisance]",
+        r"unknown.specific_heat.prior.sigma: got unit 's'",
+    ),
+    (
+        "[nuisance]",
+        "prior = { mean = '900 J/(kg K)', sigma = '0 J/(kg K)' }\n[nuisance]",
+        r"unknown.specific_heat.prior.sigma: got '0 J/\(kg K\)', expected a standard deviation above zero",
+    ),
+    (
+        "[nuisance]",
+        "prior = { mean = '900 J/(kg K)', log_sigma = -1.0 }\n[nuisance]",
+        r"unknown.specific_heat.prior.log_sigma: got -1.0, expected a number above 0",
+    ),
+    (
+        "[nuisance]",
+        "prior = { mena = '900 J/(kg K)', log_sigma = 1.0 }\n[nuisance]",
+        r"unknown.specific_heat.prior.mena: is not a known key; did you mean 'mean'",
+    ),
+    ("[nuisance]", "per_run = 3\n[nuisance]", r"unknown.specific_heat.per_run: got 3, expected true"),
+    ("[nuisance]", "fixed = true\nper_run = true\n[nuisance]", r"unknown.specific_heat: is fixed, so per_run and"),
+    ('unit = "%"', 'unit = "%"\nmissing = "skip"', r"channels.duty: got missing = 'skip' for an input"),
+    ('unit = "%"', 'unit = "%"\noffset = true', r"channels.duty: got an offset for an input"),
+    ('unit = "mm"', 'unit = "mm"\nmissing = "drop"', r"channels.position.missing: got 'drop', expected 'refuse' or 's"),
     ('title = "Bench"', "title = ", r"experiment\.toml: is not TOML: .*line 2"),
 ]
 
@@ -314,6 +354,57 @@ def test_a_mistake_is_named_with_its_file_and_key(bench: Path, old: str, new: st
         load(changed(bench, old, new))
     assert str(caught.value).startswith(str(bench / "experiment.toml") + ": ")
     assert "pydantic" not in str(caught.value)
+
+
+def test_a_held_unknown_is_a_known_value(bench: Path) -> None:
+    got = load(changed(bench, "[nuisance]", "fixed = true\n[nuisance]"))
+    assert got.unknowns == ()
+    assert got.parameters["specific_heat"] == pytest.approx(836.8)
+
+
+def test_two_outputs_each_with_its_own_noise_and_zero(bench: Path) -> None:
+    warm = (
+        '[channels.temperature]\nrole = "output"\ncolumn = "pos"\nunit = "K"\nnoise = "0.5 K"\noffset = false\n[[runs]]'
+    )
+    got = load(changed(bench, "[[runs]]", warm))
+    position, temperature = got.outputs
+    assert (position.name, position.offset, temperature.name, temperature.offset) == (
+        "position",
+        True,
+        "temperature",
+        False,
+    )
+    assert temperature.noise_sigma == pytest.approx(0.5 * 0.427, rel=0.01)
+    np.testing.assert_allclose(got.runs[0].outputs["temperature"], 1e3 * got.runs[0].output - 273.15, atol=1e-9)
+
+
+def test_missing_samples_and_gaps_in_time_are_left_out(bench: Path) -> None:
+    lines = (bench / "a.csv").read_text().splitlines()
+    lines[100:140] = [line.rsplit(",", 1)[0] + "," for line in lines[100:140]]
+    (bench / "a.csv").write_text("\n".join(lines[:200] + lines[300:]) + "\n")
+    words = r"the cell is empty; expected a number in every line; or write missing = 'skip'"
+    with pytest.raises(ExperimentError, match=words):
+        load(bench)
+    got = load(changed(bench, 'noise = "0.01 mm"', 'noise = "estimate"\nmissing = "skip"'))
+    run = got.runs[0]
+    away = np.isnan(run.output)
+    # 1 s to 1.4 s in the cells, 2 s to 3 s in the time.
+    assert away[(run.time > 1.03) & (run.time < 1.35)].all()
+    assert away[(run.time > 2.05) & (run.time < 2.95)].all()
+    assert not away[(run.time < 0.95) | ((run.time > 1.45) & (run.time < 1.9)) | (run.time > 3.05)].any()
+    assert np.isfinite(run.inputs["duty"]).all()
+    assert got.noise_sigma == pytest.approx(1e-5 * 0.427, rel=0.3)
+    assert not any("gap" in one for one in got.warnings if "'position'" in one)
+
+
+def test_a_start_that_the_model_prescribes_is_refused(tmp_path: Path) -> None:
+    np.savetxt(tmp_path / "50.txt", np.stack([300.0 + np.arange(30.0), np.linspace(4.0, 0.0, 30) ** 2], axis=1))
+    start = 'initial_temperature = { low = "0 degC", high = "50 degC", start = "20 degC" }'
+    (tmp_path / "isobaric.toml").write_text(f"{COUPON}\n[nuisance]\n{start}\n")
+    with pytest.raises(
+        ExperimentError, match=r"nuisance.initial_temperature: the temperature of this load is an input"
+    ):
+        load_experiment(tmp_path / "isobaric.toml", CATALOGUE)
 
 
 def test_a_file_without_runs_or_without_a_file(bench: Path) -> None:

@@ -21,10 +21,13 @@ from smajax.experiment.record import Experiment
 from smajax.fit.directions import directions, weak_ones
 from smajax.fit.robust import huber_weights
 from smajax.fit.sensitivity import Sensitivity
-from smajax.identify import Identified, identify
+from smajax.identified import Identified
+from smajax.identify import identify
 from smajax.parameters import set_parameters
 from smajax.presets import build
-from smajax.report.identify_page import conclusions, page, record, write_identified
+from smajax.report.identify_page import page, write_identified
+from smajax.report.identify_record import record
+from smajax.report.identify_words import conclusions
 from smajax.simulate import simulate
 
 TRUTH = {"austenite_start": 70.0, "austenite_finish": 82.0, "martensite_start": 55.0, "recoverable_strain": 0.044}
@@ -119,7 +122,7 @@ def test_a_profile_is_the_parabola_of_its_standard_error_where_the_problem_is_ne
 
 def test_without_noise_every_parameter_comes_back(tmp_path: Path) -> None:
     exact = load_experiment(_written(tmp_path, 0.0), CATALOGUE)
-    exact = dataclasses.replace(exact, noise_sigma=1e-7)
+    exact = dataclasses.replace(exact, outputs=(dataclasses.replace(exact.outputs[0], noise_sigma=1e-7),))
     for one in identify(exact, starts=16).estimates:
         assert one.value == pytest.approx(TRUTH[one.name], rel=1e-4)
 

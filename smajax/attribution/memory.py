@@ -2,27 +2,27 @@
 
 from __future__ import annotations
 
-import hashlib
-import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import jax
 import numpy as np
 
+from smajax.fit.kept import Kept
 from smajax.fit.problem import Lane, Problem
 from smajax.fit.progress import Progress, quiet
 from smajax.fit.solve import Solution, solve
-from smajax.source_mark import source_mark
 
 
 class Memory:
-    """`fit.solve.solve` that looks in `folder` first. A key covers data, model, lanes, settings and code."""
+    """`fit.solve.solve` that looks in `folder` first."""
 
     def __init__(self, folder: Path) -> None:
-        self.folder = folder
-        self.reused = 0
+        self.kept = Kept(folder)
+
+    @property
+    def reused(self) -> int:
+        return self.kept.reused
 
     def solve(
         self,
@@ -34,32 +34,22 @@ class Memory:
         **settings: Any,
     ) -> list[Solution]:
         """As `fit.solve.solve`."""
-        digest = hashlib.sha256(
-            repr((source_mark(), jax.__version__, problem.names, sorted(settings.items()))).encode()
-        )
-        digest.update(repr((problem.batch.dt, problem.offset, problem.batch.override_names)).encode())
-        for leaf in jax.tree.leaves((problem.system, problem.batch, problem.noise_sigma, list(lanes))):
-            digest.update(np.asarray(leaf).tobytes())
-        path = self.folder / f"{digest.hexdigest()[:32]}.npz"
-        if path.exists():
-            with np.load(path, allow_pickle=False) as kept:
-                self.reused += 1
-                progress(what, 1.0)
-                return [
-                    Solution(values, float(cost), bool(converged), int(legs))
-                    for values, cost, converged, legs in zip(
-                        kept["values"], kept["cost"], kept["converged"], kept["legs"], strict=True
-                    )
-                ]
+        key = self.kept.key((problem, list(lanes)), sorted(settings.items()))
+        known = self.kept.load(key)
+        if known is not None:
+            progress(what, 1.0)
+            return [
+                Solution(values, float(cost), bool(converged), int(legs))
+                for values, cost, converged, legs in zip(
+                    known["values"], known["cost"], known["converged"], known["legs"], strict=True
+                )
+            ]
         solutions = solve(problem, lanes, progress=progress, what=what, **settings)
-        self.folder.mkdir(parents=True, exist_ok=True)
-        partial = path.with_suffix(".partial.npz")
-        np.savez(
-            partial,
-            values=np.stack([solution.values for solution in solutions]),
-            cost=[solution.cost for solution in solutions],
-            converged=[solution.converged for solution in solutions],
-            legs=[solution.legs for solution in solutions],
-        )
-        os.replace(partial, path)
+        record = {
+            "values": np.stack([solution.values for solution in solutions]),
+            "cost": [solution.cost for solution in solutions],
+            "converged": [solution.converged for solution in solutions],
+            "legs": [solution.legs for solution in solutions],
+        }
+        self.kept.save(key, record)
         return solutions

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 
-from smajax.experiment.catalogue import Catalogue, ModelDescription, ParameterInfo
+from smajax.experiment.catalogue import Catalogue, ModelDescription
 from smajax.experiment.errors import ExperimentError, at_key, check_name
 from smajax.experiment.folder import data_folder
 from smajax.experiment.plausibility import (
@@ -20,10 +20,11 @@ from smajax.experiment.plausibility import (
     run_warnings,
     size_warnings,
 )
-from smajax.experiment.record import Experiment, Unknown
-from smajax.experiment.schema import ExperimentFile, Quantity, read_schema
+from smajax.experiment.record import Experiment, Output
+from smajax.experiment.schema import ExperimentFile, read_schema
 from smajax.experiment.signals import Reading, ReadRun, read_run
-from smajax.measured.names import instead, listed
+from smajax.experiment.unknowns import given_parameters, run_starts, unknowns
+from smajax.measured.names import instead
 from smajax.measured.noise import LEAST_SAMPLES, estimate_noise
 from smajax.measured.read import read_table
 from smajax.units import UnitError, convert, parse_quantity
@@ -44,61 +45,10 @@ def _describe(path: Path, file: ExperimentFile, catalogue: Catalogue) -> ModelDe
         raise ExperimentError(path, "model", str(error)) from error
 
 
-def _bounded(path: Path, key: str, value: Quantity, info: ParameterInfo) -> float:
-    """One parameter value in the program's own unit, inside what makes physical sense."""
-    with at_key(path, key):
-        number = parse_quantity(value, info.unit)
-    if not info.low <= number <= info.high:
-        raise ExperimentError(
-            path,
-            key,
-            f"got {value!r}, that is {number:g} {info.unit}; expected {info.low:g} to {info.high:g} {info.unit}",
-        )
-    return number
-
-
-def _parameters(
-    path: Path, key: str, values: Mapping[str, Quantity], file: ExperimentFile, known: Mapping[str, ParameterInfo]
-) -> dict[str, float]:
-    found: dict[str, float] = {}
-    for name, value in values.items():
-        where = f"{key}.{name}"
-        check_name(path, where, "parameter", name, known)
-        if name in file.unknown:
-            raise ExperimentError(path, where, f"is given here and is an unknown too; remove this or [unknown.{name}]")
-        found[name] = _bounded(path, where, value, known[name])
-    return found
-
-
-def _unknowns(path: Path, file: ExperimentFile, known: Mapping[str, ParameterInfo]) -> tuple[Unknown, ...]:
-    found: list[Unknown] = []
-    for name, section in file.unknown.items():
-        key = f"unknown.{name}"
-        check_name(path, key, "parameter", name, known)
-        info = known[name]
-        low = _bounded(path, f"{key}.low", section.low, info)
-        high = _bounded(path, f"{key}.high", section.high, info)
-        start = _bounded(path, f"{key}.start", section.start, info)
-        if low >= high:
-            raise ExperimentError(
-                path, f"{key}.low", f"got {section.low!r}, which is not below high = {section.high!r}; exchange the two"
-            )
-        if not low <= start <= high:
-            raise ExperimentError(
-                path, f"{key}.start", f"got {section.start!r}, expected between {section.low!r} and {section.high!r}"
-            )
-        found.append(Unknown(name=name, unit=info.unit, low=low, high=high, start=start))
-    return tuple(found)
-
-
-def _channel_units(path: Path, file: ExperimentFile, model: ModelDescription) -> tuple[str, dict[str, str]]:
-    """(name of the output, the program's own unit of every channel and input)."""
+def _channel_units(path: Path, file: ExperimentFile, model: ModelDescription) -> tuple[tuple[str, ...], dict[str, str]]:
+    """(names of the outputs, the program's own unit of every channel and input)."""
     inputs = model.inputs_required | model.inputs_optional
     units: dict[str, str] = {name: model.input_units[name] for name in inputs}
-    outputs = [name for name, channel in file.channels.items() if channel.role == "output"]
-    if len(outputs) != 1:
-        got = f"got the outputs {listed(outputs)}" if outputs else "no channel has role = 'output'"
-        raise ExperimentError(path, "channels", f"{got}; expected exactly one output channel")
     for name, channel in file.channels.items():
         key = f"channels.{name}"
         known = sorted(model.outputs if channel.role == "output" else inputs)
@@ -113,7 +63,10 @@ def _channel_units(path: Path, file: ExperimentFile, model: ModelDescription) ->
             units[name] = model.outputs[name]
         with at_key(path, f"{key}.unit"):
             convert(0.0, channel.unit, units[name])
-    return outputs[0], units
+    outputs = tuple(name for name, channel in file.channels.items() if channel.role == "output")
+    if not outputs:
+        raise ExperimentError(path, "channels", "no channel has role = 'output'; expected at least one")
+    return outputs, units
 
 
 def _check_runs(path: Path, file: ExperimentFile, model: ModelDescription) -> None:
@@ -157,9 +110,10 @@ def _step(path: Path, file: ExperimentFile) -> float:
     return step
 
 
-def _check_samples(path: Path, key: str, file: ExperimentFile, read: ReadRun, measured: int) -> None:
+def _check_samples(path: Path, key: str, name: str, file: ExperimentFile, read: ReadRun) -> None:
     """Raises ExperimentError when the run has too few samples to estimate noise from, as measured or on the clock."""
-    count = min(measured, read.run.output.size)
+    measured = read.signals[name].measured.size
+    count = min(measured, int(np.isfinite(read.run.outputs[name]).sum()))
     if count >= LEAST_SAMPLES:
         return
     # Where the file itself has too few, or one sample is one step, no other step gives more.
@@ -174,12 +128,17 @@ def _check_samples(path: Path, key: str, file: ExperimentFile, read: ReadRun, me
     )
 
 
-def _noise(path: Path, file: ExperimentFile, name: str, unit: str, fit: Sequence[ReadRun]) -> tuple[float, float, str]:
-    """(sigma on the clock, sigma at the sensor's own rate, where it is from) of the output."""
+def _output(path: Path, file: ExperimentFile, name: str, unit: str, runs: Sequence[ReadRun]) -> tuple[Output, float]:
+    """(output, sigma of its noise at the sensor's own rate); `runs` are those of the fit."""
     key = f"channels.{name}.noise"
-    given = file.channels[name].noise
-    example = _EXAMPLES.get(unit, f"0.01 {file.channels[name].unit}")
-    gain = float(np.median([read.noise_gain for read in fit]))
+    channel = file.channels[name]
+    given = channel.noise
+    offset = file.nuisance.offset if channel.offset is None else channel.offset
+    example = _EXAMPLES.get(unit, f"0.01 {channel.unit}")
+    fit = [read for read in runs if np.isfinite(read.run.outputs[name]).any()]
+    if not fit:
+        raise ExperimentError(path, f"channels.{name}", "no fit run has a sample of it; remove the channel")
+    gain = float(np.median([read.noise_gain[name] for read in fit]))
     if given is not None and given != ESTIMATE:
         try:
             sensor = parse_quantity(given, unit, difference=True)
@@ -190,16 +149,21 @@ def _noise(path: Path, file: ExperimentFile, name: str, unit: str, fit: Sequence
                 path, key, f"got {given!r}, expected a noise above zero like '{example}', or '{ESTIMATE}'"
             )
         how = f"given as {given}" + (f", times {gain:.3g} for the average over a step" if gain < 1.0 else "")
-        return sensor * gain, sensor, how
+        return Output(name, unit, sensor * gain, how, True, offset), sensor
     for read in fit:
-        _check_samples(path, key, file, read, read.signals[name].values.size)
+        _check_samples(path, key, name, file, read)
     # On the clock, where the residual is; the increment is the sensor's, since averaging hides it.
-    sigmas = [estimate_noise(read.run.output, read.quantum) for read in fit]
-    sensors = [estimate_noise(read.signals[name].values, 0.0) for read in fit]
+    on_clock = [read.run.outputs[name] for read in fit]
+    sigmas = [
+        estimate_noise(values[np.isfinite(values)], read.quantum[name])
+        for values, read in zip(on_clock, fit, strict=True)
+    ]
+    sensors = [estimate_noise(read.signals[name].measured, 0.0) for read in fit]
     sigma = float(np.median(sigmas))
     if sigma <= 0.0:
         raise ExperimentError(path, key, f"no noise can be seen in {name!r}; give it as text like '{example}'")
-    return sigma, float(np.median(sensors)), f"estimated from {len(fit)} fit run{'s' if len(fit) > 1 else ''} (median)"
+    how = f"estimated from {len(fit)} fit run{'s' if len(fit) > 1 else ''} (median)"
+    return Output(name, unit, sigma, how, False, offset), float(np.median(sensors))
 
 
 def load_experiment(path: str | Path, catalogue: Catalogue) -> Experiment:
@@ -212,15 +176,17 @@ def load_experiment(path: str | Path, catalogue: Catalogue) -> Experiment:
         path = path / "experiment.toml"
     file = read_schema(path)
     model = _describe(path, file, catalogue)
-    fixed = _parameters(path, "model.parameters", file.model.parameters, file, model.parameters)
-    unknowns = _unknowns(path, file, model.parameters)
+    fixed = given_parameters(path, "model.parameters", file.model.parameters, file, model.parameters)
+    every = unknowns(path, file, model.parameters)
+    fixed |= {unknown.name: unknown.start for unknown in every if file.unknown[unknown.name].fixed}
+    free = tuple(unknown for unknown in every if unknown.name not in fixed) + run_starts(path, file, model)
     for key, effects in (("effects.only", file.effects.only or []), ("effects.exclude", file.effects.exclude)):
         for effect in effects:
             check_name(path, key, "effect", effect, catalogue.effects)
-    output_name, units = _channel_units(path, file, model)
+    output_names, units = _channel_units(path, file, model)
     _check_runs(path, file, model)
     overrides = {
-        run.name: _parameters(path, f"runs.{run.name}.parameters", run.parameters, file, model.parameters)
+        run.name: given_parameters(path, f"runs.{run.name}.parameters", run.parameters, file, model.parameters)
         for run in file.runs
     }
     reading = Reading(
@@ -229,7 +195,7 @@ def load_experiment(path: str | Path, catalogue: Catalogue) -> Experiment:
         channels=file.channels,
         time=file.time,
         units=units,
-        output_name=output_name,
+        output_names=output_names,
         inputs_sampled=model.inputs_sampled,
         inputs_squared=model.inputs_squared,
         step=_step(path, file),
@@ -237,12 +203,13 @@ def load_experiment(path: str | Path, catalogue: Catalogue) -> Experiment:
     )
     runs = [read_run(reading, run, overrides[run.name]) for run in file.runs]
     fit = [read for read in runs if read.run.role == "fit"]
-    sigma, sensor_sigma, how = _noise(path, file, output_name, units[output_name], fit)
-    warnings = [text for read in runs for text in run_warnings(read, output_name, reading.step)]
+    outputs = [_output(path, file, name, units[name], fit) for name in output_names]
+    warnings = [text for read in runs for text in run_warnings(read, reading.step)]
     if file.time is None or file.time.kind != "sample":
         warnings += length_warnings(runs, "s" if file.time is None else file.time.unit)
-    warnings += constant_warnings(runs, output_name)
-    warnings += quantum_warning(fit, sensor_sigma, units[output_name])
+    warnings += constant_warnings(runs)
+    for output, sensor_sigma in outputs:
+        warnings += quantum_warning(fit, output.name, sensor_sigma, output.unit)
     warnings += copy_warnings(runs)
     warnings += size_warnings(runs)
     warnings += role_warnings(file.runs)
@@ -254,13 +221,9 @@ def load_experiment(path: str | Path, catalogue: Catalogue) -> Experiment:
         load=file.model.load,
         drive=file.model.drive,
         parameters=fixed,
-        unknowns=unknowns,
-        offset=file.nuisance.offset,
+        unknowns=free,
         step=reading.step,
-        output_name=output_name,
-        output_unit=units[output_name],
-        noise_sigma=sigma,
-        noise_how=how,
+        outputs=tuple(output for output, _ in outputs),
         effects_only=tuple(file.effects.only) if file.effects.only is not None else None,
         effects_excluded=tuple(file.effects.exclude),
         runs=tuple(read.run for read in runs),

@@ -42,7 +42,9 @@ def _sticks_at(values: Array, extreme: float) -> bool:
 
 
 def _output_warnings(run: str, name: str, signal: Signal) -> list[str]:
-    values = signal.values
+    values = signal.measured
+    if not values.size:
+        return [f"run {run!r}: the output {name!r} has no sample"]
     if np.ptp(values) == 0.0:
         return [f"run {run!r}: the output {name!r} is constant ({values[0]:g}); nothing can be learnt from it"]
     cut = [
@@ -67,48 +69,52 @@ def _time_warnings(run: str, name: str, signal: Signal) -> list[str]:
     ]
 
 
-def run_warnings(read: ReadRun, output_name: str, step: float) -> list[str]:
+def run_warnings(read: ReadRun, step: float) -> list[str]:
     """What looks wrong in one run, one sentence each."""
     run = read.run
     found: list[str] = []
     if run.time.size < FEW_SAMPLES:
         found.append(f"run {run.name!r}: only {run.time.size} samples at a step of {step:g} s; is the step too long?")
     for name, signal in read.signals.items():
-        found += _time_warnings(run.name, name, signal)
+        if name not in read.skipping:
+            found += _time_warnings(run.name, name, signal)
     duty = run.inputs.get("duty")
     if duty is not None and (duty.min() < 0.0 or duty.max() > 1.0):
         found.append(
             f"run {run.name!r}: the duty goes from {duty.min():g} to {duty.max():g}, outside 0 to 1; is it in percent?"
         )
-    output = read.signals[output_name]
-    found += _output_warnings(run.name, output_name, output)
-    sensor_step = float(np.median(np.diff(output.time)))
-    if step < 0.95 * sensor_step:
-        found.append(
-            f"run {run.name!r}: the step of {step:g} s is shorter than the sensor's {sensor_step:g} s; values between "
-            "two samples are interpolated and their errors are not independent"
-        )
+    for output_name in run.outputs:
+        output = read.signals[output_name]
+        found += _output_warnings(run.name, output_name, output)
+        sensor_step = float(np.median(np.diff(output.time)))
+        if step < 0.95 * sensor_step:
+            whose = "the sensor's" if len(run.outputs) == 1 else f"{output_name!r}'s"
+            found.append(
+                f"run {run.name!r}: the step of {step:g} s is shorter than {whose} {sensor_step:g} s; values between "
+                "two samples are interpolated and their errors are not independent"
+            )
     return found
 
 
-def constant_warnings(runs: Sequence[ReadRun], output_name: str) -> list[str]:
+def constant_warnings(runs: Sequence[ReadRun]) -> list[str]:
     """Inputs that never change in any run although they are read from files: the wrong column looks like that."""
     still = [
         name
         for name in runs[0].signals
-        if name != output_name
+        if name not in runs[0].run.outputs
         and all(np.ptp(read.signals[name].values) == 0.0 for read in runs if name in read.signals)
     ]
     return [f"the input {name!r} never changes in any run; is it the right column?" for name in still]
 
 
-def quantum_warning(runs: Sequence[ReadRun], sensor_noise: float, unit: str) -> list[str]:
+def quantum_warning(runs: Sequence[ReadRun], name: str, sensor_noise: float, unit: str) -> list[str]:
     """Whether the sensor's increment exceeds its noise, both before resampling and in the output's own unit."""
-    quantum = float(np.median([read.quantum for read in runs]))
+    quantum = float(np.median([read.quantum[name] for read in runs]))
     if quantum <= sensor_noise:
         return []
+    whose = "the output's" if len(runs[0].run.outputs) == 1 else f"{name!r}'s"
     return [
-        f"the output's increment of {quantum:.4g} {unit} is larger than its noise of {sensor_noise:.4g} {unit} at the "
+        f"{whose} increment of {quantum:.4g} {unit} is larger than its noise of {sensor_noise:.4g} {unit} at the "
         "sensor's rate; residuals of that size are rounding"
     ]
 

@@ -30,18 +30,49 @@ class ModelSection(Section):
     parameters: dict[str, Quantity] = Field(default={}, description="a table of name = 'number unit'")
 
 
-class UnknownSection(Section):
-    """A parameter to be found: its box and where the search starts."""
+class PriorSection(Section):
+    """What is known of a value before the runs: a normal distribution of it, or of its logarithm."""
+
+    mean: Quantity = Field(description="text like '80 W/m^2/K'")
+    sigma: Quantity | None = Field(default=None, description="text like '10 W/m^2/K'")
+    log_sigma: float | None = Field(default=None, gt=0.0, description="a number above 0; 0.2 is about 20 %")
+
+    @model_validator(mode="after")
+    def _one_spread(self) -> PriorSection:
+        if (self.sigma is None) == (self.log_sigma is None):
+            got = "both sigma and log_sigma" if self.sigma is not None else "neither sigma nor log_sigma"
+            raise ValueError(f"got {got}; give sigma = 'number unit', or log_sigma = 0.2 for one of the logarithm")
+        return self
+
+
+class BoxSection(Section):
+    """A value to be found: its box, where the search starts, and what is known of it."""
 
     low: Quantity = Field(description="text like '20 W/m^2/K'")
     high: Quantity = Field(description="text like '400 W/m^2/K'")
     start: Quantity = Field(description="text like '80 W/m^2/K'")
+    prior: PriorSection | None = Field(default=None, description="a table with mean, and sigma or log_sigma")
+
+
+class UnknownSection(BoxSection):
+    """A parameter to be found."""
+
+    per_run: bool = Field(default=False, description="true (a value of each run's own) or false (one for all runs)")
+    fixed: bool = Field(default=False, description="true (held at start) or false")
+
+    @model_validator(mode="after")
+    def _free(self) -> UnknownSection:
+        if self.fixed and (self.per_run or self.prior is not None):
+            raise ValueError("is fixed, so per_run and prior mean nothing; remove them, or fixed")
+        return self
 
 
 class NuisanceSection(Section):
     """What is fitted per run and means nothing."""
 
     offset: bool = Field(default=False, description="true or false: whether the sensor's zero moves from run to run")
+    initial_temperature: BoxSection | None = Field(default=None, description="a table with low, high, start")
+    initial_martensite_fraction: BoxSection | None = Field(default=None, description="a table with low, high, start")
 
 
 class SamplingSection(Section):
@@ -74,6 +105,10 @@ class ChannelSection(Section):
     variable: str | None = Field(default=None, description="the name of a MATLAB variable, as text")
     unit: str = Field(description="text like 'MPa', or '1' for a plain number")
     noise: Quantity | None = Field(default=None, description="'estimate', or text like '0.01 mm'")
+    offset: bool | None = Field(
+        default=None, description="true or false: goes before [nuisance] offset for this output"
+    )
+    missing: Literal["refuse", "skip"] = Field(default="refuse", description="'refuse' or 'skip'")
 
     @model_validator(mode="after")
     def _one_place(self) -> ChannelSection:
@@ -81,6 +116,10 @@ class ChannelSection(Section):
             raise ValueError("got both column and variable; give column for a text file, variable for a .mat file")
         if self.role == "input" and self.noise is not None:
             raise ValueError("got a noise for an input; noise belongs to the output channel, remove it")
+        if self.role == "input" and self.offset is not None:
+            raise ValueError("got an offset for an input; offsets are those of outputs, remove it")
+        if self.role == "input" and self.missing == "skip":
+            raise ValueError("got missing = 'skip' for an input; the model needs every sample of it: fill the gaps")
         if self.role == "output" and self.column is None and self.variable is None:
             raise ValueError("does not say where the output is; give column (text file) or variable (.mat file)")
         return self
@@ -139,7 +178,12 @@ _PLACES: dict[tuple[str, ...], type[Section]] = {
     (): ExperimentFile,
     ("model",): ModelSection,
     ("unknown", "*"): UnknownSection,
+    ("unknown", "*", "prior"): PriorSection,
     ("nuisance",): NuisanceSection,
+    ("nuisance", "initial_temperature"): BoxSection,
+    ("nuisance", "initial_temperature", "prior"): PriorSection,
+    ("nuisance", "initial_martensite_fraction"): BoxSection,
+    ("nuisance", "initial_martensite_fraction", "prior"): PriorSection,
     ("sampling",): SamplingSection,
     ("time",): TimeSection,
     ("channels", "*"): ChannelSection,

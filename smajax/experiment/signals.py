@@ -13,7 +13,7 @@ from smajax.experiment.errors import ExperimentError, at_key
 from smajax.experiment.record import Run
 from smajax.experiment.schema import ChannelSection, RunSection, TimeSection
 from smajax.measured.noise import detect_quantum
-from smajax.measured.resample import resample_input, resample_output, uniform_clock
+from smajax.measured.resample import resample_input, resample_output, resample_with_gaps, uniform_clock
 from smajax.measured.table import Array, MeasuredDataError, Table, check_time
 from smajax.units import convert, parse_quantity
 
@@ -22,24 +22,30 @@ MOST_SAMPLES = 2_000_000
 
 @dataclass(frozen=True)
 class Signal:
-    """One channel as measured, in the program's own unit: time and values, both (n,)."""
+    """One channel as measured, in the program's own unit: time and values, both (n,); nan where one is missing."""
 
     time: Array
     values: Array
+
+    @property
+    def measured(self) -> Array:
+        """The values that are there."""
+        return self.values[np.isfinite(self.values)]
 
 
 @dataclass(frozen=True)
 class ReadRun:
     """A run on the clock, and what of its raw signals the noise estimate and the warnings need.
 
-    signals: channel -> as measured. noise_gain: sigma of the output's white noise on the clock over that of the
-    sensor. quantum: the sensor's increment, 0.0 when none shows.
+    signals: channel -> as measured. By output, noise_gain: sigma of its white noise on the clock over that of the sensor;
+    quantum: the sensor's increment, 0.0 when none shows. skipping: outputs of which samples may be missing.
     """
 
     run: Run
     signals: Mapping[str, Signal]
-    noise_gain: float
-    quantum: float
+    noise_gain: Mapping[str, float]
+    quantum: Mapping[str, float]
+    skipping: frozenset[str]
 
 
 @dataclass(frozen=True)
@@ -54,7 +60,7 @@ class Reading:
     channels: Mapping[str, ChannelSection]
     time: TimeSection | None
     units: Mapping[str, str]
-    output_name: str
+    output_names: tuple[str, ...]
     inputs_sampled: frozenset[str]
     inputs_squared: frozenset[str]
     step: float
@@ -82,7 +88,12 @@ def _signal(
     taken: Collection[str | int],
 ) -> Signal:
     """One channel from its table. taken: the columns of the time and the other channels. Raises MeasuredDataError."""
-    values = convert(table.column(key, taken), channel.unit, own_unit)
+    try:
+        values = convert(table.column(key, taken, gaps=channel.missing == "skip"), channel.unit, own_unit)
+    except MeasuredDataError as error:
+        if channel.role == "input" or channel.missing == "skip" or not table.has_gaps(key):
+            raise
+        raise MeasuredDataError(f"{error}; or write missing = 'skip' for this output, which leaves them out") from None
     clock = table.clock(key)
     where, unit = f"{table.path}: the time of {key!r}", "s"
     if time is not None and time.kind == "sample":
@@ -168,27 +179,33 @@ def read_run(reading: Reading, run: RunSection, parameters: dict[str, float]) ->
     for name, signal in signals.items():
         if name in reading.inputs_sampled:
             inputs[name] = resample_output(signal.time, signal.values, clock, reading.step).values
-        elif name != reading.output_name:
+        elif name not in reading.output_names:
             inputs[name] = resample_input(
                 signal.time, signal.values, clock, reading.step, squared=name in reading.inputs_squared
             )
     for name, value in run.inputs.items():
         with at_key(reading.path, f"{where}.inputs.{name}"):
             inputs[name] = np.full(clock.size, parse_quantity(value, reading.units[name]))
-    measured = signals[reading.output_name]
-    output = resample_output(measured.time, measured.values, clock, reading.step)
+    skipping = frozenset(name for name in reading.output_names if reading.channels[name].missing == "skip")
+    outputs = {
+        name: (resample_with_gaps if name in skipping else resample_output)(
+            signals[name].time, signals[name].values, clock, reading.step
+        )
+        for name in reading.output_names
+    }
     return ReadRun(
         run=Run(
             name=run.name,
             role=run.role,
             time=clock,
             inputs=inputs,
-            output=output.values,
+            outputs={name: output.values for name, output in outputs.items()},
             parameters=parameters,
             files=files,
             sha256=_digest(files),
         ),
         signals=signals,
-        noise_gain=output.noise_gain,
-        quantum=detect_quantum(measured.values),
+        noise_gain={name: output.noise_gain for name, output in outputs.items()},
+        quantum={name: detect_quantum(signals[name].measured) for name in outputs},
+        skipping=skipping,
     )

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -11,31 +12,35 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from smajax.experiment.record import Run
-from smajax.parameters import set_vector
+from smajax.experiment.record import RUN_STARTS, Run
+from smajax.parameters import set_parameters
+from smajax.sensors import shown_by
 from smajax.simulate import simulate
-from smajax.system import System
-from smajax.types import Trajectory
+from smajax.system import System, initial_state
+from smajax.types import State, Trajectory
 
 
 class RunBatch(eqx.Module):
-    """R runs on N samples each; a shorter run is padded by holding its last input, with mask 0."""
+    """R runs on N samples each; a shorter run is padded by holding its last input, with mask 0.
+
+    A series is one output of one run: those of the first run first. A missing sample has mask 0 as well.
+    """
 
     inputs: dict[str, Float[Array, "run time"]]
-    output: Float[Array, "run time"]
-    mask: Float[Array, "run time"]
-    overrides: Float[Array, "run override"]  # values of `override_names`, run by run
+    output: Float[Array, "series time"]
+    mask: Float[Array, "series time"]
+    overrides: Float[Array, "run override"]  # values of `override_names`, run by run; also of `RUN_STARTS`
     override_names: tuple[str, ...] = eqx.field(static=True)
     dt: float = eqx.field(static=True)
+    outputs: tuple[str, ...] = eqx.field(static=True, default=("reading",))
 
     @property
-    def lengths(self) -> np.ndarray:
-        """Samples of each run, shape (R,)."""
-        return np.asarray(self.mask.sum(axis=1)).astype(int)
+    def runs(self) -> int:
+        return self.output.shape[0] // len(self.outputs)
 
 
 def pack(runs: Sequence[Run], dt: float, defaults: dict[str, float]) -> RunBatch:
-    """Pack `runs` (all with the same input channels). `defaults` holds a value for every parameter a run overrides.
+    """Pack `runs` (all with the same channels). `defaults` holds a value for every parameter a run overrides.
 
     Raises ValueError when the runs' input channels differ, naming the first run that does.
     """
@@ -57,11 +62,14 @@ def pack(runs: Sequence[Run], dt: float, defaults: dict[str, float]) -> RunBatch
 
     return RunBatch(
         inputs={name: jnp.asarray([padded(run.inputs[name], "edge") for run in runs]) for name in channels},
-        output=jnp.asarray([padded(run.output, "zero") for run in runs]),
-        mask=jnp.asarray([padded(np.ones(len(run.time)), "zero") for run in runs]),
+        output=jnp.asarray([padded(np.nan_to_num(series), "zero") for run in runs for series in run.outputs.values()]),
+        mask=jnp.asarray(
+            [padded(np.isfinite(series).astype(float), "zero") for run in runs for series in run.outputs.values()]
+        ),
         overrides=jnp.asarray([[run.parameters.get(name, defaults[name]) for name in names] for run in runs]),
         override_names=names,
         dt=dt,
+        outputs=tuple(runs[0].outputs),
     )
 
 
@@ -76,11 +84,55 @@ def halved(batch: RunBatch) -> RunBatch:
     )
 
 
-def simulate_batch(system: System, batch: RunBatch) -> Trajectory:
-    """One trajectory per run, every array of shape (R, N)."""
+def _started(
+    system: System, names: Sequence[str], own: Float[Array, " own"], inputs: dict[str, Float[Array, " time"]]
+) -> tuple[System, State | None]:
+    """`system` with a run's own values, and the state it starts in where the model does not say it."""
+    values = dict(zip(names, own, strict=True))
+    celsius = values.pop("initial_temperature", None)
+    here = set_parameters(system, {RUN_STARTS.get(name, name): value for name, value in values.items()})
+    if celsius is None:
+        return here, None
+    # A wire that was not at the air's temperature: at rest as if the air had been as warm.
+    first = {name: series[0] for name, series in inputs.items()}
+    return here, initial_state(here, {**first, "ambient_temperature": celsius})
 
-    def one(inputs: dict[str, Float[Array, " time"]], override: Float[Array, " override"]) -> Trajectory:
-        here = set_vector(system, batch.override_names, override) if batch.override_names else system
-        return simulate(here, inputs, batch.dt)
 
-    return jax.vmap(one)(batch.inputs, batch.overrides)
+def _each_run(
+    system: System,
+    batch: RunBatch,
+    own_names: Sequence[str],
+    own: Array | None,
+    seen: Callable[[System, Trajectory], Any],
+) -> Any:
+    """`seen` of every run's system and trajectory."""
+
+    names = (*batch.override_names, *own_names)
+
+    def one(inputs: dict[str, Float[Array, " time"]], values: Array) -> Any:
+        here, initial = _started(system, names, values, inputs)
+        return seen(here, simulate(here, inputs, batch.dt, initial))
+
+    values = batch.overrides if own is None else jnp.concatenate([batch.overrides, own], axis=1)
+    return jax.vmap(one)(batch.inputs, values)
+
+
+def simulate_batch(
+    system: System, batch: RunBatch, own_names: Sequence[str] = (), own: Float[Array, "run own"] | None = None
+) -> Trajectory:
+    """One trajectory per run, every array of shape (R, N). `own`: each run's own values of `own_names`."""
+    return _each_run(system, batch, own_names, own, lambda _, run: run)
+
+
+def shown_batch(
+    system: System, batch: RunBatch, own_names: Sequence[str] = (), own: Float[Array, "run own"] | None = None
+) -> Float[Array, "series time"]:
+    """What the batch's sensors show."""
+    found = _each_run(
+        system,
+        batch,
+        own_names,
+        own,
+        lambda here, run: jnp.stack([shown_by(here, run, name) for name in batch.outputs]),
+    )
+    return found.reshape(batch.output.shape[0], -1)

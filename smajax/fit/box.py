@@ -7,25 +7,32 @@ bound is infinitely far away and a narrow valley bends, and a fit that takes 20 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from dataclasses import fields as fields_of
+from functools import partial
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.sharding import Mesh, PartitionSpec
 from scipy.optimize import lsq_linear
 
+from smajax.fit.kept import Kept
 from smajax.fit.problem import Lane, Problem
 from smajax.fit.progress import Progress, quiet
 
-MOST_STEPS = 80
-ENOUGH = 1e-6  # of the cost: what a step that is the last one may still lower it by, and promise to
+MOST_STEPS = 120
+ENOUGH = 1e-8  # of the cost: what a step that is the last one may still lower it by, and promise to; scipy's too
 STILL = 1e-12  # of the box
-DAMPED = 1e-2  # share of the squared columns that damping begins with
+DAMPED = 1e-1  # share of the squared columns that damping begins with
 HOPELESS = 1e10  # damping at which no step is a better one
 AT_MOST = 0.7  # of the way to a bound
 NEAR = 1e-3  # of the box: from here on the bound itself may be reached
+WIDE = 24  # lanes at once from which on a second, narrower program is worth its compilation
+NARROWER = 6  # a batch as narrow by this takes a third of the time
+STRAGGLERS = 3  # narrow batches at most
 BLIND = 1e-14  # of the largest squared column: a parameter that nothing depends on
 
 
@@ -59,20 +66,33 @@ class _Walk:
 def _normal_equations(
     problem: Problem, lanes: Lane, places: jax.Array, outputs: jax.Array | None
 ) -> tuple[jax.Array, jax.Array, jax.Array]:
-    """(r^T r, J^T r, J^T J) of every lane at its place, by shares of its box."""
+    """(r^T r, J^T r, J^T J) of every lane at its place, by shares of its box; each local device takes its share of lanes."""
 
-    def one(lane: Lane, place: jax.Array, output: jax.Array | None) -> tuple[jax.Array, jax.Array, jax.Array]:
-        here = problem.with_output(output)
+    def one(
+        known: Problem, lane: Lane, place: jax.Array, output: jax.Array | None
+    ) -> tuple[jax.Array, jax.Array, jax.Array]:
+        here = known.with_output(output)
 
         def residual(place: jax.Array) -> tuple[jax.Array, jax.Array]:
             values = lane.values.at[lane.slots].set(lane.low + place * (lane.high - lane.low))
-            misfit = here.misfit(values) / problem.noise_sigma * jnp.sqrt(lane.weights)[:, None]
-            return misfit.ravel(), misfit.ravel()
+            value = here.residual(values, lane.weights)
+            return value, value
 
         jacobian, value = jax.jacfwd(residual, has_aux=True)(place)
         return value @ value, value @ jacobian, jacobian.T @ jacobian
 
-    return eqx.filter_vmap(one)(lanes, places, outputs)
+    def every(known: Problem, some: tuple[Lane, jax.Array, jax.Array | None]) -> tuple[jax.Array, jax.Array, jax.Array]:
+        return eqx.filter_vmap(partial(one, known))(*some)
+
+    devices = np.asarray(jax.local_devices())
+    if len(devices) == 1 or len(places) % len(devices):
+        return every(problem, (lanes, places, outputs))
+    over = PartitionSpec("lane")
+    # Not by the compiler's own partitioning: the devices would wait for each other in every iteration of every step.
+    spread = jax.shard_map(
+        every, mesh=Mesh(devices, ("lane",)), in_specs=(PartitionSpec(), over), out_specs=over, check_vma=False
+    )
+    return spread(problem, (lanes, places, outputs))
 
 
 def _step(walk: _Walk) -> np.ndarray:
@@ -109,12 +129,35 @@ def _judged(walk: _Walk, step: np.ndarray, cost: float, slope: np.ndarray, squar
         walk.damping *= max(0.1, 1.0 - (2.0 * min(share, 1.0) - 1.0) ** 3)
         walk.growth = 2.0
         if small and gained < ENOUGH * walk.cost:
-            walk.reason = "it has converged, no step lowers the cost by more than a millionth"
+            walk.reason = "it has converged, no step lowers the cost by more than 1e-8 of it"
     else:
         walk.damping *= walk.growth
         walk.growth *= 2.0
         if small or walk.damping > HOPELESS:
             walk.reason = "it has converged, no step lowers the cost any more"
+
+
+def _cut(lanes: int, at_once: int) -> list[tuple[int, int]]:
+    """(first lane, width) of each batch. A few stragglers do not pay for a wide batch that is filled up."""
+    narrow = max(at_once // NARROWER, 1)
+    widths, start = [], 0
+    while start < lanes:
+        few = at_once >= WIDE and lanes - start <= STRAGGLERS * narrow
+        widths.append((start, narrow if few else at_once))
+        start += widths[-1][1]
+    return widths
+
+
+def _packed(walks: Sequence[_Walk], rounds: int) -> dict[str, np.ndarray]:
+    """Where all fits are, as arrays."""
+    fields = {field.name: np.asarray([getattr(walk, field.name) for walk in walks]) for field in fields_of(_Walk)}
+    return {**fields, "rounds": np.asarray(rounds)}
+
+
+def _unpacked(record: Mapping[str, np.ndarray]) -> list[_Walk]:
+    names = [field.name for field in fields_of(_Walk)]
+    rows = zip(*(record[name] for name in names), strict=True)
+    return [_Walk(*(value if np.ndim(value) else value.item() for value in row)) for row in rows]
 
 
 def fit_in_box(
@@ -124,13 +167,17 @@ def fit_in_box(
     outputs: np.ndarray | None = None,
     at_once: int = 8,
     most: int = MOST_STEPS,
+    kept: Kept | None = None,
     progress: Progress = quiet,
     what: str = "fitting",
 ) -> list[Fit]:
     """Fit every lane from its own values; all lanes have the same number of slots.
 
+    With `kept`, where every fit is is written as it goes, and the same call goes on from there to the same end.
+
     `outputs`, (lanes, R, N): measured outputs of each lane's own, as in repeated experiments. Lanes that are not ended
-    go `at_once` at a time, so one compilation serves any number of them, and none waits for another.
+    go `at_once` at a time, so one compilation serves any number of them, and none waits for another; the last ones of
+    many go fewer at a time, by a second compilation.
     """
 
     def place_of(lane: Lane) -> np.ndarray:
@@ -139,11 +186,11 @@ def fit_in_box(
 
     def evaluated(some: Sequence[int], places: Sequence[np.ndarray]) -> list[tuple[float, np.ndarray, np.ndarray]]:
         found: list[tuple[float, np.ndarray, np.ndarray]] = []
-        for start in range(0, len(some), at_once):
-            part = list(some[start : start + at_once])
-            filled = part + [part[0]] * (at_once - len(part))
-            at = list(places[start : start + at_once])
-            at += [at[0]] * (at_once - len(part))
+        for start, width in _cut(len(some), at_once):
+            part = list(some[start : start + width])
+            filled = part + [part[0]] * (width - len(part))
+            at = list(places[start : start + width])
+            at += [at[0]] * (width - len(part))
             batch = jax.tree.map(lambda *leaves: jnp.stack(leaves), *(lanes[lane] for lane in filled))
             own = None if outputs is None else jnp.asarray(outputs[np.asarray(filled)])
             answers = [np.asarray(each) for each in _normal_equations(problem, batch, jnp.asarray(np.stack(at)), own)]
@@ -151,14 +198,21 @@ def fit_in_box(
         return found
 
     everyone = range(len(lanes))
-    places = [place_of(lane) for lane in lanes]
-    walks = []
-    for place, (cost, slope, square) in zip(places, evaluated(everyone, places), strict=True):
-        lost = not (np.isfinite(cost) and np.isfinite(slope).all() and np.isfinite(square).all())
-        walk = _Walk(place, cost if not lost else np.inf, slope, square, np.diag(square).copy())
-        walk.reason = "the model gives no number at the start" if lost else ""
-        walks.append(walk)
-    for number in range(most):
+    kept = kept or Kept()
+    key = kept.key((problem, list(lanes)), "fit in box", outputs if outputs is not None else "", at_once, most)
+    known = kept.load(key)
+    if known is not None:
+        walks, begun = _unpacked(known), int(known["rounds"])
+    else:
+        walks, begun = [], 0
+        places = [place_of(lane) for lane in lanes]
+        for place, (cost, slope, square) in zip(places, evaluated(everyone, places), strict=True):
+            lost = not (np.isfinite(cost) and np.isfinite(slope).all() and np.isfinite(square).all())
+            walk = _Walk(place, cost if not lost else np.inf, slope, square, np.diag(square).copy())
+            walk.reason = "the model gives no number at the start" if lost else ""
+            walks.append(walk)
+    for number in range(begun, most):
+        kept.save(key, _packed(walks, number), last=False)
         going = [lane for lane in everyone if not walks[lane].reason]
         progress(what, max(1.0 - len(going) / len(lanes), number / most))
         if not going:
@@ -167,6 +221,7 @@ def fit_in_box(
         tried = [np.clip(walks[lane].place + step, 0.0, 1.0) for lane, step in zip(going, steps, strict=True)]
         for lane, step, answer in zip(going, steps, evaluated(going, tried), strict=True):
             _judged(walks[lane], step, *answer)
+    kept.save(key, _packed(walks, most))
     progress(what, 1.0)
     ended = []
     for own, walk in zip(lanes, walks, strict=True):

@@ -41,7 +41,9 @@ def directions(
 ) -> tuple[Direction, ...]:
     """All directions of `names`, weakest first. `inflation` is the variance of an independent sample over the noise's."""
     scale = np.asarray([abs(values[name]) or 1.0 for name in names])
-    _, singular, rows = np.linalg.svd(at.columns(names) * scale, full_matrices=False)
+    # A prior's row is a sample whose noise is one, and not the residual's.
+    whole = np.concatenate([at.columns(names), np.sqrt(inflation) * at.prior_columns(names)])
+    _, singular, rows = np.linalg.svd(whole * scale, full_matrices=False)
     found = []
     for value, row in zip(singular[::-1], rows[::-1], strict=True):
         largest = row[np.argmax(np.abs(row))]

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from smajax.fit.box import Fit, fit_in_box
+from smajax.fit.kept import Kept
 from smajax.fit.problem import Problem
 from smajax.fit.progress import Progress, quiet
 
@@ -47,6 +48,7 @@ def profiles(
     errors: Mapping[str, float | None],
     inflation: float,
     progress: Progress = quiet,
+    kept: Kept | None = None,
 ) -> tuple[Profile, ...]:
     """Profiles of the parameters `asked`, which are among the fitted `names`; `best` is their fit."""
     index = problem.names.index
@@ -61,7 +63,7 @@ def profiles(
             start[index(name)] = value
             lanes.append(problem.lane(others, bounds, start, len(names)))
             points.append((name, value))
-    solved = fit_in_box(problem, lanes, progress=progress, what="profiles") if lanes else []
+    solved = fit_in_box(problem, lanes, kept=kept, progress=progress, what="profiles") if lanes else []
     found = []
     for name in asked:
         tried = [(value, one.cost) for (of, value), one in zip(points, solved, strict=True) if of == name]

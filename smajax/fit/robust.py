@@ -18,17 +18,24 @@ SETTLED = 1e-2  # weights that change by less
 NORMAL = 1.4826  # deviation over the median of the absolute, for a normal distribution
 
 
-def huber_weights(misfit: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """Weights between 0 and 1, of the shape of `misfit` (R, N); the spread is taken from the misfit itself."""
-    spread = NORMAL * np.median(np.abs(misfit[mask > 0]))
-    far = np.abs(misfit) / (BEND * max(float(spread), 1e-300))
-    return np.where(mask > 0, 1.0 / np.maximum(far, 1.0), 0.0)
+def huber_weights(misfit: np.ndarray, mask: np.ndarray, outputs: int = 1) -> np.ndarray:
+    """Weights between 0 and 1, of the shape of `misfit` (series, N).
+
+    The spread of each of the `outputs`, which follow each other in every run, is taken from the misfit itself.
+    """
+    weights = np.zeros_like(misfit)
+    for k in range(outputs):
+        own, here = misfit[k::outputs], mask[k::outputs] > 0
+        spread = NORMAL * np.median(np.abs(own[here]))
+        far = np.abs(own) / (BEND * max(float(spread), 1e-300))
+        weights[k::outputs] = np.where(here, 1.0 / np.maximum(far, 1.0), 0.0)
+    return weights
 
 
 def unweighted_misfit(weighted: Problem, values: np.ndarray) -> np.ndarray:
-    """Misfit over the noise, (R, N), each run's offset that of the weights: a plain mean is drawn by what is far off."""
+    """Misfit over the noise, (series, N), each run's offset that of the weights: a plain mean is drawn by what is far off."""
     root = np.asarray(weighted.batch.mask)
-    return misfits(weighted, values[None])[0] / np.where(root > 0.0, root, 1.0) / float(weighted.noise_sigma)
+    return misfits(weighted, values[None])[0] / np.where(root > 0.0, root, 1.0) / np.asarray(weighted.noise)
 
 
 def robust_fit(problem: Problem, first: Fit, fit: Callable[[Problem, np.ndarray], Fit]) -> tuple[Problem, Fit]:
@@ -36,8 +43,8 @@ def robust_fit(problem: Problem, first: Fit, fit: Callable[[Problem, np.ndarray]
     mask, weighted, found = np.asarray(problem.batch.mask), problem, first
     before = mask
     for _ in range(ROUNDS):
-        misfit = unweighted_misfit(weighted, found.values) * float(problem.noise_sigma)
-        weights = huber_weights(misfit, mask)
+        misfit = unweighted_misfit(weighted, found.values)
+        weights = huber_weights(misfit, mask, len(problem.batch.outputs))
         weighted = eqx.tree_at(lambda one: one.batch.mask, problem, jnp.asarray(np.sqrt(weights)))
         found = fit(weighted, found.values)
         if float(np.abs(weights - before).max()) < SETTLED:

@@ -15,17 +15,39 @@ from smajax.fit.problem import Problem
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """At one point: the misfit (R, N) and its derivative by each of `names` (R, N, A), both over the noise."""
+    """At one point: the misfit (series, N) and its derivative by each of `names` (series, N, A), both over the noise.
+
+    priors: the derivative of the priors' residuals (K, A); None where nothing is known before the runs. shown: what the
+    sensors show there (series, N), SI, without offsets.
+    """
 
     names: tuple[str, ...]
     misfit: np.ndarray
     jacobian: np.ndarray
-    mask: np.ndarray  # (R, N)
+    mask: np.ndarray  # (series, N)
+    priors: np.ndarray | None = None
+    shown: np.ndarray | None = None
 
     def columns(self, names: Sequence[str]) -> np.ndarray:
         """Jacobian columns of `names` on the measured samples, shape (samples, len(names))."""
-        picked = self.jacobian[..., [self.names.index(name) for name in names]]
-        return picked[self.mask > 0]
+        return self.jacobian[..., self._index(names)][self.mask > 0]
+
+    def prior_columns(self, names: Sequence[str]) -> np.ndarray:
+        """Of `names`, the rows of priors that know one of them, shape (rows, len(names))."""
+        if self.priors is None:
+            return np.zeros((0, len(names)))
+        picked = self.priors[:, self._index(names)]
+        return picked[np.any(picked != 0.0, axis=1)]
+
+    def of_series(self, series: Sequence[int], samples: int) -> Sensitivity:
+        """The same of some series only, their first `samples`."""
+        rows = np.asarray(series, dtype=int)
+        misfit, jacobian, mask = (part[rows, :samples] for part in (self.misfit, self.jacobian, self.mask))
+        shown = None if self.shown is None else self.shown[rows, :samples]
+        return Sensitivity(self.names, misfit, jacobian, mask, self.priors, shown)
+
+    def _index(self, names: Sequence[str]) -> list[int]:
+        return [self.names.index(name) for name in names]
 
     def residual(self) -> np.ndarray:
         """Misfit on the measured samples, shape (samples,), in units of the noise."""
@@ -33,17 +55,21 @@ class Sensitivity:
 
 
 @eqx.filter_jit
-def _evaluate(problem: Problem, values: jax.Array, slots: jax.Array) -> tuple[jax.Array, jax.Array]:
-    def at(chosen: jax.Array) -> tuple[jax.Array, jax.Array]:
-        misfit = problem.misfit(values.at[slots].set(chosen)) / problem.noise_sigma
-        return misfit, misfit
+def _evaluate(problem: Problem, values: jax.Array, slots: jax.Array) -> tuple[jax.Array, ...]:
+    def at(chosen: jax.Array) -> tuple[tuple[jax.Array, jax.Array], tuple[jax.Array, jax.Array]]:
+        here = values.at[slots].set(chosen)
+        shown = problem.shown(here)
+        misfit = problem.misfit_of(shown) / problem.noise
+        return (misfit, problem.priors.rows(here)), (misfit, shown)
 
-    jacobian, misfit = jax.jacfwd(at, has_aux=True)(values[slots])
-    return misfit, jacobian
+    (jacobian, priors), (misfit, shown) = jax.jacfwd(at, has_aux=True)(values[slots])
+    return misfit, jacobian, priors, shown
 
 
 def sensitivity(problem: Problem, values: np.ndarray, names: Sequence[str]) -> Sensitivity:
     """Misfit and Jacobian at `values` (P + 1,), by `names`. One forward-mode pass over all runs."""
     slots = jnp.asarray([problem.names.index(name) for name in names], dtype=int)
-    misfit, jacobian = _evaluate(problem, jnp.asarray(values), slots)
-    return Sensitivity(tuple(names), np.asarray(misfit), np.asarray(jacobian), np.asarray(problem.batch.mask))
+    found = (np.asarray(part) for part in _evaluate(problem, jnp.asarray(values), slots))
+    misfit, jacobian, priors, shown = found
+    mask = np.asarray(problem.batch.mask)
+    return Sensitivity(tuple(names), misfit, jacobian, mask, priors if len(priors) else None, shown)

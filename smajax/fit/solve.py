@@ -103,7 +103,7 @@ def _misfits(problem: Problem, values: jax.Array) -> jax.Array:
 
 
 def misfits(problem: Problem, points: Sequence[np.ndarray] | np.ndarray) -> np.ndarray:
-    """Misfit (SI) of every run at every point, shape (points, R, N)."""
+    """Misfit (SI) of every series at every point, shape (points, series, N)."""
     found: list[np.ndarray] = []
     for start in range(0, len(points), LANES):
         some = list(points[start : start + LANES])
@@ -113,5 +113,6 @@ def misfits(problem: Problem, points: Sequence[np.ndarray] | np.ndarray) -> np.n
 
 
 def _costs(problem: Problem, points: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    squares = (misfits(problem, points) / float(problem.noise_sigma)) ** 2
-    return np.nan_to_num((squares.sum(axis=2) * weights).sum(axis=1), nan=1e30, posinf=1e30)
+    squares = (misfits(problem, points) / np.asarray(problem.noise)) ** 2
+    by_series = np.repeat(weights, len(problem.batch.outputs), axis=1)
+    return np.nan_to_num((squares.sum(axis=2) * by_series).sum(axis=1), nan=1e30, posinf=1e30)

@@ -5,10 +5,13 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping, Sequence
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 from scipy.stats import qmc
 
 from smajax.fit.box import Fit, fit_in_box
+from smajax.fit.kept import Kept
 from smajax.fit.problem import Lane, Problem
 from smajax.fit.progress import Progress, quiet
 from smajax.fit.solve import misfits
@@ -28,6 +31,19 @@ def box_points(start: np.ndarray, columns: Sequence[int], box: np.ndarray, count
     return points
 
 
+def _costs(problem: Problem, points: np.ndarray, kept: Kept) -> np.ndarray:
+    """Sum of squares at every point; infinite where the model gives no number."""
+    key = kept.key(problem, "costs", points)
+    known = kept.load(key)
+    if known is not None:
+        return known["cost"]
+    squares = (misfits(problem, points) / np.asarray(problem.noise)) ** 2
+    before = np.asarray(jax.vmap(problem.priors.rows)(jnp.asarray(points))) ** 2
+    cost = np.nan_to_num(squares.sum(axis=(1, 2)) + before.sum(axis=1), nan=np.inf)
+    kept.save(key, {"cost": cost})
+    return cost
+
+
 def from_many_starts(
     problem: Problem,
     names: Sequence[str],
@@ -35,24 +51,25 @@ def from_many_starts(
     seed: int,
     tried: int = TRIED,
     progress: Progress = quiet,
+    kept: Kept | None = None,
 ) -> list[Fit]:
     """Fits of `names`, best first: of `tried` points the best are begun, and the best of those carried to their end."""
+    kept = kept or Kept()
     start = problem.start_values()
     points = [start]
     if tried:
         box = np.asarray([bounds[name] for name in names])
         drawn = box_points(start, [problem.names.index(name) for name in names], box, tried, seed)
         progress(f"simulating at {tried} points of the box", 0.0)
-        squares = (misfits(problem, drawn) / float(problem.noise_sigma)) ** 2
-        cost = np.nan_to_num(squares.sum(axis=(1, 2)), nan=np.inf)
+        cost = _costs(problem, drawn, kept)
         points += list(drawn[np.argsort(cost)[: BEGUN - 1]])
         progress(f"simulating at {tried} points of the box", 1.0)
 
     def lanes(values: Sequence[np.ndarray]) -> list[Lane]:
         return [problem.lane(names, bounds, one, len(names)) for one in values]
 
-    begun = fit_in_box(problem, lanes(points), most=FIRST, progress=progress, what="beginning fits")
+    begun = fit_in_box(problem, lanes(points), most=FIRST, kept=kept, progress=progress, what="beginning fits")
     best = sorted(begun, key=lambda one: one.cost)[:KEPT]
-    ended = fit_in_box(problem, lanes([one.values for one in best]), progress=progress, what="fitting")
+    ended = fit_in_box(problem, lanes([one.values for one in best]), kept=kept, progress=progress, what="fitting")
     whole = [dataclasses.replace(one, steps=one.steps + before.steps) for one, before in zip(ended, best, strict=True)]
     return sorted(whole, key=lambda one: one.cost)

@@ -21,6 +21,8 @@ UNSEEN = 1e-5
 SHARE = 0.1
 # A predicted standard error beyond this share of the allowed box: the runs say nothing that the box does not.
 VAGUE = 0.25
+# A standard error above this share of the prior's: what is known of the parameter was known before.
+BARELY = 0.95
 
 
 @dataclass(frozen=True)
@@ -38,21 +40,23 @@ def held(value: float, low: float, high: float, edge: float = AT_BOUND) -> str:
 
 
 def _covariance(
-    columns: np.ndarray, runs: Sequence[np.ndarray], variance: float | None = None
+    columns: np.ndarray, priors: np.ndarray, runs: Sequence[np.ndarray], variance: float | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(covariance, scale of each column).
+    """(covariance, scale of each column). A prior counts as one sample more, whose noise is one.
 
     That of least squares where the residual is white. Where it has a memory, Newey-West's over each run, no variance of
     it below that of least squares: it is taken from the scores of the few samples that tell a parameter, and for few it
     comes out too small (by a factor of 2.7 in a coupon of 600 samples).
     """
-    scale = np.linalg.norm(columns, axis=0)
+    scale = np.linalg.norm(np.concatenate([columns, priors]), axis=0)
     scale = np.where(scale > 0.0, scale, 1.0)
-    scaled = columns / scale
-    bread = np.linalg.pinv(scaled.T @ scaled, rcond=1e-12, hermitian=True)
+    scaled, known = columns / scale, priors / scale
+    bread = np.linalg.pinv(scaled.T @ scaled + known.T @ known, rcond=1e-12, hermitian=True)
+    before = bread @ (known.T @ known) @ bread  # zero without priors
+    each = float(np.mean(np.concatenate(runs) ** 2)) if variance is None else variance
+    plain = each * (bread - before) + before
     if variance is not None:
-        return bread * variance, scale
-    plain = bread * float(np.mean(np.concatenate(runs) ** 2))
+        return plain, scale
     if whiteness_p_value(runs) > WHITE:
         return plain, scale
     meat = np.zeros_like(bread)
@@ -65,7 +69,7 @@ def _covariance(
         for lag in range(1, min(reach, len(run) // 4) + 1):
             cross = scores[:-lag].T @ scores[lag:]
             meat += (1.0 - lag / (reach + 1.0)) * (cross + cross.T)
-    sandwich = bread @ meat @ bread
+    sandwich = bread @ meat @ bread + before
     least = np.sqrt(np.maximum(np.diag(plain), 0.0) / np.maximum(np.diag(sandwich), 1e-300))
     raised = np.maximum(least, 1.0)
     return sandwich * np.outer(raised, raised), scale
@@ -121,11 +125,12 @@ def uncertainty(
     errors: dict[str, float | None] = dict.fromkeys(names)
     if not loose:
         return Uncertainty(errors, remark)
-    columns = at.columns(loose)
-    covariance, scale = _covariance(columns, split_runs(at.misfit, at.mask), variance)
-    seen = np.any(columns, axis=0)
+    columns, priors = at.columns(loose), at.prior_columns(loose)
+    covariance, scale = _covariance(columns, priors, split_runs(at.misfit, at.mask), variance)
+    whole = np.concatenate([columns, priors])
+    seen = np.any(whole, axis=0)
     unseen = np.zeros((len(loose), len(loose)))
-    unseen[np.ix_(seen, seen)] = _unseen(columns[:, seen] / scale[seen])
+    unseen[np.ix_(seen, seen)] = _unseen(whole[:, seen] / scale[seen])
     error = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     for index, name in enumerate(loose):
         blind = not seen[index]
@@ -136,6 +141,8 @@ def uncertainty(
         elif lost:
             others = [loose[k] for k in np.flatnonzero(np.abs(unseen[index]) > SHARE**2) if k != index]
             remark[name] = f"the runs see only a combination of it with {', '.join(others)}"
+        elif priors[:, index].any() and error[index] / scale[index] > BARELY / np.linalg.norm(priors[:, index]):
+            remark[name] = "known from its prior; the runs add next to nothing"
     clear = [index for index, name in enumerate(loose) if not remark[name]]
     for index, name in enumerate(loose):
         room = bounds[name][1] - bounds[name][0]
@@ -155,7 +162,8 @@ def covariance_of(
     told = tuple(name for name in names if known.standard_error[name] is not None)
     if not told:
         return told, np.zeros((0, 0))
-    covariance, scale = _covariance(at.columns(told), split_runs(at.misfit, at.mask), variance)
+    runs = split_runs(at.misfit, at.mask)
+    covariance, scale = _covariance(at.columns(told), at.prior_columns(told), runs, variance)
     return told, covariance / np.outer(scale, scale)
 
 
@@ -180,7 +188,7 @@ def identifiability(at: Sensitivity, names: Sequence[str], bounds: Mapping[str, 
     """
     if not names:
         return ["Nothing is declared unknown: the base model is taken as it is."]
-    columns = at.columns(names)
+    columns = np.concatenate([at.columns(names), at.prior_columns(names)])
     span = np.asarray([bounds[name][1] - bounds[name][0] for name in names])
     boxed = columns * span
     singular = np.linalg.svd(boxed, compute_uv=False)

@@ -14,6 +14,7 @@ from smajax.measured.table import Array, MeasuredDataError, Table
 COMMENT_MARKS = ("#", "%")
 # In this order, because a column may hold decimal commas where another mark separates.
 SEPARATORS = ("\t", ";", ",")
+MISSING = ("", "na", "n/a")  # cells without a sample, where the experiment file allows them; nan is a number to Python
 
 
 def _text(path: Path) -> str:
@@ -133,6 +134,7 @@ def read_csv(path: Path) -> Table:
         raise MeasuredDataError(f"{path}: column name(s) {repeated} given more than once; rename them")
     columns: dict[str, Array] = {}
     unusable: dict[str, str] = {}
+    gappy: dict[str, Array] = {}
     units = header is not None and _is_units(rows)
     for place, name in enumerate(names):
         reason = _why_unusable(name, place, rows, units)
@@ -140,7 +142,10 @@ def read_csv(path: Path) -> Table:
             columns[name] = np.array([row[place] for _, row in rows], dtype=np.float64)
         else:
             unusable[name] = reason
+            if all(cell.lower() in MISSING or _is_number(cell) for cell in (row[place] for _, row in rows)):
+                cells = [row[place] for _, row in rows]
+                gappy[name] = np.array([np.nan if cell.lower() in MISSING else float(cell) for cell in cells])
     if not columns:
         raise MeasuredDataError(f"{path}: no column of numbers; {unusable[names[0]]}")
     lines = tuple(number for number, _ in rows)
-    return Table(path=path, columns=columns, unusable=unusable, order=tuple(names), lines=lines)
+    return Table(path=path, columns=columns, unusable=unusable, gappy=gappy, order=tuple(names), lines=lines)

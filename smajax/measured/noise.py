@@ -19,7 +19,7 @@ def detect_quantum(signal: Array) -> float:
 
     Values must recur, and the gaps between neighbouring levels must be whole multiples of the smallest gap.
     """
-    extent = float(np.ptp(signal))
+    extent = float(np.ptp(signal)) if signal.size else 0.0
     if extent == 0.0:
         return 0.0
     levels = np.unique(signal)

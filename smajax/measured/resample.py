@@ -16,6 +16,10 @@ from smajax.measured.table import Array
 
 # Below this many sensor samples a step there is nothing to average.
 DECIMATION_FROM = 1.05
+# A value more than this share of which would be made up is missing.
+MADE_UP = 0.25
+# Sample intervals without a row from which on samples are missing.
+GAP_INTERVALS = 5.0
 
 
 @dataclass(frozen=True)
@@ -85,6 +89,26 @@ def resample_output(time: Array, values: Array, clock: Array, step: float) -> Re
     wide = half > 1e-6 * step
     mean = centre + (high - low) / np.where(wide, 2.0 * half, 1.0)
     return Resampled(values=np.where(wide, mean, at_instant), noise_gain=window_noise_gain(per_step))
+
+
+def resample_with_gaps(time: Array, values: Array, clock: Array, step: float) -> Resampled:
+    """As `resample_output` where samples are missing (nan, or no row for several intervals): nan where too much is.
+
+    Shorter gaps are bridged by straight lines, so that one lost sample of many in a step loses no step.
+    """
+    known = np.isfinite(values)
+    if not known.any():
+        return Resampled(np.full(clock.size, np.nan), 1.0)
+    # A stretch without rows is one of missing samples at its usual interval.
+    usual = float(np.median(np.diff(time)))
+    long = np.flatnonzero(np.diff(time) > GAP_INTERVALS * usual)
+    at = np.sort(np.concatenate([time, time[long] + usual, time[long + 1] - usual]))
+    here = np.searchsorted(time, at)
+    measured = np.isclose(time[np.minimum(here, time.size - 1)], at, rtol=0.0, atol=1e-9 * usual)
+    lost = ~(measured & known[np.minimum(here, time.size - 1)])
+    found = resample_output(time, np.interp(time, time[known], values[known]), clock, step)
+    made_up = resample_output(at, lost.astype(np.float64), clock, step).values
+    return Resampled(np.where(made_up > MADE_UP, np.nan, found.values), found.noise_gain)
 
 
 def window_noise_gain(samples_per_step: float) -> float:

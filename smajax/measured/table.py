@@ -29,6 +29,7 @@ class Table:
     columns: name -> (n,) values in the file's own units; lengths may differ in a .mat file.
     clocks: name -> (n,) times of that signal, seconds, for the signals that carry their own.
     unusable: name -> why that column holds no signal; it is an error only when the column is asked for.
+    gappy: of the unusable, those that hold a signal once empty cells are taken as missing: name -> (n,) with nan there.
     lines: the line of the file, counted from 1, that each sample is from; empty where samples have no lines.
     """
 
@@ -36,6 +37,7 @@ class Table:
     columns: Mapping[str, Array]
     clocks: Mapping[str, Array] = field(default_factory=dict)
     unusable: Mapping[str, str] = field(default_factory=dict)
+    gappy: Mapping[str, Array] = field(default_factory=dict)
     order: tuple[str, ...] = ()
     lines: tuple[int, ...] = ()
 
@@ -58,21 +60,29 @@ class Table:
         free = [name for number, name in enumerate(names, start=1) if name not in taken and number not in taken]
         raise MeasuredDataError(f"{self.path}: no column {key!r}{instead(key, names, 'it has', free)}")
 
-    def column(self, key: str | int, taken: Collection[str | int] = ()) -> Array:
-        """The values of one column, shape (n,), all finite. taken: see `name_of`. Raises MeasuredDataError."""
+    def column(self, key: str | int, taken: Collection[str | int] = (), gaps: bool = False) -> Array:
+        """The values of one column, shape (n,), all finite or, with `gaps`, nan where a sample is missing.
+
+        taken: see `name_of`. Raises MeasuredDataError.
+        """
         name = self.name_of(key, taken)
-        if name in self.unusable:
+        if name in self.unusable and not (gaps and name in self.gappy):
             raise MeasuredDataError(f"{self.path}: {self.unusable[name]}")
-        values = self.columns[name]
+        values = self.gappy[name] if name in self.unusable else self.columns[name]
         if values.size == 0:
             raise MeasuredDataError(f"{self.path}: column {name!r} is empty; expected at least two samples")
-        bad = np.flatnonzero(~np.isfinite(values))
+        bad = np.flatnonzero(np.isinf(values) if gaps else ~np.isfinite(values))
         if bad.size:
             raise MeasuredDataError(
                 f"{self.path}: column {name!r} has {bad.size} value(s) that are not finite, the first is "
                 f"{values[bad[0]]} in {self.place(int(bad[0]))}; remove or repair those samples"
             )
         return values
+
+    def has_gaps(self, key: str | int) -> bool:
+        """Whether the column holds a signal once cells that are empty or nan are taken as missing samples."""
+        name = self.name_of(key)
+        return name in self.gappy or bool(name in self.columns and np.isnan(self.columns[name]).any())
 
     def clock(self, key: str | int) -> Array | None:
         """The times that the signal itself carries, shape (n,), seconds; None when it carries none."""

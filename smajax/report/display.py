@@ -45,9 +45,10 @@ _PERCENT = Display("%", 100.0)
 def display(unit: str, quantity: str = "") -> Display:
     """How to show a value given in `unit`; a unit that has no entry is shown as it is.
 
-    A strain is the one plain number that is read in per cent: `quantity`, its name, tells it from the others.
+    A strain is the one plain number that is read in per cent: `quantity`, its name, tells it from the others. A run's own
+    parameter is named `recoverable_strain[run]`.
     """
-    if unit in ("-", "1", "") and quantity.endswith("strain"):
+    if unit in ("-", "1", "") and quantity.split("[")[0].endswith("strain"):
         return _PERCENT
     return _SHOWN.get(unit) or Display(unit.replace("^2", "²").replace("^3", "³").replace("^4", "⁴"), 1.0)
 

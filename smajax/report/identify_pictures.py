@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-from smajax.identify import Identified, IdentifiedRun
+from smajax.identified import Identified, IdentifiedRun
 from smajax.report.display import axis_label, channel, digits, display, label
 from smajax.report.pictures import (
     AFTER,
@@ -20,18 +22,21 @@ from smajax.report.pictures import (
 )
 
 
-def run_with_band(found: Identified, run: IdentifiedRun) -> bytes:
-    """Measured and simulated, the residual with the noise's band and the parameters', and the varying inputs."""
-    shown = display(found.output_unit, found.output_name)
-    figure, rows = run_panels(run.time, run.inputs, found.output_name, shown)
+def run_with_band(found: Identified, run: IdentifiedRun, k: int = 0) -> bytes:
+    """Of the k-th output: measured, simulated, residual with the noise's band and the parameters', varying inputs."""
+    sensor, one = found.outputs[k], run.series[k]
+    shown = display(sensor.unit, sensor.name)
+    figure, rows = run_panels(run.time, run.inputs, sensor.name, shown)
     output, residual = rows[:2]
-    output.plot(*extremes(run.time, shown.of(run.measured)), **THICK, label="measured")
-    output.plot(*extremes(run.time, shown.of(run.simulated)), color=AFTER, linewidth=1.2, label="simulated")
-    both = 1.96 * np.hypot(run.spread, found.noise_sigma)
+    # A sample whose neighbours are missing is on no line.
+    dots: dict[str, Any] = {"marker": ".", "markersize": 3.0} if np.isnan(one.measured).any() else {}
+    output.plot(*extremes(run.time, shown.of(one.measured)), **THICK, **dots, label="measured")
+    output.plot(*extremes(run.time, shown.of(one.simulated)), color=AFTER, linewidth=1.2, label="simulated")
+    both = 1.96 * np.hypot(one.spread, sensor.noise_sigma)
     residual.fill_between(
         run.time, shown.of(-both), shown.of(both), color=NOISE, zorder=0, label="95 %: noise and parameters"
     )
-    residual.plot(*extremes(run.time, shown.of(run.measured - run.simulated)), color=AFTER, linewidth=0.9)
+    residual.plot(*extremes(run.time, shown.of(one.measured - one.simulated)), color=AFTER, linewidth=0.9, **dots)
     return panels_done(figure, rows, 3)
 
 
@@ -79,6 +84,34 @@ def profile_curves(found: Identified) -> bytes | None:
     for axes in panels[len(found.profiles) :]:
         axes.set_visible(False)
     panels[0].set_ylabel("rise of the cost", fontsize=8)
+    return as_png(figure)
+
+
+def posterior_histograms(found: Identified) -> bytes | None:
+    """Each parameter's draws beside the Gaussian of its standard error."""
+    drawn = found.posterior
+    if drawn is None:
+        return None
+    columns = min(3, len(drawn.names))
+    rows = -(-len(drawn.names) // columns)
+    figure = new_figure(2.2 * rows + 0.5, width=2.4 * columns + 0.6)
+    panels = figure.subplots(rows, columns, squeeze=False).ravel()
+    estimates = {one.name: one for one in found.estimates}
+    for axes, name, draws in zip(panels, drawn.names, drawn.flat.T, strict=False):
+        estimate = estimates[name]
+        unit = display(estimate.unit, name)
+        axes.hist(unit.of(draws), bins=40, density=True, color=AFTER, alpha=0.55)
+        if estimate.standard_error:
+            error = unit.of(estimate.standard_error)
+            left, right = axes.get_xlim()
+            fine = np.linspace(left, right, 200)
+            height = np.exp(-0.5 * ((fine - unit.of(estimate.value)) / error) ** 2) / (error * np.sqrt(2.0 * np.pi))
+            axes.plot(fine, height, color=QUIET, linewidth=1.1)
+        axes.set_xlabel(axis_label(name, unit), fontsize=8)
+        axes.set_yticks([])
+        tidy(axes)
+    for axes in panels[len(drawn.names) :]:
+        axes.set_visible(False)
     return as_png(figure)
 
 

@@ -53,9 +53,15 @@ def extremes(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarr
     if size <= 2:
         return time, values
     whole = len(time) // size * size
-    buckets = np.nan_to_num(values[:whole].reshape(-1, size))
+    # A bucket that holds a number is not drawn by a missing one: nan is neither lowest nor highest.
+    buckets = values[:whole].reshape(-1, size)
+    missing = np.isnan(buckets)
     rows = np.arange(len(buckets)) * size
-    picked = np.sort(np.stack([rows + buckets.argmin(axis=1), rows + buckets.argmax(axis=1)]), axis=0).T.ravel()
+    lowest, highest = (
+        np.where(missing, np.inf, buckets).argmin(axis=1),
+        np.where(missing, -np.inf, buckets).argmax(axis=1),
+    )
+    picked = np.sort(np.stack([rows + lowest, rows + highest]), axis=0).T.ravel()
     picked = np.append(picked, np.arange(whole, len(time)))
     return time[picked], values[picked]
 

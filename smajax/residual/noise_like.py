@@ -52,5 +52,5 @@ def correlation_time(runs: Sequence[np.ndarray]) -> float:
 
 
 def split_runs(misfit: np.ndarray, mask: np.ndarray) -> list[np.ndarray]:
-    """Misfit (R, N) and mask (R, N) -> one array of measured samples per run."""
-    return [row[valid > 0] for row, valid in zip(misfit, mask, strict=True)]
+    """Misfit and mask, (series, N) -> one array of measured samples per series that has any."""
+    return [row[valid > 0] for row, valid in zip(misfit, mask, strict=True) if valid.any()]

@@ -1,0 +1,170 @@
+"""An identification in words and rows, no more than its numbers say."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from smajax.experiment.record import Prior
+from smajax.fit.posterior import Posterior
+from smajax.identified import Estimate, Identified
+from smajax.report.display import digits, display, label, p_value, with_error
+from smajax.residual.noise_like import WHITE
+from smajax.words import and_listed
+
+OFF = 1.25  # ratio of residual to noise that is worth a sentence
+
+
+def conclusions(found: Identified) -> list[str]:
+    """What was found, in sentences that say no more than the numbers."""
+    told = [found.stopped, *(_error(found, k) for k in range(len(found.outputs)))]
+    given = [one.noise_before is None for one in found.outputs]
+    if found.whiteness_p < WHITE:
+        told.append(
+            f"The residual is {_times(found)} the noise and has a memory ({p_value(found.whiteness_p)}; one "
+            f"sample in {found.independent:.0f} is independent): the model lacks something, and the standard errors allow "
+            "for the memory but not for what that does to the values. `smajax close-loop` looks for what it is."
+        )
+    else:
+        told.append(
+            f"The residual is {_times(found)} the noise, and no memory was found in it "
+            f"({p_value(found.whiteness_p)}): nothing in these runs speaks against the model."
+        )
+        wrong = [
+            one for one, told_ in zip(found.outputs, given, strict=True) if told_ and not 1.0 / OFF < one.ratio < OFF
+        ]
+        if wrong and len(found.outputs) == 1:
+            told.append("The noise is not what was declared: errors were taken from the residual.")
+        elif wrong:
+            told.append(
+                f"The noise of {and_listed([one.name for one in wrong])} is not what was declared, so the outputs do not "
+                "have the weights they deserve: write noise = 'estimate' for it."
+            )
+    larger = [one for one in found.outputs if one.noise_before and one.noise_sigma > OFF * one.noise_before]
+    if larger:
+        told.append(
+            f"What the fit leaves of {and_listed([one.name for one in larger])} is more than the noise that the signal "
+            "itself shows: part of it is what the model lacks, and was given the weight of noise."
+        )
+    if found.normality_p < WHITE and not found.robust:
+        told.append(
+            f"It is not normally distributed ({p_value(found.normality_p)}): if single samples are far off, fit by Huber's "
+            "loss (`--robust`)."
+        )
+    edge = [one.name for one in found.estimates if "bound" in one.remark and one.standard_error is None]
+    silent = [one.name for one in found.estimates if one.standard_error is None and one.name not in edge]
+    if edge:
+        told.append(
+            f"Held by a bound, which the truth may lie beyond: {', '.join(edge)}; the others are told with it held."
+        )
+    if silent:
+        told.append(f"The runs do not tell {', '.join(silent)}: see the remarks.")
+    if better := [one.name for one in found.profiles if one.better]:
+        told.append(f"The profile of {', '.join(better)} found a better fit than this one: ask for more `--starts`.")
+    if found.posterior is not None:
+        told.append(_chains(found.posterior))
+    if found.robust:
+        told.append("Huber's loss: samples far off count less, and errors are those of that estimate.")
+    return told
+
+
+def _times(found: Identified) -> str:
+    """`1.1 times`, or by output where the fit did not make it one."""
+    if len(found.outputs) == 1:
+        return f"{found.ratio:.2g} times"
+    return and_listed([f"{one.ratio:.2g} times ({one.name})" for one in found.outputs])
+
+
+def rms_by_role(found: Identified, output: int) -> dict[str, float]:
+    """Error of one output over all runs of a role, SI."""
+    by_role = {}
+    for role in dict.fromkeys(run.role for run in found.runs):
+        errors = [run.series[output].rmse for run in found.runs if run.role == role]
+        known = [error for error in errors if np.isfinite(error)]
+        if known:
+            by_role[role] = float(np.sqrt(np.mean(np.square(known))))
+    return by_role
+
+
+def _error(found: Identified, output: int) -> str:
+    """Error of one output and its noise, in its own unit."""
+    one = found.outputs[output]
+    unit = display(one.unit, one.name)
+    errors = "; ".join(
+        f"{role} runs {digits(unit.of(error), 3)} {unit.unit}".strip()
+        for role, error in rms_by_role(found, output).items()
+    )
+    whose = f"Error of the {label(one.name)} (rms)" if len(found.outputs) > 1 else "Error (rms)"
+    noise = f"noise {digits(unit.of(one.noise_sigma), 3)} {unit.unit}, {one.noise_how}"
+    if one.noise_before is not None:
+        noise += f" (its differences show {digits(unit.of(one.noise_before), 3)} {unit.unit})".replace(" )", ")")
+    return f"{whose}: {errors}; {noise}.".replace(" ,", ",")
+
+
+def estimate_rows(found: Identified) -> list[list[str]]:
+    """Parameter, estimate with standard error, unit, bounds, start, 95 % interval of the profile, remark."""
+    profiled = {one.name: one for one in found.profiles}
+
+    def interval(one: Estimate) -> str:
+        if one.name not in profiled:
+            return ""
+        unit, known = display(one.unit, one.name), profiled[one.name]
+        last = (known.values[0], known.values[-1])
+        ends = [
+            digits(unit.of(end)) if end is not None else f"beyond {digits(unit.of(float(reached)))}"
+            for end, reached in zip((known.low, known.high), last, strict=True)
+        ]
+        return " … ".join(ends)
+
+    rows = []
+    for one in found.estimates:
+        unit = display(one.unit, one.name)
+        error = None if one.standard_error is None else unit.of(one.standard_error)
+        bounds = f"{digits(unit.of(one.lower))} … {digits(unit.of(one.upper))}"
+        rows.append(
+            [
+                one.name,
+                with_error(unit.of(one.value), error),
+                unit.unit,
+                interval(one),
+                bounds,
+                digits(unit.of(one.start)),
+                one.remark,
+            ]
+        )
+    return rows
+
+
+def _chains(drawn: Posterior) -> str:
+    """Whether the chains may be believed."""
+    worst = f"R-hat up to {drawn.r_hat.max():.3f}, at least {drawn.effective.min():.0f} independent draws"
+    if drawn.converged:
+        return f"The chains of the posterior agree ({worst})."
+    return f"The chains of the posterior do not agree yet ({worst}): ask for more draws, and do not use them before."
+
+
+def posterior_rows(found: Identified) -> list[list[str]]:
+    """Parameter, mean with standard deviation, unit, 95 % interval, R-hat, independent draws."""
+    if found.posterior is None:
+        return []
+    units = {one.name: display(one.unit, one.name) for one in found.estimates}
+    rows = []
+    for k, name in enumerate(found.posterior.names):
+        draws, unit = found.posterior.flat[:, k], units[name]
+        low, high = (digits(unit.of(float(end))) for end in np.percentile(draws, [2.5, 97.5]))
+        value = with_error(unit.of(float(draws.mean())), unit.of(float(draws.std())))
+        chains = [f"{found.posterior.r_hat[k]:.3f}", f"{found.posterior.effective[k]:.0f}"]
+        rows.append([name, value, unit.unit, f"{low} … {high}", *chains])
+    return rows
+
+
+def prior_shown(estimate: Estimate) -> str:
+    """What was known before the runs: `80 ± 10`, or `80 × or / 1.22`."""
+    known: Prior | None = estimate.prior
+    if known is None:
+        return ""
+    unit = display(estimate.unit, estimate.name)
+    if known.logarithmic:
+        return f"{digits(unit.of(known.mean))} × or / {digits(math.exp(known.sigma), 3)}"
+    return f"{digits(unit.of(known.mean))} ± {digits(unit.of(known.sigma), 2)}"
