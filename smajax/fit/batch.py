@@ -17,7 +17,7 @@ from smajax.parameters import set_parameters
 from smajax.sensors import shown_by
 from smajax.simulate import simulate
 from smajax.system import System, initial_state
-from smajax.types import State, Trajectory
+from smajax.types import Scalar, State, Trajectory
 
 
 class RunBatch(eqx.Module):
@@ -115,6 +115,20 @@ def _each_run(
 
     values = batch.overrides if own is None else jnp.concatenate([batch.overrides, own], axis=1)
     return jax.vmap(one)(batch.inputs, values)
+
+
+def shown_run(
+    system: System,
+    inputs: dict[str, Float[Array, " time"]],
+    values: Float[Array, " own"],
+    names: Sequence[str],
+    dt: Scalar | float,
+    outputs: Sequence[str],
+) -> Float[Array, "output time"]:
+    """What the sensors show of one run, with its own `values` of `names`."""
+    here, initial = _started(system, names, values, inputs)
+    run = simulate(here, inputs, dt, initial)
+    return jnp.stack([shown_by(here, run, name) for name in outputs])
 
 
 def simulate_batch(

@@ -10,18 +10,17 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from dataclasses import fields as fields_of
-from functools import partial
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.sharding import Mesh, PartitionSpec
 from scipy.optimize import lsq_linear
 
 from smajax.fit.kept import Kept
 from smajax.fit.problem import Lane, Problem
 from smajax.fit.progress import Progress, quiet
+from smajax.fit.shown import shown_and_slopes
 
 MOST_STEPS = 120
 ENOUGH = 1e-8  # of the cost: what a step that is the last one may still lower it by, and promise to; scipy's too
@@ -63,36 +62,48 @@ class _Walk:
 
 
 @eqx.filter_jit
+def _asked(lanes: Lane, places: jax.Array) -> tuple[jax.Array, jax.Array]:
+    """(values, derivatives of the values by the place) of every lane: (L, P + 1) and (L, slots, P + 1)."""
+
+    def one(lane: Lane, place: jax.Array) -> tuple[jax.Array, jax.Array]:
+        return _values_at(lane, place), jax.jacfwd(lambda there: _values_at(lane, there))(place).T
+
+    return jax.vmap(one)(lanes, places)
+
+
+def _values_at(lane: Lane, place: jax.Array) -> jax.Array:
+    return lane.values.at[lane.slots].set(lane.low + place * (lane.high - lane.low))
+
+
+@eqx.filter_jit
+def _summed(
+    problem: Problem, lanes: Lane, places: jax.Array, outputs: jax.Array | None, shown: jax.Array, slopes: jax.Array
+) -> tuple[jax.Array, jax.Array, jax.Array]:
+    """(r^T r, J^T r, J^T J) of every lane, from what its sensors show and how that moves with its place."""
+
+    def one(
+        lane: Lane, place: jax.Array, output: jax.Array | None, shown: jax.Array, slopes: jax.Array
+    ) -> tuple[jax.Array, jax.Array, jax.Array]:
+        here = problem.with_output(output)
+
+        def residual(place: jax.Array, shown: jax.Array) -> jax.Array:
+            return here.residual_of(shown, _values_at(lane, place), lane.weights)
+
+        value = residual(place, shown)
+        along = lambda way, slope: jax.jvp(residual, (place, shown), (way, slope))[1]  # noqa: E731
+        jacobian = jax.vmap(along)(jnp.eye(len(place)), slopes)
+        return value @ value, jacobian @ value, jacobian @ jacobian.T
+
+    return eqx.filter_vmap(one)(lanes, places, outputs, shown, slopes)
+
+
 def _normal_equations(
     problem: Problem, lanes: Lane, places: jax.Array, outputs: jax.Array | None
 ) -> tuple[jax.Array, jax.Array, jax.Array]:
-    """(r^T r, J^T r, J^T J) of every lane at its place, by shares of its box; each local device takes its share of lanes."""
-
-    def one(
-        known: Problem, lane: Lane, place: jax.Array, output: jax.Array | None
-    ) -> tuple[jax.Array, jax.Array, jax.Array]:
-        here = known.with_output(output)
-
-        def residual(place: jax.Array) -> tuple[jax.Array, jax.Array]:
-            values = lane.values.at[lane.slots].set(lane.low + place * (lane.high - lane.low))
-            value = here.residual(values, lane.weights)
-            return value, value
-
-        jacobian, value = jax.jacfwd(residual, has_aux=True)(place)
-        return value @ value, value @ jacobian, jacobian.T @ jacobian
-
-    def every(known: Problem, some: tuple[Lane, jax.Array, jax.Array | None]) -> tuple[jax.Array, jax.Array, jax.Array]:
-        return eqx.filter_vmap(partial(one, known))(*some)
-
-    devices = np.asarray(jax.local_devices())
-    if len(devices) == 1 or len(places) % len(devices):
-        return every(problem, (lanes, places, outputs))
-    over = PartitionSpec("lane")
-    # Not by the compiler's own partitioning: the devices would wait for each other in every iteration of every step.
-    spread = jax.shard_map(
-        every, mesh=Mesh(devices, ("lane",)), in_specs=(PartitionSpec(), over), out_specs=over, check_vma=False
-    )
-    return spread(problem, (lanes, places, outputs))
+    """(r^T r, J^T r, J^T J) of every lane at its place, by shares of its box."""
+    values, towards = (np.asarray(one) for one in _asked(lanes, places))
+    shown, slopes = shown_and_slopes(problem, values, towards)
+    return _summed(problem, lanes, places, outputs, jnp.asarray(shown), jnp.asarray(slopes))
 
 
 def _step(walk: _Walk) -> np.ndarray:

@@ -152,7 +152,17 @@ class Problem(eqx.Module):
 
         `lost`: what stands for a misfit that is not finite.
         """
-        misfit = self.misfit(values) / self.noise
+        return self.residual_of(self.shown(values), values, weights, lost)
+
+    def residual_of(
+        self,
+        shown: Float[Array, "series time"],
+        values: Float[Array, " parameter"],
+        weights: Float[Array, " run"],
+        lost: float | None = None,
+    ) -> Float[Array, " sample"]:
+        """`residual` of what the sensors show at `values`."""
+        misfit = self.misfit_of(shown) / self.noise
         misfit = misfit if lost is None else jnp.where(jnp.isfinite(misfit), misfit, lost)
         by_series = jnp.repeat(weights, len(self.batch.outputs), total_repeat_length=len(misfit))
         return jnp.concatenate([(misfit * jnp.sqrt(by_series)[:, None]).ravel(), self.priors.rows(values)])

@@ -11,6 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from smajax.fit.problem import Problem
+from smajax.fit.shown import shown_and_slopes
 
 
 @dataclass(frozen=True)
@@ -55,21 +56,22 @@ class Sensitivity:
 
 
 @eqx.filter_jit
-def _evaluate(problem: Problem, values: jax.Array, slots: jax.Array) -> tuple[jax.Array, ...]:
-    def at(chosen: jax.Array) -> tuple[tuple[jax.Array, jax.Array], tuple[jax.Array, jax.Array]]:
-        here = values.at[slots].set(chosen)
-        shown = problem.shown(here)
-        misfit = problem.misfit_of(shown) / problem.noise
-        return (misfit, problem.priors.rows(here)), (misfit, shown)
+def _evaluated(
+    problem: Problem, values: jax.Array, towards: jax.Array, shown: jax.Array, slopes: jax.Array
+) -> tuple[jax.Array, ...]:
+    def misfit(shown: jax.Array) -> jax.Array:
+        return problem.misfit_of(shown) / problem.noise
 
-    (jacobian, priors), (misfit, shown) = jax.jacfwd(at, has_aux=True)(values[slots])
-    return misfit, jacobian, priors, shown
+    jacobian = jax.vmap(lambda slope: jax.jvp(misfit, (shown,), (slope,))[1], out_axes=-1)(slopes)
+    priors = jax.vmap(lambda way: jax.jvp(problem.priors.rows, (values,), (way,))[1], out_axes=-1)(towards)
+    return misfit(shown), jacobian, priors
 
 
 def sensitivity(problem: Problem, values: np.ndarray, names: Sequence[str]) -> Sensitivity:
     """Misfit and Jacobian at `values` (P + 1,), by `names`. One forward-mode pass over all runs."""
-    slots = jnp.asarray([problem.names.index(name) for name in names], dtype=int)
-    found = (np.asarray(part) for part in _evaluate(problem, jnp.asarray(values), slots))
-    misfit, jacobian, priors, shown = found
+    towards = np.eye(len(values))[[problem.names.index(name) for name in names]]
+    (shown,), (slopes,) = shown_and_slopes(problem, np.asarray(values)[None], towards[None])
+    given = (jnp.asarray(one) for one in (values, towards, shown, slopes))
+    misfit, jacobian, priors = (np.asarray(part) for part in _evaluated(problem, *given))
     mask = np.asarray(problem.batch.mask)
     return Sensitivity(tuple(names), misfit, jacobian, mask, priors if len(priors) else None, shown)

@@ -299,9 +299,17 @@ class _Translation:
         return text.lane(f"call {text.vector(dtype)} @{name}({arguments})", dtype)
 
     def put_concatenate(self, params: Any, given: list[Value], out: Array, kinds: Any) -> Value:
-        axis = params["dimension"]
+        return self.joined(given, params["dimension"], out)
+
+    def put_stack(self, params: Any, given: list[Value], out: Array, kinds: Any) -> Value:
+        return self.joined(given, params["axis"], out)
+
+    def joined(self, given: list[Value], axis: int, out: Array) -> Value:
+        """Large arrays one after the other."""
         if axis != 0:
             raise Unsupported("large arrays put together along another axis than the first")
+        if len(given) == 1:
+            return self.put_reshape({}, given, out, ())
         room = Stored(self.text.reserve(int(np.prod(out.shape)), out.dtype), out.shape, out.dtype, own=True)
         start = 0
         for one in given:

@@ -1,0 +1,136 @@
+"""What the sensors show of simulated runs, and how it moves with the parameters, at many points at once.
+
+By `smajax.lanes`: each pair of a point and a direction is one member, and takes the run with it in forward mode. XLA does
+what has no translation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from smajax.batch.engine import available_cores
+from smajax.fit.batch import shown_run
+from smajax.fit.problem import Problem
+from smajax.lanes.evaluate import evaluator
+from smajax.lanes.text import Unsupported
+from smajax.parameters import set_vector
+from smajax.system import System
+from smajax.types import Series
+
+
+class _Run(eqx.Module):
+    """One run of a problem, without the values that are asked for."""
+
+    system: System
+    inputs: dict[str, Series]
+    overrides: jax.Array
+    dt: jax.Array
+    shared: tuple[str, ...] = eqx.field(static=True)
+    override_names: tuple[str, ...] = eqx.field(static=True)
+    own: tuple[str, ...] = eqx.field(static=True)
+    outputs: tuple[str, ...] = eqx.field(static=True)
+
+
+def _runs(problem: Problem) -> list[_Run]:
+    batch = problem.batch
+    dt = jnp.asarray(batch.dt, dtype=float)
+    names = problem.shared, batch.override_names, problem.own.names, batch.outputs
+    return [
+        _Run(
+            problem.system,
+            {name: series[run] for name, series in batch.inputs.items()},
+            batch.overrides[run],
+            dt,
+            *names,
+        )
+        for run in range(batch.runs)
+    ]
+
+
+def _shown(run: _Run, values: jax.Array) -> jax.Array:
+    """(outputs, N) at the values of what all runs share and of what is the run's own."""
+    count = len(run.shared)
+    system = set_vector(run.system, run.shared, values[:count])
+    own = jnp.concatenate([run.overrides, values[count:]])
+    return shown_run(system, run.inputs, own, (*run.override_names, *run.own), run.dt, run.outputs)
+
+
+def _vector(own: dict[str, jax.Array], what: str) -> jax.Array:
+    return jnp.stack([own[f"{what} {k}"] for k in range(sum(name.startswith(what) for name in own))])
+
+
+def _at(run: _Run, own: dict[str, jax.Array]) -> jax.Array:
+    return _shown(run, _vector(own, "value"))
+
+
+def _along(run: _Run, own: dict[str, jax.Array]) -> tuple[jax.Array, jax.Array]:
+    values, towards = _vector(own, "value"), _vector(own, "towards")
+    return jax.jvp(lambda there: _shown(run, there), (values,), (towards,))
+
+
+def _columns(what: str, rows: np.ndarray) -> dict[str, np.ndarray]:
+    return {f"{what} {k}": column for k, column in enumerate(rows.T)}
+
+
+def _of_run(problem: Problem, points: np.ndarray, run: int) -> np.ndarray:
+    """What one run depends on, of points (..., P + 1): the shared values and its own."""
+    count, own = len(problem.shared), problem.own.start.shape[1]
+    start = count + run * own
+    return np.concatenate([points[..., :count], points[..., start : start + own]], axis=-1)
+
+
+def shown_at(problem: Problem, points: Sequence[np.ndarray] | np.ndarray) -> np.ndarray:
+    """What the sensors show at points (M, P + 1): (M, series, N), SI."""
+    asked = np.asarray(points, dtype=float)
+    try:
+        found = []
+        for number, run in enumerate(_runs(problem)):
+            own = _columns("value", _of_run(problem, asked, number))
+            found.append(evaluator(_at, run, tuple(own))(run, own, available_cores()))
+    except Unsupported:
+        return np.stack([np.asarray(_shown_by_xla(problem, jnp.asarray(point))) for point in asked])
+    return np.concatenate(found, axis=1)
+
+
+def shown_and_slopes(problem: Problem, points: np.ndarray, towards: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """What the sensors show at points (M, P + 1), and its derivatives along (M, S, P + 1).
+
+    Arrays (M, series, N) and (M, S, series, N).
+    """
+    members, directions = towards.shape[:2]
+    if directions == 0:
+        return shown_at(problem, points), np.zeros((members, 0, *problem.batch.output.shape))
+    pairs = np.repeat(points, directions, axis=0), towards.reshape(members * directions, -1)
+    values, slopes = [], []
+    try:
+        for number, run in enumerate(_runs(problem)):
+            at, along = (_of_run(problem, one, number) for one in pairs)
+            own = {**_columns("value", at), **_columns("towards", along)}
+            value, slope = evaluator(_along, run, tuple(own))(run, own, available_cores())
+            values.append(value[::directions])
+            slopes.append(slope.reshape(members, directions, *slope.shape[1:]))
+    except Unsupported:
+        every = [
+            _slopes_by_xla(problem, jnp.asarray(at), jnp.asarray(way)) for at, way in zip(points, towards, strict=True)
+        ]
+        return np.stack([np.asarray(one[0]) for one in every]), np.stack([np.asarray(one[1]) for one in every])
+    return np.concatenate(values, axis=1), np.concatenate(slopes, axis=2)
+
+
+@eqx.filter_jit
+def _shown_by_xla(problem: Problem, values: jax.Array) -> jax.Array:
+    return problem.shown(values)
+
+
+@eqx.filter_jit
+def _slopes_by_xla(problem: Problem, values: jax.Array, towards: jax.Array) -> Any:
+    def one(way: jax.Array) -> tuple[jax.Array, jax.Array]:
+        return jax.jvp(problem.shown, (values,), (way,))
+
+    return jax.vmap(one, out_axes=(None, 0))(towards)
