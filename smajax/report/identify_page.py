@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,20 +13,13 @@ from smajax.report import identify_pictures as draw
 from smajax.report.display import digits, display, label, p_value, with_error
 from smajax.report.files import json_text, replace
 from smajax.report.html import picture
+from smajax.report.plain_page import bullets, table, whole
 from smajax.residual.noise_like import WHITE
 
 OFF = 1.25  # ratio of residual to noise that is worth a sentence
 KNOWN = "Every combination of the parameters is known to 5 % or better."
 KNOWN_OF_THE_REST = (
     "Of the parameters that are neither at a bound nor without effect, every combination is known to 5 %."
-)
-STYLE = (
-    "body{font:15px/1.5 system-ui,sans-serif;max-width:1080px;margin:2em auto;padding:0 1em;color:#1d1d1f;background:#fff}"
-    "td,th{text-align:left;vertical-align:top;padding:.35em .7em;border-bottom:1px solid #e3e5e9}"
-    "table{border-collapse:collapse;font-size:14px;display:block;overflow-x:auto;margin:0 0 1em}"
-    "td.n,th.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}"
-    "img{max-width:100%;display:block;margin:0 0 1em}.quiet{color:#626973}h2{margin-top:1.6em}"
-    "p,ul{max-width:62em}"
 )
 
 
@@ -80,20 +72,6 @@ def conclusions(found: Identified) -> list[str]:
     return told
 
 
-def _table(head: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequence[int] = ()) -> str:
-    def cells(kind: str, row: Sequence[str]) -> str:
-        return "".join(
-            f"<{kind}{' class=n' if k in numbers else ''}>{html.escape(cell)}</{kind}>" for k, cell in enumerate(row)
-        )
-
-    body = "".join(f"<tr>{cells('td', row)}</tr>" for row in rows)
-    return f"<table><tr>{cells('th', head)}</tr>{body}</table>"
-
-
-def _bullets(sentences: Sequence[str]) -> str:
-    return f"<ul>{''.join(f'<li>{html.escape(one)}</li>' for one in sentences)}</ul>" if sentences else ""
-
-
 def estimate_rows(found: Identified) -> list[list[str]]:
     """Parameter, estimate with standard error, unit, bounds, start, 95 % interval of the profile, remark."""
     profiled = {one.name: one for one in found.profiles}
@@ -136,11 +114,11 @@ def page(found: Identified) -> str:
     head = ["parameter", "estimate ± standard error", "unit", "95 % (profile)", "bounds", "start", "remark"]
     parts = [
         f"<h1>{say(found.title or found.experiment)}: parameters</h1>",
-        _bullets(conclusions(found)),
+        bullets(conclusions(found)),
         "<h2>Parameters</h2>",
-        _table(head, estimate_rows(found), (1,)),
+        table(head, estimate_rows(found), (1,)),
         "<h2>What the runs tell apart</h2>",
-        _bullets(found.weak) or f"<p>{KNOWN if found.all_took_part else KNOWN_OF_THE_REST}</p>",
+        bullets(found.weak) or f"<p>{KNOWN if found.all_took_part else KNOWN_OF_THE_REST}</p>",
         picture(draw.correlations(found), "correlations of the estimates"),
     ]
     if found.profiles:
@@ -162,24 +140,20 @@ def page(found: Identified) -> str:
         parts += [
             "<h2>What to measure next</h2><p class=quiet>Courses of the input within what was applied already, ranked by "
             "what one such run would tell (D-optimal, at the fit).</p>",
-            _table(["", "run", "information, nats", "standard errors become"], rows, (2,)),
+            table(["", "run", "information, nats", "standard errors become"], rows, (2,)),
             picture(draw.suggested_inputs(found), "suggested inputs"),
         ]
-    parts += ["<h2>Runs</h2>", _table(["run", "role", "samples", f"rms error ({unit.unit or '-'})"], runs, (2, 3))]
+    parts += ["<h2>Runs</h2>", table(["run", "role", "samples", f"rms error ({unit.unit or '-'})"], runs, (2, 3))]
     for one in found.runs:
         parts.append(
             f"<h3>{say(one.name)} ({say(one.role)})</h3>{picture(draw.run_with_band(found, one), label(one.name))}"
         )
     parts += [
         "<h2>Checks and provenance</h2>",
-        _bullets(found.check),
-        _table(["", ""], list(map(list, found.provenance.items()))),
+        bullets(found.check),
+        table(["", ""], list(map(list, found.provenance.items()))),
     ]
-    return (
-        '<!doctype html><html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width, '
-        f'initial-scale=1"><link rel="icon" href="data:,"><title>{say(found.title or found.experiment)}</title>'
-        f"<style>{STYLE}</style>{''.join(parts)}</html>\n"
-    )
+    return whole(f"{found.title or found.experiment}", parts)
 
 
 def record(found: Identified) -> dict[str, Any]:
