@@ -7,7 +7,7 @@ logarithm.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -141,7 +141,7 @@ class Rig:
         values = np.exp(self._low + point * self._width)
         return {name: float(f"{value:.6g}") for name, value in zip(self.names, values, strict=True)}
 
-    def point(self, gains: dict[str, float]) -> np.ndarray:
+    def point(self, gains: Mapping[str, float]) -> np.ndarray:
         """The point of gains, held in the cube."""
         values = np.asarray([gains[name] for name in self.names])
         return np.clip((np.log(values) - self._low) / self._width, 0.0, 1.0)

@@ -120,7 +120,7 @@ def _smooth(
         whole = mean + SPREAD * jnp.sqrt(variance + 1e-12)
     if goal.limits:
         over = terms[:, jnp.asarray(goal.limited)] / jnp.asarray(goal.bounds) - 1.0
-        pushed = jnp.maximum(0.0, multipliers + rho[:, None, None] * over)
+        pushed = jnp.maximum(0.0, multipliers + rho * over)
         whole += jnp.sum(jnp.where(good[:, None], pushed**2 - multipliers**2, 0.0)) / (2.0 * rho)
     return whole
 

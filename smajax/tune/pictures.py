@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.ticker import FuncFormatter
 
 from smajax.report.pictures import AFTER, BEFORE, MEASURED, QUIET, as_png, new_figure, tidy
 from smajax.tune.terms import TERMS
@@ -73,19 +74,17 @@ def _over_set_points(axes: Axes, found: Tuned, name: str) -> None:
                     markerfacecolor=filled,
                 )
         axes.plot([], [], "s-", color=colour, markersize=3.5, label=told)
-    if name == "settling_time":
-        top = 1.08 * found.settings.seconds
-        if any((found.checks[check].seen.judged[..., column] >= never).any() for check, _ in shown):
-            axes.annotate("never", (0.01, top), xycoords=("axes fraction", "data"), fontsize=8, va="bottom")
-        axes.set_ylim(0.0, 1.18 * found.settings.seconds)
-    else:
-        axes.set_ylim(bottom=0.0)
+    if any((found.checks[check].seen.judged[..., column] >= never).any() for check, _ in shown):
+        at_top = 1.08 * found.settings.seconds
+        axes.annotate("never", (0.01, at_top), xycoords=("axes fraction", "data"), fontsize=8, va="bottom")
     if name in found.settings.limits:
         axes.axhline(found.settings.limits[name], color=MEASURED, linewidth=0.9, linestyle=":", label="limit")
+    # Room above for the legend.
+    axes.set_ylim(0.0, 1.35 * max(axes.dataLim.y1, found.settings.limits.get(name, 0.0), 1e-3))
     axes.plot([], [], "o", color=QUIET, markerfacecolor="white", markersize=3.5, label="never seen")
     axes.set_xlabel("set point (°)", fontsize=9)
     axes.set_title(f"{term.label} ({term.unit})", fontsize=9.5, loc="left")
-    axes.legend(frameon=False, fontsize=7.5, loc="best")
+    axes.legend(frameon=False, fontsize=7.5, loc="upper left", ncols=2)
     tidy(axes)
 
 
@@ -112,6 +111,8 @@ def costs_over_loops(found: Tuned) -> bytes:
     finite = costs[np.isfinite(costs) & (costs > 0.0)]
     if finite.size and finite.max() > 5.0 * finite.min():
         axes.set_yscale("log")
+        for formatter in (axes.yaxis.set_major_formatter, axes.yaxis.set_minor_formatter):
+            formatter(FuncFormatter(lambda value, _: f"{value:g}" if f"{value:.0e}"[0] in "125" else ""))
     axes.set_xlabel("closed loops run", fontsize=9)
     axes.set_ylabel("cost", fontsize=9)
     axes.legend(frameon=False, fontsize=8)

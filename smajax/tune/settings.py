@@ -38,6 +38,7 @@ class TuneSettings:
     delay: int = 0
     seed: int = 0
     unseen: int = 32  # plants of the check
+    start: Mapping[str, float] = field(default_factory=dict)  # gains to begin from in the place of the preset's
 
     @property
     def goal(self) -> Goal:
@@ -108,4 +109,5 @@ class TuneSettings:
             "delay_periods": self.delay,
             "seed": self.seed,
             "plants_of_the_check": self.unseen,
+            "start": dict(self.start),
         }

@@ -95,7 +95,7 @@ def tune(
     what = f"tuning {settings.controller}"
     if after is None:
         progress(f"{what}: {settings.tried} points of the box", 0.0)
-        now = begin(rig, goal, members, effort, rig.before)
+        now = begin(rig, goal, members, effort, rig.point(settings.start) if settings.start else rig.before)
         progress(f"{what}: {settings.tried} points of the box", 1.0)
     else:
         now, rig.simulations = after, after.simulations
