@@ -330,6 +330,9 @@ def tune(
         list[str] | None, typer.Option(help="of the same, met in every loop: settling_time=4,overshoot=2")
     ] = None,
     by: Annotated[str, typer.Option(help="trust-region or adam")] = "trust-region",
+    start: Annotated[
+        Path | None, typer.Option(help="gains.json to begin from, in the place of the preset's gains")
+    ] = None,
     starts: Annotated[int | None, typer.Option(min=1, help="points that gains are moved from; default 6")] = None,
     rounds: Annotated[int | None, typer.Option(min=1, help="steps, at most; default 30")] = None,
     seconds: Annotated[float, typer.Option(min=0.1, help="length of each closed loop")] = 10.0,
@@ -357,12 +360,19 @@ def tune(
 
     prepare(cores=True)
     from smajax.figures.rigs import arm
+    from smajax.gains_file import GainsFileError, read_gains
     from smajax.progress import shown
     from smajax.tune.folder import tune_into
     from smajax.tune.objective import REGULATION
     from smajax.tune.page import conclusions, gain_rows
     from smajax.tune.settings import TuneSettings
 
+    try:
+        begun = read_gains(start, arm()) if start is not None else None
+        if begun is not None and begun.controller != controller:
+            raise GainsFileError(f"gains file {start} is of {begun.controller}, not of {controller}.")
+    except GainsFileError as error:
+        raise typer.BadParameter(str(error), param_hint="--start") from None
     settings = TuneSettings(
         controller,
         _numbers("--set-points", set_points if set_points is not None else "-20,20,60" if fast else TUNED_AT),
@@ -381,6 +391,7 @@ def tune(
         delay,
         seed,
         4 if fast else 32,
+        {} if begun is None else begun.values,
     )
     command = "smajax " + shlex.join(sys.argv[1:])
     try:
@@ -458,7 +469,8 @@ def sweep(
     try:
         tuned = tuple(read_gains(path, arm()) for path in gains or ())
     except GainsFileError as error:
-        raise typer.BadParameter(str(error), param_hint="--gains") from None
+        hint = " Shares of the main gain are `--gain-shares`." if any(not one.suffix for one in gains or ()) else ""
+        raise typer.BadParameter(f"{error}{hint}", param_hint="--gains") from None
     asked = controllers or ",".join(dict.fromkeys(one.controller for one in tuned)) or "all"
     names = tuple(CONTROLLERS) if asked == "all" else tuple(part for part in asked.split(",") if part)
     pair = tuple(over.split(","))

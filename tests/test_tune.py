@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -252,6 +254,7 @@ def test_a_wrong_gains_file_is_answered(text: str, told: str, tmp_path: Path) ->
         ({"by": "adma"}, "did you mean 'adam'"),
         ({"period": 0.015}, "whole number"),
         ({"filtered": "kalman"}, "printed"),
+        ({"start": {"boundary": 1.0}}, "surface_slope"),
         ({"seconds": 4.005}, "whole number of control periods"),
     ],
 )
@@ -268,6 +271,14 @@ def test_a_folder_that_holds_something_else_is_refused(folder: Path, tmp_path: P
     assert [one.name for one in tmp_path.iterdir()] == ["thesis.tex"]
     with pytest.raises(ValueError, match=r"seconds: 3.0 there, 5.0 asked"):
         tune_into(arm(), dataclasses.replace(SETTINGS, seconds=5.0), folder)
+
+
+def test_a_wrong_name_ends_the_command_with_2(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "smajax", "tune", "pdi", "--out", str(tmp_path / "out")]
+    ended = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert ended.returncode == 2
+    assert "did you mean 'pid'" in ended.stderr
+    assert not (tmp_path / "out").exists()
 
 
 def test_what_is_checked_was_not_tuned_on() -> None:

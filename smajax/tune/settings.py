@@ -62,6 +62,9 @@ class TuneSettings:
             raise ValueError(
                 f"a loop lasts a whole number of control periods of {self.period:g} s, not {self.seconds:g} s."
             )
+        box = CONTROLLERS[self.controller].box
+        if self.start and set(self.start) != set(box):
+            raise ValueError(f"gains to begin from are {', '.join(box)}, all of them; not {', '.join(self.start)}.")
         if self.unseen < 1:
             raise ValueError(f"the check needs at least one plant, not {self.unseen}.")
         _ = self.goal, self.effort  # they check themselves

@@ -18,7 +18,7 @@ from studies.tuning.picture import draw
 from studies.tuning.record import HERE, keep, kept
 from studies.tuning.requirement import Effort, requirement
 
-CANDIDATES = 150  # closed loops of a search: so many candidates on all members
+CANDIDATES = 100  # closed loops of a search: so many candidates on all members
 WAYS = {"trust-region": (0, 1), "adam": (0,), "nelder-mead": (0, 1), "cma-es": (0, 1), "grid": (0,)}  # seeds
 FAST_PROBLEM = Problem("vsc3", "worst", (0.0, 30.0), varied=False, seconds=3.0)
 FAST_EFFORT = Effort((0.0, 30.0), 30.0, 4, 2, 3, 2, 1, 3.0)
