@@ -7,7 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from smajax.control_presets import CONTROLLERS
 from studies.tuning import picture, record, requirement, run
+from studies.tuning.peers import PROBLEMS
 from studies.tuning.record import kept
 
 CANDIDATES = 12
@@ -52,9 +54,9 @@ def test_what_is_kept_is_not_run_again(results: Path, monkeypatch: pytest.Monkey
 def test_the_kept_results_are_whole() -> None:
     """The README's tables are of these: every problem by every way, and every controller."""
     whole = kept(record.HERE / "results.json")
-    names = {f"{one.name}; {way}; {seed}" for one in run.PROBLEMS for way, seeds in run.WAYS.items() for seed in seeds}
+    names = {f"{one.name}; {way}; {seed}" for one in PROBLEMS for way, seeds in run.WAYS.items() for seed in seeds}
     assert set(whole["peers"]) == names
-    assert set(whole["requirement"]) == set(run.CONTROLLERS)
+    assert set(whole["requirement"]) == set(CONTROLLERS)
     assert len(picture.draw(whole)) > 1000
     gains = {one.stem for one in (record.HERE / "gains").glob("*.json")}
-    assert gains == set(run.CONTROLLERS)
+    assert gains == set(CONTROLLERS)

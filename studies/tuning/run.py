@@ -12,11 +12,13 @@ from pathlib import Path
 from smajax.control_presets import CONTROLLERS
 from smajax.figures.rigs import arm
 from smajax.fit.progress import Progress
+from smajax.report.files import replace
 from smajax.runtime import prepare
 from studies.tuning.peers import PROBLEMS, Problem, searched
 from studies.tuning.picture import draw
 from studies.tuning.record import HERE, keep, kept
 from studies.tuning.requirement import Effort, requirement
+from studies.tuning.tables import readme
 
 CANDIDATES = 100  # closed loops of a search: so many candidates on all members
 WAYS = {"trust-region": (0, 1), "adam": (0,), "nelder-mead": (0, 1), "cma-es": (0, 1), "grid": (0,)}  # seeds
@@ -68,7 +70,9 @@ def main(arguments: list[str]) -> None:
     names = [part for part in parts if part in CONTROLLERS] or ([] if parts else list(CONTROLLERS))
     require(path, ["vsc3"] if fast and names else names, FAST_EFFORT if fast else Effort(), bool(parts))
     if not fast:
-        (HERE / "tuning.png").write_bytes(draw(kept(path)))
+        results, words = kept(path), (HERE / "words.md").read_text(encoding="utf-8")
+        (HERE / "tuning.png").write_bytes(draw(results))
+        replace(HERE / "README.md", readme(results, words))
 
 
 if __name__ == "__main__":
