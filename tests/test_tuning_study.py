@@ -19,7 +19,6 @@ CANDIDATES = 12
 def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("study") / "fast.json"
     run.compare(path, (run.FAST_PROBLEM,), CANDIDATES, again=False)
-    run.require(path, ["vsc3"], run.FAST_EFFORT, again=False)
     return path
 
 
@@ -33,7 +32,9 @@ def test_every_search_keeps_to_its_budget_and_never_worsens(results: Path) -> No
         assert (np.diff(costs) < 0.0).all()
 
 
+@pytest.mark.slow
 def test_the_requirement_is_judged_on_every_set_point_and_plant(results: Path) -> None:
+    run.require(results, ["vsc3"], run.FAST_EFFORT, again=False)
     found = kept(results)["requirement"]["vsc3"]
     members = requirement.judged_on(run.FAST_EFFORT)
     assert found["after"]["loops"] == members.size == 2 * (1 + 8 + 2)
@@ -46,9 +47,7 @@ def test_what_is_kept_is_not_run_again(results: Path, monkeypatch: pytest.Monkey
         raise AssertionError("run again")
 
     monkeypatch.setattr(run, "searched", never)
-    monkeypatch.setattr(run, "requirement", never)
     run.compare(results, (run.FAST_PROBLEM,), CANDIDATES, again=False)
-    run.require(results, ["vsc3"], run.FAST_EFFORT, again=False)
 
 
 def test_the_kept_results_are_whole() -> None:

@@ -27,7 +27,7 @@ from smajax.tune.objective import Goal
 VARIATION = {"inertia": 0.2, "damping": 0.2, "convection": 0.2}
 SET_POINTS = (-40.0, 20.0, 85.0)
 SIGMA = 0.2  # of CMA-ES, share of the box by logarithm
-TRIED = 32
+TRIED, TRIED_ALONE = 32, 8  # points tried on the plant as believed: a few candidates' worth of loops
 
 
 @dataclass(frozen=True)
@@ -39,6 +39,10 @@ class Problem:
     set_points: tuple[float, ...] = SET_POINTS
     varied: bool = True
     seconds: float = 10.0
+
+    @property
+    def tried(self) -> int:
+        return TRIED if self.varied else TRIED_ALONE
 
     @property
     def name(self) -> str:
@@ -88,7 +92,7 @@ def _by_gradient(
     part = 0
     # One start after the other, each the best of other points, until nothing is left.
     while rig.simulations < budget:
-        effort = Effort(TRIED, 1, 40, seed + 100 * part, rule)
+        effort = Effort(problem.tried, 1, 40, seed + 100 * part, rule)
         now = begin(rig, goal, members, effort, None)
         while not now.ended and rig.simulations + members.size * int(now.alive.sum()) <= budget:
             now = one_round(rig, goal, members, effort, now)
@@ -149,7 +153,7 @@ def searched(system: System, problem: Problem, way: str, budget: int, seed: int)
     """The course of one search: [closed loops, best cost] after each of its evaluations, and the seconds it took."""
     goal = Goal(problem.objective)
     members = tuned_on(problem.set_points, VARIATION if problem.varied else {}, 0)
-    loops = int(np.clip(1 << (members.size - 1).bit_length(), 8, LOOPS))
+    loops = int(np.clip(1 << (members.size - 1).bit_length(), 16, LOOPS))
     rig = Rig(CONTROLLERS[problem.controller], system, seconds=problem.seconds, loops=loops)
     began = clock.monotonic()
     if way in ("trust-region", "adam"):
@@ -160,7 +164,7 @@ def searched(system: System, problem: Problem, way: str, budget: int, seed: int)
         if way == "grid":
             run = lambda: _grid(counted, len(rig.names))  # noqa: E731
         else:
-            start = begin(rig, goal, members, Effort(TRIED, 1, 1, seed), None).points[0]
+            start = begin(rig, goal, members, Effort(problem.tried, 1, 1, seed), None).points[0]
             own = _nelder_mead if way == "nelder-mead" else _cma_es
             run = lambda: own(counted, start, seed)  # noqa: E731
         with contextlib.suppress(Spent):

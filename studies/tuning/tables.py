@@ -12,6 +12,7 @@ from studies.tuning.requirement import LIMITS
 
 FIFTH = 0.2
 EQUAL = 1.01  # costs are equal within 1 %
+LEVEL = 7.5  # of a cost
 PEERS = ("adam", "cma-es", "nelder-mead", "grid")
 
 
@@ -78,6 +79,16 @@ def verdict(results: Mapping[str, Any]) -> str:
     return "\n".join(told)
 
 
+def first_below(results: Mapping[str, Any]) -> str:
+    """Closed loops until PID's worst case costs less than `LEVEL`, a number a seed."""
+    ways = by_problem(results)["pid, worst, plants 20 % wrong"]
+    told = []
+    for way, several in ways.items():
+        firsts = [next((run for run, cost in one["course"] if cost < LEVEL), None) for one in several]
+        told.append(f"{way} {' / '.join('never' if one is None else f'{one:,}' for one in firsts)}")
+    return f"{'; '.join(told)} loops."
+
+
 def seconds_table(results: Mapping[str, Any]) -> str:
     """Milliseconds a closed loop, with compilation, as the machine was."""
     per: dict[str, list[float]] = {}
@@ -121,6 +132,7 @@ def readme(results: Mapping[str, Any], words: str) -> str:
         "PEERS": peers_table,
         "VERDICT": verdict,
         "SECONDS": seconds_table,
+        "FIRST": first_below,
         "REQUIREMENT": requirement_table,
     }
     for mark, made in parts.items():
