@@ -1,6 +1,6 @@
 """Adam (optax) on the smooth objective, limits by the augmented Lagrangian; a start that gains nothing goes back to its best.
 
-For comparison, and where a linear model of every loop asks for too much memory; `trust` needs far fewer loops.
+With limits `trust` comes much further in as many loops (studies/tuning).
 """
 
 from __future__ import annotations

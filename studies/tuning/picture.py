@@ -16,7 +16,7 @@ COLOURS = {
     "nelder-mead": "#d9a441",
     "grid": "#8a8f98",
 }
-COLUMNS = 3
+COLUMNS = 2
 
 
 def draw(results: Mapping[str, Any]) -> bytes:

@@ -1,6 +1,6 @@
 """Tuning beside its peers, and the requirement for every controller: `python -m studies.tuning.run [--fast] [part ...]`.
 
-Parts: `peers` and the controllers by name; default all (half an hour on two cores). `--fast`: a minute, into
+Parts: `peers` and the controllers by name; default all (an hour on two cores). `--fast`: some minutes, into
 `fast.json`. What is finished is kept in `results.json`; a part that is named is made again.
 """
 

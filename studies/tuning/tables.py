@@ -74,7 +74,7 @@ def verdict(results: Mapping[str, Any]) -> str:
         name = {"adam": "Adam", "cma-es": "CMA-ES", "nelder-mead": "Nelder-Mead", "grid": "the grid"}[peer]
         told.append(
             f"- against {name}: {len(problems) - len(lost)} of {len(problems)} problems"
-            + (f"; not on {'; '.join(lost)}" if lost else "")
+            + (f"; not on {'; '.join(lost)}" if 0 < len(lost) < len(problems) else "")
         )
     return "\n".join(told)
 
@@ -87,15 +87,6 @@ def first_below(results: Mapping[str, Any]) -> str:
         firsts = [next((run for run, cost in one["course"] if cost < LEVEL), None) for one in several]
         told.append(f"{way} {' / '.join('never' if one is None else f'{one:,}' for one in firsts)}")
     return f"{'; '.join(told)} loops."
-
-
-def seconds_table(results: Mapping[str, Any]) -> str:
-    """Milliseconds a closed loop, with compilation, as the machine was."""
-    per: dict[str, list[float]] = {}
-    for ways in by_problem(results).values():
-        for way, several in ways.items():
-            per.setdefault(way, []).extend(1e3 * one["seconds"] / one["closed_loops"] for one in several)
-    return ", ".join(f"{way} {np.median(values):.2g}" for way, values in per.items())
 
 
 def requirement_table(results: Mapping[str, Any]) -> str:
@@ -131,7 +122,6 @@ def readme(results: Mapping[str, Any], words: str) -> str:
     parts = {
         "PEERS": peers_table,
         "VERDICT": verdict,
-        "SECONDS": seconds_table,
         "FIRST": first_below,
         "REQUIREMENT": requirement_table,
     }
