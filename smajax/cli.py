@@ -1,4 +1,4 @@
-"""The command line: `smajax close-loop experiment.toml --out DIR`, `smajax demo`, `smajax figures` and `smajax sweep`."""
+"""The command line: `smajax close-loop experiment.toml --out DIR`, `smajax demo`, `smajax figures`, `sweep` and `tune`."""
 
 from __future__ import annotations
 
@@ -28,6 +28,7 @@ app = typer.Typer(
     rich_markup_mode=None,  # the plain help is there at once
 )
 DEMOS = ("latent", "complete")
+TUNED_AT = "-40,-20,0,20,40,60,85"
 SET_POINTS, GAINS = "-40,-20,0,10,20,40,50,60,80", "0.5,0.7,1,1.4,2"
 
 
@@ -315,11 +316,139 @@ def _numbers(option: str, text: str) -> tuple[float, ...]:
         raise typer.BadParameter(f"numbers with commas between them, not `{text}`", param_hint=option) from None
 
 
+def _pairs(option: str, several: list[str] | None) -> dict[str, float]:
+    pairs: dict[str, float] = {}
+    for part in ",".join(several or ()).replace(" ", ",").split(","):
+        name, sign, value = part.partition("=")
+        if not part:
+            continue
+        try:
+            if not sign or name in pairs:
+                raise ValueError
+            pairs[name] = float(value)
+        except ValueError:
+            raise typer.BadParameter(
+                f"each name once with its number, as in `name=0.2,other=1`, not `{part}`", param_hint=option
+            ) from None
+    return pairs
+
+
+@app.command()
+def tune(
+    controller: Annotated[str, typer.Argument(help="pid, vsc1, vsc2, vsc3, nvsc, sld, backstepping1 or backstepping2")],
+    set_points: Annotated[str | None, typer.Option(help="degrees, with commas; default -40,-20,0,20,40,60,85")] = None,
+    variation: Annotated[
+        list[str] | None,
+        typer.Option(help="how wrong the plant may be: inertia=0.2,convection=0.2; may be repeated"),
+    ] = None,
+    objective: Annotated[str, typer.Option(help="nominal, worst or mean-variance")] = "worst",
+    weights: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="of tracking_error, overshoot, settling_time, steady_error, energy, chatter, peak_temperature; default "
+            "settling_time=1,overshoot=1,steady_error=2 (a second, a degree, half a degree)"
+        ),
+    ] = None,
+    limits: Annotated[
+        list[str] | None, typer.Option(help="of the same, met in every loop: settling_time=4,overshoot=2")
+    ] = None,
+    by: Annotated[str, typer.Option(help="trust-region or adam")] = "trust-region",
+    start: Annotated[
+        Path | None, typer.Option(help="gains.json to begin from, in the place of the preset's gains")
+    ] = None,
+    starts: Annotated[int | None, typer.Option(min=1, help="points that gains are moved from; default 6")] = None,
+    rounds: Annotated[int | None, typer.Option(min=1, help="steps, at most; default 30")] = None,
+    seconds: Annotated[float, typer.Option(min=0.1, help="length of each closed loop")] = 10.0,
+    estimator: Annotated[str, typer.Option(help="`printed` or `model` filter; none: told the true state")] = "",
+    noise: Annotated[float, typer.Option(min=0.0, help="noise of the angle's readings, degrees (1 sigma)")] = 0.0,
+    period: Annotated[float, typer.Option(help="sample time of the controller, s, a multiple of 0.01")] = 0.01,
+    delay: Annotated[int, typer.Option(min=0, help="control periods until a command arrives")] = 0,
+    seed: Annotated[int, typer.Option(help="of starts, plants and noise")] = 0,
+    out: Annotated[Path, typer.Option(help="folder for gains.json, the page, the pictures and the numbers")] = Path(
+        "tune"
+    ),
+    fast: Annotated[bool, typer.Option("--fast", help="by default set points -20,20,60, 3 starts, 10 rounds")] = False,
+    json_out: Annotated[bool, typer.Option("--json", help="print tune.json on stdout instead of words")] = False,
+    open_page: Annotated[bool, typer.Option("--open/--no-open", help="open the page in a browser")] = True,
+) -> None:
+    """Tune the gains of a controller of the arm by gradient, on many set points and plants at once.
+
+    Variations: inertia, damping, convection, ambient, payload, supply. The gains are checked on plants and set points that
+    tuning never saw. `smajax sweep --gains tune/gains.json` reads them. Exit code 1 when a limit is not met. Ctrl-C loses
+    nothing: the same command goes on.
+
+    Example:  smajax tune sld --variation inertia=0.2,damping=0.2,convection=0.2 --limits settling_time=4,overshoot=2
+    """
+    from smajax.runtime import prepare
+
+    prepare(cores=True)
+    from smajax.figures.rigs import arm
+    from smajax.gains_file import GainsFileError, read_gains
+    from smajax.progress import shown
+    from smajax.tune.folder import tune_into
+    from smajax.tune.objective import REGULATION
+    from smajax.tune.page import conclusions, gain_rows
+    from smajax.tune.settings import TuneSettings
+
+    try:
+        begun = read_gains(start, arm()) if start is not None else None
+        if begun is not None and begun.controller != controller:
+            raise GainsFileError(f"gains file {start} is of {begun.controller}, not of {controller}.")
+    except GainsFileError as error:
+        raise typer.BadParameter(str(error), param_hint="--start") from None
+    settings = TuneSettings(
+        controller,
+        _numbers("--set-points", set_points if set_points is not None else "-20,20,60" if fast else TUNED_AT),
+        _pairs("--variation", variation),
+        objective,
+        _pairs("--weights", weights) or dict(REGULATION),
+        _pairs("--limits", limits),
+        8 if fast else 32,
+        starts or (3 if fast else 6),
+        rounds or (10 if fast else 30),
+        by,
+        seconds,
+        estimator,
+        noise,
+        period,
+        delay,
+        seed,
+        4 if fast else 32,
+        {} if begun is None else begun.values,
+    )
+    command = "smajax " + shlex.join(sys.argv[1:])
+    try:
+        settings.check(arm())
+        _folder(out)
+        with _resumable("Finished rounds are kept: the same command goes on."), shown(console()) as progress:
+            found = tune_into(arm(), settings, out, command, progress)
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from None
+    page = out / "tune.html"
+    if json_out:
+        typer.echo((out / "tune.json").read_text(encoding="utf-8"), nl=False)
+    else:
+        for sentence in conclusions(found):
+            typer.echo(sentence)
+        for row in gain_rows(found):
+            typer.echo(f"  {row[0]:<24} {row[1]:>10} -> {row[2]:<10} {row[3]}" + (f"  ({row[5]})" if row[5] else ""))
+        typer.echo(f"Gains: {(out / 'gains.json').resolve()}")
+        typer.echo(f"Page: {page.resolve()}")
+    if open_page and sys.stdout.isatty() and not os.environ.get("CI"):
+        _browse(page)
+    if settings.limits and not found.within_limits:
+        raise typer.Exit(1)
+
+
 @app.command()
 def sweep(
     controllers: Annotated[
-        str, typer.Option(help="pid, vsc1, vsc2, vsc3, nvsc, sld, backstepping1, backstepping2 (with commas), or `all`")
-    ] = "all",
+        str | None,
+        typer.Option(
+            help="pid, vsc1, vsc2, vsc3, nvsc, sld, backstepping1, backstepping2 (with commas), or `all`; default all, "
+            "or those of the gains files"
+        ),
+    ] = None,
     over: Annotated[str, typer.Option(help="the two mismatches of the maps")] = "convection,damping",
     points: Annotated[
         int | None, typer.Option(min=2, help="mismatches from 0.5 to 2 along each side of a map; default 15")
@@ -328,6 +457,10 @@ def sweep(
         str | None, typer.Option(help="degrees, with commas; default -40,-20,0,10,20,40,50,60,80")
     ] = None,
     gains: Annotated[
+        list[Path] | None,
+        typer.Option(help="gains.json of `smajax tune`, in the place of the preset's; may be repeated"),
+    ] = None,
+    gain_shares: Annotated[
         str | None, typer.Option(help="shares of the controller's main gain; default 0.5,0.7,1,1.4,2")
     ] = None,
     seconds: Annotated[float, typer.Option(min=0.1, help="length of each closed loop")] = 10.0,
@@ -352,10 +485,17 @@ def sweep(
     prepare(cores=True)
     from smajax.control_presets import CONTROLLERS
     from smajax.figures.rigs import arm
+    from smajax.gains_file import GainsFileError, read_gains
     from smajax.progress import shown
     from smajax.sweep_run import SweepSettings, as_text, run_sweep
 
-    names = tuple(CONTROLLERS) if controllers == "all" else tuple(part for part in controllers.split(",") if part)
+    try:
+        tuned = tuple(read_gains(path, arm()) for path in gains or ())
+    except GainsFileError as error:
+        hint = " Shares of the main gain are `--gain-shares`." if any(not one.suffix for one in gains or ()) else ""
+        raise typer.BadParameter(f"{error}{hint}", param_hint="--gains") from None
+    asked = controllers or ",".join(dict.fromkeys(one.controller for one in tuned)) or "all"
+    names = tuple(CONTROLLERS) if asked == "all" else tuple(part for part in asked.split(",") if part)
     pair = tuple(over.split(","))
     if len(pair) != 2:
         raise typer.BadParameter(f"two mismatches with a comma between them, not `{over}`", param_hint="--over")
@@ -364,12 +504,13 @@ def sweep(
         *pair,
         points or (3 if fast else 15),
         _numbers("--set-points", set_points if set_points is not None else "-20,20,60" if fast else SET_POINTS),
-        _numbers("--gains", gains if gains is not None else "1" if fast else GAINS),
+        _numbers("--gain-shares", gain_shares if gain_shares is not None else "1" if fast else GAINS),
         seconds,
         filtered=estimator,
         noise=noise,
         period=period,
         delay=delay,
+        tuned=tuned,
     )
     try:
         with _resumable("Finished controllers are kept: the same command goes on."), shown(console()) as progress:

@@ -6,7 +6,7 @@ A preset takes the system that the controller is to believe in.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from smajax.controller.backstepping_one import BacksteppingOne
 from smajax.controller.backstepping_two import BacksteppingTwo
@@ -24,6 +24,7 @@ from smajax.load.arm import Arm
 from smajax.load.base import AbstractMovingLoad
 from smajax.parameters import set_parameters
 from smajax.system import System
+from smajax.types import Scalar
 from smajax.wire.constitutive import IntegratedForm
 from smajax.wire.heat import cross_section
 
@@ -189,28 +190,73 @@ def with_printed_law(system: System) -> System:
     return set_parameters(dataclasses.replace(system, wire=wire), {"thermal_modulus": 0.0})
 
 
+def layered(controller: AbstractController, width: Scalar) -> AbstractController:
+    """VSC1 with a layer of half thickness `width` (rad): the controller that it is in the limit of none, with a derivative."""
+    assert isinstance(controller, Vsc1)
+    return Vsc2(controller.high_voltage, controller.low_voltage, width)
+
+
+Box = Mapping[str, tuple[float, float]]  # gain -> its positive bounds; the box is searched by logarithm
+
+PID_BOX: Box = {
+    "proportional_gain": (0.5, 100.0),
+    "integral_gain": (0.1, 100.0),
+    "derivative_gain": (0.05, 30.0),
+    "unwinding_time": (0.02, 20.0),
+}
+# The upper voltage is the printed one: more would be another amplifier.
+SWITCH_BOX: Box = {"high_voltage": (5.0, 10.0), "low_voltage": (0.5, 5.0)}
+SURFACE_BOX: Box = {"surface_slope": (0.5, 30.0), "boundary": (0.02, 30.0)}
+# A_f' changes by 37 C/s at most in these steps: with a band beyond that the temperature is never given back.
+PASSING_BOX: Box = {"temperature_band": (1.0, 37.0), "temperature_gain": (0.1, 30.0), "passing_speed": (0.05, 10.0)}
+# A stress known to 1 MPa is what an estimator gives: 1e-6 V/Pa answers that with one volt.
+STRESS_BOX: Box = {
+    "surface_slope": (0.5, 20.0),
+    "gain": (1e-3, 0.1),
+    "boundary": (0.3, 30.0),
+    "stress_gain": (2e-8, 1e-6),
+    "stress_integral_gain": (1e-8, 5e-6),
+    "stress_derivative_gain": (1e-10, 1e-7),
+}
+
+
 @dataclasses.dataclass(frozen=True)
 class ControllerPreset:
-    """A controller as a sweep runs it."""
+    """A controller as a sweep runs it and as tuning changes it."""
 
     make: Callable[[System], AbstractController]
     main_gain: str  # the gain that a sweep varies
     told: str  # what it reads of the plant
+    box: Box  # the gains that are tuned
     plant: Callable[[System], System] = lambda system: system  # the plant that its section is written for
+    # One that switches -> one with a derivative, of a width that goes to nothing.
+    smoothed: Callable[[AbstractController, Scalar], AbstractController] | None = None
 
 
 ANGLE, STATE = "angle", "angle, rate, stress, temperature, fraction"
 
 # Name on the command line -> controller.
 CONTROLLERS: dict[str, ControllerPreset] = {
-    "pid": ControllerPreset(pid, "proportional_gain", ANGLE),
-    "vsc1": ControllerPreset(vsc1, "high_voltage", ANGLE),
-    "vsc2": ControllerPreset(vsc2, "boundary", ANGLE),
-    "vsc3": ControllerPreset(vsc3, "surface_slope", ANGLE),
-    "nvsc": ControllerPreset(temperature_vsc, "temperature_gain", STATE),
-    "sld": ControllerPreset(quick_stress_sliding, "surface_slope", STATE),
-    "backstepping1": ControllerPreset(backstepping_one, "damping_gain", STATE, with_printed_law),
-    "backstepping2": ControllerPreset(backstepping_two, "damping_gain", STATE, with_printed_law),
+    "pid": ControllerPreset(pid, "proportional_gain", ANGLE, PID_BOX),
+    "vsc1": ControllerPreset(vsc1, "high_voltage", ANGLE, SWITCH_BOX, smoothed=layered),
+    "vsc2": ControllerPreset(vsc2, "boundary", ANGLE, {**SWITCH_BOX, "boundary": (0.01, 1.0)}),
+    "vsc3": ControllerPreset(vsc3, "surface_slope", ANGLE, {**SWITCH_BOX, **SURFACE_BOX}),
+    "nvsc": ControllerPreset(temperature_vsc, "temperature_gain", STATE, {**SWITCH_BOX, **SURFACE_BOX, **PASSING_BOX}),
+    "sld": ControllerPreset(quick_stress_sliding, "surface_slope", STATE, STRESS_BOX),
+    "backstepping1": ControllerPreset(
+        backstepping_one,
+        "damping_gain",
+        STATE,
+        {"damping_gain": (0.2, 10.0), "stress_gain": (1.0, 150.0)},
+        with_printed_law,
+    ),
+    "backstepping2": ControllerPreset(
+        backstepping_two,
+        "damping_gain",
+        STATE,
+        {"damping_gain": (0.2, 10.0), "temperature_gain": (1.0, 150.0)},
+        with_printed_law,
+    ),
 }
 # Name on the command line -> filter.
 FILTERS: dict[str, Callable[[System], AbstractEstimator]] = {"printed": printed_filter, "model": model_filter}

@@ -102,8 +102,26 @@ class Interface(eqx.Module):
     every: int = eqx.field(static=True, default=1)  # the controller is called every so many steps
     delay: int = eqx.field(static=True, default=0)  # control periods until its command arrives
 
+    def settings(self, dt: Scalar, key: jax.Array, number: Scalar) -> dict[str, Any]:
+        """Arguments of a closed loop; its noise is the one of its `number`."""
+        return {
+            "dt": dt,
+            "every": self.every,
+            "estimator": self.estimator,
+            "sensor": self.sensor,
+            "key": None if self.sensor is None else jax.random.fold_in(key, number.astype(int)),
+            "delay": self.delay,
+        }
+
 
 NOTHING_BETWEEN = Interface()
+
+
+def mismatched(system: System, ratios: Mapping[str, Scalar]) -> System:
+    """The plant whose parameters are `ratios` (by the names of `MISMATCHES`) times those of `system`."""
+    own = tuple(MISMATCHES.values())
+    shares = jnp.stack([ratios[name] for name in MISMATCHES])
+    return set_vector(system, own, get_parameters(system, own) * shares)
 
 
 class Outcome(NamedTuple):
@@ -131,21 +149,10 @@ class _Rig(eqx.Module):
 
 def _setting(rig: _Rig, values: dict[str, Scalar]) -> tuple[System, AbstractController, Reference, dict[str, Any]]:
     """Plant, controller, set point and interface of one closed loop."""
-    names = tuple(MISMATCHES)
-    own = tuple(MISMATCHES.values())
-    ratios = jnp.stack([values[name] for name in names])
-    plant = set_vector(rig.system, own, get_parameters(rig.system, own) * ratios)
     gain = get_parameters(rig.controller, [rig.main_gain]) * values[GAIN]
-    interface = {
-        "dt": rig.time[1] - rig.time[0],
-        "every": rig.interface.every,
-        "estimator": rig.interface.estimator,
-        "sensor": rig.interface.sensor,
-        "key": None if rig.interface.sensor is None else jax.random.fold_in(rig.key, values[NUMBER].astype(int)),
-        "delay": rig.interface.delay,
-    }
+    interface = rig.interface.settings(rig.time[1] - rig.time[0], rig.key, values[NUMBER])
     controller = set_vector(rig.controller, [rig.main_gain], gain)
-    return plant, controller, constant(rig.time, values[TARGET]), interface
+    return mismatched(rig.system, values), controller, constant(rig.time, values[TARGET]), interface
 
 
 def _judged(rig: _Rig, values: dict[str, Scalar]) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from smajax.batch.provenance import digest
 from smajax.control_presets import CONTROLLERS, FILTERS
 from smajax.fit.progress import Progress
+from smajax.gains_file import Gains
 from smajax.load.base import AbstractMovingLoad
 from smajax.measured_state import Sensor
 from smajax.merit import Merit
@@ -53,14 +54,60 @@ class SweepSettings:
     noise: float = 0.0  # degrees, standard deviation of the angle's readings
     period: float = 0.01  # s, sample time of the controller, a whole number of `dt`
     delay: int = 0  # control periods until a command arrives
+    tuned: tuple[Gains, ...] = ()  # in the place of the presets'
 
     @property
     def between(self) -> str:
         """What lies between plant and controller, in words."""
-        told = f"their states from the filter `{self.filtered}`" if self.filtered else "the true state"
-        noise = f"the angle with {self.noise:g}° of noise" if self.noise else "the angle without noise"
-        late = f", commands {self.delay} periods late" if self.delay else ""
-        return f"Controllers are called every {1e3 * self.period:g} ms{late} and are told {told}, {noise}."
+        told = [f"{one.controller} has gains from a file" for one in self.tuned]
+        return " ".join(
+            [
+                between_in_words(self.filtered, self.noise, self.period, self.delay),
+                *[f"{', '.join(told)}."] * bool(told),
+            ]
+        )
+
+
+def check_set_points(system: System, set_points: Sequence[float]) -> None:
+    """ValueError for set points (deg) beyond the stops of the load, or none."""
+    limits = (
+        np.degrees([float(end) for end in system.load.limits()])
+        if isinstance(system.load, AbstractMovingLoad)
+        else (-np.inf, np.inf)
+    )
+    odd = [angle for angle in set_points if not limits[0] <= angle <= limits[1]]
+    if odd or not set_points:
+        raise ValueError(
+            f"set points are angles between the arm's stops, {limits[0]:g} to {limits[1]:g} degrees, at least one; not "
+            f"{', '.join(f'{angle:g}' for angle in odd) or 'none'}."
+        )
+
+
+def check_interface(filtered: str, period: float, dt: float) -> None:
+    """ValueError for a filter there is not, or a period (s) that is no whole number of steps of `dt`."""
+    if filtered and filtered not in FILTERS:
+        raise ValueError(f"no filter `{filtered}`; there are {', '.join(FILTERS)}.")
+    steps = period / dt
+    if steps < 0.5 or abs(steps - round(steps)) > 1e-6:
+        raise ValueError(f"a controller's period is a whole number of simulation steps of {dt:g} s, not {period:g} s.")
+
+
+def interface_of(system: System, filtered: str, noise: float, period: float, dt: float, delay: int) -> Interface:
+    """What lies between: the filter by name, noise in degrees, period in s, delay in periods."""
+    return Interface(
+        FILTERS[filtered](system) if filtered else None,
+        Sensor(noise_sigma=float(np.radians(noise))) if noise else None,
+        round(period / dt),
+        delay,
+    )
+
+
+def between_in_words(filtered: str, noise: float, period: float, delay: int) -> str:
+    """The same in a sentence."""
+    told = f"their states from the filter `{filtered}`" if filtered else "the true state"
+    read = f"the angle with {noise:g}° of noise" if noise else "the angle without noise"
+    late = f", commands {delay} periods late" if delay else ""
+    return f"Controllers are called every {1e3 * period:g} ms{late} and are told {told}, {read}."
 
 
 def run_sweep(system: System, settings: SweepSettings, out: Path, progress: Progress) -> list[list[str]]:
@@ -71,25 +118,14 @@ def run_sweep(system: System, settings: SweepSettings, out: Path, progress: Prog
     unknown = [name for name in settings.controllers if name not in CONTROLLERS]
     if unknown or not settings.controllers:
         raise ValueError(f"no controller `{', '.join(unknown)}`; there are {', '.join(CONTROLLERS)}.")
-    if settings.filtered and settings.filtered not in FILTERS:
-        raise ValueError(f"no filter `{settings.filtered}`; there are {', '.join(FILTERS)}.")
-    limits = (
-        np.degrees([float(end) for end in system.load.limits()])
-        if isinstance(system.load, AbstractMovingLoad)
-        else (-np.inf, np.inf)
-    )
-    odd = [angle for angle in settings.set_points if not limits[0] <= angle <= limits[1]]
-    if odd or not settings.set_points:
-        raise ValueError(
-            f"set points are angles between the arm's stops, {limits[0]:g} to {limits[1]:g} degrees, at least one; not "
-            f"{', '.join(f'{angle:g}' for angle in odd) or 'none'}."
-        )
+    check_set_points(system, settings.set_points)
     if not settings.gains or min(settings.gains) <= 0.0:
         raise ValueError(f"gains are shares of the preset's, above 0, at least one; not {settings.gains}.")
-    steps = settings.period / settings.dt
-    if steps < 0.5 or abs(steps - round(steps)) > 1e-6:
+    check_interface(settings.filtered, settings.period, settings.dt)
+    spare = [gains.controller for gains in settings.tuned if gains.controller not in settings.controllers]
+    if spare:
         raise ValueError(
-            f"a controller's period is a whole number of simulation steps of {settings.dt:g} s, not {settings.period:g} s."
+            f"gains are given for {', '.join(spare)}, and only {', '.join(settings.controllers)} are swept."
         )
     out.mkdir(parents=True, exist_ok=True)
     targets = np.radians(settings.set_points)
@@ -123,15 +159,13 @@ def _controller(
     """One controller, from the folder where an interrupted sweep of this code and setting has finished it."""
     preset = CONTROLLERS[name]
     system, gain = preset.plant(system), preset.main_gain
-    own = dataclasses.replace(settings, controllers=(name,))
+    tuned = tuple(gains for gains in settings.tuned if gains.controller == name)
+    own = dataclasses.replace(settings, controllers=(name,), tuned=tuned)
     kept = out / "finished" / f"{name}-{digest(system, [str(own)])[:16]}.npz"
     fields = [field.name for field in dataclasses.fields(Merit)]
     if not kept.exists():
-        interface = Interface(
-            FILTERS[settings.filtered](system) if settings.filtered else None,
-            Sensor(noise_sigma=float(np.radians(settings.noise))) if settings.noise else None,
-            round(settings.period / settings.dt),
-            settings.delay,
+        interface = interface_of(
+            system, settings.filtered, settings.noise, settings.period, settings.dt, settings.delay
         )
 
         def told(_: str, share: float) -> None:
@@ -141,7 +175,7 @@ def _controller(
         rows = np.concatenate([grid.lanes(), lanes({}, grid.targets)])
         target = float(np.radians(LINE_TARGET))
         lines = np.concatenate([lanes({one: np.asarray(LINES)}, target) for one in MISMATCHES])
-        controller = preset.make(system)
+        controller = tuned[-1].put(system) if tuned else preset.make(system)
         asked: dict[str, Any] = {"seconds": settings.seconds, "dt": settings.dt, "interface": interface}
         found = closed_loops(system, controller, gain, rows, **asked, progress=told)
         drawn = positions(system, controller, gain, lines, **asked).reshape(len(MISMATCHES), len(LINES), -1)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -15,33 +14,12 @@ from smajax.report.files import json_text, replace
 from smajax.report.html import picture
 from smajax.report.identify_record import record
 from smajax.report.identify_words import conclusions, estimate_rows, posterior_rows, prior_shown
+from smajax.report.plain_page import bullets, table, whole
 
 KNOWN = "Every combination of the parameters is known to 5 % or better."
 KNOWN_OF_THE_REST = (
     "Of the parameters that are neither at a bound nor without effect, every combination is known to 5 %."
 )
-STYLE = (
-    "body{font:15px/1.5 system-ui,sans-serif;max-width:1080px;margin:2em auto;padding:0 1em;color:#1d1d1f;background:#fff}"
-    "td,th{text-align:left;vertical-align:top;padding:.35em .7em;border-bottom:1px solid #e3e5e9}"
-    "table{border-collapse:collapse;font-size:14px;display:block;overflow-x:auto;margin:0 0 1em}"
-    "td.n,th.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}"
-    "img{max-width:100%;display:block;margin:0 0 1em}.quiet{color:#626973}h2{margin-top:1.6em}"
-    "p,ul{max-width:62em}"
-)
-
-
-def _table(head: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequence[int] = ()) -> str:
-    def cells(kind: str, row: Sequence[str]) -> str:
-        return "".join(
-            f"<{kind}{' class=n' if k in numbers else ''}>{html.escape(cell)}</{kind}>" for k, cell in enumerate(row)
-        )
-
-    body = "".join(f"<tr>{cells('td', row)}</tr>" for row in rows)
-    return f"<table><tr>{cells('th', head)}</tr>{body}</table>"
-
-
-def _bullets(sentences: Sequence[str]) -> str:
-    return f"<ul>{''.join(f'<li>{html.escape(one)}</li>' for one in sentences)}</ul>" if sentences else ""
 
 
 def _run_rows(found: Identified) -> tuple[list[str], list[list[str]]]:
@@ -72,11 +50,11 @@ def page(found: Identified) -> str:
         rows = [[*row[:-1], prior_shown(one), row[-1]] for row, one in zip(rows, found.estimates, strict=True)]
     parts = [
         f"<h1>{say(found.title or found.experiment)}: parameters</h1>",
-        _bullets(conclusions(found)),
+        bullets(conclusions(found)),
         "<h2>Parameters</h2>",
-        _table(head, rows, (1,)),
+        table(head, rows, (1,)),
         "<h2>What the runs tell apart</h2>",
-        _bullets(found.weak) or f"<p>{KNOWN if found.all_took_part else KNOWN_OF_THE_REST}</p>",
+        bullets(found.weak) or f"<p>{KNOWN if found.all_took_part else KNOWN_OF_THE_REST}</p>",
         picture(draw.correlations(found), "correlations of the estimates"),
     ]
     if found.profiles:
@@ -92,7 +70,7 @@ def page(found: Identified) -> str:
             f"{100.0 * found.posterior.accepted:.0f} % of the jumps were taken; the samples count by 1/"
             f"{digits(found.posterior.inflation, 2)}, as in the standard errors. Histograms: draws; grey: what the standard "
             "error stands for.</p>",
-            _table(chains, posterior_rows(found), (1, 4, 5)),
+            table(chains, posterior_rows(found), (1, 4, 5)),
             picture(draw.posterior_histograms(found), "posterior"),
         ]
     if found.suggestions:
@@ -108,10 +86,10 @@ def page(found: Identified) -> str:
         parts += [
             "<h2>What to measure next</h2><p class=quiet>Courses of the input within what was applied already, ranked by "
             "what one such run would tell (D-optimal, at the fit).</p>",
-            _table(["", "run", "information, nats", "standard errors become"], rows, (2,)),
+            table(["", "run", "information, nats", "standard errors become"], rows, (2,)),
             picture(draw.suggested_inputs(found), "suggested inputs"),
         ]
-    parts += ["<h2>Runs</h2>", _table(run_head, runs, range(2, len(run_head)))]
+    parts += ["<h2>Runs</h2>", table(run_head, runs, range(2, len(run_head)))]
     if found.own_of_held_out:
         units = {one.name.split("[")[0]: display(one.unit, one.name) for one in found.estimates}
         own = [
@@ -131,14 +109,10 @@ def page(found: Identified) -> str:
         parts.append(f"<h3>{say(run.name)} ({say(run.role)})</h3>{''.join(pictures)}")
     parts += [
         "<h2>Checks and provenance</h2>",
-        _bullets(found.check),
-        _table(["", ""], list(map(list, found.provenance.items()))),
+        bullets(found.check),
+        table(["", ""], list(map(list, found.provenance.items()))),
     ]
-    return (
-        '<!doctype html><html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width, '
-        f'initial-scale=1"><link rel="icon" href="data:,"><title>{say(found.title or found.experiment)}</title>'
-        f"<style>{STYLE}</style>{''.join(parts)}</html>\n"
-    )
+    return whole(f"{found.title or found.experiment}", parts)
 
 
 def write_identified(found: Identified, folder: Path) -> Path:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from smajax.control_presets import backstepping_two
+from smajax.control_presets import CONTROLLERS, backstepping_two
 from smajax.figures.backstepping_runs import plant
 from smajax.gain_search import regulation_cost
 from studies.gains.record import main, searched
 
-BOX = {"damping_gain": (0.2, 10.0), "temperature_gain": (1.0, 150.0)}
+BOX = CONTROLLERS["backstepping2"].box
 TARGETS = [-20.0, 0.0, 20.0, 40.0]  # degrees
 
 

@@ -9,13 +9,15 @@ from typing import Any
 
 import jax.numpy as jnp
 
+from smajax.control_presets import PID_BOX
 from smajax.controller.pid import Pid
 from smajax.gain_search import regulation_cost
 from smajax.merit import Merit
 from smajax.types import Scalar
 from studies.gains.record import Cost, main, or_never, searched
 
-BOX = {"proportional_gain": (0.5, 100.0), "integral_gain": (0.1, 100.0), "derivative_gain": (0.05, 30.0)}
+# The source names no anti-windup.
+BOX = {name: bounds for name, bounds in PID_BOX.items() if name != "unwinding_time"}
 
 
 def reaches_in(printed: float) -> Cost:
@@ -36,9 +38,7 @@ def searches() -> dict[str, dict[str, Any]]:
         "tuned_at_0_deg": searched(plain, BOX, [0.0], regulation_cost),
         "tuned_at_10_deg": searched(plain, BOX, [10.0], reaches_in(2.5)),
         "tuned_at_40_deg": searched(plain, BOX, [40.0], reaches_in(4.0)),
-        "tuned_everywhere": searched(
-            plain, {**BOX, "unwinding_time": (0.02, 20.0)}, [-30.0, 10.0, 40.0, 70.0], regulation_cost, candidates=72
-        ),
+        "tuned_everywhere": searched(plain, PID_BOX, [-30.0, 10.0, 40.0, 70.0], regulation_cost, candidates=72),
     }
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import jax.numpy as jnp
 
-from smajax.control_presets import temperature_vsc
+from smajax.control_presets import PASSING_BOX, temperature_vsc
 from smajax.figures.rigs import arm
 from smajax.merit import Merit
 from smajax.types import Scalar
@@ -21,10 +21,10 @@ def as_soon_and_no_further(one: Merit, seconds: float) -> Scalar:
 
 def searches() -> dict[str, dict[str, Any]]:
     """Every search of this controller by name."""
-    # A_f' changes by 37 C/s at most in these steps: with a band beyond that the temperature is never given back.
-    box = {"temperature_band": (1.0, 37.0), "temperature_gain": (0.1, 30.0), "passing_speed": (0.05, 10.0)}
     targets = [0.0, 25.0, 50.0, 70.0]
-    return {"temperature_vsc": searched(temperature_vsc(arm()), box, targets, as_soon_and_no_further, candidates=72)}
+    return {
+        "temperature_vsc": searched(temperature_vsc(arm()), PASSING_BOX, targets, as_soon_and_no_further, candidates=72)
+    }
 
 
 if __name__ == "__main__":

@@ -1,0 +1,75 @@
+"""A tuning in a folder: its state after every round, and in the end gains, page, pictures and numbers."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from smajax.batch.provenance import digest
+from smajax.control_presets import CONTROLLERS
+from smajax.fit.progress import Progress, quiet
+from smajax.gains_file import write_gains
+from smajax.made_with import made_with
+from smajax.report.files import json_text, replace
+from smajax.system import System
+from smajax.tune.descent import Descent, load
+from smajax.tune.page import page, record
+from smajax.tune.pictures import before_after, costs_over_loops
+from smajax.tune.settings import TuneSettings
+from smajax.tune.tune import Tuned, tune
+
+ASKED, STATE, GAINS = "asked.json", "state.npz", "gains.json"
+OURS = {ASKED, STATE, GAINS, "tune.html", "tune.json", "before_after.png", "descent.png"}
+
+
+def check_folder(out: Path, asked: dict[str, object]) -> None:
+    """ValueError when `out` holds something else than this tuning, finished or not."""
+    found = sorted(one.name for one in out.iterdir() if not one.name.startswith(".")) if out.is_dir() else []
+    other = [name for name in found if name not in OURS]
+    if other or (found and ASKED not in found):
+        raise ValueError(
+            f"--out {out} holds something else ({', '.join((other or found)[:3])}): give the name of a new or empty folder."
+        )
+    if not found:
+        return
+    before = json.loads((out / ASKED).read_text(encoding="utf-8"))
+    differ = sorted(name for name in asked.keys() | before.keys() if asked.get(name) != before.get(name))
+    if differ:
+        told = "; ".join(
+            f"{name}: {before.get(name)} there, {asked.get(name)} asked" for name in differ if name != "code"
+        )
+        told = told or "it was begun by another version of smajax or on another plant"
+        raise ValueError(f"--out {out} holds another tuning ({told}): give another folder, or delete that one.")
+
+
+def tune_into(
+    system: System, settings: TuneSettings, out: Path, command: str = "", progress: Progress = quiet
+) -> Tuned:
+    """Tune, or go on where this tuning was interrupted, and write the folder, each file in one step.
+
+    Raises ValueError for settings that make no sense, and for a folder that holds something else.
+    """
+    settings.check(system)
+    mark = digest(CONTROLLERS[settings.controller].plant(system))[:16]
+    asked = json.loads(json.dumps({**settings.record(), "code": mark}))
+    check_folder(out, asked)
+    out.mkdir(parents=True, exist_ok=True)
+    replace(out / ASKED, json_text(asked))
+
+    def keep(descent: Descent) -> None:
+        descent.save(out / STATE)
+
+    after = load(out / STATE) if (out / STATE).exists() else None
+    if after is not None and not after.ended:
+        progress(f"say: going on after round {after.round}", 1.0)
+    found = tune(system, settings, after=after, keep=keep, progress=progress)
+    told = {"tuned": settings.record(), "command": command, **made_with()}
+    write_gains(out / GAINS, found.after, found.units, told)
+    pictures = {"before_after.png": before_after(found), "descent.png": costs_over_loops(found)}
+    for name, png in pictures.items():
+        part = out / f".{name}.part"
+        part.write_bytes(png)
+        part.replace(out / name)
+    replace(out / "tune.json", json_text(record(found, command)))
+    replace(out / "tune.html", page(found, pictures, command))
+    return found

@@ -1,0 +1,216 @@
+"""A tuning as one self-contained page, and as a record for machines."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from smajax.made_with import made_with
+from smajax.report.display import digits
+from smajax.report.html import picture
+from smajax.report.plain_page import bullets, table, whole
+from smajax.tune.terms import TERMS
+from smajax.tune.tune import Check, Tuned
+
+EDGE = 0.02  # of the box, by logarithm
+CHECKS = {
+    "tuned on": "tuned on",
+    "inside": "never seen: plants within the variation, set points between those tuned",
+    "beyond": "never seen: another parameter wrong by 20 %, set points tuned",
+}
+
+
+def at_the_edge(found: Tuned) -> list[str]:
+    """Gains that ended at a bound of their box."""
+    edge = []
+    for name, (low, high) in found.box.items():
+        value = found.after.values[name]
+        if min(value / low, high / value) < (high / low) ** EDGE:
+            edge.append(name)
+    return edge
+
+
+def broken(found: Tuned, check: Check) -> list[str]:
+    """Which limits the tuned gains do not meet: by how much, where, in how many loops."""
+    told = []
+    for name, limit in found.settings.limits.items():
+        term, values = TERMS[name], check.seen.judged[1, :, list(TERMS).index(name)]
+        over = values > limit
+        if over.any():
+            at = int(np.argmax(values))
+            never = name == "settling_time" and values[at] >= 2.0 * found.settings.seconds
+            worst = "never reached" if never else f"{digits(float(values[at]), 3)} {term.unit}"
+            told.append(
+                f"{term.label} {worst} at {np.degrees(check.members.targets[at]):.3g}° where {limit:g} {term.unit} are "
+                f"asked ({int(over.sum())} of {len(values)} loops)"
+            )
+    return told
+
+
+def conclusions(found: Tuned) -> list[str]:
+    """What came out, in sentences that say no more than the numbers."""
+    before, after = found.costs
+    tuned, inside = found.checks["tuned on"], found.checks["inside"]
+    told = [f"The cost is {digits(after, 3)} with the tuned gains and {digits(before, 3)} with the preset's."]
+    if dict(found.before) == dict(found.after.values) or (
+        after >= before and found.excesses["tuned on"][1] >= found.excesses["tuned on"][0]
+    ):
+        told = ["Nothing better than the preset's gains was found."]
+    if found.settings.limits:
+        missed = broken(found, tuned)
+        told.append(
+            f"Not every limit is met: {'; '.join(missed)}."
+            if missed
+            else f"Every limit is met in all {tuned.members.size} closed loops tuned on."
+        )
+        missed = broken(found, inside)
+        told.append(
+            f"In plants within the variation that were never seen: {'; '.join(missed)}."
+            if missed
+            else f"And in all {inside.members.size} closed loops of plants and set points never seen, within the variation."
+        )
+        if "beyond" in found.checks and (missed := broken(found, found.checks["beyond"])):
+            told.append(f"With a parameter wrong that was not varied: {'; '.join(missed)}.")
+    for name, check in found.checks.items():
+        settled = np.isfinite(np.asarray(check.seen.merits.settling_time)).mean(axis=1)
+        if settled.min() < 1.0:
+            told.append(
+                f"Loops that settle, {CHECKS[name]}: {100 * settled[0]:.0f} % before, {100 * settled[1]:.0f} % after."
+            )
+    if edge := at_the_edge(found):
+        told.append(f"At a bound of the box, beyond which better gains may lie: {', '.join(edge)}.")
+    descent = found.descent
+    told.append(
+        f"It took {descent.simulations:,} closed loops in {descent.round} rounds"
+        + (
+            f"; {descent.wild:,} of them had slopes of no use (a limit cycle multiplies every difference)"
+            if descent.wild
+            else ""
+        )
+        + (f"; {descent.left_out:,} gave numbers that are none" if descent.left_out else "")
+        + "."
+    )
+    return told
+
+
+def gain_rows(found: Tuned) -> list[list[str]]:
+    """Gain, before, after, unit, box, remark."""
+    edge = at_the_edge(found)
+    return [
+        [
+            name,
+            digits(found.before[name]),
+            digits(found.after.values[name]),
+            found.units[name],
+            f"{low:g} … {high:g}",
+            "at the bound" if name in edge else "",
+        ]
+        for name, (low, high) in found.box.items()
+    ]
+
+
+def _figures(found: Tuned, check: Check) -> list[list[str]]:
+    """A row a term: median and worst before and after."""
+    rows = []
+    for column, (name, term) in enumerate(TERMS.items()):
+        cells = []
+        for which in (0, 1):
+            values = check.seen.judged[which, :, column]
+            never = 2.0 * found.settings.seconds if name == "settling_time" else np.inf
+            for value in (float(np.median(values)), float(np.max(values))):
+                cells.append("never" if value >= never else digits(0.0 if abs(value) < 1e-6 else value, 3))
+        limit = found.settings.limits.get(name)
+        rows.append([f"{term.label} ({term.unit})", *cells, "" if limit is None else f"{limit:g}"])
+    return rows
+
+
+def page(found: Tuned, pictures: Mapping[str, bytes], command: str) -> str:
+    """The whole page, pictures inside."""
+    say, settings = html.escape, found.settings
+    head = ["", "median before", "worst before", "median after", "worst after", "limit"]
+    parts = [
+        f"<h1>Gains of {say(settings.controller)}, tuned</h1>",
+        bullets(conclusions(found)),
+        f"<p>Tuned on {say(settings.plants_in_words())}. {say(settings.goal_in_words())}.</p>",
+        picture(pictures["before_after.png"], "angles and figures of merit before and after"),
+        "<p class=quiet>Above: thick, the plant as believed; thin, plants never seen. Below: from the least to the largest "
+        "over the plants at each set point; squares were tuned on, circles never seen.</p>",
+        "<h2>Gains</h2>",
+        table(["gain", "before", "after", "unit", "box", ""], gain_rows(found), (1, 2)),
+    ]
+    for name, check in found.checks.items():
+        parts += [
+            f"<h2>{say(CHECKS[name].capitalize())}</h2><p class=quiet>{check.members.size} closed loops of "
+            f"{settings.seconds:g} s.</p>",
+            table(head, _figures(found, check), (1, 2, 3, 4, 5)),
+        ]
+    parts += [
+        "<h2>The search</h2>",
+        picture(pictures["descent.png"], "cost over closed loops"),
+        f"<p class=quiet>{say(settings.between_in_words())}</p>",
+        table(["", ""], [["command", command], *map(list, made_with().items())]),
+    ]
+    return whole(f"Gains of {settings.controller}", [str(part) for part in parts])
+
+
+def record(found: Tuned, command: str) -> dict[str, Any]:
+    """Everything but the lines; a settling time that is never is null."""
+    descent = found.descent
+    return {
+        "controller": found.settings.controller,
+        "conclusions": conclusions(found),
+        "asked": found.settings.record(),
+        "gains": {
+            name: {
+                "before": found.before[name],
+                "after": found.after.values[name],
+                "unit": found.units[name],
+                "box": list(found.box[name]),
+            }
+            for name in found.box
+        },
+        "cost": {"before": found.costs[0], "after": found.costs[1]},
+        "limits_met": found.within_limits if found.settings.limits else None,
+        "checks": {
+            name: {
+                "what": CHECKS[name],
+                "loops": one.members.size,
+                "limit_exceeded_by_share": {"before": found.excesses[name][0], "after": found.excesses[name][1]},
+                **{
+                    when: {
+                        term: {
+                            "unit": TERMS[term].unit,
+                            "median": _plain(found, term, np.median(one.seen.judged[which, :, column])),
+                            "worst": _plain(found, term, np.max(one.seen.judged[which, :, column])),
+                        }
+                        for column, term in enumerate(TERMS)
+                    }
+                    for which, when in ((0, "before"), (1, "after"))
+                },
+            }
+            for name, one in found.checks.items()
+        },
+        "search": {
+            "closed_loops": descent.simulations,
+            "rounds": descent.round,
+            "slopes_of_no_use": descent.wild,
+            "no_numbers": descent.left_out,
+            "best_cost_within_limits_by_round": [
+                float(one)
+                for one in np.minimum.accumulate(
+                    np.nanmin(np.where(descent.excesses <= 0.0, descent.costs, np.inf), axis=1)
+                )[: descent.round]
+            ],
+            "closed_loops_by_round": descent.ran[: descent.round].tolist(),
+        },
+        "command": command,
+        "made_with": made_with(),
+    }
+
+
+def _plain(found: Tuned, term: str, value: float) -> float | None:
+    never = term == "settling_time" and value >= 2.0 * found.settings.seconds
+    return None if never else float(value)

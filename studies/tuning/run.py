@@ -1,0 +1,79 @@
+"""Tuning beside its peers, and the requirement for every controller: `python -m studies.tuning.run [--fast] [part ...]`.
+
+Parts: `peers` and the controllers by name; default all (an hour on two cores). `--fast`: some minutes, into
+`fast.json`. What is finished is kept in `results.json`; a part that is named is made again.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from smajax.control_presets import CONTROLLERS
+from smajax.figures.rigs import arm
+from smajax.fit.progress import Progress
+from smajax.report.files import replace
+from smajax.runtime import prepare
+from studies.tuning.peers import PROBLEMS, Problem, searched
+from studies.tuning.picture import draw
+from studies.tuning.record import HERE, keep, kept
+from studies.tuning.requirement import Effort, requirement
+from studies.tuning.tables import readme
+
+CANDIDATES = 100  # closed loops of a search: so many candidates on all members
+WAYS = {"trust-region": (0, 1), "adam": (0,), "nelder-mead": (0, 1), "cma-es": (0, 1), "grid": (0,)}  # seeds
+FAST_PROBLEM = Problem("vsc3", "worst", (0.0, 30.0), varied=False, seconds=3.0)
+FAST_EFFORT = Effort((0.0, 30.0), 30.0, 4, 2, 3, 2, 1, 3.0)
+
+
+def say(what: str, share: float) -> None:
+    """Progress for a log."""
+    if what.startswith("say: "):
+        print(what.removeprefix("say: "), flush=True)
+
+
+def compare(path: Path, problems: tuple[Problem, ...], candidates: int, again: bool, progress: Progress = say) -> None:
+    """Every way on every problem, kept one by one."""
+    for problem in problems:
+        members = len(problem.set_points) * (9 if problem.varied else 1)
+        for way, seeds in WAYS.items():
+            for seed in seeds:
+                name = f"{problem.name}; {way}; {seed}"
+                if name in kept(path).get("peers", {}) and not again:
+                    continue
+                found = searched(arm(), problem, way, candidates * members, seed)
+                keep(path, "peers", name, found)
+                progress(f"say: {name}: cost {found['course'][-1][1]:.4g} in {found['closed_loops']} loops", 1.0)
+
+
+def require(path: Path, names: list[str], effort: Effort, again: bool, progress: Progress = say) -> None:
+    """The requirement for every controller of `names`."""
+    for name in names:
+        if name in kept(path).get("requirement", {}) and not again:
+            continue
+        found = requirement(arm(), name, effort, progress, keep=path.name == "results.json")
+        keep(path, "requirement", name, found)
+        progress(f"say: {name}: {'met' if found['met'] else 'not met'}, {found['limit_exceeded_by_share']}", 1.0)
+
+
+def main(arguments: list[str]) -> None:
+    """The parts asked for."""
+    fast = "--fast" in arguments
+    parts = [part for part in arguments if part != "--fast"]
+    unknown = [part for part in parts if part not in ("peers", "picture", *CONTROLLERS)]
+    if unknown:
+        raise SystemExit(f"no part {', '.join(unknown)}; there are peers, picture, {', '.join(CONTROLLERS)}.")
+    prepare(cores=True)
+    path = HERE / ("fast.json" if fast else "results.json")
+    if not parts or "peers" in parts:
+        compare(path, (FAST_PROBLEM,) if fast else PROBLEMS, 12 if fast else CANDIDATES, bool(parts))
+    names = [part for part in parts if part in CONTROLLERS] or ([] if parts else list(CONTROLLERS))
+    require(path, ["vsc3"] if fast and names else names, FAST_EFFORT if fast else Effort(), bool(parts))
+    if not fast:
+        results, words = kept(path), (HERE / "words.md").read_text(encoding="utf-8")
+        (HERE / "tuning.png").write_bytes(draw(results))
+        replace(HERE / "README.md", readme(results, words))
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

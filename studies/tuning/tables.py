@@ -1,0 +1,130 @@
+"""The study's README, from its numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from smajax.control_presets import CONTROLLERS
+from studies.tuning.requirement import LIMITS
+
+FIFTH = 0.2
+EQUAL = 1.01  # costs are equal within 1 %
+LEVEL = 7.5  # of a cost
+PEERS = ("adam", "cma-es", "nelder-mead", "grid")
+
+
+def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head), *("| " + " | ".join(row) + " |" for row in rows)]
+    return "\n".join(lines)
+
+
+def cost_after(found: Mapping[str, Any], loops: float) -> float:
+    """The best cost of a search after so many closed loops; infinite before its first."""
+    done = [cost for run, cost in found["course"] if run <= loops]
+    return float(done[-1]) if done else np.inf
+
+
+def by_problem(results: Mapping[str, Any]) -> dict[str, dict[str, list[Mapping[str, Any]]]]:
+    """Problem -> way -> its searches, one a seed."""
+    found: dict[str, dict[str, list[Mapping[str, Any]]]] = {}
+    for name, one in results["peers"].items():
+        problem, way, _ = name.split("; ")
+        found.setdefault(problem, {}).setdefault(way, []).append(one)
+    return found
+
+
+def reached(ways: Mapping[str, list[Mapping[str, Any]]], peer: str, budget: float) -> bool:
+    """Every seed of the trust region is, after a fifth of the loops, as low as the peer's best seed after all."""
+    own = max(cost_after(one, FIFTH * budget) for one in ways["trust-region"])
+    return own <= EQUAL * min(cost_after(one, budget) for one in ways[peer])
+
+
+def _shown(values: Sequence[float]) -> str:
+    return " / ".join("–" if not np.isfinite(value) else f"{value:.3g}" for value in values)
+
+
+def peers_table(results: Mapping[str, Any]) -> str:
+    """A row a problem."""
+    rows = []
+    for problem, ways in by_problem(results).items():
+        budget = max(one["closed_loops"] for several in ways.values() for one in several)
+        cells = [problem, f"{budget:,}", _shown([cost_after(one, FIFTH * budget) for one in ways["trust-region"]])]
+        cells.append(_shown([cost_after(one, budget) for one in ways["trust-region"]]))
+        for peer in PEERS:
+            mark = "**" if reached(ways, peer, budget) else ""
+            cells.append(f"{mark}{_shown([cost_after(one, budget) for one in ways[peer]])}{mark}")
+        rows.append(cells)
+    head = ["problem", "loops", "trust region, a fifth", "trust region, all", "Adam", "CMA-ES", "Nelder-Mead", "grid"]
+    return _table(head, rows)
+
+
+def verdict(results: Mapping[str, Any]) -> str:
+    """Where a fifth of the loops was enough, in a sentence a peer."""
+    told = []
+    problems = by_problem(results)
+    for peer in PEERS:
+        lost = []
+        for problem, ways in problems.items():
+            budget = max(one["closed_loops"] for several in ways.values() for one in several)
+            if not reached(ways, peer, budget):
+                lost.append(problem)
+        name = {"adam": "Adam", "cma-es": "CMA-ES", "nelder-mead": "Nelder-Mead", "grid": "the grid"}[peer]
+        told.append(
+            f"- against {name}: {len(problems) - len(lost)} of {len(problems)} problems"
+            + (f"; not on {'; '.join(lost)}" if 0 < len(lost) < len(problems) else "")
+        )
+    return "\n".join(told)
+
+
+def first_below(results: Mapping[str, Any]) -> str:
+    """Closed loops until PID's worst case costs less than `LEVEL`, a number a seed."""
+    ways = by_problem(results)["pid, worst, plants 20 % wrong"]
+    told = []
+    for way, several in ways.items():
+        firsts = [next((run for run, cost in one["course"] if cost < LEVEL), None) for one in several]
+        told.append(f"{way} {' / '.join('never' if one is None else f'{one:,}' for one in firsts)}")
+    return f"{'; '.join(told)} loops."
+
+
+def requirement_table(results: Mapping[str, Any]) -> str:
+    """A row a controller: what the worst loop does."""
+    rows = []
+    for name in CONTROLLERS:
+        if name not in results["requirement"]:
+            continue
+        one = results["requirement"][name]
+        after, alone = one["after"], one["after_on_the_plant_as_believed"]
+        cells = [name, "yes" if one["met"] else "no", f"{after['loops_that_meet_all']:,} of {after['loops']:,}"]
+        for term in LIMITS:
+            worst, at = after[term]["worst"], after[term]["at_deg"]
+            cells.append(f"{'never' if worst is None else f'{worst:.3g}'} ({at:g}°)")
+        cells.append(f"{one['before']['loops_that_meet_all']:,}")
+        cells.append(f"{alone['loops_that_meet_all']} of {alone['loops']}")
+        rows.append(cells)
+    head = [
+        "controller",
+        "met",
+        "loops that meet all three",
+        "worst settling, s",
+        "worst overshoot, °",
+        "worst steady error, °",
+        "with the preset's gains",
+        "plant as believed",
+    ]
+    return _table(head, rows)
+
+
+def readme(results: Mapping[str, Any], words: str) -> str:
+    """`words` with the tables put in where it names them."""
+    parts = {
+        "PEERS": peers_table,
+        "VERDICT": verdict,
+        "FIRST": first_below,
+        "REQUIREMENT": requirement_table,
+    }
+    for mark, made in parts.items():
+        words = words.replace(f"<{mark}>", made(results))
+    return words
