@@ -70,7 +70,7 @@ def conclusions(found: Tuned) -> list[str]:
         told.append(
             f"In plants within the variation that were never seen: {'; '.join(missed)}."
             if missed
-            else f"And in all {inside.members.size} closed loops of plants and set points never seen, within the variation."
+            else f"Every limit is met in all {inside.members.size} closed loops of plants and set points never seen, within the variation."
         )
         if "beyond" in found.checks and (missed := broken(found, found.checks["beyond"])):
             told.append(f"With a parameter wrong that was not varied: {'; '.join(missed)}.")
