@@ -59,7 +59,11 @@ def advance(
         own = jnp.where(last, at.left, jnp.minimum(at.tried, 0.5 * at.left))
         new, error = step_and_error(system, at.state, inputs, own)
         worst = _relative(system, error, tolerance)
-        good = (worst <= 1.0) | (own <= shortest)
+        # What is no number any more is let go on to the end at once: no step mends it.
+        lost = ~jnp.isfinite(at.state.wire.temperature + at.state.motion.position + at.state.wire.stress)
+        own = jnp.where(lost, at.left, own)
+        last = last | lost
+        good = (worst <= 1.0) | (own <= shortest) | lost
         factor = jnp.clip(SAFETY * jnp.maximum(worst, 1e-6) ** (-1.0 / 3.0), SHRINK, GROW)
         asked = jnp.maximum(own * factor, shortest)
         # A step cut short by the end of the time says nothing against a longer one.

@@ -59,7 +59,7 @@ def simulate_compiled(
     and for a tolerance that is none; Unsupported for an effect or a load of your own that cannot be translated.
     """
     check_inputs(system, inputs)
-    if tolerance is not None and (tolerance <= 0.0 or not isinstance(system.load, AbstractMovingLoad)):
+    if tolerance is not None and (not tolerance > 0.0 or not isinstance(system.load, AbstractMovingLoad)):
         raise ValueError(f"`tolerance` is a positive number, for a load that moves; got {tolerance}. Take 1e-4.")
     series = {name: jnp.asarray(values, dtype=float) for name, values in inputs.items()}
     limit = None if tolerance is None else jnp.asarray(tolerance, dtype=float)

@@ -245,7 +245,14 @@ def step_and_error(
     """The same of a moving load by the scheme of order 3, and what it may be off by: (C, m or rad, m/s or rad/s)."""
     new, (heat, position, velocity) = _moving_step(system, state, inputs, dt, ORDER_THREE)
     capacity = stored_heat(system.wire, (), jnp.ones_like(heat), new.wire.martensite_fraction)
-    return _read(system, state, new, new.motion.position, dt), (heat / capacity, position, velocity)
+    # Exact where the load moves evenly over the step, which here may be many times as long as the sensor's lag.
+    lag = sum(effect.sensor_time_constant() for effect in system.effects)
+    if isinstance(lag, (int, float)) and lag == 0:
+        reading = new.motion.position
+    else:
+        behind = lag * (new.motion.position - state.motion.position) / dt
+        reading = new.motion.position - behind + (state.reading - state.motion.position + behind) * jnp.exp(-dt / lag)
+    return State(new.time, new.wire, new.motion, reading), (heat / capacity, position, velocity)
 
 
 def _read(system: System, old: State, new: State, shown: Scalar, dt: Scalar) -> State:

@@ -218,3 +218,55 @@ def test_a_function_with_no_translation_runs_by_xla_or_says_why():
     np.testing.assert_array_equal(found["least"], [1.0, 1.0, 2.0])
     with pytest.raises(ValueError, match="`sort`"):
         list(chunks(sorted_pair, None, axes, 3, [0], engine="lanes"))
+
+
+def _weak(x: jax.Array) -> jax.Array:
+    """The same numbers, of a kind that gives way to others: a conversion that converts nothing."""
+    return lax.convert_element_type_p.bind(x, new_dtype=np.dtype(float), weak_type=True, sharding=None)
+
+
+TRAPS: dict[str, Function] = {
+    "a constant stays its own number when its kind changes": lambda a, b: (
+        _weak(jnp.stack([jnp.asarray(5.0), a])[0]) / b
+    ),
+    "a number that is none is larger than any": lambda a, b: jnp.maximum(a, jnp.nan) + b,
+    "a table looked up by small whole numbers": lambda a, b: jnp.arange(300.0)[(a * 10.0).astype("int8")],
+    "the sign of what has none": lambda a, b: jnp.sign((a * 2.0**62).astype("uint64")),
+    "a quotient that is cut to a whole number": lambda a, b: jnp.floor((3.0 * a) / a) + jnp.round(49.0 * b / b),
+    "bits that do not matter are kept": lambda a, b: sum(lax.optimization_barrier((a, b))),
+}
+
+
+@pytest.mark.parametrize("name", TRAPS)
+def test_traps(name):
+    a, b = np.linspace(1.0, 12.0, 199), np.linspace(0.3, 49.0, 199)
+    np.testing.assert_allclose(by_lanes(TRAPS[name], a, b), by_xla(TRAPS[name], a, b), rtol=1e-15)
+
+
+REFUSED: dict[str, Function] = {
+    "filled in beyond the end": lambda a, b: jnp.take(jnp.broadcast_to(a, (100,)), b.astype(int)),
+    "filled in at a known place": lambda a, b: (
+        jnp.stack([a, b]).at[jnp.array([0, 5])].get(mode="fill", fill_value=0).sum()
+    ),
+    "divided by what may be none": lambda a, b: lax.div(a.astype(int), b.astype(int)).astype(float),
+    "the rest of a division by nothing": lambda a, b: lax.rem(a.astype(int), 0).astype(float),
+    "a whole power that each member says": lambda a, b: a ** b.astype(int),
+    "the sum of nothing": lambda a, b: jnp.stack([a, b])[:0].sum(),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_has_no_translation_is_refused(name):
+    with pytest.raises(Unsupported):
+        by_lanes(REFUSED[name], np.ones(8), np.ones(8))
+
+
+def test_arrays_of_numpy_in_any_layout_and_numbers_of_any_kind():
+    def total(model, own):
+        return {"sum": own["a"] * model["t"].sum() + jnp.asarray(model["n"]).astype(float)}
+
+    axes = zipped(a=[1.0, 2.0])
+    for number in (1, 1.5, True):
+        for array in (np.arange(10.0)[::2], np.arange(12.0).reshape(3, 4).T[1], np.arange(5, dtype="float32")):
+            ((_, found),) = chunks(total, {"t": array, "n": number}, axes, 2, [0], engine="lanes")
+            np.testing.assert_allclose(found["sum"], np.array([1.0, 2.0]) * array.sum() + float(number))

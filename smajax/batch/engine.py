@@ -77,7 +77,7 @@ def result_shapes(function: Function, model: Any, axes: Axes) -> Any:
     key = kind_of(function, model, tuple(axes.names))
     if key not in _shapes:
         while len(_shapes) >= KEPT:
-            del _shapes[next(iter(_shapes))]
+            _shapes.pop(next(iter(_shapes)), None)
         _shapes[key] = eqx.filter_eval_shape(function, model, {name: jnp.zeros(()) for name in axes.names})
     return _shapes[key]
 

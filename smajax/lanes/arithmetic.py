@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -49,6 +50,8 @@ def _extreme(larger: bool) -> Operation:
             return _chosen(text, first, left, right)
         if right.constant:
             left, right = right, left
+        if left.number is not None and math.isnan(left.number):
+            return left
         # The second where one is no number: enough where the first is a constant.
         found = _chosen(text, text.assign(f"fcmp o{sign} {kind} {left.name}, {right.name}"), left, right)
         if left.constant:
@@ -98,6 +101,9 @@ def _absolute(text: Text, out: str, one: Lane, **_: Any) -> Lane:
 
 def _sign(text: Text, out: str, one: Lane, **_: Any) -> Lane:
     kind, zero = text.vector(out), text.constant(0, out)
+    if not _signed(out):
+        some = text.assign(f"icmp ne {kind} {one.name}, {zero.name}")
+        return _chosen(text, some, text.constant(1, out), zero)
     above, below = ("fcmp ogt", "fcmp olt") if _floating(out) else ("icmp sgt", "icmp slt")
     positive = text.assign(f"{above} {kind} {one.name}, {zero.name}")
     negative = text.assign(f"{below} {kind} {one.name}, {zero.name}")
@@ -188,14 +194,19 @@ def _rounded(text: Text, out: str, one: Lane, *, rounding_method: Any, **_: Any)
 
 
 def _remainder(text: Text, out: str, left: Lane, right: Lane, **_: Any) -> Lane:
-    if not _floating(out) and not right.constant:
-        raise Unsupported("a remainder by a number that is not known before")  # by zero it would stop the program
+    if not _floating(out) and right.number in (None, 0.0, -1.0):
+        raise Unsupported("a remainder by a number that may be none")  # by zero it would stop the program
     return _binary("frem", "srem" if _signed(out) else "urem")(text, out, left, right)
 
 
+def exact_quotient(text: Text, out: str, left: Lane, right: Lane, **_: Any) -> Lane:
+    """x/y to the last bit: where 3 y / y has to be 3."""
+    return text.lane(f"fdiv {text.vector(out)} {left.name}, {right.name}", out)
+
+
 def _divided(text: Text, out: str, left: Lane, right: Lane, **_: Any) -> Lane:
-    if not _floating(out) and not right.constant:
-        raise Unsupported("a whole division by a number that is not known before")
+    if not _floating(out) and right.number in (None, 0.0, -1.0):
+        raise Unsupported("a whole division by a number that may be none")
     if not _floating(out):
         return _binary(None, "sdiv" if _signed(out) else "udiv")(text, out, left, right)
     if right.name in text.either:
@@ -211,7 +222,7 @@ def _divided(text: Text, out: str, left: Lane, right: Lane, **_: Any) -> Lane:
 
 def _converted(text: Text, out: str, one: Lane, **_: Any) -> Lane:
     if scalar_type(one.dtype) == scalar_type(out):
-        return Lane(one.name, out, one.constant)
+        return Lane(one.name, out, one.number if _floating(out) else None)
     source, target = text.vector(one.dtype), text.vector(out)
     if out == "bool":
         test = "fcmp une" if _floating(one.dtype) else "icmp ne"
@@ -306,5 +317,4 @@ ELEMENTWISE: Mapping[str, Operation] = {
     "stop_gradient": _same,
     "copy": _same,
     "copy_p": _same,
-    "optimization_barrier": _same,
 }

@@ -19,18 +19,23 @@ KEPT = 32  # compiled functions
 BITS = 60  # of the number by which members are put in order
 MOST_SORTED = 6  # numbers of a member that are looked at for that
 
-_kept: dict[Hashable, Evaluator | Unsupported] = {}
+_kept: dict[Hashable, Evaluator | str] = {}
 
 
 class Evaluator:
     """`function(model, own)` of one member as a function of whole arrays, for models with arrays of the same shapes."""
 
-    def __init__(self, kernel: Kernel, tree: Any, names: tuple[str, ...], dtype: np.dtype) -> None:
-        self._kernel, self._tree, self._names, self._dtype = kernel, tree, names, dtype
+    def __init__(
+        self, kernel: Kernel, tree: Any, names: tuple[str, ...], dtype: np.dtype, shared: Sequence[np.dtype]
+    ) -> None:
+        self._kernel, self._tree, self._names, self._dtype, self._shared = kernel, tree, names, dtype, shared
 
     def __call__(self, model: Any, own: dict[str, np.ndarray], threads: int) -> Any:
         """What the function gives, every leaf with one row a member; `own` are arrays of shape (members,)."""
-        shared = [np.asarray(_plain(leaf)) for leaf in jax.tree.leaves(eqx.filter(model, eqx.is_array))]
+        leaves = jax.tree.leaves(eqx.filter(model, _is_array))
+        shared = [
+            np.ascontiguousarray(_plain(leaf), dtype=dtype) for leaf, dtype in zip(leaves, self._shared, strict=True)
+        ]
         order = alike([own[name] for name in self._names])
         values = [np.ascontiguousarray(own[name][order], dtype=self._dtype) for name in self._names]
         back = np.argsort(order)
@@ -57,6 +62,10 @@ def alike(series: Sequence[np.ndarray]) -> np.ndarray:
     return np.argsort(code, kind="stable")
 
 
+def _is_array(leaf: Any) -> bool:
+    return isinstance(leaf, jax.Array | np.ndarray)
+
+
 def _is_key(leaf: Any) -> bool:
     return jnp.issubdtype(leaf.dtype, jax.dtypes.prng_key)
 
@@ -78,11 +87,13 @@ def lanes_of(dtypes: set[str]) -> int:
 
 def kind_of(function: Callable[[Any, Any], Any], model: Any, names: tuple[str, ...]) -> Hashable:
     """What a traced program depends on: not on the values of the model's arrays."""
-    arrays, static = eqx.partition(model, eqx.is_array)
+    arrays, static = eqx.partition(model, _is_array)
     leaves, tree = jax.tree.flatten(arrays)
     settled, settled_tree = jax.tree.flatten(static)
     kinds = tuple((leaf.shape, str(leaf.dtype), getattr(leaf, "weak_type", False)) for leaf in leaves)
-    return function, tree, settled_tree, tuple(settled), kinds, names, str(jnp.zeros(()).dtype)
+    # To Python 1, 1.0 and True are one key; to a traced program they are not.
+    told = tuple((type(one), repr(one)) if isinstance(one, bool | int | float | complex) else one for one in settled)
+    return function, tree, settled_tree, told, kinds, names, str(jnp.zeros(()).dtype)
 
 
 def evaluator(function: Callable[[Any, Any], Any], model: Any, names: tuple[str, ...]) -> Evaluator:
@@ -93,15 +104,15 @@ def evaluator(function: Callable[[Any, Any], Any], model: Any, names: tuple[str,
     key = kind_of(function, model, names)
     if key not in _kept:
         while len(_kept) >= KEPT:
-            del _kept[next(iter(_kept))]
+            _kept.pop(next(iter(_kept)), None)
         try:
-            arrays, static = eqx.partition(model, eqx.is_array)
+            arrays, static = eqx.partition(model, _is_array)
             _kept[key] = _compiled(function, arrays, static, names)
         except Unsupported as reason:
-            _kept[key] = reason
+            _kept[key] = str(reason)
     found = _kept[key]
-    if isinstance(found, Unsupported):
-        raise found
+    if isinstance(found, str):
+        raise Unsupported(found)
     return found
 
 
@@ -121,5 +132,10 @@ def _compiled(function: Callable[[Any, Any], Any], arrays: Any, static: Any, nam
     program = jax.make_jaxpr(member)(*map(_plain, leaves), *(none for _ in names))
     dtypes = {str(aval.dtype) for aval in (*program.in_avals, *program.out_avals)}
     own = [False] * len(leaves) + [True] * len(names)
-    kernel = Kernel(translate(program, own, lanes_of(dtypes), has_wide_vectors()))
-    return Evaluator(kernel, shape[0], names, np.dtype(none.dtype))
+    translated = translate(program, own, lanes_of(dtypes), has_wide_vectors())
+    try:
+        kernel = Kernel(translated)
+    except RuntimeError as reason:  # LLVM's words for a text that makes no sense to it
+        raise Unsupported(f"something in this program ({str(reason).splitlines()[-1]})") from None
+    shared = [np.dtype(aval.dtype) for aval in program.in_avals[: len(leaves)]]
+    return Evaluator(kernel, shape[0], names, np.dtype(none.dtype), shared)

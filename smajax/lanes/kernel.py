@@ -22,27 +22,32 @@ def _machine() -> Any:
 
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
-    features = llvm.get_host_cpu_features().flatten()
+    features = ",".join(f"{'+' if has else '-'}{name}" for name, has in sorted(_features().items()))
     return llvm.Target.from_default_triple().create_target_machine(
         cpu=llvm.get_host_cpu_name(), features=features, opt=3, jit=True
     )
 
 
+def _features() -> dict[str, bool]:
+    """What the processor can do; nothing beyond the least where LLVM does not know it."""
+    import llvmlite.binding as llvm
+
+    try:
+        return dict(llvm.get_host_cpu_features())
+    except RuntimeError:
+        return {}
+
+
 @cache
 def vector_bits() -> int:
     """Of the processor's widest vectors."""
-    import llvmlite.binding as llvm
-
-    features = llvm.get_host_cpu_features()
-    return 512 if has_wide_vectors() else 256 if features.get("avx") else 128
+    return 512 if has_wide_vectors() else 256 if _features().get("avx") else 128
 
 
 @cache
 def has_wide_vectors() -> bool:
     """Whether it has AVX-512, with the instructions on 64-bit numbers."""
-    import llvmlite.binding as llvm
-
-    features = llvm.get_host_cpu_features()
+    features = _features()
     return all(bool(features.get(name)) for name in ("avx512f", "avx512dq", "avx512vl"))
 
 

@@ -11,7 +11,7 @@ import jax.extend as jex
 import numpy as np
 from jax.interpreters import partial_eval
 
-from smajax.lanes.arithmetic import ELEMENTWISE, select
+from smajax.lanes.arithmetic import ELEMENTWISE, exact_quotient, select
 from smajax.lanes.text import NAME, Lane, Text, Unsupported, scalar_type
 from smajax.lanes.values import (
     SMALL,
@@ -97,6 +97,22 @@ def _whole(known: Value) -> int:
     return int(np.asarray(known))
 
 
+def _rounds(equation: Any) -> bool:
+    """Whether it cuts its argument to a whole number: a quotient must not be a bit below one then."""
+    name = equation.primitive.name
+    if name in ("jit", "pjit"):
+        name = str(equation.params.get("name", ""))
+    to_whole = name == "convert_element_type" and "int" in str(equation.params["new_dtype"])
+    return to_whole or name in ("floor", "ceil", "round", "trunc", "fix", "floor_divide")
+
+
+def _constants(consts: Sequence[Any]) -> list[Value]:
+    try:
+        return [np.asarray(one) for one in consts]
+    except TypeError:
+        raise Unsupported("a constant that is no array of numbers") from None
+
+
 def _open(program: Any) -> tuple[Any, Sequence[Any]]:
     return (program.jaxpr, program.consts) if hasattr(program, "consts") else (program, ())
 
@@ -116,18 +132,23 @@ class _Translation:
 
         for variable, value in zip([*jaxpr.constvars, *jaxpr.invars], [*consts, *given], strict=True):
             names[variable] = value
+        to_the_bit = {id(one) for equation in jaxpr.eqns if _rounds(equation) for one in equation.invars}
         for equation in jaxpr.eqns:
-            found = self.equation(equation, [read(one) for one in equation.invars])
+            given = [read(one) for one in equation.invars]
+            whole = equation.primitive.name == "div" and id(equation.outvars[0]) in to_the_bit
+            found = self.equation(equation, given, "exact_div" if whole else equation.primitive.name)
             for variable, value in zip(equation.outvars, found, strict=True):
                 names[variable] = value
         return [read(one) for one in jaxpr.outvars]
 
     def closed(self, program: Any, given: Sequence[Value]) -> list[Value]:
         jaxpr, consts = _open(program)
-        return self.program(jaxpr, [np.asarray(one) for one in consts], given)
+        return self.program(jaxpr, _constants(consts), given)
 
-    def equation(self, equation: Any, given: list[Value]) -> list[Value]:
-        name, params = equation.primitive.name, equation.params
+    def equation(self, equation: Any, given: list[Value], name: str) -> list[Value]:
+        params = equation.params
+        if name == "optimization_barrier":
+            return given
         if name in CALLS:
             return self.closed(params[CALLS[name]], given)
         if name == "scan":
@@ -142,12 +163,19 @@ class _Translation:
             return [np.asarray(one) for one in (found if equation.primitive.multiple_results else [found])]
         out = _array(equation.outvars[0].aval)
         kinds = [str(one.aval.dtype) for one in equation.invars]
-        if name in ELEMENTWISE:
+        if name == "exact_div" and not out.dtype.startswith("float"):
+            name = "div"
+        if name in ELEMENTWISE or name == "exact_div":
             return [self.elementwise(name, params, given, out)]
+        if name == "gather" and "FILL" in str(params["mode"]):
+            # Not a place there is: `moved` finds out where something would be put in.
+            params = {**params, "fill_value": -1}
+            if not self.at_known_places(name, given):
+                raise Unsupported("a gathering that puts something in the place of what is beyond the ends")
         small = all(size_of(one) <= SMALL for one in given)
         small &= all(int(np.prod(one.aval.shape)) <= SMALL for one in equation.outvars)
         if name in MOVES and small and self.at_known_places(name, given):
-            return self.moved(equation, given)
+            return self.moved(equation.primitive, params, given)
         if name in MOVES and len(set(map(_only_lane, given[: 1 if MOVES[name] else None]))) == 1:
             lane = _only_lane(given[0])
             if lane is not None and name not in ("dynamic_update_slice", "scatter", "split"):
@@ -165,8 +193,12 @@ class _Translation:
         if name == "convert_element_type" and isinstance(given[0], Stored) and given[0].dtype == out.dtype:
             return given[0]
 
+        operation = exact_quotient if name == "exact_div" else ELEMENTWISE[name]
+
         def put(*lanes: Lane) -> Lane:
-            return ELEMENTWISE[name](self.text, out.dtype, *lanes, **params)
+            if name not in ("select_n", "convert_element_type") and len({one.dtype for one in lanes}) > 1:
+                raise Unsupported(f"`{name}` of different kinds of numbers")
+            return operation(self.text, out.dtype, *lanes, **params)
 
         if size > SMALL:
             if all(isinstance(one, Filled) or (is_known(one) and size_of(one) == 1) for one in given):
@@ -188,9 +220,8 @@ class _Translation:
         data = MOVES[name]
         return data is None or all(is_known(one) for number, one in enumerate(given) if number not in data)
 
-    def moved(self, equation: Any, given: list[Value]) -> list[Value]:
+    def moved(self, primitive: Any, params: dict[str, Any], given: list[Value]) -> list[Value]:
         """What only moves numbers of small arrays about: done with their numbers in the place of themselves."""
-        primitive = equation.primitive
         data = MOVES[primitive.name]
         lanes: list[Lane] = []
         named = []
@@ -202,7 +233,7 @@ class _Translation:
             named.append(np.arange(len(lanes), len(lanes) + own.size, dtype="int32").reshape(own.shape))
             lanes += list(own.ravel())
         with jax.ensure_compile_time_eval():
-            found = primitive.bind(*named, **equation.params)
+            found = primitive.bind(*named, **params)
         results = found if primitive.multiple_results else [found]
         places = [np.asarray(one) for one in results]
         if any(((one < 0) | (one >= len(lanes))).any() for one in places):
@@ -271,12 +302,12 @@ class _Translation:
     def looked_up(self, array: Value, index: Lane, dtype: str) -> Lane:
         """Of a row of numbers the one that each lane asks for; the nearest end where there is none."""
         text, shape = self.text, self.shape_of(array)
+        index = ELEMENTWISE["convert_element_type"](text, "int64", index)
         most = text.constant(shape[0] - 1, index.dtype)
         low = ELEMENTWISE["max"](text, index.dtype, index, text.constant(0, index.dtype))
         low = ELEMENTWISE["min"](text, index.dtype, low, most)
         if isinstance(array, Held) and array.size <= 8:
             return select(text, dtype, low, *array.ravel()) if array.size > 1 else array.ravel()[0]
-        low = ELEMENTWISE["convert_element_type"](text, "int64", low)
         stored = in_memory(text, array, shape, dtype)
         kind = scalar_type(dtype)
         if dtype == "bool":
@@ -319,6 +350,8 @@ class _Translation:
 
     def reduced(self, name: str, given: list[Value], axes: Sequence[int], out: Array) -> Value:
         lanes = np.asarray(in_registers(self.text, given[0]))
+        if lanes.size == 0:
+            raise Unsupported("the sum of no numbers")
         moved = np.moveaxis(lanes, axes, range(len(axes))).reshape(-1, *out.shape)
         total = moved[0]
         operation = ELEMENTWISE[name]
@@ -350,8 +383,8 @@ class _Translation:
 
     def put_dot_general(self, params: Any, given: list[Value], out: Array, kinds: Any) -> Value:
         (left_axes, right_axes), (left_batch, right_batch) = params["dimension_numbers"]
-        if left_batch or right_batch:
-            raise Unsupported("products of batches of matrices")
+        if left_batch or right_batch or set(kinds) != {out.dtype} or out.dtype == "bool":
+            raise Unsupported("products of matrices in batches, of truth values, or of different kinds of numbers")
         left, right = (np.asarray(in_registers(self.text, one)) for one in given)
         count = int(np.prod([left.shape[axis] for axis in left_axes]))
         rows = np.moveaxis(left, left_axes, range(-len(left_axes), 0)).reshape(-1, count)
@@ -386,7 +419,7 @@ class _Translation:
         fixed, carry = params["num_consts"], params["num_carry"]
         length, backward = params["length"], params["reverse"]
         jaxpr, consts = _open(params["jaxpr"])
-        known = [np.asarray(one) for one in consts]
+        known = _constants(consts)
         start = [self.carried(one) for one in given[fixed : fixed + carry]]
         series = given[fixed + carry :]
         kinds = [_array(one.aval) for one in jaxpr.invars[fixed + carry :]]
@@ -532,7 +565,7 @@ def translate(program: Any, own: Sequence[bool], lanes: int, wide: bool = False)
     results = tuple(_array(aval) for aval in program.out_avals)
     # What no result asks for may well be what has no translation.
     asked, _ = partial_eval.dce_jaxpr(program.jaxpr, [True] * len(results), instantiate=True)
-    found = put.program(asked, [np.asarray(one) for one in program.consts], given)
+    found = put.program(asked, _constants(program.consts), given)
     for pointer, result, answer in zip(outputs, results, found, strict=True):
         _leave(text, pointer, first, result, answer)
     following = text.assign("add i64 %group, 1")
@@ -554,6 +587,8 @@ def translate(program: Any, own: Sequence[bool], lanes: int, wide: bool = False)
 def _leave(text: Text, pointer: str, first: str, result: Array, value: Value) -> None:
     """A result where the caller finds it: members one after the other."""
     size = int(np.prod(result.shape))
+    if size == 0:
+        return
     if size == 1:
         text.store_lanes(in_registers(text, value).ravel()[0], text.address(pointer, first, result.dtype))
         return
