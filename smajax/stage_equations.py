@@ -36,6 +36,7 @@ class Stage(eqx.Module):
     heat: Scalar  # H_b, J/m
     position: Scalar  # x_b
     velocity: Scalar  # v_b
+    enough: float = eqx.field(static=True)  # how far the last iteration may still move the solution (`stage_solver`)
 
 
 def friction_in_use(stage: Stage, position: Scalar) -> tuple[Scalar, Scalar]:

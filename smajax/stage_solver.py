@@ -10,7 +10,7 @@ it), so its root lies between the present fraction and the end of the branch. Th
 stage, and it is solved without a new linearisation.
 
 Two linearisations are nearly always enough (`studies/benchmarks` says how often), and cost the same for every member of a
-batch. Where the second still moved the solution by `TOLERANCE`, more follow, with the inner equation solved to the end in
+batch. Where the second still moved the solution by `Stage.enough`, more follow, with the inner equation solved to the end in
 its bracket: a member that needs them makes its batch wait, and changes nothing for the others.
 """
 
@@ -47,9 +47,8 @@ INNER = (3, 1)  # steps of the inner equation after the first two linearisations
 CLOSE = 1e-6  # last step of it after later ones
 MOST_ITERATIONS = 50
 UNDAMPED = 12  # iterations before every second step is halved
-# Enough: when no unknown moves by more than this share of its scale, 1 C, 1 % strain, 1e-4 E, and xi in full; in float32,
-# by more than what rounding alone moves it. The step after would move it by about the square of that.
-TOLERANCE = 1e-4
+# Enough: when no unknown moves by more than `Stage.enough` of its scale, 1 C, 1 % strain, 1e-4 E, and xi in full; in
+# float32, by more than what rounding alone moves it. The step after would move it by about the square of that.
 ROUNDINGS = 1e3
 DRIVING = (heating_temperature, cooling_temperature)  # both linear in temperature and stress
 Entry = Scalar | None  # of a Jacobian; None: zero whatever the values, and never computed
@@ -153,7 +152,7 @@ def solve(system: System, stage: Stage, inputs: Inputs) -> Solution:
     open_at_start = open_branches(law, effects, old)
     slips = friction_limit(system)
     sticks = stage.old.motion.position - PRESLIDING * stage.old.motion.friction
-    tolerance = max(TOLERANCE, ROUNDINGS * float(jnp.finfo(xi.dtype).eps))
+    tolerance = max(stage.enough, ROUNDINGS * float(jnp.finfo(xi.dtype).eps))
 
     def iterate(at: _Iterate, number: int | None) -> _Iterate:
         """One linearisation more; `number` of the first two, None for later ones."""

@@ -51,17 +51,19 @@ class Scheme(NamedTuple):
     moved: tuple[float, ...]
     later_moved: tuple[float, ...]
     compared: tuple[float, ...]  # weights less those of a scheme of one order less
+    enough: float  # of `Stage`
 
 
 _TWO, _THREE = 1.0 - 0.5**0.5, 0.435866521508459
 # Alexander 1977: order 2 and 3, L-stable; the stages go forward in time, as a wire with a memory has to.
-ORDER_TWO = Scheme(_TWO, (_TWO, 1.0), (1.0 - _TWO, 0.0), (0.0, 0.0), (0.0, 0.0))
+ORDER_TWO = Scheme(_TWO, (_TWO, 1.0), (1.0 - _TWO, 0.0), (0.0, 0.0), (0.0, 0.0), enough=1e-4)
 ORDER_THREE = Scheme(
     gamma=_THREE,
     ends=(_THREE, 0.5 * (1.0 + _THREE), 1.0),
     moved=(0.5 * (1.0 - _THREE), 1.5 * _THREE**2 - 5.0 * _THREE + 1.25, 0.0),
     later_moved=(-1.5 * _THREE**2 + 4.0 * _THREE - 0.25, 0.0, 0.0),
     compared=(_THREE, -2.0 * _THREE, _THREE),
+    enough=1e-3,  # its square is far below what a step is tolerated to be off by
 )
 
 
@@ -166,10 +168,10 @@ def _moving_step(
         bases = [base + moved * slope for base, slope in zip(carry.later, slopes, strict=True)]
         later = [base + later_moved * slope for base, slope in zip(carry.later, slopes, strict=True)]
         error = [total + compared * slope for total, slope in zip(carry.error, slopes, strict=True)]
-        return _Bases(Stage(new, ends, carry.stage.step, *bases), later, error), None
+        return _Bases(Stage(new, ends, carry.stage.step, *bases, scheme.enough), later, error), None
 
     gamma = scheme.gamma * dt
-    first = Stage(state, state.time + scheme.ends[0] * dt, gamma, *start)
+    first = Stage(state, state.time + scheme.ends[0] * dt, gamma, *start, scheme.enough)
     # The time scanned over is that at which the *next* stage ends.
     times = jnp.stack([state.time + share * dt for share in (*scheme.ends[1:], 1.0)])
     shares = [jnp.stack([share * dt for share in row]) for row in (scheme.moved, scheme.later_moved, scheme.compared)]

@@ -23,7 +23,7 @@ from studies.benchmarks import problem
 from studies.benchmarks.given import load
 
 REPEATS = 10
-TOLERANCE = 2e-4
+TOLERANCE = 3e-4
 
 
 def main() -> None:
