@@ -138,7 +138,7 @@ def run_batch(
     `first_bad_time`. Results take a quarter of `budget` bytes at a time. With `out` they are streamed to a Zarr group
     there, and the same call goes on where an earlier one was stopped; the data set returned then reads from disk.
 
-    On a processor the batch is compiled by `smajax.lanes`, ten times as fast as by XLA; `engine="xla"` asks for the other
+    On a processor the batch is compiled by `smajax.lanes`, five to twenty times as fast as by XLA; `engine="xla"` asks for the other
     (they agree to 1e-12 of a run), and where only XLA can do it, it does.
 
     Raises ValueError for what does not fit together, and when `out` holds another batch.
