@@ -248,8 +248,8 @@ def step_and_error(
     new, (heat, position, velocity) = _moving_step(system, state, inputs, dt, ORDER_THREE)
     capacity = stored_heat(system.wire, (), jnp.ones_like(heat), new.wire.martensite_fraction)
     # Exact where the load moves evenly over the step, which here may be many times as long as the sensor's lag.
-    lag = sum(effect.sensor_time_constant() for effect in system.effects)
-    if isinstance(lag, (int, float)) and lag == 0:
+    lag = _lag(system)
+    if lag is None:
         reading = new.motion.position
     else:
         behind = lag * (new.motion.position - state.motion.position) / dt
@@ -257,11 +257,17 @@ def step_and_error(
     return State(new.time, new.wire, new.motion, reading), (heat / capacity, position, velocity)
 
 
+def _lag(system: System) -> Scalar | float | None:
+    """Time constant of the sensor, s; None where no effect gives it one."""
+    lag = sum(effect.sensor_time_constant() for effect in system.effects)
+    return None if isinstance(lag, (int, float)) and lag == 0 else lag
+
+
 def _read(system: System, old: State, new: State, shown: Scalar, dt: Scalar) -> State:
     """`new` with what the sensor reads of `shown`.
 
     Backward Euler in the reading: unlike exp(-dt/tau) it has a slope at tau = 0, which a score test needs.
     """
-    lag = sum(effect.sensor_time_constant() for effect in system.effects)
-    reading = shown if isinstance(lag, (int, float)) and lag == 0 else (lag * old.reading + dt * shown) / (lag + dt)
+    lag = _lag(system)
+    reading = shown if lag is None else (lag * old.reading + dt * shown) / (lag + dt)
     return State(new.time, new.wire, new.motion, reading)

@@ -20,7 +20,7 @@ from jax import lax
 from jax.sharding import Mesh, PartitionSpec
 
 from smajax.batch.axes import Axes
-from smajax.lanes.evaluate import KEPT, Evaluator, evaluator, kind_of
+from smajax.lanes.evaluate import Evaluator, evaluator, kind_of, recalled
 from smajax.lanes.text import Unsupported
 
 BLOCK = 512  # members at once on a core: about 100 numbers each fit its second-level cache
@@ -74,12 +74,9 @@ _shapes: dict[Hashable, Any] = {}
 
 def result_shapes(function: Function, model: Any, axes: Axes) -> Any:
     """Shapes and kinds of what one member gives; traced once for each kind of arguments."""
+    one = {name: jnp.zeros(()) for name in axes.names}
     key = kind_of(function, model, tuple(axes.names))
-    if key not in _shapes:
-        while len(_shapes) >= KEPT:
-            _shapes.pop(next(iter(_shapes)), None)
-        _shapes[key] = eqx.filter_eval_shape(function, model, {name: jnp.zeros(()) for name in axes.names})
-    return _shapes[key]
+    return recalled(_shapes, key, lambda: eqx.filter_eval_shape(function, model, one))
 
 
 def member_bytes(function: Function, model: Any, axes: Axes) -> int:

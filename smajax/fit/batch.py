@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Sequence
+from functools import partial
 
 import equinox as eqx
 import jax
@@ -98,25 +98,6 @@ def _started(
     return here, initial_state(here, {**first, "ambient_temperature": celsius})
 
 
-def _each_run(
-    system: System,
-    batch: RunBatch,
-    own_names: Sequence[str],
-    own: Array | None,
-    seen: Callable[[System, Trajectory], Any],
-) -> Any:
-    """`seen` of every run's system and trajectory."""
-
-    names = (*batch.override_names, *own_names)
-
-    def one(inputs: dict[str, Float[Array, " time"]], values: Array) -> Any:
-        here, initial = _started(system, names, values, inputs)
-        return seen(here, simulate(here, inputs, batch.dt, initial))
-
-    values = batch.overrides if own is None else jnp.concatenate([batch.overrides, own], axis=1)
-    return jax.vmap(one)(batch.inputs, values)
-
-
 def shown_run(
     system: System,
     inputs: dict[str, Float[Array, " time"]],
@@ -131,22 +112,21 @@ def shown_run(
     return jnp.stack([shown_by(here, run, name) for name in outputs])
 
 
-def simulate_batch(
-    system: System, batch: RunBatch, own_names: Sequence[str] = (), own: Float[Array, "run own"] | None = None
-) -> Trajectory:
-    """One trajectory per run, every array of shape (R, N). `own`: each run's own values of `own_names`."""
-    return _each_run(system, batch, own_names, own, lambda _, run: run)
+def simulate_batch(system: System, batch: RunBatch) -> Trajectory:
+    """One trajectory per run, every array of shape (R, N)."""
+
+    def one(inputs: dict[str, Float[Array, " time"]], values: Array) -> Trajectory:
+        here, initial = _started(system, batch.override_names, values, inputs)
+        return simulate(here, inputs, batch.dt, initial)
+
+    return jax.vmap(one)(batch.inputs, batch.overrides)
 
 
 def shown_batch(
     system: System, batch: RunBatch, own_names: Sequence[str] = (), own: Float[Array, "run own"] | None = None
 ) -> Float[Array, "series time"]:
-    """What the batch's sensors show."""
-    found = _each_run(
-        system,
-        batch,
-        own_names,
-        own,
-        lambda here, run: jnp.stack([shown_by(here, run, name) for name in batch.outputs]),
-    )
-    return found.reshape(batch.output.shape[0], -1)
+    """What the batch's sensors show. `own`: each run's own values of `own_names`."""
+    names = (*batch.override_names, *own_names)
+    values = batch.overrides if own is None else jnp.concatenate([batch.overrides, own], axis=1)
+    one = partial(shown_run, system, names=names, dt=batch.dt, outputs=batch.outputs)
+    return jax.vmap(lambda inputs, own: one(inputs, own))(batch.inputs, values).reshape(batch.output.shape[0], -1)

@@ -14,6 +14,7 @@ import optimistix as optx
 
 from smajax.fit.problem import Lane, Problem, free_of, residual, values_of
 from smajax.fit.progress import Progress, quiet
+from smajax.fit.shown import shown_at
 
 STEPS_PER_LEG = 10
 # The residual's square at the start of a leg. The solver damps with the identity and starts at one: with this cost a
@@ -98,18 +99,13 @@ def solve(
 
 
 @eqx.filter_jit
-def _misfits(problem: Problem, values: jax.Array) -> jax.Array:
-    return jax.vmap(problem.misfit)(values)
+def _misfits(problem: Problem, shown: jax.Array) -> jax.Array:
+    return jax.vmap(problem.misfit_of)(shown)
 
 
 def misfits(problem: Problem, points: Sequence[np.ndarray] | np.ndarray) -> np.ndarray:
     """Misfit (SI) of every series at every point, shape (points, series, N)."""
-    found: list[np.ndarray] = []
-    for start in range(0, len(points), LANES):
-        some = list(points[start : start + LANES])
-        batch = jnp.asarray(np.stack([*some, *[some[0]] * (LANES - len(some))]))
-        found += list(np.asarray(_misfits(problem, batch))[: len(some)])
-    return np.stack(found)
+    return np.asarray(_misfits(problem, jnp.asarray(shown_at(problem, points))))
 
 
 def _costs(problem: Problem, points: np.ndarray, weights: np.ndarray) -> np.ndarray:

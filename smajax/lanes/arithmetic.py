@@ -236,7 +236,7 @@ def _converted(text: Text, out: str, one: Lane, **_: Any) -> Lane:
     elif _floating(one.dtype):
         # Out of range: the nearest, as XLA does, in the place of anything.
         name = f"llvm.fpto{'s' if _signed(out) else 'u'}i.sat.v{text.lanes}{scalar_type(out)}"
-        name += f".v{text.lanes}{'f64' if one.dtype == 'float64' else 'f32'}"
+        name += f".v{text.lanes}{text.suffix(one.dtype)}"
         text.declare(name, target, [source])
         return text.lane(f"call {target} @{name}({source} {one.name})", out)
     else:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 import equinox as eqx
 import jax
@@ -18,6 +18,8 @@ VECTORS = 2  # of members under way at once: while one waits for a result the ot
 KEPT = 32  # compiled functions
 BITS = 60  # of the number by which members are put in order
 MOST_SORTED = 6  # numbers of a member that are looked at for that
+
+Made = TypeVar("Made")
 
 _kept: dict[Hashable, Evaluator | str] = {}
 
@@ -96,21 +98,29 @@ def kind_of(function: Callable[[Any, Any], Any], model: Any, names: tuple[str, .
     return function, tree, settled_tree, told, kinds, names, str(jnp.zeros(()).dtype)
 
 
+def recalled(kept: dict[Hashable, Made], key: Hashable, make: Callable[[], Made]) -> Made:
+    """What was made for a key before, or now; the oldest makes room."""
+    if key not in kept:
+        while len(kept) >= KEPT:
+            kept.pop(next(iter(kept)), None)
+        kept[key] = make()
+    return kept[key]
+
+
 def evaluator(function: Callable[[Any, Any], Any], model: Any, names: tuple[str, ...]) -> Evaluator:
     """`function` compiled; `names` are those of the numbers that a member has of its own.
 
     Raises Unsupported, which says what of the function cannot be translated.
     """
-    key = kind_of(function, model, names)
-    if key not in _kept:
-        while len(_kept) >= KEPT:
-            _kept.pop(next(iter(_kept)), None)
+
+    def made() -> Evaluator | str:
+        arrays, static = eqx.partition(model, _is_array)
         try:
-            arrays, static = eqx.partition(model, _is_array)
-            _kept[key] = _compiled(function, arrays, static, names)
+            return _compiled(function, arrays, static, names)
         except Unsupported as reason:
-            _kept[key] = str(reason)
-    found = _kept[key]
+            return str(reason)
+
+    found = recalled(_kept, kind_of(function, model, names), made)
     if isinstance(found, str):
         raise Unsupported(found)
     return found

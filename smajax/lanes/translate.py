@@ -12,23 +12,10 @@ import numpy as np
 from jax.interpreters import partial_eval
 
 from smajax.lanes.arithmetic import ELEMENTWISE, exact_quotient, select
+from smajax.lanes.loop import Loop
+from smajax.lanes.memory import copy, in_memory, in_registers, mapped, row, write
 from smajax.lanes.text import NAME, Lane, Text, Unsupported, scalar_type
-from smajax.lanes.values import (
-    SMALL,
-    Filled,
-    Held,
-    Stored,
-    Value,
-    copy,
-    held,
-    in_memory,
-    in_registers,
-    is_known,
-    mapped,
-    row,
-    size_of,
-    write,
-)
+from smajax.lanes.values import SMALL, Filled, Held, Stored, Value, held, is_known, size_of
 
 CALLS = {  # primitives that stand for a program of their own, and where it is kept
     "jit": "jaxpr",
@@ -58,6 +45,15 @@ MOVES: dict[str, tuple[int, ...] | None] = {
     "squeeze": None,
     "stack": None,
     "transpose": None,
+}
+# What folds an array along some of its axes, and by which operation.
+REDUCTIONS = {
+    "reduce_sum": "add",
+    "reduce_prod": "mul",
+    "reduce_max": "max",
+    "reduce_min": "min",
+    "reduce_and": "and",
+    "reduce_or": "or",
 }
 
 
@@ -172,6 +168,8 @@ class _Translation:
             params = {**params, "fill_value": -1}
             if not self.at_known_places(name, given):
                 raise Unsupported("a gathering that puts something in the place of what is beyond the ends")
+        if name in REDUCTIONS:
+            return [self.reduced(REDUCTIONS[name], given, params["axes"], out)]
         small = all(size_of(one) <= SMALL for one in given)
         small &= all(int(np.prod(one.aval.shape)) <= SMALL for one in equation.outvars)
         if name in MOVES and small and self.at_known_places(name, given):
@@ -319,8 +317,7 @@ class _Translation:
             scaled = text.assign(f"mul {text.vector('int64')} {offsets}, {text.constant(text.lanes, 'int64').name}")
             offsets = text.assign(f"add {text.vector('int64')} {scaled}, <{own}>")
         places = text.assign(f"getelementptr {kind}, ptr {stored.address}, {text.vector('int64')} {offsets}")
-        suffix = {"double": "f64", "float": "f32"}.get(kind, kind)
-        name = f"llvm.masked.gather.v{text.lanes}{suffix}.v{text.lanes}p0"
+        name = f"llvm.masked.gather.v{text.lanes}{text.suffix(dtype)}.v{text.lanes}p0"
         pointers = f"<{text.lanes} x ptr>"
         text.declare(name, text.vector(dtype), [pointers, text.vector("bool"), text.vector(dtype)])
         arguments = (
@@ -363,24 +360,6 @@ class _Translation:
             total = np.asarray(held(flat, out.shape))
         return held(list(np.ravel(total)), out.shape)
 
-    def put_reduce_sum(self, params: Any, given: list[Value], out: Array, kinds: Any) -> Value:
-        return self.reduced("add", given, params["axes"], out)
-
-    def put_reduce_prod(self, params: Any, given: list[Value], out: Array, kinds: Any) -> Value:
-        return self.reduced("mul", given, params["axes"], out)
-
-    def put_reduce_max(self, params: Any, given: list[Value], out: Array, kinds: Any) -> Value:
-        return self.reduced("max", given, params["axes"], out)
-
-    def put_reduce_min(self, params: Any, given: list[Value], out: Array, kinds: Any) -> Value:
-        return self.reduced("min", given, params["axes"], out)
-
-    def put_reduce_and(self, params: Any, given: list[Value], out: Array, kinds: Any) -> Value:
-        return self.reduced("and", given, params["axes"], out)
-
-    def put_reduce_or(self, params: Any, given: list[Value], out: Array, kinds: Any) -> Value:
-        return self.reduced("or", given, params["axes"], out)
-
     def put_dot_general(self, params: Any, given: list[Value], out: Array, kinds: Any) -> Value:
         (left_axes, right_axes), (left_batch, right_batch) = params["dimension_numbers"]
         if left_batch or right_batch or set(kinds) != {out.dtype} or out.dtype == "bool":
@@ -411,9 +390,6 @@ class _Translation:
             raise Unsupported(f"an array of the shape {value.shape} carried from step to step")
         return in_registers(self.text, value)
 
-    def begin(self, start: Sequence[Held], stem: str) -> _Loop:
-        return _Loop(self.text, start, stem)
-
     def scan(self, params: dict[str, Any], given: list[Value], out: Sequence[Array]) -> list[Value]:
         text = self.text
         fixed, carry = params["num_consts"], params["num_carry"]
@@ -431,7 +407,7 @@ class _Translation:
             for one, kind in zip(series, kinds, strict=True)
         ]
         rooms = [Stored(text.reserve(int(np.prod(one.shape)), one.dtype), one.shape, one.dtype, True) for one in kept]
-        loop = self.begin(start, "scan")
+        loop = Loop(text, start, "scan")
         index = loop.count
         if backward:
             index = text.assign(f"sub i64 {length - 1}, {index}")
@@ -448,7 +424,7 @@ class _Translation:
         cond_fixed, body_fixed = params["cond_nconsts"], params["body_nconsts"]
         tests, bodies = given[:cond_fixed], given[cond_fixed : cond_fixed + body_fixed]
         start = [self.carried(one) for one in given[cond_fixed + body_fixed :]]
-        loop = self.begin(start, "while")
+        loop = Loop(text, start, "while")
         going = in_registers(text, self.closed(params["cond_jaxpr"], [*tests, *loop.carry])[0]).ravel()[0]
         inside, after = text.new_label("body"), text.new_label("end")
         # A lane that is done keeps what it has while others go on.
@@ -486,43 +462,6 @@ class _Translation:
             )
             for of in zip(*found, strict=True)
         ]
-
-
-class _Loop:
-    """A loop whose carry are lanes; its first lines wait for what the last ones bring."""
-
-    def __init__(self, text: Text, start: Sequence[Held], stem: str) -> None:
-        self.text, self.start, self.before = text, start, text.block
-        self.top = text.new_label(stem)
-        text.jump(self.top)
-        text.label(self.top)
-        self.count, self.next = text.fresh("i"), text.fresh("i")
-        self.carry = [held([Lane(text.fresh("c"), one.dtype) for one in array.ravel()], array.shape) for array in start]
-        self.at = len(text.lines)
-        text.lines += [""] * (1 + sum(array.size for array in start))
-
-    def again(self, end: Sequence[Held]) -> None:
-        """Back to the top with `end` as the carry."""
-        text = self.text
-        text.put(f"{self.next} = add i64 {self.count}, 1")
-        lines = [f"  {self.count} = phi i64 [ 0, %{self.before} ], [ {self.next}, %{text.block} ]"]
-        for start, here, new in zip(self.start, self.carry, end, strict=True):
-            for one, name, other in zip(start.ravel(), here.ravel(), new.ravel(), strict=True):
-                kind = text.vector(name.dtype)
-                lines.append(
-                    f"  {name.name} = phi {kind} [ {one.name}, %{self.before} ], [ {other.name}, %{text.block} ]"
-                )
-        text.lines[self.at : self.at + len(lines)] = lines
-        text.jump(self.top)
-
-    def end_after(self, rounds: int, end: Sequence[Held]) -> None:
-        text = self.text
-        more, done = text.new_label("more"), text.new_label("done")
-        following = text.assign(f"add i64 {self.count}, 1")
-        text.branch(text.assign(f"icmp slt i64 {following}, {rounds}"), more, done)
-        text.label(more)
-        self.again(end)
-        text.label(done)
 
 
 def translate(program: Any, own: Sequence[bool], lanes: int, wide: bool = False) -> Translated:
@@ -595,7 +534,7 @@ def _leave(text: Text, pointer: str, first: str, result: Array, value: Value) ->
     kept = "int8" if result.dtype == "bool" else result.dtype
     rows = in_memory(text, value, result.shape, result.dtype) if not isinstance(value, Filled) else value
     base = text.address(pointer, text.assign(f"mul i64 {first}, {size}"), result.dtype)
-    loop = _Loop(text, [], "leave")
+    loop = Loop(text, [], "leave")
     lane = in_registers(text, row(text, rows, loop.count, (), result.dtype)).ravel()[0]
     if result.dtype == "bool":
         lane = ELEMENTWISE["convert_element_type"](text, kept, lane)
@@ -604,4 +543,4 @@ def _leave(text: Text, pointer: str, first: str, result: Array, value: Value) ->
         one = text.assign(f"extractelement {text.vector(kept)} {lane.name}, i64 {k}")
         at = text.assign(f"add i64 {loop.count}, {k * size}")
         text.put(f"store {kind} {one}, ptr {text.address(base, at, kept)}")
-    loop.end_after(size, [])
+    loop.end_after(size)

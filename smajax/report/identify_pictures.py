@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from smajax.identified import Identified, IdentifiedRun
 from smajax.report.display import axis_label, channel, digits, display, label
@@ -59,14 +60,19 @@ def correlations(found: Identified) -> bytes | None:
     return as_png(figure)
 
 
+def _panels(count: int, height: float) -> tuple[Figure, np.ndarray]:
+    """A figure with room for `count` panels of a height (inch), three a row."""
+    columns = min(3, count)
+    rows = -(-count // columns)
+    figure = new_figure(height * rows + 0.5, width=2.4 * columns + 0.6)
+    return figure, figure.subplots(rows, columns, squeeze=False).ravel()
+
+
 def profile_curves(found: Identified) -> bytes | None:
     """Rise of the cost over each profiled parameter, with the parabola that its standard error stands for."""
     if not found.profiles:
         return None
-    columns = min(3, len(found.profiles))
-    rows = -(-len(found.profiles) // columns)
-    figure = new_figure(2.5 * rows + 0.5, width=2.4 * columns + 0.6)
-    panels = figure.subplots(rows, columns, squeeze=False).ravel()
+    figure, panels = _panels(len(found.profiles), 2.5)
     estimates = {one.name: one for one in found.estimates}
     for axes, one in zip(panels, found.profiles, strict=False):
         estimate = estimates[one.name]
@@ -92,10 +98,7 @@ def posterior_histograms(found: Identified) -> bytes | None:
     drawn = found.posterior
     if drawn is None:
         return None
-    columns = min(3, len(drawn.names))
-    rows = -(-len(drawn.names) // columns)
-    figure = new_figure(2.2 * rows + 0.5, width=2.4 * columns + 0.6)
-    panels = figure.subplots(rows, columns, squeeze=False).ravel()
+    figure, panels = _panels(len(drawn.names), 2.2)
     estimates = {one.name: one for one in found.estimates}
     for axes, name, draws in zip(panels, drawn.names, drawn.flat.T, strict=False):
         estimate = estimates[name]
