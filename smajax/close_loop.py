@@ -7,14 +7,10 @@ import time as clock
 from dataclasses import dataclass
 from pathlib import Path
 
-import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
-from scipy.stats import qmc
 
-from smajax.attribution.memory import Memory
-from smajax.attribution.search import Evidence, Model, Search, Start, scores_at, search
+from smajax.attribution.search import Evidence, Model, Search, scores_at, search
 from smajax.attribution.verdict import cannot_know, shown, summary, unexplained, verdict
 from smajax.catalogue import candidates
 from smajax.effects.library import LIBRARY
@@ -22,10 +18,10 @@ from smajax.experiment.errors import ExperimentError
 from smajax.experiment.record import RUN_STARTS, Experiment, Run
 from smajax.extended import base_model, extended
 from smajax.fit.batch import RunBatch, halved, pack, simulate_batch
+from smajax.fit.kept import Kept
 from smajax.fit.problem import Problem
 from smajax.fit.progress import Progress, quiet
 from smajax.fit.sensitivity import Sensitivity, sensitivity
-from smajax.fit.solve import Solution
 from smajax.fit.uncertainty import Uncertainty, identifiability, uncertainty
 from smajax.load.coupon import AbstractCoupon
 from smajax.made_with import made_with
@@ -44,9 +40,6 @@ from smajax.residual.portrait import portrait
 from smajax.types import Trajectory
 
 SEED = 2004
-# The starts beside the given one are spread over this share of each box, around the given start.
-SPREAD = 0.4
-STARTS = 4
 
 
 @dataclass(frozen=True)
@@ -91,7 +84,7 @@ def close_loop(
     _refuse_what_only_identify_does(experiment)
     began = clock.monotonic()
     job = _job(experiment)
-    kept = Memory(memory)
+    kept = Kept(memory)
     progress("checking what these runs can tell", 0.0)
     start = job.problem.start_values()
     setting = Search(
@@ -99,7 +92,7 @@ def close_loop(
         job.unknowns,
         job.bounds,
         job.candidates,
-        kept.solve,
+        kept,
         lambda value: shown(value, experiment.output_unit, experiment.output_name),
         progress,
     )
@@ -109,8 +102,7 @@ def close_loop(
     for line in check:
         progress(f"say: check: {line}", 1.0)
 
-    base = _base_fit(job, setting, start, seed)
-    first, final = search(setting, base)
+    first, final = search(setting, setting.base(start, seed))
 
     progress("standard errors and pictures", 0.0)
     before = _told(job, setting, first, start)
@@ -169,24 +161,6 @@ def _refuse_what_only_identify_does(experiment: Experiment) -> None:
             refuse(
                 f"channels.{experiment.output_name}.missing", f"leaves out no sample, and run {run.name!r} lacks some"
             )
-
-
-def _base_fit(job: _Job, setting: Search, start: np.ndarray, seed: int) -> Solution:
-    """Base model from the declared start and from Sobol points around it, in one batch."""
-    names = job.problem.names
-    points = [start]
-    sobol = qmc.Sobol(len(job.unknowns), seed=seed)
-    for shares in sobol.random(STARTS)[: STARTS - 1]:
-        point = np.array(start)
-        for name, share in zip(job.unknowns, shares, strict=True):
-            low, high = job.bounds[name]
-            middle = float(np.clip(start[names.index(name)], low, high))
-            point[names.index(name)] = np.clip(
-                middle + SPREAD * (share - 0.5) * (high - low), low + 0.02 * (high - low), high - 0.02 * (high - low)
-            )
-        points.append(point)
-    solutions, _ = setting.fit([Start((), point) for point in points], "fitting the base model")
-    return min(solutions, key=lambda solution: solution.cost)
 
 
 def _preset(job: _Job) -> dict[str, str]:
@@ -274,17 +248,16 @@ def _effects(job: _Job, setting: Search, final: Model, after: _Told) -> tuple[Ef
     return tuple(sorted(findings, key=strength))
 
 
-@eqx.filter_jit
-def _simulated(problem: Problem, values: jax.Array, batch: RunBatch) -> Trajectory:
-    return simulate_batch(problem.system_at(values), batch)
+def _simulated(problem: Problem, values: np.ndarray, batch: RunBatch) -> Trajectory:
+    return simulate_batch(problem.system_at(jnp.asarray(values)), batch)
 
 
 def _compare(job: _Job, first: Model, final: Model) -> tuple[tuple[RunFinding, ...], Portrait, Portrait]:
     """Every run, held-out ones included, by both models; and the portraits of the fit runs' residuals."""
     experiment = job.experiment
     batch = pack(experiment.runs, experiment.step, parameter_values(job.problem.system))
-    before = _simulated(job.problem, jnp.asarray(first.values), batch)
-    after = _simulated(job.problem, jnp.asarray(final.values), batch)
+    before = _simulated(job.problem, first.values, batch)
+    after = _simulated(job.problem, final.values, batch)
     runs = []
     residuals: dict[str, list[np.ndarray]] = {"before": [], "after": []}
     states: dict[str, list[dict[str, np.ndarray]]] = {"before": [], "after": []}
@@ -331,7 +304,7 @@ def _integration_error(job: _Job, final: Model) -> float:
     """By how much the output (rms, worst fit run, SI, offset aside) changes when the step is halved."""
     if isinstance(job.problem.system.load, AbstractCoupon):
         return 0.0  # a closed form at each sample
-    batch, values = job.problem.batch, jnp.asarray(final.values)
+    batch, values = job.problem.batch, final.values
     coarse = _simulated(job.problem, values, batch).reading
     fine = _simulated(job.problem, values, halved(batch)).reading[:, ::2]
     change, mask = np.asarray(fine - coarse), np.asarray(batch.mask)
@@ -353,7 +326,7 @@ def _series(run: Run, trajectory: Trajectory, index: int) -> dict[str, np.ndarra
     return series | {name: values for name, values in run.inputs.items() if name not in series}
 
 
-def _provenance(experiment: Experiment, kept: Memory, command: str, seed: int, seconds: float) -> dict[str, str]:
+def _provenance(experiment: Experiment, kept: Kept, command: str, seed: int, seconds: float) -> dict[str, str]:
     return {
         **made_with(),
         "command": command,

@@ -103,7 +103,7 @@ def identify(
 
     def again(what: str) -> Callable[[Problem, np.ndarray], Fit]:
         def fit(changed: Problem, values: np.ndarray) -> Fit:
-            lane = changed.lane(names, bounds, values, len(names))
+            lane = changed.lane(names, bounds, values)
             return fit_in_box(changed, [lane], kept=kept, progress=progress, what=what)[0]
 
         return fit
@@ -246,7 +246,7 @@ def _own_of_held_out(
     start[: len(held_out.shared)] = values[: len(held_out.shared)]
     free = held_out.own.in_full
     boxes = {name: bounds[f"{name.split('[')[0]}[{problem.own.runs[0]}]"] for name in free}
-    lane = held_out.lane(free, boxes, start, len(free))
+    lane = held_out.lane(free, boxes, start)
     found = fit_in_box(held_out, [lane], kept=kept, progress=progress, what="what is the held-out runs' own")[0]
     return {name: float(found.values[held_out.names.index(name)]) for name in free}
 

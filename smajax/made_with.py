@@ -7,7 +7,7 @@ from importlib import metadata
 
 import jax
 
-PACKAGES = ("smajax", "jax", "equinox", "optimistix", "numpy", "scipy")
+PACKAGES = ("smajax", "jax", "equinox", "numpy", "scipy")
 
 
 def made_with() -> dict[str, str]:

@@ -50,6 +50,9 @@ def simulate(
     check_inputs(system, inputs)
     series = {name: jnp.asarray(values, dtype=float) for name, values in inputs.items()}
     state = initial_state(system, {name: values[0] for name, values in series.items()}) if initial is None else initial
+    # Every number of the state then has a derivative where the model has one: a scan some of whose numbers gain theirs
+    # on the way is traced anew for each, and so is all within it.
+    state = jax.tree.map(lambda leaf: leaf + 0.0 * system.start_fraction, state)
     ahead = isinstance(system.load, AbstractCoupon)
     held = {name: values[1:] if ahead else values[:-1] for name, values in series.items()}
 

@@ -175,7 +175,7 @@ def _moving_step(
     # The time scanned over is that at which the *next* stage ends.
     times = jnp.stack([state.time + share * dt for share in (*scheme.ends[1:], 1.0)])
     shares = [jnp.stack([share * dt for share in row]) for row in (scheme.moved, scheme.later_moved, scheme.compared)]
-    none = [jnp.zeros_like(one) for one in start]
+    none = [0.0 * one for one in start]  # with a derivative, as in `simulate`
     end, _ = lax.scan(body, _Bases(first, list(start), none), (times, *shares))
     old = end.stage.old
     heat, position, velocity = end.error

@@ -8,8 +8,9 @@ import numpy as np
 from smajax.attribution.search import Fitted, Model, Search
 from smajax.extended import extended
 from smajax.fit.batch import RunBatch, simulate_batch
+from smajax.fit.box import Fit
+from smajax.fit.kept import Kept
 from smajax.fit.problem import Problem
-from smajax.fit.solve import Solution, solve
 from smajax.presets import build
 
 DT, SAMPLES, NOISE = 0.1, 200, 1e-4
@@ -26,13 +27,13 @@ def _setting() -> Search:
     noise = NOISE * np.random.default_rng(7).normal(size=truth.shape)
     batch = RunBatch(inputs, truth + noise, blank.mask, blank.overrides, (), DT)
     problem = Problem.build(extended(base, ("latent_heat",), {}), batch, NOISE, False)
-    return Search(problem, ("convection_coefficient",), BOUNDS, ("latent_heat",), solve, "{:.3g} m".format)
+    return Search(problem, ("convection_coefficient",), BOUNDS, ("latent_heat",), Kept(), "{:.3g} m".format)
 
 
-def _at(setting: Search, enthalpy: float) -> Solution:
+def _at(setting: Search, enthalpy: float) -> Fit:
     values = setting.problem.start_values()
     values[setting.problem.names.index("latent_heat.enthalpy")] = enthalpy
-    return Solution(values, 1.0, True, 1)
+    return Fit(values, 1.0, True, "", 1)
 
 
 def test_an_effect_that_one_run_alone_shows_is_not_told_without_it() -> None:

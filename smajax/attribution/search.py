@@ -12,14 +12,19 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+import equinox as eqx
+import jax.numpy as jnp
 import numpy as np
 
 from smajax.attribution.screen import Score, scaled, screen, significant, switches
 from smajax.effects.library import LIBRARY
+from smajax.fit.box import Fit, fit_in_box
+from smajax.fit.kept import Kept
 from smajax.fit.problem import Problem
 from smajax.fit.progress import Progress, quiet
 from smajax.fit.sensitivity import sensitivity
-from smajax.fit.solve import Solution, misfits
+from smajax.fit.shown import misfits
+from smajax.fit.starts import from_many_starts, hopped
 from smajax.fit.uncertainty import held
 from smajax.report.findings import Round
 from smajax.residual.noise_like import correlation_time, split_runs
@@ -28,15 +33,13 @@ SIGNIFICANT = 1e-3  # of the score tests of one round, counted together
 PENALTY = 0.01  # by how much of its mean square a coefficient must lower the error on left-out runs
 CHANCE = 1.0  # by how many standard errors of the paired difference, too (the one-standard-error rule)
 SINGLES, PAIRS = 6, 2  # refitted in a round
-NEARLY_GAUSS_NEWTON = 1e6  # `start_cost` of a fit that begins close to its optimum
 NUDGE = 1e-3  # share of an effect's start at which its score is taken
 INSIDE = 0.03  # a refit starts at least this share of the box away from bounds to which a poorer model was driven
 TOLD = 1.0  # to what share of itself the other runs must tell an effect's size for a left-out run to count
-LOOSE = 1.0  # how far a fold's parameters may stray for nothing, in their unbounded form (a logit of the box)
+LOOSE = 1.0  # how far a fold's parameters may stray for nothing, in logits of the box
+ENOUGH = 1e-5  # of its cost: where a refit ends
 JUDGED = 3  # candidates taken to the left-out runs
 MOST_ROUNDS = 3
-
-Solve = Callable[..., list[Solution]]  # `fit.solve.solve`, or that with a memory
 
 
 @dataclass(frozen=True)
@@ -64,7 +67,7 @@ class Fitted(NamedTuple):
     """A set of effects fitted to all runs."""
 
     effects: tuple[str, ...]
-    solution: Solution
+    solution: Fit
 
 
 @dataclass
@@ -85,7 +88,7 @@ class Search:
     unknowns: tuple[str, ...]
     bounds: Mapping[str, tuple[float, float]]
     candidates: tuple[str, ...]
-    solve: Solve
+    kept: Kept
     shown: Callable[[float], str]  # an error in the unit that an engineer reads
     progress: Progress = quiet
     evidence: dict[str, Evidence] = field(default_factory=dict)
@@ -123,52 +126,67 @@ class Search:
             values[place] = np.clip(values[place], low + room, high - room)
         return values
 
-    def restricted(self, effects: Sequence[str]) -> Problem:
-        """The same runs with a model that carries only `effects`: what is not in play costs nothing in a fit."""
-        kept = tuple(effect for effect in self.problem.system.effects if effect.effect_name in effects)
+    def restricted(self, effects: Sequence[str]) -> tuple[Problem, list[int]]:
+        """The same runs with a model that carries, of the candidates, only `effects`; where its parameters are in ours.
+
+        What is not in play costs nothing in a fit.
+        """
+        gone = set(self.candidates) - set(effects)
+        kept = tuple(effect for effect in self.problem.system.effects if effect.effect_name not in gone)
         system = dataclasses.replace(self.problem.system, effects=kept)
-        return Problem.build(system, self.problem.batch, self.problem.noise_sigma, self.problem.offset)
+        problem = Problem.build(system, self.problem.batch, self.problem.noise_sigma, self.problem.offset)
+        return problem, [self.problem.names.index(name) for name in problem.names] + [len(self.problem.names)]
 
     def fit(
-        self, starts: Sequence[Start], what: str, within: Sequence[Start] = (), **settings: float
-    ) -> tuple[list[Solution], np.ndarray]:
-        """Fit every start in one go: (solutions with full parameter vectors, misfit of all runs at each, (S, R, N)).
+        self, starts: Sequence[Start], what: str, *, enough: float = ENOUGH, hops: bool = False
+    ) -> tuple[list[Fit], np.ndarray]:
+        """Fit every start: (fits with full parameter vectors, misfit of all runs at each, (S, R, N)).
 
-        `within` are fits of before that had room for these: the program compiled for them is used again.
+        `hops`: each from points near its end as well (`fit.starts.hopped`).
         """
-        shaping = (*starts, *within)
-        together = [name for name in self.candidates if any(name in start.effects for start in shaping)]
-        problem = self.restricted(together)
-        # At least one slot: with nothing free it is a dummy, and the fit returns its start.
-        slots = max(1, *(len(self.free(start.effects)) for start in shaping))
-        index = [self.problem.names.index(name) for name in problem.names] + [len(self.problem.names)]
+        problem, index = self.restricted([name for start in starts for name in start.effects])
         lanes = []
         for start in starts:
-            weights = np.ones(problem.batch.output.shape[0])
+            weights = np.ones(problem.batch.runs)
             if start.without is not None:
                 weights[start.without] = 0.0
-            lanes.append(
-                problem.lane(self.free(start.effects), self.bounds, start.values[index], slots, weights, start.tie)
-            )
-        solutions = self.solve(problem, lanes, progress=self.progress, what=what, **settings)
-        found = misfits(problem, [solution.values for solution in solutions])
-        whole = []
-        for start, solution in zip(starts, solutions, strict=True):
-            values = np.array(start.values)
-            values[index] = solution.values
-            whole.append(dataclasses.replace(solution, values=values))
-        return whole, found
+            lanes.append(problem.lane(self.free(start.effects), self.bounds, start.values[index], weights, start.tie))
+        fits = fit_in_box(problem, lanes, enough=enough, kept=self.kept, progress=self.progress, what=what)
+        if hops:
+            fits = hopped(problem, lanes, fits, enough=enough, kept=self.kept, progress=self.progress, what=what)
+        found = misfits(problem, [one.values for one in fits])
+        return [self.whole(one, start.values, index) for start, one in zip(starts, fits, strict=True)], found
+
+    def base(self, start: np.ndarray, seed: int) -> Fit:
+        """The base model fitted, from `start` and from many points of its box."""
+        problem, index = self.restricted(())
+        here = eqx.tree_at(lambda one: one.system, problem, problem.system_at(jnp.asarray(start[index])))
+        fits = from_many_starts(
+            here,
+            self.unknowns,
+            self.bounds,
+            seed,
+            progress=self.progress,
+            kept=self.kept,
+            enough=ENOUGH,
+            what="fitting the base model",
+        )
+        return self.whole(fits[0], start, index)
+
+    def whole(self, found: Fit, start: np.ndarray, index: Sequence[int]) -> Fit:
+        """A fit of a restricted problem with the parameters of the whole library's."""
+        values = np.array(start)
+        values[np.asarray(index)] = found.values
+        return dataclasses.replace(found, values=values)
 
     def rmse(self, misfit: np.ndarray) -> float:
         return float(np.sqrt((misfit**2).sum() / np.asarray(self.problem.batch.mask).sum()))
 
-    def judged(
-        self, fitted: Sequence[Fitted], present: Model | None = None, within: Sequence[Start] = ()
-    ) -> list[Model]:
+    def judged(self, fitted: Sequence[Fitted], present: Model | None = None) -> list[Model]:
         """Leave each fit run out in turn, refit to the others, and predict the one left out.
 
-        A fold starts at the fit to all runs and is tied to it, each parameter to within about `LOOSE` of its unbounded
-        form: else a direction that the others hardly tell runs wherever the last iteration happened to take it, and
+        A fold starts at the fit to all runs and is tied to it, each parameter to within about `LOOSE` of its logit in
+        the box: else a direction that the others hardly tell runs wherever the last iteration happened to take it, and
         with it the prediction. In such a direction the fold keeps what the run left out said: where the others do not
         tell the size of what is new (`told_without`), `present`'s error stands and the effect is credited with nothing.
         """
@@ -181,9 +199,7 @@ class Search:
             for entry, level in zip(fitted, levels, strict=True)
             for run in folds
         ]
-        _, found = self.fit(
-            starts, "predicting runs left out", within, legs=3, enough=5e-3, start_cost=NEARLY_GAUSS_NEWTON
-        )
+        _, found = self.fit(starts, "predicting runs left out")
         models = []
         for place, entry in enumerate(fitted):
             own = found[place * len(folds) : (place + 1) * len(folds)]
@@ -279,7 +295,7 @@ def start_values(
     return values
 
 
-def search(setting: Search, base: Solution) -> tuple[Model, Model]:
+def search(setting: Search, base: Fit) -> tuple[Model, Model]:
     """(base model, final model). Fills `setting.evidence` and `setting.rounds` on the way."""
     problem, names = setting.problem, setting.problem.names
     first = setting.judged([Fitted((), base)])[0]
@@ -303,7 +319,7 @@ def search(setting: Search, base: Solution) -> tuple[Model, Model]:
             Start((*model.effects, *score.effects), start_values(begin, names, score, setting.bounds))
             for score in chosen
         ]
-        solutions, _ = setting.fit(starts, f"round {number}: refitting candidates", legs=4, enough=1e-2)
+        solutions, _ = setting.fit(starts, f"round {number}: refitting candidates", hops=True)
         fitted = [Fitted(begun.effects, solution) for begun, solution in zip(starts, solutions, strict=True)]
         if number == 1:
             samples = float(np.asarray(problem.batch.mask).sum())
@@ -319,7 +335,7 @@ def search(setting: Search, base: Solution) -> tuple[Model, Model]:
         alone = next((entry for entry in weighed if len(entry.effects) == len(model.effects) + 1), taken[0])
         if alone not in taken:  # a pair is never added without its best single effect having had its chance
             taken = [*taken[:-1], alone]
-        judged = setting.judged(polished(setting, taken, starts), model, starts)
+        judged = setting.judged(taken, model)
         if number == 1 and problem.batch.output.shape[0] > 1:
             for entry in judged:
                 if len(entry.effects) == 1:
@@ -345,18 +361,9 @@ def search(setting: Search, base: Solution) -> tuple[Model, Model]:
 def refined(setting: Search, model: Model) -> Model:
     """The final model taken to its optimum, from where it is and from a little off its bounds: error bars want that."""
     starts = [Start(model.effects, values) for values in (model.values, setting.inside(model))]
-    solutions, _ = setting.fit(starts, "polishing the final model", enough=1e-4, start_cost=NEARLY_GAUSS_NEWTON)
-    best = min(solutions, key=lambda solution: solution.cost)
+    fits, _ = setting.fit(starts, "polishing the final model", enough=1e-8, hops=True)
+    best = min(fits, key=lambda one: one.cost)
     return dataclasses.replace(model, values=best.values, cost=best.cost) if best.cost < model.cost else model
-
-
-def polished(setting: Search, fitted: Sequence[Fitted], within: Sequence[Start]) -> list[Fitted]:
-    """The same fits taken to their optimum: a fit stopped short looks worse on left-out runs than its model is."""
-    starts = [Start(entry.effects, entry.solution.values) for entry in fitted]
-    solutions, _ = setting.fit(
-        starts, "polishing the best", within, legs=3, enough=1e-4, start_cost=NEARLY_GAUSS_NEWTON
-    )
-    return [Fitted(entry.effects, new) for entry, new in zip(fitted, solutions, strict=True)]
 
 
 def simplest(setting: Search, judged: Sequence[Model], present: Model) -> tuple[Model, list[Model]]:
@@ -398,9 +405,8 @@ def pruned(setting: Search, model: Model) -> Model:
             for name in setting.coefficients(effect):
                 values[names.index(name)] = _base(name)
             starts.append(Start(rest, values))
-        all_of_it = [Start(model.effects, model.values)]
-        solutions, _ = setting.fit(starts, "taking effects out again", all_of_it, legs=3)
-        whole = Fitted(model.effects, Solution(model.values, model.cost, True, 0))
+        solutions, _ = setting.fit(starts, "taking effects out again", hops=True)
+        whole = Fitted(model.effects, Fit(model.values, model.cost, True, "", 0))
         kept, *judged = setting.judged(
             [whole, *(Fitted(begun.effects, solution) for begun, solution in zip(starts, solutions, strict=True))]
         )

@@ -12,7 +12,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from smajax.compiled import simulate_compiled
 from smajax.experiment.record import RUN_STARTS, Run
+from smajax.lanes.text import Unsupported
 from smajax.parameters import set_parameters
 from smajax.sensors import shown_by
 from smajax.simulate import simulate
@@ -113,13 +115,19 @@ def shown_run(
 
 
 def simulate_batch(system: System, batch: RunBatch) -> Trajectory:
-    """One trajectory per run, every array of shape (R, N)."""
+    """One trajectory per run, numpy's arrays of shape (R, N); outside of `jit`, `vmap` and `grad`."""
+    runs = []
+    for number in range(batch.runs):
+        inputs = {name: series[number] for name, series in batch.inputs.items()}
+        here, initial = _started(system, batch.override_names, batch.overrides[number], inputs)
+        try:
+            runs.append(simulate_compiled(here, inputs, batch.dt, initial=initial))
+        except Unsupported:
+            runs.append(_by_xla(here, inputs, batch.dt, initial))
+    return jax.tree.map(lambda *leaves: np.stack(leaves), *runs)
 
-    def one(inputs: dict[str, Float[Array, " time"]], values: Array) -> Trajectory:
-        here, initial = _started(system, batch.override_names, values, inputs)
-        return simulate(here, inputs, batch.dt, initial)
 
-    return jax.vmap(one)(batch.inputs, batch.overrides)
+_by_xla = eqx.filter_jit(simulate)
 
 
 def shown_batch(

@@ -10,10 +10,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from dataclasses import fields as fields_of
+from typing import Any
 
-import equinox as eqx
-import jax
-import jax.numpy as jnp
 import numpy as np
 from scipy.optimize import lsq_linear
 
@@ -29,9 +27,7 @@ DAMPED = 1e-1  # share of the squared columns that damping begins with
 HOPELESS = 1e10  # damping at which no step is a better one
 AT_MOST = 0.7  # of the way to a bound
 NEAR = 1e-3  # of the box: from here on the bound itself may be reached
-WIDE = 24  # lanes at once from which on a second, narrower program is worth its compilation
-NARROWER = 6  # a batch as narrow by this takes a third of the time
-STRAGGLERS = 3  # narrow batches at most
+ROOM = 2**28  # bytes of derivatives at once
 BLIND = 1e-14  # of the largest squared column: a parameter that nothing depends on
 
 
@@ -61,49 +57,30 @@ class _Walk:
     reason: str = ""
 
 
-@eqx.filter_jit
-def _asked(lanes: Lane, places: jax.Array) -> tuple[jax.Array, jax.Array]:
-    """(values, derivatives of the values by the place) of every lane: (L, P + 1) and (L, slots, P + 1)."""
-
-    def one(lane: Lane, place: jax.Array) -> tuple[jax.Array, jax.Array]:
-        return _values_at(lane, place), jax.jacfwd(lambda there: _values_at(lane, there))(place).T
-
-    return jax.vmap(one)(lanes, places)
-
-
-def _values_at(lane: Lane, place: jax.Array) -> jax.Array:
-    return lane.values.at[lane.slots].set(lane.low + place * (lane.high - lane.low))
-
-
-@eqx.filter_jit
-def _summed(
-    problem: Problem, lanes: Lane, places: jax.Array, outputs: jax.Array | None, shown: jax.Array, slopes: jax.Array
-) -> tuple[jax.Array, jax.Array, jax.Array]:
-    """(r^T r, J^T r, J^T J) of every lane, from what its sensors show and how that moves with its place."""
-
-    def one(
-        lane: Lane, place: jax.Array, output: jax.Array | None, shown: jax.Array, slopes: jax.Array
-    ) -> tuple[jax.Array, jax.Array, jax.Array]:
-        here = problem.with_output(output)
-
-        def residual(place: jax.Array, shown: jax.Array) -> jax.Array:
-            return here.residual_of(shown, _values_at(lane, place), lane.weights)
-
-        value = residual(place, shown)
-        along = lambda way, slope: jax.jvp(residual, (place, shown), (way, slope))[1]  # noqa: E731
-        jacobian = jax.vmap(along)(jnp.eye(len(place)), slopes)
-        return value @ value, jacobian @ value, jacobian @ jacobian.T
-
-    return eqx.filter_vmap(one)(lanes, places, outputs, shown, slopes)
+Equations = tuple[float, np.ndarray, np.ndarray]  # r^T r, J^T r, J^T J of one fit, by shares of its box
 
 
 def _normal_equations(
-    problem: Problem, lanes: Lane, places: jax.Array, outputs: jax.Array | None
-) -> tuple[jax.Array, jax.Array, jax.Array]:
-    """(r^T r, J^T r, J^T J) of every lane at its place, by shares of its box."""
-    values, towards = (np.asarray(one) for one in _asked(lanes, places))
-    shown, slopes = shown_and_slopes(problem, values, towards)
-    return _summed(problem, lanes, places, outputs, jnp.asarray(shown), jnp.asarray(slopes))
+    problem: Problem, lanes: Sequence[Lane], places: Sequence[np.ndarray], outputs: np.ndarray | None
+) -> list[Equations]:
+    """Of every lane at its place. Directions of all lanes go side by side, whatever each of them frees."""
+    points = np.stack([lane.at(place) for lane, place in zip(lanes, places, strict=True)])
+    most = max(1, *(len(lane.slots) for lane in lanes))
+    towards = np.zeros((len(lanes), most, points.shape[1]))
+    for own, lane in zip(towards, lanes, strict=True):
+        own[np.arange(len(lane.slots)), lane.slots] = lane.high - lane.low
+    shown, slopes = shown_and_slopes(problem, points, towards)
+    found = []
+    for k, (lane, place) in enumerate(zip(lanes, places, strict=True)):
+        measured = problem.measured if outputs is None else outputs[k]
+        weight = np.repeat(np.sqrt(lane.weights), len(problem.batch.outputs))[:, None] / np.asarray(problem.noise)
+        residual = weight * problem.centred(measured - shown[k])
+        jacobian = -weight * problem.centred(slopes[k, : len(lane.slots)])
+        value = np.concatenate([residual.ravel(), problem.priors.rows(points[k]), lane.tie * (place - lane.place)])
+        known = problem.priors.slopes(points[k])[:, lane.slots] * (lane.high - lane.low)
+        rows = np.concatenate([jacobian.reshape(len(lane.slots), -1), known.T, np.diag(lane.tie)], axis=1)
+        found.append((float(value @ value), rows @ value, rows @ rows.T))
+    return found
 
 
 def _step(walk: _Walk) -> np.ndarray:
@@ -125,13 +102,15 @@ def _step(walk: _Walk) -> np.ndarray:
     return np.clip(lsq_linear(factor.T, -np.linalg.solve(factor, walk.slope), (low, wide), method="bvls").x, low, high)
 
 
-def _judged(walk: _Walk, step: np.ndarray, cost: float, slope: np.ndarray, square: np.ndarray) -> None:
+def _judged(
+    walk: _Walk, step: np.ndarray, cost: float, slope: np.ndarray, square: np.ndarray, enough: float = ENOUGH
+) -> None:
     """Take the step or not, and say so when it was the last."""
     promised = -(2.0 * walk.slope @ step + step @ walk.square @ step)
     known = np.isfinite(cost) and np.isfinite(slope).all() and np.isfinite(square).all()
     gained = walk.cost - cost if known else -np.inf
     walk.steps += 1
-    small = 0.0 < promised < ENOUGH * walk.cost
+    small = 0.0 < promised < enough * walk.cost
     if gained > 0.0:
         share = gained / max(promised, 1e-300)
         walk.place, walk.cost = np.clip(walk.place + step, 0.0, 1.0), cost
@@ -139,8 +118,8 @@ def _judged(walk: _Walk, step: np.ndarray, cost: float, slope: np.ndarray, squar
         walk.scale = np.maximum(walk.scale, np.diag(square))
         walk.damping *= max(0.1, 1.0 - (2.0 * min(share, 1.0) - 1.0) ** 3)
         walk.growth = 2.0
-        if small and gained < ENOUGH * walk.cost:
-            walk.reason = "it has converged, no step lowers the cost by more than 1e-8 of it"
+        if small and gained < enough * walk.cost:
+            walk.reason = f"it has converged, no step lowers the cost by more than {enough:.0e} of it"
     else:
         walk.damping *= walk.growth
         walk.growth *= 2.0
@@ -148,27 +127,28 @@ def _judged(walk: _Walk, step: np.ndarray, cost: float, slope: np.ndarray, squar
             walk.reason = "it has converged, no step lowers the cost any more"
 
 
-def _cut(lanes: int, at_once: int) -> list[tuple[int, int]]:
-    """(first lane, width) of each batch. A few stragglers do not pay for a wide batch that is filled up."""
-    narrow = max(at_once // NARROWER, 1)
-    widths, start = [], 0
-    while start < lanes:
-        few = at_once >= WIDE and lanes - start <= STRAGGLERS * narrow
-        widths.append((start, narrow if few else at_once))
-        start += widths[-1][1]
-    return widths
-
-
 def _packed(walks: Sequence[_Walk], rounds: int) -> dict[str, np.ndarray]:
-    """Where all fits are, as arrays."""
-    fields = {field.name: np.asarray([getattr(walk, field.name) for walk in walks]) for field in fields_of(_Walk)}
+    """Where all fits are, as arrays; those of fits with fewer free parameters are filled up with zeros."""
+    most = max((len(walk.place) for walk in walks), default=0)
+
+    def filled(value: np.ndarray | float | str) -> np.ndarray:
+        one = np.asarray(value)
+        return np.pad(one, [(0, most - size) for size in one.shape]) if one.ndim else one
+
+    fields = {
+        field.name: np.asarray([filled(getattr(walk, field.name)) for walk in walks]) for field in fields_of(_Walk)
+    }
     return {**fields, "rounds": np.asarray(rounds)}
 
 
-def _unpacked(record: Mapping[str, np.ndarray]) -> list[_Walk]:
-    names = [field.name for field in fields_of(_Walk)]
-    rows = zip(*(record[name] for name in names), strict=True)
-    return [_Walk(*(value if np.ndim(value) else value.item() for value in row)) for row in rows]
+def _unpacked(record: Mapping[str, np.ndarray], lanes: Sequence[Lane]) -> list[_Walk]:
+    def cut(value: np.ndarray, size: int) -> Any:
+        return value[(slice(size),) * value.ndim] if value.ndim else value.item()
+
+    rows = zip(*(record[field.name] for field in fields_of(_Walk)), strict=True)
+    return [
+        _Walk(*(cut(np.asarray(one), len(lane.slots)) for one in row)) for lane, row in zip(lanes, rows, strict=True)
+    ]
 
 
 def fit_in_box(
@@ -176,69 +156,59 @@ def fit_in_box(
     lanes: Sequence[Lane],
     *,
     outputs: np.ndarray | None = None,
-    at_once: int = 8,
     most: int = MOST_STEPS,
+    enough: float = ENOUGH,
     kept: Kept | None = None,
     progress: Progress = quiet,
     what: str = "fitting",
 ) -> list[Fit]:
-    """Fit every lane from its own values; all lanes have the same number of slots.
+    """Fit every lane from its own values.
 
-    With `kept`, where every fit is is written as it goes, and the same call goes on from there to the same end.
-
-    `outputs`, (lanes, R, N): measured outputs of each lane's own, as in repeated experiments. Lanes that are not ended
-    go `at_once` at a time, so one compilation serves any number of them, and none waits for another; the last ones of
-    many go fewer at a time, by a second compilation.
+    A fit ends when a step lowers its cost by less than `enough` of it and promised no more. With `kept`, where every fit
+    is is written as it goes, and the same call goes on from there to the same end. `outputs`, (lanes, series, N):
+    measured outputs of each lane's own, as in repeated experiments.
     """
+    size = max([len(lane.slots) for lane in lanes], default=1) * problem.measured.nbytes
+    at_once = max(1, ROOM // max(size, 1))
 
-    def place_of(lane: Lane) -> np.ndarray:
-        low, high = np.asarray(lane.low), np.asarray(lane.high)
-        return np.clip((np.asarray(lane.values)[np.asarray(lane.slots)] - low) / (high - low), 0.0, 1.0)
-
-    def evaluated(some: Sequence[int], places: Sequence[np.ndarray]) -> list[tuple[float, np.ndarray, np.ndarray]]:
-        found: list[tuple[float, np.ndarray, np.ndarray]] = []
-        for start, width in _cut(len(some), at_once):
-            part = list(some[start : start + width])
-            filled = part + [part[0]] * (width - len(part))
-            at = list(places[start : start + width])
-            at += [at[0]] * (width - len(part))
-            batch = jax.tree.map(lambda *leaves: jnp.stack(leaves), *(lanes[lane] for lane in filled))
-            own = None if outputs is None else jnp.asarray(outputs[np.asarray(filled)])
-            answers = [np.asarray(each) for each in _normal_equations(problem, batch, jnp.asarray(np.stack(at)), own)]
-            found += [(float(cost), slope, square) for cost, slope, square in zip(*answers, strict=True)][: len(part)]
+    def evaluated(some: Sequence[int], places: Sequence[np.ndarray]) -> list[Equations]:
+        found: list[Equations] = []
+        for start in range(0, len(some), at_once):
+            part = list(some[start : start + at_once])
+            own = None if outputs is None else outputs[np.asarray(part)]
+            found += _normal_equations(problem, [lanes[k] for k in part], places[start : start + at_once], own)
         return found
 
     everyone = range(len(lanes))
     kept = kept or Kept()
-    key = kept.key((problem, list(lanes)), "fit in box", outputs if outputs is not None else "", at_once, most)
+    key = kept.key((problem, list(lanes)), "fit in box", outputs if outputs is not None else "", most, enough)
     known = kept.load(key)
     if known is not None:
-        walks, begun = _unpacked(known), int(known["rounds"])
+        walks, begun = _unpacked(known, lanes), int(known["rounds"])
     else:
         walks, begun = [], 0
-        places = [place_of(lane) for lane in lanes]
-        for place, (cost, slope, square) in zip(places, evaluated(everyone, places), strict=True):
+        at = [lane.place for lane in lanes]
+        for own, place, (cost, slope, square) in zip(lanes, at, evaluated(everyone, at), strict=True):
             lost = not (np.isfinite(cost) and np.isfinite(slope).all() and np.isfinite(square).all())
             walk = _Walk(place, cost if not lost else np.inf, slope, square, np.diag(square).copy())
-            walk.reason = "the model gives no number at the start" if lost else ""
+            idle = "" if len(own.slots) else "no parameter is free"
+            walk.reason = "the model gives no number at the start" if lost else idle
             walks.append(walk)
     for number in range(begun, most):
         kept.save(key, _packed(walks, number), last=False)
-        going = [lane for lane in everyone if not walks[lane].reason]
-        progress(what, max(1.0 - len(going) / len(lanes), number / most))
+        going = [k for k in everyone if not walks[k].reason]
+        progress(what, max(1.0 - len(going) / max(len(lanes), 1), number / most))
         if not going:
             break
-        steps = [_step(walks[lane]) for lane in going]
-        tried = [np.clip(walks[lane].place + step, 0.0, 1.0) for lane, step in zip(going, steps, strict=True)]
-        for lane, step, answer in zip(going, steps, evaluated(going, tried), strict=True):
-            _judged(walks[lane], step, *answer)
+        steps = [_step(walks[k]) for k in going]
+        tried = [np.clip(walks[k].place + step, 0.0, 1.0) for k, step in zip(going, steps, strict=True)]
+        for k, step, answer in zip(going, steps, evaluated(going, tried), strict=True):
+            _judged(walks[k], step, *answer, enough=enough)
     kept.save(key, _packed(walks, most))
     progress(what, 1.0)
     ended = []
-    for own, walk in zip(lanes, walks, strict=True):
-        values = np.array(own.values)
-        low, high = np.asarray(own.low), np.asarray(own.high)
-        values[np.asarray(own.slots)] = low + walk.place * (high - low)
+    for lane, walk in zip(lanes, walks, strict=True):
         done = bool(walk.reason) and np.isfinite(walk.cost)
-        ended.append(Fit(values, walk.cost, done, walk.reason or f"{most} steps were not enough", walk.steps))
+        reason = walk.reason or f"{most} steps were not enough"
+        ended.append(Fit(lane.at(walk.place), walk.cost, done, reason, walk.steps))
     return ended

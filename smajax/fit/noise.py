@@ -12,7 +12,7 @@ import numpy as np
 from smajax.fit.box import Fit
 from smajax.fit.problem import Problem
 from smajax.fit.robust import NORMAL
-from smajax.fit.solve import misfits
+from smajax.fit.shown import misfits
 
 ROUNDS = 20
 SETTLED = 1e-3  # relative change of a sigma that changes no weight worth a step

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any, TypeVar
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -10,6 +11,9 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from smajax.experiment.record import Prior
+
+ArrayOf = TypeVar("ArrayOf", bound=Any)
+LEAST = 1e-12  # of its mean: as near to zero as the logarithm of a value is taken
 
 
 class Priors(eqx.Module):
@@ -28,10 +32,24 @@ class Priors(eqx.Module):
         logarithmic = tuple(prior.logarithmic for prior in here.values())
         return cls(tuple(here), logarithmic, jnp.asarray(means, dtype=float), jnp.asarray(sigmas, dtype=float))
 
-    def rows(self, values: Float[Array, " parameter"]) -> Float[Array, " prior"]:
-        r"""$(\theta - \mu)/\sigma$ or $\ln(\theta/\mu)/\sigma$: their squares are minus twice the log-density."""
-        at = values[jnp.asarray(self.slots, dtype=int)]
-        bent = np.asarray(self.logarithmic, dtype=bool)
+    def rows(self, values: ArrayOf) -> ArrayOf:
+        r"""$(\theta - \mu)/\sigma$ or $\ln(\theta/\mu)/\sigma$ of values (P + 1,): (K,).
+
+        Their squares are minus twice the log-density. Of numpy's and of JAX's arrays alike.
+        """
+        xp = values.__array_namespace__()
+        mean, sigma, bent = xp.asarray(self.mean), xp.asarray(self.sigma), np.asarray(self.logarithmic, dtype=bool)
+        at = values[np.asarray(self.slots, dtype=int)]
+        ratio = xp.where(bent, at / xp.where(bent, mean, 1.0), 1.0)
         # A value at zero is infinitely far off; a finite one lets a fit come back from a bound there.
-        plain = jnp.log(jnp.maximum(jnp.where(bent, at / jnp.where(bent, self.mean, 1.0), 1.0), 1e-12))
-        return jnp.where(bent, plain, at - self.mean) / self.sigma
+        return xp.where(bent, xp.log(xp.maximum(ratio, LEAST)), at - mean) / sigma
+
+    def slopes(self, values: np.ndarray) -> np.ndarray:
+        """Derivative of `rows` by every value, (K, P + 1)."""
+        bent, slots = np.asarray(self.logarithmic, dtype=bool), np.asarray(self.slots, dtype=int)
+        at = values[slots]
+        least = LEAST * np.where(bent, np.asarray(self.mean), 1.0)
+        found = np.zeros((len(slots), len(values)))
+        inner = np.where(bent, np.where(at > least, 1.0 / np.maximum(at, least), 0.0), 1.0)
+        found[np.arange(len(slots)), slots] = inner / np.asarray(self.sigma)
+        return found

@@ -4,32 +4,44 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array, Float
 
 from smajax.experiment.record import Prior
 from smajax.fit.batch import RunBatch, shown_batch
-from smajax.fit.bounds import bounded, unbounded
 from smajax.fit.priors import Priors
 from smajax.parameters import get_parameters, parameters, set_vector
 from smajax.system import System
 
+ArrayOf = TypeVar("ArrayOf", bound=Any)
+# How near to a bound the logit that ties a parameter to its start is taken, as a share of the box.
+NEAREST = 1e-3
+
 
 class Lane(NamedTuple):
-    """One fit of a batch. All lanes of a batch have the same number of slots, so that they share one compilation."""
+    """One fit of many: what it frees, in which box, and where it starts. F free parameters."""
 
-    slots: Int[Array, " slot"]  # index into the parameter vector; the last index is a dummy that nothing reads
-    low: Float[Array, " slot"]
-    high: Float[Array, " slot"]
-    values: Float[Array, " parameter"]  # every parameter of the model, and the dummy at the end
-    weights: Float[Array, " run"]  # 0 leaves a run out
-    tie: Float[Array, ""]  # pull back to the start, in the residual's unit per unit of the unbounded parameter; 0: none
-    scale: Float[Array, ""]  # the residual is divided by this, so that damping of order one means something
+    slots: np.ndarray  # (F,), index into the parameter vector
+    low: np.ndarray  # (F,)
+    high: np.ndarray  # (F,)
+    values: np.ndarray  # every parameter of the model, and the dummy at the end, (P + 1,)
+    weights: np.ndarray  # (R,): 0 leaves a run out
+    tie: np.ndarray  # (F,): pull back to the start, in the residual's unit per box
+
+    @property
+    def place(self) -> np.ndarray:
+        """The start, in shares of the box, (F,)."""
+        return np.clip((self.values[self.slots] - self.low) / (self.high - self.low), 0.0, 1.0)
+
+    def at(self, place: np.ndarray) -> np.ndarray:
+        """The whole parameter vector, (P + 1,), at a place of the box."""
+        values = np.array(self.values)
+        values[self.slots] = self.low + place * (self.high - self.low)
+        return values
 
 
 class Own(eqx.Module):
@@ -95,24 +107,28 @@ class Problem(eqx.Module):
         free: Sequence[str],
         bounds: Mapping[str, tuple[float, float]],
         values: np.ndarray,
-        slots: int,
         weights: np.ndarray | None = None,
         tie: float = 0.0,
     ) -> Lane:
-        """A lane that frees `free` within `bounds`, starting from `values`; unused slots point at the dummy."""
-        if len(free) > slots:
-            raise ValueError(f"{len(free)} parameters are to be free but the batch has {slots} slots; ask for more.")
-        dummy = len(self.names)
-        index = [self.names.index(name) for name in free] + [dummy] * (slots - len(free))
-        low = [bounds[name][0] for name in free] + [-1.0] * (slots - len(free))
-        high = [bounds[name][1] for name in free] + [1.0] * (slots - len(free))
-        full = np.ones(self.batch.runs) if weights is None else weights
-        slot = jnp.asarray(index, dtype=int)
-        return Lane(slot, *(jnp.asarray(part) for part in (low, high, values, full, tie, 1.0)))
+        """A lane that frees `free` within `bounds`, starting from `values`.
 
-    def with_output(self, output: Float[Array, "run time"] | None) -> Problem:
-        """The same with other measured outputs; None: its own."""
-        return self if output is None else eqx.tree_at(lambda one: one.batch.output, self, output)
+        `tie`: of the parameters' logits in the box, so that one near a bound is held to its own size.
+        """
+        slots = np.asarray([self.names.index(name) for name in free], dtype=int)
+        low, high = (np.asarray([bounds[name][side] for name in free], dtype=float) for side in (0, 1))
+        full = np.ones(self.batch.runs) if weights is None else np.asarray(weights, dtype=float)
+        loose = Lane(slots, low, high, np.asarray(values, dtype=float), full, np.zeros(len(free)))
+        share = np.clip(loose.place, NEAREST, 1.0 - NEAREST)
+        return loose._replace(tie=tie / (share * (1.0 - share)))
+
+    def with_output(self, output: Float[Array, "series time"]) -> Problem:
+        """The same with other measured outputs."""
+        return eqx.tree_at(lambda one: one.batch.output, self, output)
+
+    @property
+    def measured(self) -> np.ndarray:
+        """The outputs, (series, N), SI."""
+        return np.asarray(self.batch.output)
 
     def system_at(self, values: Float[Array, " parameter"]) -> System:
         """The model, without what is each run's own."""
@@ -131,80 +147,21 @@ class Problem(eqx.Module):
         return self.misfit_of(self.shown(values))
 
     def misfit_of(self, shown: Float[Array, "series time"]) -> Float[Array, "series time"]:
-        """`misfit` of what the sensors show.
+        """`misfit` of what the sensors show."""
+        return self.centred(self.batch.output - shown)
 
-        The offset enters linearly, so its best value for any model is the mean misfit: it needs no slot.
+    def centred(self, raw: ArrayOf) -> ArrayOf:
+        """(..., series, N) with each run's best offset taken off where the experiment declares one; 0 in padding.
+
+        The offset enters linearly, so its best value for any model is the mean misfit: it needs no slot. Of numpy's and
+        of JAX's arrays alike.
         """
-        batch = self.batch
-        raw = batch.output - shown
+        xp = raw.__array_namespace__()
+        mask = xp.asarray(self.batch.mask)
         if any(self.offset):
             # The mask may hold square roots of weights between 0 and 1 (`fit.robust`).
-            weight = batch.mask**2
-            total = weight.sum(axis=1)
-            best = (raw * weight).sum(axis=1) / jnp.where(total > 0.0, total, 1.0)
-            raw = raw - jnp.where(np.tile(self.offset, batch.runs), best, 0.0)[:, None]
-        return raw * batch.mask
-
-    def residual(
-        self, values: Float[Array, " parameter"], weights: Float[Array, " run"], lost: float | None = None
-    ) -> Float[Array, " sample"]:
-        """Misfit over noise, run by run times the root of its weight, and the priors': what least squares makes small.
-
-        `lost`: what stands for a misfit that is not finite.
-        """
-        return self.residual_of(self.shown(values), values, weights, lost)
-
-    def residual_of(
-        self,
-        shown: Float[Array, "series time"],
-        values: Float[Array, " parameter"],
-        weights: Float[Array, " run"],
-        lost: float | None = None,
-    ) -> Float[Array, " sample"]:
-        """`residual` of what the sensors show at `values`."""
-        misfit = self.misfit_of(shown) / self.noise
-        misfit = misfit if lost is None else jnp.where(jnp.isfinite(misfit), misfit, lost)
-        by_series = jnp.repeat(weights, len(self.batch.outputs), total_repeat_length=len(misfit))
-        return jnp.concatenate([(misfit * jnp.sqrt(by_series)[:, None]).ravel(), self.priors.rows(values)])
-
-
-def values_of(free: Float[Array, " slot"], lane: Lane) -> Float[Array, " parameter"]:
-    """The whole parameter vector of a lane."""
-    return lane.values.at[lane.slots].set(bounded(free, lane.low, lane.high))
-
-
-def free_of(lane: Lane) -> Float[Array, " slot"]:
-    """Where the solver starts: the lane's own values, moved off their bounds."""
-    return unbounded(jnp.asarray(lane.values)[lane.slots], jnp.asarray(lane.low), jnp.asarray(lane.high))
-
-
-def _weighted(free: Float[Array, " slot"], lane: Lane, problem: Problem) -> Float[Array, " sample"]:
-    # A lane that blows up loses; it must not stop the others.
-    found = problem.residual(values_of(free, lane), lane.weights, lost=1e6)
-    return jnp.concatenate([found, lane.tie * (free - free_of(lane))]) / lane.scale
-
-
-@eqx.filter_custom_jvp
-def residual(
-    free: Float[Array, " slot"], arguments: tuple[Lane, Problem]
-) -> tuple[Float[Array, " sample"], Float[Array, ""]]:
-    """(misfit over noise and scale, weighted run by run, as one vector; its square): what least squares makes small.
-
-    Its derivative is formed as a whole matrix, in one forward pass: a solver that linearises it then carries that
-    matrix and not every intermediate of the simulation, and the model is compiled once instead of three times.
-    """
-    weighted = _weighted(free, *arguments)
-    return weighted, weighted @ weighted
-
-
-@residual.def_jvp
-def _residual_jvp(primals, tangents):  # type: ignore[no-untyped-def]  # the signature is equinox's
-    (free, arguments), (towards, _) = primals, tangents
-
-    def with_value(point: Float[Array, " slot"]) -> tuple[Array, Array]:
-        value = _weighted(point, *arguments)
-        return value, value
-
-    jacobian, value = jax.jacfwd(with_value, has_aux=True)(free)
-    change = jacobian @ towards
-    return (value, value @ value), (change, 2.0 * value @ change)
+            weight = mask**2
+            total = xp.sum(weight, axis=-1)
+            best = xp.sum(raw * weight, axis=-1) / xp.where(total > 0.0, total, 1.0)
+            raw = raw - xp.where(xp.asarray(np.tile(self.offset, self.batch.runs)), best, 0.0)[..., None]
+        return raw * mask

@@ -61,7 +61,7 @@ def profiles(
         for value in sorted({min(max(here + share * error, low), high) for share in ERRORS} - {here}):
             start = np.array(best.values)
             start[index(name)] = value
-            lanes.append(problem.lane(others, bounds, start, len(names)))
+            lanes.append(problem.lane(others, bounds, start))
             points.append((name, value))
     solved = fit_in_box(problem, lanes, kept=kept, progress=progress, what="profiles") if lanes else []
     found = []

@@ -5,9 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import equinox as eqx
-import jax
-import jax.numpy as jnp
 import numpy as np
 
 from smajax.fit.problem import Problem
@@ -55,23 +52,13 @@ class Sensitivity:
         return self.misfit[self.mask > 0]
 
 
-@eqx.filter_jit
-def _evaluated(
-    problem: Problem, values: jax.Array, towards: jax.Array, shown: jax.Array, slopes: jax.Array
-) -> tuple[jax.Array, ...]:
-    def misfit(shown: jax.Array) -> jax.Array:
-        return problem.misfit_of(shown) / problem.noise
-
-    jacobian = jax.vmap(lambda slope: jax.jvp(misfit, (shown,), (slope,))[1], out_axes=-1)(slopes)
-    priors = jax.vmap(lambda way: jax.jvp(problem.priors.rows, (values,), (way,))[1], out_axes=-1)(towards)
-    return misfit(shown), jacobian, priors
-
-
 def sensitivity(problem: Problem, values: np.ndarray, names: Sequence[str]) -> Sensitivity:
     """Misfit and Jacobian at `values` (P + 1,), by `names`. One forward-mode pass over all runs."""
     towards = np.eye(len(values))[[problem.names.index(name) for name in names]]
     (shown,), (slopes,) = shown_and_slopes(problem, np.asarray(values)[None], towards[None])
-    given = (jnp.asarray(one) for one in (values, towards, shown, slopes))
-    misfit, jacobian, priors = (np.asarray(part) for part in _evaluated(problem, *given))
+    noise = np.asarray(problem.noise)
+    misfit = problem.centred(problem.measured - shown) / noise
+    jacobian = np.moveaxis(-problem.centred(slopes) / noise, 0, -1)
+    priors = problem.priors.slopes(np.asarray(values)) @ towards.T
     mask = np.asarray(problem.batch.mask)
     return Sensitivity(tuple(names), misfit, jacobian, mask, priors if len(priors) else None, shown)

@@ -8,11 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse.csgraph import connected_components
 
-from smajax.fit.bounds import AT_BOUND
 from smajax.fit.sensitivity import Sensitivity
 from smajax.residual.noise_like import WHITE, correlation_time, split_runs, whiteness_p_value
 from smajax.words import and_listed
 
+# A fitted value nearer to a bound than this share of the box counts as held by it.
+AT_BOUND = 2e-3
 # Two parameters whose estimates are correlated more than this move together: the runs see one combination of them.
 TOGETHER = 0.98
 # A direction in which the scaled columns are shorter than this share of the longest is one the runs do not see; a

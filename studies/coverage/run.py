@@ -27,17 +27,16 @@ from studies.coverage.rig import BOUNDS, NOISE, Rig, rig
 
 HERE = Path(__file__).parent
 SEED = 6
-AT_ONCE = 50
 WITHIN = 1.959964
 
 
-def repeated(rig: Rig, count: int, most: int = MOST_STEPS, at_once: int = AT_ONCE) -> tuple[list[Fit], np.ndarray]:
+def repeated(rig: Rig, count: int, most: int = MOST_STEPS) -> tuple[list[Fit], np.ndarray]:
     """Fits of `count` noisy repetitions, and their outputs (count, R, N)."""
     exact = np.asarray(rig.problem.batch.output)
     noise = NOISE * np.random.default_rng(SEED).standard_normal((count, *exact.shape))
     outputs = exact + noise
-    lane = rig.problem.lane(rig.names, BOUNDS, rig.start, len(rig.names))
-    return fit_in_box(rig.problem, [lane] * count, outputs=outputs, at_once=at_once, most=most), outputs
+    lane = rig.problem.lane(rig.names, BOUNDS, rig.start)
+    return fit_in_box(rig.problem, [lane] * count, outputs=outputs, most=most), outputs
 
 
 def errors(rig: Rig, solutions: list[Fit], outputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -85,15 +84,14 @@ def study(fast: bool) -> dict[str, Any]:
     """Everything as numbers."""
     dt, fine, count, peers = (0.02, 0.02, 40, 2) if fast else (0.02, 0.005, 200, 20)
     exact = rig(fine)
-    lane = exact.problem.lane(exact.names, BOUNDS, exact.start, len(exact.names))
-    best = fit_in_box(exact.problem, [lane], at_once=1)[0]
+    lane = exact.problem.lane(exact.names, BOUNDS, exact.start)
+    best = fit_in_box(exact.problem, [lane])[0]
     index = exact.problem.names.index
     without = {name: float(best.values[index(name)] / exact.truth[name] - 1.0) for name in exact.names}
-    here, at_once = rig(dt), min(AT_ONCE, count)
-    for some in (min(AT_ONCE, count), 1):  # compiled before the clock starts: batches, and stragglers
-        repeated(here, some, most=1, at_once=at_once)
+    here = rig(dt)
+    repeated(here, 1, most=1)  # compiled before the clock starts
     began, worked = clock.perf_counter(), clock.process_time()
-    solutions, outputs = repeated(here, count, at_once=at_once)
+    solutions, outputs = repeated(here, count)
     each, work = (clock.perf_counter() - began) / count, (clock.process_time() - worked) / count
     off, spread = errors(here, solutions, outputs)
     inside = np.abs(off) <= WITHIN * spread
