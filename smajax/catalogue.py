@@ -10,11 +10,12 @@ from smajax.parameters import parameters
 from smajax.presets import DRIVES, LOADS, WIRES, build
 from smajax.sensors import sensors_of
 from smajax.system import System
+from smajax.wire.laws import LAWS
 
 
-def describe(wire: str, load: str, drive: str) -> ModelDescription:
+def describe(wire: str, load: str, drive: str, law: str = "") -> ModelDescription:
     """Parameters and channels of one combination. ValueError when the three do not go together."""
-    system = build(wire, load, drive)
+    system = build(wire, load, drive, law)
     if isinstance(system.load, AbstractCoupon) != (drive == "none"):
         raise ValueError(
             f"load `{load}` with drive `{drive}`: a coupon's temperature is prescribed, so it takes the drive `none`; "
@@ -35,7 +36,12 @@ def describe(wire: str, load: str, drive: str) -> ModelDescription:
 
 
 CATALOGUE = Catalogue(
-    wires=tuple(WIRES), loads=tuple(LOADS), drives=tuple(DRIVES), effects=tuple(LIBRARY), describe=describe
+    wires=tuple(WIRES),
+    loads=tuple(LOADS),
+    drives=tuple(DRIVES),
+    laws=tuple(LAWS),
+    effects=tuple(LIBRARY),
+    describe=describe,
 )
 
 

@@ -10,6 +10,8 @@ from pathlib import Path
 import jax.numpy as jnp
 import numpy as np
 
+from smajax.attribution.bootstrap import bootstrapped
+from smajax.attribution.rivals import rivals
 from smajax.attribution.search import Evidence, Model, Search, scores_at, search
 from smajax.attribution.verdict import cannot_know, shown, summary, unexplained, verdict
 from smajax.catalogue import candidates
@@ -69,11 +71,17 @@ def _job(experiment: Experiment) -> _Job:
 
 
 def close_loop(
-    experiment: Experiment, *, memory: Path, progress: Progress = quiet, command: str = "", seed: int = SEED
+    experiment: Experiment,
+    *,
+    memory: Path | None = None,
+    progress: Progress = quiet,
+    command: str = "",
+    seed: int = SEED,
+    apart: bool = False,
 ) -> Findings:
     """Fit the base model, look at what it leaves, find what it lacks, and judge on runs the fit never saw.
 
-    `memory` is a folder for finished fits: a loop that was interrupted goes on from there. Held-out runs are simulated
+    `memory` is a folder for finished fits: a loop that was interrupted goes on from there. `apart`: of `Search`. Held-out runs are simulated
     once, at the very end. The caller chooses precision; anything but float64 is refused with a ValueError, because the
     differences that decide here are far below float32's rounding over a run.
     """
@@ -95,6 +103,7 @@ def close_loop(
         kept,
         lambda value: shown(value, experiment.output_unit, experiment.output_name),
         progress,
+        apart,
     )
     at_start = sensitivity(job.problem, start, setting.every)
     check = [*experiment.warnings, *identifiability(at_start, job.unknowns, job.bounds)]
@@ -107,7 +116,9 @@ def close_loop(
     progress("standard errors and pictures", 0.0)
     before = _told(job, setting, first, start)
     after = _told(job, setting, final, start) if final.effects else before
-    effects = _effects(job, setting, final, after)
+    intervals = bootstrapped(setting, final, seed)
+    effects = _effects(job, setting, final, after, intervals)
+    mistaken = rivals(setting, final, job.fit_runs)
     runs, portrait_before, portrait_after = _compare(job, first, final)
     integration = _integration_error(job, final)
     progress("standard errors and pictures", 1.0)
@@ -120,7 +131,14 @@ def close_loop(
         summary=summary(answer, experiment, runs, effects, portrait_after, len(job.candidates)),
         unexplained=unexplained(answer, experiment, runs, portrait_after),
         cannot_know=cannot_know(
-            experiment, after.parameters, effects, setting.rounds, len(job.fit_runs), integration, _preset(job)
+            experiment,
+            after.parameters,
+            effects,
+            setting.rounds,
+            mistaken,
+            len(job.fit_runs),
+            integration,
+            _preset(job),
         ),
         check=tuple(check),
         output_name=experiment.output_name,
@@ -134,6 +152,7 @@ def close_loop(
         portrait_before=portrait_before,
         portrait_after=portrait_after,
         rounds=tuple(setting.rounds),
+        rivals=mistaken,
         provenance=_provenance(experiment, kept, command, seed, clock.monotonic() - began),
     )
 
@@ -205,7 +224,9 @@ def _told(job: _Job, setting: Search, model: Model, start: np.ndarray) -> _Told:
     )
 
 
-def _effects(job: _Job, setting: Search, final: Model, after: _Told) -> tuple[EffectFinding, ...]:
+def _effects(
+    job: _Job, setting: Search, final: Model, after: _Told, intervals: dict[str, tuple[float, float]]
+) -> tuple[EffectFinding, ...]:
     """Every candidate with its evidence: added ones first, the strongest of them at the head, then by score."""
     left = [name for name in job.candidates if name not in final.effects]
     last = {score.effects[0]: score for score in scores_at(setting, final, left)[0]} if left else {}
@@ -214,7 +235,9 @@ def _effects(job: _Job, setting: Search, final: Model, after: _Told) -> tuple[Ef
     for name in job.candidates:
         effect, seen = LIBRARY[name], setting.evidence.get(name, Evidence())
         coefficients = {
-            full.split(".", 1)[1]: CoefficientFinding(told[full].value, told[full].standard_error, told[full].unit)
+            full.split(".", 1)[1]: CoefficientFinding(
+                told[full].value, told[full].standard_error, told[full].unit, intervals.get(full)
+            )
             for full in setting.coefficients(name)
             if full in told
         }

@@ -74,19 +74,15 @@ def candidate_runs(runs: Sequence[Run]) -> dict[str, dict[str, np.ndarray]]:
     return found
 
 
-def suggestions(
-    problem: Problem, values: np.ndarray, names: Sequence[str], runs: Sequence[Run], inflation: float, count: int = 5
-) -> tuple[Suggestion, ...]:
-    """The `count` best candidates for the parameters `names` at the fit `values` (P + 1,), best first; D-optimal.
-
-    The information of a run is that of its Jacobian at the fit, each run's offset taken off where the experiment has
-    one: it holds for the model as fitted, and knows nothing of an effect that the model lacks.
-    """
+def trial(
+    problem: Problem, values: np.ndarray, runs: Sequence[Run]
+) -> tuple[dict[str, dict[str, np.ndarray]], Problem]:
+    """(candidate runs by what they are in words, the problem that has them as its runs) at the fit `values` (P + 1,)."""
     candidates = candidate_runs(runs)
-    if not candidates or not names:
-        return ()
     batch = problem.batch
     series = list(candidates.values())
+    if not series:
+        return {}, problem
     length = len(next(iter(series[0].values())))
     blank = jnp.zeros((len(series) * len(batch.outputs), length))
     # Parameters that a run overrides: as they were in the first one; what is each run's own: as in the mean of them.
@@ -95,17 +91,31 @@ def suggestions(
     inputs = {name: jnp.asarray(np.stack([one[name] for one in series])) for name in batch.inputs}
     overridden = (*batch.override_names, *problem.own.names)
     runs_to_try = RunBatch(inputs, blank, jnp.ones_like(blank), overrides, overridden, batch.dt, outputs=batch.outputs)
-    trial = Problem.build(problem.system_at(jnp.asarray(values)), runs_to_try, problem.noise_sigma, problem.offset)
+    system = problem.system_at(jnp.asarray(values))
+    return candidates, Problem.build(system, runs_to_try, problem.noise_sigma, problem.offset)
+
+
+def suggestions(
+    problem: Problem, values: np.ndarray, names: Sequence[str], runs: Sequence[Run], inflation: float, count: int = 5
+) -> tuple[Suggestion, ...]:
+    """The `count` best candidates for the parameters `names` at the fit `values` (P + 1,), best first; D-optimal.
+
+    The information of a run is that of its Jacobian at the fit, each run's offset taken off where the experiment has
+    one: it holds for the model as fitted, and knows nothing of an effect that the model lacks.
+    """
+    candidates, to_try = trial(problem, values, runs)
+    if not candidates or not names:
+        return ()
     scale = np.asarray([abs(values[problem.names.index(name)]) or 1.0 for name in names])
     at = sensitivity(problem, values, names)
     here, priors = at.columns(names) * scale, at.prior_columns(names) * scale
-    shared = [name for name in names if name in trial.names]
-    there = sensitivity(trial, trial.start_values(), shared)
+    shared = [name for name in names if name in to_try.names]
+    there = sensitivity(to_try, to_try.start_values(), shared)
     known = here.T @ here / inflation + priors.T @ priors + SEEN * np.eye(len(names))
     before = np.sqrt(np.diag(np.linalg.inv(known)))
     found = []
-    by_run = np.zeros((len(series), blank.size // len(series), len(names)))
-    by_run[..., [list(names).index(name) for name in shared]] = there.jacobian.reshape(len(series), -1, len(shared))
+    by_run = np.zeros((len(candidates), to_try.measured.size // len(candidates), len(names)))
+    by_run[..., [list(names).index(name) for name in shared]] = there.jacobian.reshape(len(candidates), -1, len(shared))
     for (what, one), jacobian in zip(candidates.items(), by_run, strict=True):
         tells = jacobian * scale
         if not np.isfinite(tells).all():

@@ -17,7 +17,9 @@ def base_model(experiment: Experiment) -> System:
 
     It has the effects of which the experiment names a parameter (`latent_heat.enthalpy`), and no others.
     """
-    system = extended(build(experiment.wire, experiment.load, experiment.drive), experiment.declared_effects)
+    system = extended(
+        build(experiment.wire, experiment.load, experiment.drive, experiment.law), experiment.declared_effects
+    )
     starts = {unknown.name: unknown.start for unknown in experiment.unknowns if unknown.name not in RUN_STARTS}
     return set_parameters(system, {**experiment.parameters, **starts})
 

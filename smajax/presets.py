@@ -26,6 +26,7 @@ from smajax.wire.conditions import Enhanced
 from smajax.wire.constitutive import Constitutive
 from smajax.wire.heat import Heat
 from smajax.wire.kinetics import Kinetics
+from smajax.wire.laws import under_law
 from smajax.wire.resistance import Resistance
 from smajax.wire.wire import Wire
 
@@ -221,9 +222,10 @@ DRIVES: dict[str, Callable[[], AbstractDrive]] = {
 }
 
 
-def build(wire: str, load: str, drive: str) -> System:
-    """A system by preset names; KeyError lists the names there are."""
+def build(wire: str, load: str, drive: str, law: str = "") -> System:
+    """A system by preset names, its wire under the named kinetics law or its own; KeyError lists the names there are."""
     for kind, name, table in (("wire", wire, WIRES), ("load", load, LOADS), ("drive", drive, DRIVES)):
         if name not in table:
             raise KeyError(f"No {kind} preset `{name}`; there are {sorted(table)}.")
-    return System(WIRES[wire](), LOADS[load](), DRIVES[drive]())
+    made = WIRES[wire]()
+    return System(under_law(made, law) if law else made, LOADS[load](), DRIVES[drive]())

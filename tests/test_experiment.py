@@ -16,7 +16,7 @@ from smajax.experiment.load import load_experiment
 from smajax.experiment.record import Experiment
 
 
-def describe(wire: str, load: str, drive: str) -> ModelDescription:
+def describe(wire: str, load: str, drive: str, law: str = "") -> ModelDescription:
     if load == "coupon" and drive != "none":
         raise ValueError("a coupon has no drive; write drive = 'none'")
     parameters = {
@@ -35,6 +35,7 @@ CATALOGUE = Catalogue(
     wires={"flexinol", "niti"},
     loads={"bias_spring", "coupon"},
     drives={"duty", "none"},
+    laws={"liang", "enhanced"},
     effects={"latent_heat", "friction"},
     describe=describe,
 )
@@ -497,7 +498,7 @@ def test_a_run_of_hours_is_a_warning(bench: Path) -> None:
     [("voltage", "V", "the voltage reaches 4200 V; is it in mV?"), ("current", "A", "the current reaches 4200 A; is")],
 )
 def test_numbers_too_large_for_a_wire_are_a_warning(bench: Path, drive: str, unit: str, words: str) -> None:
-    def driven(wire: str, load: str, drive: str) -> ModelDescription:
+    def driven(wire: str, load: str, drive: str, law: str = "") -> ModelDescription:
         return replace(describe(wire, load, drive), inputs_required=frozenset({drive}))
 
     catalogue = replace(CATALOGUE, drives={drive}, describe=driven)
@@ -507,3 +508,9 @@ def test_numbers_too_large_for_a_wire_are_a_warning(bench: Path, drive: str, uni
     assert sum(words in one for one in load_experiment(bench, catalogue).warnings) == 1
     (bench / "experiment.toml").write_text(text.replace('unit = "%"', f'unit = "m{unit}"'))
     assert load_experiment(bench, catalogue).warnings == (ONE_FIT,)
+
+
+def test_a_law_that_there_is_none_of_is_told_with_the_ones_there_are(bench: Path) -> None:
+    (bench / "experiment.toml").write_text(BENCH.replace('drive = "duty"', 'drive = "duty"\nlaw = "lian"'))
+    with pytest.raises(ExperimentError, match=r"model\.law.*lian.*liang"):
+        load_experiment(bench / "experiment.toml", CATALOGUE)

@@ -44,12 +44,12 @@ MOST_ROUNDS = 3
 
 @dataclass(frozen=True)
 class Start:
-    """Where one fit begins: the effects whose coefficients are free, all parameters, and the run that is left out."""
+    """Where one fit begins: the effects whose coefficients are free, all parameters, and how much each run counts."""
 
     effects: tuple[str, ...]
     values: np.ndarray  # (P + 1,), in the order of the whole library's problem
-    without: int | None = None
-    tie: float = 0.0  # see `Lane.tie`
+    weights: np.ndarray | None = None  # of the runs, (R,); None: all alike
+    tie: float = 0.0  # of `Problem.lane`
 
 
 @dataclass(frozen=True)
@@ -91,6 +91,7 @@ class Search:
     kept: Kept
     shown: Callable[[float], str]  # an error in the unit that an engineer reads
     progress: Progress = quiet
+    apart: bool = False  # a program for each set of effects: pays where many experiments of one kind follow each other
     evidence: dict[str, Evidence] = field(default_factory=dict)
     rounds: list[Round] = field(default_factory=list)
 
@@ -144,13 +145,18 @@ class Search:
 
         `hops`: each from points near its end as well (`fit.starts.hopped`).
         """
+        sets = sorted({start.effects for start in starts})
+        if self.apart and len(sets) > 1:
+            places = [[k for k, start in enumerate(starts) if start.effects == one] for one in sets]
+            parts = [self.fit([starts[k] for k in some], what, enough=enough, hops=hops) for some in places]
+            order = np.argsort(np.concatenate(places))
+            together = [one for part, _ in parts for one in part]
+            return [together[k] for k in order], np.concatenate([found for _, found in parts])[order]
         problem, index = self.restricted([name for start in starts for name in start.effects])
-        lanes = []
-        for start in starts:
-            weights = np.ones(problem.batch.runs)
-            if start.without is not None:
-                weights[start.without] = 0.0
-            lanes.append(problem.lane(self.free(start.effects), self.bounds, start.values[index], weights, start.tie))
+        lanes = [
+            problem.lane(self.free(start.effects), self.bounds, start.values[index], start.weights, start.tie)
+            for start in starts
+        ]
         fits = fit_in_box(problem, lanes, enough=enough, kept=self.kept, progress=self.progress, what=what)
         if hops:
             fits = hopped(problem, lanes, fits, enough=enough, kept=self.kept, progress=self.progress, what=what)
@@ -179,6 +185,11 @@ class Search:
         values[np.asarray(index)] = found.values
         return dataclasses.replace(found, values=values)
 
+    @staticmethod
+    def known(model: Model) -> Fit:
+        """A fitted model as a fit that has ended."""
+        return Fit(model.values, model.cost, True, "", 0)
+
     def rmse(self, misfit: np.ndarray) -> float:
         return float(np.sqrt((misfit**2).sum() / np.asarray(self.problem.batch.mask).sum()))
 
@@ -190,14 +201,14 @@ class Search:
         with it the prediction. In such a direction the fold keeps what the run left out said: where the others do not
         tell the size of what is new (`told_without`), `present`'s error stands and the effect is credited with nothing.
         """
-        runs = self.problem.batch.output.shape[0]
+        runs = self.problem.batch.runs
         # With one run nothing can be left out: the fit itself is all there is, and the report says so.
-        folds: list[int | None] = list(range(runs)) if runs > 1 else [None]
+        folds = list(1.0 - np.eye(runs)) if runs > 1 else [np.ones(1)]
         levels = self.levels(fitted)
         starts = [
-            Start(entry.effects, entry.solution.values, run, np.sqrt(level) / LOOSE)
+            Start(entry.effects, entry.solution.values, weights, np.sqrt(level) / LOOSE)
             for entry, level in zip(fitted, levels, strict=True)
-            for run in folds
+            for weights in folds
         ]
         _, found = self.fit(starts, "predicting runs left out")
         models = []
@@ -233,7 +244,7 @@ class Search:
         index, values = self.problem.names.index, entry.solution.values
         new = [effect for effect in entry.effects if effect not in present.effects]
         own = [name for effect in new for name in self.coefficients(effect)]
-        size = np.asarray([values[index(name)] - _base(name) for name in own])
+        size = np.asarray([values[index(name)] - base_value(name) for name in own])
         others = [name for name in self.loose(entry.effects, values) if name not in own]
         level = float(np.mean(at.residual() ** 2)) * correlation_time(split_runs(at.misfit, at.mask))
         told = []
@@ -261,7 +272,7 @@ class Search:
         return enough, told
 
 
-def _base(coefficient: str) -> float:
+def base_value(coefficient: str) -> float:
     """The value at which a coefficient such as `latent_heat.enthalpy` changes nothing."""
     effect, name = coefficient.split(".", 1)
     return float(getattr(LIBRARY[effect].base(), name))
@@ -379,18 +390,22 @@ def simplest(setting: Search, judged: Sequence[Model], present: Model) -> tuple[
     return chosen, [m for m in alike if not set(chosen.effects) <= set(m.effects)]
 
 
-def scores_at(setting: Search, model: Model, left: Sequence[str]) -> tuple[list[Score], list[Score]]:
-    """Score tests of the effects not yet in `model`, at its fit.
+def nudged(setting: Search, values: np.ndarray, effects: Sequence[str]) -> np.ndarray:
+    """`values` with `effects` switched on by next to nothing.
 
-    Each is switched on by next to nothing: a transformation with a tail follows its curve where one without rests, so
-    at exactly zero the coefficient of a tail has no derivative there.
+    A transformation with a tail follows its curve where one without rests, so at exactly zero the coefficient of a tail
+    has no derivative there.
     """
-    index = setting.problem.names.index
-    values = np.array(model.values)
-    for effect in left:
+    found = np.array(values)
+    for effect in effects:
         for name in switches(effect):
-            values[index(name)] += NUDGE * LIBRARY[effect].starts[name.removeprefix(f"{effect}.")]
-    at = sensitivity(setting.problem, values, setting.every)
+            found[setting.problem.names.index(name)] += NUDGE * LIBRARY[effect].starts[name.removeprefix(f"{effect}.")]
+    return found
+
+
+def scores_at(setting: Search, model: Model, left: Sequence[str]) -> tuple[list[Score], list[Score]]:
+    """Score tests of the effects not yet in `model`, at its fit."""
+    at = sensitivity(setting.problem, nudged(setting, model.values, left), setting.every)
     return screen(at, setting.loose(model.effects, model.values), left, setting.bounds)
 
 
@@ -403,10 +418,10 @@ def pruned(setting: Search, model: Model) -> Model:
             rest = tuple(name for name in model.effects if name != effect)
             values = np.array(model.values)
             for name in setting.coefficients(effect):
-                values[names.index(name)] = _base(name)
+                values[names.index(name)] = base_value(name)
             starts.append(Start(rest, values))
         solutions, _ = setting.fit(starts, "taking effects out again", hops=True)
-        whole = Fitted(model.effects, Fit(model.values, model.cost, True, "", 0))
+        whole = Fitted(model.effects, setting.known(model))
         kept, *judged = setting.judged(
             [whole, *(Fitted(begun.effects, solution) for begun, solution in zip(starts, solutions, strict=True))]
         )

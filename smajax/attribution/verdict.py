@@ -8,12 +8,13 @@ import numpy as np
 
 from smajax.experiment.record import Experiment
 from smajax.report.display import display
-from smajax.report.findings import EffectFinding, ParameterFinding, Portrait, Round, RunFinding, Verdict
+from smajax.report.findings import EffectFinding, ParameterFinding, Portrait, Rival, Round, RunFinding, Verdict
 from smajax.residual.portrait import noise_like
 from smajax.words import and_listed
 
 # A residual this many times the declared noise, or the other way round, says that the noise was declared wrongly.
 WRONG_NOISE = 1.2
+MENTIONED = 0.05  # weight from which on a rival is named
 
 
 def verdict(added: Sequence[str], after: Portrait) -> Verdict:
@@ -141,6 +142,7 @@ def cannot_know(
     parameters: Sequence[ParameterFinding],
     effects: Sequence[EffectFinding],
     rounds: Sequence[Round],
+    rivals: Sequence[Rival],
     fit_runs: int,
     integration: float,
     preset: Mapping[str, str],
@@ -161,6 +163,17 @@ def cannot_know(
         "not tell them apart. The one with the fewest coefficients was taken."
         for entry in rounds
         if entry.alike and set(entry.chosen.split(" + ")) <= added
+    ]
+    told += [
+        f"Whether it is {titles[one.effect]} or {titles[one.rival]}: their traces in these runs are {one.alike:.2f} alike, "
+        f"and the runs give the second a weight of {one.weight:.2f}."
+        + (
+            f" A run with {one.separating_run} would tell them apart by {one.separation:.1f} times the noise."
+            if one.separating_run
+            else ""
+        )
+        for one in rivals
+        if one.weight > MENTIONED
     ]
     told += [f"{p.name}: {p.remark}; its value is not measured by these runs." for p in parameters if p.remark]
     if fit_runs == 2:

@@ -53,11 +53,12 @@ class ModelDescription:
 class Catalogue:
     """Names that an experiment file may use, and the description of a combination of them.
 
-    describe(wire, load, drive) raises ValueError when the three do not go together.
+    describe(wire, load, drive, law) raises ValueError when the three do not go together; law "" is the wire's own.
     """
 
     wires: Collection[str]
     loads: Collection[str]
     drives: Collection[str]
+    laws: Collection[str]
     effects: Collection[str]
-    describe: Callable[[str, str, str], ModelDescription]
+    describe: Callable[[str, str, str, str], ModelDescription]

@@ -39,8 +39,10 @@ def _describe(path: Path, file: ExperimentFile, catalogue: Catalogue) -> ModelDe
     check_name(path, "model.wire", "wire", model.wire, catalogue.wires)
     check_name(path, "model.load", "load", model.load, catalogue.loads)
     check_name(path, "model.drive", "drive", model.drive, catalogue.drives)
+    if model.law:
+        check_name(path, "model.law", "law", model.law, catalogue.laws)
     try:
-        return catalogue.describe(model.wire, model.load, model.drive)
+        return catalogue.describe(model.wire, model.load, model.drive, model.law)
     except ValueError as error:
         raise ExperimentError(path, "model", str(error)) from error
 
@@ -220,6 +222,7 @@ def load_experiment(path: str | Path, catalogue: Catalogue) -> Experiment:
         wire=file.model.wire,
         load=file.model.load,
         drive=file.model.drive,
+        law=file.model.law,
         parameters=fixed,
         unknowns=free,
         step=reading.step,

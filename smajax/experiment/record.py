@@ -91,6 +91,7 @@ class Experiment:
     wire: str
     load: str
     drive: str
+    law: str  # of the kinetics; "": the wire's own
     parameters: dict[str, float]
     unknowns: tuple[Unknown, ...]
     step: float

@@ -27,6 +27,7 @@ class ModelSection(Section):
     wire: str = Field(description="the name of a wire, as text")
     load: str = Field(description="the name of a load, as text")
     drive: str = Field(description="the name of a drive, as text ('none' when nothing drives the wire)")
+    law: str = Field(default="", description="the name of a kinetics law, as text; left out, the wire's own")
     parameters: dict[str, Quantity] = Field(default={}, description="a table of name = 'number unit'")
 
 

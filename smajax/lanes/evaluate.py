@@ -15,7 +15,7 @@ from smajax.lanes.text import Unsupported
 from smajax.lanes.translate import translate
 
 VECTORS = 2  # of members under way at once: while one waits for a result the other goes on
-KEPT = 32  # compiled functions
+KEPT = 128  # compiled functions
 BITS = 60  # of the number by which members are put in order
 MOST_SORTED = 6  # numbers of a member that are looked at for that
 
@@ -99,12 +99,12 @@ def kind_of(function: Callable[[Any, Any], Any], model: Any, names: tuple[str, .
 
 
 def recalled(kept: dict[Hashable, Made], key: Hashable, make: Callable[[], Made]) -> Made:
-    """What was made for a key before, or now; the oldest makes room."""
-    if key not in kept:
-        while len(kept) >= KEPT:
-            kept.pop(next(iter(kept)), None)
-        kept[key] = make()
-    return kept[key]
+    """What was made for a key before, or now; what was not asked for longest makes room."""
+    found = kept.pop(key) if key in kept else make()
+    while len(kept) >= KEPT:
+        kept.pop(next(iter(kept)), None)
+    kept[key] = found
+    return found
 
 
 def evaluator(function: Callable[[Any, Any], Any], model: Any, names: tuple[str, ...]) -> Evaluator:

@@ -51,6 +51,7 @@ class CoefficientFinding:
     value: float
     standard_error: float | None
     unit: str
+    by_runs: tuple[float, float] | None = None  # 95 % interval over fits to runs drawn anew
 
 
 @dataclass(frozen=True)
@@ -93,6 +94,19 @@ class Round:
 
 
 @dataclass(frozen=True)
+class Rival:
+    """A candidate that could be mistaken for an effect that was added."""
+
+    effect: str
+    rival: str
+    alike: float  # share of the effect's trace in these runs that the rival could have left, 0..1
+    weight: float  # of the model that has it instead, among the model and all its rivals, 0..1
+    left_out_rmse: float  # SI
+    separating_run: str  # the run on which the two fitted models differ most; "" where none was looked for
+    separation: float  # by how many times the noise, rms
+
+
+@dataclass(frozen=True)
 class Findings:
     experiment: str  # short name
     title: str
@@ -113,4 +127,5 @@ class Findings:
     portrait_before: Portrait
     portrait_after: Portrait
     rounds: tuple[Round, ...]
+    rivals: tuple[Rival, ...] = ()
     provenance: dict[str, str] = field(default_factory=dict)  # versions, seed, data hashes, command, seconds

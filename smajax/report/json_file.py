@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Mapping
 from typing import Any
@@ -57,7 +58,12 @@ def _parameter(found: ParameterFinding) -> dict[str, Any]:
 
 
 def _coefficient(found: CoefficientFinding) -> dict[str, Any]:
-    return {"value": found.value, "standard_error": found.standard_error, "unit": found.unit}
+    return {
+        "value": found.value,
+        "standard_error": found.standard_error,
+        "unit": found.unit,
+        "interval_over_runs": found.by_runs,
+    }
 
 
 def _effect(effect: EffectFinding) -> dict[str, Any]:
@@ -116,6 +122,7 @@ def findings_to_json(findings: Findings) -> dict[str, Any]:
             }
             for entry in findings.rounds
         ],
+        "rivals": [dataclasses.asdict(rival) for rival in findings.rivals],
         "unexplained": findings.unexplained,
         "cannot_know": findings.cannot_know,
         "check": findings.check,

@@ -1,0 +1,32 @@
+"""How far an estimate hangs on which runs there happened to be: fits to runs drawn anew, with replacement."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from smajax.attribution.search import LOOSE, Fitted, Model, Search, Start
+
+DRAWS = 32
+INTERVAL = (2.5, 97.5)  # percentiles
+FEWEST = 3  # runs
+
+
+def bootstrapped(setting: Search, model: Model, seed: int) -> dict[str, tuple[float, float]]:
+    """95 % interval of every free parameter over fits to runs drawn with replacement; empty for fewer than 3 runs.
+
+    The fits are tied to `model` as those with a run left out are (`Search.judged`). With few runs the interval is
+    coarse: three runs can be drawn in ten ways.
+    """
+    count = setting.problem.batch.runs
+    names = setting.free(model.effects)
+    if count < FEWEST or not names:
+        return {}
+    drawn = np.random.default_rng(seed).multinomial(count, np.full(count, 1.0 / count), DRAWS)
+    level = setting.levels([Fitted(model.effects, setting.known(model))])[0]
+    ways, again = np.unique(drawn, axis=0, return_inverse=True)
+    starts = [Start(model.effects, model.values, way.astype(float), np.sqrt(level) / LOOSE) for way in ways]
+    fits, _ = setting.fit(starts, "runs drawn anew")
+    place = setting.problem.names.index
+    values = np.stack([[one.values[place(name)] for name in names] for one in fits])[np.ravel(again)]
+    low, high = np.percentile(values, INTERVAL, axis=0)
+    return {name: (float(a), float(b)) for name, a, b in zip(names, low, high, strict=True)}

@@ -1,0 +1,117 @@
+"""What a closed loop said of a case, held against what is true of it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from smajax.effects.library import LIBRARY
+
+# The generator's names where they differ from the library's: it was written without having seen the library.
+CALLED = {
+    "drive_dead_zone": "dead_zone",
+    "pwm": "pwm_smoothing",
+    "stress_rate_share": "enhanced_conditions",
+    "different_slopes": "unequal_stress_slopes",
+    "rate_dependence": "lagging_transformation",
+    "transformation_drift": "drifting_temperatures",
+    "dead_band": "sensor_backlash",
+    "input_gain": "input_level",
+}
+EQUATIONS = ("heat", "electrical", "kinetics", "constitutive", "mechanics", "sensor", "input")
+NOTHING, OUTSIDE = "nothing", "not in the library"
+CONFUSABLE = 0.05  # weight from which on a rival counts as named
+
+
+@dataclass(frozen=True)
+class Judged:
+    """One case beside its truth. Errors are rms over the noise."""
+
+    case: str
+    kind: str  # null, single, pair, outside
+    rig: str
+    asked: float  # noises that the effect leaves after a refit of the base model
+    strength: float  # what it came to: a physical limit may lie below
+    truth: tuple[str, ...]  # as the library calls them
+    equations: tuple[str, ...]  # in which they are
+    verdict: str
+    added: tuple[str, ...]  # the strongest first
+    named: tuple[str, ...]  # added, and what the report says could be mistaken for it
+    where: tuple[str, ...]  # equations of what was added, or where an unknown term was found to live
+    fit_before: float
+    fit_after: float
+    held_out_before: float
+    held_out_after: float
+    seconds: float
+
+    @property
+    def effect_right(self) -> bool:
+        """Every true effect is among those that are named."""
+        return set(self.truth) <= set(self.named)
+
+    @property
+    def equation_right(self) -> bool:
+        """The strongest effect, or the unknown term, is in an equation that lacks something."""
+        return bool(self.where) and self.where[0] in self.equations
+
+    @property
+    def told(self) -> str:
+        """One of `EQUATIONS`, `NOTHING` or `OUTSIDE`: what the answer comes down to."""
+        return self.where[0] if self.where else NOTHING if self.verdict == "adequate" else OUTSIDE
+
+
+def equation_of(group: str) -> str:
+    """The library's word for the generator's."""
+    return "input" if group == "command" else group
+
+
+def _error(runs: Sequence[Mapping[str, Any]], role: str, which: str, noise: float) -> float:
+    own = [run for run in runs if (run["role"] == "fit") == (role == "fit")]
+    squares = sum(run[f"rmse_{which}"] ** 2 * run["samples"] for run in own)
+    return float((squares / max(sum(run["samples"] for run in own), 1)) ** 0.5 / noise)
+
+
+def judge(truth: Mapping[str, Any], report: Mapping[str, Any], seconds: float) -> Judged:
+    """From truth.json and the report's JSON."""
+    noise = report["output"]["noise_sigma"]
+    added = tuple(effect["name"] for effect in report["effects"] if effect["added"])
+    rivals = [one["rival"] for one in report["rivals"] if one["weight"] >= CONFUSABLE]
+    alike = [name for entry in report["rounds"] for model in entry["alike"] for name in model.split(" + ")]
+    unknown = [term["equation"] for term in report.get("unknown", ())][:1]
+    names = tuple(CALLED.get(name, name) for name in truth["effects"])
+    # What the library does not hold is outside, whatever the generator thinks.
+    foreign = any(entry["outside"] for entry in truth["effects"].values()) or any(name not in LIBRARY for name in names)
+    return Judged(
+        case=truth["case"],
+        kind="outside" if foreign else truth["kind"],
+        rig=truth["rig"],
+        asked=truth["strength_asked"],
+        strength=truth["strength_together"],
+        truth=names,
+        equations=tuple(equation_of(entry["group"]) for entry in truth["effects"].values()),
+        verdict=report["verdict"],
+        added=added,
+        named=tuple(dict.fromkeys([*added, *rivals, *alike])),
+        where=tuple(dict.fromkeys([*(LIBRARY[name].equation for name in added), *unknown])),
+        fit_before=_error(report["runs"], "fit", "before", noise),
+        fit_after=_error(report["runs"], "fit", "after", noise),
+        held_out_before=_error(report["runs"], "held-out", "before", noise),
+        held_out_after=_error(report["runs"], "held-out", "after", noise),
+        seconds=seconds,
+    )
+
+
+def load(path: Path) -> Judged:
+    """One that `save` wrote."""
+    record = json.loads(path.read_text(encoding="utf-8"))
+    return Judged(**{name: tuple(value) if isinstance(value, list) else value for name, value in record.items()})
+
+
+def save(one: Judged, path: Path) -> None:
+    """Whole or not at all."""
+    partial = path.with_suffix(".partial")
+    partial.write_text(json.dumps(asdict(one), indent=1) + "\n", encoding="utf-8")
+    partial.replace(path)

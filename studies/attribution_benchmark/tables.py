@@ -1,0 +1,179 @@
+"""The judged cases as tables and one picture."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from studies.attribution_benchmark.judge import EQUATIONS, NOTHING, OUTSIDE, Judged
+
+STRENGTHS = (1.0, 3.0, 10.0)
+REACHED = 0.8  # of the strength asked for: a case that comes to less is counted where it comes to
+
+
+def share(cases: Sequence[Judged], holds: Callable[[Judged], bool]) -> str:
+    """ "12 of 14 (86 %)"."""
+    if not cases:
+        return "none tried"
+    good = sum(holds(one) for one in cases)
+    return f"{good} of {len(cases)} ({100.0 * good / len(cases):.0f} %)"
+
+
+def strength_of(one: Judged) -> float:
+    """The largest of `STRENGTHS` that the case comes to."""
+    return max([size for size in STRENGTHS if one.strength >= REACHED * size], default=0.0)
+
+
+def bars(cases: Sequence[Judged]) -> list[tuple[str, str, str]]:
+    """(what, bar, measured)."""
+    nulls = [one for one in cases if one.kind == "null"]
+    strong = [one for one in cases if one.kind == "single" and strength_of(one) == 10.0]
+    pairs = [one for one in cases if one.kind == "pair"]
+    outside = [one for one in cases if one.kind == "outside" and strength_of(one) == 10.0]
+    return [
+        ("nothing is missing, and it says so", "95 %", share(nulls, lambda one: one.verdict == "adequate")),
+        ("10 times the noise: right equation", "95 %", share(strong, lambda one: one.equation_right)),
+        ("10 times the noise: right effect, or named beside it", "90 %", share(strong, lambda one: one.effect_right)),
+        ("both effects of a pair", "70 %", share(pairs, lambda one: one.effect_right)),
+        (
+            "outside the library, 10 times: said so, or the right equation",
+            "80 %",
+            share(outside, lambda one: one.told in (*one.equations, OUTSIDE) or one.equation_right),
+        ),
+        (
+            "held-out error at most 1.2 times the noise (in the library, 10 times)",
+            "all",
+            share(strong, lambda one: one.held_out_after <= 1.2),
+        ),
+        ("a case in under two minutes", "all", share(cases, lambda one: one.seconds < 120.0)),
+    ]
+
+
+def confusion(cases: Sequence[Judged]) -> tuple[list[str], list[str], np.ndarray]:
+    """(true, told, counts) by equation, cases with one effect or none."""
+    rows = [*EQUATIONS, NOTHING]
+    columns = [*EQUATIONS, OUTSIDE, NOTHING]
+    counts = np.zeros((len(rows), len(columns)), int)
+    for one in cases:
+        if one.kind == "pair":
+            continue
+        counts[rows.index(one.equations[0] if one.equations else NOTHING), columns.index(one.told)] += 1
+    return rows, columns, counts
+
+
+def power(cases: Sequence[Judged]) -> list[tuple[str, str, str, str, str]]:
+    """(strength, cases, not called adequate, right equation, right effect) of single effects of the library."""
+    found = []
+    for size in STRENGTHS:
+        own = [one for one in cases if one.kind == "single" and strength_of(one) == size]
+        found.append(
+            (
+                f"{size:g}",
+                str(len(own)),
+                share(own, lambda one: one.verdict != "adequate"),
+                share(own, lambda one: one.equation_right),
+                share(own, lambda one: one.effect_right),
+            )
+        )
+    return found
+
+
+def missed(cases: Sequence[Judged]) -> list[Judged]:
+    """Cases behind a bar that was missed: nulls with an alarm, strong effects that were not named."""
+    return [
+        one
+        for one in cases
+        if (one.kind == "null" and one.verdict != "adequate")
+        or (one.kind == "single" and strength_of(one) == 10.0 and not one.effect_right)
+        or (one.kind == "outside" and strength_of(one) == 10.0 and one.told not in (*one.equations, OUTSIDE))
+    ]
+
+
+def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    lines = [f"| {' | '.join(head)} |", f"|{'---|' * len(head)}"]
+    return "\n".join([*lines, *(f"| {' | '.join(row)} |" for row in rows)])
+
+
+def text(cases: Sequence[Judged]) -> str:
+    """All tables, Markdown."""
+    rows, columns, counts = confusion(cases)
+    matrix = [[name, *(str(count or "") for count in line)] for name, line in zip(rows, counts, strict=True)]
+    listed = [
+        [one.case, f"{one.strength:.1f}", one.verdict, " + ".join(one.added) or "–", f"{one.held_out_after:.2f}"]
+        for one in missed(cases)
+    ]
+    before = np.asarray([one.held_out_before for one in cases if one.kind == "single"])
+    after = np.asarray([one.held_out_after for one in cases if one.kind == "single"])
+    held = (
+        f"Held-out error of single effects over the noise, median: {np.median(before):.2f} with the base model refitted, "
+        f"{np.median(after):.2f} after."
+        if len(before)
+        else ""
+    )
+    return "\n\n".join(
+        [
+            f"{len(cases)} cases.",
+            _table(("bar", "asked", "measured"), bars(cases)),
+            "Equation named (columns) for the equation that lacks something (rows); single effects, foreign ones and nulls:",
+            _table(("", *columns), matrix),
+            "Power by strength, in noises left after a refit of the base model:",
+            _table(("strength", "cases", "seen", "right equation", "right effect or named beside it"), power(cases)),
+            held,
+            "Cases behind the bars that were missed:" if listed else "",
+            _table(("case", "strength", "verdict", "added", "held-out error / noise"), listed) if listed else "",
+        ]
+    )
+
+
+def picture(cases: Sequence[Judged], path: Path) -> None:
+    """Confusion matrix and power."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    rows, columns, counts = confusion(cases)
+    figure, (left, right) = plt.subplots(1, 2, figsize=(12.0, 4.8), width_ratios=(1.4, 1.0))
+    shares = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
+    left.imshow(shares, cmap="Blues", vmin=0.0, vmax=1.0, aspect="auto")
+    for (row, column), count in np.ndenumerate(counts):
+        if count:
+            left.text(
+                column, row, str(count), ha="center", va="center", color="w" if shares[row, column] > 0.5 else "k"
+            )
+    left.set_xticks(range(len(columns)), columns, rotation=35, ha="right")
+    left.set_yticks(range(len(rows)), rows)
+    left.set_xlabel("named")
+    left.set_ylabel("lacks something")
+    for what, label in (
+        (lambda one: one.verdict != "adequate", "seen"),
+        (lambda one: one.equation_right, "right equation"),
+        (lambda one: one.effect_right, "right effect, or named beside it"),
+    ):
+        points = []
+        for size in STRENGTHS:
+            own = [one for one in cases if one.kind == "single" and strength_of(one) == size]
+            points.append(np.mean([what(one) for one in own]) if own else np.nan)
+        right.plot(STRENGTHS, points, "o-", label=label)
+    nulls = [one.verdict != "adequate" for one in cases if one.kind == "null"]
+    if nulls:
+        right.axhline(np.mean(nulls), color="0.5", ls="--", label=f"false alarms on {len(nulls)} nulls")
+    right.set_xscale("log")
+    right.set_xticks(STRENGTHS, [f"{size:g}" for size in STRENGTHS])
+    right.set_ylim(-0.02, 1.02)
+    right.set_xlabel("strength: noises left after a refit of the base model")
+    right.set_ylabel("share of cases")
+    right.legend(loc="lower right", fontsize=8)
+    figure.tight_layout()
+    figure.savefig(path, dpi=130)
+    plt.close(figure)
+
+
+def written(cases: Sequence[Judged], out: Path) -> str:
+    """Tables as results.md and the picture as results.png in `out`; the tables."""
+    found = text(cases)
+    (out / "results.md").write_text(found + "\n", encoding="utf-8")
+    picture(cases, out / "results.png")
+    return found
