@@ -1,0 +1,1 @@
+"""The source's own discovery, made again by the loop."""
