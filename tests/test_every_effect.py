@@ -18,6 +18,7 @@ from smajax.parameters import get_parameters, parameters, set_vector
 from smajax.presets import build
 from smajax.simulate import simulate
 from smajax.system import System
+from smajax.units import convert
 
 DT = 0.05
 # The first on which an effect applies shows it.
@@ -111,6 +112,17 @@ def _told(effect: str) -> _Told:
         )
         rounding[share] = [1e-13 * np.abs(features[at]).max() / step for at, step in zip(mine, wide, strict=True)]
     return _Told(shown[0][0], shown[0][1], names, forward, difference, rounding)
+
+
+@pytest.mark.parametrize("effect", sorted(LIBRARY))
+def test_an_experiment_file_can_say_its_coefficients(effect: str) -> None:
+    """Their units are ones that the reader knows, and `switches` and `starts` name coefficients within their bounds."""
+    table = parameters(LIBRARY[effect].base())
+    for name, entry in table.items():
+        assert convert(1.0, entry.unit, entry.unit) == 1.0
+        low, high = entry.low, entry.high
+        assert low <= LIBRARY[effect].starts[_short(name)] <= high
+    assert {f"{effect}.{name}" for name in LIBRARY[effect].switches} <= set(table)
 
 
 def _short(name: str) -> str:

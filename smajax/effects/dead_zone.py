@@ -21,7 +21,7 @@ class DeadZone(AbstractEffect):
     """
 
     threshold: Scalar = parameter(
-        "V, A, W or -", 0.0, 2.0, "delta: command that is lost, in the unit of the drive's channel"
+        "-", 0.0, 2.0, "delta: command that is lost, a number of V, A, W or duty as the drive's channel is"
     )
 
     effect_name: ClassVar[str] = "dead_zone"

@@ -18,7 +18,7 @@ class InputClock(AbstractEffect):
     On a whole recorded series (`simulate`, a batch or a fit); a closed loop refuses it.
     """
 
-    rate: Scalar = parameter("s/s", -0.05, 0.05, "r: by how much what acts falls behind the log, per second of the run")
+    rate: Scalar = parameter("-", -0.05, 0.05, "r: by how much what acts falls behind the log, per second of the run")
 
     effect_name: ClassVar[str] = "input_clock"
     title: ClassVar[str] = "wrong clock of the recorded input"

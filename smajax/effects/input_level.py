@@ -18,7 +18,9 @@ class InputLevel(AbstractEffect):
     r"""$u = (1 + g)\,u_{rec} + o$ on the channel of the drive, never below zero where the recorded one is not."""
 
     gain: Scalar = parameter("-", -0.5, 1.0, "g: relative error of the recorded input")
-    offset: Scalar = parameter("V, A, W or -", -1.0, 1.0, "o: what is added, in the unit of the drive's channel")
+    offset: Scalar = parameter(
+        "-", -1.0, 1.0, "o: what is added, a number of V, A, W or duty as the drive's channel is"
+    )
 
     effect_name: ClassVar[str] = "input_level"
     title: ClassVar[str] = "wrong level of the recorded input"
