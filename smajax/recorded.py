@@ -8,18 +8,14 @@ import jax
 import jax.numpy as jnp
 from jax import lax
 
-from smajax.effects.base import AbstractEffect
+from smajax.effects.base import having
 from smajax.system import System
 from smajax.types import Scalar, Series
 
 
-def _late(system: System) -> list[AbstractEffect]:
-    return [effect for effect in system.effects if type(effect).input_lag is not AbstractEffect.input_lag]
-
-
 def refuse_lag(system: System, what: str) -> None:
     """ValueError where an effect shifts the input in time, of which `what` knows no series."""
-    for effect in _late(system):
+    for effect in having(system.effects, "input_lag"):
         raise ValueError(
             f"`{effect.effect_name}` shifts a recorded input in time, but {what} makes its input as it goes: leave "
             "the effect out, and give a closed loop its `delay`."
@@ -32,7 +28,7 @@ def acting_inputs(system: System, series: Mapping[str, Series], dt: Scalar | flo
     A lag of a part of a step gives the mean over the step of the input that holds between samples. Beyond its ends a
     series is as at them.
     """
-    late, acting = _late(system), dict(series)
+    late, acting = having(system.effects, "input_lag"), dict(series)
     channels = sorted(system.drive.inputs_required & set(series))
     if not late or not channels:
         return acting

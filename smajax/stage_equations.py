@@ -7,6 +7,7 @@ from typing import NamedTuple
 import equinox as eqx
 import jax.numpy as jnp
 
+from smajax.effects.base import having
 from smajax.load.base import AbstractMovingLoad
 from smajax.system import System, ambient_temperature, heating_power, load_resistance
 from smajax.types import Inputs, Scalar, State
@@ -49,9 +50,11 @@ def friction_limit(system: System, velocity: Scalar) -> Scalar | None:
     """Largest friction in the unit of the load's resistance; None where no effect has friction."""
     load = system.load
     assert isinstance(load, AbstractMovingLoad)
-    limits = [effect.friction_limit(load.lever() * velocity) for effect in system.effects]
-    felt = [limit for limit in limits if not (isinstance(limit, (int, float)) and limit == 0.0)]
-    return jnp.sum(jnp.stack([jnp.asarray(limit) for limit in felt])) if felt else None
+    rubbing = having(system.effects, "friction_limit")
+    if not rubbing:
+        return None
+    speed = load.lever() * velocity
+    return jnp.sum(jnp.stack([jnp.asarray(effect.friction_limit(speed)) for effect in rubbing]))
 
 
 def _heating(system: System, stage: Stage, inputs: Inputs, temperature: Scalar, fraction: Scalar) -> Scalar:

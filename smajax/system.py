@@ -6,7 +6,7 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from smajax.drive.base import AbstractDrive
-from smajax.effects.base import AbstractEffect, absent
+from smajax.effects.base import AbstractEffect, having
 from smajax.load.base import AbstractMovingLoad
 from smajax.load.coupon import AbstractCoupon, StrainCoupon
 from smajax.parameters import parameter
@@ -38,16 +38,16 @@ def heating_power(system: System, resistance: Scalar, inputs: Inputs) -> Scalar:
     """
     drive, effects, length = system.drive, system.effects, system.wire.wire_length
     acting = dict(inputs)
-    for channel in drive.inputs_required:
-        for effect in effects:
-            acting[channel] = effect.command(channel, acting[channel])
-    power, own = drive.power(resistance, length, acting), resistance * length
-    series = sum(effect.series_resistance() for effect in effects)
-    if not absent(series):
-        power = power * drive.wire_share(own, series)
-    sag = sum(effect.current_sag() for effect in effects)
-    if not absent(sag):
-        power = power / (1.0 + sag * drive.drawn_current(own + series, acting)) ** 2
+    for effect in having(effects, "command"):
+        acting |= {channel: effect.command(channel, acting[channel]) for channel in drive.inputs_required}
+    power = drive.power(resistance, length, acting)
+    behind, sagging = having(effects, "series_resistance"), having(effects, "current_sag")
+    series = sum(effect.series_resistance() for effect in behind)
+    if behind:
+        power = power * drive.wire_share(resistance * length, series)
+    if sagging:
+        asked = drive.drawn_current(resistance * length + series, acting)
+        power = power / (1.0 + sum(effect.current_sag() for effect in sagging) * asked) ** 2
     return power
 
 
@@ -56,12 +56,15 @@ def load_resistance(system: System, time: Scalar, position: Scalar, velocity: Sc
     load, effects = system.load, system.effects
     assert isinstance(load, AbstractMovingLoad)
     resisting = load.resistance(position, velocity, inputs)
-    change = sum(effect.load_change(time) for effect in effects)
-    if not absent(change):
-        resisting = resisting + change * load.resistance(position, jnp.zeros_like(position), inputs)
-    lever = load.lever()
-    added = sum(effect.resisting_force(load, lever * (position - load.start()), lever * velocity) for effect in effects)
-    return resisting if absent(added) else resisting + lever * added
+    changing, adding = having(effects, "load_change"), having(effects, "resisting_force")
+    if changing:
+        static = load.resistance(position, jnp.zeros_like(position), inputs)
+        resisting = resisting + sum(effect.load_change(time) for effect in changing) * static
+    if adding:
+        lever = load.lever()
+        moved, speed = lever * (position - load.start()), lever * velocity
+        resisting = resisting + lever * sum(effect.resisting_force(load, moved, speed) for effect in adding)
+    return resisting
 
 
 def initial_state(system: System, inputs: Inputs) -> State:

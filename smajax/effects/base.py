@@ -8,6 +8,7 @@ model. The default methods below change nothing; an effect overrides the one equ
 from __future__ import annotations
 
 import abc
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, ClassVar
 
 import equinox as eqx
@@ -117,6 +118,6 @@ class AbstractEffect(eqx.Module):
         return 0.0
 
 
-def absent(total: Scalar | float) -> bool:
-    """Whether a sum over the effects is the plain zero of those that have no say in it: then it costs nothing."""
-    return isinstance(total, (int, float)) and total == 0
+def having(effects: Sequence[AbstractEffect], method: str) -> list[AbstractEffect]:
+    """Those of `effects` that override `method`: where there are none, it is not even traced."""
+    return [effect for effect in effects if getattr(type(effect), method) is not getattr(AbstractEffect, method)]

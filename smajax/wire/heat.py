@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import equinox as eqx
 import jax.numpy as jnp
 
-from smajax.effects.base import AbstractEffect, absent
+from smajax.effects.base import AbstractEffect, having
 from smajax.parameters import parameter
 from smajax.types import Scalar
 
@@ -55,7 +55,7 @@ def heat_rate(
     """
     surface = jnp.pi * wire.wire_diameter
     loss = wire.heat.convection_coefficient * surface * (temperature - ambient)
-    change = sum(effect.convection_change(time) for effect in effects)
-    if not absent(change):
-        loss = loss * (1.0 + change)
+    changing = having(effects, "convection_change")
+    if changing:
+        loss = loss * (1.0 + sum(effect.convection_change(time) for effect in changing))
     return power - loss - sum(effect.heat_loss(wire, temperature, ambient) for effect in effects)
