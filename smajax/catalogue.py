@@ -51,5 +51,8 @@ def candidates(system: System, only: tuple[str, ...] | None, excluded: tuple[str
     return tuple(
         name
         for name, effect in LIBRARY.items()
-        if effect.equation not in useless and name not in excluded and (only is None or name in only)
+        if effect.equation not in useless
+        and effect.applies(system)
+        and name not in excluded
+        and (only is None or name in only)
     )

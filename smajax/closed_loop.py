@@ -16,6 +16,7 @@ from smajax.controller.base import AbstractController
 from smajax.estimator.base import AbstractEstimator
 from smajax.measured_state import MeasuredState, Sensor, truth
 from smajax.parameters import check_bounds, inside_bounds
+from smajax.recorded import refuse_lag
 from smajax.reference import Reference, resting
 from smajax.simulate import DEFAULT_STEP, trajectory
 from smajax.step import step
@@ -143,6 +144,7 @@ def _run(
 ) -> tuple[State, _Carry, Any, Reference]:
     """(first state, end, (states, commands, measured) of every period where they are `kept`, what was wanted)."""
     check_bounds(controller)
+    refuse_lag(system, "a closed loop")
     wanted = wanted if isinstance(wanted, Reference) else resting(wanted)
     count = jnp.shape(wanted.position)[0]
     if every < 1 or (count - 1) % every:

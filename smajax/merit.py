@@ -12,7 +12,7 @@ from smajax.closed_loop import AbstractWatch, ClosedLoop, watch_closed_loop
 from smajax.controller.base import AbstractController
 from smajax.load.base import AbstractMovingLoad
 from smajax.reference import Reference
-from smajax.system import System
+from smajax.system import System, heating_power
 from smajax.types import Scalar, State
 from smajax.wire.resistance import resistance_per_metre
 
@@ -127,7 +127,7 @@ class Judge(AbstractWatch):
         turned = rising * (extreme - now.command) > LIVELY
         system = self.system
         ohms = resistance_per_metre(system.wire, system.effects, now.temperature, now.fraction)
-        power = system.drive.power(ohms, system.wire.wire_length, system.drive.from_voltage(now.command))
+        power = heating_power(system, ohms, system.drive.from_voltage(now.command))
         return _Seen(
             number=seen.number + 1,
             began=seen.began,

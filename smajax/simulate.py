@@ -9,6 +9,7 @@ import jax.numpy as jnp
 from jax import lax
 
 from smajax.load.coupon import AbstractCoupon
+from smajax.recorded import acting_inputs
 from smajax.step import step
 from smajax.system import System, initial_state
 from smajax.types import Scalar, Series, State, Trajectory
@@ -48,7 +49,7 @@ def simulate(
     at t_i). `initial` defaults to rest with the first inputs. Raises ValueError for missing or ill-shaped inputs.
     """
     check_inputs(system, inputs)
-    series = {name: jnp.asarray(values, dtype=float) for name, values in inputs.items()}
+    series = acting_inputs(system, {name: jnp.asarray(values, dtype=float) for name, values in inputs.items()}, dt)
     state = initial_state(system, {name: values[0] for name, values in series.items()}) if initial is None else initial
     # Every number of the state then has a derivative where the model has one: a scan some of whose numbers gain theirs
     # on the way is traced anew for each, and so is all within it.

@@ -7,8 +7,9 @@ from typing import NamedTuple
 import equinox as eqx
 import jax.numpy as jnp
 
+from smajax.effects.base import having
 from smajax.load.base import AbstractMovingLoad
-from smajax.system import System, ambient_temperature
+from smajax.system import System, ambient_temperature, heating_power, load_resistance
 from smajax.types import Inputs, Scalar, State
 from smajax.wire.constitutive import stress_at
 from smajax.wire.heat import cross_section, heat_rate, stored_heat
@@ -45,19 +46,23 @@ def friction_in_use(stage: Stage, position: Scalar) -> tuple[Scalar, Scalar]:
     return jnp.clip(raw, -1.0, 1.0), raw
 
 
-def friction_limit(system: System) -> Scalar | None:
-    """Coulomb's limit in the unit of the load's resistance; None where no effect has friction."""
-    limits = [effect.friction_limit() for effect in system.effects]
-    felt = [limit for limit in limits if not (isinstance(limit, (int, float)) and limit == 0.0)]
-    return jnp.sum(jnp.stack([jnp.asarray(limit) for limit in felt])) if felt else None
+def friction_limit(system: System, velocity: Scalar) -> Scalar | None:
+    """Largest friction in the unit of the load's resistance; None where no effect has friction."""
+    load = system.load
+    assert isinstance(load, AbstractMovingLoad)
+    rubbing = having(system.effects, "friction_limit")
+    if not rubbing:
+        return None
+    speed = load.lever() * velocity
+    return jnp.sum(jnp.stack([jnp.asarray(effect.friction_limit(speed)) for effect in rubbing]))
 
 
 def _heating(system: System, stage: Stage, inputs: Inputs, temperature: Scalar, fraction: Scalar) -> Scalar:
     wire, effects = system.wire, system.effects
     ohms = resistance_per_metre(wire, effects, temperature, fraction)
-    power = system.drive.power(ohms, wire.wire_length, inputs)
+    power = heating_power(system, ohms, inputs)
     ambient = ambient_temperature(system, stage.time, inputs)
-    return heat_rate(wire, effects, temperature, ambient, power)
+    return heat_rate(wire, effects, temperature, ambient, power, stage.time)
 
 
 def motion_rates(stage: Stage, position: Scalar) -> tuple[Scalar, Scalar]:
@@ -72,10 +77,10 @@ def _free_position(system: System, stage: Stage, inputs: Inputs, z: Unknowns) ->
     assert isinstance(load, AbstractMovingLoad)
     velocity, acceleration = motion_rates(stage, z.position)
     inertia = load.inertia(inputs)
-    limit = friction_limit(system)
+    limit = friction_limit(system, velocity)
     friction = 0.0 if limit is None else limit * friction_in_use(stage, z.position)[0]
     pull = load.lever() * cross_section(system.wire) * z.stress
-    resisting = load.resistance(z.position, velocity, inputs) + friction
+    resisting = load_resistance(system, stage.time, z.position, velocity, inputs) + friction
     return z.position - (inertia * acceleration + resisting - pull) * stage.step**2 / inertia
 
 

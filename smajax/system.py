@@ -6,7 +6,7 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from smajax.drive.base import AbstractDrive
-from smajax.effects.base import AbstractEffect
+from smajax.effects.base import AbstractEffect, having
 from smajax.load.base import AbstractMovingLoad
 from smajax.load.coupon import AbstractCoupon, StrainCoupon
 from smajax.parameters import parameter
@@ -31,6 +31,42 @@ def ambient_temperature(system: System, time: Scalar, inputs: Inputs) -> Scalar:
     return ambient + sum(effect.ambient_shift(time) for effect in system.effects)
 
 
+def heating_power(system: System, resistance: Scalar, inputs: Inputs) -> Scalar:
+    """Electrical power in each metre of wire, W/m: what the drive gives, less what effects lose before the wire.
+
+    `resistance` is the wire's, ohm/m.
+    """
+    drive, effects, length = system.drive, system.effects, system.wire.wire_length
+    acting = dict(inputs)
+    for effect in having(effects, "command"):
+        acting |= {channel: effect.command(channel, acting[channel]) for channel in drive.inputs_required}
+    power = drive.power(resistance, length, acting)
+    behind, sagging = having(effects, "series_resistance"), having(effects, "current_sag")
+    series = sum(effect.series_resistance() for effect in behind)
+    if behind:
+        power = power * drive.wire_share(resistance * length, series)
+    if sagging:
+        asked = drive.drawn_current(resistance * length + series, acting)
+        power = power / (1.0 + sum(effect.current_sag() for effect in sagging) * asked) ** 2
+    return power
+
+
+def load_resistance(system: System, time: Scalar, position: Scalar, velocity: Scalar, inputs: Inputs) -> Scalar:
+    """What the wire has to overcome, N (N m for an arm): the load's own, and what effects add to it."""
+    load, effects = system.load, system.effects
+    assert isinstance(load, AbstractMovingLoad)
+    resisting = load.resistance(position, velocity, inputs)
+    changing, adding = having(effects, "load_change"), having(effects, "resisting_force")
+    if changing:
+        static = load.resistance(position, jnp.zeros_like(position), inputs)
+        resisting = resisting + sum(effect.load_change(time) for effect in changing) * static
+    if adding:
+        lever = load.lever()
+        moved, speed = lever * (position - load.start()), lever * velocity
+        resisting = resisting + lever * sum(effect.resisting_force(load, moved, speed) for effect in adding)
+    return resisting
+
+
 def initial_state(system: System, inputs: Inputs) -> State:
     """At rest with the first inputs: a moving load in equilibrium at ambient temperature, a coupon as prescribed."""
     strain = jnp.zeros_like(system.start_fraction)
@@ -44,8 +80,9 @@ def initial_state(system: System, inputs: Inputs) -> State:
             stress = inputs["stress"]
     else:
         position = reading = system.load.start()
-        temperature = ambient_temperature(system, jnp.zeros_like(position), inputs)
-        at_rest = system.load.resistance(position, jnp.zeros_like(position), inputs)
+        at_once = jnp.zeros_like(position)
+        temperature = ambient_temperature(system, at_once, inputs)
+        at_rest = load_resistance(system, at_once, position, jnp.zeros_like(position), inputs)
         # An end stop may carry part of the load, the wire the rest; what the wire carries is what pulls on it.
         stress = jnp.maximum(at_rest / (system.load.lever() * cross_section(system.wire)), 0.0)
     temperature, stress, strain, position, reading, fraction = jnp.broadcast_arrays(

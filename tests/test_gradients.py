@@ -1,4 +1,7 @@
-"""Automatic derivatives against central differences, through branch changes, for every parameter and coefficient."""
+"""Automatic derivatives against central differences, through branch changes, for every parameter of the base models.
+
+Those of every effect are in `test_every_effect`.
+"""
 
 from __future__ import annotations
 
@@ -7,10 +10,6 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from smajax.attribution.screen import switches
-from smajax.attribution.search import NUDGE
-from smajax.effects.library import LIBRARY
-from smajax.extended import extended
 from smajax.fit.problem import Problem
 from smajax.parameters import set_parameters
 from smajax.presets import build
@@ -43,18 +42,6 @@ CASES: dict[str, tuple[System, dict[str, jax.Array]]] = {
 @pytest.mark.parametrize("case", sorted(CASES))
 def test_every_base_parameter(case: str) -> None:
     compare(CASES[case][0], open_loop(CASES[case][1], DT))
-
-
-@pytest.mark.parametrize("effect", sorted(LIBRARY))
-@pytest.mark.parametrize("share", [NUDGE, 1.0], ids=["next to nothing", "switched on"])
-def test_every_effect_coefficient(effect: str, share: float) -> None:
-    """At its start, and where its score is taken: at exactly zero a tail has no derivative (see `scores_at`)."""
-    system, inputs = CASES["dead_weight"]
-    starts = {
-        name: size * (share if name in switches(effect) else 1.0)
-        for name, size in ((f"{effect}.{key}", size) for key, size in LIBRARY[effect].starts.items())
-    }
-    compare(extended(system, (effect,), starts), open_loop(inputs, DT))
 
 
 def test_reverse_mode_agrees_with_forward_mode() -> None:

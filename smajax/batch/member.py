@@ -14,6 +14,7 @@ from smajax.checkpointed import checkpointed_scan
 from smajax.load.coupon import AbstractCoupon
 from smajax.measure import SHOWN, AbstractMeasure, value_of
 from smajax.parameters import set_parameters
+from smajax.recorded import acting_inputs
 from smajax.step import step
 from smajax.system import System, initial_state
 from smajax.types import Scalar, Series, State
@@ -63,8 +64,9 @@ def member(recipe: Recipe, values: Values) -> dict[str, jax.Array]:
     system = set_parameters(recipe.system, own)
     constants = recipe.constants | {name: values[name] for name in recipe.channels}
     ahead = isinstance(system.load, AbstractCoupon)
-    series = {name: run[1:] if ahead else run[:-1] for name, run in recipe.series.items()}
-    first = {**constants, **{name: run[0] for name, run in recipe.series.items()}}
+    acting = acting_inputs(system, recipe.series, recipe.dt)
+    series = {name: run[1:] if ahead else run[:-1] for name, run in acting.items()}
+    first = {**constants, **{name: run[0] for name, run in acting.items()}}
     state = initial_state(system, first)
 
     def one(carry: Any, now: dict[str, Scalar]) -> tuple[Any, None]:

@@ -106,7 +106,8 @@ def temperature_for(
 def power_for(believed: System, temperature: Scalar, rate: Scalar) -> Scalar:
     r"""$U = m c_p \dot T + h_c A_c (T - T_\infty)$, W/m (eq. 4.68, 4.80)."""
     wire = believed.wire
-    loss = -heat_rate(wire, (), temperature, wire.heat.ambient_temperature, jnp.zeros_like(temperature))
+    nothing = jnp.zeros_like(temperature)
+    loss = -heat_rate(wire, (), temperature, wire.heat.ambient_temperature, nothing, nothing)
     return mass_per_metre(wire) * wire.heat.specific_heat * rate + loss
 
 

@@ -22,6 +22,14 @@ class AbstractDrive(eqx.Module):
     def power(self, resistance: Scalar, length: Scalar, inputs: Inputs) -> Scalar:
         """I^2 R per metre of wire, W/m; `resistance` in ohm/m, `length` in m."""
 
+    def wire_share(self, own: Scalar, series: Scalar | float) -> Scalar | float:
+        """Share of `power` that is left to a wire of `own` ohm behind `series` ohm: all of it, if the drive does not notice."""
+        return 1.0
+
+    def drawn_current(self, resistance: Scalar, inputs: Inputs) -> Scalar | float:
+        """Current asked of the supply by `resistance` ohm while it is on, A; zero where the drive has no current of its own."""
+        return 0.0
+
     def from_voltage(self, voltage: Scalar) -> Inputs:
         """The inputs by which a controller's voltage (V, 0 or more) reaches the wire. ValueError for a drive of another kind."""
         raise ValueError(

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+import jax.numpy as jnp
+
 from smajax.drive.base import AbstractDrive
 from smajax.types import Inputs, Scalar
 
@@ -16,3 +18,6 @@ class Current(AbstractDrive):
 
     def power(self, resistance: Scalar, length: Scalar, inputs: Inputs) -> Scalar:
         return inputs["current"] ** 2 * resistance
+
+    def drawn_current(self, resistance: Scalar, inputs: Inputs) -> Scalar:
+        return jnp.abs(inputs["current"])

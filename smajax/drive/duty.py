@@ -21,6 +21,12 @@ class Duty(AbstractDrive):
     def power(self, resistance: Scalar, length: Scalar, inputs: Inputs) -> Scalar:
         return inputs["duty"] * (self.supply_voltage / length) ** 2 / resistance
 
+    def wire_share(self, own: Scalar, series: Scalar | float) -> Scalar:
+        return (own / (own + series)) ** 2
+
+    def drawn_current(self, resistance: Scalar, inputs: Inputs) -> Scalar:
+        return self.supply_voltage / resistance
+
     def from_voltage(self, voltage: Scalar) -> Inputs:
         """The duty that heats as `voltage` would; all of the supply is the most there is."""
         duty = (voltage / self.supply_voltage) ** 2

@@ -15,3 +15,7 @@ class Power(AbstractDrive):
 
     def power(self, resistance: Scalar, length: Scalar, inputs: Inputs) -> Scalar:
         return inputs["power"] / length
+
+    def wire_share(self, own: Scalar, series: Scalar | float) -> Scalar:
+        # The power is that at the supply's terminals.
+        return own / (own + series)

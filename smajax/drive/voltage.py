@@ -24,10 +24,19 @@ class Voltage(AbstractDrive):
     inputs_required: ClassVar[frozenset[str]] = frozenset({"voltage"})
     inputs_squared: ClassVar[frozenset[str]] = inputs_required
 
-    def power(self, resistance: Scalar, length: Scalar, inputs: Inputs) -> Scalar:
+    def _put(self, inputs: Inputs) -> Scalar:
+        """Voltage at the amplifier's terminals, V."""
         asked = jnp.abs(self.amplifier_gain * inputs["voltage"])
-        put = jnp.where(asked >= self.amplifier_limit, self.amplifier_limit, asked)
-        return (put / length) ** 2 / resistance
+        return jnp.where(asked >= self.amplifier_limit, self.amplifier_limit, asked)
+
+    def power(self, resistance: Scalar, length: Scalar, inputs: Inputs) -> Scalar:
+        return (self._put(inputs) / length) ** 2 / resistance
+
+    def wire_share(self, own: Scalar, series: Scalar | float) -> Scalar:
+        return (own / (own + series)) ** 2
+
+    def drawn_current(self, resistance: Scalar, inputs: Inputs) -> Scalar:
+        return self._put(inputs) / resistance
 
     def from_voltage(self, voltage: Scalar) -> Inputs:
         return {"voltage": voltage}

@@ -8,6 +8,7 @@ model. The default methods below change nothing; an effect overrides the one equ
 from __future__ import annotations
 
 import abc
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, ClassVar
 
 import equinox as eqx
@@ -15,6 +16,8 @@ import equinox as eqx
 from smajax.types import Scalar
 
 if TYPE_CHECKING:
+    from smajax.load.base import AbstractMovingLoad
+    from smajax.system import System
     from smajax.wire.wire import Wire
 
 
@@ -38,6 +41,11 @@ class AbstractEffect(eqx.Module):
     def base(cls) -> AbstractEffect:
         """The effect at its base value: present in the equations and changing nothing."""
 
+    @classmethod
+    def applies(cls, system: System) -> bool:
+        """Whether it can change anything of this wire, load and drive: a candidate that cannot is not looked at."""
+        return True
+
     def stored_heat(self, wire: Wire, temperature: Scalar, fraction: Scalar) -> Scalar | float:
         """Heat stored per metre beside m c_p T, J/m."""
         return 0.0
@@ -46,12 +54,28 @@ class AbstractEffect(eqx.Module):
         """Heat lost per metre beside h_c A_c (T - T_inf), W/m."""
         return 0.0
 
+    def convection_change(self, time: Scalar) -> Scalar | float:
+        """Relative change of h_c, -."""
+        return 0.0
+
     def ambient_shift(self, time: Scalar) -> Scalar | float:
         """Added to the ambient temperature, C."""
         return 0.0
 
     def resistance_factor(self, temperature: Scalar, fraction: Scalar) -> Scalar | float:
         """Relative change of the resistance per metre, -."""
+        return 0.0
+
+    def command(self, channel: str, value: Scalar) -> Scalar:
+        """What the drive makes of the `value` recorded on one of its channels, in the channel's unit."""
+        return value
+
+    def series_resistance(self) -> Scalar | float:
+        """Resistance between the supply and the wire, ohm."""
+        return 0.0
+
+    def current_sag(self) -> Scalar | float:
+        """Relative fall of the supply per ampere that it is asked for, 1/A."""
         return 0.0
 
     def heating_shape(self, z: Scalar, remaining: Scalar) -> Scalar:
@@ -73,10 +97,27 @@ class AbstractEffect(eqx.Module):
         """Strain beside eps_L xi_s and the elastic part, a function of state, -; `detwinned` is xi_s."""
         return 0.0
 
-    def friction_limit(self) -> Scalar | float:
-        """Coulomb limit of the load's friction, N (N m for an arm)."""
+    def friction_limit(self, speed: Scalar) -> Scalar | float:
+        """Largest friction of the load, N (N m for an arm), at a speed of the wire's moving end, m/s."""
+        return 0.0
+
+    def resisting_force(self, load: AbstractMovingLoad, displacement: Scalar, speed: Scalar) -> Scalar | float:
+        """Force against contraction beside the load's, N; displacement (m) and speed (m/s) are the wire's moving end's."""
+        return 0.0
+
+    def load_change(self, time: Scalar) -> Scalar | float:
+        """Relative change of the load's weight and springs, -."""
+        return 0.0
+
+    def input_lag(self, time: Scalar) -> Scalar | float:
+        """By how much the drive's input is older at `time` than recorded, s. `simulate` heeds it, a closed loop refuses it."""
         return 0.0
 
     def sensor_time_constant(self) -> Scalar | float:
         """Time constant of a first-order sensor, s."""
         return 0.0
+
+
+def having(effects: Sequence[AbstractEffect], method: str) -> list[AbstractEffect]:
+    """Those of `effects` that override `method`: where there are none, it is not even traced."""
+    return [effect for effect in effects if getattr(type(effect), method) is not getattr(AbstractEffect, method)]

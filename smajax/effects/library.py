@@ -8,30 +8,67 @@ from smajax.effects.ambient_drift import AmbientDrift
 from smajax.effects.asymmetric_transformation import AsymmetricTransformation
 from smajax.effects.base import AbstractEffect
 from smajax.effects.coulomb_friction import CoulombFriction
+from smajax.effects.dead_zone import DeadZone
+from smajax.effects.draught import Draught
+from smajax.effects.end_conduction import EndConduction
+from smajax.effects.input_clock import InputClock
+from smajax.effects.input_delay import InputDelay
+from smajax.effects.input_level import InputLevel
 from smajax.effects.latent_heat import LatentHeat
+from smajax.effects.lead_resistance import LeadResistance
+from smajax.effects.load_shift import LoadShift
+from smajax.effects.nonlinear_spring import NonlinearSpring
 from smajax.effects.phase_resistance import PhaseResistance
+from smajax.effects.phase_specific_heat import PhaseSpecificHeat
+from smajax.effects.pwm_smoothing import PwmSmoothing
 from smajax.effects.radiation import Radiation
 from smajax.effects.rising_convection import RisingConvection
 from smajax.effects.sensor_lag import SensorLag
+from smajax.effects.series_compliance import SeriesCompliance
+from smajax.effects.slack import Slack
 from smajax.effects.smooth_transformation import SmoothTransformation
 from smajax.effects.stress_dependent_strain import StressDependentStrain
+from smajax.effects.stribeck_friction import StribeckFriction
+from smajax.effects.supply_sag import SupplySag
+from smajax.effects.temperature_resistance import TemperatureResistance
 from smajax.effects.thermal_expansion import ThermalExpansion
 from smajax.effects.two_part_transformation import TwoPartTransformation
+from smajax.effects.viscous_friction import ViscousFriction
+from smajax.effects.wrong_load import WrongLoad
 
 LIBRARY: dict[str, type[AbstractEffect]] = {
     effect.effect_name: effect
     for effect in (
+        # What was recorded comes before what the drive makes of it.
+        InputLevel,
+        InputDelay,
+        InputClock,
         LatentHeat,
         RisingConvection,
         Radiation,
         AmbientDrift,
+        Draught,
+        PhaseSpecificHeat,
+        EndConduction,
         PhaseResistance,
+        TemperatureResistance,
+        LeadResistance,
+        SupplySag,
+        DeadZone,
+        PwmSmoothing,
         SmoothTransformation,
         AsymmetricTransformation,
         TwoPartTransformation,
         ThermalExpansion,
         StressDependentStrain,
         CoulombFriction,
+        StribeckFriction,
+        ViscousFriction,
+        SeriesCompliance,
+        Slack,
+        NonlinearSpring,
+        WrongLoad,
+        LoadShift,
         SensorLag,
     )
 }

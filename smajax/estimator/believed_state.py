@@ -9,6 +9,7 @@ from jaxtyping import Array, Bool, Float
 
 from smajax.limited import limited
 from smajax.load.base import AbstractMovingLoad
+from smajax.recorded import refuse_lag
 from smajax.step import step
 from smajax.system import System
 from smajax.types import Motion, Scalar, State
@@ -66,6 +67,7 @@ def with_correction(system: System, state: State, vector: Corrected, transformin
 
 def advanced(system: System, state: State, voltage: Scalar, period: Scalar, substeps: int) -> State:
     """The simulator's own steps through one period with `voltage` held."""
+    refuse_lag(system, "a filter")
     inputs = system.drive.from_voltage(voltage)
     for _ in range(substeps):
         state = step(system, state, inputs, period / substeps)

@@ -29,8 +29,9 @@ from smajax.load.arm import Arm
 from smajax.load.coupon import Coupon
 from smajax.measured_state import MeasuredState
 from smajax.parameters import parameter
+from smajax.recorded import refuse_lag
 from smajax.step import step
-from smajax.system import System, ambient_temperature, initial_state
+from smajax.system import System, ambient_temperature, heating_power, initial_state
 from smajax.types import Scalar, State
 from smajax.wire.heat import cross_section, heat_rate, mass_per_metre
 from smajax.wire.resistance import resistance_per_metre
@@ -117,6 +118,7 @@ class PrintedFilter(AbstractEstimator):
 
     def transition(self, vector: Vector, coupon: State, voltage: Scalar, period: Scalar) -> Vector:
         """f of eq. 4.24-4.28, and the sample that was the last."""
+        refuse_lag(self.system, "a filter")
         load, wire, effects = self.system.load, self.system.wire, self.system.effects
         assert isinstance(load, Arm)
         angle, rate, _, temperature, earlier_angle, earlier_rate = vector
@@ -125,9 +127,9 @@ class PrintedFilter(AbstractEstimator):
         torque = load.inertia({}) * acceleration + load.resistance(next_angle, next_rate, {})
         stress = torque / (load.lever() * cross_section(wire))
         ohms = resistance_per_metre(wire, effects, temperature, coupon.wire.martensite_fraction)
-        power = self.system.drive.power(ohms, wire.wire_length, self.system.drive.from_voltage(voltage))
+        power = heating_power(self.system, ohms, self.system.drive.from_voltage(voltage))
         ambient = ambient_temperature(self.system, coupon.time, {})
-        warming = heat_rate(wire, effects, temperature, ambient, power)
+        warming = heat_rate(wire, effects, temperature, ambient, power, coupon.time)
         warming = warming / (mass_per_metre(wire) * wire.heat.specific_heat)
         return jnp.stack([next_angle, next_rate, stress / MEGA, temperature + period * warming, angle, rate])
 

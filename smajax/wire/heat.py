@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import equinox as eqx
 import jax.numpy as jnp
 
-from smajax.effects.base import AbstractEffect
+from smajax.effects.base import AbstractEffect, having
 from smajax.parameters import parameter
 from smajax.types import Scalar
 
@@ -42,7 +42,12 @@ def stored_heat(wire: Wire, effects: Sequence[AbstractEffect], temperature: Scal
 
 
 def heat_rate(
-    wire: Wire, effects: Sequence[AbstractEffect], temperature: Scalar, ambient: Scalar, power: Scalar
+    wire: Wire,
+    effects: Sequence[AbstractEffect],
+    temperature: Scalar,
+    ambient: Scalar,
+    power: Scalar,
+    time: Scalar,
 ) -> Scalar:
     r"""$m c_p \dot T = I^2 R - h_c A_c (T - T_\infty)$, the right-hand side, W/m (Elahinia 2004, eq. 3.1).
 
@@ -50,4 +55,7 @@ def heat_rate(
     """
     surface = jnp.pi * wire.wire_diameter
     loss = wire.heat.convection_coefficient * surface * (temperature - ambient)
+    changing = having(effects, "convection_change")
+    if changing:
+        loss = loss * (1.0 + sum(effect.convection_change(time) for effect in changing))
     return power - loss - sum(effect.heat_loss(wire, temperature, ambient) for effect in effects)

@@ -1,0 +1,49 @@
+"""A bias spring that is no straight line."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+from smajax.effects.base import AbstractEffect
+from smajax.load.bias_spring import BiasSpring
+from smajax.parameters import parameter
+from smajax.types import Scalar
+
+if TYPE_CHECKING:
+    from smajax.load.base import AbstractMovingLoad
+    from smajax.system import System
+
+
+class NonlinearSpring(AbstractEffect):
+    r"""$F \mathrel{+}= a k x^3/(x^2 + x_r^2)$: cubic at first, and a stiffness of $(1 + a) k$ far beyond $x_r$, positive for a > -1.
+
+    A cubic without end would turn a softening spring around.
+    """
+
+    change: Scalar = parameter("-", -0.9, 5.0, "a: relative change of the stiffness; > 0: it stiffens")
+    displacement: Scalar = parameter("m", 1e-3, 0.2, "x_r: displacement from the start over which it changes")
+
+    effect_name: ClassVar[str] = "nonlinear_spring"
+    title: ClassVar[str] = "nonlinear bias spring"
+    equation: ClassVar[str] = "mechanics"
+    formula: ClassVar[str] = "F_0 + k x + a k x^3/(x^2 + x_r^2) in the place of F_0 + k x (a cubic that levels off)"
+    sentence: ClassVar[str] = (
+        "The spring gets stiffer (or softer) as it is stretched: the end of the stroke is shorter (or longer) than its "
+        "beginning promises."
+    )
+    switches: ClassVar[tuple[str, ...]] = ("change",)
+    starts: ClassVar[dict[str, float]] = {"change": 0.1, "displacement": 0.01}
+
+    @classmethod
+    def base(cls) -> NonlinearSpring:
+        return cls(change=0.0, displacement=0.01)
+
+    @classmethod
+    def applies(cls, system: System) -> bool:
+        return isinstance(system.load, BiasSpring)
+
+    def resisting_force(self, load: AbstractMovingLoad, displacement: Scalar, speed: Scalar) -> Scalar | float:
+        if not isinstance(load, BiasSpring):
+            return 0.0
+        square = displacement**2
+        return self.change * load.spring_stiffness * displacement * square / (square + self.displacement**2)

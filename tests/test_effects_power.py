@@ -1,0 +1,238 @@
+"""Effects of heat, circuit, mechanics and input against closed forms, and where they apply."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from smajax.batch.axes import grid
+from smajax.batch.run import run_batch
+from smajax.catalogue import candidates
+from smajax.closed_loop import simulate_closed_loop
+from smajax.compiled import simulate_compiled
+from smajax.control_presets import CONTROLLERS
+from smajax.effects.end_conduction import DEPTH, EndConduction
+from smajax.effects.library import LIBRARY
+from smajax.extended import extended
+from smajax.figures.rigs import arm
+from smajax.presets import build
+from smajax.system import System
+
+DT = 0.05
+RIGS = {
+    "dead_weight": (build("flexinol_table_3_2", "dead_weight", "voltage"), "voltage", 7.4),
+    "bias_spring": (build("flexinol_ht_500um", "bias_spring", "duty"), "duty", 0.35),
+}
+
+
+def _inputs(channel: str, top: float) -> dict[str, jax.Array]:
+    shares = [jnp.full(120, 1.0), jnp.full(60, 0.6), jnp.full(60, 0.95), jnp.full(120, 0.0)]
+    return {channel: top * jnp.concatenate(shares)}
+
+
+def _lost(system: System, temperature: float) -> float:
+    """h_c A_c (T - T_inf), W/m: what keeps the wire at `temperature`."""
+    heat = system.wire.heat
+    surface = np.pi * float(system.wire.wire_diameter)
+    return float(heat.convection_coefficient) * surface * (temperature - float(heat.ambient_temperature))
+
+
+def _settled(effect: str, values: dict[str, float], rig: str = "dead_weight", **held: float) -> tuple[System, Any]:
+    """(system, its state at the end) after a minute with inputs held, from cold."""
+    system = RIGS[rig][0]
+    full = extended(system, (effect,), {f"{effect}.{name}": value for name, value in values.items()})
+    run = simulate_compiled(full, {name: jnp.full(601, value) for name, value in held.items()}, 0.1)
+    return full, jax.tree.map(lambda series: float(series[-1]), run)
+
+
+def _ohms(system: System, fraction: float) -> float:
+    law, area = system.wire.resistance, 0.25 * np.pi * float(system.wire.wire_diameter) ** 2
+    resistivity = (1.0 - fraction) * float(law.resistivity_austenite) + fraction * float(law.resistivity_martensite)
+    return resistivity / area * float(system.wire.wire_length)
+
+
+def test_leads_leave_the_wire_the_power_of_a_divided_voltage() -> None:
+    volts, lead = 8.0, 3.0
+    system, end = _settled("lead_resistance", {"resistance": lead}, voltage=volts)
+    own = _ohms(system, end.martensite_fraction)
+    power = (volts / (own + lead)) ** 2 * own / float(system.wire.wire_length)
+    assert _lost(system, end.temperature) == pytest.approx(power, rel=1e-6)
+
+
+def test_a_resistance_that_rises_with_temperature_settles_where_loss_is_power() -> None:
+    volts, alpha = 8.0, 1e-3
+    system, end = _settled("temperature_resistance", {"coefficient": alpha}, voltage=volts)
+    own = _ohms(system, end.martensite_fraction) * (1.0 + alpha * (end.temperature - 20.0))
+    power = volts**2 / own / float(system.wire.wire_length)
+    assert _lost(system, end.temperature) == pytest.approx(power, rel=1e-6)
+
+
+def test_a_sagging_supply_gives_less_than_its_largest_current() -> None:
+    volts, sag = 8.0, 0.4
+    system, end = _settled("supply_sag", {"sag": sag}, voltage=volts)
+    own = _ohms(system, end.martensite_fraction)
+    current = volts / own / (1.0 + sag * volts / own)
+    power = current**2 * own / float(system.wire.wire_length)
+    assert _lost(system, end.temperature) == pytest.approx(power, rel=1e-6)
+
+
+def test_a_current_knows_no_leads_and_a_power_none_of_a_sag() -> None:
+    """Where a drive cannot show an effect it is no candidate, and changes nothing if it is put in all the same."""
+    for drive, without, value in (("current", "lead_resistance", 0.3), ("power", "supply_sag", 1.5)):
+        system = build("flexinol_table_3_2", "dead_weight", drive)
+        assert without not in candidates(system, None, ())
+        assert "input_level" in candidates(system, None, ())
+        inputs = {drive: jnp.where(jnp.arange(200) < 120, value, 0.0)}
+        plain = simulate_compiled(system, inputs, DT)
+        starts = {f"{without}.{name}": size for name, size in LIBRARY[without].starts.items()}
+        same = simulate_compiled(extended(system, (without,), starts), inputs, DT)
+        np.testing.assert_allclose(same.temperature, plain.temperature, rtol=1e-12)
+        assert np.ptp(plain.temperature) > 20.0
+    names = candidates(build("flexinol_isobaric", "coupon", "none"), None, ())
+    assert not {"input_level", "input_delay", "input_clock", "slack"} & set(names)
+    assert "pwm_smoothing" not in candidates(RIGS["dead_weight"][0], None, ())
+    assert "nonlinear_spring" not in candidates(RIGS["dead_weight"][0], None, ())
+    assert {"pwm_smoothing", "nonlinear_spring"} <= set(candidates(RIGS["bias_spring"][0], None, ()))
+
+
+def test_pulses_smoothed_throughout_heat_by_the_square_of_the_duty() -> None:
+    smooth, hard = (
+        _settled("pwm_smoothing", {"share": share}, "bias_spring", duty=duty)[1]
+        for share, duty in ((1.0, 0.3), (0.0, 0.09))
+    )
+    assert smooth.temperature == pytest.approx(hard.temperature, rel=1e-9)
+
+
+def test_the_spring_in_series_gives_way_by_force_over_stiffness() -> None:
+    """Cold, 0.5 N are hung on: the load sags by F/k more than without it."""
+    system, compliance = RIGS["dead_weight"][0], 2e-4
+    mass = jnp.where(jnp.arange(400) < 10, 0.075, 0.075 + 0.5 / 9.81)
+    inputs = {"voltage": jnp.zeros(400), "mass": mass}
+    held = simulate_compiled(system, inputs, DT).position
+    soft = simulate_compiled(
+        extended(system, ("series_compliance",), {"series_compliance.compliance": compliance}), inputs, DT
+    )
+    assert soft.position[-1] - held[-1] == pytest.approx(-0.5 * compliance, rel=1e-6)
+    taken = extended(system, ("slack",), {"slack.length": 1e-3, "slack.force": 0.4})
+    before, after = 0.075 * 9.81, 0.075 * 9.81 + 0.5
+    expected = 1e-3 * (np.exp(-after / 0.4) - np.exp(-before / 0.4))
+    assert simulate_compiled(taken, inputs, DT).position[-1] - held[-1] == pytest.approx(expected, rel=1e-5)
+
+
+def test_a_stiffer_spring_asks_for_its_force() -> None:
+    system, end = _settled("nonlinear_spring", {"change": 2.0, "displacement": 5e-3}, "bias_spring", duty=0.35)
+    x, k = end.position, float(system.load.spring_stiffness)
+    force = float(system.load.spring_preload) + k * x + 2.0 * k * x**3 / (x**2 + 25e-6)
+    assert x > 5e-3
+    assert end.stress * 0.25 * np.pi * 0.5e-3**2 == pytest.approx(force, rel=1e-6)
+
+
+def test_a_wrong_load_is_on_the_wire_from_the_start_and_a_shifted_one_from_its_time() -> None:
+    weight, area = 0.075 * 9.81, 0.25 * np.pi * 150e-6**2
+    system = RIGS["dead_weight"][0]
+    inputs = {"voltage": jnp.zeros(401)}
+    wrong = simulate_compiled(extended(system, ("wrong_load",), {"wrong_load.share": 0.2}), inputs, DT)
+    np.testing.assert_allclose(wrong.stress, 1.2 * weight / area, rtol=1e-6)
+    shift = {"load_shift.share": 0.2, "load_shift.time": 10.0, "load_shift.width": 0.1}
+    shifted = simulate_compiled(extended(system, ("load_shift",), shift), inputs, DT)
+    assert shifted.stress[100] == pytest.approx(weight / area, rel=1e-6)
+    assert shifted.stress[-1] == pytest.approx(1.2 * weight / area, rel=1e-6)
+
+
+def test_a_draught_cools_from_its_time_on() -> None:
+    draught = {"draught.change": 0.5, "draught.time": 20.0, "draught.width": 0.1}
+    system = extended(RIGS["dead_weight"][0], ("draught",), draught)
+    run = simulate_compiled(system, {"voltage": jnp.full(801, 5.0)}, DT)
+    calm, blown = (_lost(system, float(run.temperature[at])) for at in (360, 800))
+    # Martensite all the time, so that the power is the same: the loss is it in both cases.
+    assert run.martensite_fraction.min() > 0.999
+    assert 1.5 * blown == pytest.approx(calm, rel=1e-6)
+
+
+def test_a_specific_heat_by_phase_changes_the_pace_and_not_the_rest() -> None:
+    plain, other = (_settled("phase_specific_heat", {"contrast": a}, voltage=8.0)[1] for a in (0.0, 0.3))
+    assert plain.martensite_fraction < 1e-6
+    assert other.temperature == pytest.approx(plain.temperature, rel=1e-6)
+    # All austenite, cooled from there: the time constant m c_p/(h_c pi d) is longer by the contrast.
+    system = RIGS["dead_weight"][0]
+    inputs = {"voltage": jnp.where(jnp.arange(1001) < 600, 8.0, 0.0)}
+    rates = []
+    for a in (0.0, 0.3):
+        run = simulate_compiled(
+            extended(system, ("phase_specific_heat",), {"phase_specific_heat.contrast": a}), inputs, 0.02
+        )
+        assert run.martensite_fraction[604] < 1e-6
+        rates.append(np.log((run.temperature[604] - 23.0) / (run.temperature[600] - 23.0)))
+    assert rates[0] / rates[1] == pytest.approx(1.3, rel=1e-3)
+
+
+def test_cool_ends_are_those_of_the_fin() -> None:
+    """Pieces of the two zones against the fin's own profile: the mean austenite of a wire whose pieces switch at z = 1/2."""
+    half = 30.0  # mu l_0/2
+    share = DEPTH / half
+    effect = EndConduction(share=share, heating_distance=5.0, cooling_distance=3.0)
+    for z in (2.0, 4.0, 8.0, 15.0):
+        s = np.linspace(0.0, half, 200_001)
+        own = (z + 5.0) * (1.0 - np.cosh(s) / np.cosh(half)) - 5.0
+        exact = float(np.mean(1.0 / (1.0 + np.exp(np.clip(2.0 * np.pi * (own - 0.5), -700, 700)))))
+        found = float(effect.heating_shape(jnp.asarray(z), jnp.zeros(())))
+        # Four pieces: within a piece of the exact mean.
+        assert abs(found - exact) < share / 4
+        assert found > 0.0
+
+
+def test_a_delay_of_whole_and_of_half_steps_is_the_shifted_input() -> None:
+    system, channel, top = RIGS["dead_weight"]
+    inputs = _inputs(channel, top)
+    for delay, steps in ((3 * DT, 3), (-2 * DT, -2)):
+        places = np.clip(np.arange(360) - steps, 0, 359)
+        late = simulate_compiled(extended(system, ("input_delay",), {"input_delay.delay": delay}), inputs, DT)
+        moved = simulate_compiled(system, {channel: inputs[channel][places]}, DT)
+        np.testing.assert_allclose(late.reading, moved.reading, rtol=0.0, atol=1e-9 * np.ptp(moved.reading))
+    half = simulate_compiled(extended(system, ("input_delay",), {"input_delay.delay": 0.5 * DT}), inputs, DT)
+    mean = 0.5 * (inputs[channel] + inputs[channel][np.clip(np.arange(360) - 1, 0, 359)])
+    moved = simulate_compiled(system, {channel: mean}, DT)
+    np.testing.assert_allclose(half.reading, moved.reading, rtol=0.0, atol=1e-9 * np.ptp(moved.reading))
+
+
+def test_a_clock_that_falls_behind_is_a_delay_that_grows() -> None:
+    system, channel, _ = RIGS["dead_weight"]
+    ramp = jnp.linspace(0.0, 8.0, 301)
+    slow = simulate_compiled(extended(system, ("input_clock",), {"input_clock.rate": 0.05}), {channel: ramp}, DT)
+    stretched = simulate_compiled(system, {channel: 0.95 * ramp}, DT)
+    np.testing.assert_allclose(slow.temperature, stretched.temperature, rtol=1e-9)
+
+
+def test_the_recorded_level_is_a_straight_line_of_the_one_that_acts() -> None:
+    system, channel, top = RIGS["dead_weight"]
+    inputs = _inputs(channel, top)
+    level = {"input_level.gain": 0.1, "input_level.offset": 0.3}
+    found = simulate_compiled(extended(system, ("input_level",), level), inputs, DT)
+    acted = simulate_compiled(system, {channel: 1.1 * inputs[channel] + 0.3}, DT)
+    np.testing.assert_allclose(found.reading, acted.reading, rtol=0.0, atol=1e-12)
+    # A duty below zero would cool.
+    low = _settled("input_level", {"offset": -0.2}, "bias_spring", duty=0.1)[1]
+    assert low.temperature == pytest.approx(22.0, abs=1e-9)
+
+
+def test_below_its_threshold_a_dead_zone_passes_next_to_nothing() -> None:
+    zone = LIBRARY["dead_zone"](threshold=0.1)
+    assert abs(float(zone.command("voltage", jnp.asarray(1e-3)))) < 1e-5
+    assert float(zone.command("voltage", jnp.asarray(-20.0))) == pytest.approx(-19.9, abs=1e-3)
+    slope = jax.grad(lambda limit: LIBRARY["dead_zone"](threshold=limit).command("duty", jnp.asarray(0.0)))
+    assert float(slope(jnp.asarray(0.0))) == 0.0
+
+
+def test_a_batch_delays_its_inputs_too_and_a_closed_loop_refuses() -> None:
+    system, channel, top = RIGS["dead_weight"]
+    inputs, late = _inputs(channel, top), extended(system, ("input_delay",))
+    found = run_batch(late, inputs, grid({"input_delay.delay": [0.0, 4 * DT]}), dt=DT)
+    single = simulate_compiled(extended(system, ("input_delay",), {"input_delay.delay": 4 * DT}), inputs, DT)
+    np.testing.assert_allclose(found["position"][1], single.position, rtol=0.0, atol=1e-12)
+    plant = arm()
+    with pytest.raises(ValueError, match=r"input_delay.*leave"):
+        simulate_closed_loop(extended(plant, ("input_delay",)), CONTROLLERS["pid"].make(plant), jnp.full(11, 0.1), 0.01)
