@@ -167,7 +167,7 @@ def solve(system: System, stage: Stage, inputs: Inputs) -> Solution:
             return z.temperature + base[0] + slope[0] * moved, z.stress + base[2] + slope[2] * moved
 
         tried = along(xi)
-        asked = choose_branch(law, old, open_at_start, *tried, *curves(law, effects, old, *tried))
+        asked = choose_branch(law, effects, old, open_at_start, *tried, *curves(law, effects, old, *tried))
 
         def miss(fraction: Scalar) -> Scalar:
             return fraction - curve_on(law, effects, old, asked, *along(fraction))

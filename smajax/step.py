@@ -17,6 +17,7 @@ implicit function theorem, of any order, in forward and in reverse mode.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 from typing import NamedTuple, TypeVar
 
@@ -27,12 +28,14 @@ from jax import lax
 
 from smajax.load.base import AbstractMovingLoad
 from smajax.load.coupon import Coupon, StrainCoupon
+from smajax.reading import followed, reading_of, time_constant
 from smajax.stage_equations import Stage, Unknowns, equations, friction_in_use, motion_rates
 from smajax.stage_solver import Solution, solve, solved_linear
 from smajax.system import System
 from smajax.types import Inputs, Motion, Scalar, State, WireState
 from smajax.wire.constitutive import strain_at, stress_at
 from smajax.wire.heat import stored_heat
+from smajax.wire.kept import over
 from smajax.wire.kinetics import choose_branch, curves, fraction_on, open_branches, remembered
 from smajax.wire.root import root
 
@@ -133,6 +136,8 @@ def _stage(system: System, stage: Stage, inputs: Inputs) -> tuple[State, Scalar,
     """One stage of a moving load: (state at its end, dH/dt, v, a)."""
     load = system.load
     assert isinstance(load, AbstractMovingLoad)
+    begun = over(stage.old.wire, stage.time - stage.old.time)
+    stage = dataclasses.replace(stage, old=dataclasses.replace(stage.old, wire=begun))
     wire, position, free = _ended(system, stage, inputs)
     lower, upper = load.limits()
     below, above = free < lower, free > upper
@@ -145,7 +150,7 @@ def _stage(system: System, stage: Stage, inputs: Inputs) -> tuple[State, Scalar,
         stored_heat(system.wire, system.effects, wire.temperature, wire.martensite_fraction) - stage.heat
     ) / stage.step
     friction, _ = friction_in_use(stage, position)
-    new = State(stage.time, wire, Motion(position, velocity, friction), stage.old.reading)
+    new = State(stage.time, wire, Motion(position, velocity, friction), stage.old.reading, stage.old.sensor)
     return new, heating, velocity, acceleration
 
 
@@ -179,20 +184,20 @@ def _moving_step(
     end, _ = lax.scan(body, _Bases(first, list(start), none), (times, *shares))
     old = end.stage.old
     heat, position, velocity = end.error
-    return State(end.stage.time, old.wire, old.motion, old.reading), (heat, position, velocity)
+    return State(end.stage.time, old.wire, old.motion, old.reading, old.sensor), (heat, position, velocity)
 
 
 def _coupon_step(system: System, state: State, inputs: Inputs, dt: Scalar) -> State:
     """Temperature and stress at the end of the step are prescribed: the fraction follows in closed form."""
-    wire, effects, old = system.wire, system.effects, state.wire
+    wire, effects, old = system.wire, system.effects, over(state.wire, dt)
     temperature, stress = inputs["temperature"], jnp.maximum(inputs["stress"], 0.0)
     heated, cooled = curves(wire.kinetics, effects, old, temperature, stress)
     open_at_start = open_branches(wire.kinetics, effects, old)
-    branch = choose_branch(wire.kinetics, old, open_at_start, temperature, stress, heated, cooled)
+    branch = choose_branch(wire.kinetics, effects, old, open_at_start, temperature, stress, heated, cooled)
     xi = fraction_on(old, branch, heated, cooled)
     strain = strain_at(wire, effects, old, temperature, stress, xi)
     new = remembered(wire.kinetics, effects, old, branch, temperature, stress, strain, xi)
-    return State(state.time + dt, new, state.motion, state.reading)
+    return State(state.time + dt, new, state.motion, state.reading, state.sensor)
 
 
 def _strain_coupon_step(system: System, state: State, inputs: Inputs, dt: Scalar) -> State:
@@ -201,7 +206,7 @@ def _strain_coupon_step(system: System, state: State, inputs: Inputs, dt: Scalar
     For any fraction the strain gives the stress, and with it the curve; fraction less curve rises with the fraction,
     so the root lies between the present fraction and the end of the branch: Newton's method held in that bracket.
     """
-    wire, effects, old = system.wire, system.effects, state.wire
+    wire, effects, old = system.wire, system.effects, over(state.wire, dt)
     temperature, strain = inputs["temperature"], inputs["strain"]
     before = old.martensite_fraction
 
@@ -210,7 +215,8 @@ def _strain_coupon_step(system: System, state: State, inputs: Inputs, dt: Scalar
 
     frozen = stress_of(before)
     curve = curves(wire.kinetics, effects, old, temperature, frozen)
-    branch = choose_branch(wire.kinetics, old, open_branches(wire.kinetics, effects, old), temperature, frozen, *curve)
+    open_at_start = open_branches(wire.kinetics, effects, old)
+    branch = choose_branch(wire.kinetics, effects, old, open_at_start, temperature, frozen, *curve)
 
     def miss(xi: Scalar) -> Scalar:
         return xi - fraction_on(old, branch, *curves(wire.kinetics, effects, old, temperature, stress_of(xi)))
@@ -221,7 +227,8 @@ def _strain_coupon_step(system: System, state: State, inputs: Inputs, dt: Scalar
     stress = stress_of(xi)
     own = strain_at(wire, effects, old, temperature, stress, xi)
     new = remembered(wire.kinetics, effects, old, branch, temperature, stress, own, xi)
-    return State(state.time + dt, new, Motion(-strain, jnp.zeros_like(strain), jnp.zeros_like(strain)), state.reading)
+    still = jnp.zeros_like(strain)
+    return State(state.time + dt, new, Motion(-strain, still, still), state.reading, state.sensor)
 
 
 def step(system: System, state: State, inputs: Inputs, dt: Scalar | float) -> State:
@@ -248,19 +255,13 @@ def step_and_error(
     new, (heat, position, velocity) = _moving_step(system, state, inputs, dt, ORDER_THREE)
     capacity = stored_heat(system.wire, (), jnp.ones_like(heat), new.wire.martensite_fraction)
     # Exact where the load moves evenly over the step, which here may be many times as long as the sensor's lag.
-    lag = _lag(system)
+    lag = time_constant(system.effects)
     if lag is None:
-        reading = new.motion.position
+        late = new.motion.position
     else:
         behind = lag * (new.motion.position - state.motion.position) / dt
-        reading = new.motion.position - behind + (state.reading - state.motion.position + behind) * jnp.exp(-dt / lag)
-    return State(new.time, new.wire, new.motion, reading), (heat / capacity, position, velocity)
-
-
-def _lag(system: System) -> Scalar | float | None:
-    """Time constant of the sensor, s; None where no effect gives it one."""
-    lag = sum(effect.sensor_time_constant() for effect in system.effects)
-    return None if isinstance(lag, (int, float)) and lag == 0 else lag
+        late = new.motion.position - behind + (followed(state) - state.motion.position + behind) * jnp.exp(-dt / lag)
+    return _with_reading(system, state, new, late), (heat / capacity, position, velocity)
 
 
 def _read(system: System, old: State, new: State, shown: Scalar, dt: Scalar) -> State:
@@ -268,6 +269,9 @@ def _read(system: System, old: State, new: State, shown: Scalar, dt: Scalar) -> 
 
     Backward Euler in the reading: unlike exp(-dt/tau) it has a slope at tau = 0, which a score test needs.
     """
-    lag = _lag(system)
-    reading = shown if lag is None else (lag * old.reading + dt * shown) / (lag + dt)
-    return State(new.time, new.wire, new.motion, reading)
+    lag = time_constant(system.effects)
+    return _with_reading(system, old, new, shown if lag is None else (lag * followed(old) + dt * shown) / (lag + dt))
+
+
+def _with_reading(system: System, old: State, new: State, late: Scalar) -> State:
+    return State(new.time, new.wire, new.motion, *reading_of(system.effects, late, new.time, old.sensor))
