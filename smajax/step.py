@@ -36,7 +36,7 @@ from smajax.types import Inputs, Motion, Scalar, State, WireState
 from smajax.wire.constitutive import strain_at, stress_at
 from smajax.wire.heat import stored_heat
 from smajax.wire.kept import over
-from smajax.wire.kinetics import choose_branch, curves, fraction_on, open_branches, remembered
+from smajax.wire.mixture import choose_branch, curve_on, open_branches, remembered, settled
 from smajax.wire.root import root
 
 Tree = TypeVar("Tree")
@@ -104,8 +104,8 @@ def _differentiable(given: tuple[System, Stage, Inputs]) -> Solution:
 
     def all_four(z: Unknowns) -> Unknowns:
         missed = equations(system, stage, inputs, z)
-        asked = curves(wire.kinetics, effects, old, z.temperature, z.stress)
-        return Unknowns(missed.heat, missed.motion, missed.stress, z.fraction - fraction_on(old, found.branch, *asked))
+        asked = curve_on(wire.kinetics, effects, old, found.branch, z.temperature, z.stress)
+        return Unknowns(missed.heat, missed.motion, missed.stress, z.fraction - asked)
 
     def linear(g: Callable[[Unknowns], Unknowns], asked: Unknowns) -> Unknowns:
         one, zero = jnp.ones_like(asked.fraction), jnp.zeros_like(asked.fraction)
@@ -124,12 +124,10 @@ def _ended(system: System, stage: Stage, inputs: Inputs) -> tuple[WireState, Sca
     """Solve one stage: (the wire at its end, the position, the position without end stops)."""
     wire, effects, old = system.wire, system.effects, stage.old.wire
     z, branch, free = _solved((system, stage, dict(inputs)))
-    # Rounding only; not `clip`, which halves the derivative at the ends themselves.
-    xi = jnp.where(z.fraction > 1.0, 1.0, jnp.where(z.fraction < 0.0, 0.0, z.fraction))
-    xi = jnp.where(branch.heating | branch.cooling, xi, old.martensite_fraction)
-    stress = jnp.maximum(z.stress, 0.0)
-    strain = strain_at(wire, effects, old, z.temperature, stress, xi)
-    return remembered(wire.kinetics, effects, old, branch, z.temperature, stress, strain, xi), z.position, free
+    at = z.temperature, jnp.maximum(z.stress, 0.0)
+    fractions = settled(wire.kinetics, effects, old, branch, z.temperature, z.stress, z.fraction)
+    strain = strain_at(wire, effects, old, *at, fractions[0])
+    return remembered(wire.kinetics, effects, old, branch, *at, strain, fractions), z.position, free
 
 
 def _stage(system: System, stage: Stage, inputs: Inputs) -> tuple[State, Scalar, Scalar, Scalar]:
@@ -191,12 +189,11 @@ def _coupon_step(system: System, state: State, inputs: Inputs, dt: Scalar) -> St
     """Temperature and stress at the end of the step are prescribed: the fraction follows in closed form."""
     wire, effects, old = system.wire, system.effects, over(state.wire, dt)
     temperature, stress = inputs["temperature"], jnp.maximum(inputs["stress"], 0.0)
-    heated, cooled = curves(wire.kinetics, effects, old, temperature, stress)
-    open_at_start = open_branches(wire.kinetics, effects, old)
-    branch = choose_branch(wire.kinetics, effects, old, open_at_start, temperature, stress, heated, cooled)
-    xi = fraction_on(old, branch, heated, cooled)
-    strain = strain_at(wire, effects, old, temperature, stress, xi)
-    new = remembered(wire.kinetics, effects, old, branch, temperature, stress, strain, xi)
+    law, at = wire.kinetics, (temperature, stress)
+    branch = choose_branch(law, effects, old, open_branches(law, effects, old), *at)
+    fractions = settled(law, effects, old, branch, *at, curve_on(law, effects, old, branch, *at))
+    strain = strain_at(wire, effects, old, *at, fractions[0])
+    new = remembered(law, effects, old, branch, *at, strain, fractions)
     return State(state.time + dt, new, state.motion, state.reading, state.sensor)
 
 
@@ -208,25 +205,24 @@ def _strain_coupon_step(system: System, state: State, inputs: Inputs, dt: Scalar
     """
     wire, effects, old = system.wire, system.effects, over(state.wire, dt)
     temperature, strain = inputs["temperature"], inputs["strain"]
-    before = old.martensite_fraction
+    law, before = wire.kinetics, old.martensite_fraction
 
     def stress_of(xi: Scalar) -> Scalar:
         return stress_at(wire, effects, old, strain, temperature, old.stress, xi)
 
     frozen = stress_of(before)
-    curve = curves(wire.kinetics, effects, old, temperature, frozen)
-    open_at_start = open_branches(wire.kinetics, effects, old)
-    branch = choose_branch(wire.kinetics, effects, old, open_at_start, temperature, frozen, *curve)
+    branch = choose_branch(law, effects, old, open_branches(law, effects, old), temperature, frozen)
 
     def miss(xi: Scalar) -> Scalar:
-        return xi - fraction_on(old, branch, *curves(wire.kinetics, effects, old, temperature, stress_of(xi)))
+        return xi - curve_on(law, effects, old, branch, temperature, stress_of(xi))
 
     low = jnp.where(branch.heating, 0.0, before)
     high = jnp.where(branch.cooling, 1.0, before)
     xi = root(miss, before, low, high)
-    stress = stress_of(xi)
-    own = strain_at(wire, effects, old, temperature, stress, xi)
-    new = remembered(wire.kinetics, effects, old, branch, temperature, stress, own, xi)
+    fractions = settled(law, effects, old, branch, temperature, stress_of(xi), xi)
+    stress = stress_of(fractions[0])
+    own = strain_at(wire, effects, old, temperature, stress, fractions[0])
+    new = remembered(law, effects, old, branch, temperature, stress, own, fractions)
     still = jnp.zeros_like(strain)
     return State(state.time + dt, new, Motion(-strain, still, still), state.reading, state.sensor)
 

@@ -15,6 +15,7 @@ import equinox as eqx
 from smajax.types import Scalar, WireState
 
 if TYPE_CHECKING:
+    from smajax.wire.conditions import AbstractConditions
     from smajax.wire.kinetics import Kinetics
     from smajax.wire.wire import Wire
 
@@ -80,6 +81,10 @@ class AbstractEffect(eqx.Module):
         """Whether it moves a range: the direction of a step is then that of the moved distance."""
         own, base = type(self), AbstractEffect
         return own.heating_distance is not base.heating_distance or own.cooling_distance is not base.cooling_distance
+
+    def second_conditions(self) -> tuple[AbstractConditions, Scalar] | None:
+        """Branch conditions that a share of the wire follows in the place of the law's, and that share, -."""
+        return None
 
     def kept_at_start(self, temperature: Scalar, stress: Scalar) -> dict[str, Scalar]:
         """What it remembers of the wire from step to step, by name, at rest: an entry of `WireState.kept` each."""

@@ -50,7 +50,7 @@ class DriftingTemperatures(AbstractEffect):
         return transformed(old, fraction)
 
     def _done(self, old: WireState) -> Scalar:
-        return -jnp.expm1(-0.5 * old.kept[TRANSFORMED] / self.cycles)
+        return 1.0 - jnp.exp(-0.5 * old.kept[TRANSFORMED] / self.cycles)
 
     def heating_distance(self, law: Kinetics, z: Scalar, temperature: Scalar, stress: Scalar, old: WireState) -> Scalar:
         return z - self.heating * self._done(old) / heating_width(law)

@@ -10,6 +10,7 @@ from smajax.effects.base import AbstractEffect
 from smajax.effects.coulomb_friction import CoulombFriction
 from smajax.effects.creep import Creep
 from smajax.effects.drifting_temperatures import DriftingTemperatures
+from smajax.effects.enhanced_conditions import EnhancedConditions
 from smajax.effects.lagging_transformation import LaggingTransformation
 from smajax.effects.latent_heat import LatentHeat
 from smajax.effects.minor_loops import MinorLoops
@@ -41,6 +42,7 @@ LIBRARY: dict[str, type[AbstractEffect]] = {
         SmoothTransformation,
         AsymmetricTransformation,
         TwoPartTransformation,
+        EnhancedConditions,
         UnequalStressSlopes,
         StressDependentWidth,
         MinorLoops,

@@ -42,4 +42,4 @@ class ResidualStrain(AbstractEffect):
         return transformed(old, fraction)
 
     def kept_strain(self, at: WireState) -> Scalar | float:
-        return -self.final * jnp.expm1(-0.5 * at.kept[TRANSFORMED] / self.cycles)
+        return self.final * (1.0 - jnp.exp(-0.5 * at.kept[TRANSFORMED] / self.cycles))

@@ -14,7 +14,7 @@ from smajax.system import System
 from smajax.types import Motion, Scalar, State
 from smajax.wire.constitutive import strain_at, stress_at
 from smajax.wire.kept import kept_after, over
-from smajax.wire.kinetics import austenite_left, martensite_left
+from smajax.wire.mixture import corrected, moved
 
 # Position (rad, m), velocity, temperature (C), martensite fraction.
 Corrected = Float[Array, "4"]
@@ -47,22 +47,14 @@ def with_vector(system: System, state: State, vector: Corrected) -> State:
         martensite_fraction=fraction,
         detwinned_fraction=wire.kinetics.variants.detwinned(old, stress, fraction),
     )
+    new = moved(effects, old, new)
     return State(state.time, new, Motion(position, velocity, state.motion.friction), state.reading, state.sensor)
 
 
 def with_correction(system: System, state: State, vector: Corrected, transforming: Bool[Array, ""]) -> State:
     """`with_vector`, and the curves laid so that the corrected fraction does not jump in the next step."""
     new = with_vector(system, state, vector)
-    law, at = system.wire.kinetics, (new.wire.temperature, new.wire.stress, new.wire)
-    h, k = martensite_left(law, system.effects, *at), austenite_left(law, system.effects, *at)
-    kept = law.renewal.corrected(state.wire, transforming, h, k, new.wire.martensite_fraction)
-    wire = dataclasses.replace(
-        new.wire,
-        xi_M=kept.xi_M,
-        xi_A=kept.xi_A,
-        heating_missed=kept.heating_missed,
-        cooling_missed=kept.cooling_missed,
-    )
+    wire = corrected(system.wire.kinetics, system.effects, state.wire, new.wire, transforming)
     return dataclasses.replace(new, wire=wire)
 
 

@@ -133,6 +133,7 @@ class Branch(eqx.Module):
 
     heating: Bool[Array, ""]
     cooling: Bool[Array, ""]
+    parts: tuple[Branch, Branch] | None = None  # of a wire in two parts (`mixture.py`)
 
 
 def _shares(law: Kinetics, effects: Sequence[AbstractEffect], state: WireState) -> tuple[Scalar, Scalar]:

@@ -14,6 +14,7 @@ from smajax.types import Scalar, WireState
 from smajax.wire.constitutive import Constitutive
 from smajax.wire.heat import Heat
 from smajax.wire.kinetics import Kinetics, austenite_left, martensite_left
+from smajax.wire.mixture import begun
 from smajax.wire.resistance import Resistance
 
 
@@ -50,10 +51,11 @@ def start(
     h = martensite_left(wire.kinetics, effects, temperature, stress, whole)
     k = austenite_left(wire.kinetics, effects, temperature, stress, whole)
     laid = wire.kinetics.renewal.start(h, k, fraction)
-    return dataclasses.replace(
+    whole = dataclasses.replace(
         whole,
         xi_M=laid.xi_M,
         xi_A=laid.xi_A,
         heating_missed=laid.heating_missed + zero,
         cooling_missed=laid.cooling_missed + zero,
     )
+    return begun(effects, whole)
