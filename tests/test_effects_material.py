@@ -6,6 +6,7 @@ All effects of a rig are in one model and switched on one at a time by their val
 from __future__ import annotations
 
 import dataclasses
+import itertools
 
 import jax
 import jax.numpy as jnp
@@ -34,12 +35,13 @@ def _under(system: System, law: str) -> System:
 
 
 def _ramps(*ends: float, each: int = 90) -> np.ndarray:
-    return np.concatenate([np.linspace(*pair, each) for pair in zip(ends[:-1], ends[1:], strict=True)])
+    return np.concatenate([np.linspace(*pair, each) for pair in itertools.pairwise(ends)])
 
 
-# A full stroke with a turn on its way, and back.
-HEATED = {
-    "voltage": 7.4 * np.concatenate([np.full(n, level) for n, level in ((120, 1.0), (60, 0.6), (60, 0.95), (120, 0))])
+# Strokes with a turn on their way, under a weight that changes.
+STROKES = {
+    "voltage": 7.4 * np.concatenate([np.full(n, level) for n, level in ((110, 1.0), (9, 0.0), (91, 0.95), (130, 0.0))]),
+    "mass": np.where((np.arange(340) // 40) % 4 == 2, 0.1, 0.075),
 }
 # The weights of claim M13: part of the load taken off a wire that rests within its range, and put back.
 UNLOADED = {
@@ -48,25 +50,24 @@ UNLOADED = {
 }
 UNSTRESSED = {"temperature": _ramps(90.0, 20.0, 90.0, 60.0, 50.0), "stress": np.full(360, 5e6)}
 RIGS = {
-    "heated": (
+    "strokes": (
         DEAD_WEIGHT,
-        HEATED,
+        STROKES,
         (
+            "unequal_stress_slopes",
+            "stress_dependent_width",
             "minor_loops",
             "lagging_transformation",
             "drifting_temperatures",
             "residual_strain",
+            "creep",
             "sensor_gain",
             "sensor_drift",
             "sensor_offset",
             "sensor_backlash",
         ),
     ),
-    "unloaded": (
-        _under(DEAD_WEIGHT, "liang"),
-        UNLOADED,
-        ("enhanced_conditions", "unequal_stress_slopes", "stress_dependent_width", "creep"),
-    ),
+    "unloaded": (_under(DEAD_WEIGHT, "liang"), UNLOADED, ("enhanced_conditions",)),
     "split": (_under(COUPON, "brinson"), UNSTRESSED, ("two_way_memory",)),
 }
 
@@ -107,7 +108,7 @@ def test_effects_at_their_base_value_are_the_base_model_and_each_off_it_is_not(r
     for name in names:
         on = simulate_compiled(set_parameters(full, _starts(name)), inputs, DT)
         _sound(system, on)
-        assert _gap(on, plain, "reading") > 1e-3, name
+        assert _gap(on, plain, "reading") > 1e-4, name
         own = [entry for key, entry in parameters(full).items() if key.startswith(f"{name}.")]
         for _ in range(6):  # anywhere in the bounds, and now and then on one
             shares = np.clip(random.uniform(-0.1, 1.1, len(own)), 0.0, 1.0)
@@ -126,11 +127,10 @@ def test_derivatives_are_the_differences_and_the_score_test_sees_every_switch(ri
     base = {key: value for key, value in parameter_values(full).items() if "." in key}
     series = {channel: jnp.asarray(values) for channel, values in inputs.items()}
 
-    def means(model, own):
+    def readings(model, own):
         def along(share):
             there = {key: own[key] + share * own[f"{key} towards"] for key in base}
-            reading = simulate(set_parameters(model, there), series, DT).reading
-            return jnp.stack([reading.mean(), reading[150:].mean(), reading[-100:].mean()])
+            return simulate(set_parameters(model, there), series, DT).reading
 
         return jax.jvp(along, (own["step"],), (jnp.ones_like(own["step"]),))
 
@@ -146,7 +146,9 @@ def test_derivatives_are_the_differences_and_the_score_test_sees_every_switch(ri
     for key in base:
         members[f"{key} towards"] = np.repeat([size * (key == moved) for moved, _, size, _ in cases], 3)
     members["step"] = np.concatenate([[-step, 0.0, step] for *_, step in cases])
-    values, slopes = evaluator(means, full, tuple(members))(full, members, 1)
+    found = evaluator(readings, full, tuple(members))(full, members, 1)
+    # Means of parts of a run: no sample that lies at a kink hides the derivative.
+    values, slopes = (np.stack([one[:, start:].mean(axis=1) for start in (0, 150, 260)], axis=1) for one in found)
     for number, (key, at, _, step) in enumerate(cases):
         low, here, high = values[3 * number : 3 * number + 3]
         slope, difference = slopes[3 * number + 1], (high - low) / (2.0 * step)
@@ -161,7 +163,7 @@ def test_steps_of_their_own_carry_what_effects_remember():
     names = ("lagging_transformation", "sensor_lag", "sensor_gain", "sensor_backlash")
     on = {key: value for name in names for key, value in _starts(name).items()}
     system = extended(DEAD_WEIGHT, names, on)
-    voltage = HEATED["voltage"]
+    voltage = STROKES["voltage"]
     own = simulate_compiled(system, {"voltage": voltage}, DT, 1e-5)
     fixed = simulate_compiled(system, {"voltage": np.repeat(voltage, 10)}, DT / 10.0)
     assert np.abs(own.reading - fixed.reading[::10]).max() < 2e-2 * np.ptp(fixed.reading)
@@ -191,27 +193,26 @@ def test_a_share_of_one_is_the_enhanced_law_and_one_of_zero_is_liangs():
 
 def test_residual_strain_and_drift_after_n_cycles_are_those_of_the_formula():
     """Full cycles of a coupon under one stress: N of them give 1 - exp(-N/N_0) of either."""
-    n, scale, most, shift = 7, 5.0, 4e-3, 8.0
-    temperature = np.concatenate([[20.0], *([_ramps(20.0, 110.0, 20.0)] * n)])
+    n, each, scale, most, shift = 4, 900, 5.0, 4e-3, 8.0
+    temperature = np.concatenate([[20.0], *([_ramps(20.0, 110.0, 20.0, each=each)] * n)])
     inputs = {"temperature": temperature, "stress": np.full(len(temperature), 60e6)}
     plain = simulate_compiled(COUPON, inputs, DT)
-    asked = {
-        "residual_strain.final": most,
-        "residual_strain.cycles": scale,
-        "drifting_temperatures.heating": shift,
-        "drifting_temperatures.cycles": scale,
-    }
-    run = simulate_compiled(extended(COUPON, ("residual_strain", "drifting_temperatures"), asked), inputs, DT)
-    ends = 180 * np.arange(1, n + 1)
+    full = extended(
+        COUPON,
+        ("residual_strain", "drifting_temperatures"),
+        {"residual_strain.cycles": scale, "drifting_temperatures.cycles": scale},
+    )
+    run = simulate_compiled(set_parameters(full, {"residual_strain.final": most}), inputs, DT)
+    ends = 2 * each * np.arange(1, n + 1)
     done = 1.0 - np.exp(-np.arange(1, n + 1) / scale)
     np.testing.assert_allclose(run.strain[ends] - plain.strain[ends], most * done, rtol=1e-9)
-    np.testing.assert_allclose(plain.strain[ends], plain.strain[0], atol=1e-12)
+    run = simulate_compiled(set_parameters(full, {"drifting_temperatures.heating": shift}), inputs, DT)
     # Half of the wire is austenite at another temperature: later in every cycle by the drift so far.
     for cycle in range(1, n):
-        up = slice(180 * cycle + 1, 180 * cycle + 91)
+        up = slice(2 * each * cycle + 1, 2 * each * cycle + each + 1)
         half = [np.interp(-0.5, -one.martensite_fraction[up], temperature[up]) for one in (plain, run)]
         # It goes on drifting while it heats, by a quarter of a cycle up to here.
-        assert half[1] - half[0] == pytest.approx(shift * (1.0 - np.exp(-(cycle + 0.25) / scale)), abs=0.05)
+        assert half[1] - half[0] == pytest.approx(shift * (1.0 - np.exp(-(cycle + 0.25) / scale)), abs=0.02)
 
 
 def test_a_trained_wire_lengthens_on_cooling_without_a_load():
@@ -258,7 +259,7 @@ def test_a_lagging_transformation_is_late_by_its_time_constant():
 
 
 def test_a_small_loop_begins_its_way_back_earlier_and_a_full_one_where_it_did():
-    inputs = {"temperature": _ramps(20.0, 110.0, 58.5, 110.0, 20.0), "stress": np.full(360, 60e6)}
+    inputs = {"temperature": _ramps(20.0, 110.0, 55.0, 110.0, 20.0), "stress": np.full(360, 60e6)}
     plain = simulate_compiled(COUPON, inputs, DT)
     on = {"minor_loops.heating": 0.5, "minor_loops.cooling": 0.5}
     run = simulate_compiled(extended(COUPON, ("minor_loops",), on), inputs, DT)
@@ -283,7 +284,7 @@ def test_a_sensor_shows_what_its_faults_make_of_the_position():
         "sensor_offset.shift": 3e-3,
         "sensor_backlash.half_width": 1e-3,
     }
-    run = simulate_compiled(extended(DEAD_WEIGHT, names, on), HEATED, DT)
+    run = simulate_compiled(extended(DEAD_WEIGHT, names, on), STROKES, DT)
     before = 1.1 * np.asarray(run.position) + 1e-4 * np.asarray(run.time) + 3e-3
     known = [before[0]]
     for value in before[1:]:

@@ -32,7 +32,7 @@ class Creep(AbstractEffect):
         "temperature changes."
     )
     switches: ClassVar[tuple[str, ...]] = ("compliance",)
-    starts: ClassVar[dict[str, float]] = {"compliance": 2e-12, "time_constant": 5.0}
+    starts: ClassVar[dict[str, float]] = {"compliance": 5e-12, "time_constant": 5.0}
 
     @classmethod
     def base(cls) -> Creep:
