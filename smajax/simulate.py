@@ -39,6 +39,23 @@ def check_inputs(system: System, inputs: Mapping[str, Series]) -> int:
     return next(iter(lengths.values()))[0]
 
 
+def first_state(system: System, series: Mapping[str, Series], initial: State | None) -> State:
+    """`initial`, or rest with the first inputs. ValueError where `initial` is of a model that remembers other things."""
+    rest = initial_state(system, {name: values[0] for name, values in series.items()})
+    if initial is None:
+        return rest
+    for part, theirs, ours in (
+        ("wire", initial.wire.kept, rest.wire.kept),
+        ("sensor", initial.sensor, rest.sensor),
+    ):
+        if set(theirs) != set(ours):
+            raise ValueError(
+                f"`initial` remembers {sorted(theirs)} of the {part}, but the effects of this system need "
+                f"{sorted(ours)}. Take a state that a system with the same effects has come to."
+            )
+    return initial
+
+
 def simulate(
     system: System, inputs: Mapping[str, Series], dt: Scalar | float = DEFAULT_STEP, initial: State | None = None
 ) -> Trajectory:
@@ -49,7 +66,7 @@ def simulate(
     """
     check_inputs(system, inputs)
     series = {name: jnp.asarray(values, dtype=float) for name, values in inputs.items()}
-    state = initial_state(system, {name: values[0] for name, values in series.items()}) if initial is None else initial
+    state = first_state(system, series, initial)
     ahead = isinstance(system.load, AbstractCoupon)
     held = {name: values[1:] if ahead else values[:-1] for name, values in series.items()}
 

@@ -21,7 +21,7 @@ from smajax.lanes.evaluate import evaluator
 from smajax.parameters import parameter_values, parameters, set_parameters
 from smajax.presets import build
 from smajax.simulate import simulate
-from smajax.system import System
+from smajax.system import System, initial_state
 from smajax.types import Trajectory
 from smajax.wire.laws import under_law
 
@@ -295,3 +295,11 @@ def test_a_sensor_shows_what_its_faults_make_of_the_position():
     for value in before[1:]:
         known.append(min(max(known[-1], value - 1e-3), value + 1e-3))
     np.testing.assert_allclose(run.reading, known, atol=1e-14)
+
+
+def test_a_state_that_remembers_other_things_is_refused():
+    plain = initial_state(DEAD_WEIGHT, {name: values[0] for name, values in STROKES.items()})
+    late = extended(DEAD_WEIGHT, ("lagging_transformation",))
+    for tolerance in (None, 1e-4):
+        with pytest.raises(ValueError, match="lagging_temperature"):
+            simulate_compiled(late, STROKES, DT, tolerance, plain)

@@ -17,6 +17,7 @@ from smajax.presets import build
 from smajax.simulate import simulate
 from smajax.system import System
 from tests.derivatives import compare, open_loop
+from tests.test_effects_material import RIGS
 
 DT = 0.05
 
@@ -45,7 +46,13 @@ def test_every_base_parameter(case: str) -> None:
     compare(CASES[case][0], open_loop(CASES[case][1], DT))
 
 
-@pytest.mark.parametrize("effect", sorted(LIBRARY))
+# By machine code and with the other effects of its rig an effect of `test_effects_material` is tested always.
+ALWAYS = {name for *_, names in RIGS.values() for name in names}
+
+
+@pytest.mark.parametrize(
+    "effect", [pytest.param(name, marks=[pytest.mark.slow] * (name in ALWAYS)) for name in sorted(LIBRARY)]
+)
 @pytest.mark.parametrize("share", [NUDGE, 1.0], ids=["next to nothing", "switched on"])
 def test_every_effect_coefficient(effect: str, share: float) -> None:
     """At its start, and where its score is taken: at exactly zero a tail has no derivative (see `scores_at`)."""
