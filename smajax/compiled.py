@@ -15,8 +15,8 @@ from smajax.adaptive import advance
 from smajax.lanes.evaluate import evaluator
 from smajax.load.base import AbstractMovingLoad
 from smajax.recorded import acting_inputs
-from smajax.simulate import DEFAULT_STEP, check_inputs, simulate, trajectory
-from smajax.system import System, initial_state
+from smajax.simulate import DEFAULT_STEP, check_inputs, first_state, simulate, trajectory
+from smajax.system import System
 from smajax.types import Scalar, Series, State, Trajectory
 
 
@@ -33,8 +33,7 @@ def _run(asked: _Asked, _: dict[str, Scalar]) -> Trajectory:
     if tolerance is None:
         return simulate(system, inputs, dt, asked.initial)
     inputs = acting_inputs(system, inputs, dt)
-    first = {name: values[0] for name, values in inputs.items()}
-    state = initial_state(system, first) if asked.initial is None else asked.initial
+    state = first_state(system, inputs, asked.initial)
 
     def one(carry: Any, now: dict[str, Scalar]) -> tuple[Any, State]:
         state, tried = carry

@@ -40,6 +40,23 @@ def check_inputs(system: System, inputs: Mapping[str, Series]) -> int:
     return next(iter(lengths.values()))[0]
 
 
+def first_state(system: System, series: Mapping[str, Series], initial: State | None) -> State:
+    """`initial`, or rest with the first inputs. ValueError where `initial` is of a model that remembers other things."""
+    rest = initial_state(system, {name: values[0] for name, values in series.items()})
+    if initial is None:
+        return rest
+    for part, theirs, ours in (
+        ("wire", initial.wire.kept, rest.wire.kept),
+        ("sensor", initial.sensor, rest.sensor),
+    ):
+        if set(theirs) != set(ours):
+            raise ValueError(
+                f"`initial` remembers {sorted(theirs)} of the {part}, but the effects of this system need "
+                f"{sorted(ours)}. Take a state that a system with the same effects has come to."
+            )
+    return initial
+
+
 def simulate(
     system: System, inputs: Mapping[str, Series], dt: Scalar | float = DEFAULT_STEP, initial: State | None = None
 ) -> Trajectory:
@@ -50,7 +67,7 @@ def simulate(
     """
     check_inputs(system, inputs)
     series = acting_inputs(system, {name: jnp.asarray(values, dtype=float) for name, values in inputs.items()}, dt)
-    state = initial_state(system, {name: values[0] for name, values in series.items()}) if initial is None else initial
+    state = first_state(system, series, initial)
     # Every number of the state then has a derivative where the model has one: a scan some of whose numbers gain theirs
     # on the way is traced anew for each, and so is all within it.
     state = jax.tree.map(lambda leaf: leaf + 0.0 * system.start_fraction, state)

@@ -34,13 +34,10 @@ from smajax.types import Inputs, Scalar
 from smajax.wire.constitutive import young_modulus
 from smajax.wire.kinetics import (
     Branch,
-    choose_branch,
     cooling_temperature,
-    curve_on,
-    curves,
     heating_temperature,
-    open_branches,
 )
+from smajax.wire.mixture import choose_branch, curve_on, open_branches
 from smajax.wire.root import bracketed
 
 INNER = (3, 1)  # steps of the inner equation after the first two linearisations
@@ -167,7 +164,7 @@ def solve(system: System, stage: Stage, inputs: Inputs) -> Solution:
             return z.temperature + base[0] + slope[0] * moved, z.stress + base[2] + slope[2] * moved
 
         tried = along(xi)
-        asked = choose_branch(law, old, open_at_start, *tried, *curves(law, effects, old, *tried))
+        asked = choose_branch(law, effects, old, open_at_start, *tried)
 
         def miss(fraction: Scalar) -> Scalar:
             return fraction - curve_on(law, effects, old, asked, *along(fraction))

@@ -17,6 +17,7 @@ implicit function theorem, of any order, in forward and in reverse mode.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 from typing import NamedTuple, TypeVar
 
@@ -27,13 +28,15 @@ from jax import lax
 
 from smajax.load.base import AbstractMovingLoad
 from smajax.load.coupon import Coupon, StrainCoupon
+from smajax.reading import followed, reading_of, time_constant
 from smajax.stage_equations import Stage, Unknowns, equations, friction_in_use, motion_rates
 from smajax.stage_solver import Solution, solve, solved_linear
 from smajax.system import System
 from smajax.types import Inputs, Motion, Scalar, State, WireState
 from smajax.wire.constitutive import strain_at, stress_at
 from smajax.wire.heat import stored_heat
-from smajax.wire.kinetics import choose_branch, curves, fraction_on, open_branches, remembered
+from smajax.wire.kept import over
+from smajax.wire.mixture import choose_branch, curve_on, open_branches, remembered, settled
 from smajax.wire.root import root
 
 Tree = TypeVar("Tree")
@@ -101,8 +104,8 @@ def _differentiable(given: tuple[System, Stage, Inputs]) -> Solution:
 
     def all_four(z: Unknowns) -> Unknowns:
         missed = equations(system, stage, inputs, z)
-        asked = curves(wire.kinetics, effects, old, z.temperature, z.stress)
-        return Unknowns(missed.heat, missed.motion, missed.stress, z.fraction - fraction_on(old, found.branch, *asked))
+        asked = curve_on(wire.kinetics, effects, old, found.branch, z.temperature, z.stress)
+        return Unknowns(missed.heat, missed.motion, missed.stress, z.fraction - asked)
 
     def linear(g: Callable[[Unknowns], Unknowns], asked: Unknowns) -> Unknowns:
         one, zero = jnp.ones_like(asked.fraction), jnp.zeros_like(asked.fraction)
@@ -121,18 +124,18 @@ def _ended(system: System, stage: Stage, inputs: Inputs) -> tuple[WireState, Sca
     """Solve one stage: (the wire at its end, the position, the position without end stops)."""
     wire, effects, old = system.wire, system.effects, stage.old.wire
     z, branch, free = _solved((system, stage, dict(inputs)))
-    # Rounding only; not `clip`, which halves the derivative at the ends themselves.
-    xi = jnp.where(z.fraction > 1.0, 1.0, jnp.where(z.fraction < 0.0, 0.0, z.fraction))
-    xi = jnp.where(branch.heating | branch.cooling, xi, old.martensite_fraction)
-    stress = jnp.maximum(z.stress, 0.0)
-    strain = strain_at(wire, effects, old, z.temperature, stress, xi)
-    return remembered(wire.kinetics, effects, old, branch, z.temperature, stress, strain, xi), z.position, free
+    at = z.temperature, jnp.maximum(z.stress, 0.0)
+    fractions = settled(wire.kinetics, effects, old, branch, z.temperature, z.stress, z.fraction)
+    strain = strain_at(wire, effects, old, *at, fractions[0])
+    return remembered(wire.kinetics, effects, old, branch, *at, strain, fractions), z.position, free
 
 
 def _stage(system: System, stage: Stage, inputs: Inputs) -> tuple[State, Scalar, Scalar, Scalar]:
     """One stage of a moving load: (state at its end, dH/dt, v, a)."""
     load = system.load
     assert isinstance(load, AbstractMovingLoad)
+    begun = over(stage.old.wire, stage.time - stage.old.time)
+    stage = dataclasses.replace(stage, old=dataclasses.replace(stage.old, wire=begun))
     wire, position, free = _ended(system, stage, inputs)
     lower, upper = load.limits()
     below, above = free < lower, free > upper
@@ -145,7 +148,7 @@ def _stage(system: System, stage: Stage, inputs: Inputs) -> tuple[State, Scalar,
         stored_heat(system.wire, system.effects, wire.temperature, wire.martensite_fraction) - stage.heat
     ) / stage.step
     friction, _ = friction_in_use(stage, position)
-    new = State(stage.time, wire, Motion(position, velocity, friction), stage.old.reading)
+    new = State(stage.time, wire, Motion(position, velocity, friction), stage.old.reading, stage.old.sensor)
     return new, heating, velocity, acceleration
 
 
@@ -179,20 +182,19 @@ def _moving_step(
     end, _ = lax.scan(body, _Bases(first, list(start), none), (times, *shares))
     old = end.stage.old
     heat, position, velocity = end.error
-    return State(end.stage.time, old.wire, old.motion, old.reading), (heat, position, velocity)
+    return State(end.stage.time, old.wire, old.motion, old.reading, old.sensor), (heat, position, velocity)
 
 
 def _coupon_step(system: System, state: State, inputs: Inputs, dt: Scalar) -> State:
     """Temperature and stress at the end of the step are prescribed: the fraction follows in closed form."""
-    wire, effects, old = system.wire, system.effects, state.wire
+    wire, effects, old = system.wire, system.effects, over(state.wire, dt)
     temperature, stress = inputs["temperature"], jnp.maximum(inputs["stress"], 0.0)
-    heated, cooled = curves(wire.kinetics, effects, old, temperature, stress)
-    open_at_start = open_branches(wire.kinetics, effects, old)
-    branch = choose_branch(wire.kinetics, old, open_at_start, temperature, stress, heated, cooled)
-    xi = fraction_on(old, branch, heated, cooled)
-    strain = strain_at(wire, effects, old, temperature, stress, xi)
-    new = remembered(wire.kinetics, effects, old, branch, temperature, stress, strain, xi)
-    return State(state.time + dt, new, state.motion, state.reading)
+    law, at = wire.kinetics, (temperature, stress)
+    branch = choose_branch(law, effects, old, open_branches(law, effects, old), *at)
+    fractions = settled(law, effects, old, branch, *at, curve_on(law, effects, old, branch, *at))
+    strain = strain_at(wire, effects, old, *at, fractions[0])
+    new = remembered(law, effects, old, branch, *at, strain, fractions)
+    return State(state.time + dt, new, state.motion, state.reading, state.sensor)
 
 
 def _strain_coupon_step(system: System, state: State, inputs: Inputs, dt: Scalar) -> State:
@@ -201,27 +203,28 @@ def _strain_coupon_step(system: System, state: State, inputs: Inputs, dt: Scalar
     For any fraction the strain gives the stress, and with it the curve; fraction less curve rises with the fraction,
     so the root lies between the present fraction and the end of the branch: Newton's method held in that bracket.
     """
-    wire, effects, old = system.wire, system.effects, state.wire
+    wire, effects, old = system.wire, system.effects, over(state.wire, dt)
     temperature, strain = inputs["temperature"], inputs["strain"]
-    before = old.martensite_fraction
+    law, before = wire.kinetics, old.martensite_fraction
 
     def stress_of(xi: Scalar) -> Scalar:
         return stress_at(wire, effects, old, strain, temperature, old.stress, xi)
 
     frozen = stress_of(before)
-    curve = curves(wire.kinetics, effects, old, temperature, frozen)
-    branch = choose_branch(wire.kinetics, old, open_branches(wire.kinetics, effects, old), temperature, frozen, *curve)
+    branch = choose_branch(law, effects, old, open_branches(law, effects, old), temperature, frozen)
 
     def miss(xi: Scalar) -> Scalar:
-        return xi - fraction_on(old, branch, *curves(wire.kinetics, effects, old, temperature, stress_of(xi)))
+        return xi - curve_on(law, effects, old, branch, temperature, stress_of(xi))
 
     low = jnp.where(branch.heating, 0.0, before)
     high = jnp.where(branch.cooling, 1.0, before)
     xi = root(miss, before, low, high)
-    stress = stress_of(xi)
-    own = strain_at(wire, effects, old, temperature, stress, xi)
-    new = remembered(wire.kinetics, effects, old, branch, temperature, stress, own, xi)
-    return State(state.time + dt, new, Motion(-strain, jnp.zeros_like(strain), jnp.zeros_like(strain)), state.reading)
+    fractions = settled(law, effects, old, branch, temperature, stress_of(xi), xi)
+    stress = stress_of(fractions[0])
+    own = strain_at(wire, effects, old, temperature, stress, fractions[0])
+    new = remembered(law, effects, old, branch, temperature, stress, own, fractions)
+    still = jnp.zeros_like(strain)
+    return State(state.time + dt, new, Motion(-strain, still, still), state.reading, state.sensor)
 
 
 def step(system: System, state: State, inputs: Inputs, dt: Scalar | float) -> State:
@@ -248,19 +251,13 @@ def step_and_error(
     new, (heat, position, velocity) = _moving_step(system, state, inputs, dt, ORDER_THREE)
     capacity = stored_heat(system.wire, (), jnp.ones_like(heat), new.wire.martensite_fraction)
     # Exact where the load moves evenly over the step, which here may be many times as long as the sensor's lag.
-    lag = _lag(system)
+    lag = time_constant(system.effects)
     if lag is None:
-        reading = new.motion.position
+        late = new.motion.position
     else:
         behind = lag * (new.motion.position - state.motion.position) / dt
-        reading = new.motion.position - behind + (state.reading - state.motion.position + behind) * jnp.exp(-dt / lag)
-    return State(new.time, new.wire, new.motion, reading), (heat / capacity, position, velocity)
-
-
-def _lag(system: System) -> Scalar | float | None:
-    """Time constant of the sensor, s; None where no effect gives it one."""
-    lag = sum(effect.sensor_time_constant() for effect in system.effects)
-    return None if isinstance(lag, (int, float)) and lag == 0 else lag
+        late = new.motion.position - behind + (followed(state) - state.motion.position + behind) * jnp.exp(-dt / lag)
+    return _with_reading(system, state, new, late), (heat / capacity, position, velocity)
 
 
 def _read(system: System, old: State, new: State, shown: Scalar, dt: Scalar) -> State:
@@ -268,6 +265,9 @@ def _read(system: System, old: State, new: State, shown: Scalar, dt: Scalar) -> 
 
     Backward Euler in the reading: unlike exp(-dt/tau) it has a slope at tau = 0, which a score test needs.
     """
-    lag = _lag(system)
-    reading = shown if lag is None else (lag * old.reading + dt * shown) / (lag + dt)
-    return State(new.time, new.wire, new.motion, reading)
+    lag = time_constant(system.effects)
+    return _with_reading(system, old, new, shown if lag is None else (lag * followed(old) + dt * shown) / (lag + dt))
+
+
+def _with_reading(system: System, old: State, new: State, late: Scalar) -> State:
+    return State(new.time, new.wire, new.motion, *reading_of(system.effects, late, new.time, old.sensor))

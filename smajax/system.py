@@ -10,6 +10,7 @@ from smajax.effects.base import AbstractEffect, having
 from smajax.load.base import AbstractMovingLoad
 from smajax.load.coupon import AbstractCoupon, StrainCoupon
 from smajax.parameters import parameter
+from smajax.reading import first_reading
 from smajax.types import Inputs, Motion, Scalar, State
 from smajax.wire.heat import cross_section
 from smajax.wire.wire import Wire, start
@@ -90,4 +91,5 @@ def initial_state(system: System, inputs: Inputs) -> State:
     )
     zero = jnp.zeros_like(stress)
     wire = start(system.wire, system.effects, temperature, stress, strain, fraction)
-    return State(zero, wire, Motion(position, zero, zero), reading)
+    reading, sensor = first_reading(system.effects, reading, zero)
+    return State(zero, wire, Motion(position, zero, zero), reading, sensor)

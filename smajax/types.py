@@ -27,6 +27,7 @@ class WireState(eqx.Module):
     cooling_missed: Scalar  # likewise
     detwinned_fraction: Scalar  # xi_s: the part of the martensite that gives strain, all of it without Brinson's split
     formed_by_loading: Scalar  # 1 where loading, not cooling, formed the martensite last; else 0
+    kept: dict[str, Scalar] = eqx.field(default_factory=dict)  # what effects remember (`wire/kept.py`); mostly nothing
 
 
 class Motion(eqx.Module):
@@ -44,6 +45,9 @@ class State(eqx.Module):
     wire: WireState
     motion: Motion
     reading: Scalar  # what the sensor shows: m, rad, or - (strain)
+    sensor: dict[str, Scalar] = eqx.field(
+        default_factory=dict
+    )  # what a sensor remembers (`reading.py`); mostly nothing
 
 
 class Trajectory(eqx.Module):

@@ -174,7 +174,7 @@ def test_cool_ends_are_those_of_the_fin() -> None:
     """Pieces of the two zones against the fin's own profile: the mean austenite of a wire whose pieces switch at z = 1/2."""
     half = 30.0  # mu l_0/2
     share = DEPTH / half
-    effect = EndConduction(share=share, heating_distance=5.0, cooling_distance=3.0)
+    effect = EndConduction(share=share, above_air_heating=5.0, above_air_cooling=3.0)
     for z in (2.0, 4.0, 8.0, 15.0):
         s = np.linspace(0.0, half, 200_001)
         own = (z + 5.0) * (1.0 - np.cosh(s) / np.cosh(half)) - 5.0

@@ -19,6 +19,7 @@ from smajax.presets import build
 from smajax.simulate import simulate
 from smajax.system import System
 from smajax.units import convert
+from tests.test_effects_material import RIGS as ELSEWHERE
 
 DT = 0.05
 # The first on which an effect applies shows it.
@@ -26,6 +27,8 @@ RIGS: dict[str, tuple[System, str, float]] = {
     "dead_weight": (build("flexinol_table_3_2", "dead_weight", "voltage"), "voltage", 7.4),
     "bias_spring": (build("flexinol_ht_500um", "bias_spring", "duty"), "duty", 0.35),
 }
+# Those of kinetics, constitutive law and sensor are together in one model a rig in `test_effects_material`.
+HERE = sorted(set(LIBRARY) - {name for *_, names in ELSEWHERE.values() for name in names})
 Array = np.ndarray
 Shown = tuple[Array, Array]  # reading and temperature, (members, samples) each
 
@@ -129,21 +132,21 @@ def _short(name: str) -> str:
     return name.split(".", 1)[1]
 
 
-@pytest.mark.parametrize("effect", sorted(LIBRARY))
+@pytest.mark.parametrize("effect", HERE)
 def test_at_its_base_the_model_is_the_base_model(effect: str) -> None:
     plain = _plain(_rig(effect))
     # The same equations in another program: products and sums are put together otherwise, to the last bit but one.
     np.testing.assert_allclose(_told(effect).at_base, plain, rtol=0.0, atol=1e-10 * np.ptp(plain))
 
 
-@pytest.mark.parametrize("effect", sorted(LIBRARY))
+@pytest.mark.parametrize("effect", HERE)
 def test_at_its_start_it_can_be_seen(effect: str) -> None:
     told = _told(effect)
     assert np.abs(told.at_starts - told.at_base).max() > 1e-4 * np.ptp(told.at_base)
 
 
 @pytest.mark.parametrize("share", [NUDGE, 1.0], ids=["next to nothing", "switched on"])
-@pytest.mark.parametrize("effect", sorted(LIBRARY))
+@pytest.mark.parametrize("effect", HERE)
 def test_its_derivatives_are_the_differences(effect: str, share: float) -> None:
     """Where its score is taken, and where a refit begins: at exactly zero a tail has no derivative (see `scores_at`)."""
     told = _told(effect)

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from smajax.compiled import simulate_compiled
 from smajax.effects.library import LIBRARY, at_base
 from smajax.extended import extended
 from smajax.parameters import get_parameters, parameters, set_parameters
@@ -84,7 +85,7 @@ def test_fraction_stays_in_range_with_every_effect_on(levels: list[float], share
         )
         for k, name in enumerate(names)
     }
-    run = RUN(set_parameters(full, on), _inputs(channel, top, levels), DT)
+    run = simulate_compiled(set_parameters(full, on), _inputs(channel, top, levels), DT)
     assert np.isfinite(run.position).all()
     assert np.isfinite(run.temperature).all()
     assert 0.0 <= float(run.martensite_fraction.min()) <= float(run.martensite_fraction.max()) <= 1.0
@@ -94,10 +95,10 @@ def test_the_library_at_its_base_value_is_the_base_model() -> None:
     """All of it together; one by one in `test_every_effect`."""
     for rig, (system, channel, top) in RIGS.items():
         inputs = _inputs(channel, top, [0.8, 0.2, 1.0, 0.0])
-        plain, same = RUN(system, inputs, DT), RUN(extended(system, tuple(LIBRARY)), inputs, DT)
+        plain, same = (simulate_compiled(one, inputs, DT) for one in (system, extended(system, tuple(LIBRARY))))
         for which in ("temperature", "martensite_fraction", "stress", "reading"):
             np.testing.assert_allclose(
-                getattr(same, which), getattr(plain, which), rtol=1e-12, atol=1e-12, err_msg=f"{rig}, {which}"
+                getattr(same, which), getattr(plain, which), rtol=1e-10, atol=1e-10, err_msg=f"{rig}, {which}"
             )
 
 

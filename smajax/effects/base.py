@@ -13,11 +13,13 @@ from typing import TYPE_CHECKING, ClassVar
 
 import equinox as eqx
 
-from smajax.types import Scalar
+from smajax.types import Scalar, WireState
 
 if TYPE_CHECKING:
     from smajax.load.base import AbstractMovingLoad
     from smajax.system import System
+    from smajax.wire.conditions import AbstractConditions
+    from smajax.wire.kinetics import Kinetics
     from smajax.wire.wire import Wire
 
 
@@ -91,6 +93,35 @@ class AbstractEffect(eqx.Module):
         own, base = type(self), AbstractEffect
         return own.heating_shape is not base.heating_shape or own.cooling_shape is not base.cooling_shape
 
+    def heating_distance(self, law: Kinetics, z: Scalar, temperature: Scalar, stress: Scalar, old: WireState) -> Scalar:
+        """The reduced distance itself, from what the law has; `old` is the wire before the step."""
+        return z
+
+    def cooling_distance(self, law: Kinetics, z: Scalar, temperature: Scalar, stress: Scalar, old: WireState) -> Scalar:
+        """Likewise on cooling."""
+        return z
+
+    def displaces(self) -> bool:
+        """Whether it moves a range: the direction of a step is then that of the moved distance."""
+        own, base = type(self), AbstractEffect
+        return own.heating_distance is not base.heating_distance or own.cooling_distance is not base.cooling_distance
+
+    def second_conditions(self) -> tuple[AbstractConditions, Scalar] | None:
+        """Branch conditions that a share of the wire follows in the place of the law's, and that share, -."""
+        return None
+
+    def kept_at_start(self, temperature: Scalar, stress: Scalar) -> dict[str, Scalar]:
+        """What it remembers of the wire from step to step, by name, at rest: an entry of `WireState.kept` each."""
+        return {}
+
+    def kept_after(self, old: WireState, temperature: Scalar, stress: Scalar, fraction: Scalar) -> dict[str, Scalar]:
+        """The same entries after a step from `old` to (`temperature`, `stress`, `fraction`)."""
+        return {}
+
+    def kept_strain(self, at: WireState) -> Scalar | float:
+        """Strain beside that of `strain` which depends on what is kept, a function of `at`, -."""
+        return 0.0
+
     def strain(
         self, wire: Wire, temperature: Scalar, stress: Scalar, fraction: Scalar, detwinned: Scalar
     ) -> Scalar | float:
@@ -116,6 +147,16 @@ class AbstractEffect(eqx.Module):
     def sensor_time_constant(self) -> Scalar | float:
         """Time constant of a first-order sensor, s."""
         return 0.0
+
+    recalls: ClassVar[bool] = False  # whether `sensed` needs its own last reading
+
+    def sensed(self, reading: Scalar, time: Scalar, last: Scalar) -> Scalar:
+        """What the sensor shows where it would show `reading`, the lag included; `last`: what this gave before."""
+        return reading
+
+    def senses(self) -> bool:
+        """Whether it changes what the sensor shows."""
+        return type(self).sensed is not AbstractEffect.sensed
 
 
 def having(effects: Sequence[AbstractEffect], method: str) -> list[AbstractEffect]:

@@ -30,8 +30,8 @@ class EndConduction(AbstractEffect):
     """
 
     share: Scalar = parameter("-", 0.0, 0.5, "w: share of the wire that lies in the two end zones")
-    heating_distance: Scalar = parameter("-", 0.5, 50.0, "q on heating: (A_s + sigma/C_A - T_inf)/(A_f - A_s), about")
-    cooling_distance: Scalar = parameter("-", 0.5, 50.0, "q on cooling: (M_f + sigma/C_M - T_inf)/(M_s - M_f), about")
+    above_air_heating: Scalar = parameter("-", 0.5, 50.0, "q on heating: (A_s + sigma/C_A - T_inf)/(A_f - A_s), about")
+    above_air_cooling: Scalar = parameter("-", 0.5, 50.0, "q on cooling: (M_f + sigma/C_M - T_inf)/(M_s - M_f), about")
 
     effect_name: ClassVar[str] = "end_conduction"
     title: ClassVar[str] = "cool ends (conduction into the clamps)"
@@ -45,18 +45,18 @@ class EndConduction(AbstractEffect):
         "does, and the ends turn back first."
     )
     switches: ClassVar[tuple[str, ...]] = ("share",)
-    starts: ClassVar[dict[str, float]] = {"share": 0.05, "heating_distance": 5.0, "cooling_distance": 3.0}
+    starts: ClassVar[dict[str, float]] = {"share": 0.05, "above_air_heating": 5.0, "above_air_cooling": 3.0}
 
     @classmethod
     def base(cls) -> EndConduction:
-        return cls(share=0.0, heating_distance=5.0, cooling_distance=3.0)
+        return cls(share=0.0, above_air_heating=5.0, above_air_cooling=3.0)
 
     def _mixed(self, z: Scalar, remaining: Scalar, distance: Scalar, steepness: float) -> Scalar:
         ends = sum(jax.nn.sigmoid(steepness * (z - missing * (z + distance) - 0.5)) for missing in MISSING)
         return (1.0 - self.share) * remaining + self.share / PIECES * ends
 
     def heating_shape(self, z: Scalar, remaining: Scalar) -> Scalar:
-        return self._mixed(z, remaining, self.heating_distance, -STEEPNESS)
+        return self._mixed(z, remaining, self.above_air_heating, -STEEPNESS)
 
     def cooling_shape(self, z: Scalar, remaining: Scalar) -> Scalar:
-        return self._mixed(z, remaining, self.cooling_distance, STEEPNESS)
+        return self._mixed(z, remaining, self.above_air_cooling, STEEPNESS)

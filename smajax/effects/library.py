@@ -8,31 +8,44 @@ from smajax.effects.ambient_drift import AmbientDrift
 from smajax.effects.asymmetric_transformation import AsymmetricTransformation
 from smajax.effects.base import AbstractEffect
 from smajax.effects.coulomb_friction import CoulombFriction
+from smajax.effects.creep import Creep
 from smajax.effects.dead_zone import DeadZone
 from smajax.effects.draught import Draught
+from smajax.effects.drifting_temperatures import DriftingTemperatures
 from smajax.effects.end_conduction import EndConduction
+from smajax.effects.enhanced_conditions import EnhancedConditions
 from smajax.effects.input_clock import InputClock
 from smajax.effects.input_delay import InputDelay
 from smajax.effects.input_level import InputLevel
+from smajax.effects.lagging_transformation import LaggingTransformation
 from smajax.effects.latent_heat import LatentHeat
 from smajax.effects.lead_resistance import LeadResistance
 from smajax.effects.load_shift import LoadShift
+from smajax.effects.minor_loops import MinorLoops
 from smajax.effects.nonlinear_spring import NonlinearSpring
 from smajax.effects.phase_resistance import PhaseResistance
 from smajax.effects.phase_specific_heat import PhaseSpecificHeat
 from smajax.effects.pwm_smoothing import PwmSmoothing
 from smajax.effects.radiation import Radiation
+from smajax.effects.residual_strain import ResidualStrain
 from smajax.effects.rising_convection import RisingConvection
+from smajax.effects.sensor_backlash import SensorBacklash
+from smajax.effects.sensor_drift import SensorDrift
+from smajax.effects.sensor_gain import SensorGain
 from smajax.effects.sensor_lag import SensorLag
+from smajax.effects.sensor_offset import SensorOffset
 from smajax.effects.series_compliance import SeriesCompliance
 from smajax.effects.slack import Slack
 from smajax.effects.smooth_transformation import SmoothTransformation
 from smajax.effects.stress_dependent_strain import StressDependentStrain
+from smajax.effects.stress_dependent_width import StressDependentWidth
 from smajax.effects.stribeck_friction import StribeckFriction
 from smajax.effects.supply_sag import SupplySag
 from smajax.effects.temperature_resistance import TemperatureResistance
 from smajax.effects.thermal_expansion import ThermalExpansion
 from smajax.effects.two_part_transformation import TwoPartTransformation
+from smajax.effects.two_way_memory import TwoWayMemory
+from smajax.effects.unequal_stress_slopes import UnequalStressSlopes
 from smajax.effects.viscous_friction import ViscousFriction
 from smajax.effects.wrong_load import WrongLoad
 
@@ -59,8 +72,17 @@ LIBRARY: dict[str, type[AbstractEffect]] = {
         SmoothTransformation,
         AsymmetricTransformation,
         TwoPartTransformation,
+        EnhancedConditions,
+        UnequalStressSlopes,
+        StressDependentWidth,
+        MinorLoops,
+        LaggingTransformation,
+        DriftingTemperatures,
         ThermalExpansion,
         StressDependentStrain,
+        TwoWayMemory,
+        ResidualStrain,
+        Creep,
         CoulombFriction,
         StribeckFriction,
         ViscousFriction,
@@ -70,6 +92,10 @@ LIBRARY: dict[str, type[AbstractEffect]] = {
         WrongLoad,
         LoadShift,
         SensorLag,
+        SensorGain,
+        SensorDrift,
+        SensorOffset,
+        SensorBacklash,
     )
 }
 

@@ -12,7 +12,11 @@ from smajax.types import Scalar
 
 
 class TwoPartTransformation(AbstractEffect):
-    r"""$h = (1 - w) h_{core} + w / (1 + e^{(z - 1/2 - s)/b})$ with its own w and s by branch and one width b."""
+    r"""$h = (1 - w) h_{core} + w / (1 + e^{(z - 1/2 - s)/b})$ with its own w and s by branch and one width b.
+
+    A transformation in two steps too, as by the R-phase on cooling: `cooling_weight` of the wire transforms in a range of
+    its own, `cooling_shift` ranges from the other. Only its strain is that of martensite here.
+    """
 
     heating_weight: Scalar = parameter("-", 0.0, 0.8, "w on heating: share of the wire that follows the tails")
     cooling_weight: Scalar = parameter("-", 0.0, 0.8, "w on cooling")

@@ -14,7 +14,8 @@ from smajax.step import step
 from smajax.system import System
 from smajax.types import Motion, Scalar, State
 from smajax.wire.constitutive import strain_at, stress_at
-from smajax.wire.kinetics import austenite_left, martensite_left
+from smajax.wire.kept import kept_after, over
+from smajax.wire.mixture import corrected, moved
 
 # Position (rad, m), velocity, temperature (C), martensite fraction.
 Corrected = Float[Array, "4"]
@@ -32,7 +33,7 @@ def with_vector(system: System, state: State, vector: Corrected) -> State:
     Strain follows from the position and stress from the constitutive law, which counts from `state`. The curves of the
     kinetics stay: on a branch the fraction belongs to the temperature, which is how a reading of the position tells it.
     """
-    load, wire, effects, old = system.load, system.wire, system.effects, state.wire
+    load, wire, effects, old = system.load, system.wire, system.effects, over(state.wire, 0.0)
     assert isinstance(load, AbstractMovingLoad)
     position = limited(vector[0], *load.limits())
     velocity, temperature, fraction = vector[1], vector[2], limited(vector[3], 0.0, 1.0)
@@ -40,28 +41,21 @@ def with_vector(system: System, state: State, vector: Corrected) -> State:
     stress = stress_at(wire, effects, old, strain, temperature, old.stress, fraction)
     new = dataclasses.replace(
         old,
+        kept=kept_after(effects, old, temperature, stress, fraction),
         temperature=temperature,
         stress=stress,
         strain=strain_at(wire, effects, old, temperature, stress, fraction),
         martensite_fraction=fraction,
         detwinned_fraction=wire.kinetics.variants.detwinned(old, stress, fraction),
     )
-    return State(state.time, new, Motion(position, velocity, state.motion.friction), state.reading)
+    new = moved(effects, old, new)
+    return State(state.time, new, Motion(position, velocity, state.motion.friction), state.reading, state.sensor)
 
 
 def with_correction(system: System, state: State, vector: Corrected, transforming: Bool[Array, ""]) -> State:
     """`with_vector`, and the curves laid so that the corrected fraction does not jump in the next step."""
     new = with_vector(system, state, vector)
-    law, at = system.wire.kinetics, (new.wire.temperature, new.wire.stress)
-    h, k = martensite_left(law, system.effects, *at), austenite_left(law, system.effects, *at)
-    kept = law.renewal.corrected(state.wire, transforming, h, k, new.wire.martensite_fraction)
-    wire = dataclasses.replace(
-        new.wire,
-        xi_M=kept.xi_M,
-        xi_A=kept.xi_A,
-        heating_missed=kept.heating_missed,
-        cooling_missed=kept.cooling_missed,
-    )
+    wire = corrected(system.wire.kinetics, system.effects, state.wire, new.wire, transforming)
     return dataclasses.replace(new, wire=wire)
 
 

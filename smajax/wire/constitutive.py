@@ -13,6 +13,7 @@ import jax.numpy as jnp
 from smajax.effects.base import AbstractEffect
 from smajax.parameters import parameter
 from smajax.types import Scalar, WireState
+from smajax.wire.kept import kept_after
 from smajax.wire.root import root
 from smajax.wire.stiffness import AbstractStiffness, Mixed
 
@@ -102,17 +103,20 @@ def transformation_strain(wire: Wire, fraction: Scalar) -> Scalar:
 def effect_strain(wire: Wire, effects: Sequence[AbstractEffect], at: WireState) -> Scalar | float:
     """Strain that the effects add to eps_L xi_s and the elastic part, a function of state, -."""
     state = at.temperature, at.stress, at.martensite_fraction, at.detwinned_fraction
-    return sum(effect.strain(wire, *state) for effect in effects)
+    return sum(effect.strain(wire, *state) + effect.kept_strain(at) for effect in effects)
 
 
-def _tried(wire: Wire, old: WireState, temperature: Scalar, stress: Scalar, xi: Scalar) -> WireState:
-    """`old` with the unknowns of a step put in, and the detwinned part that belongs to them."""
+def _tried(
+    wire: Wire, effects: Sequence[AbstractEffect], old: WireState, temperature: Scalar, stress: Scalar, xi: Scalar
+) -> WireState:
+    """`old` with the unknowns of a step put in, and the detwinned part and the memory that belong to them."""
     detwinned = wire.kinetics.variants.detwinned(old, stress, xi)
     changed = {
         "temperature": temperature,
         "stress": stress,
         "martensite_fraction": xi,
         "detwinned_fraction": detwinned,
+        "kept": kept_after(effects, old, temperature, stress, xi),
     }
     return dataclasses.replace(old, **changed)
 
@@ -133,7 +137,7 @@ def stress_at(
     """
 
     def asked(guess: Scalar) -> Scalar:
-        new = _tried(wire, old, temperature, guess, xi)
+        new = _tried(wire, effects, old, temperature, guess, xi)
         at, stress_there, modulus = wire.constitutive.form.elastic_line(wire, effects, old, new)
         pulled = stress_there + modulus * (strain - at)
         return jnp.where(pulled < 0.0, 0.0, pulled)
@@ -151,6 +155,6 @@ def strain_at(
     wire: Wire, effects: Sequence[AbstractEffect], old: WireState, temperature: Scalar, stress: Scalar, xi: Scalar
 ) -> Scalar:
     """The wire's own strain at a given stress, -: the same law read the other way round."""
-    new = _tried(wire, old, temperature, stress, xi)
+    new = _tried(wire, effects, old, temperature, stress, xi)
     at, stress_there, modulus = wire.constitutive.form.elastic_line(wire, effects, old, new)
     return at + (stress - stress_there) / modulus

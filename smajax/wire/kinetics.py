@@ -22,6 +22,7 @@ from smajax.effects.base import AbstractEffect
 from smajax.parameters import parameter
 from smajax.types import Scalar, WireState
 from smajax.wire.conditions import AbstractConditions
+from smajax.wire.kept import kept_after, over
 from smajax.wire.renewal import FINISHED, AbstractRenewal, Corrected, beyond
 from smajax.wire.shape import AbstractShape, Cosine
 from smajax.wire.variants import AbstractVariants, Single
@@ -55,34 +56,66 @@ def cooling_temperature(law: Kinetics, temperature: Scalar, stress: Scalar) -> S
     return temperature - stress / law.stress_slope_martensite
 
 
-def heating_distance(law: Kinetics, temperature: Scalar, stress: Scalar) -> Scalar:
-    """z = (y_A - A_s)/(A_f - A_s)."""
-    width = jnp.maximum(law.austenite_finish - law.austenite_start, NARROWEST_RANGE)
-    return (heating_temperature(law, temperature, stress) - law.austenite_start) / width
+def heating_width(law: Kinetics) -> Scalar:
+    """A_f - A_s, C."""
+    return jnp.maximum(law.austenite_finish - law.austenite_start, NARROWEST_RANGE)
 
 
-def cooling_distance(law: Kinetics, temperature: Scalar, stress: Scalar) -> Scalar:
-    """z = (y_M - M_f)/(M_s - M_f)."""
-    width = jnp.maximum(law.martensite_start - law.martensite_finish, NARROWEST_RANGE)
-    return (cooling_temperature(law, temperature, stress) - law.martensite_finish) / width
+def cooling_width(law: Kinetics) -> Scalar:
+    """M_s - M_f, C."""
+    return jnp.maximum(law.martensite_start - law.martensite_finish, NARROWEST_RANGE)
+
+
+def heating_distance(
+    law: Kinetics, effects: Sequence[AbstractEffect], temperature: Scalar, stress: Scalar, old: WireState | None
+) -> Scalar:
+    """z = (y_A - A_s)/(A_f - A_s) of a step from `old`, which only effects look at."""
+    z = (heating_temperature(law, temperature, stress) - law.austenite_start) / heating_width(law)
+    for effect in effects:
+        assert old is not None, "what has effects is given the wire before the step"
+        z = effect.heating_distance(law, z, temperature, stress, old)
+    return z
+
+
+def cooling_distance(
+    law: Kinetics, effects: Sequence[AbstractEffect], temperature: Scalar, stress: Scalar, old: WireState | None
+) -> Scalar:
+    """z = (y_M - M_f)/(M_s - M_f), likewise."""
+    z = (cooling_temperature(law, temperature, stress) - law.martensite_finish) / cooling_width(law)
+    for effect in effects:
+        assert old is not None, "what has effects is given the wire before the step"
+        z = effect.cooling_distance(law, z, temperature, stress, old)
+    return z
 
 
 def _or_none(share: Scalar) -> Scalar:
     return jnp.where(share > FINISHED, share, 0.0)
 
 
-def martensite_left(law: Kinetics, effects: Sequence[AbstractEffect], temperature: Scalar, stress: Scalar) -> Scalar:
+def martensite_left(
+    law: Kinetics,
+    effects: Sequence[AbstractEffect],
+    temperature: Scalar,
+    stress: Scalar,
+    old: WireState | None = None,
+) -> Scalar:
     r"""h((y_A - A_s)/(A_f - A_s)) of the law's shape and the effects: 1 below the range (Elahinia 2004, eq. 3.10)."""
-    z = heating_distance(law, temperature, stress)
+    z = heating_distance(law, effects, temperature, stress, old)
     share = law.shape.martensite_left(z)
     for effect in effects:
         share = effect.heating_shape(z, share)
     return _or_none(share)
 
 
-def austenite_left(law: Kinetics, effects: Sequence[AbstractEffect], temperature: Scalar, stress: Scalar) -> Scalar:
+def austenite_left(
+    law: Kinetics,
+    effects: Sequence[AbstractEffect],
+    temperature: Scalar,
+    stress: Scalar,
+    old: WireState | None = None,
+) -> Scalar:
     r"""k((y_M - M_f)/(M_s - M_f)) of the law's shape and the effects: 1 above the range (Elahinia 2004, eq. 3.5)."""
-    z = cooling_distance(law, temperature, stress)
+    z = cooling_distance(law, effects, temperature, stress, old)
     share = law.shape.austenite_left(z)
     for effect in effects:
         share = effect.cooling_shape(z, share)
@@ -100,11 +133,12 @@ class Branch(eqx.Module):
 
     heating: Bool[Array, ""]
     cooling: Bool[Array, ""]
+    parts: tuple[Branch, Branch] | None = None  # of a wire in two parts (`mixture.py`)
 
 
 def _shares(law: Kinetics, effects: Sequence[AbstractEffect], state: WireState) -> tuple[Scalar, Scalar]:
     """(h, k) at a state."""
-    at = state.temperature, state.stress
+    at = state.temperature, state.stress, over(state, 0.0)
     return martensite_left(law, effects, *at), austenite_left(law, effects, *at)
 
 
@@ -112,7 +146,8 @@ def curves(
     law: Kinetics, effects: Sequence[AbstractEffect], state: WireState, temperature: Scalar, stress: Scalar
 ) -> tuple[Scalar, Scalar]:
     """xi on the heating curve (eq. 3.3) and on the cooling curve (eq. 3.5) that belong to `state`."""
-    h, k = martensite_left(law, effects, temperature, stress), austenite_left(law, effects, temperature, stress)
+    at = temperature, stress, state
+    h, k = martensite_left(law, effects, *at), austenite_left(law, effects, *at)
     return law.renewal.curves(state, *_shares(law, effects, state), h, k)
 
 
@@ -127,8 +162,9 @@ def curve_on(
     """`fraction_on` of `curves`, with the one shape of the branch computed, where no effect shapes the two apart."""
     if any(effect.shapes() for effect in effects):
         return fraction_on(state, branch, *curves(law, effects, state, temperature, stress))
-    mirrored = 1.0 - cooling_distance(law, temperature, stress)
-    z = jnp.where(branch.cooling, mirrored, heating_distance(law, temperature, stress))
+    at = temperature, stress, state
+    mirrored = 1.0 - cooling_distance(law, effects, *at)
+    z = jnp.where(branch.cooling, mirrored, heating_distance(law, effects, *at))
     share = _or_none(law.shape.martensite_left(z))
     return fraction_on(state, branch, *law.renewal.curves(state, *_shares(law, effects, state), share, share))
 
@@ -138,13 +174,32 @@ def open_branches(law: Kinetics, effects: Sequence[AbstractEffect], state: WireS
     if any(effect.shapes() for effect in effects):
         h, k = _shares(law, effects, state)
         return Branch(h > 0.0, k > 0.0)
-    at = state.temperature, state.stress
+    at = state.temperature, state.stress, over(state, 0.0)
     left = law.shape.anything_left
-    return Branch(left(heating_distance(law, *at)), left(1.0 - cooling_distance(law, *at)))
+    return Branch(left(heating_distance(law, effects, *at)), left(1.0 - cooling_distance(law, effects, *at)))
+
+
+def _tightening(
+    law: Kinetics, effects: Sequence[AbstractEffect], state: WireState, temperature: Scalar, stress: Scalar
+) -> tuple[Scalar, Scalar]:
+    """Change of stress of a step as the directions of heating and of cooling see it, Pa.
+
+    Where an effect moves a range, the stress that would have moved it as far: the enhanced conditions ask whether the
+    wire goes through the range, not why.
+    """
+    tighter = stress - state.stress
+    if not any(effect.displaces() for effect in effects):
+        return tighter, tighter
+    warmer = temperature - state.temperature
+    new, old = (temperature, stress, state), (state.temperature, state.stress, over(state, 0.0))
+    heated = heating_width(law) * (heating_distance(law, effects, *new) - heating_distance(law, effects, *old))
+    cooled = cooling_width(law) * (cooling_distance(law, effects, *new) - cooling_distance(law, effects, *old))
+    return (warmer - heated) * law.stress_slope_austenite, (warmer - cooled) * law.stress_slope_martensite
 
 
 def choose_branch(
     law: Kinetics,
+    effects: Sequence[AbstractEffect],
     state: WireState,
     open_at_start: Branch,
     temperature: Scalar,
@@ -157,11 +212,12 @@ def choose_branch(
     `heated` and `cooled` are the curves there. The ranges are [A_s', A_f'] for heating and [M_f', M_s'] for cooling
     (eq. 3.18 prints A_s in the place of M_s, twice; Table 3.3 and eq. 3.6 have M_s).
     """
-    warmer, tighter = temperature - state.temperature, stress - state.stress
+    warmer = temperature - state.temperature
+    tighter, tighter_cooling = _tightening(law, effects, state, temperature, stress)
     loss, gain = state.martensite_fraction - heated, cooled - state.martensite_fraction
     loaded = state.formed_by_loading > 0.5
     may_heat = law.conditions.heats(warmer, tighter, law.stress_slope_austenite, loaded) & open_at_start.heating
-    may_cool = law.conditions.cools(warmer, tighter, law.stress_slope_martensite) & open_at_start.cooling
+    may_cool = law.conditions.cools(warmer, tighter_cooling, law.stress_slope_martensite) & open_at_start.cooling
     heating, cooling = beyond(loss) & may_heat, beyond(gain) & may_cool
     # Overlapping ranges can ask for both; one step transforms one way only (source, after eq. 3.26).
     return Branch(heating & ~(cooling & (gain > loss)), cooling & ~(heating & (gain <= loss)))
@@ -186,7 +242,8 @@ def remembered(
     xi: Scalar,
 ) -> WireState:
     """The wire after a step that ended at (`temperature`, `stress`, `strain`, `xi`), its memory brought up to date."""
-    h, k = martensite_left(law, effects, temperature, stress), austenite_left(law, effects, temperature, stress)
+    at = temperature, stress, old
+    h, k = martensite_left(law, effects, *at), austenite_left(law, effects, *at)
     kept = law.renewal.renewed(old, branch.heating, branch.cooling, h, k, xi)
     by_loading = (stress - old.stress) / law.stress_slope_martensite > old.temperature - temperature
     formed_by_loading = jnp.where(branch.cooling, 1.0 * by_loading, old.formed_by_loading)
@@ -202,4 +259,5 @@ def remembered(
         kept.cooling_missed,
         detwinned,
         formed_by_loading,
+        kept_after(effects, old, temperature, stress, xi),
     )

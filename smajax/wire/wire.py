@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 
 import equinox as eqx
@@ -13,6 +14,7 @@ from smajax.types import Scalar, WireState
 from smajax.wire.constitutive import Constitutive
 from smajax.wire.heat import Heat
 from smajax.wire.kinetics import Kinetics, austenite_left, martensite_left
+from smajax.wire.mixture import begun
 from smajax.wire.resistance import Resistance
 
 
@@ -40,20 +42,20 @@ def start(
     xi_M = 1 and xi_A = 0 for a fully martensitic cold wire, as the source says (sec. 3.7); anywhere else both curves
     are laid through the given state.
     """
-    h = martensite_left(wire.kinetics, effects, temperature, stress)
-    k = austenite_left(wire.kinetics, effects, temperature, stress)
-    kept = wire.kinetics.renewal.start(h, k, fraction)
-    detwinned = wire.kinetics.variants.detwinned_at_start(stress, fraction)
     zero = jnp.zeros_like(stress)
-    return WireState(
-        temperature,
-        stress,
-        strain,
-        fraction,
-        kept.xi_M,
-        kept.xi_A,
-        kept.heating_missed + zero,
-        kept.cooling_missed + zero,
-        detwinned,
-        zero,
+    kept: dict[str, Scalar] = {}
+    for effect in effects:
+        kept.update(effect.kept_at_start(temperature, stress))
+    detwinned = wire.kinetics.variants.detwinned_at_start(stress, fraction)
+    whole = WireState(temperature, stress, strain, fraction, zero + 1.0, zero, zero, zero, detwinned + zero, zero, kept)
+    h = martensite_left(wire.kinetics, effects, temperature, stress, whole)
+    k = austenite_left(wire.kinetics, effects, temperature, stress, whole)
+    laid = wire.kinetics.renewal.start(h, k, fraction)
+    whole = dataclasses.replace(
+        whole,
+        xi_M=laid.xi_M,
+        xi_A=laid.xi_A,
+        heating_missed=laid.heating_missed + zero,
+        cooling_missed=laid.cooling_missed + zero,
     )
+    return begun(effects, whole)

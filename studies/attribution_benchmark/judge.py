@@ -106,8 +106,9 @@ def judge(truth: Mapping[str, Any], report: Mapping[str, Any], seconds: float) -
 
 def load(path: Path) -> Judged:
     """One that `save` wrote."""
-    record = json.loads(path.read_text(encoding="utf-8"))
-    return Judged(**{name: tuple(value) if isinstance(value, list) else value for name, value in record.items()})
+    record: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    fields: dict[str, Any] = {name: tuple(one) if isinstance(one, list) else one for name, one in record.items()}
+    return Judged(**fields)
 
 
 def save(one: Judged, path: Path) -> None:

@@ -1,0 +1,59 @@
+"""A transformation that lags behind the temperature: the faster the wire is heated, the higher its range seems."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+import jax.numpy as jnp
+
+from smajax.effects.base import AbstractEffect
+from smajax.parameters import parameter
+from smajax.types import Scalar, WireState
+from smajax.wire.kept import DURATION, following
+from smajax.wire.kinetics import cooling_width, heating_width
+
+if TYPE_CHECKING:
+    from smajax.wire.kinetics import Kinetics
+
+
+LAGGING = "lagging_temperature"
+
+
+class LaggingTransformation(AbstractEffect):
+    r"""$\tau \dot T_k + T_k = T$, with T_k in the place of T in both curves.
+
+    At a steady rate the ranges are shifted by $\tau \dot T$: up on heating, down on cooling. The late temperature is
+    carried from step to step, solved together with everything else.
+    """
+
+    time_constant: Scalar = parameter("s", 0.0, 20.0, "tau")
+
+    effect_name: ClassVar[str] = "lagging_transformation"
+    title: ClassVar[str] = "transformation that depends on the rate"
+    equation: ClassVar[str] = "kinetics"
+    formula: ClassVar[str] = "tau dT_k/dt + T_k = T, T_k in the place of T in eq. 3.3 and 3.5 (a lag of first order)"
+    sentence: ClassVar[str] = (
+        "The phases take time to change: when heated or cooled quickly the wire transforms at a higher (lower) "
+        "temperature, and goes on for a moment when the temperature stands still."
+    )
+    switches: ClassVar[tuple[str, ...]] = ("time_constant",)
+    starts: ClassVar[dict[str, float]] = {"time_constant": 0.1}
+
+    @classmethod
+    def base(cls) -> LaggingTransformation:
+        return cls(time_constant=0.0)
+
+    def kept_at_start(self, temperature: Scalar, stress: Scalar) -> dict[str, Scalar]:
+        return {LAGGING: temperature, DURATION: jnp.zeros_like(temperature)}
+
+    def kept_after(self, old: WireState, temperature: Scalar, stress: Scalar, fraction: Scalar) -> dict[str, Scalar]:
+        return {LAGGING: following(old, LAGGING, temperature, self.time_constant)}
+
+    def _behind(self, temperature: Scalar, old: WireState) -> Scalar:
+        return following(old, LAGGING, temperature, self.time_constant) - temperature
+
+    def heating_distance(self, law: Kinetics, z: Scalar, temperature: Scalar, stress: Scalar, old: WireState) -> Scalar:
+        return z + self._behind(temperature, old) / heating_width(law)
+
+    def cooling_distance(self, law: Kinetics, z: Scalar, temperature: Scalar, stress: Scalar, old: WireState) -> Scalar:
+        return z + self._behind(temperature, old) / cooling_width(law)

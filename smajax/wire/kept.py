@@ -1,0 +1,45 @@
+"""What effects remember of a wire from step to step: entries of `WireState.kept`, there only if an effect asks for them."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import jax.numpy as jnp
+
+from smajax.types import Scalar, WireState
+
+if TYPE_CHECKING:
+    from smajax.effects.base import AbstractEffect
+
+DURATION = "duration"  # s, of the step that is being made
+TRANSFORMED = "transformed"  # -, sum of all |d xi| so far; 2 a full cycle
+
+
+def kept_after(
+    effects: Sequence[AbstractEffect], old: WireState, temperature: Scalar, stress: Scalar, fraction: Scalar
+) -> dict[str, Scalar]:
+    """The memory after a step from `old`, known before the step is solved: stress and strain belong to it exactly."""
+    kept = dict(old.kept)
+    for effect in effects:
+        kept.update(effect.kept_after(old, temperature, stress, fraction))
+    return kept
+
+
+def over(old: WireState, duration: Scalar | float) -> WireState:
+    """`old` as the beginning of a step of `duration` seconds; 0: as it is."""
+    if DURATION not in old.kept:
+        return old
+    return dataclasses.replace(old, kept={**old.kept, DURATION: duration + jnp.zeros_like(old.stress)})
+
+
+def transformed(old: WireState, fraction: Scalar) -> dict[str, Scalar]:
+    """The entry `TRANSFORMED` after a step."""
+    return {TRANSFORMED: old.kept[TRANSFORMED] + jnp.abs(fraction - old.martensite_fraction)}
+
+
+def following(old: WireState, name: str, value: Scalar, time_constant: Scalar) -> Scalar:
+    """The entry `name` after a step towards `value` with a time constant (s): backward Euler, `value` itself at 0 s."""
+    duration = jnp.maximum(old.kept[DURATION], 1e-12)
+    return value + time_constant / (time_constant + duration) * (old.kept[name] - value)
