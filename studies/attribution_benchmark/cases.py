@@ -20,6 +20,9 @@ NULLS = 30  # a rig
 LARGEST_CHANGE = 0.25  # of a base parameter
 LARGEST_SHIFT, LARGEST_WIDTH = 5.0, 0.25  # K of a range; of its width
 LARGEST_SLOPE = 0.1  # of C_A, C_M
+# What other values of the unknowns, or a run's zero, take up whole: the right answer is that nothing is missing.
+ABSORBED = ("sensor_offset", "input_gain", "end_conduction")
+ABSORBED_SHARE = 0.3  # of the largest coefficient
 # Pairs of different kinds that a bench may well hold at once.
 PAIRS = (
     ("latent_heat", "coulomb_friction"),
@@ -44,7 +47,7 @@ COUPON_PAIRS = (
 
 @dataclass(frozen=True)
 class Case:
-    """One case; `strength` 0: a null."""
+    """One case; `strength` 0: a null, or effects that a refit takes up."""
 
     rig: str
     effects: tuple[str, ...]
@@ -59,7 +62,9 @@ class Case:
 
     @property
     def kind(self) -> str:
-        """null, single, pair or outside."""
+        """null, absorbed, single, pair or outside."""
+        if self.effects and not self.strength:
+            return "absorbed"
         if any(EFFECTS[name].outside for name in self.effects):
             return "outside"
         return ("null", "single", "pair")[len(self.effects)]
@@ -91,6 +96,9 @@ def cases() -> list[Case]:
     found = [Case(rig, (), 0.0, i) for rig in RIGS for i in range(NULLS)]
     for name in EFFECTS:
         for rig in (rig for rig in RIGS if applies(name, rig)):
+            if name in ABSORBED:
+                found.append(Case(rig, (name,), 0.0, 0))
+                continue
             found += [Case(rig, (name,), strength, i) for i, strength in enumerate(STRENGTHS)]
     for rig in RIGS:
         for pair in COUPON_PAIRS if rig == "coupon" else PAIRS:
@@ -124,6 +132,10 @@ def truth(case: Case) -> Truth:
     if not case.effects:
         return Truth(case.rig, wire, {}, {}, 0.0)
     ruler = Ruler(rig, wire)
+    if case.kind == "absorbed":
+        effects = {name: ABSORBED_SHARE * EFFECTS[name].largest for name in case.effects}
+        strength = ruler.strength(effects)
+        return Truth(case.rig, wire, effects, {n: Found(c, strength, False) for n, c in effects.items()}, strength)
     found = {name: ruler.find(name, case.strength) for name in case.effects}
     effects = {name: f.coefficient for name, f in found.items()}
     alone = len(found) == 1

@@ -15,7 +15,7 @@ from studies.attribution_benchmark.parameters import Effects, Wire
 from studies.attribution_benchmark.runs import Run
 
 Vector = NDArray[np.float64]
-SUBSTEPS = 8
+SUBSTEPS = 4
 LEVEL = 100e6  # Pa: stress at which widths are as given
 
 

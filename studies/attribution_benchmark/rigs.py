@@ -73,7 +73,7 @@ HEATED = (
     "martensite_start",
     "martensite_finish",
 )
-ARM_CLOCK, HUNG_CLOCK, SPRING_CLOCK = Clock(0.1, 5, 401), Clock(0.1, 5, 401), Clock(0.4, 5, 401)
+ARM_CLOCK, HUNG_CLOCK, SPRING_CLOCK = Clock(0.025, 20, 801), Clock(0.05, 10, 601), Clock(0.25, 8, 601)
 COUPON_CLOCK = Clock(1.0, 1, 401)
 ARM = Rig(
     "arm",
@@ -92,7 +92,7 @@ ARM = Rig(
     _arm,
     ARM_CLOCK,
     lambda wire: powered(ARM_CLOCK, wire, 105e6, 105e6),
-    math.radians(0.3),
+    math.radians(0.4),
     HEATED,
 )
 DEAD_WEIGHT = Rig(
@@ -197,10 +197,14 @@ def actuator_of(rig: Rig, wire: Wire, run: Run, effects: Effects) -> Actuator:
     return Actuator(wire, load, effects, rig.clock.seconds, float(run.command.max()))
 
 
-def show(rig: Rig, wire: Wire, run: Run, effects: Effects) -> Vector:
-    """Noise-free reading of one run: angle from its start (rad), way (m), or strain from its start."""
+def value(rig: Rig, wire: Wire, run: Run, effects: Effects) -> Vector:
+    """What a perfect sensor would read in one run: angle from its start (rad), way (m), or strain from its start."""
     if rig.load is None:
-        value = strain(wire, rig.clock.times, run, effects)
-        return reading(rig.clock.times, value - value[0], effects, rig.stroke)
-    value = simulate(rig, wire, run, effects)[2]
-    return reading(rig.clock.times, value - value[0], effects, rig.stroke)
+        return strain(wire, rig.clock.times, run, effects)
+    position = simulate(rig, wire, run, effects)[2]
+    return position - position[0]
+
+
+def show(rig: Rig, wire: Wire, run: Run, effects: Effects) -> Vector:
+    """Noise-free reading of one run."""
+    return reading(rig.clock.times, value(rig, wire, run, effects), effects, rig.stroke)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from studies.attribution_benchmark.parameters import Wire
 
 Vector = NDArray[np.float64]
+COOLED = 12.0  # K below the end of cooling
 
 
 @dataclass(frozen=True)
@@ -80,7 +81,10 @@ def command(wire: Wire, temperature: Vector) -> Vector:
 
 @dataclass(frozen=True)
 class Marks:
-    """Temperatures, degC, at which a wire under some stress begins and ends to transform; its time constant, s."""
+    """Temperatures, degC, at which a wire under some stress begins and ends to transform; its time constant, s.
+
+    `off` is where a run lets it cool to: not so far that it cools faster than the load can follow, and goes slack.
+    """
 
     off: float
     start: float
@@ -94,8 +98,8 @@ class Marks:
         """Marks of a wire that carries about `stress`, Pa."""
         up, down = stress / wire.stress_slope_austenite, stress / wire.stress_slope_martensite
         slow = wire.mass * wire.specific_heat / (wire.convection_coefficient * wire.surface)
-        hot = wire.austenite_start + up, wire.austenite_finish + up
-        return Marks(wire.ambient_temperature, *hot, wire.martensite_start + down, wire.martensite_finish + down, slow)
+        hot, cold = (wire.austenite_start + up, wire.austenite_finish + up), wire.martensite_finish + down
+        return Marks(max(cold - COOLED, wire.ambient_temperature), *hot, wire.martensite_start + down, cold, slow)
 
     @property
     def middle(self) -> float:
@@ -125,7 +129,7 @@ def powered(clock: Clock, wire: Wire, light: float, heavy: float, masses: Sequen
         return Run(name, role, command(wire, temperature), mass)
 
     steps = clock.levels(
-        (0.03, m.off), (0.22, m.full + 10), (0.2, m.off), (0.2, m.hot(0.5)), (0.15, m.full + 20), (0.2, m.off)
+        (0.03, m.off), (0.22, m.full + 8), (0.2, m.off), (0.2, m.hot(0.5)), (0.15, m.full + 12), (0.2, m.off)
     )
     rungs = [
         h.start - 4,
@@ -135,9 +139,7 @@ def powered(clock: Clock, wire: Wire, light: float, heavy: float, masses: Sequen
         h.cold - 5,
     ]
     ladder = clock.levels(*[(0.1, rung) for rung in rungs])
-    triangle = clock.ramps(
-        (0, m.off + 10), (0.35, m.full + 12), (0.65, m.cold - 10), (0.85, m.hot(0.5)), (1, m.cold - 10)
-    )
+    triangle = clock.ramps((0, m.off), (0.35, m.full + 12), (0.65, m.cold - 10), (0.85, m.hot(0.5)), (1, m.cold - 10))
     loops = clock.sines(m.middle, wave(0.5 * (m.full - m.cold) + 6, 5, 1.2))
     bursts = [pair for on in (0.07, 0.1, 0.14) for pair in ((on, h.full + 12), (0.12, m.cold - 12))]
     pulses = clock.levels(*bursts, (0.13, h.full), (1, m.off))

@@ -35,7 +35,7 @@ def reading(times: Vector, value: Vector, effects: Effects, stroke: float) -> Ve
         shown += eccentric * np.sin(2 * np.pi * shown / (ECCENTRIC_PERIOD * stroke) + ECCENTRIC_PHASE)
     flat = get("sensor_saturation", 0.0)
     if flat:  # the sensor's slope falls over the far half of the stroke
-        x = np.maximum(shown / stroke - 0.5, 0.0)
-        shown -= flat * stroke * x**2
+        x = np.maximum(np.abs(shown) / stroke - 0.5, 0.0)
+        shown -= np.sign(shown) * flat * stroke * x**2
     cell = get("quantisation", 0.0) * stroke
     return np.round(shown / cell) * cell if cell else shown

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from studies.attribution_benchmark.effects import EFFECTS
 from studies.attribution_benchmark.parameters import Effects, Wire
-from studies.attribution_benchmark.rigs import Rig, show
+from studies.attribution_benchmark.rigs import Rig, value
+from studies.attribution_benchmark.sensor import reading
 
 Vector = NDArray[np.float64]
 TOLERANCE = 0.1  # of the strength asked for
@@ -38,20 +39,26 @@ class Ruler:
 
     def __init__(self, rig: Rig, wire: Wire) -> None:
         self.rig, self.wire = rig, wire
+        self._values: dict[tuple[object, ...], list[Vector]] = {}  # a sensor's effects need no new simulation
         self.runs = [run for run in rig.runs(wire) if run.role == "fit"]
         self.null = self.readings(wire, {})
         self.basis = np.linalg.qr(np.column_stack(self._columns()))[0]
 
     def readings(self, wire: Wire, effects: Effects) -> Vector:
         """Noise-free readings of all fit runs, in noises."""
-        return np.concatenate([show(self.rig, wire, run, effects) for run in self.runs]) / self.rig.noise
+        behind = {name: c for name, c in effects.items() if EFFECTS[name].group != "sensor"}
+        key = (wire, *sorted(behind.items()))
+        if key not in self._values:
+            self._values[key] = [value(self.rig, wire, run, behind) for run in self.runs]
+        times, stroke = self.rig.clock.times, self.rig.stroke
+        return np.concatenate([reading(times, x, effects, stroke) for x in self._values[key]]) / self.rig.noise
 
     def _columns(self) -> list[Vector]:
         columns = []
         for name in self.rig.unknowns:
-            value = getattr(self.wire, name)
-            step = DEGREES if name.endswith(("start", "finish")) else SHARE * value
-            column = (self.readings(replace(self.wire, **{name: value + step}), {}) - self.null) / step
+            nominal = getattr(self.wire, name)
+            step = DEGREES if name.endswith(("start", "finish")) else SHARE * nominal
+            column = (self.readings(replace(self.wire, **{name: nominal + step}), {}) - self.null) / step
             columns.append(column / np.linalg.norm(column))
         count = self.rig.clock.count
         for i in range(len(self.runs)):
@@ -101,4 +108,4 @@ def _next(trials: list[tuple[float, float]]) -> float:
         slope = (a[1] - b[1]) / (a[0] - b[0]) if a[0] != b[0] else 1.0
     nearest = min(trials, key=lambda trial: abs(trial[1]))
     move = -nearest[1] / min(max(slope, 0.3), 3.0)
-    return nearest[0] + min(max(move, -4.0), 4.0)
+    return nearest[0] + min(max(move, -3.0), 3.0)
