@@ -12,7 +12,7 @@ import pytest
 
 from studies.attribution_benchmark.actuator import Actuator
 from studies.attribution_benchmark.cases import Case, cases, true_wire, truth
-from studies.attribution_benchmark.effects import EFFECTS, applies
+from studies.attribution_benchmark.effects import EFFECTS, absorbed, applies
 from studies.attribution_benchmark.kinetics import Curve
 from studies.attribution_benchmark.rigs import RIGS, Rig, actuator_of, show, simulate
 from studies.attribution_benchmark.runs import Clock, Run
@@ -149,6 +149,19 @@ def test_a_case_is_the_same_each_time(tmp_path) -> None:
     assert not any("truth" in p.name for p in (tmp_path / "one" / case.name).iterdir())
 
 
+def test_what_is_called_absorbed_is_another_value_of_the_unknowns() -> None:
+    """Gain of the voltage and loss to the ends: the same readings as other h_c and c_p without them."""
+    rig, run = _short("arm")
+    run, rig = replace(run, command=1.1 * run.command[:61]), replace(rig, clock=replace(SHORT, count=61))
+    w, effects = rig.wire, {"input_gain": 0.05, "end_conduction": 0.01}
+    assert all(absorbed(name, "arm") for name in effects)
+    loss = w.convection_coefficient + 0.01 / (w.wire_length * w.surface)
+    other = replace(w, convection_coefficient=loss / 1.05**2, specific_heat=w.specific_heat / 1.05**2)
+    shown, without = show(rig, w, run, effects), show(rig, other, run, {})
+    assert np.ptp(shown) > 10 * rig.noise
+    assert np.abs(shown - without).max() < 1e-3 * rig.noise
+
+
 def test_enough_cases_of_each_kind() -> None:
     every = cases()
     assert len({case.name for case in every}) == len(every) >= 200
@@ -156,6 +169,7 @@ def test_enough_cases_of_each_kind() -> None:
     assert kinds["null"] >= 100
     assert kinds["pair"] >= 30
     assert kinds["outside"] >= 20
+    assert kinds["absorbed"] >= 10
     foreign = {EFFECTS[name].group for name in EFFECTS if EFFECTS[name].outside}
     assert foreign >= {"heat", "electrical", "kinetics", "constitutive", "mechanics", "sensor"}
 

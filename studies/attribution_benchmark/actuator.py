@@ -213,7 +213,7 @@ class Actuator:
             self.stop = 0
         if self.share != 1.0:
             condition = self._condition(t, s)
-            self.gate = (condition > 1.5 * REST) - (condition < -1.5 * REST)
+            self.gate = int(condition > 1.5 * REST) - int(condition < -1.5 * REST)
         driver, paces = self._driver(s), self._paces(t, s, hold=True)
         for b, pace in zip(self.branches, paces, strict=True):
             z = b.progress(*driver)[0]

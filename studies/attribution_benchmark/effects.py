@@ -105,7 +105,17 @@ _COUPON = (
 )
 # A bias spring and a single mass say nothing of how widths, slopes and strains go with stress; only the arm's stress
 # changes fast enough beside its temperature to tell shares of the stress rate apart.
-_NOT_HERE = {("stress_rate_share", "dead_weight"), ("stress_rate_share", "bias_spring")}
+_NOT_HERE = {("stress_rate_share", "dead_weight"), ("stress_rate_share", "bias_spring"), ("pwm", "bias_spring")}
+# Other values of the unknowns, or of a run's zero, give exactly the same readings: a gain of the voltage is one of h_c
+# and c_p (eq. 3.1), a loss to the ends one of h_c, a lead one of both where the resistance is constant.
+_ABSORBED = {
+    "sensor_offset": EVERYWHERE,
+    "input_gain": LOADED,
+    "end_conduction": LOADED,
+    "lead_resistance": ("arm", "bias_spring"),
+    "different_slopes": ("coupon",),  # whose C_A and C_M are unknowns
+    "wrong_load": ("coupon",),
+}
 
 
 def applies(name: str, rig: str) -> bool:
@@ -113,3 +123,8 @@ def applies(name: str, rig: str) -> bool:
     if rig == "coupon" and name in _COUPON:
         return True
     return rig in EFFECTS[name].rigs and (name, rig) not in _NOT_HERE
+
+
+def absorbed(name: str, rig: str) -> bool:
+    """Whether a refit of the base model takes the effect up whole: the right answer is that nothing is missing."""
+    return rig in _ABSORBED.get(name, ())

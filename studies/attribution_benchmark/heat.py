@@ -84,8 +84,6 @@ class Electricity:
             value /= math.sqrt(1 + (self.soft * value) ** 2)
         if self.duty:
             volts, share = self.gain, max(value, 0.0)
-            if self.pwm:  # edges that cost a fixed share of each period
-                share = max(share - self.pwm * self.supply * share * (1 - share), 0.0)
         else:
             volts, share = self.gain * value, 1.0
             if self.pwm:  # a mean voltage made by switching heats by more than its square

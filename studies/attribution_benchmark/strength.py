@@ -1,7 +1,7 @@
 """How strong an effect is: what of its change in the readings no refit of the base model takes up, in noises.
 
-The refit is its linear part: the change is projected off the numerical derivatives of the readings to the unknowns of
-the experiment file and to each run's zero; the root mean square of the rest over the noise is the strength.
+The refit is that of the unknowns of the experiment file and of each run's zero, on noise-free readings, by steps of
+Gauss and Newton with the derivatives at the truth. The root mean square of what is left over the noise is the strength.
 """
 
 from __future__ import annotations
@@ -21,6 +21,10 @@ from studies.attribution_benchmark.sensor import reading
 Vector = NDArray[np.float64]
 TOLERANCE = 0.1  # of the strength asked for
 TRIALS = 8
+REFITS = 3  # steps at most
+NOTHING = 0.05  # noises: a rest that counts as none
+ENOUGH = 0.95  # a step that leaves more of the rest than this share is the last
+CLOSER = 0.7  # in logarithms, towards what can be simulated
 DEGREES = 0.1  # steps of the derivatives: of a temperature, K
 SHARE = 2e-3  # of all else
 
@@ -42,7 +46,9 @@ class Ruler:
         self._values: dict[tuple[object, ...], list[Vector]] = {}  # a sensor's effects need no new simulation
         self.runs = [run for run in rig.runs(wire) if run.role == "fit"]
         self.null = self.readings(wire, {})
-        self.basis = np.linalg.qr(np.column_stack(self._columns()))[0]
+        columns = self._columns()
+        self.sizes = np.array([np.linalg.norm(column) for column in columns])
+        self.basis, self.corner = np.linalg.qr(np.column_stack(columns) / self.sizes)
 
     def readings(self, wire: Wire, effects: Effects) -> Vector:
         """Noise-free readings of all fit runs, in noises."""
@@ -58,8 +64,7 @@ class Ruler:
         for name in self.rig.unknowns:
             nominal = getattr(self.wire, name)
             step = DEGREES if name.endswith(("start", "finish")) else SHARE * nominal
-            column = (self.readings(replace(self.wire, **{name: nominal + step}), {}) - self.null) / step
-            columns.append(column / np.linalg.norm(column))
+            columns.append((self.readings(replace(self.wire, **{name: nominal + step}), {}) - self.null) / step)
         count = self.rig.clock.count
         for i in range(len(self.runs)):
             zero = np.zeros(self.null.size)
@@ -69,9 +74,26 @@ class Ruler:
 
     def strength(self, effects: Effects) -> float:
         """Root mean square of what a refit leaves of the effects, in noises."""
-        change = self.readings(self.wire, effects) - self.null
-        rest = change - self.basis @ (self.basis.T @ change)
-        return float(np.sqrt(np.mean(rest**2)))
+        shown = self.readings(self.wire, effects)
+        wire, rest = self.wire, shown - self.null
+        left = self._without_zeros(rest)
+        for _ in range(REFITS):
+            move = np.linalg.solve(self.corner, self.basis.T @ rest) / self.sizes
+            moved = {name: getattr(wire, name) + float(d) for name, d in zip(self.rig.unknowns, move, strict=False)}
+            wire = replace(wire, **moved)
+            if not _possible(wire):
+                break
+            rest = shown - self.readings(wire, {})
+            now = self._without_zeros(rest)
+            done, left = now > ENOUGH * left, min(now, left)
+            if done or left < NOTHING:
+                break
+        return left
+
+    def _without_zeros(self, rest: Vector) -> float:
+        """Root mean square about each run's own mean."""
+        by_run = rest.reshape(len(self.runs), -1)
+        return float(np.sqrt(np.mean((by_run - by_run.mean(axis=1, keepdims=True)) ** 2)))
 
     def find(self, name: str, wanted: float, others: Mapping[str, float] | None = None) -> Found:
         """Coefficient of an effect at which its strength, beside `others`, is `wanted`; secant in logarithms."""
@@ -85,13 +107,30 @@ class Ruler:
         trials: list[tuple[float, float]] = []
         size = min(math.log(abs(effect.first)), largest)
         for _ in range(TRIALS):
-            trials.append((size, miss(size)))
+            try:
+                trials.append((size, miss(size)))
+            except (ValueError, RuntimeError):  # no such wire: the ranges meet, or the modes chatter
+                largest = size - CLOSER
+                size = largest
+                continue
             best = min(trials, key=lambda trial: abs(trial[1]))
             if abs(best[1]) < TOLERANCE or (size == largest and trials[-1][1] < 0):
                 break
             size = min(_next(trials), largest)
+        if not trials:
+            raise ValueError(
+                f"{name} at {effect.first:g} cannot be simulated on {self.rig.name}; expected a smaller first"
+            )
         size, missed = min(trials, key=lambda trial: abs(trial[1]))
         return Found(sign * math.exp(size), wanted * math.exp(missed), size >= largest and missed < -TOLERANCE)
+
+
+def _possible(wire: Wire) -> bool:
+    """Whether a refit has stayed with wires that exist."""
+    ranges = wire.austenite_finish - wire.austenite_start, wire.martensite_start - wire.martensite_finish
+    rates = wire.convection_coefficient, wire.specific_heat, wire.recoverable_strain, wire.stress_slope_austenite
+    apart = wire.austenite_finish > wire.martensite_start and wire.austenite_start > wire.martensite_finish
+    return min(*ranges, *rates) > 0 and apart
 
 
 def _next(trials: list[tuple[float, float]]) -> float:
