@@ -1,0 +1,142 @@
+"""The cases: which rig, which effects, how strong, which seed. All else follows from a case's name.
+
+Nulls lack nothing; singles hold one effect of `effects.EFFECTS`, pairs two, foreign ones one that is in no library.
+"""
+
+from __future__ import annotations
+
+import zlib
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from studies.attribution_benchmark.effects import EFFECTS, absorbed, applies
+from studies.attribution_benchmark.parameters import Wire
+from studies.attribution_benchmark.rigs import RIGS, Rig
+from studies.attribution_benchmark.strength import Found, Ruler
+
+STRENGTHS = (1.0, 3.0, 10.0)  # noises, after a refit
+NULLS = 30  # a rig
+LARGEST_CHANGE = 0.25  # of a base parameter
+LARGEST_SHIFT, LARGEST_WIDTH = 5.0, 0.25  # K of a range; of its width
+LARGEST_SLOPE = 0.1  # of C_A, C_M
+ABSORBED_SHARE = 0.3  # of the largest coefficient
+# Pairs of different kinds that a bench may well hold at once.
+PAIRS = (
+    ("latent_heat", "coulomb_friction"),
+    ("latent_heat", "phase_resistance"),
+    ("latent_heat", "smooth_transformation"),
+    ("rising_convection", "sensor_lag"),
+    ("rising_convection", "thermal_expansion"),
+    ("ambient_drift", "minor_loops"),
+    ("draught", "creep"),
+    ("phase_resistance", "two_part_transformation"),
+    ("temperature_resistance", "sensor_drift"),
+    ("lead_resistance", "coulomb_friction"),
+    ("smooth_transformation", "quantisation"),
+    ("asymmetric_transformation", "residual_strain"),
+)
+COUPON_PAIRS = (
+    ("smooth_transformation", "thermal_expansion"),
+    ("asymmetric_transformation", "minor_loops"),
+    ("stress_dependent_strain", "dead_band"),
+)
+
+
+@dataclass(frozen=True)
+class Case:
+    """One case; `strength` 0: a null, or effects that a refit takes up."""
+
+    rig: str
+    effects: tuple[str, ...]
+    strength: float
+    number: int
+
+    @property
+    def name(self) -> str:
+        """Names its folder and seeds its random numbers."""
+        what = "+".join(self.effects) or "null"
+        return f"{self.rig}-{what}-{self.strength:g}-{self.number:02d}"
+
+    @property
+    def kind(self) -> str:
+        """null, absorbed, single, pair or outside."""
+        if self.effects and not self.strength:
+            return "absorbed"
+        if any(EFFECTS[name].outside for name in self.effects):
+            return "outside"
+        return ("null", "single", "pair")[len(self.effects)]
+
+    @property
+    def seed(self) -> int:
+        """The same on every machine."""
+        return zlib.crc32(self.name.encode())
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What is true of a case: its wire, the coefficients of its effects and the strengths they were found to have."""
+
+    rig_name: str
+    wire: Wire
+    effects: dict[str, float]
+    found: dict[str, Found]
+    together: float  # strength of all effects at once
+
+    @property
+    def rig(self) -> Rig:
+        """The rig."""
+        return RIGS[self.rig_name]
+
+
+def cases() -> list[Case]:
+    """All cases, in a fixed order."""
+    found = [Case(rig, (), 0.0, i) for rig in RIGS for i in range(NULLS)]
+    for name in EFFECTS:
+        for rig in (rig for rig in RIGS if applies(name, rig)):
+            if absorbed(name, rig):
+                found.append(Case(rig, (name,), 0.0, 0))
+                continue
+            found += [Case(rig, (name,), strength, i) for i, strength in enumerate(STRENGTHS)]
+    for rig in RIGS:
+        for pair in COUPON_PAIRS if rig == "coupon" else PAIRS:
+            if any(absorbed(name, rig) for name in pair):
+                continue
+            found.append(Case(rig, pair, STRENGTHS[1], 0))
+            found.append(Case(rig, pair, STRENGTHS[2], 1))
+    return found
+
+
+def true_wire(case: Case) -> Wire:
+    """The rig's wire with every unknown off its nominal value."""
+    rig, random = RIGS[case.rig], np.random.default_rng([case.seed, 0])
+    w = rig.wire
+    changed: dict[str, float] = {}
+    for name in rig.unknowns:
+        if not name.endswith(("start", "finish")):
+            most = LARGEST_SLOPE if name.startswith("stress_slope") else LARGEST_CHANGE
+            changed[name] = getattr(w, name) * (1 + random.uniform(-most, most))
+    for low, high in (("austenite_start", "austenite_finish"), ("martensite_finish", "martensite_start")):
+        shift, width = random.uniform(-LARGEST_SHIFT, LARGEST_SHIFT), 1 + random.uniform(-LARGEST_WIDTH, LARGEST_WIDTH)
+        middle, half = (
+            (getattr(w, low) + getattr(w, high)) / 2 + shift,
+            (getattr(w, high) - getattr(w, low)) / 2 * width,
+        )
+        changed[low], changed[high] = middle - half, middle + half
+    return replace(w, **changed)  # type: ignore[arg-type]
+
+
+def truth(case: Case) -> Truth:
+    """Wire and coefficients of a case; takes some seconds per effect on a rig with a load."""
+    rig, wire = RIGS[case.rig], true_wire(case)
+    if not case.effects:
+        return Truth(case.rig, wire, {}, {}, 0.0)
+    if case.kind == "absorbed":
+        effects = {name: ABSORBED_SHARE * EFFECTS[name].largest for name in case.effects}
+        return Truth(case.rig, wire, effects, {name: Found(c, 0.0, False) for name, c in effects.items()}, 0.0)
+    ruler = Ruler(rig, wire)
+    found = {name: ruler.find(name, case.strength) for name in case.effects}
+    effects = {name: f.coefficient for name, f in found.items()}
+    alone = len(found) == 1
+    together = next(iter(found.values())).strength if alone else ruler.strength(effects)
+    return Truth(case.rig, wire, effects, found, together)

@@ -1,0 +1,62 @@
+"""Coupon at constant stress on a prescribed temperature: xi in closed form, its memory by the branches.
+
+The rate form (eq. 3.2) at constant stress is strain' = (-theta_T/E(xi) + alpha) T' + eps_L xi'. xi is exact at every
+point of the path; the thermal term is summed over SUBSTEPS points between two samples.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studies.attribution_benchmark.kinetics import branches
+from studies.attribution_benchmark.mechanics import Strains
+from studies.attribution_benchmark.parameters import Effects, Wire
+from studies.attribution_benchmark.runs import Run
+
+Vector = NDArray[np.float64]
+SUBSTEPS = 4
+LEVEL = 100e6  # Pa: stress at which widths are as given
+
+
+def strain(wire: Wire, times: Vector, run: Run, effects: Effects) -> Vector:
+    """Strain at the samples, from 0 at the first; all martensite at the start."""
+    if run.other is None:
+        raise ValueError(f"run {run.name!r} has no stress; expected one of a coupon's runs")
+    stress = float(run.other[0]) * (1 + effects.get("wrong_load", 0.0))
+    strains, lag = Strains(wire, effects), effects.get("rate_dependence", 0.0)
+    pair = branches(wire, effects, LEVEL)
+    fine = np.linspace(times[0], times[-1], (times.size - 1) * SUBSTEPS + 1)
+    # the oven is read at `times`; a delay means that the wire is behind it
+    path = np.interp(fine - effects.get("input_delay", 0.0), times, run.command)
+    step = float(fine[1] - fine[0])
+    xi, done, late = 1.0, 0.0, float(path[0])
+    total, creep, kept = 0.0, strains.creep * stress / strains.level, np.zeros(fine.size)
+    seen = late
+    for k in range(1, fine.size):
+        change = float(path[k] - path[k - 1])
+        if lag:
+            ramp, decay = change / step, float(np.exp(-step / lag))
+            seen = float(path[k]) - ramp * lag + (late - float(path[k - 1]) + ramp * lag) * decay
+        else:
+            seen = float(path[k])
+        sign = (seen > late) - (seen < late)
+        old = xi
+        for b in pair:
+            if b.sign == sign and b.left(xi) > 0:
+                z = b.progress(seen, stress, done)[0]
+                left = min(b.left(xi), max(b.amplitude * b.curve.at(z)[0], 0.0))
+                if left < b.left(xi):
+                    xi = b.left(left)
+                    pair[b.sign > 0].renew(seen, stress, done, xi)
+        done += abs(xi - old)
+        middle = (xi + old) / 2
+        modulus = wire.young_modulus_austenite + middle * (wire.young_modulus_martensite - wire.young_modulus_austenite)
+        total += (strains.expansion - wire.thermal_modulus / modulus) * change
+        total += strains.per_fraction(middle, stress, sign) * (xi - old)
+        if strains.creep:
+            rate = strains.creep_rate(creep, stress, middle)
+            creep += rate * step
+            total += rate * step
+        late, kept[k] = seen, total
+    return kept[::SUBSTEPS]
