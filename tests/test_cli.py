@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -111,6 +112,7 @@ def test_ctrl_c_is_answered(tmp_path: Path) -> None:
         stderr=subprocess.PIPE,
         stdout=subprocess.DEVNULL,
         text=True,
+        env={**os.environ, "SMAJAX_PROGRESS": "lines"},
     ) as run:
         assert run.stderr is not None
         assert "checking" in run.stderr.readline()

@@ -59,7 +59,9 @@ def test_the_figures_kept_in_studies_are_those_of_the_rows(chapter: str) -> None
         assert (folder / f"{row.name}.png").stat().st_size > 10_000
         drawn.append(Drawn(row, kept["holds"], kept["found"], kept["caveat"]))
     assert (folder / "README.md").read_text(encoding="utf-8") == as_markdown(drawn)
-    assert (folder / "index.html").read_text(encoding="utf-8") == as_page(drawn)
+    page = as_page(drawn, folder)
+    assert page.count("data:image/png;base64,") == len(drawn)
+    assert "<script>" in page
 
 
 def test_an_unknown_figure_is_answered_with_the_list() -> None:
