@@ -75,9 +75,10 @@ def main() -> None:
         from smajax.command.folder import FolderTaken
         from smajax.experiment.errors import ExperimentError
         from smajax.measured.table import MeasuredDataError
+        from smajax.plugins import PluginError
         from smajax.units import UnitError
 
-        if not isinstance(error, (ExperimentError, FolderTaken, MeasuredDataError, OSError, UnitError)):
+        if not isinstance(error, (ExperimentError, FolderTaken, MeasuredDataError, OSError, PluginError, UnitError)):
             raise
         console().print(f"error: {error}", style="red", markup=False, highlight=False, soft_wrap=True)
         raise SystemExit(2) from None
