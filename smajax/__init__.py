@@ -16,6 +16,12 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from smajax import control_presets as control_presets
+    from smajax import effects as effects
+    from smajax import measure as measure
+    from smajax import presets as presets
+    from smajax import reference as reference
+    from smajax import units as units
     from smajax.batch.axes import grid as grid
     from smajax.batch.axes import sampled as sampled
     from smajax.batch.axes import zipped as zipped
@@ -85,6 +91,8 @@ NAMES = {
     "write_report": ("smajax.report.write", "write_report"),
     "zipped": ("smajax.batch.axes", "zipped"),
 }
+# Modules that are asked for by their own name.
+MODULES = ("control_presets", "effects", "measure", "presets", "reference", "units")
 
 
 def _found(name: str) -> Any:
@@ -98,13 +106,17 @@ def __getattr__(name: str) -> Any:
         from importlib.metadata import version
 
         return version("smajax")
+    if name in MODULES:
+        return import_module(f"smajax.{name}")
     if name not in NAMES:
-        raise AttributeError(f"module 'smajax' has no attribute {name!r}; it has {', '.join(sorted(NAMES))}")
+        raise AttributeError(
+            f"module 'smajax' has no attribute {name!r}; it has {', '.join(sorted([*NAMES, *MODULES]))}"
+        )
     return _found(name)
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *NAMES, "__version__"})
+    return sorted({*globals(), *NAMES, *MODULES, "__version__"})
 
 
 class _Package(ModuleType):

@@ -33,7 +33,7 @@ def _loop(experiment: Path, out: Path, command: str, overwrite: bool) -> tuple[F
 
     check_path(out)
     loaded = load_experiment(experiment, CATALOGUE)
-    asked = {"experiment": loaded.name, "title": loaded.title}
+    asked = {"experiment": loaded.name}
     with resumable(), claimed(out, "close-loop", asked, OWN, overwrite), shown(console()) as progress:
         findings = close_loop(loaded, memory=out / "fits", progress=progress, command=command)
         return findings, write_report(findings, out)

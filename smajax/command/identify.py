@@ -59,7 +59,7 @@ def identify_command(
     command += f" --profile {','.join(profiled)}" * bool(profiled) + " --robust" * robust + " --design" * design
     command += f" --posterior {posterior}" * bool(posterior)
     # Other options add to the same result: fits that were done without a profile serve with one.
-    asked = {"experiment": loaded.name, "title": loaded.title}
+    asked = {"experiment": loaded.name}
     kept = "Fits are kept as they go: the same command goes on from there."
     try:
         with resumable(kept), claimed(out, "identify", asked, OWN, overwrite), shown(console()) as progress:

@@ -129,7 +129,7 @@ def simulate(
                     f"--step is for a model with one required input; this one has {needs}: use --input NAME=..."
                 )
             asked = Asked(**{**vars(asked), "inputs": {**series, next(iter(required)): step}})
-        with resumable("Nothing was written."):
+        with resumable("Nothing was written: run the same command again."):
             if closed:
                 loop = AskedLoop(
                     controller,
