@@ -42,6 +42,14 @@ def test_overwriting_leaves_what_is_not_ours(tmp_path: Path) -> None:
         assert sorted(one.name for one in out.iterdir()) == [MARK, "thesis.tex"]
 
 
+def test_a_file_of_the_users_is_not_written_over(tmp_path: Path) -> None:
+    (tmp_path / "README.md").write_text("mine")
+    ended = run.invoke(app, ["figures", "M9", "--out", str(tmp_path)])
+    assert isinstance(ended.exception, FolderTaken)
+    assert "would write over (README.md)" in str(ended.exception)
+    assert [one.name for one in tmp_path.iterdir()] == ["README.md"]
+
+
 def _broken_off(out: Path, wrote: str, error: BaseException) -> None:
     with claimed(out, "sweep", {}, []):
         (out / "finished").mkdir()

@@ -44,7 +44,7 @@ def test_chapter_three_is_whole() -> None:
 
 @pytest.mark.parametrize("chapter", sorted(CHAPTERS))
 def test_the_figures_kept_in_studies_are_those_of_the_rows(chapter: str) -> None:
-    """`smajax figures chapter3 --out studies/chapter3` writes them anew."""
+    """`smajax figures chapter3 --out studies/chapter3 --overwrite` writes them anew."""
     folder = Path(__file__).parents[1] / "studies" / chapter
     drawn = []
     for row in CHAPTERS[chapter]:

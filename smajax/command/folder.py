@@ -48,12 +48,17 @@ def _read(out: Path) -> dict[str, Any] | None:
     return held if isinstance(held, dict) and {"command", "asked"} <= held.keys() else None
 
 
-def _other(out: Path, command: str, asked: Asked, goes_on: Callable[[Asked, Asked], bool]) -> str:
+def _other(out: Path, command: str, asked: Asked, own: Sequence[str], goes_on: Callable[[Asked, Asked], bool]) -> str:
     """What else `out` holds, in words; empty where it may be written to."""
     held = _read(out)
     if held is None:
-        names = [name for name, whose in LAST.items() if whose != command and (out / name).exists()]
-        return f"a result of `smajax {LAST[names[0]]}` ({names[0]})" if names else ""
+        whose = {LAST[name]: name for name in LAST if (out / name).exists()}
+        if command in whose:
+            return ""
+        if whose:
+            return "a result of " + " and ".join(f"`smajax {one}` ({name})" for one, name in whose.items())
+        there = sorted(one.name for pattern in own for one in out.glob(pattern))
+        return f"what this command would write over ({', '.join(there[:3])})" if there else ""
     if held["command"] != command:
         return f"a result of `smajax {held['command']}`"
     if goes_on(held["asked"], asked):
@@ -64,7 +69,9 @@ def _other(out: Path, command: str, asked: Asked, goes_on: Callable[[Asked, Aske
 def _clear(out: Path, own: Sequence[str]) -> None:
     """Delete what smajax wrote there; what else is there stays."""
     held = _read(out) or {}
-    kept = [name for name in held.get("files", ()) if isinstance(name, str) and "/" not in name and ".." not in name]
+    # The mark is a file like any other: a pattern in it that means everything, or another folder, is none of ours.
+    named = [name for name in held.get("files", ()) if isinstance(name, str)]
+    kept = [name for name in named if "/" not in name and ".." not in name and name.strip("*?.")]
     for pattern in {*own, *kept, MARK}:
         for one in out.glob(pattern):
             if one.is_dir() and not one.is_symlink():
@@ -119,10 +126,10 @@ def claimed(
     check_path(out)
     asked = json.loads(json.dumps(dict(asked)))
     if out.is_dir():
-        other = _other(out, command, asked, goes_on)
+        other = _other(out, command, asked, own, goes_on)
         if other and not overwrite:
             raise FolderTaken(
-                f"--out {out} holds {other}: give the name of another folder, or --overwrite to delete that result."
+                f"--out {out} holds {other}: give the name of another folder, or --overwrite to delete that."
             )
         if overwrite:
             _clear(out, own)
