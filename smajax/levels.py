@@ -22,14 +22,20 @@ class Given:
     time: Array
     values: Array
     seconds: float | None  # how long it lasts
+    measured: bool = False  # samples of a file, with straight lines between them where a model takes values at instants
+
+    def at(self, clock: Array) -> Array:
+        """The sample that holds at each instant, shape (n,)."""
+        # An instant that rounding put a hair before a sample belongs after it.
+        return np.asarray(self.values[np.clip(np.searchsorted(self.time, clock + 1e-9, side="right") - 1, 0, None)])
 
     def on(self, clock: Array, dt: float, *, squared: bool = False, sampled: bool = False) -> Array:
         """On a uniform clock, shape (n,): a command's mean over each step, or (`sampled`) a measured value at each instant.
 
         squared: see `resample_input`.
         """
-        if self.seconds is None:
-            return np.full(clock.size, self.values[0])
+        if self.seconds is None or (sampled and not self.measured):
+            return self.at(clock)
         if sampled:
             return resample_output(self.time, self.values, clock, dt).values
         return resample_input(self.time, self.values, clock, dt, squared=squared)
@@ -75,7 +81,7 @@ def column(path: Path, key: str | int, unit: str, own: str, time: str = "") -> G
     check_time(clock, f"{path}: the time of {key!r}", clock_unit, table.place)
     seconds = convert(clock, clock_unit, "s")
     seconds = seconds - seconds[0]
-    return Given(seconds, convert(values, written or own, own), float(seconds[-1]))
+    return Given(seconds, convert(values, written or own, own), float(seconds[-1]), measured=True)
 
 
 def given(text: str, own: str, time: str = "") -> Given:

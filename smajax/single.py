@@ -127,7 +127,7 @@ def run_closed(asked: Asked, loop: AskedLoop) -> Ran:
         raise ValueError(f"the run is shorter than one control period of {loop.period:g} s.")
     clock = clock[: periods * between.every + 1]
     # A set point holds from its instant on: a mean over the step before it would come early.
-    position = wanted.values[np.clip(np.searchsorted(wanted.time, clock + 1e-9, side="right") - 1, 0, None)]
+    position = wanted.at(clock)
     ran, merits = judged_loop_compiled(
         plant,
         gains.put(believed),
