@@ -13,6 +13,7 @@ import xarray as xr
 from typer.testing import CliRunner
 
 from smajax.cli import app
+from smajax.command.folder import FolderTaken
 from smajax.compiled import simulate_compiled
 from smajax.compose import compose
 from smajax.levels import clock_of, given, levels
@@ -66,6 +67,15 @@ def test_what_was_written_is_an_input_again(folder: Path, tmp_path: Path) -> Non
     first = json.loads((folder / "simulate.json").read_text(encoding="utf-8"))
     again = json.loads(told.stdout)
     np.testing.assert_allclose(again["series"]["position"], first["series"]["position"], rtol=1e-6)
+
+
+def test_the_same_run_may_be_shown_again_and_another_goes_elsewhere(folder: Path) -> None:
+    words = ["simulate", *HANGING, "--step", "5V:2s,0V:1s", "--dt", "10ms", "--out", str(folder)]
+    again = run.invoke(app, [*words, "--set", "wire.heat.convection_coefficient=80", "--json"])
+    assert again.exit_code == 0, again.output
+    other = run.invoke(app, [*words, "--set", "wire.heat.convection_coefficient=90"])
+    assert isinstance(other.exception, FolderTaken)
+    assert "{'wire.heat.convection_coefficient': '80'} there" in str(other.exception)
 
 
 def test_a_gains_file_closes_the_loop(tmp_path: Path) -> None:

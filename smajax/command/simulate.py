@@ -130,6 +130,7 @@ def simulate(
                 )
             asked = Asked(**{**vars(asked), "inputs": {**series, next(iter(required)): step}})
         with resumable("Nothing was written: run the same command again."):
+            loop: AskedLoop | None = None
             if closed:
                 loop = AskedLoop(
                     controller,
@@ -151,7 +152,13 @@ def simulate(
         raise typer.BadParameter(str(error)) from None
     command = command_line()
     title = f"{wire}, {load}, {drive}" + (f", {ran.found.attrs['controller']}" if closed else "")
-    with claimed(out, "simulate", {"command": command}, OWN, overwrite):
+    # What was asked of the model, not how it is shown.
+    told = {
+        **vars(asked),
+        **(vars(loop) if loop is not None else {}),
+        "gains": None if gains is None else gains.read_text(),
+    }
+    with claimed(out, "simulate", told, OWN, overwrite):
         page = write_run(ran, out, title, command)
     for note in ran.notes:
         console().print(note, soft_wrap=True, markup=False, highlight=False)
