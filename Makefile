@@ -5,10 +5,10 @@ VENV  := .venv
 BIN   := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test test-all lint format clean
+.PHONY: demo test test-all lint format package clean
 
 demo: $(READY)
-	$(BIN)/smajax demo --out demo-report
+	SMAJAX_PROGRESS=lines $(BIN)/smajax demo --out demo-report
 
 test: lint
 	$(BIN)/python -m pytest -n 2 --dist worksteal
@@ -20,6 +20,16 @@ lint: $(READY)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+
+# Wheel and source archive; the wheel must work from an empty folder in an environment of its own.
+package: $(READY)
+	rm -rf dist build/try
+	$(BIN)/python -m build --outdir dist .
+	$(BIN)/python -m venv build/try/env
+	build/try/env/bin/python -m pip install --quiet --disable-pip-version-check dist/*.whl
+	mkdir build/try/empty
+	cd build/try/empty && ../env/bin/smajax --version && ../env/bin/smajax presets && ../env/bin/smajax doctor \
+	  && ../env/bin/smajax simulate --step 7V:2s --out run && ../env/bin/python -c 'import smajax; smajax.simulate_dataset'
 
 format: $(READY)
 	$(BIN)/ruff check --fix .

@@ -13,14 +13,19 @@ from smajax.system import System
 from smajax.wire.laws import LAWS
 
 
-def describe(wire: str, load: str, drive: str, law: str = "") -> ModelDescription:
-    """Parameters and channels of one combination. ValueError when the three do not go together."""
-    system = build(wire, load, drive, law)
+def check_together(system: System, load: str, drive: str) -> None:
+    """ValueError unless what is prescribed has no drive, and what is heated has one."""
     if isinstance(system.load, AbstractCoupon) != (drive == "none"):
         raise ValueError(
             f"load `{load}` with drive `{drive}`: a coupon's temperature is prescribed, so it takes the drive `none`; "
             f"every other load is heated and takes one of {sorted(set(DRIVES) - {'none'})}."
         )
+
+
+def describe(wire: str, load: str, drive: str, law: str = "") -> ModelDescription:
+    """Parameters and channels of one combination. ValueError when the three do not go together."""
+    system = build(wire, load, drive, law)
+    check_together(system, load, drive)
     # An effect is part of the base model when the experiment names a parameter of it.
     whole = extended(system, candidates(system, None, ()))
     return ModelDescription(

@@ -1,4 +1,4 @@
-"""One run as machine code: for a call by itself, outside of `jit`, `vmap` and `grad`."""
+"""One run, open or closed loop, as machine code: for a call by itself, outside of `jit`, `vmap` and `grad`."""
 
 from __future__ import annotations
 
@@ -12,9 +12,16 @@ import numpy as np
 from jax import lax
 
 from smajax.adaptive import advance
+from smajax.closed_loop import ClosedLoop, simulate_closed_loop
+from smajax.controller.base import AbstractController
+from smajax.estimator.base import AbstractEstimator
 from smajax.lanes.evaluate import evaluator
+from smajax.lanes.text import Unsupported
 from smajax.load.base import AbstractMovingLoad
+from smajax.measured_state import Sensor
+from smajax.merit import Merit, merit
 from smajax.recorded import acting_inputs
+from smajax.reference import Reference
 from smajax.simulate import DEFAULT_STEP, check_inputs, first_state, simulate, trajectory
 from smajax.system import System
 from smajax.types import Scalar, Series, State, Trajectory
@@ -66,4 +73,57 @@ def simulate_compiled(
     limit = None if tolerance is None else jnp.asarray(tolerance, dtype=float)
     asked = _Asked(system, series, jnp.asarray(dt, dtype=float), limit, initial)
     found = evaluator(_run, asked, ("number",))(asked, {"number": np.zeros(1)}, threads=1)
+    return jax.tree.map(lambda leaf: leaf[0], found)
+
+
+class _AskedLoop(eqx.Module):
+    system: System
+    controller: AbstractController
+    wanted: Reference
+    dt: Scalar
+    estimator: AbstractEstimator | None
+    sensor: Sensor | None
+    key: jax.Array | None
+    every: int = eqx.field(static=True)
+    delay: int = eqx.field(static=True)
+
+
+def _judged_run(asked: _AskedLoop, _: dict[str, Scalar]) -> tuple[ClosedLoop, Merit]:
+    loop = simulate_closed_loop(
+        asked.system,
+        asked.controller,
+        asked.wanted,
+        asked.dt,
+        asked.every,
+        estimator=asked.estimator,
+        sensor=asked.sensor,
+        key=asked.key,
+        delay=asked.delay,
+    )
+    return loop, merit(loop, asked.system)
+
+
+def judged_loop_compiled(
+    system: System,
+    controller: AbstractController,
+    wanted: Reference,
+    dt: float = DEFAULT_STEP,
+    every: int = 1,
+    *,
+    estimator: AbstractEstimator | None = None,
+    sensor: Sensor | None = None,
+    key: jax.Array | None = None,
+    delay: int = 0,
+) -> tuple[ClosedLoop, Merit]:
+    """`simulate_closed_loop` and `merit` of it, arrays of numpy; by XLA where a part cannot be translated.
+
+    Arguments and errors as there, for `wanted` as a `Reference`.
+    """
+    asked = _AskedLoop(
+        system, controller, wanted, jnp.asarray(dt, dtype=float), estimator, sensor, key, every=every, delay=delay
+    )
+    try:
+        found = evaluator(_judged_run, asked, ("number",))(asked, {"number": np.zeros(1)}, threads=1)
+    except Unsupported:
+        return jax.tree.map(np.asarray, eqx.filter_jit(_judged_run)(asked, {}))
     return jax.tree.map(lambda leaf: leaf[0], found)

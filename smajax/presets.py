@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 from smajax.drive.base import AbstractDrive
 from smajax.drive.current import Current
@@ -21,6 +22,8 @@ from smajax.load.bias_spring import BiasSpring
 from smajax.load.coupon import AbstractCoupon, Coupon, StrainCoupon
 from smajax.load.dead_weight import DeadWeight
 from smajax.parameters import set_parameters
+from smajax.plugins import LOADS as PLUGGED
+from smajax.plugins import brought
 from smajax.system import System
 from smajax.wire.conditions import Enhanced
 from smajax.wire.constitutive import Constitutive
@@ -204,13 +207,24 @@ WIRES: dict[str, Callable[[], Wire]] = {
         flexinol_isobaric,
     )
 }
-LOADS: dict[str, Callable[[], AbstractMovingLoad | AbstractCoupon]] = {
+_LOADS: dict[str, Callable[[], AbstractMovingLoad | AbstractCoupon]] = {
     "dead_weight": dead_weight,
     "bias_spring": bias_spring,
     "arm": arm,
     "coupon": Coupon,
     "strain_coupon": StrainCoupon,
 }
+
+
+def _wrong(name: str, load: Any) -> str:
+    """What keeps a function of another package from being the preset of a load."""
+    if not callable(load):
+        return f"is {load!r}; expected a function without arguments that returns a load"
+    return ""
+
+
+# Ours, then those of other packages (`smajax.plugins`); one is made when it is asked for.
+LOADS: dict[str, Callable[[], AbstractMovingLoad | AbstractCoupon]] = {**_LOADS, **brought(PLUGGED, _LOADS, _wrong)}
 DRIVES: dict[str, Callable[[], AbstractDrive]] = {
     "voltage": voltage,
     "amplified_voltage": amplified_voltage,

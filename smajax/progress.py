@@ -1,7 +1,8 @@
-"""Progress of long work: a bar in a terminal, one line a stage elsewhere."""
+"""Progress of long work: a bar in a terminal, nothing elsewhere unless it is asked for."""
 
 from __future__ import annotations
 
+import os
 import sys
 import time as clock
 from collections.abc import Iterator
@@ -11,26 +12,40 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from smajax.fit.progress import Progress as Report
+from smajax.fit.progress import quiet
+
+# Where stderr is no terminal nothing is said, so that a program that calls us has a clean one; with `lines` a log of a
+# build has a line for each stage.
+VARIABLE = "SMAJAX_PROGRESS"
 
 
 @contextmanager
 def shown(console: Console) -> Iterator[Report]:
     """Yields `report(what, share)`; share 1 closes the stage. What begins with "say: " is a sentence, not a stage."""
-    began = clock.monotonic()
-    if not sys.stderr.isatty():
-        last = ""
+    if sys.stderr.isatty():
+        with _bars(console) as report:
+            yield report
+    elif os.environ.get(VARIABLE) == "lines":
+        yield _lines(console)
+    else:
+        yield quiet
 
-        def line(what: str, share: float) -> None:
-            nonlocal last
-            if what.startswith("say: ") or (what != last and share < 1.0):
-                told = what.removeprefix("say: ")
-                console.print(
-                    f"[{clock.monotonic() - began:6.1f} s] {told}", markup=False, highlight=False, soft_wrap=True
-                )
-                last = what
 
-        yield line
-        return
+def _lines(console: Console) -> Report:
+    began, last = clock.monotonic(), ""
+
+    def line(what: str, share: float) -> None:
+        nonlocal last
+        if what.startswith("say: ") or (what != last and share < 1.0):
+            told = what.removeprefix("say: ")
+            console.print(f"[{clock.monotonic() - began:6.1f} s] {told}", markup=False, highlight=False, soft_wrap=True)
+            last = what
+
+    return line
+
+
+@contextmanager
+def _bars(console: Console) -> Iterator[Report]:
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), TimeRemainingColumn())
     with Progress(*columns, console=console) as bar:
         open_tasks: dict[str, TaskID] = {}

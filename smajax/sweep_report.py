@@ -17,6 +17,8 @@ from matplotlib.ticker import FixedLocator, FormatStrFormatter
 from smajax.control_presets import CONTROLLERS, with_printed_law
 from smajax.figures.drawing import keyed, named, panels
 from smajax.merit import Merit
+from smajax.report.html import picture
+from smajax.report.plain_page import table, whole
 from smajax.sweep import Grid
 
 # Figure of merit -> (what it is called, unit shown, factor from SI).
@@ -161,36 +163,43 @@ def comparison_rows(targets: np.ndarray, merits: Mapping[str, Merit]) -> list[li
 
 
 def page(
-    targets: np.ndarray, merits: Mapping[str, Merit], grid: Grid, swept: Sequence[Swept], seconds: float, between: str
+    targets: np.ndarray,
+    merits: Mapping[str, Merit],
+    grid: Grid,
+    swept: Sequence[Swept],
+    seconds: float,
+    between: str,
+    folder: Path,
 ) -> str:
-    """One page for a browser; pictures lie beside it."""
+    """One page for a browser, with the pictures that lie in `folder` inside; the rows as CSV lie beside it."""
     say = html.escape
     head = ["controller", "settles at", *(f"{label} ({unit})" for label, unit, _ in SHOWN.values())]
-    body = "".join(
-        f"<tr>{''.join(f'<td>{say(cell)}</td>' for cell in row)}</tr>" for row in comparison_rows(targets, merits)
-    )
-    loops = grid.size
-    parts = "".join(
-        f"<h2>{say(one.name)}</h2><p>{loops:,} closed loops of {seconds:g} s; {failures(one)}. {say(over_mismatches(grid, one))} {say(told(one.name))} "
+
+    def drawn(name: str, alt: str) -> str:
+        return str(picture((folder / name).read_bytes(), alt))
+
+    parts = [
+        f"<h2>{say(one.name)}</h2><p>{grid.size:,} closed loops of {seconds:g} s; {failures(one)}. "
+        f"{say(over_mismatches(grid, one))} {say(told(one.name))} "
         f'<a href="{one.name}.csv">every loop as CSV</a></p>'
-        f'<img src="{one.name}_maps.png" alt="maps of {say(one.name)}">'
-        f'<img src="{one.name}_lines.png" alt="lines of {say(one.name)}">'
+        + drawn(f"{one.name}_maps.png", f"maps of {one.name}")
+        + drawn(f"{one.name}_lines.png", f"lines of {one.name}")
         for one in swept
-    )
-    return (
-        '<!doctype html><html lang="en"><meta charset="utf-8"><title>Controllers compared</title><style>'
-        "body{font:15px/1.45 system-ui,sans-serif;max-width:1180px;margin:2em auto;padding:0 1em;color:#1d1d1f}"
-        "td,th{text-align:left;vertical-align:top;padding:.35em .6em;border-bottom:1px solid #e3e5e9}"
-        "table{border-collapse:collapse;font-size:14px;display:block;overflow-x:auto}img{max-width:100%}</style>"
+    ]
+    top = (
         "<h1>Controllers compared</h1><p>The plant as the controller believes it, "
         f"{len(targets)} set points from {np.degrees(targets.min()):.0f}° to {np.degrees(targets.max()):.0f}°; "
         f"median / worst over the set points. Within 1° counts as there. {say(between)}</p>"
-        f"<table><tr>{''.join(f'<th>{say(cell)}</th>' for cell in head)}</tr>{body}</table>"
-        '<img src="comparison.png" alt="figures of merit over the set point">'
+    )
+    mismatches = (
         f"<h1>Mismatch of {say(grid.first)} and {say(grid.second)}</h1><p>The plant's value over the one that the "
         "controller believes, where it believes in one. Maps: median over the set points at the preset's gains.</p>"
-        f"{parts}</html>\n"
     )
+    compared = [
+        table(head, comparison_rows(targets, merits)),
+        drawn("comparison.png", "figures of merit over the set point"),
+    ]
+    return whole("Controllers compared", [top, *compared, mismatches, *parts])
 
 
 def told(name: str) -> str:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+import json
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ from smajax.load.base import AbstractMovingLoad
 from smajax.measured_state import Sensor
 from smajax.merit import Merit
 from smajax.reference import clock
+from smajax.report.files import replace
 from smajax.sweep import MISMATCHES, Grid, Interface, closed_loops, lanes, positions, ratios
 from smajax.sweep_report import (
     Swept,
@@ -56,6 +58,10 @@ class SweepSettings:
     delay: int = 0  # control periods until a command arrives
     tuned: tuple[Gains, ...] = ()  # in the place of the presets'
 
+    def record(self) -> dict[str, Any]:
+        """What was asked, for JSON."""
+        return json.loads(json.dumps({**vars(self), "tuned": [vars(one) for one in self.tuned]}, default=dict))
+
     @property
     def between(self) -> str:
         """What lies between plant and controller, in words."""
@@ -66,6 +72,23 @@ class SweepSettings:
                 *[f"{', '.join(told)}."] * bool(told),
             ]
         )
+
+
+def files_of(controllers: Sequence[str]) -> list[str]:
+    """Names that a sweep of these controllers writes into its folder."""
+    own = [f"{name}{end}" for name in controllers for end in (".csv", "_maps.png", "_lines.png")]
+    return ["index.html", "sweep.json", "comparison.png", "finished", *own]
+
+
+def goes_on(before: Mapping[str, Any], asked: Mapping[str, Any]) -> bool:
+    """Whether a sweep may go on where another lies: the same but for controllers that are added."""
+    rest = {"controllers", "tuned"}
+    gains = [one for one in asked["tuned"] if one["controller"] in before["controllers"]]
+    return (
+        {k: v for k, v in before.items() if k not in rest} == {k: v for k, v in asked.items() if k not in rest}
+        and set(before["controllers"]) <= set(asked["controllers"])
+        and gains == before["tuned"]
+    )
 
 
 def check_set_points(system: System, set_points: Sequence[float]) -> None:
@@ -146,10 +169,8 @@ def run_sweep(system: System, settings: SweepSettings, out: Path, progress: Prog
     comparison = Figure(figsize=(10.0, 11.0))
     draw_comparison(comparison, targets, compared)
     comparison.savefig(out / "comparison.png", dpi=90, facecolor="white")
-    (out / "sweep.json").write_text(as_json(targets, compared, grid, swept, settings.between), encoding="utf-8")
-    (out / "index.html").write_text(
-        page(targets, compared, grid, swept, settings.seconds, settings.between), encoding="utf-8"
-    )
+    replace(out / "sweep.json", as_json(targets, compared, grid, swept, settings.between))
+    replace(out / "index.html", page(targets, compared, grid, swept, settings.seconds, settings.between, out))
     return comparison_rows(targets, compared)
 
 

@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from smajax import explicit_arm as equations
 from smajax.figures.rigs import arm
 from smajax.parameters import set_parameters
 from smajax.simulate import simulate
-from studies.benchmarks import equations, peers, problem
+from studies.benchmarks import peers, problem
 from studies.benchmarks.given import Given, load
 
 SOLVED = 4

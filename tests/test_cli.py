@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 import subprocess
 import sys
 from pathlib import Path
+
+import pytest
+
+from smajax.command.base import console
+from smajax.progress import VARIABLE, shown
 
 
 def _run(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
@@ -111,6 +117,7 @@ def test_ctrl_c_is_answered(tmp_path: Path) -> None:
         stderr=subprocess.PIPE,
         stdout=subprocess.DEVNULL,
         text=True,
+        env={**os.environ, "SMAJAX_PROGRESS": "lines"},
     ) as run:
         assert run.stderr is not None
         assert "checking" in run.stderr.readline()
@@ -118,3 +125,16 @@ def test_ctrl_c_is_answered(tmp_path: Path) -> None:
         said = run.stderr.read()
     assert run.returncode == 130, said
     assert "goes on from there" in said
+
+
+def test_progress_is_silent_where_nobody_looks(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for setting, told in (("", ""), ("lines", "fitting")):
+        monkeypatch.setenv(VARIABLE, setting)
+        with shown(console()) as progress:
+            progress("fitting", 0.0)
+            progress("say: one more thing", 1.0)
+        said = capsys.readouterr().err
+        assert told in said
+        assert bool(said) is bool(told)

@@ -75,7 +75,7 @@ def _features(shown: Shown) -> Array:
 
 
 class _Told(NamedTuple):
-    """Of one effect, by one program: readings (samples,), and derivatives of features by coefficient, (C, 4) by share."""
+    """Of one effect, by a program that all of its rig share: readings (samples,), and derivatives of features by coefficient, (C, 4) by share."""
 
     at_base: Array
     at_starts: Array
@@ -88,9 +88,11 @@ class _Told(NamedTuple):
 @cache
 def _told(effect: str) -> _Told:
     rig, starts_of = _rig(effect), LIBRARY[effect].starts
-    full = extended(RIGS[rig][0], (effect,))
+    everything = tuple(name for name in HERE if _rig(name) == rig)
+    full = extended(RIGS[rig][0], everything)
     table = parameters(full)
-    names = [name for name in table if "." in name]
+    all_of_it = [name for name in table if "." in name]
+    names = [name for name in all_of_it if name.startswith(f"{effect}.")]
     base = np.asarray(get_parameters(full, names))
     starts = np.asarray([starts_of[_short(name)] for name in names])
     switch = np.asarray([_short(name) in LIBRARY[effect].switches for name in names])
@@ -103,7 +105,11 @@ def _told(effect: str) -> _Told:
             steps[share, k] = min(1e-5 * room, 0.1 * abs(at[k]) or 1e-5 * room)
             points += [at, at - steps[share, k] * one, at + steps[share, k] * one]
             ways += [one, 0.0 * one, 0.0 * one]
-    shown, slopes = _shown(rig, (effect,), names, np.stack(points), np.stack(ways))
+    own = [all_of_it.index(name) for name in names]
+    at = np.tile(np.asarray(get_parameters(full, all_of_it)), (len(points), 1))
+    along = np.zeros_like(at)
+    at[:, own], along[:, own] = np.stack(points), np.stack(ways)
+    shown, slopes = _shown(rig, everything, all_of_it, at, along)
     features, slope = _features(shown)[2:], _features(slopes)[2:]
     forward, difference, rounding = {}, {}, {}
     for number, share in enumerate(shares):

@@ -430,6 +430,28 @@ def test_a_bad_sample_is_refused_with_its_run(bench: Path) -> None:
             load(bench)
 
 
+def test_samples_at_one_time_are_taken_out_or_refused(bench: Path) -> None:
+    lines = (bench / "a.csv").read_text().splitlines()
+    (bench / "a.csv").write_text("\n".join([*lines, lines[-1]]) + "\n")
+    assert any(
+        "1 samples of 'duty' at a time that another one has were taken out" in told for told in load(bench).warnings
+    )
+    with (bench / "a.csv").open("a") as file:
+        file.write("4990,0,0\n")
+    with pytest.raises(ExperimentError, match=r"does not increase.*or write repeated = 'mean'"):
+        load(bench)
+    text = (bench / "experiment.toml").read_text()
+    (bench / "experiment.toml").write_text(text.replace('unit = "ms"', 'unit = "ms"\nrepeated = "last"', 1))
+    assert load(bench).runs[0].time.shape == (100,)
+
+
+def test_an_uneven_clock_is_a_warning(bench: Path) -> None:
+    lines = (bench / "a.csv").read_text().splitlines()
+    kept = [line for number, line in enumerate(lines) if number % 5 != 2 or number == 0]
+    (bench / "a.csv").write_text("\n".join(kept) + "\n")
+    assert any("'position' is sampled unevenly (0.01 to 0.02 s apart)" in told for told in load(bench).warnings)
+
+
 def rewrite(path: Path, duty: float = 20.0, position: np.ndarray | None = None, count: int = 500) -> None:
     """The run of `write_run` in one of its wrong forms."""
     time = 10.0 * np.arange(count)

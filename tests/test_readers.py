@@ -7,8 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy.io
+import xarray as xr
 
+from smajax.measured.extras import needed
 from smajax.measured.read import read_table
+from smajax.measured.repeated import once
 from smajax.measured.table import MeasuredDataError, check_time
 
 
@@ -93,7 +96,7 @@ def test_a_text_table_with_a_mistake(tmp_path: Path, text: str, words: str) -> N
     [
         ("oops", "line 3, column 'x': 'oops' is not a number"),
         ("", "line 3, column 'x': the cell is empty"),
-        ("1,5", "write a decimal point"),
+        ("1,500", "may be decimal or set thousands apart: write a decimal point"),
         ("nan", "not finite, the first is nan in line 3"),
         ("-inf", "not finite, the first is -inf in line 3"),
     ],
@@ -148,7 +151,7 @@ def test_files_that_are_not_what_their_suffix_says(tmp_path: Path) -> None:
     with pytest.raises(MeasuredDataError, match="damaged or cut short"):
         read_table(tmp_path / "cut.mat")
     (tmp_path / "new.mat").write_bytes(b"MATLAB 7.3 MAT-file, Platform: GLNXA64")
-    with pytest.raises(MeasuredDataError, match=r"MATLAB 7\.3 file; save it again"):
+    with pytest.raises(MeasuredDataError, match=r"MATLAB 7\.3 file is damaged|smajax\[formats\]', or save it again"):
         read_table(tmp_path / "new.mat")
 
 
@@ -202,3 +205,86 @@ def test_time_must_increase() -> None:
         check_time(np.array([0.0]), "here")
     with pytest.raises(MeasuredDataError, match="here is nan in line 9"):
         check_time(np.array([0.0, np.nan]), "here", place=lambda _: "line 9")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "time;x\n0,0;1,5\n0,25;-2,5e1\n",
+        "0,0 1,5\n0,25 -2,5e1\n",
+        'time,x\n"0,0","1,5"\n"0,25","-2,5e1"\n',
+        "time\tx\n0\t1,500\n0,25\t-25\n",
+    ],
+)
+def test_decimal_commas(tmp_path: Path, text: str) -> None:
+    table = read_table(written(tmp_path / "run.csv", text))
+    np.testing.assert_array_equal(table.column(1), [0.0, 0.25])
+    np.testing.assert_array_equal(table.column(2), [1.5, -25.0])
+
+
+def test_commas_that_may_be_thousands_are_not_guessed(tmp_path: Path) -> None:
+    table = read_table(written(tmp_path / "run.csv", "time;x\n0;1,500\n1;2,500\n"))
+    with pytest.raises(MeasuredDataError, match="set thousands apart"):
+        table.column("x")
+    points = read_table(written(tmp_path / "points.csv", "time;x;y\n0;1.5;1,5\n1;2.5;2,25\n"))
+    with pytest.raises(MeasuredDataError, match="write a decimal point"):
+        points.column("y")
+
+
+def test_matlab_7_3_files_are_read_as_those_of_version_5(tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "run.mat", "w", userblock_size=512) as file:
+        duty = file.create_group("Duty")
+        duty["time"] = np.array([[0.0, 0.1, 0.2]])
+        duty.create_group("signals")["values"] = np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]])
+        file["gain"] = np.array([[1.0], [2.0]])
+        file["text"] = np.array([[77], [78]], dtype=np.uint16)
+        file["text"].attrs["MATLAB_class"] = np.bytes_(b"char")
+        file.create_group("Other")["y"] = np.array([[1.0]])
+    with (tmp_path / "run.mat").open("r+b") as raw:
+        raw.write(b"MATLAB 7.3 MAT-file")
+    table = read_table(tmp_path / "run.mat")
+    np.testing.assert_array_equal(table.column("Duty[2]"), [4.0, 5.0, 6.0])
+    np.testing.assert_array_equal(table.clock("Duty[1]"), [0.0, 0.1, 0.2])
+    np.testing.assert_array_equal(table.column("gain"), [1.0, 2.0])
+    with pytest.raises(MeasuredDataError, match="no real numbers"):
+        table.column("text")
+    with pytest.raises(MeasuredDataError, match=r"expected 'time' and 'signals.values'"):
+        table.column("Other")
+
+
+def test_parquet_files(tmp_path: Path) -> None:
+    parquet, arrow = pytest.importorskip("pyarrow.parquet"), pytest.importorskip("pyarrow")
+    when = np.array(["2024-05-01T10:00:00.000", "2024-05-01T10:00:00.250"], "datetime64[ms]")
+    parquet.write_table(arrow.table({"when": when, "x": [1, None], "say": ["a", "b"]}), tmp_path / "run.parquet")
+    table = read_table(tmp_path / "run.parquet")
+    np.testing.assert_array_equal(table.column("when"), [0.0, 0.25])
+    np.testing.assert_array_equal(table.column("x", gaps=True), [1.0, np.nan])
+    with pytest.raises(MeasuredDataError, match="expected numbers"):
+        table.column("say")
+    with pytest.raises(MeasuredDataError, match="no Parquet file"):
+        read_table(written(tmp_path / "no.parquet", "x"))
+
+
+def test_netcdf_files(tmp_path: Path) -> None:
+    held = xr.Dataset({"x": ("time", [1.0, 2.0]), "wide": (("time", "k"), np.zeros((2, 3)))}, {"time": [0.0, 0.5]})
+    held.to_netcdf(tmp_path / "run.nc", engine="scipy")
+    table = read_table(tmp_path / "run.nc")
+    np.testing.assert_array_equal(table.column("time"), [0.0, 0.5])
+    np.testing.assert_array_equal(table.column("x"), [1.0, 2.0])
+    with pytest.raises(MeasuredDataError, match="no NetCDF file"):
+        read_table(written(tmp_path / "no.nc", "x"))
+
+
+def test_a_library_that_is_missing_is_named(tmp_path: Path) -> None:
+    with pytest.raises(MeasuredDataError, match=r"needs no_such_library: pip install 'smajax\[formats\]', or else"):
+        needed("no_such_library", tmp_path / "run.mat", "or else")
+
+
+def test_samples_at_the_same_time() -> None:
+    time, values = np.array([0.0, 1.0, 1.0, 2.0, 2.0]), np.array([5.0, 6.0, 6.0, 7.0, 9.0])
+    found = {how: once(time, values, how) for how in ("refuse", "mean", "last")}
+    np.testing.assert_array_equal(found["refuse"][0], [0.0, 1.0, 2.0, 2.0])  # those that differ are left to be refused
+    np.testing.assert_array_equal(found["mean"][1], [5.0, 6.0, 8.0])
+    np.testing.assert_array_equal(found["last"][1], [5.0, 6.0, 9.0])
+    assert [one[2] for one in found.values()] == [1, 2, 2]

@@ -15,12 +15,13 @@ import pytest
 from smajax.closed_loop import simulate_closed_loop
 from smajax.control_presets import CONTROLLERS
 from smajax.figures.rigs import arm
+from smajax.gains_file import Gains
 from smajax.measured_state import Sensor
 from smajax.merit import merit
 from smajax.parameters import get_parameters, set_parameters
 from smajax.reference import clock, constant
 from smajax.sweep import Grid, Interface, closed_loops, lanes, ratios
-from smajax.sweep_run import SweepSettings, run_sweep
+from smajax.sweep_run import SweepSettings, goes_on, run_sweep
 
 SETTINGS = SweepSettings(("vsc3",), "payload", "supply", 2, (0.0, 30.0), (1.0,), seconds=3.0)
 
@@ -52,8 +53,9 @@ def test_a_lane_is_the_single_loop_of_that_plant(folder: Path) -> None:
 
 def test_the_folder_is_whole(folder: Path) -> None:
     page = (folder / "index.html").read_text(encoding="utf-8")
+    assert page.count("data:image/png;base64,") == 3
+    assert 'href="vsc3.csv"' in page
     for name in ("comparison.png", "vsc3_maps.png", "vsc3_lines.png", "vsc3.csv"):
-        assert name in page
         assert (folder / name).stat().st_size > 300
     record = json.loads((folder / "sweep.json").read_text(encoding="utf-8"))
     assert record["sweep"]["loops"] == 8
@@ -126,3 +128,13 @@ def test_noise_sample_time_and_delay_reach_the_loop() -> None:
 def test_a_period_between_two_steps_is_answered(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="whole number"):
         run_sweep(arm(), dataclasses.replace(SETTINGS, period=0.015), tmp_path, lambda what, share: None)
+
+
+def test_only_controllers_may_be_added_to_a_folder() -> None:
+    before = SETTINGS.record()
+    assert json.loads(json.dumps(before)) == before
+    assert goes_on(before, dataclasses.replace(SETTINGS, controllers=("pid", "vsc3")).record())
+    assert not goes_on(before, dataclasses.replace(SETTINGS, controllers=("pid",)).record())
+    assert not goes_on(before, dataclasses.replace(SETTINGS, seconds=4.0).record())
+    tuned = (Gains("vsc3", {"boundary": 0.1}),)
+    assert not goes_on(before, dataclasses.replace(SETTINGS, tuned=tuned).record())

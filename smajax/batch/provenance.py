@@ -14,6 +14,7 @@ import equinox as eqx
 import jax
 import numpy as np
 
+from smajax import plugins
 from smajax.parameters import parameter_values
 from smajax.source_mark import source_mark
 
@@ -39,7 +40,7 @@ def versions() -> dict[str, str]:
 
 def digest(model: Any, more: Sequence[str | np.ndarray] = ()) -> str:
     """Hex digest of the code, of the structure and the numbers of `model`, and of `more`."""
-    mark = hashlib.sha256(f"{source_mark()} {jax.tree.structure(model)}".encode())
+    mark = hashlib.sha256(f"{source_mark()} {plugins.versions() or ''} {jax.tree.structure(model)}".encode())
     for leaf in (*jax.tree.leaves(model), *more):
         mark.update(leaf.encode() if isinstance(leaf, str) else np.ascontiguousarray(leaf).tobytes())
     return mark.hexdigest()

@@ -1,8 +1,9 @@
-"""The library of candidate effects: one file and one line here each."""
+"""The library of candidate effects: one file and one line here each, and what other packages bring."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 from smajax.effects.ambient_drift import AmbientDrift
 from smajax.effects.asymmetric_transformation import AsymmetricTransformation
@@ -48,8 +49,11 @@ from smajax.effects.two_way_memory import TwoWayMemory
 from smajax.effects.unequal_stress_slopes import UnequalStressSlopes
 from smajax.effects.viscous_friction import ViscousFriction
 from smajax.effects.wrong_load import WrongLoad
+from smajax.plugins import EFFECTS, brought
 
-LIBRARY: dict[str, type[AbstractEffect]] = {
+EQUATIONS = ("heat", "electrical", "kinetics", "constitutive", "mechanics", "sensor", "input")
+
+_OWN: dict[str, type[AbstractEffect]] = {
     effect.effect_name: effect
     for effect in (
         # What was recorded comes before what the drive makes of it.
@@ -98,6 +102,24 @@ LIBRARY: dict[str, type[AbstractEffect]] = {
         SensorBacklash,
     )
 }
+
+
+def _wrong(name: str, effect: Any) -> str:
+    """What keeps a class of another package from being an effect of that name."""
+    if not (isinstance(effect, type) and issubclass(effect, AbstractEffect)):
+        return f"is {effect!r}; expected a class of `smajax.AbstractEffect`"
+    lacking = [one for one in AbstractEffect.__annotations__ if not hasattr(effect, one)]
+    if lacking:
+        return f"lacks {', '.join(lacking)}, which every effect says of itself"
+    if effect.effect_name != name:
+        return f"calls itself {effect.effect_name!r}: give both the same name"
+    if effect.equation not in EQUATIONS:
+        return f"is in the equation {effect.equation!r}; expected one of {', '.join(EQUATIONS)}"
+    return ""
+
+
+# Ours, then those of other packages (`smajax.plugins`), in the order of their names.
+LIBRARY: dict[str, type[AbstractEffect]] = {**_OWN, **brought(EFFECTS, _OWN, _wrong)}
 
 
 def at_base(names: Sequence[str]) -> tuple[AbstractEffect, ...]:

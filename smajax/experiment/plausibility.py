@@ -14,6 +14,8 @@ from smajax.measured.table import Array
 FEW_SAMPLES = 20
 GAP_STEPS = 5.0
 FLAT_SAMPLES = 5
+# Intervals that differ by more than this share of the usual one, and the share of them that makes a clock uneven.
+UNEVEN, UNEVEN_SHARE = 0.2, 0.1
 # Seconds: longer than most runs of a wire; a run of eleven seconds lasts that long when its ms are taken for s.
 LONGEST_RUN = 3.0 * 3600.0
 FEWEST_FIT_RUNS = 3
@@ -61,11 +63,24 @@ def _time_warnings(run: str, name: str, signal: Signal) -> list[str]:
     intervals = np.diff(signal.time)
     usual = float(np.median(intervals))
     longest = int(np.argmax(intervals))
+    found: list[str] = []
+    if signal.repeated:
+        found.append(
+            f"run {run!r}: {signal.repeated} samples of {name!r} at a time that another one has were taken out"
+        )
+    uneven = float(np.mean(np.abs(intervals - usual) > UNEVEN * usual))
+    if uneven > UNEVEN_SHARE:
+        low, high = np.percentile(intervals, [5.0, 95.0])
+        found.append(
+            f"run {run!r}: {name!r} is sampled unevenly ({low:.3g} to {high:.3g} s apart); it is brought to the even clock "
+            "by its own times"
+        )
     if intervals[longest] <= GAP_STEPS * usual:
-        return []
+        return found
     return [
+        *found,
         f"run {run!r}: {name!r} has a gap of {intervals[longest]:.4g} s at {signal.time[longest]:.6g} s "
-        f"(usual interval {usual:.4g} s); it is bridged, check that nothing happened in it"
+        f"(usual interval {usual:.4g} s); it is bridged, check that nothing happened in it",
     ]
 
 

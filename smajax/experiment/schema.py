@@ -88,6 +88,9 @@ class TimeSection(Section):
     kind: Literal["column", "sample"] = Field(default="column", description="'column' or 'sample'")
     column: str | int | None = Field(default=None, description="the name of the time column, or its number from 1")
     unit: str = Field(default="s", description="text like 's' or 'ms'")
+    repeated: Literal["refuse", "mean", "last"] = Field(
+        default="refuse", description="'refuse', 'mean' or 'last': what becomes of samples at the same time that differ"
+    )
 
     @model_validator(mode="after")
     def _one_way(self) -> TimeSection:

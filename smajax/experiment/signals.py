@@ -13,6 +13,7 @@ from smajax.experiment.errors import ExperimentError, at_key
 from smajax.experiment.record import Run
 from smajax.experiment.schema import ChannelSection, RunSection, TimeSection
 from smajax.measured.noise import detect_quantum
+from smajax.measured.repeated import once
 from smajax.measured.resample import resample_input, resample_output, resample_with_gaps, uniform_clock
 from smajax.measured.table import Array, MeasuredDataError, Table, check_time
 from smajax.units import convert, parse_quantity
@@ -22,10 +23,14 @@ MOST_SAMPLES = 2_000_000
 
 @dataclass(frozen=True)
 class Signal:
-    """One channel as measured, in the program's own unit: time and values, both (n,); nan where one is missing."""
+    """One channel as measured, in the program's own unit: time and values, both (n,); nan where one is missing.
+
+    repeated: how many samples at a time that another one has were taken out.
+    """
 
     time: Array
     values: Array
+    repeated: int = 0
 
     @property
     def measured(self) -> Array:
@@ -107,9 +112,19 @@ def _signal(
         where = f"{table.path}: time column {table.name_of(time.column)!r}"
     if clock.size != values.size:
         raise MeasuredDataError(f"{table.path}: {key!r} has {values.size} values and its time has {clock.size}")
+    how = "refuse" if time is None else time.repeated
     # Before the conversion, so that an error shows what is written in the file.
-    check_time(clock, where, unit, table.place)
-    return Signal(time=convert(clock, unit, "s"), values=values)
+    if np.isfinite(clock).all():
+        clock, values, repeated = once(clock, values, how)
+    else:
+        repeated = 0
+    try:
+        check_time(clock, where, unit, table.place if not repeated else lambda index: f"sample {index + 1}")
+    except MeasuredDataError as error:
+        if how == "refuse" and time is not None and np.all(np.diff(clock) >= 0.0) and clock.size > 1:
+            raise MeasuredDataError(f"{error}; or write repeated = 'mean' (or 'last') under [time]") from None
+        raise
+    return Signal(time=convert(clock, unit, "s"), values=values, repeated=repeated)
 
 
 def _taken(reading: Reading, name: str) -> frozenset[str | int]:

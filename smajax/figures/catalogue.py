@@ -96,12 +96,17 @@ CHAPTERS: dict[str, tuple[Row, ...]] = {
 }
 
 
+def every_row() -> list[Row]:
+    """All figures, in order."""
+    return [row for chapter in CHAPTERS.values() for row in chapter]
+
+
 def rows(name: str) -> tuple[Row, ...]:
     """The figures of a chapter, or the one figure of that name. KeyError lists the names there are."""
     if name in CHAPTERS:
         return CHAPTERS[name]
-    found = tuple(row for chapter in CHAPTERS.values() for row in chapter if row.name.lower() == name.lower())
+    found = tuple(row for row in every_row() if row.name.lower() == name.lower())
     if not found:
-        names = [row.name for chapter in CHAPTERS.values() for row in chapter]
+        names = [row.name for row in every_row()]
         raise KeyError(f"No figure `{name}`; there are {', '.join([*CHAPTERS, *names])}.")
     return found

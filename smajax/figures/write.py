@@ -10,8 +10,12 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
+from smajax.figures.catalogue import every_row
 from smajax.figures.row import Row
 from smajax.fit.progress import Progress
+from smajax.report.files import replace
+from smajax.report.html import picture
+from smajax.report.plain_page import whole
 from smajax.source_mark import source_mark
 
 SIZE = (9.0, 5.6)  # inches
@@ -70,8 +74,13 @@ def draw(rows: Sequence[Row], folder: Path, fast: bool, progress: Progress) -> l
     mark = folder / MARK
     setting = f"{'fast' if fast else 'full'} {source_mark()}\n"
     if not mark.exists() or mark.read_text(encoding="utf-8") != setting:
-        for old in (*folder.glob("*.json"), *folder.glob("*.png")):
-            old.unlink()
+        stale = [
+            name for row in every_row() for name in (f"{row.name}.json", f"{row.name}.png") if (folder / name).exists()
+        ]
+        for name in stale:
+            (folder / name).unlink()
+        if stale:
+            progress(f"say: {len(stale) // 2} figures of another version of smajax or another setting are gone.", 1.0)
         mark.write_text(setting, encoding="utf-8")
     drawn = []
     for index, row in enumerate(rows):
@@ -80,6 +89,18 @@ def draw(rows: Sequence[Row], folder: Path, fast: bool, progress: Progress) -> l
         progress(f"{row.name}: {row.system}", 1.0)
         progress(f"say: {row.name} {drawn[-1].verdict} ({index + 1} of {len(rows)})", 1.0)
     return drawn
+
+
+def lying_in(folder: Path) -> list[Drawn]:
+    """Every figure in `folder`, whenever it was drawn, in the order of the catalogue."""
+    return [one for one in (_kept(row, folder) for row in every_row()) if one is not None]
+
+
+def write_pages(folder: Path) -> Path:
+    """The table and the pictures of every figure in `folder`, as README.md and index.html; the path of the latter."""
+    drawn = lying_in(folder)
+    replace(folder / "README.md", as_markdown(drawn))
+    return replace(folder / "index.html", as_page(drawn, folder))
 
 
 def as_markdown(drawn: Sequence[Drawn]) -> str:
@@ -108,31 +129,28 @@ def as_markdown(drawn: Sequence[Drawn]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def as_page(drawn: Sequence[Drawn]) -> str:
-    """The same for a browser."""
+def as_page(drawn: Sequence[Drawn], folder: Path) -> str:
+    """The same for a browser, in one file; the pictures are those in `folder`."""
     say = html.escape
-    style = (
-        "body{font:15px/1.45 system-ui,sans-serif;max-width:1080px;margin:2em auto;padding:0 1em;color:#1d1d1f}"
-        "td,th{text-align:left;vertical-align:top;padding:.35em .6em;border-bottom:1px solid #e3e5e9}"
-        "table{border-collapse:collapse;font-size:14px}img{max-width:100%}.fails{color:#c8553d;font-weight:600}"
-    )
     rows = "".join(
-        f'<tr><td><a href="#{one.row.name}">{one.row.name}</a><br>{say(one.row.where)}</td><td>{say(one.row.system)}</td>'
-        f"<td>{say(one.row.claim)}</td><td>{say(one.found)}</td>"
+        f'<tr><td data-v="{index}"><a href="#{one.row.name}">{one.row.name}</a><br>{say(one.row.where)}</td>'
+        f"<td>{say(one.row.system)}</td><td>{say(one.row.claim)}</td><td>{say(one.found)}</td>"
         f'<td class="{"holds" if one.holds else "fails"}">{one.verdict}</td></tr>'
-        for one in drawn
+        for index, one in enumerate(drawn)
     )
-    parts = "".join(
+    parts = [
         f'<h2 id="{one.row.name}">{one.row.name}: {say(one.row.system)}</h2><p>{say(one.found)}.</p>'
         + (f"<p>Note: {say(one.caveat)}</p>" if one.caveat else "")
-        + f'<img src="{one.row.name}.png" alt="{one.row.name}">'
+        + picture((folder / f"{one.row.name}.png").read_bytes(), f"{one.row.name}: {one.found}")
         for one in drawn
+    ]
+    head = (
+        "<style>.fails{color:#c8553d;font-weight:600}</style>"
+        "<h1>Figures of the source, reproduced</h1><p>Source: M. H. Elahinia (2004).</p><table class=sortable><thead><tr>"
+        "<th>figure</th><th>system</th><th>what the source says</th><th>what was measured</th><th>holds</th></tr></thead>"
+        f"<tbody>{rows}</tbody></table>"
     )
-    return (
-        f'<!doctype html><html lang="en"><meta charset="utf-8"><title>Figures of the source</title><style>{style}</style>'
-        "<h1>Figures of the source, reproduced</h1><p>Source: M. H. Elahinia (2004).</p><table><tr><th></th><th>system</th>"
-        f"<th>what the source says</th><th>what was measured</th><th></th></tr>{rows}</table>{parts}</html>\n"
-    )
+    return whole("Figures of the source", [head, *parts])
 
 
 def as_text(drawn: Sequence[Drawn]) -> str:

@@ -1,8 +1,9 @@
-"""Text tables: comma, tab, semicolon or whitespace separated, with or without a header line."""
+"""Text tables: comma, tab, semicolon or whitespace separated, with decimal points or commas, with or without a header line."""
 
 from __future__ import annotations
 
 import csv
+import re
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,6 +15,9 @@ from smajax.measured.table import Array, MeasuredDataError, Table
 COMMENT_MARKS = ("#", "%")
 # In this order, because a column may hold decimal commas where another mark separates.
 SEPARATORS = ("\t", ";", ",")
+# A number with a decimal comma, and one of these that may as well be thousands.
+DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
+THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
 MISSING = ("", "na", "n/a")  # cells without a sample, where the experiment file allows them; nan is a number to Python
 
 
@@ -38,7 +42,29 @@ def _separator(lines: Sequence[str]) -> str | None:
     cut short holds no mark at all. A header alone is asked when there is nothing else.
     """
     asked = lines[1:] or lines
+    if 2 * sum(_blank_separated(line) for line in asked) > len(asked):
+        return None
     return next((mark for mark in SEPARATORS if 2 * sum(mark in line for line in asked) > len(asked)), None)
+
+
+def _blank_separated(line: str) -> bool:
+    """Whether blanks separate numbers with decimal commas, so that the commas do not separate: `0,5 1,25`."""
+    cells = line.split()
+    numbers = sum(DECIMAL_COMMA.fullmatch(cell) is not None for cell in cells)
+    return len(cells) > 1 and numbers > 0 and all(DECIMAL_COMMA.fullmatch(cell) or _is_number(cell) for cell in cells)
+
+
+def _with_points(rows: list[tuple[int, list[str]]]) -> list[tuple[int, list[str]]]:
+    """Cells with decimal commas as numbers, in a file that has no decimal points and where they cannot be thousands."""
+    cells = [cell for _, row in rows for cell in row]
+    commas = [cell for cell in cells if DECIMAL_COMMA.fullmatch(cell)]
+    points = any("." in cell and _is_number(cell) for cell in cells)
+    if not commas or points or all(THOUSANDS.fullmatch(cell) for cell in commas):
+        return rows
+    return [
+        (number, [cell.replace(",", ".") if DECIMAL_COMMA.fullmatch(cell) else cell for cell in row])
+        for number, row in rows
+    ]
 
 
 def _rows(text: str) -> list[tuple[int, list[str]]]:
@@ -95,7 +121,7 @@ def _why_unusable(name: str, place: int, rows: Sequence[tuple[int, list[str]]], 
     got = f"line {number}, column {name!r}: " + (f"{cell!r} is not a number" if cell else "the cell is empty")
     if units and number == rows[0][0] and all(_is_number(row[place]) for _, row in rows[1:]):
         return f"{got}; line {number} looks like units: delete it"
-    hint = "; write a decimal point, not a comma" if "," in cell else ""
+    hint = "; its comma may be decimal or set thousands apart: write a decimal point" if "," in cell else ""
     return f"{got}{hint}; expected a number in every line"
 
 
@@ -105,7 +131,7 @@ def read_csv(path: Path) -> Table:
     Columns are named by the header, or "1", "2", ... without one. A column with a cell that is not a number is
     an error only when it is asked for. Raises MeasuredDataError.
     """
-    rows = _rows(_text(path))
+    rows = _with_points(_rows(_text(path)))
     if not rows:
         raise MeasuredDataError(f"{path}: holds no data line")
     header: list[str] | None = None

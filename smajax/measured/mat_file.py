@@ -1,4 +1,4 @@
-"""MATLAB version 5 files: Simulink "Structure with time" and plain numeric arrays."""
+"""MATLAB files: Simulink "Structure with time" and plain numeric arrays."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from smajax.measured.mat73_file import read_mat73
 from smajax.measured.table import Array, MeasuredDataError, Table
 
 _MAGIC = b"MATLAB "
@@ -67,7 +68,7 @@ def _add_structure(name: str, value: Any, columns: dict[str, Array], clocks: dic
 
 
 def read_mat(path: Path) -> Table:
-    """Reads every numeric signal of a MATLAB v5 file.
+    """Reads every numeric signal of a MATLAB file; one of version 7.3 by `read_mat73`.
 
     A "Structure with time" becomes a column with its own clock; an array (n, k) becomes columns name[1] ... name[k].
     A variable of another structure is an error only when it is asked for. Raises MeasuredDataError.
@@ -77,7 +78,7 @@ def read_mat(path: Path) -> Table:
     with path.open("rb") as file:
         start = file.read(16)
     if start.startswith(b"MATLAB 7.3") or start.startswith(b"\x89HDF"):
-        raise MeasuredDataError(f"{path}: is a MATLAB 7.3 file; save it again with save(..., '-v7')")
+        return read_mat73(path)
     if not start.startswith(_MAGIC):
         raise MeasuredDataError(f"{path}: is not the MATLAB version 5 file that its suffix says")
     try:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import MappingProxyType
 
+from smajax.measured.columns_file import read_netcdf, read_parquet
 from smajax.measured.csv_file import read_csv
 from smajax.measured.mat_file import read_mat
 from smajax.measured.names import listed, nearest
@@ -13,7 +14,14 @@ from smajax.measured.table import MeasuredDataError, Table
 
 # A new file kind is one line here.
 READERS: Mapping[str, Callable[[Path], Table]] = MappingProxyType(
-    {".csv": read_csv, ".txt": read_csv, ".tsv": read_csv, ".mat": read_mat}
+    {
+        ".csv": read_csv,
+        ".txt": read_csv,
+        ".tsv": read_csv,
+        ".mat": read_mat,
+        ".parquet": read_parquet,
+        ".nc": read_netcdf,
+    }
 )
 
 

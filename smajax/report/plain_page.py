@@ -4,6 +4,11 @@ from __future__ import annotations
 
 import html
 from collections.abc import Sequence
+from pathlib import Path
+
+# What makes a page of one file answer clicks: tables that sort, pictures that open at full size.
+SCRIPT = (Path(__file__).parent / "interactive.js").read_text(encoding="utf-8")
+CLICKED = (Path(__file__).parent / "interactive.css").read_text(encoding="utf-8")
 
 STYLE = (
     "body{font:15px/1.5 system-ui,sans-serif;max-width:1080px;margin:2em auto;padding:0 1em;color:#1d1d1f;background:#fff}"
@@ -11,7 +16,8 @@ STYLE = (
     "table{border-collapse:collapse;font-size:14px;display:block;overflow-x:auto;margin:0 0 1em}"
     "td.n,th.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}"
     "img{max-width:100%;display:block;margin:0 0 1em}.quiet{color:#626973}h2{margin-top:1.6em}"
-    "p,ul{max-width:62em}"
+    "p,ul{max-width:62em;overflow-wrap:anywhere}"
+    "@media(max-width:520px){body{margin:1em auto;padding:0 .6em}td,th{padding:.3em .4em}}"
 )
 
 
@@ -24,7 +30,7 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequence[
         )
 
     body = "".join(f"<tr>{cells('td', row)}</tr>" for row in rows)
-    return f"<table><tr>{cells('th', head)}</tr>{body}</table>"
+    return f"<table class=sortable><thead><tr>{cells('th', head)}</tr></thead><tbody>{body}</tbody></table>"
 
 
 def bullets(sentences: Sequence[str]) -> str:
@@ -37,5 +43,5 @@ def whole(title: str, parts: Sequence[str]) -> str:
     return (
         '<!doctype html><html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width, '
         f'initial-scale=1"><link rel="icon" href="data:,"><title>{html.escape(title)}</title>'
-        f"<style>{STYLE}</style>{''.join(parts)}</html>\n"
+        f"<style>{STYLE}{CLICKED}</style>{''.join(parts)}<script>{SCRIPT}</script></html>\n"
     )

@@ -17,10 +17,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from studies.attribution_benchmark.cases import Case, cases
-from studies.attribution_benchmark.write import write
-
 from studies.attribution_benchmark.judge import Judged, judge, load, save
 from studies.attribution_benchmark.tables import written
+from studies.attribution_benchmark.write import write
 
 
 def chosen(only: str, strengths: Sequence[float], nulls: int, part: tuple[int, int]) -> list[Case]:

@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from studies.benchmarks import equations
+from smajax import explicit_arm as equations
 from studies.benchmarks.given import Given, load
 
 # Relative and absolute, from the loosest on.

@@ -18,10 +18,10 @@ from typing import Any
 
 import numpy as np
 
+from smajax.machine import machine
 from smajax.runtime import prepare
 from smajax.simulate import DEFAULT_STEP
 from studies.benchmarks import cpp, peers
-from studies.benchmarks.machine import machine
 from studies.benchmarks.table import told
 
 RESULTS = Path(__file__).parent / "results"

@@ -10,9 +10,9 @@ from pathlib import Path
 
 from smajax.batch.run import run_batch
 from smajax.figures.rigs import arm
+from smajax.machine import peak_memory
 from smajax.runtime import prepare
 from studies.benchmarks import problem
-from studies.benchmarks.machine import peak_memory
 from studies.benchmarks.single import TOLERANCE
 from studies.benchmarks.throughput import MEASURES
 

@@ -20,12 +20,12 @@ from smajax.batch.axes import zipped
 from smajax.batch.engine import available_cores
 from smajax.batch.run import run_batch
 from smajax.figures.rigs import arm
+from smajax.machine import peak_memory
 from smajax.measure import Last
 from smajax.runtime import prepare
 from smajax.simulate import DEFAULT_STEP
 from studies.benchmarks import problem
 from studies.benchmarks.given import Given, load
-from studies.benchmarks.machine import peak_memory
 
 MEASURES = (Last("position"), Last("martensite_fraction"))
 REPEATS = 3

@@ -47,3 +47,13 @@ def peak_memory() -> int:
     """Most bytes that this process has had in memory so far."""
     unit = 1 if platform.system() == "Darwin" else 1024
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit
+
+
+def available_memory() -> int | None:
+    """Bytes that a program may still take without swapping; None where the system does not say."""
+    file = Path("/proc/meminfo")
+    if file.exists():
+        for line in file.read_text().splitlines():
+            if line.startswith("MemAvailable:"):
+                return 1024 * int(line.split()[1])
+    return None

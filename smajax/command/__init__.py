@@ -1,0 +1,1 @@
+"""The commands, one a file: options, words and exit codes. What a command computes lies elsewhere and is imported late."""

@@ -1,0 +1,110 @@
+"""`smajax close-loop` and `smajax demo`: from measured runs to the missing effect."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from importlib import resources
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from smajax.command.base import Json, Open, OpenUnless, Overwrite, browse, browse_from_terminal, console, resumable
+
+if TYPE_CHECKING:
+    from smajax.report.findings import Findings
+
+DEMOS = ("latent", "complete")
+OWN = ("report.html", "report.json", "fits")
+
+
+def _loop(experiment: Path, out: Path, command: str, overwrite: bool) -> tuple[Findings, Path]:
+    # Imported here so that `--help` does not wait for JAX; x64 is the caller's choice, and this is the caller.
+    from smajax.runtime import prepare
+
+    prepare()
+    from smajax.catalogue import CATALOGUE
+    from smajax.close_loop import close_loop
+    from smajax.command.folder import check_path, claimed
+    from smajax.experiment.load import load_experiment
+    from smajax.progress import shown
+    from smajax.report.write import write_report
+
+    check_path(out)
+    loaded = load_experiment(experiment, CATALOGUE)
+    asked = {"experiment": loaded.name}
+    with resumable(), claimed(out, "close-loop", asked, OWN, overwrite), shown(console()) as progress:
+        findings = close_loop(loaded, memory=out / "fits", progress=progress, command=command)
+        return findings, write_report(findings, out)
+
+
+def _say(findings: Findings, page: Path) -> None:
+    typer.echo(f"\n{findings.title}\nVerdict: {findings.verdict}")
+    for sentence in findings.summary:
+        typer.echo(f"  {sentence}")
+    typer.echo(f"Report: {page.resolve()}")
+
+
+def close_loop_command(
+    experiment: Annotated[Path, typer.Argument(help="experiment.toml, or the folder that holds it")],
+    out: Annotated[
+        Path, typer.Option(help="folder for report.html and report.json; finished fits are kept there too")
+    ] = Path("report"),
+    overwrite: Overwrite = False,
+    json_out: Json = False,
+    open_page: Open = False,
+) -> None:
+    """Fit the base model, find what it lacks, add it, and report the error before and after.
+
+    Ctrl-C loses nothing: the same command with the same --out goes on from the fits that are finished.
+
+    Example:  smajax close-loop experiment.toml --out report
+    """
+    command = f"smajax close-loop {shlex.quote(str(experiment))} --out {shlex.quote(str(out))}"
+    findings, page = _loop(experiment, out, command, overwrite)
+    if json_out:
+        from smajax.report.json_file import findings_to_json
+
+        typer.echo(json.dumps(findings_to_json(findings)))
+    else:
+        _say(findings, page)
+    if open_page:
+        browse(page)
+
+
+def demo(
+    out: Annotated[Path, typer.Option(help="folder for the reports")] = Path("demo-report"),
+    only: Annotated[str | None, typer.Option(help=f"one of {', '.join(DEMOS)}")] = None,
+    overwrite: Overwrite = False,
+    json_out: Json = False,
+    open_page: OpenUnless = True,
+) -> None:
+    """The main job on two virtual benches shipped with the package: one lacks an effect, the other lacks nothing.
+
+    Each bench was made by a simulator that shares no code with this one; what it really contains lies in truth.toml,
+    which the loop does not read and which is printed after each verdict.
+
+    Example:  smajax demo --only latent --out demo-report
+    """
+    if only is not None and only not in DEMOS:
+        raise typer.BadParameter(f"there is no demo `{only}`; choose one of {', '.join(DEMOS)}.", param_hint="--only")
+    pages, records = [], {}
+    for name in DEMOS if only is None else (only,):
+        with resources.as_file(resources.files("smajax") / "demo" / name) as folder:
+            if not json_out:
+                typer.echo(f"\n=== {name} ===")
+            findings, page = _loop(folder / "experiment.toml", out / name, f"smajax demo --only {name}", overwrite)
+            if json_out:
+                from smajax.report.json_file import findings_to_json
+
+                records[name] = findings_to_json(findings)
+            else:
+                _say(findings, page)
+                typer.echo("The truth, which the loop did not read:")
+                for line in (folder / "truth.toml").read_text(encoding="utf-8").splitlines():
+                    typer.echo(f"  {line}")
+        pages.append(page)
+    if json_out:
+        typer.echo(json.dumps(records))
+    browse_from_terminal(pages[0], open_page)

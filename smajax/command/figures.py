@@ -1,0 +1,61 @@
+"""`smajax figures`: the source's figures with the numbers that prove them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from smajax.command.base import UNMET, Json, OpenUnless, Overwrite, browse_from_terminal, console, resumable
+
+OWN = (".made-by", "index.html", "README.md", "[MC][0-9].*", "[MC][0-9][0-9].*")
+
+
+def figures(
+    names: Annotated[
+        list[str] | None, typer.Argument(help="chapters (chapter3, chapter4) and single figures (M7 C12); default all")
+    ] = None,
+    out: Annotated[Path, typer.Option(help="folder for the pictures, the numbers (JSON) and the table")] = Path(
+        "figures"
+    ),
+    fast: Annotated[bool, typer.Option("--fast", help="coarser steps, fewer samples, the same claims")] = False,
+    overwrite: Overwrite = False,
+    json_out: Json = False,
+    open_page: OpenUnless = True,
+) -> None:
+    """Draw the source's figures, each with the number that proves it, and print which claims hold.
+
+    Exit code 3 when one that was asked for does not. Figures that lie in the folder already stay on its page. Ctrl-C loses
+    nothing: the same command goes on with the figures that are missing.
+
+    Example:  smajax figures M7 C12 --out figures
+    """
+    from smajax.runtime import prepare
+
+    prepare()
+    from smajax.command.folder import claimed
+    from smajax.figures.catalogue import CHAPTERS, rows
+    from smajax.figures.write import as_text, draw, write_pages
+    from smajax.progress import shown
+
+    try:
+        asked = [row for name in names or CHAPTERS for row in rows(name)]
+    except KeyError as error:
+        raise typer.BadParameter(error.args[0], param_hint="NAME") from None
+    setting = {"setting": "fast" if fast else "full"}
+    kept = "Finished figures are kept: the same command goes on."
+    with resumable(kept), claimed(out, "figures", setting, OWN, overwrite), shown(console()) as progress:
+        drawn = draw(list(dict.fromkeys(asked)), out, fast, progress)
+        page = write_pages(out)
+    if json_out:
+        typer.echo(
+            json.dumps({one.row.name: {"holds": one.holds, "found": one.found, "note": one.caveat} for one in drawn})
+        )
+    else:
+        typer.echo(as_text(drawn))
+        typer.echo(f"Page: {page.resolve()}")
+    browse_from_terminal(page, open_page)
+    if not all(one.holds for one in drawn):
+        raise typer.Exit(UNMET)

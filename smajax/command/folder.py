@@ -1,0 +1,144 @@
+"""The folder that a command writes: one result in it, never two mixed, and none left behind by a command that was refused.
+
+A hidden file in the folder says which command began it and what was asked. The same command goes on there; another one, or
+the same one asked otherwise, is refused, unless it is to overwrite.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from smajax.report.files import json_text, replace
+
+MARK = ".smajax.json"
+# Folders of versions without the mark are known by the file that each command writes last.
+LAST = {
+    "report.html": "close-loop",
+    "identify.html": "identify",
+    "tune.html": "tune",
+    "sweep.json": "sweep",
+    ".made-by": "figures",
+}
+Asked = Mapping[str, Any]
+
+
+class FolderTaken(ValueError):
+    """The output folder holds another result."""
+
+
+def _same(before: Asked, asked: Asked) -> bool:
+    return dict(before) == dict(asked)
+
+
+def _differences(before: Asked, asked: Asked) -> str:
+    differ = sorted(name for name in before.keys() | asked.keys() if before.get(name) != asked.get(name))
+    return "; ".join(f"{name}: {before.get(name)} there, {asked.get(name)} asked" for name in differ)
+
+
+def _read(out: Path) -> dict[str, Any] | None:
+    try:
+        held = json.loads((out / MARK).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return held if isinstance(held, dict) and {"command", "asked"} <= held.keys() else None
+
+
+def _other(out: Path, command: str, asked: Asked, own: Sequence[str], goes_on: Callable[[Asked, Asked], bool]) -> str:
+    """What else `out` holds, in words; empty where it may be written to."""
+    held = _read(out)
+    if held is None:
+        whose = {LAST[name]: name for name in LAST if (out / name).exists()}
+        if command in whose:
+            return ""
+        if whose:
+            return "a result of " + " and ".join(f"`smajax {one}` ({name})" for one, name in whose.items())
+        there = sorted(one.name for pattern in own for one in out.glob(pattern))
+        return f"what this command would write over ({', '.join(there[:3])})" if there else ""
+    if held["command"] != command:
+        return f"a result of `smajax {held['command']}`"
+    if goes_on(held["asked"], asked):
+        return ""
+    return f"another result of `smajax {command}` ({_differences(held['asked'], asked)})"
+
+
+def _clear(out: Path, own: Sequence[str]) -> None:
+    """Delete what smajax wrote there; what else is there stays."""
+    held = _read(out) or {}
+    # The mark is a file like any other: a pattern in it that means everything, or another folder, is none of ours.
+    named = [name for name in held.get("files", ()) if isinstance(name, str)]
+    kept = [name for name in named if "/" not in name and ".." not in name and name.strip("*?.")]
+    for pattern in {*own, *kept, MARK}:
+        for one in out.glob(pattern):
+            if one.is_dir() and not one.is_symlink():
+                shutil.rmtree(one)
+            else:
+                one.unlink()
+
+
+def _made(out: Path) -> list[Path]:
+    """Create the folder; those that were not there before, the innermost first."""
+    new = [part for part in (out, *out.parents) if not part.exists()]
+    out.mkdir(parents=True, exist_ok=True)
+    return new
+
+
+def _abandon(out: Path, new: Sequence[Path]) -> None:
+    """Take back what was created, where nothing has been written into it."""
+    if any(one.is_file() and one.name != MARK for one in out.rglob("*")):
+        return
+    if not new:
+        (out / MARK).unlink(missing_ok=True)
+        return
+    shutil.rmtree(out)
+    for part in new[1:]:
+        if any(part.iterdir()):
+            break
+        part.rmdir()
+
+
+def check_path(out: Path) -> None:
+    """NotADirectoryError where a file is in the way: told before the work, not after it."""
+    for part in (out, *out.parents):
+        if part.exists() and not part.is_dir():
+            raise NotADirectoryError(f"--out: {part} is a file; give the name of a folder.")
+
+
+@contextmanager
+def claimed(
+    out: Path,
+    command: str,
+    asked: Asked,
+    own: Sequence[str],
+    overwrite: bool = False,
+    goes_on: Callable[[Asked, Asked], bool] = _same,
+) -> Iterator[Path]:
+    """`out`, made and marked as `command`'s; within it the work is done.
+
+    asked: what tells this result from another, JSON values. own: names (globs) that the command writes there, all that
+    `overwrite` deletes. goes_on(before, asked): whether a result begun as `before` may be gone on with as `asked`.
+    Raises NotADirectoryError where a file is in the way, FolderTaken for a folder that holds another result.
+    """
+    check_path(out)
+    asked = json.loads(json.dumps(dict(asked)))
+    if out.is_dir():
+        other = _other(out, command, asked, own, goes_on)
+        if other and not overwrite:
+            raise FolderTaken(
+                f"--out {out} holds {other}: give the name of another folder, or --overwrite to delete that."
+            )
+        if overwrite:
+            _clear(out, own)
+    marked = (out / MARK).exists()
+    new = _made(out)
+    replace(out / MARK, json_text({"command": command, "asked": asked, "files": list(own)}))
+    try:
+        yield out
+    except BaseException:
+        if not marked:
+            _abandon(out, new)
+        raise

@@ -1,0 +1,62 @@
+"""`smajax effects` and `smajax presets`: what there is."""
+
+from __future__ import annotations
+
+import json
+
+import typer
+
+from smajax.command.base import Json
+
+
+def effects(json_out: Json = False) -> None:
+    """List the effects that `close-loop` may add: equation, formula, and what each means for a wire.
+
+    Example:  smajax effects --json
+    """
+    from smajax.effects.library import LIBRARY
+    from smajax.parameters import parameters
+
+    told = {
+        name: {
+            "title": effect.title,
+            "equation": effect.equation,
+            "formula": effect.formula,
+            "meaning": effect.sentence,
+            "parameters": {
+                entry.name: {"unit": entry.unit, "bounds": [entry.low, entry.high]}
+                for entry in parameters(effect.base()).values()
+            },
+        }
+        for name, effect in LIBRARY.items()
+    }
+    if json_out:
+        typer.echo(json.dumps(told))
+        return
+    for name, one in told.items():
+        typer.echo(f"{name}  [{one['equation']}]\n  {one['title']}: {one['formula']}\n  {one['meaning']}")
+        for full, entry in one["parameters"].items():  # type: ignore[attr-defined]
+            typer.echo(f"    {full}: {entry['bounds'][0]:g} to {entry['bounds'][1]:g} {entry['unit']}")
+
+
+def presets(json_out: Json = False) -> None:
+    """List the wires, loads and drives that an experiment file may name, and the controllers of the arm.
+
+    Example:  smajax presets
+    """
+    from smajax.control_presets import CONTROLLERS
+    from smajax.presets import DRIVES, LOADS, WIRES
+    from smajax.wire.laws import LAWS
+
+    told = {
+        "wires": list(WIRES),
+        "loads": list(LOADS),
+        "drives": list(DRIVES),
+        "controllers": list(CONTROLLERS),
+        "laws": list(LAWS),
+    }
+    if json_out:
+        typer.echo(json.dumps(told))
+        return
+    for kind, names in told.items():
+        typer.echo(f"{kind}: {', '.join(names)}")

@@ -1,0 +1,175 @@
+"""`smajax simulate`: one run of a model, open or closed loop, into files and a page."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from smajax.command.base import (
+    Json,
+    Open,
+    Overwrite,
+    browse,
+    command_line,
+    console,
+    resumable,
+)
+
+
+def _texts(option: str, several: Sequence[str] | None) -> dict[str, str]:
+    """`NAME=TEXT`, given once or more."""
+    found: dict[str, str] = {}
+    for part in several or ():
+        name, sign, text = part.partition("=")
+        if not sign or not name.strip() or name.strip() in found:
+            raise typer.BadParameter(f"each name once, as in `name=text`, not `{part}`", param_hint=option)
+        found[name.strip()] = text.strip()
+    return found
+
+
+def simulate(
+    wire: Annotated[str, typer.Argument(help="a wire of `smajax presets`")] = "niti_table_3_1",
+    load: Annotated[str, typer.Argument(help="a load of `smajax presets`")] = "arm",
+    drive: Annotated[
+        str, typer.Argument(help="a drive of `smajax presets`; `none` for a coupon")
+    ] = "amplified_voltage",
+    step: Annotated[
+        str | None, typer.Option(help="levels of the drive's input, each with its time: 6V:5s,0V:10s")
+    ] = None,
+    inputs: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--input",
+            help="NAME=levels, NAME=a constant (ambient_temperature=25degC), or a column of a file, NAME=log.csv:U:mV; repeat",
+        ),
+    ] = None,
+    time: Annotated[
+        str, typer.Option(help="time column of such files, COLUMN or COLUMN:UNIT; default: by its name")
+    ] = "",
+    values: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            help="a parameter: wire.heat.convection_coefficient=80, convection_coefficient='80 W/m^2/K' or "
+            "latent_heat.enthalpy='20 J/g', which adds that effect; repeat",
+        ),
+    ] = None,
+    law: Annotated[str, typer.Option(help="kinetics: tanaka, liang, brinson or enhanced")] = "",
+    seconds: Annotated[
+        float | None, typer.Option(min=0.0, help="length of the run; default: that of the inputs")
+    ] = None,
+    dt: Annotated[str, typer.Option(help="time between samples")] = "5ms",
+    tolerance: Annotated[
+        float | None, typer.Option(help="steps of its own between samples, to this error (1e-4 is good); moving loads")
+    ] = None,
+    gains: Annotated[
+        Path | None, typer.Option(help="gains.json of `smajax tune`: a closed loop of the arm by that controller")
+    ] = None,
+    controller: Annotated[str, typer.Option(help="a closed loop by this controller's preset gains")] = "",
+    set_point: Annotated[
+        str | None, typer.Option(help="what the loop is to reach: 40deg:5s,10deg:5s, or a file")
+    ] = None,
+    mismatch: Annotated[
+        list[str] | None, typer.Option(help="a parameter of the plant that the controller does not know of, as --set")
+    ] = None,
+    estimator: Annotated[str, typer.Option(help="`printed` or `model` filter; none: told the true state")] = "",
+    noise: Annotated[float, typer.Option(min=0.0, help="noise of the angle's readings, degrees (1 sigma)")] = 0.0,
+    period: Annotated[float, typer.Option(help="sample time of the controller, s, a multiple of --dt")] = 0.01,
+    delay: Annotated[int, typer.Option(min=0, help="control periods until a command arrives")] = 0,
+    seed: Annotated[int, typer.Option(help="of the noise")] = 0,
+    out: Annotated[Path, typer.Option(help="folder for simulate.csv, .nc, .json, .png and .html")] = Path("simulated"),
+    overwrite: Overwrite = False,
+    json_out: Json = False,
+    open_page: Open = False,
+) -> None:
+    """Run a model once: wire x load x drive under given inputs, or the arm under a controller.
+
+    By default the model is the source's arm. Angles are given in deg; what is written is SI with degC and rad.
+
+    Example:  smajax simulate flexinol_table_3_2 dead_weight flexinol_voltage --step 5V:8s,0V:8s --set convection_coefficient=80
+
+    Example:  smajax simulate --gains tune/gains.json --set-point 40deg:5s,10deg:5s --out loop
+    """
+    from smajax.runtime import prepare
+
+    prepare()
+    from smajax.command.folder import check_path, claimed
+    from smajax.gains_file import GainsFileError
+    from smajax.report.files import json_text
+    from smajax.report.simulate_page import OWN, merit_rows, record, summary_rows, write_run
+    from smajax.single import Asked, AskedLoop, channels, run_closed, run_open
+    from smajax.units import UnitError, parse_quantity
+
+    check_path(out)
+    series, closed = _texts("--input", inputs), gains is not None or bool(controller)
+    if gains is not None and controller:
+        raise typer.BadParameter("--gains names its controller; leave --controller out.")
+    if closed != (set_point is not None):
+        raise typer.BadParameter("a closed loop needs --set-point, and --gains or --controller.")
+    if closed and (series or step or tolerance is not None):
+        raise typer.BadParameter(
+            "in a closed loop the controller gives the voltage: leave --step, --input and --tolerance out."
+        )
+    if not closed and mismatch:
+        raise typer.BadParameter("--mismatch is for closed loops; use --set.")
+    try:
+        asked = Asked(
+            wire, load, drive, law, _texts("--set", values), series, time, seconds, parse_quantity(dt, "s"), tolerance
+        )
+        if not asked.dt > 0.0:
+            raise UnitError(f"--dt: got {dt!r}, expected a time above zero")
+        if step is not None:
+            required, _ = channels(asked.system())
+            if len(required) != 1 or required & series.keys():
+                needs = ", ".join(sorted(required)) or "none"
+                raise ValueError(
+                    f"--step is for a model with one required input; this one has {needs}: use --input NAME=..."
+                )
+            asked = Asked(**{**vars(asked), "inputs": {**series, next(iter(required)): step}})
+        with resumable("Nothing was written: run the same command again."):
+            loop: AskedLoop | None = None
+            if closed:
+                loop = AskedLoop(
+                    controller,
+                    set_point or "",
+                    gains,
+                    _texts("--mismatch", mismatch),
+                    estimator,
+                    noise,
+                    period,
+                    delay,
+                    seed,
+                )
+                ran = run_closed(asked, loop)
+            else:
+                ran = run_open(asked)
+    except KeyError as error:
+        raise typer.BadParameter(error.args[0]) from None
+    except (ValueError, GainsFileError) as error:
+        raise typer.BadParameter(str(error)) from None
+    command = command_line()
+    title = f"{wire}, {load}, {drive}" + (f", {ran.found.attrs['controller']}" if closed else "")
+    # What was asked of the model, not how it is shown.
+    told = {
+        **vars(asked),
+        **(vars(loop) if loop is not None else {}),
+        "gains": None if gains is None else gains.read_text(),
+    }
+    with claimed(out, "simulate", told, OWN, overwrite):
+        page = write_run(ran, out, title, command)
+    for note in ran.notes:
+        console().print(note, soft_wrap=True, markup=False, highlight=False)
+    if json_out:
+        typer.echo(json_text(record(ran, command)), nl=False)
+    else:
+        typer.echo(title)
+        for row in summary_rows(ran.found):
+            typer.echo(f"  {row[0]:<28} {row[1]:>11} … {row[2]:<11} last {row[3]:<11} {row[4]}")
+        for row in merit_rows(ran):
+            typer.echo(f"  {row[0]:<28} {row[1]} {row[2]}")
+        typer.echo(f"Page: {page.resolve()}")
+    if open_page:
+        browse(page)

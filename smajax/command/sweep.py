@@ -1,0 +1,108 @@
+"""`smajax sweep`: robustness of the controllers of the arm."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from smajax.command.base import Json, OpenUnless, Overwrite, browse_from_terminal, console, numbers, resumable
+
+SET_POINTS, GAINS = "-40,-20,0,10,20,40,50,60,80", "0.5,0.7,1,1.4,2"
+
+
+def sweep(
+    controllers: Annotated[
+        str | None,
+        typer.Option(
+            help="pid, vsc1, vsc2, vsc3, nvsc, sld, backstepping1, backstepping2 (with commas), or `all`; default all, "
+            "or those of the gains files"
+        ),
+    ] = None,
+    over: Annotated[str, typer.Option(help="the two mismatches of the maps")] = "convection,damping",
+    points: Annotated[
+        int | None, typer.Option(min=2, help="mismatches from 0.5 to 2 along each side of a map; default 15")
+    ] = None,
+    set_points: Annotated[
+        str | None, typer.Option(help="degrees, with commas; default -40,-20,0,10,20,40,50,60,80")
+    ] = None,
+    gains: Annotated[
+        list[Path] | None,
+        typer.Option(help="gains.json of `smajax tune`, in the place of the preset's; may be repeated"),
+    ] = None,
+    gain_shares: Annotated[
+        str | None, typer.Option(help="shares of the controller's main gain; default 0.5,0.7,1,1.4,2")
+    ] = None,
+    seconds: Annotated[float, typer.Option(min=0.1, help="length of each closed loop")] = 10.0,
+    estimator: Annotated[str, typer.Option(help="`printed` or `model` filter; none: told the true state")] = "",
+    noise: Annotated[float, typer.Option(min=0.0, help="noise of the angle's readings, degrees (1 sigma)")] = 0.0,
+    period: Annotated[float, typer.Option(help="sample time of the controller, s, a multiple of 0.01")] = 0.01,
+    delay: Annotated[int, typer.Option(min=0, help="control periods until a command arrives")] = 0,
+    out: Annotated[Path, typer.Option(help="folder for the page, the pictures and the rows")] = Path("sweep"),
+    fast: Annotated[
+        bool, typer.Option("--fast", help="by default 3 x 3 mismatches, set points -20,20,60, gain 1")
+    ] = False,
+    overwrite: Overwrite = False,
+    json_out: Json = False,
+    open_page: OpenUnless = True,
+) -> None:
+    """Run controllers of the arm on plants that are not what they believe, and compare them on every set point.
+
+    Mismatches: inertia, damping, convection, ambient, payload, supply. Ctrl-C loses nothing: the same command goes on.
+
+    Example:  smajax sweep --controllers pid,sld --over convection,ambient --out sweep
+    """
+    from smajax.runtime import prepare
+
+    prepare(cores=True)
+    from smajax.command.folder import FolderTaken, claimed
+    from smajax.control_presets import CONTROLLERS
+    from smajax.figures.rigs import arm
+    from smajax.gains_file import GainsFileError, read_gains
+    from smajax.progress import shown
+    from smajax.sweep_run import SweepSettings, as_text, files_of, goes_on, run_sweep
+
+    try:
+        tuned = tuple(read_gains(path, arm()) for path in gains or ())
+    except GainsFileError as error:
+        hint = " Shares of the main gain are `--gain-shares`." if any(not one.suffix for one in gains or ()) else ""
+        raise typer.BadParameter(f"{error}{hint}", param_hint="--gains") from None
+    asked = controllers or ",".join(dict.fromkeys(one.controller for one in tuned)) or "all"
+    names = tuple(CONTROLLERS) if asked == "all" else tuple(part for part in asked.split(",") if part)
+    pair = tuple(over.split(","))
+    if len(pair) != 2:
+        raise typer.BadParameter(f"two mismatches with a comma between them, not `{over}`", param_hint="--over")
+    settings = SweepSettings(
+        names,
+        *pair,
+        points or (3 if fast else 15),
+        numbers("--set-points", set_points if set_points is not None else "-20,20,60" if fast else SET_POINTS),
+        numbers("--gain-shares", gain_shares if gain_shares is not None else "1" if fast else GAINS),
+        seconds,
+        filtered=estimator,
+        noise=noise,
+        period=period,
+        delay=delay,
+        tuned=tuned,
+    )
+    kept = "Finished controllers are kept: the same command goes on."
+    record, own = settings.record(), files_of(names)
+    try:
+        with (
+            resumable(kept),
+            claimed(out, "sweep", record, own, overwrite, goes_on),
+            shown(console()) as progress,
+        ):
+            rows = run_sweep(arm(), settings, out, progress)
+    except FolderTaken:
+        raise
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from None
+    page = out / "index.html"
+    if json_out:
+        typer.echo((out / "sweep.json").read_text(encoding="utf-8"), nl=False)
+    else:
+        typer.echo(as_text(rows))
+        typer.echo(f"Page: {page.resolve()}")
+    browse_from_terminal(page, open_page)

@@ -1,0 +1,136 @@
+"""`smajax tune`: gains by gradient."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from smajax.command.base import (
+    UNMET,
+    Json,
+    OpenUnless,
+    Overwrite,
+    browse_from_terminal,
+    command_line,
+    console,
+    numbers,
+    pairs,
+    resumable,
+)
+
+TUNED_AT = "-40,-20,0,20,40,60,85"
+
+
+def tune(
+    controller: Annotated[str, typer.Argument(help="pid, vsc1, vsc2, vsc3, nvsc, sld, backstepping1 or backstepping2")],
+    set_points: Annotated[str | None, typer.Option(help="degrees, with commas; default -40,-20,0,20,40,60,85")] = None,
+    variation: Annotated[
+        list[str] | None,
+        typer.Option(help="how wrong the plant may be: inertia=0.2,convection=0.2; may be repeated"),
+    ] = None,
+    objective: Annotated[str, typer.Option(help="nominal, worst or mean-variance")] = "worst",
+    weights: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="of tracking_error, overshoot, settling_time, steady_error, energy, chatter, peak_temperature; default "
+            "settling_time=1,overshoot=1,steady_error=2 (a second, a degree, half a degree)"
+        ),
+    ] = None,
+    limits: Annotated[
+        list[str] | None, typer.Option(help="of the same, met in every loop: settling_time=4,overshoot=2")
+    ] = None,
+    by: Annotated[str, typer.Option(help="trust-region or adam")] = "trust-region",
+    start: Annotated[
+        Path | None, typer.Option(help="gains.json to begin from, in the place of the preset's gains")
+    ] = None,
+    starts: Annotated[int | None, typer.Option(min=1, help="points that gains are moved from; default 6")] = None,
+    rounds: Annotated[int | None, typer.Option(min=1, help="steps, at most; default 30")] = None,
+    seconds: Annotated[float, typer.Option(min=0.1, help="length of each closed loop")] = 10.0,
+    estimator: Annotated[str, typer.Option(help="`printed` or `model` filter; none: told the true state")] = "",
+    noise: Annotated[float, typer.Option(min=0.0, help="noise of the angle's readings, degrees (1 sigma)")] = 0.0,
+    period: Annotated[float, typer.Option(help="sample time of the controller, s, a multiple of 0.01")] = 0.01,
+    delay: Annotated[int, typer.Option(min=0, help="control periods until a command arrives")] = 0,
+    seed: Annotated[int, typer.Option(help="of starts, plants and noise")] = 0,
+    out: Annotated[Path, typer.Option(help="folder for gains.json, the page, the pictures and the numbers")] = Path(
+        "tune"
+    ),
+    fast: Annotated[bool, typer.Option("--fast", help="by default set points -20,20,60, 3 starts, 10 rounds")] = False,
+    overwrite: Overwrite = False,
+    json_out: Json = False,
+    open_page: OpenUnless = True,
+) -> None:
+    """Tune the gains of a controller of the arm by gradient, on many set points and plants at once.
+
+    Variations: inertia, damping, convection, ambient, payload, supply. The gains are checked on plants and set points that
+    tuning never saw. `smajax sweep --gains tune/gains.json` reads them. Exit code 3 when a limit is not met. Ctrl-C loses
+    nothing: the same command goes on.
+
+    Example:  smajax tune sld --variation inertia=0.2,damping=0.2,convection=0.2 --limits settling_time=4,overshoot=2
+    """
+    from smajax.runtime import prepare
+
+    prepare(cores=True)
+    from smajax.command.folder import FolderTaken, claimed
+    from smajax.figures.rigs import arm
+    from smajax.gains_file import GainsFileError, read_gains
+    from smajax.progress import shown
+    from smajax.tune.folder import OURS, tune_into
+    from smajax.tune.objective import REGULATION
+    from smajax.tune.page import conclusions, gain_rows
+    from smajax.tune.settings import TuneSettings
+
+    try:
+        begun = read_gains(start, arm()) if start is not None else None
+        if begun is not None and begun.controller != controller:
+            raise GainsFileError(f"gains file {start} is of {begun.controller}, not of {controller}.")
+    except GainsFileError as error:
+        raise typer.BadParameter(str(error), param_hint="--start") from None
+    settings = TuneSettings(
+        controller,
+        numbers("--set-points", set_points if set_points is not None else "-20,20,60" if fast else TUNED_AT),
+        pairs("--variation", variation),
+        objective,
+        pairs("--weights", weights) or dict(REGULATION),
+        pairs("--limits", limits),
+        8 if fast else 32,
+        starts or (3 if fast else 6),
+        rounds or (10 if fast else 30),
+        by,
+        seconds,
+        estimator,
+        noise,
+        period,
+        delay,
+        seed,
+        4 if fast else 32,
+        {} if begun is None else begun.values,
+    )
+    kept = "Finished rounds are kept: the same command goes on."
+    asked = {"tuning": controller}  # what else was asked lies in a file of the tuning's own, which it checks
+    try:
+        settings.check(arm())
+        with (
+            resumable(kept),
+            claimed(out, "tune", asked, sorted(OURS), overwrite),
+            shown(console()) as progress,
+        ):
+            found = tune_into(arm(), settings, out, command_line(), progress)
+    except FolderTaken:
+        raise
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from None
+    page = out / "tune.html"
+    if json_out:
+        typer.echo((out / "tune.json").read_text(encoding="utf-8"), nl=False)
+    else:
+        for sentence in conclusions(found):
+            typer.echo(sentence)
+        for row in gain_rows(found):
+            typer.echo(f"  {row[0]:<24} {row[1]:>10} -> {row[2]:<10} {row[3]}" + (f"  ({row[5]})" if row[5] else ""))
+        typer.echo(f"Gains: {(out / 'gains.json').resolve()}")
+        typer.echo(f"Page: {page.resolve()}")
+    browse_from_terminal(page, open_page)
+    if settings.limits and not found.within_limits:
+        raise typer.Exit(UNMET)

@@ -1,0 +1,72 @@
+"""A model from names: wire, load, drive, kinetics law, effects, and values that differ from the presets'."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+
+from smajax.catalogue import check_together
+from smajax.effects.library import LIBRARY
+from smajax.extended import extended
+from smajax.measured.names import instead
+from smajax.parameters import check_bounds, parameters, set_parameters
+from smajax.presets import build
+from smajax.system import System
+from smajax.units import UnitError, parse_quantity
+from smajax.wire.laws import under_law
+
+
+def parameter_name(system: System, name: str) -> str:
+    """The parameter that `name` means: its own name, or its place in the model (`wire.heat.convection_coefficient`).
+
+    Raises ValueError with the nearest name, and all there are.
+    """
+    table = parameters(system)
+    places = {".".join(map(str, entry.path)): own for own, entry in table.items()}
+    if name in table or name in places:
+        return name if name in table else places[name]
+    raise ValueError(f"no parameter {name!r}{instead(name, [*table], 'this model has')}")
+
+
+def _value(system: System, name: str, value: str | float) -> float:
+    """The value in the program's own unit; text may carry a unit of its own, a plain number is SI, degC, rad."""
+    unit = parameters(system)[name].unit
+    if not isinstance(value, str):
+        return float(value)
+    try:
+        return float(value)
+    except ValueError:
+        pass
+    try:
+        return parse_quantity(value, "1" if unit == "-" else unit)
+    except UnitError as error:
+        raise UnitError(f"{name}: {error}") from None
+
+
+def compose(
+    wire: str,
+    load: str,
+    drive: str,
+    *,
+    law: str = "",
+    effects: Sequence[str] = (),
+    values: Mapping[str, str | float] | None = None,
+) -> System:
+    """Presets by name, under a kinetics law, with effects and parameters of one's own.
+
+    values: parameter -> a number (SI, temperatures in degC, angles in rad) or text with a unit (`"80 W/m^2/K"`); by its name
+    or its place in the model. An effect is part of the model when one of its parameters is given (`latent_heat.enthalpy`).
+    Raises KeyError for a preset, law or effect there is not, ValueError for a parameter there is not, a value out of its
+    bounds, or three presets that do not go together, UnitError for a unit of another kind.
+    """
+    system = build(wire, load, drive)
+    check_together(system, load, drive)
+    if law:
+        system = dataclasses.replace(system, wire=under_law(system.wire, law))
+    given = dict(values or {})
+    named = {name.split(".")[0] for name in given} & LIBRARY.keys()
+    system = extended(system, [*dict.fromkeys([*effects, *sorted(named)])])
+    known = {parameter_name(system, name): value for name, value in given.items()}
+    system = set_parameters(system, {name: _value(system, name, value) for name, value in known.items()})
+    check_bounds(system)
+    return system

@@ -1,0 +1,119 @@
+"""What smajax runs on, for a person who asks for help, and what may be wrong with it."""
+
+from __future__ import annotations
+
+import os
+import re
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from smajax.machine import available_memory, machine
+from smajax.plugins import versions
+from smajax.runtime import TRIED, kept_programs
+
+PACKAGE = "smajax"
+
+
+def _requirements() -> dict[str, bool]:
+    """Every package that smajax names -> whether it is of an extra."""
+    found: dict[str, bool] = {}
+    for line in metadata.requires(PACKAGE) or ():
+        name = re.match(r"[\w.-]+", line)
+        if name is not None:
+            found[name.group()] = found.get(name.group(), True) and "extra ==" in line
+    return found
+
+
+def _version(name: str) -> str:
+    try:
+        return metadata.version(name)
+    except metadata.PackageNotFoundError:
+        return ""
+
+
+def _size(folder: Path) -> int:
+    return sum(one.stat().st_size for one in folder.rglob("*") if one.is_file()) if folder.is_dir() else 0
+
+
+def _lanes() -> dict[str, Any]:
+    """Whether the processor's vectors are used, shown by a program that is compiled and run."""
+    try:
+        import jax.numpy as jnp
+        import numpy as np
+
+        from smajax.compiled import simulate_compiled
+        from smajax.lanes.kernel import vector_bits
+        from smajax.presets import build
+
+        system = build("flexinol_table_3_2", "dead_weight", "voltage")
+        run = simulate_compiled(system, {"voltage": jnp.full(21, 3.0)}, 0.01)
+        works = bool(np.isfinite(run.temperature).all() and run.temperature[-1] > run.temperature[0])
+        return {
+            "works": works,
+            "vector_bits": vector_bits(),
+            "why": "" if works else "a run gave numbers that make no sense",
+        }
+    except Exception as error:
+        return {"works": False, "vector_bits": None, "why": repr(error)}
+
+
+def examined(lanes: bool = True) -> dict[str, Any]:
+    """Versions, machine, devices, cache and memory. `lanes`: also compile and run a small model."""
+    import jax
+
+    cache = kept_programs()
+    return {
+        "smajax": {"version": _version(PACKAGE), "folder": str(Path(__file__).parent)},
+        "machine": machine(),
+        "packages": {name: _version(name) for name, extra in _requirements().items() if not extra},
+        "packages of extras": {name: _version(name) for name, extra in _requirements().items() if extra},
+        "devices": [f"{one.platform}: {one.device_kind}" for one in jax.devices()],
+        "float64": bool(jax.config.read("jax_enable_x64")),
+        "lanes": _lanes() if lanes else {},
+        "compiled programs": {
+            "folder": str(cache),
+            "bytes": _size(cache),
+            "writable": os.access(
+                cache if cache.is_dir() else next(one for one in cache.parents if one.exists()), os.W_OK
+            ),
+            "clear": "smajax doctor --clear-cache",
+        },
+        "memory": {"available_bytes": available_memory()},
+        "plug-ins": list(versions()),
+    }
+
+
+def remarks(found: dict[str, Any]) -> list[str]:
+    """What is likely to give trouble, each with what to do."""
+    told = [
+        f"{name} is not installed: pip install '{PACKAGE}'"
+        for name, version in found["packages"].items()
+        if not version
+    ]
+    jaxlib = found["machine"]["versions"].get("jaxlib", "0.0")
+    numbers = tuple(int(part) for part in jaxlib.split(".")[:2])
+    if not TRIED[0] <= numbers <= TRIED[1]:
+        told.append(
+            f"jaxlib {jaxlib} is none that was tried ({TRIED[0]} to {TRIED[1]}): it compiles with its own defaults."
+        )
+    if not found["float64"]:
+        told.append("JAX computes in float32 here: jax.config.update('jax_enable_x64', True) before the first array.")
+    if found["lanes"] and not found["lanes"]["works"]:
+        told.append(f"machine code does not work here ({found['lanes']['why']}); XLA is used, several times slower.")
+    if not found["compiled programs"]["writable"]:
+        told.append("the folder of compiled programs cannot be written: set JAX_COMPILATION_CACHE_DIR to one that can.")
+    memory = found["memory"]["available_bytes"]
+    if memory is not None and memory < 2 << 30:
+        told.append(f"only {memory / 1e9:.1f} GB of memory are free: give `run_batch` a smaller `budget`.")
+    return told
+
+
+def clear_cache() -> int:
+    """Delete the compiled programs, and nothing else that may lie in their folder; the bytes that are free again."""
+    folder = kept_programs()
+    before = _size(folder)
+    for ending in ("-cache", "-atime"):
+        for one in folder.glob(f"*{ending}"):
+            one.unlink(missing_ok=True)
+    return before - _size(folder)

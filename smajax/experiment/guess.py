@@ -1,0 +1,179 @@
+"""What the columns of a log may be: quantity, unit and how sure, from headings and magnitudes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+
+from smajax.measured.headers import is_time, unit_in, words
+from smajax.measured.table import Array, Table
+from smajax.units import UnitError, convert
+
+SURE, LIKELY, GUESS = "sure", "likely", "a guess"  # heading and unit; heading, unit by magnitude; neither
+TIME = "time"
+# Quantity -> (words of headings, the program's own unit). In this order: "ambient temperature" is not "temperature".
+QUANTITIES: Mapping[str, tuple[frozenset[str], str]] = MappingProxyType(
+    {
+        "ambient_temperature": (frozenset(["ambient", "room", "air", "environment", "tamb", "tinf"]), "degC"),
+        "voltage": (
+            frozenset(["voltage", "volt", "volts", "u", "v", "spannung", "vin", "ucmd", "vcmd", "tension"]),
+            "V",
+        ),
+        "current": (frozenset(["current", "amp", "amps", "ampere", "i", "strom", "courant"]), "A"),
+        "power": (frozenset(["power", "watt", "watts", "p", "leistung"]), "W"),
+        "duty": (frozenset(["duty", "pwm", "dutycycle"]), "1"),
+        "stress": (frozenset(["stress", "sigma", "spannungmpa"]), "Pa"),
+        "strain": (frozenset(["strain", "eps", "epsilon", "dehnung"]), "1"),
+        "angle": (frozenset(["angle", "theta", "phi", "winkel", "encoder", "rotation"]), "rad"),
+        "temperature": (frozenset(["temperature", "temp", "thermocouple", "twire", "tc", "temperatur", "t"]), "degC"),
+        "position": (
+            frozenset(["position", "pos", "displacement", "disp", "displ", "stroke", "lvdt", "laser", "weg", "x"]),
+            "m",
+        ),
+        "resistance": (frozenset(["resistance", "res", "ohm", "r", "widerstand"]), "ohm"),
+        "force": (frozenset(["force", "load", "loadcell", "kraft", "f"]), "N"),
+        "mass": (frozenset(["mass", "payload", "weight", "masse"]), "kg"),
+    }
+)
+# Units that people write and that mean something else to a unit library.
+MEANT = {"C": "degC", "°": "deg", "F": "degF", "": "", "-": "1", "%": "percent", "Ohm": "ohm", "Ω": "ohm"}
+DRIVES = ("voltage", "current", "power", "duty")
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column and what it may be; `quantity` is empty where nothing tells."""
+
+    key: str | int  # as an experiment file names it
+    name: str
+    quantity: str
+    unit: str
+    sure: str
+    why: str
+
+
+def _unit_by_size(quantity: str, values: Array) -> str:
+    """The unit in which numbers of this size are usual for a wire."""
+    size = float(np.nanmax(np.abs(values))) if values.size else 0.0
+    match quantity:
+        case "voltage":
+            return "mV" if size > 300.0 else "V"
+        case "current":
+            return "mA" if size > 50.0 else "A"
+        case "power":
+            return "mW" if size > 2000.0 else "W"
+        case "duty":
+            return "percent" if size > 1.5 else "1"
+        case "strain":
+            return "percent" if size > 0.3 else "1"
+        case "stress":
+            return "Pa" if size > 1e5 else "MPa"
+        case "angle":
+            return "deg" if size > 7.0 else "rad"
+        case "temperature" | "ambient_temperature":
+            return "K" if float(np.nanmin(values)) > 200.0 else "degC"
+        case "position":
+            return "mm" if size > 0.3 else "m"
+        case "mass":
+            return "g" if size > 5.0 else "kg"
+        case "force":
+            return "N"
+    return QUANTITIES[quantity][1] if quantity in QUANTITIES else "s"
+
+
+def time_unit(seconds: Array) -> str:
+    """Of a clock without a unit: milliseconds where it counts in whole numbers beyond an hour."""
+    whole = bool(np.all(seconds == np.round(seconds)))
+    return "ms" if whole and float(np.ptp(seconds)) > 3600.0 and float(np.median(np.diff(seconds))) >= 2.0 else "s"
+
+
+def _of_kind(unit: str, own: str) -> bool:
+    try:
+        convert(0.0, unit, own)
+    except UnitError:
+        return False
+    return True
+
+
+def _by_unit(unit: str) -> str:
+    """The quantity that a unit alone speaks for."""
+    order = ("voltage", "current", "power", "temperature", "position", "stress", "force", "resistance", "mass", "angle")
+    return next((name for name in order if _of_kind(unit, QUANTITIES[name][1])), "")
+
+
+def _column(table: Table, key: str | int, name: str) -> Column:
+    values = table.columns[name]
+    unit = MEANT.get(unit_in(name), unit_in(name))
+    said = set(words(name))
+    if isinstance(key, int):
+        return Column(key, name, "", "", GUESS, "no heading")
+    quantity = next(
+        (one for one, (known, own) in QUANTITIES.items() if said & known and (not unit or _of_kind(unit, own))), ""
+    )
+    if quantity and unit:
+        return Column(key, name, quantity, unit, SURE, "heading and unit")
+    if quantity:
+        return Column(key, name, quantity, _unit_by_size(quantity, values), LIKELY, "heading; unit by magnitude")
+    if unit and unit != "1" and (quantity := _by_unit(unit)):
+        return Column(key, name, quantity, unit, LIKELY, "unit in the heading")
+    why = "named like a time, and goes back somewhere" if is_time(name) else "nothing tells"
+    return Column(key, name, "", unit, GUESS, why)
+
+
+def _is_clock(table: Table, name: str, headed: bool) -> bool:
+    values = table.columns[name]
+    grows = values.size > 1 and bool(np.all(np.diff(values) >= 0.0)) and float(values[-1]) > float(values[0])
+    unit = MEANT.get(unit_in(name), unit_in(name))
+    if headed:
+        return is_time(name) and grows and (not unit or _of_kind(unit, "s"))
+    return grows and bool(np.all(np.diff(values) > 0.0))
+
+
+def _in_levels(values: Array) -> bool:
+    """Whether a signal rests at a few levels, as a command does and a sensor does not."""
+    return np.unique(values).size <= max(2, values.size // 20)
+
+
+def _by_shape(columns: Sequence[Column], table: Table) -> list[Column]:
+    """Columns without headings: what rests at levels is taken for the voltage, what moves for the position."""
+    found: list[Column] = []
+    for one in columns:
+        taken = {other.quantity for other in found} | {other.quantity for other in columns if other.quantity}
+        quantity = "voltage" if _in_levels(table.columns[one.name]) else "position"
+        if one.quantity or not isinstance(one.key, int) or quantity in taken:
+            found.append(one)
+            continue
+        unit = _unit_by_size(quantity, table.columns[one.name])
+        why = "it rests at levels" if quantity == "voltage" else "it moves all the time"
+        found.append(Column(one.key, one.name, quantity, unit, GUESS, f"no heading; {why}; unit by magnitude"))
+    return found
+
+
+def columns_of(table: Table) -> list[Column]:
+    """Every usable column with what it may be, the time first where there is one; each quantity once, by the surest."""
+    order = [name for name in (table.order or tuple(table.columns)) if name in table.columns]
+    headed = not all(name.isdigit() for name in order)
+    clock = None if table.clocks else next((name for name in order if _is_clock(table, name, headed)), None)
+    found: list[Column] = []
+    if clock is not None:
+        unit = MEANT.get(unit_in(clock), unit_in(clock))
+        key: str | int = clock if headed else order.index(clock) + 1
+        sure, why = (
+            (SURE, "heading and unit")
+            if headed and unit
+            else (LIKELY if headed else GUESS, "it only grows; unit by magnitude")
+        )
+        found.append(Column(key, clock, TIME, unit or time_unit(table.columns[clock]), sure, why))
+    rest = [_column(table, name if headed else order.index(name) + 1, name) for name in order if name != clock]
+    rest = _by_shape(rest, table)
+    rank = {SURE: 0, LIKELY: 1, GUESS: 2}
+    for one in rest:
+        rivals = [other for other in rest if other.quantity == one.quantity]
+        first = min(rivals, key=lambda other: rank[other.sure])
+        if one.quantity and one is not first:
+            one = Column(one.key, one.name, "", one.unit, GUESS, f"{first.name!r} is taken for the {first.quantity}")
+        found.append(one)
+    return found

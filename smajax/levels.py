@@ -1,0 +1,109 @@
+"""Inputs as people write them: `6V:5s,0V:10s`, a constant `25 degC`, or a column of a file `log.csv:U:mV`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from smajax.measured.headers import time_column, unit_in
+from smajax.measured.read import READERS, read_table
+from smajax.measured.resample import resample_input, resample_output, uniform_clock
+from smajax.measured.table import Array, check_time
+from smajax.units import UnitError, convert, parse_quantity
+
+
+@dataclass(frozen=True)
+class Given:
+    """One input: samples (time (s), values (own unit)), each held until the next; a constant has one and no `seconds`."""
+
+    time: Array
+    values: Array
+    seconds: float | None  # how long it lasts
+    measured: bool = False  # samples of a file, with straight lines between them where a model takes values at instants
+
+    def at(self, clock: Array) -> Array:
+        """The sample that holds at each instant, shape (n,)."""
+        # An instant that rounding put a hair before a sample belongs after it.
+        return np.asarray(self.values[np.clip(np.searchsorted(self.time, clock + 1e-9, side="right") - 1, 0, None)])
+
+    def on(self, clock: Array, dt: float, *, squared: bool = False, sampled: bool = False) -> Array:
+        """On a uniform clock, shape (n,): a command's mean over each step, or (`sampled`) a measured value at each instant.
+
+        squared: see `resample_input`.
+        """
+        if self.seconds is None or (sampled and not self.measured):
+            return self.at(clock)
+        if sampled:
+            return resample_output(self.time, self.values, clock, dt).values
+        return resample_input(self.time, self.values, clock, dt, squared=squared)
+
+
+def levels(text: str, unit: str) -> Given:
+    """`LEVEL:TIME,LEVEL:TIME,...` with units, such as `6V:5s,0V:10s`. UnitError for what it cannot be read as."""
+    values, lengths = [], []
+    for part in text.split(","):
+        level, colon, length = part.rpartition(":")
+        if not colon:
+            raise UnitError(f"got {part.strip()!r}, expected LEVEL:TIME, such as '6V:5s'")
+        values.append(parse_quantity(level, unit))
+        lengths.append(parse_quantity(length, "s"))
+    if min(lengths) <= 0.0:
+        raise UnitError(f"got {text!r}, expected times above zero")
+    ends = np.cumsum(lengths)
+    return Given(np.concatenate([[0.0], ends[:-1]]), np.asarray(values), float(ends[-1]))
+
+
+def column(path: Path, key: str | int, unit: str, own: str, time: str = "") -> Given:
+    """A column of a measured file; time counts from its first sample.
+
+    unit: of the column; empty: what its header says, else the message asks for it. time: `COLUMN` or `COLUMN:UNIT`, by
+    default the one that its header names. Raises MeasuredDataError, UnitError.
+    """
+    table = read_table(path)
+    values = table.column(key)
+    written = unit or unit_in(table.name_of(key))
+    if not written and own not in ("1", "-"):
+        raise UnitError(
+            f"{path}: column {table.name_of(key)!r} does not say its unit; write it behind: {path.name}:{key}:{own}"
+        )
+    clock, clock_unit = table.clock(key), "s"
+    if clock is None:
+        name, _, clock_unit = time.partition(":")
+        at = (
+            table.name_of(int(name) if name.isdigit() and name not in table.columns else name)
+            if name
+            else time_column(table)
+        )
+        clock, clock_unit = table.column(at), clock_unit or unit_in(at) or "s"
+    check_time(clock, f"{path}: the time of {key!r}", clock_unit, table.place)
+    seconds = convert(clock, clock_unit, "s")
+    seconds = seconds - seconds[0]
+    return Given(seconds, convert(values, written or own, own), float(seconds[-1]), measured=True)
+
+
+def given(text: str, own: str, time: str = "") -> Given:
+    """An input from text: levels, a constant, or `FILE:COLUMN` and `FILE:COLUMN:UNIT`; `own` is the unit that it comes in."""
+    head, colon, rest = text.partition(":")
+    if colon and (Path(head).suffix.lower() in READERS or Path(head).is_file()):
+        name, _, unit = rest.partition(":")
+        key: str | int = int(name) if name.isdigit() else name
+        return column(Path(head), key, unit, own, time)
+    if colon:
+        return levels(text, own)
+    return Given(np.zeros(1), np.asarray([parse_quantity(text, own)]), None)
+
+
+def clock_of(several: Sequence[Given], seconds: float | None, dt: float) -> Array:
+    """t_0 ... t_n of a run as long as asked, or as its longest input. ValueError where nothing says how long."""
+    lasting = [one.seconds for one in several if one.seconds is not None]
+    if seconds is None and not lasting:
+        raise ValueError(
+            "nothing says how long the run is: give levels with times (6V:5s,0V:10s), a file, or --seconds."
+        )
+    end = max(lasting) if seconds is None else seconds
+    if end < dt:
+        raise ValueError(f"the run lasts {end:g} s, less than a step of {dt:g} s.")
+    return uniform_clock(0.0, end, dt)

@@ -1,0 +1,76 @@
+"""What a column's heading says: its unit, and whether it is the time."""
+
+from __future__ import annotations
+
+import re
+
+from smajax.measured.names import listed
+from smajax.measured.table import MeasuredDataError, Table
+
+BRACKETS = re.compile(r"[\[(]\s*([^\[\]()]*(?:\([^()]*\)[^\[\]()]*)?)\s*[\])]\s*$")
+TIMES = {"time", "t", "zeit", "temps", "tiempo", "timestamp", "elapsed", "seconds", "sec", "clock"}
+
+
+def bare(name: str) -> str:
+    """The heading without its unit."""
+    return BRACKETS.sub("", name).strip()
+
+
+def words(name: str) -> list[str]:
+    """The words of a heading, in small letters: `Wire_Temp2 [C]` -> wire, temp."""
+    apart = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", bare(name))
+    return [word for word in re.split(r"[\W\d_]+", apart.lower()) if word]
+
+
+def unit_in(name: str) -> str:
+    """The unit that a heading has in brackets at its end, `U [mV]` or `T (°C)`, or behind an underscore, `time_s`; else empty."""
+    found = BRACKETS.search(name)
+    if found is not None:
+        return found.group(1).strip()
+    tail = name.rsplit("_", 1)[-1] if "_" in name else ""
+    return tail if tail in TAILS else ""
+
+
+TAILS = {
+    "s",
+    "ms",
+    "us",
+    "V",
+    "mV",
+    "A",
+    "mA",
+    "W",
+    "mW",
+    "m",
+    "mm",
+    "um",
+    "degC",
+    "deg",
+    "rad",
+    "N",
+    "mN",
+    "MPa",
+    "Pa",
+    "kPa",
+    "ohm",
+    "K",
+    "g",
+    "kg",
+    "percent",
+}
+
+
+def is_time(name: str) -> bool:
+    """Whether a heading names a time."""
+    said = words(name)
+    return bool(said) and said[0] in TIMES
+
+
+def time_column(table: Table) -> str:
+    """The only column whose heading names a time. Raises MeasuredDataError where none or several do."""
+    names = table.order or tuple(table.columns)
+    found = [name for name in names if is_time(name)]
+    if len(found) == 1:
+        return found[0]
+    told = f"columns {listed(found)} may be the time" if found else "no column is named like a time"
+    raise MeasuredDataError(f"{table.path}: {told}; say which it is (it has: {listed(names)})")

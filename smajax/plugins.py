@@ -1,0 +1,59 @@
+"""Parts that other packages bring, by entry point: `smajax.effects` and `smajax.loads`.
+
+    [project.entry-points."smajax.effects"]
+    my_effect = "my_package.my_effect:MyEffect"
+
+They are loaded with the table that they belong to. A name that is taken is refused, and a package that cannot be loaded is
+named: a study that went on without a part that it asks for would say something else than it seems to.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import lru_cache
+from importlib.metadata import EntryPoint, entry_points
+from typing import Any, TypeVar
+
+EFFECTS, LOADS = "smajax.effects", "smajax.loads"
+Part = TypeVar("Part")
+
+
+class PluginError(RuntimeError):
+    """An entry point that cannot be used: which, of which package, why, what to do."""
+
+
+def _whose(point: EntryPoint) -> str:
+    package = f" of {point.dist.name} {point.dist.version}" if point.dist is not None else ""
+    return f"the entry point `{point.name} = {point.value}`{package} in the group {point.group!r}"
+
+
+def brought(group: str, own: Mapping[str, Part], check: Callable[[str, Any], str]) -> dict[str, Part]:
+    """What other packages bring to the table `own`, by name, in the order of the names.
+
+    check(name, part) says what is wrong with a part, or nothing. Raises PluginError for a part that cannot be loaded, is
+    not what it should be, or has a name that is taken.
+    """
+    found: dict[str, Part] = {}
+    for point in sorted(entry_points(group=group), key=lambda one: (one.name, one.value)):
+        try:
+            part = point.load()
+        except Exception as error:
+            raise PluginError(
+                f"{_whose(point)} cannot be loaded ({error!r}): mend or uninstall that package."
+            ) from error
+        if point.name in own or point.name in found:
+            raise PluginError(f"{_whose(point)} has a name that is taken: rename it there, or uninstall that package.")
+        wrong = check(point.name, part)
+        if wrong:
+            raise PluginError(f"{_whose(point)} {wrong}.")
+        found[point.name] = part
+    return found
+
+
+@lru_cache(maxsize=1)
+def versions() -> tuple[str, ...]:
+    """`group name package version` of every part that other packages bring: kept work of another set is other work."""
+    points = [point for group in (EFFECTS, LOADS) for point in entry_points(group=group)]
+    return tuple(
+        sorted(f"{one.group} {one.name} {one.dist.name} {one.dist.version}" for one in points if one.dist is not None)
+    )

@@ -1,0 +1,168 @@
+"""A single run -> CSV, NetCDF, JSON, a picture and a page."""
+
+from __future__ import annotations
+
+import csv
+import html
+import io
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+
+from smajax.figures.drawing import BLUE, GREY, RED, named, panels
+from smajax.parameters import parameter_values, parameters
+from smajax.report.display import axis_label, digits, display, label
+from smajax.report.files import json_text, replace, replace_bytes
+from smajax.report.html import picture
+from smajax.report.plain_page import bullets, table, whole
+from smajax.single import Ran
+
+PLAIN = ("position", "temperature", "martensite_fraction", "stress")
+MERITS = {
+    "reach_time": "s",
+    "settling_time": "s",
+    "overshoot": "rad",
+    "steady_error": "rad",
+    "steady_offset": "rad",
+    "energy": "J",
+    "switches_per_second": "1/s",
+    "peak_temperature": "degC",
+}
+
+
+def as_csv(found: xr.Dataset) -> str:
+    """One row a sample, SI, units in the heading: `time [s],voltage [V],...`; smajax reads it back."""
+    text = io.StringIO()
+    columns = {"time": found["time"], **found.data_vars}
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(
+        [f"{name} [{'1' if one.attrs['units'] in ('-', '') else one.attrs['units']}]" for name, one in columns.items()]
+    )
+    for row in np.stack([one.to_numpy() for one in columns.values()], axis=1).tolist():
+        writer.writerow([f"{value:.10g}" for value in row])
+    return text.getvalue()
+
+
+def as_netcdf(found: xr.Dataset) -> bytes:
+    """NetCDF 3, which every reader knows."""
+    return bytes(found.to_netcdf(engine="scipy"))
+
+
+def record(ran: Ran, command: str, series: bool = True) -> dict[str, Any]:
+    """Everything in SI: the model, least, greatest and last of each variable, figures of merit, and the series."""
+    found = ran.found
+    return {
+        "command": command,
+        "provenance": {name: value for name, value in found.attrs.items() if name != "parameters (SI)"},
+        "parameters": parameter_values(ran.system),
+        "notes": list(ran.notes),
+        "merit": {name: {"value": value, "unit": MERITS[name]} for name, value in ran.merit.items()},
+        "summary": {
+            str(name): {
+                "unit": one.attrs["units"],
+                "least": float(one.min()),
+                "greatest": float(one.max()),
+                "last": float(one[-1]),
+            }
+            for name, one in found.data_vars.items()
+        },
+        "series": {str(name): found[name].to_numpy().tolist() for name in ("time", *found.data_vars)} if series else {},
+    }
+
+
+def _inputs(found: xr.Dataset) -> list[str]:
+    """The variables that are no state of the model."""
+    names = [str(name) for name in found.data_vars]
+    return [name for name in names[: names.index("temperature")] if name != "wanted"]
+
+
+def drawn(found: xr.Dataset) -> bytes:
+    """Input, position, temperature, fraction and stress over time, and the hysteresis of the position."""
+    inputs = _inputs(found)
+    shown = [*inputs[:1], *PLAIN]
+    figure = Figure(figsize=(10.0, 8.2))
+    axes = panels(figure, 3, 2)
+    time = found["time"].to_numpy()
+
+    def values(name: str) -> tuple[Any, str]:
+        unit = display(found[name].attrs["units"], name)
+        return unit.of(found[name].to_numpy()), axis_label(name, unit)
+
+    for one, name in zip(axes, shown, strict=False):
+        what, said = values(name)
+        one.plot(time, what, color=RED if name in inputs else BLUE, linewidth=1.3)
+        if name == "position" and "wanted" in found:
+            one.plot(time, values("wanted")[0], color=GREY, linewidth=1.0, linestyle="--")
+        named(one, "time (s)", said)
+    last = axes[len(shown)]
+    temperature, said = values("temperature")
+    position, other = values("position")
+    last.plot(temperature, position, color=BLUE, linewidth=1.1)
+    named(last, said, other)
+    for spare in axes[len(shown) + 1 :]:
+        spare.axis("off")
+    image = io.BytesIO()
+    figure.savefig(image, dpi=90, facecolor="white", format="png")
+    return image.getvalue()
+
+
+def summary_rows(found: xr.Dataset) -> list[list[str]]:
+    """A row a variable: least, greatest, last, in the units that a reader sees."""
+    rows = []
+    for name, one in found.data_vars.items():
+        unit = display(one.attrs["units"], str(name))
+        rows.append(
+            [label(str(name)), *(digits(unit.of(float(value))) for value in (one.min(), one.max(), one[-1])), unit.unit]
+        )
+    return rows
+
+
+def merit_rows(ran: Ran) -> list[list[str]]:
+    """A row a figure of merit."""
+    rows = []
+    for name, value in ran.merit.items():
+        unit = display(MERITS[name], name)
+        rows.append([label(name), "never" if np.isinf(value) else digits(unit.of(value), 3), unit.unit])
+    return rows
+
+
+def page(ran: Ran, image: bytes, title: str, command: str) -> str:
+    """The whole page, picture inside."""
+    table_of = parameters(ran.system)
+    values = [
+        [name, digits(value, 6), table_of[name].unit, table_of[name].about]
+        for name, value in parameter_values(ran.system).items()
+    ]
+    parts = [f"<h1>{html.escape(title)}</h1>", bullets(ran.notes)]
+    if ran.merit:
+        parts.append(table(["figure of merit", "", "unit"], merit_rows(ran), (1,)))
+    parts += [
+        str(picture(image, "the run over time")),
+        table(["", "least", "greatest", "last", "unit"], summary_rows(ran.found), (1, 2, 3)),
+        "<h2>Parameters (SI, temperatures in °C, angles in rad)</h2>",
+        table(["parameter", "value", "unit", "what it is"], values, (1,)),
+        "<h2>Provenance</h2>",
+        table(
+            ["", ""],
+            [["command", command], *([k, str(v)] for k, v in ran.found.attrs.items() if k != "parameters (SI)")],
+        ),
+        "<p class=quiet>The same numbers: simulate.csv, simulate.nc, simulate.json.</p>",
+    ]
+    return whole(title, parts)
+
+
+OWN: Sequence[str] = ("simulate.csv", "simulate.nc", "simulate.json", "simulate.png", "simulate.html")
+
+
+def write_run(ran: Ran, folder: Path, title: str, command: str) -> Path:
+    """All files of a run into `folder`, each in one step; the path of the page."""
+    image = drawn(ran.found)
+    replace(folder / "simulate.csv", as_csv(ran.found))
+    replace_bytes(folder / "simulate.nc", as_netcdf(ran.found))
+    replace(folder / "simulate.json", json_text(record(ran, command)))
+    replace_bytes(folder / "simulate.png", image)
+    return replace(folder / "simulate.html", page(ran, image, title, command))

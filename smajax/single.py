@@ -1,0 +1,155 @@
+"""One run from what a person asks for: model by name, inputs as text -> data set, figures of merit, remarks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import xarray as xr
+
+from smajax.closed_loop import check_answers
+from smajax.compiled import judged_loop_compiled
+from smajax.compose import compose
+from smajax.control_presets import CONTROLLERS
+from smajax.dataset import labelled_loop, simulate_dataset
+from smajax.experiment.catalogue import INPUT_UNITS
+from smajax.gains_file import Gains, read_gains
+from smajax.levels import clock_of, given
+from smajax.load.base import AbstractMovingLoad
+from smajax.load.coupon import AbstractCoupon
+from smajax.measured.names import instead
+from smajax.parameters import parameter_values
+from smajax.reference import resting
+from smajax.simulate import DEFAULT_STEP
+from smajax.sweep_run import between_in_words, check_interface, interface_of
+from smajax.system import System
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A run: presets by name, values that differ, inputs as text (`levels.given`), and the step, s."""
+
+    wire: str = "niti_table_3_1"
+    load: str = "arm"
+    drive: str = "amplified_voltage"
+    law: str = ""
+    values: Mapping[str, str] = field(default_factory=dict)
+    inputs: Mapping[str, str] = field(default_factory=dict)
+    time: str = ""  # the time column of files
+    seconds: float | None = None
+    dt: float = DEFAULT_STEP
+    tolerance: float | None = None
+
+    def system(self, more: Mapping[str, str] | None = None) -> System:
+        """The model, with `more` values on top."""
+        return compose(self.wire, self.load, self.drive, law=self.law, values={**self.values, **(more or {})})
+
+
+@dataclass(frozen=True)
+class AskedLoop:
+    """A closed loop around it; angles in rad, the rest as in a sweep."""
+
+    controller: str
+    set_points: str  # levels: `40deg:5s,10deg:5s`
+    gains: Path | None = None
+    mismatch: Mapping[str, str] = field(default_factory=dict)  # values of the plant that the controller does not know
+    estimator: str = ""
+    noise: float = 0.0  # degrees
+    period: float = 0.01  # s
+    delay: int = 0  # periods
+    seed: int = 0
+
+
+@dataclass(frozen=True)
+class Ran:
+    """What came out: `found` over time, figures of merit of a closed loop (SI), what should be known of it."""
+
+    found: xr.Dataset
+    system: System
+    merit: Mapping[str, float]
+    notes: tuple[str, ...]
+
+
+def channels(system: System) -> tuple[frozenset[str], frozenset[str]]:
+    """(inputs that the model needs, inputs that it may have besides)."""
+    required = system.load.inputs_required | system.drive.inputs_required
+    return required, (system.load.inputs_optional | system.drive.inputs_optional | {"ambient_temperature"}) - required
+
+
+def _unit(name: str) -> str:
+    return "N m" if name == "load_torque" else INPUT_UNITS[name]
+
+
+def _notes(found: xr.Dataset) -> list[str]:
+    wrong = [str(name) for name in found.data_vars if not np.isfinite(found[name].to_numpy()).all()]
+    return [f"Numbers that are none in {', '.join(wrong)}: is the heat or the step too large?"] if wrong else []
+
+
+def run_open(asked: Asked) -> Ran:
+    """The run. Raises KeyError, ValueError, UnitError, MeasuredDataError for what cannot be used."""
+    system = asked.system()
+    required, optional = channels(system)
+    for name in asked.inputs:
+        if name not in required | optional:
+            raise ValueError(f"no input {name!r}{instead(name, sorted(required | optional), 'this model takes')}")
+    several = {name: given(text, _unit(name), asked.time) for name, text in asked.inputs.items()}
+    clock = clock_of(list(several.values()), asked.seconds, asked.dt)
+    measured = system.load.inputs_required if isinstance(system.load, AbstractCoupon) else frozenset()
+    series: Any = {
+        name: one.on(clock, asked.dt, squared=name in system.drive.inputs_squared, sampled=name in measured)
+        for name, one in several.items()
+    }
+    found = simulate_dataset(system, series, asked.dt, asked.tolerance)
+    return Ran(found, system, {}, tuple(_notes(found)))
+
+
+def run_closed(asked: Asked, loop: AskedLoop) -> Ran:
+    """The closed loop. Raises as `run_open`, and GainsFileError."""
+    believed, plant = asked.system(), asked.system(loop.mismatch)
+    if not isinstance(believed.load, AbstractMovingLoad) or believed.load.reading[1] != "rad":
+        raise ValueError(f"controllers are those of the arm: give the load `arm`, not `{asked.load}`.")
+    gains = Gains(loop.controller, {}) if loop.gains is None else read_gains(loop.gains, believed)
+    if gains.controller not in CONTROLLERS:
+        raise ValueError(f"no controller {gains.controller!r}{instead(gains.controller, CONTROLLERS, 'there are')}")
+    preset = CONTROLLERS[gains.controller]
+    believed, plant = preset.plant(believed), preset.plant(plant)
+    check_interface(loop.estimator, loop.period, asked.dt)
+    between = interface_of(believed, loop.estimator, loop.noise, loop.period, asked.dt, loop.delay)
+    wanted = given(loop.set_points, "rad", asked.time)
+    clock = clock_of([wanted], asked.seconds, asked.dt)
+    periods = (clock.size - 1) // between.every
+    if periods < 1:
+        raise ValueError(f"the run is shorter than one control period of {loop.period:g} s.")
+    clock = clock[: periods * between.every + 1]
+    # A set point holds from its instant on: a mean over the step before it would come early.
+    position = wanted.at(clock)
+    ran, merits = judged_loop_compiled(
+        plant,
+        gains.put(believed),
+        resting(jnp.asarray(position)),
+        asked.dt,
+        between.every,
+        estimator=between.estimator,
+        sensor=between.sensor,
+        key=None if between.sensor is None else jax.random.key(loop.seed),
+        delay=between.delay,
+    )
+    told = between_in_words(loop.estimator, loop.noise, loop.period, loop.delay)
+    found = labelled_loop(
+        plant, ran, dt=asked.dt, controller=gains.controller, gains=parameter_values(gains.put(believed)), between=told
+    )
+    notes = _notes(found)
+    try:
+        check_answers(ran)
+    except ValueError as error:
+        notes.append(str(error))
+    judged = {name: float(value) for name, value in vars(merits).items()}
+    if np.ptp(position) > 0.0:
+        judged = {}  # they look at one set point from the start of the run
+        notes.append("Figures of merit are those of a run to one set point; this one has several.")
+    return Ran(found, plant, judged, tuple(notes))

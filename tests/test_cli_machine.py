@@ -1,0 +1,110 @@
+"""`smajax doctor`, `bench` and `new-experiment`: what they say is so."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from smajax import doctor
+from smajax.bench import bench, in_words
+from smajax.catalogue import CATALOGUE
+from smajax.cli import app
+from smajax.experiment.guess import columns_of
+from smajax.experiment.load import load_experiment
+from smajax.experiment.template import begun
+from smajax.measured.read import read_table
+
+run = CliRunner()
+DEMO = Path(__file__).parents[1] / "smajax" / "demo" / "latent"
+
+
+def test_the_doctor_finds_what_is_missing() -> None:
+    found = doctor.examined()
+    assert found["float64"]
+    assert found["lanes"]["works"], found["lanes"]["why"]
+    assert found["packages"]["jax"]
+    assert found["memory"]["available_bytes"] is None or found["memory"]["available_bytes"] > 1 << 20
+    ill = {**found, "float64": False, "packages": {**found["packages"], "optax": ""}}
+    ill["compiled programs"] = {**found["compiled programs"], "writable": False}
+    told = " ".join(doctor.remarks(ill))
+    assert "optax is not installed" in told
+    assert "jax_enable_x64" in told
+    assert "JAX_COMPILATION_CACHE_DIR" in told
+
+
+def test_only_compiled_programs_are_cleared(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("JAX_COMPILATION_CACHE_DIR", str(tmp_path))
+    (tmp_path / "jit_f-abc-cache").write_bytes(b"x" * 1000)
+    (tmp_path / "thesis.tex").write_text("mine")
+    assert doctor.clear_cache() == 1000
+    assert [one.name for one in tmp_path.iterdir()] == ["thesis.tex"]
+
+
+def test_the_bench_compares_the_same_trajectories() -> None:
+    found = bench(count=64, peers=2)
+    assert found["agree"]
+    assert 0.0 < found["largest_difference_degrees"] < 0.1
+    assert found["ratio"] == pytest.approx(found["scipy_ms"] / found["smajax_ms"])
+    assert found["machine"]["processor"] in in_words(found)[0]
+
+
+def test_a_template_loads_as_it_is(tmp_path: Path) -> None:
+    logs = [str(DEMO / name) for name in ("steps.csv", "triangle.csv", "pulses.csv")]
+    told = run.invoke(app, ["new-experiment", *logs, "--out", str(tmp_path / "e.toml"), "--json"])
+    assert told.exit_code == 0, told.output
+    assert json.loads(told.stdout)["loads"]
+    begun_as, made = load_experiment(tmp_path / "e.toml", CATALOGUE), load_experiment(DEMO, CATALOGUE)
+    assert [one.role for one in begun_as.runs] == ["fit", "fit", "held-out"]
+    np.testing.assert_array_equal(begun_as.runs[0].inputs["voltage"], made.runs[0].inputs["voltage"])
+    np.testing.assert_array_equal(begun_as.runs[0].outputs["position"], made.runs[0].outputs["position"])
+    assert run.invoke(app, ["new-experiment", *logs, "--out", str(tmp_path / "e.toml")]).exit_code == 2
+
+
+@pytest.mark.parametrize(
+    ("head", "row", "expected"),
+    [
+        ("Time [ms],U [mV],Displ [mm]", "{t},{v},{x}", {"time": "ms", "voltage": "mV", "position": "mm"}),
+        (
+            "t;T (C);Strain;Stress",
+            "{t};{T};{e};{s}",
+            {"time": "s", "temperature": "degC", "strain": "1", "stress": "MPa"},
+        ),
+        ("zeit,Winkel,PWM", "{t},{x},{p}", {"time": "s", "angle": "deg", "duty": "percent"}),
+        (
+            "seconds,Room temp,Temp,u",
+            "{t},{T},{K},{v}",
+            {"time": "s", "ambient_temperature": "degC", "temperature": "K", "voltage": "mV"},
+        ),
+    ],
+)
+def test_units_are_those_of_headings_and_magnitudes(
+    tmp_path: Path, head: str, row: str, expected: dict[str, str]
+) -> None:
+    values = [
+        {
+            "t": 10 * k,
+            "v": 5000 * (k % 20 > 9),
+            "x": 3.1 + 10 * np.sin(k),
+            "T": 30 + k,
+            "e": 0.01 + k / 1e4,
+            "s": 100 + k,
+            "p": 40,
+            "K": 300 + k,
+        }
+        for k in range(40)
+    ]
+    (tmp_path / "log.csv").write_text("\n".join([head, *(row.format(**one) for one in values)]))
+    assert {one.quantity: one.unit for one in columns_of(read_table(tmp_path / "log.csv")) if one.quantity} == expected
+
+
+def test_what_the_model_needs_and_no_column_gives_is_said(tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text("time,displacement\n" + "\n".join(f"{k / 10},{np.sin(k / 9)}" for k in range(60)))
+    guessed = begun([tmp_path / "log.csv"], tmp_path / "e.toml")
+    assert any("voltage: MISSING" in line for line in guessed.told)
+    told = run.invoke(app, ["new-experiment", str(tmp_path / "log.csv"), "--out", str(tmp_path / "e.toml")])
+    assert told.exit_code == 3
+    assert "needs the input 'voltage'" in told.stdout.replace("\n", " ")

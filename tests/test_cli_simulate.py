@@ -1,0 +1,162 @@
+"""`smajax simulate`: the run is that of the model asked for, in every format, open and closed loop; mistakes are answered."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+import xarray as xr
+from typer.testing import CliRunner
+
+from smajax.cli import app
+from smajax.command.folder import FolderTaken
+from smajax.compiled import simulate_compiled
+from smajax.compose import compose
+from smajax.levels import clock_of, given, levels
+from smajax.parameters import parameter_values, set_parameters
+from smajax.presets import build
+from smajax.units import UnitError
+
+run = CliRunner()
+HANGING = ("flexinol_table_3_2", "dead_weight", "flexinol_voltage")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("simulated") / "run"
+    words = ["simulate", *HANGING, "--step", "5V:2s,0V:1s", "--set", "wire.heat.convection_coefficient=80"]
+    told = run.invoke(app, [*words, "--dt", "10ms", "--out", str(out)])
+    assert told.exit_code == 0, told.output
+    return out
+
+
+def test_the_run_is_that_of_the_model(folder: Path) -> None:
+    system = set_parameters(build(*HANGING), {"convection_coefficient": 80.0})
+    voltage = jnp.where(jnp.arange(301) < 200, 5.0, 0.0)
+    expected = simulate_compiled(system, {"voltage": voltage}, 0.01)
+    with xr.open_dataset(folder / "simulate.nc", engine="scipy") as found:
+        np.testing.assert_allclose(found["position"], expected.position, rtol=1e-9)
+        np.testing.assert_allclose(found["voltage"], voltage, rtol=1e-12)
+        assert (found["position"].attrs["units"], found["stress"].attrs["units"]) == ("m", "Pa")
+    with (folder / "simulate.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert float(rows[150]["position [m]"]) == pytest.approx(float(expected.position[150]), rel=1e-9)
+    record = json.loads((folder / "simulate.json").read_text(encoding="utf-8"))
+    assert record["parameters"]["convection_coefficient"] == 80.0
+    assert record["summary"]["temperature"]["greatest"] == pytest.approx(float(expected.temperature.max()))
+    assert (folder / "simulate.png").stat().st_size > 10_000
+    assert "data:image/png;base64," in (folder / "simulate.html").read_text(encoding="utf-8")
+
+
+def test_what_was_written_is_an_input_again(folder: Path, tmp_path: Path) -> None:
+    words = [
+        "simulate",
+        *HANGING,
+        "--input",
+        f"voltage={folder / 'simulate.csv'}:voltage [V]",
+        "--dt",
+        "10ms",
+        "--json",
+    ]
+    told = run.invoke(app, [*words, "--set", "convection_coefficient=80 W/m^2/K", "--out", str(tmp_path / "again")])
+    assert told.exit_code == 0, told.output
+    first = json.loads((folder / "simulate.json").read_text(encoding="utf-8"))
+    again = json.loads(told.stdout)
+    np.testing.assert_allclose(again["series"]["position"], first["series"]["position"], rtol=1e-6)
+
+
+def test_the_same_run_may_be_shown_again_and_another_goes_elsewhere(folder: Path) -> None:
+    words = ["simulate", *HANGING, "--step", "5V:2s,0V:1s", "--dt", "10ms", "--out", str(folder)]
+    again = run.invoke(app, [*words, "--set", "wire.heat.convection_coefficient=80", "--json"])
+    assert again.exit_code == 0, again.output
+    other = run.invoke(app, [*words, "--set", "wire.heat.convection_coefficient=90"])
+    assert isinstance(other.exception, FolderTaken)
+    assert "{'wire.heat.convection_coefficient': '80'} there" in str(other.exception)
+
+
+def test_a_gains_file_closes_the_loop(tmp_path: Path) -> None:
+    gains = {"controller": "pid", "gains": {"proportional_gain": 13.0}}
+    (tmp_path / "gains.json").write_text(json.dumps(gains))
+    words = ["simulate", "--gains", str(tmp_path / "gains.json"), "--set-point", "30deg:6s", "--dt", "10ms", "--json"]
+    told = run.invoke(app, [*words, "--out", str(tmp_path / "loop")])
+    assert told.exit_code == 0, told.output
+    record = json.loads(told.stdout)
+    assert record["merit"]["steady_error"]["value"] < np.radians(1.0)
+    assert np.degrees(record["series"]["wanted"][-1]) == pytest.approx(30.0)
+    assert record["series"]["position"][-1] == pytest.approx(np.radians(30.0), abs=np.radians(1.0))
+    assert "'proportional_gain': 13.0" in record["provenance"]["gains"]
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["--step", "7:10"], "without a unit"),
+        (["--step", "7V"], "how long the run is"),
+        (["--step", "7V:1s,3V"], "LEVEL:TIME"),
+        (["--step", "7V:1s", "--set", "convection_coeficient=80"], "did you mean 'convection_coefficient'"),
+        (["--step", "7V:1s", "--set", "convection_coefficient=-80"], "outside of the bounds"),
+        (["--step", "7V:1s", "--set", "convection_coefficient=80 kg"], "convection_coefficient: got unit 'kg'"),
+        (["--input", "voltage=5V"], "how long the run is"),
+        (["--input", "current=5A", "--seconds", "1"], "no input 'current'"),
+        (["flexinol", "--step", "7V:1s"], "No wire preset"),
+        (["--controller", "pdi", "--set-point", "1deg:1s"], "did you mean 'pid'"),
+        (["--controller", "pid"], "needs --set-point"),
+        (["flexinol_table_3_2", "coupon", "voltage", "--step", "7V:1s"], "takes the drive `none`"),
+        (["--input", "voltage=nowhere.csv:U"], "no such file"),
+    ],
+)
+def test_mistakes_are_answered_and_leave_no_folder(words: list[str], told: str, tmp_path: Path) -> None:
+    out = tmp_path / "deep" / "out"
+    ended = run.invoke(app, ["simulate", *words, "--out", str(out)])
+    said = " ".join((ended.output + str(ended.exception)).replace("│", " ").split())
+    assert ended.exit_code == 2
+    assert told in said
+    assert not out.parent.exists()
+
+
+def test_an_effect_comes_with_its_parameter() -> None:
+    system = compose(*HANGING, values={"latent_heat.enthalpy": "20 J/g", "ambient_temperature": "300 K"}, law="liang")
+    values = parameter_values(system)
+    assert values["latent_heat.enthalpy"] == pytest.approx(20e3)
+    assert values["ambient_temperature"] == pytest.approx(26.85)
+    assert type(system.wire.kinetics.conditions).__name__ == "Liang"
+
+
+def test_levels_hold_until_the_next(tmp_path: Path) -> None:
+    one = levels("6V:1s,200mV:500ms", "V")
+    clock = clock_of([one], None, 0.25)
+    np.testing.assert_allclose(one.on(clock, 0.25), [6, 6, 6, 6, 0.2, 0.2, 0.2])
+    (tmp_path / "log.csv").write_text("Time (ms);U [mV]\n0;1000\n500;2000\n1000;2000\n")
+    held = given(f"{tmp_path / 'log.csv'}:U [mV]", "V")
+    np.testing.assert_allclose(held.on(clock_of([held], None, 0.25), 0.25), [1, 1, 2, 2, 2])
+    clock = clock_of([held], None, 0.25)
+    np.testing.assert_allclose(held.on(clock, 0.25, sampled=True)[1], 1.5, atol=0.2)  # a file's samples: lines between
+    np.testing.assert_allclose(one.on(clock, 0.25, sampled=True), [6, 6, 6, 6, 0.2])  # levels: none
+    with pytest.raises(UnitError, match="above zero"):
+        levels("6V:0s", "V")
+
+
+def test_a_coupon_is_given_its_temperature_and_stress(tmp_path: Path) -> None:
+    words = [
+        "simulate",
+        "flexinol_isobaric",
+        "coupon",
+        "none",
+        "--dt",
+        "100ms",
+        "--json",
+        "--out",
+        str(tmp_path / "out"),
+    ]
+    inputs = ["--input", "temperature=30degC:1s,99degC:1s", "--input", "stress=100MPa"]
+    told = run.invoke(app, [*words, *inputs])
+    assert told.exit_code == 0, told.output
+    record = json.loads(told.stdout)
+    assert record["series"]["temperature"][9:11] == [30.0, 99.0]
+    assert record["series"]["stress"] == [100e6] * 21
+    assert record["series"]["martensite_fraction"][-1] == pytest.approx(0.0, abs=1e-6)
+    assert record["series"]["reading"][0] - record["series"]["reading"][-1] == pytest.approx(0.04, abs=5e-3)

@@ -1,0 +1,120 @@
+"""Another package adds an effect and a load by entry points alone; what cannot be used is refused by name."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from smajax.effects.library import _OWN, _wrong
+from smajax.plugins import EFFECTS, PluginError, brought
+
+PACKAGE = """
+from typing import ClassVar
+
+from smajax import AbstractEffect, parameter
+from smajax.load.dead_weight import DeadWeight
+
+
+class Draught(AbstractEffect):
+    effect_name: ClassVar[str] = "draught"
+    title: ClassVar[str] = "draught"
+    equation: ClassVar[str] = "heat"
+    formula: ClassVar[str] = "P' = k (T - T_inf)"
+    sentence: ClassVar[str] = "Moving air takes more heat away."
+    switches: ClassVar[tuple[str, ...]] = ("strength",)
+    starts: ClassVar[dict[str, float]] = {"strength": 0.1}
+    strength: object = parameter("W/(m K)", 0.0, 10.0, "k", default=0.0)
+
+    @classmethod
+    def base(cls):
+        return cls()
+
+    def heat_loss(self, wire, temperature, ambient):
+        return self.strength * (temperature - ambient)
+
+
+def bucket():
+    return DeadWeight(load_mass=1.0, damping=20.0)
+
+
+nothing = 3
+"""
+LOOK = """
+import json
+from smajax.compose import compose
+from smajax.compiled import simulate_compiled
+import jax.numpy as jnp
+from smajax.effects.library import LIBRARY
+from smajax.plugins import versions
+ends = []
+for strength in ("0 W/m/K", "0.1 W/m/K"):
+    system = compose("flexinol_table_3_2", "bucket", "voltage", values={"draught.strength": strength})
+    ends.append(float(simulate_compiled(system, {"voltage": jnp.full(101, 3.0)}, 0.01).temperature[-1]))
+print(json.dumps([list(LIBRARY)[-1], float(system.load.load_mass), ends, versions()]))
+"""
+
+
+def _installed(folder: Path, points: str) -> dict[str, str]:
+    """A package as an installer leaves it, and the environment in which it is found."""
+    (folder / "airflow.py").write_text(PACKAGE)
+    info = folder / "airflow-1.2.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: airflow\nVersion: 1.2\n")
+    (info / "entry_points.txt").write_text(points)
+    return {**os.environ, "PYTHONPATH": os.pathsep.join([str(folder), os.environ.get("PYTHONPATH", "")])}
+
+
+def _asked(code: str, environment: dict[str, str], cwd: Path) -> subprocess.CompletedProcess[str]:
+    here = str(Path(__file__).parents[1])
+    path = os.pathsep.join([here, environment["PYTHONPATH"]])
+    return subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        cwd=cwd,
+        env={**environment, "PYTHONPATH": path},
+        check=False,
+    )
+
+
+def test_an_effect_and_a_load_of_another_package(tmp_path: Path) -> None:
+    points = "[smajax.effects]\ndraught = airflow:Draught\n[smajax.loads]\nbucket = airflow:bucket\n"
+    told = _asked(LOOK, _installed(tmp_path, points), tmp_path)
+    assert told.returncode == 0, told.stderr
+    last, mass, (still, moving), versions = json.loads(told.stdout)
+    assert (last, mass) == ("draught", 1.0)
+    assert moving < still - 1.0
+    assert versions == ["smajax.effects draught airflow 1.2", "smajax.loads bucket airflow 1.2"]
+
+
+@pytest.mark.parametrize(
+    ("point", "told"),
+    [
+        ("latent_heat = airflow:Draught", "of airflow 1.2 in the group 'smajax.effects' has a name that is taken"),
+        ("draft = airflow:Draught", "calls itself 'draught'"),
+        ("draught = airflow:nothing", "expected a class of `smajax.AbstractEffect`"),
+        ("draught = airflow:missing", "cannot be loaded"),
+    ],
+)
+def test_what_cannot_be_used_is_refused_by_name(
+    point: str, told: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _installed(tmp_path, f"[smajax.effects]\n{point}\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(PluginError, match=re.escape(told)):
+        brought(EFFECTS, _OWN, _wrong)
+
+
+def test_the_command_line_says_it_without_a_traceback(tmp_path: Path) -> None:
+    environment = _installed(tmp_path, "[smajax.effects]\nlatent_heat = airflow:Draught\n")
+    code = "import sys; sys.argv = ['smajax', 'effects']; from smajax.cli import main; main()"
+    ended = _asked(code, environment, tmp_path)
+    assert ended.returncode == 2, ended.stderr
+    assert "a name that is taken: rename it there, or uninstall" in " ".join(ended.stderr.split())
+    assert "Traceback" not in ended.stderr
