@@ -16,7 +16,7 @@ test: lint
 test-all: lint
 	$(BIN)/python -m pytest -n 2 --dist worksteal -m "slow or not slow"
 
-# site/index.html; any warning ends it.
+# site/index.html; any warning ends it. To search it as well, a browser wants a server: python -m http.server -d site
 docs: $(READY)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[docs]'
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
