@@ -12,6 +12,8 @@ from pathlib import Path
 
 import pytest
 
+from smajax import __version__
+
 ROOT = Path(__file__).parents[1]
 PAGES = [*sorted((ROOT / "docs" / "how-to").glob("*.md")), ROOT / "CONTRIBUTING.md"]
 FENCE = re.compile(r'^```(\w+)(?: title="([^"]+)")?\n(.*?)^```\n(?:\n^```text\n(.*?)^```\n)?', re.MULTILINE | re.DOTALL)
@@ -85,6 +87,29 @@ def test_the_reference_names_no_module_that_is_gone() -> None:
         for name in re.findall(r"^::: smajax\.(\S+)$", page.read_text(encoding="utf-8"), re.MULTILINE):
             place = ROOT / "smajax" / name.replace(".", "/")
             assert place.is_dir() or place.with_suffix(".py").is_file(), f"{page.name}: {name}"
+
+
+def test_every_link_of_a_page_leads_to_a_file() -> None:
+    pages = [ROOT / "README.md", *PAGES, *(ROOT / "docs").rglob("*.md"), *(ROOT / "studies").rglob("*.md")]
+    lost = [
+        f"{page.relative_to(ROOT)}: {target}"
+        for page in pages
+        for target in re.findall(
+            r"\]\(([^)#\s]+)", re.sub(r"```.*?```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
+        )
+        if "://" not in target and not (page.parent / target).exists()
+    ]
+    assert lost == []
+
+
+def test_every_page_is_in_the_sites_list() -> None:
+    listed = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
+    docs = ROOT / "docs"
+    assert [page.name for page in docs.rglob("*.md") if page.relative_to(docs).as_posix() not in listed] == []
+
+
+def test_what_is_cited_is_this_version() -> None:
+    assert f"\nversion: {__version__}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
 
 
 @pytest.mark.slow

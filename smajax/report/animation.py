@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
+import io
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -18,6 +17,7 @@ from PIL import Image
 from smajax.compiled import simulate_compiled
 from smajax.load.arm import Arm
 from smajax.load.base import AbstractMovingLoad
+from smajax.report.files import replace
 from smajax.report.pictures import MEASURED, QUIET, tidy
 from smajax.simulate import DEFAULT_STEP
 from smajax.system import System
@@ -76,21 +76,14 @@ def animate(system: System, run: Trajectory, path: Path | str, *, seconds: float
             for artist in draw(int(sample)):
                 figure.draw_artist(artist)
         images.append(Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB").quantize(COLOURS))
-    return _written(images, path, round(1e3 * seconds / len(images)))
+    return replace(path, _gif(images, round(1e3 * seconds / len(images))))
 
 
-def _written(images: list[Image.Image], path: Path, each: int) -> Path:
-    """`each` frame is shown for so many milliseconds."""
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".gif")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            images[0].save(file, format="GIF", save_all=True, append_images=images[1:], duration=each, loop=0)
-        os.chmod(name, 0o644)
-        os.replace(name, path)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
-    return path
+def _gif(images: list[Image.Image], each: int) -> bytes:
+    """Every image is shown for `each` milliseconds, again and again."""
+    stream = io.BytesIO()
+    images[0].save(stream, format="GIF", save_all=True, append_images=images[1:], duration=each, loop=0)
+    return stream.getvalue()
 
 
 def _arm(axes: Axes, system: System, run: Trajectory) -> Draw:
