@@ -536,3 +536,14 @@ def test_a_law_that_there_is_none_of_is_told_with_the_ones_there_are(bench: Path
     (bench / "experiment.toml").write_text(BENCH.replace('drive = "duty"', 'drive = "duty"\nlaw = "lian"'))
     with pytest.raises(ExperimentError, match=r"model\.law.*lian.*liang"):
         load_experiment(bench / "experiment.toml", CATALOGUE)
+
+
+def test_every_input_of_every_load_and_drive_has_a_unit() -> None:
+    from smajax.experiment.catalogue import INPUT_UNITS
+    from smajax.presets import DRIVES, LOADS
+    from smajax.units import convert
+
+    for made in (*LOADS.values(), *DRIVES.values()):
+        own = made()
+        for name in own.inputs_required | own.inputs_optional:
+            assert convert(1.0, INPUT_UNITS[name], INPUT_UNITS[name]) == 1.0, name

@@ -76,7 +76,7 @@ def fraction_for(believed: System, position: Scalar, stress: Scalar) -> Scalar:
 
 
 def bounded_arccos(value: Scalar, edge: Scalar) -> Scalar:
-    r"""arccos with the slope held at that of $\pm(1 - $ `edge`$)$ beyond it, $1/\sqrt{2\,edge}$ about; flat beyond +-1."""
+    r"""arccos with the slope held at that of $\pm(1 - \mathrm{edge})$ beyond it, $1/\sqrt{2\,\mathrm{edge}}$ about; flat beyond +-1."""
     inside = limited(value, edge - 1.0, 1.0 - edge)
     return jnp.arccos(inside) - (limited(value, -1.0, 1.0) - inside) / jnp.sqrt(1.0 - inside**2)
 

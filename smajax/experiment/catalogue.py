@@ -13,6 +13,7 @@ INPUT_UNITS: Mapping[str, str] = MappingProxyType(
         "power": "W",
         "duty": "1",
         "mass": "kg",
+        "load_torque": "N m",
         "temperature": "degC",
         "stress": "Pa",
         "strain": "1",

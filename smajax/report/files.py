@@ -10,18 +10,13 @@ from pathlib import Path
 from typing import Any
 
 
-def replace(path: Path, text: str) -> Path:
-    """Write `text` to `path` in one step; the path."""
-    return replace_bytes(path, text.encode("utf-8"))
-
-
-def replace_bytes(path: Path, data: bytes) -> Path:
-    """Write `data` to `path` in one step; the path."""
+def replace(path: Path, content: str | bytes) -> Path:
+    """Write `content`, text as UTF-8, to `path` in one step; the path."""
     # In the same folder, because a rename is one step only within one file system.
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     try:
         with os.fdopen(handle, "wb") as file:
-            file.write(data)
+            file.write(content.encode("utf-8") if isinstance(content, str) else content)
         os.chmod(name, 0o644)  # mkstemp makes a file for its owner alone
         os.replace(name, path)
     except BaseException:

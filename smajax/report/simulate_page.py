@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from smajax.figures.drawing import BLUE, GREY, RED, named, panels
 from smajax.parameters import parameter_values, parameters
 from smajax.report.display import axis_label, digits, display, label
-from smajax.report.files import json_text, replace, replace_bytes
+from smajax.report.files import json_text, replace
 from smajax.report.html import picture
 from smajax.report.plain_page import bullets, table, whole
 from smajax.single import Ran
@@ -162,7 +162,7 @@ def write_run(ran: Ran, folder: Path, title: str, command: str) -> Path:
     """All files of a run into `folder`, each in one step; the path of the page."""
     image = drawn(ran.found)
     replace(folder / "simulate.csv", as_csv(ran.found))
-    replace_bytes(folder / "simulate.nc", as_netcdf(ran.found))
+    replace(folder / "simulate.nc", as_netcdf(ran.found))
     replace(folder / "simulate.json", json_text(record(ran, command)))
-    replace_bytes(folder / "simulate.png", image)
+    replace(folder / "simulate.png", image)
     return replace(folder / "simulate.html", page(ran, image, title, command))

@@ -66,7 +66,7 @@ def measure(case: Case, true: Truth) -> dict[str, Vector]:
     return read
 
 
-def _table(rig: Rig, run: Run, read: Vector) -> str:
+def table_text(rig: Rig, run: Run, read: Vector) -> str:
     columns, names = [[f"{t:.2f}" for t in rig.clock.times]], ["time_s"]
     names.append(COMMAND[rig.name][1])
     columns.append([f"{value:.6g}" for value in run.command])
@@ -82,7 +82,7 @@ def _table(rig: Rig, run: Run, read: Vector) -> str:
     return "\n".join(rows) + "\n"
 
 
-def _experiment(rig: Rig, runs: tuple[Run, ...]) -> str:
+def experiment_text(rig: Rig, runs: tuple[Run, ...]) -> str:
     wire, load, drive = PRESETS[rig.name]
     lines = ['title = "Simulated measurement"', "", "[model]"]
     lines += [f'wire = "{wire}"', f'load = "{load}"', f'drive = "{drive}"', "", "[model.parameters]"]
@@ -121,8 +121,8 @@ def write(case: Case, out: Path) -> Truth:
     half.mkdir(parents=True)
     runs = true.rig.runs(true.wire)
     for run in runs:
-        (half / f"{run.name}.csv").write_text(_table(true.rig, run, read[run.name]))
-    (half / "experiment.toml").write_text(_experiment(true.rig, runs))
+        (half / f"{run.name}.csv").write_text(table_text(true.rig, run, read[run.name]))
+    (half / "experiment.toml").write_text(experiment_text(true.rig, runs))
     record = {
         "case": case.name,
         "kind": case.kind,

@@ -1,0 +1,138 @@
+"""What the site takes from the repository when it is built, and its equations as MathML: nothing is kept twice.
+
+A page links a file of the repository by its path, as it does where the repository is read by itself (`../tests/x.py`).
+Pages and pictures of `studies/` become part of the site; any other text file that a page links becomes a page that
+shows it. A link that leads to nothing ends the build.
+"""
+
+from __future__ import annotations
+
+import html
+import os
+import posixpath
+import re
+from pathlib import Path
+from typing import Any
+
+from latex2mathml.converter import convert
+from mkdocs.exceptions import PluginError
+from mkdocs.structure.files import File, Files
+
+ROOT = Path(__file__).parents[1]
+TAKEN = (
+    "studies/*.md",
+    "studies/*/README.md",
+    "studies/benchmarks/results/*/README.md",
+    "CHANGELOG.md",
+    "CONTRIBUTING.md",
+)
+PICTURES = ("studies/*.png", "studies/*/*.png", "docs/*.png")
+LINK = re.compile(r"(\]\()([^)#\s]+)((?:#[^)\s]*)?\))")
+LABELLED = re.compile(r"\[([^\[\]]*)\]\(([^)#\s]+)\)")
+FENCED = re.compile(r"^(```|~~~).*?^\1[ \t]*$", re.MULTILINE | re.DOTALL)
+MATHS = re.compile(r'<(span|div) class="arithmatex">(.*?)</\1>', re.DOTALL)
+ASIDE = ("__init__", "__main__")  # of modules
+LANGUAGES = {".py": "python", ".toml": "toml", ".json": "json", ".slurm": "bash", ".cpp": "cpp", ".yml": "yaml"}
+
+
+def place(path: str) -> str:
+    """Where a file of the repository lies in the site, as a source."""
+    if path.startswith("docs/"):
+        return path.removeprefix("docs/")
+    if Path(path).suffix == ".png" or any(Path(path).match(one) for one in TAKEN):
+        return path
+    # A page of its own by a command (`studies/sweep/index.html`) would lie where its README's does.
+    return path.replace("index.html", "page.html") if path.endswith(".html") else f"repository/{path}.md"
+
+
+def linked(page: str, text: str) -> list[str]:
+    """Paths in the repository that a page of it links. PluginError for one that is not there."""
+    found = []
+    for _, target, _ in LINK.findall(FENCED.sub("", text)):
+        if "://" in target or target.startswith("mailto:"):
+            continue
+        path = posixpath.normpath(posixpath.join(posixpath.dirname(page), target))
+        if not (ROOT / path).exists():
+            raise PluginError(f"{page} links {target}, and there is no {path}")
+        found.append(path)
+    return found
+
+
+def on_files(files: Files, config: Any) -> Files:
+    """Puts in what the pages of the site and of the studies link."""
+    taken = [path.relative_to(ROOT).as_posix() for one in TAKEN for path in sorted(ROOT.glob(one))]
+    taken += [path.relative_to(ROOT).as_posix() for one in PICTURES for path in sorted(ROOT.glob(one))]
+    pages = [f"docs/{file.src_uri}" for file in files.documentation_pages()]
+    pages += [path for path in taken if path.endswith(".md")]
+    more = [path for page in pages for path in linked(page, (ROOT / page).read_text(encoding="utf-8"))]
+    for path in dict.fromkeys([*taken, *more]):
+        source = ROOT / path
+        if source.is_dir() or files.get_file_from_path(place(path)) is not None:
+            continue
+        if place(path).startswith("repository/"):
+            text = source.read_text(encoding="utf-8")
+            shown = f"---\nsearch: {{ exclude: true }}\n---\n# `{path}`\n\n````{LANGUAGES.get(source.suffix, 'text')}\n{text}\n````\n"
+            files.append(File.generated(config, place(path), content=shown))
+        else:
+            files.append(File.generated(config, place(path), abs_src_path=str(source)))
+    files.append(File.generated(config, "reference/other.md", content=others(files)))
+    return files
+
+
+def others(files: Files) -> str:
+    """A page of the modules that no page of the reference names, so that a new one is never left out."""
+    pages = [file for file in files.documentation_pages() if file.src_uri.startswith("reference/")]
+    told = "\n".join(file.content_string for file in pages)
+    package = ROOT / "smajax"
+    paths = [path.relative_to(ROOT).with_suffix("") for path in sorted(package.rglob("*.py"))]
+    names = [".".join(path.parts) for path in paths if path.name not in ASIDE and "figures" not in path.parts]
+    left = [f"::: {name}" for name in names if not re.search(rf"^::: {re.escape(name)}$", told, re.MULTILINE)]
+    return (
+        "\n\n".join(["# Everything else", "Commands, pages of commands, and what several stages share.", *left]) + "\n"
+    )
+
+
+def origin(source: str) -> str:
+    """The inverse of `place`, for a page."""
+    return source if any(Path(source).match(one) for one in TAKEN) else f"docs/{source}"
+
+
+def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str:
+    """Links of the repository as links of the site; a folder's is its name alone."""
+    here = page.file.src_uri
+    if here.startswith("repository/"):
+        return markdown
+    mine = origin(here)
+
+    def path_of(target: str) -> str:
+        return posixpath.normpath(posixpath.join(posixpath.dirname(mine), target))
+
+    def unlinked(match: re.Match[str]) -> str:
+        return match[1] if (ROOT / path_of(match[2])).is_dir() else match[0]
+
+    def led(match: re.Match[str]) -> str:
+        before, target, after = match.groups()
+        if "://" in target or target.startswith("mailto:"):
+            return match[0]
+        return f"{before}{os.path.relpath(place(path_of(target)), posixpath.dirname(here) or '.')}{after}"
+
+    def changed(text: str) -> str:
+        return LINK.sub(led, LABELLED.sub(unlinked, text))
+
+    fences = list(FENCED.finditer(markdown))
+    parts, at = [], 0
+    for fence in fences:
+        parts += [changed(markdown[at : fence.start()]), fence[0]]
+        at = fence.end()
+    return "".join([*parts, changed(markdown[at:])])
+
+
+def on_page_content(content: str, page: Any, config: Any, files: Files) -> str:
+    """LaTeX as MathML, which browsers draw by themselves."""
+
+    def drawn(match: re.Match[str]) -> str:
+        text = html.unescape(match[2]).strip()
+        block = text.startswith("\\[")
+        return convert(text[2:-2].strip(), display="block" if block else "inline")
+
+    return MATHS.sub(drawn, content)

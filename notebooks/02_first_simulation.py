@@ -1,0 +1,60 @@
+# %% [markdown]
+# # First simulation
+#
+# An arm on a wire, a step of voltage, and what the wire goes through on the way: wire x load x drive, by name.
+
+# %%
+import jax
+
+jax.config.update("jax_enable_x64", True)
+
+import matplotlib.pyplot as plt  # noqa: E402
+import numpy as np  # noqa: E402
+
+from smajax.compiled import simulate_compiled  # noqa: E402
+from smajax.parameters import parameters, set_parameters  # noqa: E402
+from smajax.presets import DRIVES, LOADS, WIRES, build  # noqa: E402
+
+print("wires: ", ", ".join(WIRES))
+print("loads: ", ", ".join(LOADS))
+print("drives:", ", ".join(DRIVES))
+
+# %% [markdown]
+# The source's rotary arm. Every parameter has a unit, bounds and a meaning, and may be changed by name.
+
+# %%
+arm = build("niti_table_3_1", "arm", "amplified_voltage")
+for name in ("convection_coefficient", "austenite_finish", "payload_mass"):
+    entry = parameters(arm)[name]
+    print(f"{name:24s} {entry.low:g} to {entry.high:g} {entry.unit}: {entry.about}")
+
+# %% [markdown]
+# Inputs are series, SI, `dt` apart. 7.2 V stop inside of the transformation range; 7.3 V carry the arm past the angle of greatest stress, where the
+# transformation temperatures fall and it runs through by itself.
+
+# %%
+dt = 0.005
+time = np.arange(4001) * dt  # s
+runs = {volts: simulate_compiled(arm, {"voltage": np.full(time.size, volts)}, dt) for volts in (7.2, 7.3)}
+ends = {volts: float(np.degrees(run.position[-1])) for volts, run in runs.items()}
+for volts, run in runs.items():
+    print(
+        f"{volts} V: ends at {ends[volts]:.1f} degrees, xi = {run.martensite_fraction[-1]:.2f}, {run.temperature[-1]:.1f} C"
+    )
+
+# %%
+figure, (angle, plane) = plt.subplots(1, 2, figsize=(9, 3.4), layout="constrained")
+for volts, run in runs.items():
+    angle.plot(time, np.degrees(run.position), label=f"{volts} V")
+    plane.plot(run.temperature, 1e-6 * run.stress)
+angle.set(xlabel="time (s)", ylabel="angle (degrees)")
+angle.legend()
+plane.set(xlabel="temperature (°C)", ylabel="stress (MPa)")
+
+# %% [markdown]
+# A heavier payload at the same voltage. The program was compiled once: values are no part of it.
+
+# %%
+heavier = set_parameters(arm, {"payload_mass": 0.065})  # kg
+run = simulate_compiled(heavier, {"voltage": np.full(time.size, 7.3)}, dt)
+print(f"with 65 g in the place of 57 g it ends at {np.degrees(run.position[-1]):.1f} degrees")
