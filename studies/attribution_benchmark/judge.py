@@ -31,7 +31,7 @@ class Judged:
     """One case beside its truth. Errors are rms over the noise."""
 
     case: str
-    kind: str  # null, single, pair, outside
+    kind: str  # null, absorbed, single, pair, outside
     rig: str
     asked: float  # noises that the effect leaves after a refit of the base model
     strength: float  # what it came to: a physical limit may lie below
@@ -62,6 +62,15 @@ class Judged:
         """One of `EQUATIONS`, `NOTHING` or `OUTSIDE`: what the answer comes down to."""
         return self.where[0] if self.where else NOTHING if self.verdict == "adequate" else OUTSIDE
 
+    @property
+    def right(self) -> bool:
+        """The answer that the case's kind asks for."""
+        if self.kind in ("null", "absorbed"):
+            return self.verdict == "adequate"
+        if self.kind == "outside":
+            return self.told in (*self.equations, OUTSIDE)
+        return self.effect_right
+
 
 def equation_of(group: str) -> str:
     """The library's word for the generator's."""
@@ -86,7 +95,7 @@ def judge(truth: Mapping[str, Any], report: Mapping[str, Any], seconds: float) -
     foreign = any(entry["outside"] for entry in truth["effects"].values()) or any(name not in LIBRARY for name in names)
     return Judged(
         case=truth["case"],
-        kind="outside" if foreign else truth["kind"],
+        kind="outside" if foreign and truth["kind"] != "absorbed" else truth["kind"],
         rig=truth["rig"],
         asked=truth["strength_asked"],
         strength=truth["strength_together"],

@@ -82,8 +82,7 @@ def main() -> None:
             print(f"[{number}/{len(todo)}] {case.name}: failed\n{traceback.format_exc()}", flush=True)
             continue
         save(one, path)
-        right = {"null": one.verdict == "adequate", "outside": one.told in (*one.equations, "not in the library")}
-        mark = "right" if right.get(one.kind, one.effect_right) else "equation right" if one.equation_right else "wrong"
+        mark = "right" if one.right else "equation right" if one.equation_right else "wrong"
         print(
             f"[{number}/{len(todo)}] {case.name} ({one.strength:.1f}): {one.verdict} {'+'.join(one.added)} {mark}; "
             f"{one.held_out_before:.2f} -> {one.held_out_after:.2f}, {one.seconds:.0f} s",

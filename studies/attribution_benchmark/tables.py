@@ -34,13 +34,18 @@ def bars(cases: Sequence[Judged]) -> list[tuple[str, str, str]]:
     outside = [one for one in cases if one.kind == "outside" and strength_of(one) == 10.0]
     return [
         ("nothing is missing, and it says so", "95 %", share(nulls, lambda one: one.verdict == "adequate")),
+        (
+            "what other values of the unknowns imitate: nothing is missing",
+            "–",
+            share([one for one in cases if one.kind == "absorbed"], lambda one: one.right),
+        ),
         ("10 times the noise: right equation", "95 %", share(strong, lambda one: one.equation_right)),
         ("10 times the noise: right effect, or named beside it", "90 %", share(strong, lambda one: one.effect_right)),
         ("both effects of a pair", "70 %", share(pairs, lambda one: one.effect_right)),
         (
             "outside the library, 10 times: said so, or the right equation",
             "80 %",
-            share(outside, lambda one: one.told in (*one.equations, OUTSIDE) or one.equation_right),
+            share(outside, lambda one: one.right),
         ),
         (
             "held-out error at most 1.2 times the noise (in the library, 10 times)",
@@ -83,11 +88,7 @@ def power(cases: Sequence[Judged]) -> list[tuple[str, str, str, str, str]]:
 def missed(cases: Sequence[Judged]) -> list[Judged]:
     """Cases behind a bar that was missed: nulls with an alarm, strong effects that were not named."""
     return [
-        one
-        for one in cases
-        if (one.kind == "null" and one.verdict != "adequate")
-        or (one.kind == "single" and strength_of(one) == 10.0 and not one.effect_right)
-        or (one.kind == "outside" and strength_of(one) == 10.0 and one.told not in (*one.equations, OUTSIDE))
+        one for one in cases if not one.right and (one.kind == "null" or strength_of(one) == 10.0 or one.kind == "pair")
     ]
 
 
