@@ -11,6 +11,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from smajax.attribution.search import Evidence, Model, Search, scores_at, search
+from smajax.attribution.unknown import unknown_terms
+from smajax.attribution.unknown_words import told_of
 from smajax.attribution.verdict import cannot_know, shown, summary, unexplained, verdict
 from smajax.catalogue import candidates
 from smajax.effects.library import LIBRARY
@@ -112,12 +114,14 @@ def close_loop(
     integration = _integration_error(job, final)
     progress("standard errors and pictures", 1.0)
     answer = verdict(final.effects, portrait_after)
+    unknown = unknown_terms(setting, final) if answer in ("partly explained", "not in the library") else ()
+    opening, *rest = summary(answer, experiment, runs, effects, portrait_after, len(job.candidates))
     return Findings(
         experiment=experiment.name,
         title=experiment.title,
         source=experiment.path.name,
         verdict=answer,
-        summary=summary(answer, experiment, runs, effects, portrait_after, len(job.candidates)),
+        summary=(opening, *told_of(unknown, setting.shown), *rest),
         unexplained=unexplained(answer, experiment, runs, portrait_after),
         cannot_know=cannot_know(
             experiment, after.parameters, effects, setting.rounds, len(job.fit_runs), integration, _preset(job)
@@ -134,6 +138,7 @@ def close_loop(
         portrait_before=portrait_before,
         portrait_after=portrait_after,
         rounds=tuple(setting.rounds),
+        unknown=unknown,
         provenance=_provenance(experiment, kept, command, seed, clock.monotonic() - began),
     )
 

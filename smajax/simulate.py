@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 
 import jax
@@ -61,7 +62,11 @@ def simulate(
         return new, new
 
     _, states = lax.scan(body, state, held)
-    return trajectory(state, states)
+    run = trajectory(state, states)
+    shown = run.reading
+    for effect in system.effects:
+        shown = effect.sensed(shown, run.time, shown)
+    return dataclasses.replace(run, reading=shown)
 
 
 def trajectory(first: State, rest: State) -> Trajectory:

@@ -8,7 +8,7 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from smajax.load.base import AbstractMovingLoad
-from smajax.system import System, ambient_temperature
+from smajax.system import System, ambient_temperature, load_resistance
 from smajax.types import Inputs, Scalar, State
 from smajax.wire.constitutive import stress_at
 from smajax.wire.heat import cross_section, heat_rate, stored_heat
@@ -75,7 +75,7 @@ def _free_position(system: System, stage: Stage, inputs: Inputs, z: Unknowns) ->
     limit = friction_limit(system)
     friction = 0.0 if limit is None else limit * friction_in_use(stage, z.position)[0]
     pull = load.lever() * cross_section(system.wire) * z.stress
-    resisting = load.resistance(z.position, velocity, inputs) + friction
+    resisting = load_resistance(system, z.position, velocity, inputs) + friction
     return z.position - (inertia * acceleration + resisting - pull) * stage.step**2 / inertia
 
 

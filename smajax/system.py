@@ -31,6 +31,17 @@ def ambient_temperature(system: System, time: Scalar, inputs: Inputs) -> Scalar:
     return ambient + sum(effect.ambient_shift(time) for effect in system.effects)
 
 
+def load_resistance(system: System, position: Scalar, velocity: Scalar, inputs: Inputs) -> Scalar:
+    """What the wire has to overcome, N (N m for an arm): the load's own, and what effects add to it."""
+    load = system.load
+    assert isinstance(load, AbstractMovingLoad)
+    lever = load.lever()
+    end = lever * (position - load.start()), lever * velocity
+    added = sum(effect.resisting_force(load, *end) for effect in system.effects)
+    resisting = load.resistance(position, velocity, inputs)
+    return resisting if isinstance(added, (int, float)) and added == 0 else resisting + lever * added
+
+
 def initial_state(system: System, inputs: Inputs) -> State:
     """At rest with the first inputs: a moving load in equilibrium at ambient temperature, a coupon as prescribed."""
     strain = jnp.zeros_like(system.start_fraction)
@@ -45,7 +56,7 @@ def initial_state(system: System, inputs: Inputs) -> State:
     else:
         position = reading = system.load.start()
         temperature = ambient_temperature(system, jnp.zeros_like(position), inputs)
-        at_rest = system.load.resistance(position, jnp.zeros_like(position), inputs)
+        at_rest = load_resistance(system, position, jnp.zeros_like(position), inputs)
         # An end stop may carry part of the load, the wire the rest; what the wire carries is what pulls on it.
         stress = jnp.maximum(at_rest / (system.load.lever() * cross_section(system.wire)), 0.0)
     temperature, stress, strain, position, reading, fraction = jnp.broadcast_arrays(

@@ -15,6 +15,7 @@ import equinox as eqx
 from smajax.types import Scalar
 
 if TYPE_CHECKING:
+    from smajax.load.base import AbstractMovingLoad
     from smajax.wire.wire import Wire
 
 
@@ -77,6 +78,14 @@ class AbstractEffect(eqx.Module):
         """Coulomb limit of the load's friction, N (N m for an arm)."""
         return 0.0
 
+    def resisting_force(self, load: AbstractMovingLoad, displacement: Scalar, speed: Scalar) -> Scalar | float:
+        """Force against contraction beside the load's, N; displacement (m) and speed (m/s) are the wire's moving end's."""
+        return 0.0
+
     def sensor_time_constant(self) -> Scalar | float:
         """Time constant of a first-order sensor, s."""
         return 0.0
+
+    def sensed(self, reading: Scalar, time: Scalar, last: Scalar) -> Scalar:
+        """What the sensor shows where it would show `reading`, the lag included; `last`: what this gave before."""
+        return reading
