@@ -33,7 +33,9 @@ from smajax.unknown.terms import UNKNOWN, AbstractUnknown
 
 REFITTED = 6  # terms
 JUDGED = 4  # of them, taken to the left-out runs
-APART = 2.0  # standard errors by which an equation must do better than another one to be named in its place
+# Standard errors by which a term must do better than none, and than another that does better than none, to be named: of
+# a dozen that were tried the best is one standard error ahead by luck alone.
+APART = 2.0
 TOWARDS, INSIDE = 0.5, 0.8  # of the score test's estimate, and at most this share of the largest: where a refit begins
 WEAK = 1.0  # sigma of the prior of every coefficient about zero, in shares of the largest: a fit is then well posed
 GRID = 61  # points at which a function is drawn
@@ -86,8 +88,8 @@ def _best_of_each(scores: Sequence[Score], count: int) -> list[Score]:
 def unknown_terms(setting: Search, final: Model) -> tuple[UnknownTerm, ...]:
     """What was learnt of each term that came to the runs left out, best first.
 
-    The first is `named` when it foretells left-out runs better than the final model does, by `Search.better`. Equations
-    that cannot be told from its own stand in `alike`.
+    The first is `named` when it foretells left-out runs better than the final model does, by `Search.better` and `APART`
+    standard errors. Terms that do better than none, too, and that it is not as far ahead of, stand in `alike`.
     """
     search, values, found = with_terms(setting, final)
     if not search.candidates:
@@ -103,11 +105,13 @@ def unknown_terms(setting: Search, final: Model) -> tuple[UnknownTerm, ...]:
     present = search.judged([base])[0]
     judged = sorted(search.judged(fitted, present), key=lambda model: model.left_out_rmse)
     best = judged[0]
-    enough, why = search.better(best, present)
+    enough, why = search.better(best, present, APART)
     # One run fits too well to name anything: there is none to foretell.
     enough = enough and len(present.left_out) > 1
     rivals = [
-        model for model in judged[1:] if search.better(model, present)[0] and not search.better(best, model, APART)[0]
+        model
+        for model in judged[1:]
+        if model.left_out_rmse < present.left_out_rmse and not search.better(best, model, APART)[0]
     ]
     told = []
     gains = {score.effects: score.gain for score in scores}

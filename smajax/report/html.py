@@ -171,9 +171,8 @@ def _runs(findings: Findings) -> list[dict[str, Any]]:
 
 
 def _unknown(findings: Findings) -> list[dict[str, Any]]:
-    """The terms with a picture of the best, and of those that cannot be told from it."""
-    best = findings.unknown[0] if findings.unknown else None
-    drawn = {best.name, *best.alike} if best else set()
+    """The terms, with a picture of the one that is named and of those that cannot be told from it."""
+    drawn = {name for term in findings.unknown if term.named for name in (term.name, *term.alike)}
     return [
         {
             "term": term,
