@@ -226,6 +226,19 @@ def test_a_formula_that_is_in_the_dictionary_is_found_and_one_that_is_too_long_i
         np.testing.assert_allclose(best.curve, truth, atol=0.1 * np.max(truth))
 
 
+def test_a_formula_is_of_the_function_even_where_the_parameters_could_take_it_over() -> None:
+    """A resistance scaled as a whole is a convection scaled: that way lies R = 0, which is no formula for its bend."""
+    share = np.linspace(0.0, 1.0, 201)
+    truth = 0.1 * np.cos(4.0 * share)
+    coefficients = np.linalg.lstsq(design(share), truth, rcond=None)[0]
+    scaled = 1.0 + coefficients
+    covariance = 1e-4 * np.eye(COUNT) + 10.0 * np.outer(scaled, scaled)
+    best = formulas(0.0, 1.0, coefficients, covariance, 500.0, "s")[0]
+    # As high a shift as the function is large, but not on to -1.
+    np.testing.assert_allclose(best.curve, truth, atol=0.12)
+    assert np.corrcoef(best.curve, truth)[0, 1] > 0.95
+
+
 def _told(named: bool, *alike: str) -> tuple[str, ...]:
     empty = np.zeros(0)
 

@@ -5,7 +5,7 @@ A formula g = theta . phi is held against the coefficients c of the learnt splin
     chi^2 = (c - B theta)^T C^-1 (c - B theta),       BIC = chi^2 + k ln n
 
 with B the dictionary's terms as splines, k the numbers that a formula has, and n the samples that count as independent
-(Schwarz 1978). So a formula is free where the runs do not tell the function, and bound where they do.
+(Schwarz 1978). So a formula is free, within `FREE`, where the runs do not tell the function, and bound where they do.
 """
 
 from __future__ import annotations
@@ -21,6 +21,9 @@ from smajax.report.findings import Formula
 from smajax.unknown.spline import design
 
 OFFERED = 3
+# By how much a formula may differ from the function for nothing, in shares of its size: at most so where the model's
+# parameters could take the difference over (the covariance is that of small changes), at least so anywhere.
+FREE, EXACT = 0.3, 1e-6
 FINE = 201  # points at which a term is turned into a spline
 PLACES = np.linspace(0.15, 0.85, 15)  # of a step, in shares of the range
 STEEP = 0.05  # half width of a step, in shares of the range
@@ -82,10 +85,9 @@ def formulas(
     x = low + width * share
     words = _dictionary(low, width, symbol)
     splines = np.stack([np.linalg.lstsq(basis, word.of(x), rcond=None)[0] for word in words], axis=1)
-    # What the runs tell of the function to within a millionth of its size is told exactly enough.
-    size = max(float(np.max(np.abs(coefficients))), 1e-300)
+    size = max(float(np.sqrt(np.mean(coefficients**2))), 1e-300)
     values, directions = np.linalg.eigh(covariance)
-    root = directions.T / np.sqrt(np.maximum(values, (1e-6 * size) ** 2))[:, None]
+    root = directions.T / np.clip(np.sqrt(np.maximum(values, 0.0)), EXACT * size, FREE * size)[:, None]
     target, columns = root @ coefficients, root @ splines
     found = []
     for count in (1, 2):
