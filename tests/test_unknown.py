@@ -208,7 +208,7 @@ def test_where_nothing_is_missing_no_term_is_better_than_none() -> None:
     terms = unknown_terms(*_setting())
     assert terms
     assert not any(term.named for term in terms)
-    assert "do not say in which equation" in told_of(terms, str)[0]
+    assert "Nor do these runs say in which equation" in told_of(terms, str)[0]
 
 
 def test_a_formula_that_is_in_the_dictionary_is_found_and_one_that_is_too_long_is_not() -> None:

@@ -16,8 +16,8 @@ def told_of(terms: Sequence[UnknownTerm], shown: Callable[[float], str]) -> tupl
     best = terms[0]
     if not best.named:
         return (
-            "Nor does a smooth unknown function of one state, put into each equation in turn, foretell runs left out "
-            f"better beyond chance: these runs do not say in which equation it is missing ({best.why}).",
+            "Nor do these runs say in which equation it is missing: of the smooth unknown functions of one state that were "
+            f"put into each in turn none is better beyond chance. The nearest is {best.title}: {best.why}.",
         )
     brought = f"error on runs left out {shown(best.left_out_before)} before, {shown(best.left_out_after)} with it"
     others = [term for term in terms if term.name in best.alike]

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -36,6 +37,7 @@ def _powers() -> np.ndarray:
 POWERS = _powers()
 
 
+@jax.jit  # traced once and not at each of the hundred places of a step
 def spline(coefficients: Sequence[Scalar], share: Scalar) -> Scalar:
     """The function at `share` of its range, 0..1; outside of that what it is at the nearer end.
 
