@@ -13,6 +13,8 @@ import numpy as np
 from smajax.attribution.bootstrap import bootstrapped
 from smajax.attribution.rivals import rivals
 from smajax.attribution.search import Evidence, Model, Search, scores_at, search
+from smajax.attribution.unknown import unknown_terms
+from smajax.attribution.unknown_words import told_of
 from smajax.attribution.verdict import cannot_know, shown, summary, unexplained, verdict
 from smajax.catalogue import candidates
 from smajax.effects.library import LIBRARY
@@ -123,12 +125,14 @@ def close_loop(
     integration = _integration_error(job, final)
     progress("standard errors and pictures", 1.0)
     answer = verdict(final.effects, portrait_after)
+    unknown = unknown_terms(setting, final) if answer in ("partly explained", "not in the library") else ()
+    opening, *rest = summary(answer, experiment, runs, effects, portrait_after, len(job.candidates))
     return Findings(
         experiment=experiment.name,
         title=experiment.title,
         source=experiment.path.name,
         verdict=answer,
-        summary=summary(answer, experiment, runs, effects, portrait_after, len(job.candidates)),
+        summary=(opening, *told_of(unknown, setting.shown), *rest),
         unexplained=unexplained(answer, experiment, runs, portrait_after),
         cannot_know=cannot_know(
             experiment,
@@ -153,6 +157,7 @@ def close_loop(
         portrait_after=portrait_after,
         rounds=tuple(setting.rounds),
         rivals=mistaken,
+        unknown=unknown,
         provenance=_provenance(experiment, kept, command, seed, clock.monotonic() - began),
     )
 

@@ -79,6 +79,7 @@ def test_one_run_no_unknown_and_no_candidate_still_give_an_answer(tmp_path: Path
     assert findings.before == ()
     assert "no candidate effect was to be tried" in findings.summary[0]
     assert any("no run could be left out" in line for line in findings.summary)
+    assert not any(term.named for term in findings.unknown)
     assert any("Nothing is declared unknown" in line for line in findings.check)
 
 
@@ -156,3 +157,8 @@ def test_isobaric_flexinol(measured_data: Path, tmp_path: Path) -> None:
     assert pooled(findings.runs, "held-out", "before") > 0.12e-2
     assert pooled(findings.runs, "held-out", "after") < 0.06e-2
     assert _added(findings)
+    # More than noise is left, and the unknown terms have been asked. The best is less than two standard errors ahead.
+    assert findings.verdict == "partly explained"
+    assert findings.unknown
+    assert not any(term.named for term in findings.unknown)
+    assert findings.summary[1].startswith("Nor do these runs say in which equation it is missing")

@@ -20,11 +20,13 @@ from smajax.report.findings import (
     CoefficientFinding,
     EffectFinding,
     Findings,
+    Formula,
     ParameterFinding,
     Portrait,
     Role,
     Round,
     RunFinding,
+    UnknownTerm,
 )
 from smajax.report.html import findings_to_html
 from smajax.report.json_file import findings_to_json
@@ -459,3 +461,50 @@ def test_numbers_that_round_to_nothing_or_have_underflowed():
     ]
     assert [p_value(value) for value in (0.0, 0.413)] == ["p < 1e-300", "p = 0.41"]
     assert [share(value) for value in (0.0, 1e-13, 0.7612, NAN)] == ["0.0", "< 0.1", "76.1", "–"]
+
+
+def _unknown_term(name: str, named: bool, alike: tuple[str, ...] = ()) -> UnknownTerm:
+    at = np.linspace(-1.0, 90.0, 61)
+    values = 1.2 / (1.0 + np.exp(-(at - 52.0) / 4.0))
+    return UnknownTerm(
+        name=name,
+        title="a heat loss depending on the <temperature>",
+        equation="heat",
+        symbol="T - T_inf",
+        state="temperature over ambient",
+        state_unit="K",
+        unit="W/m",
+        named=named,
+        alike=alike,
+        why="error on left-out runs 1.8 mm -> 0.2 mm" if named else "",
+        score_gain=0.85,
+        left_out_before=1.8e-3,
+        left_out_after=2.0e-4,
+        at=at,
+        values=values,
+        error=0.2 + 0.0 * at,
+        error_held=0.05 + 0.0 * at,
+        cells=np.linspace(-1.0, 90.0, 21),
+        samples=np.arange(20),
+        formulas=(Formula("1.27 (1 + tanh((T - T_inf - 52.4)/4.51))/2", 3.1, 2, 12.0, values[::2]),),
+    )
+
+
+def test_unknown_terms_are_told_drawn_and_recorded(findings, page):
+    terms = (_unknown_term("unknown_a", True, ("unknown_b",)), _unknown_term("unknown_b", False))
+    with_terms = dataclasses.replace(findings, unknown=(*terms, _unknown_term("unknown_c", False)))
+    told = Page(findings_to_html(with_terms))
+    text = " ".join(told.text)
+    assert "What no effect of the library accounts for" in text
+    assert "What no effect of the library accounts for" not in " ".join(page.text)
+    assert "1.27 (1 + tanh((T - T_inf - 52.4)/4.51))/2" in text
+    assert "f in W/m, T - T_inf in K" in text
+    # The best and the one that is not told from it are drawn, the third is a row of the table only.
+    assert len(told.images()) == len(page.images()) + 2
+    assert text.count("not told from the best") == 1
+    record = json.loads(json.dumps(findings_to_json(with_terms), allow_nan=False))["unknown"]
+    assert [one["named"] for one in record] == [True, False, False]
+    assert record[0]["function"]["values"] == pytest.approx(terms[0].values.tolist())
+    assert record[0]["formulas"][0]["numbers"] == 2
+    assert sum(record[0]["samples"]["counts"]) == 190
+    assert findings_to_json(findings)["unknown"] == []

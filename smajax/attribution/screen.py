@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import optimize, stats
 
-from smajax.effects.library import LIBRARY
+from smajax.effects.every import EVERY
 from smajax.fit.sensitivity import Sensitivity
 
 
@@ -34,7 +34,7 @@ class Score:
 
 def switches(effect: str) -> tuple[str, ...]:
     """Parameter names of the coefficients that switch `effect` on."""
-    return tuple(f"{effect}.{name}" for name in LIBRARY[effect].switches)
+    return tuple(f"{effect}.{name}" for name in EVERY[effect].switches)
 
 
 def _score(

@@ -17,6 +17,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from smajax.attribution.screen import Score, scaled, screen, significant, switches
+from smajax.effects.every import EVERY
 from smajax.effects.library import LIBRARY
 from smajax.fit.box import Fit, fit_in_box
 from smajax.fit.kept import Kept
@@ -275,7 +276,7 @@ class Search:
 def base_value(coefficient: str) -> float:
     """The value at which a coefficient such as `latent_heat.enthalpy` changes nothing."""
     effect, name = coefficient.split(".", 1)
-    return float(getattr(LIBRARY[effect].base(), name))
+    return float(getattr(EVERY[effect].base(), name))
 
 
 def _paired(old: np.ndarray, new: np.ndarray, mask: np.ndarray) -> float:

@@ -78,7 +78,7 @@ def _normal_equations(
         jacobian = -weight * problem.centred(slopes[k, : len(lane.slots)])
         value = np.concatenate([residual.ravel(), problem.priors.rows(points[k]), lane.tie * (place - lane.place)])
         known = problem.priors.slopes(points[k])[:, lane.slots] * (lane.high - lane.low)
-        rows = np.concatenate([jacobian.reshape(len(lane.slots), -1), known.T, np.diag(lane.tie)], axis=1)
+        rows = np.concatenate([jacobian.reshape(len(lane.slots), residual.size), known.T, np.diag(lane.tie)], axis=1)
         found.append((float(value @ value), rows @ value, rows @ rows.T))
     return found
 

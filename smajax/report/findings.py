@@ -107,6 +107,43 @@ class Rival:
 
 
 @dataclass(frozen=True)
+class Formula:
+    """A simple formula for a function that was learnt, SI; `curve`: its values along the function's range."""
+
+    text: str  # "0.12 + 3.1e-05 T^2"
+    missed: float  # chi-square against the learnt function
+    numbers: int  # that it has
+    bic: float
+    curve: np.ndarray
+
+
+@dataclass(frozen=True)
+class UnknownTerm:
+    """A smooth function of one state, put into one equation for what no effect of the library accounts for; SI."""
+
+    name: str  # "unknown_loss_of_temperature"
+    title: str  # "a heat loss depending on the temperature over the air's"
+    equation: str
+    symbol: str  # of the state
+    state: str  # in words
+    state_unit: str
+    unit: str  # of the function
+    named: bool  # the one that foretells left-out runs best, better than the model without it beyond chance
+    alike: tuple[str, ...]  # terms that left-out runs cannot tell from the named one
+    why: str
+    score_gain: float
+    left_out_before: float
+    left_out_after: float
+    at: np.ndarray  # states, (points,)
+    values: np.ndarray  # the function there
+    error: np.ndarray  # its standard error there
+    error_held: np.ndarray  # the same with the model's parameters held at their values
+    cells: np.ndarray  # edges of cells of the range, (cells + 1,)
+    samples: np.ndarray  # samples of the fit runs in each cell
+    formulas: tuple[Formula, ...]
+
+
+@dataclass(frozen=True)
 class Findings:
     experiment: str  # short name
     title: str
@@ -128,4 +165,5 @@ class Findings:
     portrait_after: Portrait
     rounds: tuple[Round, ...]
     rivals: tuple[Rival, ...] = ()
+    unknown: tuple[UnknownTerm, ...] = ()  # terms sought for what the library does not hold, best first
     provenance: dict[str, str] = field(default_factory=dict)  # versions, seed, data hashes, command, seconds

@@ -15,6 +15,7 @@ from markupsafe import Markup
 from smajax.report import pictures
 from smajax.report.display import chance, correlation, digits, display, label, p_value, share, with_error
 from smajax.report.findings import Findings, ParameterFinding
+from smajax.report.unknown_pictures import function_learnt, units
 
 VERDICTS = {
     "adequate": ("The model is adequate", "good"),
@@ -169,6 +170,18 @@ def _runs(findings: Findings) -> list[dict[str, Any]]:
     ]
 
 
+def _unknown(findings: Findings) -> list[dict[str, Any]]:
+    """The terms, with a picture of the one that is named and of those that cannot be told from it."""
+    drawn = {name for term in findings.unknown if term.named for name in (term.name, *term.alike)}
+    return [
+        {
+            "term": term,
+            "picture": picture(function_learnt(term) if term.name in drawn else None, term.title, "narrow"),
+        }
+        for term in findings.unknown
+    ]
+
+
 def findings_to_html(findings: Findings) -> str:
     """The whole page, as text. Names and sentences of the record are escaped; numbers are those of the record."""
     environment = Environment(
@@ -211,6 +224,8 @@ def findings_to_html(findings: Findings) -> str:
         runs=_runs(findings),
         phases=_phase_rows(findings),
         correlations=_correlations(findings),
+        unknown=_unknown(findings),
+        units=units,
         picture_errors=picture(pictures.errors_by_run(findings), "Error of each run before and after", "narrow"),
         picture_candidates=picture(
             pictures.candidates_ranked(findings), "Base model and candidates by error", "narrow"

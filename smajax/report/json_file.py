@@ -9,7 +9,15 @@ from typing import Any
 
 import numpy as np
 
-from smajax.report.findings import CoefficientFinding, EffectFinding, Findings, ParameterFinding, Portrait, RunFinding
+from smajax.report.findings import (
+    CoefficientFinding,
+    EffectFinding,
+    Findings,
+    ParameterFinding,
+    Portrait,
+    RunFinding,
+    UnknownTerm,
+)
 
 
 def plain(value: Any) -> Any:
@@ -92,6 +100,35 @@ def _portrait(portrait: Portrait) -> dict[str, Any]:
     }
 
 
+def _unknown(term: UnknownTerm) -> dict[str, Any]:
+    return {
+        "name": term.name,
+        "title": term.title,
+        "equation": term.equation,
+        "named": term.named,
+        "alike": term.alike,
+        "why": term.why,
+        "score_gain": term.score_gain,
+        "leave_one_out_rmse_without": term.left_out_before,
+        "leave_one_out_rmse": term.left_out_after,
+        "function": {
+            "of": term.symbol,
+            "state": term.state,
+            "state_unit": term.state_unit,
+            "unit": term.unit,
+            "at": term.at,
+            "values": term.values,
+            "standard_error": term.error,
+            "standard_error_parameters_held": term.error_held,
+        },
+        "samples": {"edges": term.cells, "counts": term.samples},
+        "formulas": [
+            {"text": one.text, "chi_square": one.missed, "numbers": one.numbers, "bic": one.bic}
+            for one in term.formulas
+        ],
+    }
+
+
 def findings_to_json(findings: Findings) -> dict[str, Any]:
     """The record without its time series, ready for `json.dumps(..., allow_nan=False)`."""
     record = {
@@ -123,6 +160,7 @@ def findings_to_json(findings: Findings) -> dict[str, Any]:
             for entry in findings.rounds
         ],
         "rivals": [dataclasses.asdict(rival) for rival in findings.rivals],
+        "unknown": [_unknown(term) for term in findings.unknown],
         "unexplained": findings.unexplained,
         "cannot_know": findings.cannot_know,
         "check": findings.check,

@@ -89,7 +89,7 @@ def judge(truth: Mapping[str, Any], report: Mapping[str, Any], seconds: float) -
     added = tuple(effect["name"] for effect in report["effects"] if effect["added"])
     rivals = [one["rival"] for one in report["rivals"] if one["weight"] >= CONFUSABLE]
     alike = [name for entry in report["rounds"] for model in entry["alike"] for name in model.split(" + ")]
-    unknown = [term["equation"] for term in report.get("unknown", ())][:1]
+    unknown = [term["equation"] for term in report["unknown"] if term["named"]]
     names = tuple(CALLED.get(name, name) for name in truth["effects"])
     # What the library does not hold is outside, whatever the generator thinks.
     foreign = any(entry["outside"] for entry in truth["effects"].values()) or any(name not in LIBRARY for name in names)
