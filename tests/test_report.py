@@ -263,7 +263,12 @@ def test_json_is_strict_and_holds_the_record(findings, folder):
     assert read["after"]["parameters"]["latent_heat.enthalpy"]["value"] == 24187.3
     latent = next(effect for effect in read["effects"] if effect["added"])
     assert latent["name"] == "latent_heat"
-    assert latent["coefficients"]["enthalpy"] == {"value": 24187.3, "standard_error": 210.6, "unit": "J/kg"}
+    assert latent["coefficients"]["enthalpy"] == {
+        "value": 24187.3,
+        "standard_error": 210.6,
+        "unit": "J/kg",
+        "interval_over_runs": None,
+    }
 
 
 def test_what_is_no_number_is_null(findings):

@@ -16,6 +16,7 @@ from smajax.report.findings import Rival
 
 ALIKE = 0.7  # of an effect's trace: from here on a rival is worth a refit
 REFITTED = 3  # rivals of each effect
+ABSORBED = 1e-6  # of itself: all that is left of a trace that other parameters make as well
 LIKELY = 0.01  # weight from which on a run that tells the two apart is looked for
 
 
@@ -26,9 +27,9 @@ def imitation(at: Sensitivity, trace: np.ndarray, others: Sequence[str], rival: 
     columns = at.columns(rival)
     left = columns - basis @ (basis.T @ columns)
     # What the others absorb to rounding has no direction of its own.
-    kept = np.linalg.norm(left, axis=0) > 1e-6 * np.linalg.norm(columns, axis=0)
+    kept = np.linalg.norm(left, axis=0) > ABSORBED * np.linalg.norm(columns, axis=0)
     size = float(np.linalg.norm(own))
-    if not kept.any() or size == 0.0:
+    if not kept.any() or size <= ABSORBED * float(np.linalg.norm(trace)):
         return 0.0
     directions = np.linalg.qr(scaled(left[:, kept]))[0]
     return float(np.linalg.norm(directions.T @ own)) / size
