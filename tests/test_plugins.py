@@ -21,9 +21,9 @@ from smajax import AbstractEffect, parameter
 from smajax.load.dead_weight import DeadWeight
 
 
-class Draught(AbstractEffect):
-    effect_name: ClassVar[str] = "draught"
-    title: ClassVar[str] = "draught"
+class Breeze(AbstractEffect):
+    effect_name: ClassVar[str] = "breeze"
+    title: ClassVar[str] = "breeze"
     equation: ClassVar[str] = "heat"
     formula: ClassVar[str] = "P' = k (T - T_inf)"
     sentence: ClassVar[str] = "Moving air takes more heat away."
@@ -54,7 +54,7 @@ from smajax.effects.library import LIBRARY
 from smajax.plugins import versions
 ends = []
 for strength in ("0 W/m/K", "0.1 W/m/K"):
-    system = compose("flexinol_table_3_2", "bucket", "voltage", values={"draught.strength": strength})
+    system = compose("flexinol_table_3_2", "bucket", "voltage", values={"breeze.strength": strength})
     ends.append(float(simulate_compiled(system, {"voltage": jnp.full(101, 3.0)}, 0.01).temperature[-1]))
 print(json.dumps([list(LIBRARY)[-1], float(system.load.load_mass), ends, versions()]))
 """
@@ -84,22 +84,22 @@ def _asked(code: str, environment: dict[str, str], cwd: Path) -> subprocess.Comp
 
 
 def test_an_effect_and_a_load_of_another_package(tmp_path: Path) -> None:
-    points = "[smajax.effects]\ndraught = airflow:Draught\n[smajax.loads]\nbucket = airflow:bucket\n"
+    points = "[smajax.effects]\nbreeze = airflow:Breeze\n[smajax.loads]\nbucket = airflow:bucket\n"
     told = _asked(LOOK, _installed(tmp_path, points), tmp_path)
     assert told.returncode == 0, told.stderr
     last, mass, (still, moving), versions = json.loads(told.stdout)
-    assert (last, mass) == ("draught", 1.0)
+    assert (last, mass) == ("breeze", 1.0)
     assert moving < still - 1.0
-    assert versions == ["smajax.effects draught airflow 1.2", "smajax.loads bucket airflow 1.2"]
+    assert versions == ["smajax.effects breeze airflow 1.2", "smajax.loads bucket airflow 1.2"]
 
 
 @pytest.mark.parametrize(
     ("point", "told"),
     [
-        ("latent_heat = airflow:Draught", "of airflow 1.2 in the group 'smajax.effects' has a name that is taken"),
-        ("draft = airflow:Draught", "calls itself 'draught'"),
-        ("draught = airflow:nothing", "expected a class of `smajax.AbstractEffect`"),
-        ("draught = airflow:missing", "cannot be loaded"),
+        ("latent_heat = airflow:Breeze", "of airflow 1.2 in the group 'smajax.effects' has a name that is taken"),
+        ("draft = airflow:Breeze", "calls itself 'breeze'"),
+        ("breeze = airflow:nothing", "expected a class of `smajax.AbstractEffect`"),
+        ("breeze = airflow:missing", "cannot be loaded"),
     ],
 )
 def test_what_cannot_be_used_is_refused_by_name(
@@ -112,7 +112,7 @@ def test_what_cannot_be_used_is_refused_by_name(
 
 
 def test_the_command_line_says_it_without_a_traceback(tmp_path: Path) -> None:
-    environment = _installed(tmp_path, "[smajax.effects]\nlatent_heat = airflow:Draught\n")
+    environment = _installed(tmp_path, "[smajax.effects]\nlatent_heat = airflow:Breeze\n")
     code = "import sys; sys.argv = ['smajax', 'effects']; from smajax.cli import main; main()"
     ended = _asked(code, environment, tmp_path)
     assert ended.returncode == 2, ended.stderr
