@@ -1,0 +1,105 @@
+"""Judging of the attribution benchmark: what counts as right, and what the tables say of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from studies.attribution_benchmark.judge import Judged, judge, load, save
+from studies.attribution_benchmark.tables import bars, confusion, missed, strength_of, text, written
+
+
+def _report(verdict: str, added: list[str], rivals: list[tuple[str, float]] = [], unknown: str = "") -> dict[str, Any]:  # noqa: B006
+    runs = [
+        {"role": role, "rmse_before": before, "rmse_after": after, "samples": 100}
+        for role, before, after in (("fit", 3.0, 1.0), ("fit", 4.0, 1.0), ("held-out", 5.0, 1.1))
+    ]
+    return {
+        "verdict": verdict,
+        "output": {"noise_sigma": 1.0},
+        "runs": runs,
+        "effects": [{"name": name, "added": True} for name in added] + [{"name": "radiation", "added": False}],
+        "rivals": [{"rival": name, "weight": weight} for name, weight in rivals],
+        "rounds": [{"alike": []}],
+        "unknown": [{"equation": unknown, "named": True}] if unknown else [],
+    }
+
+
+def _truth(kind: str, effects: dict[str, str], outside: bool = False, strength: float = 10.0) -> dict[str, Any]:
+    return {
+        "case": f"rig-{kind}",
+        "kind": kind,
+        "rig": "rig",
+        "strength_asked": 10.0,
+        "strength_together": strength,
+        "effects": {name: {"group": group, "outside": outside} for name, group in effects.items()},
+    }
+
+
+HEAT, STRAIN = {"latent_heat": "heat"}, {"creep": "constitutive"}
+CASES = {
+    "named": (judge(_truth("single", HEAT), _report("explained", ["latent_heat"]), 1.0), True, True),
+    "named beside it": (
+        judge(_truth("single", HEAT), _report("explained", ["phase_specific_heat"], [("latent_heat", 0.2)]), 1.0),
+        True,
+        True,
+    ),
+    "a rival of no weight": (
+        judge(_truth("single", HEAT), _report("explained", ["phase_specific_heat"], [("latent_heat", 1e-3)]), 1.0),
+        False,
+        True,
+    ),
+    "called otherwise": (
+        judge(_truth("single", {"dead_band": "sensor"}), _report("explained", ["sensor_backlash"]), 1.0),
+        True,
+        True,
+    ),
+    "one of two": (judge(_truth("pair", {**HEAT, **STRAIN}), _report("explained", ["creep"]), 1.0), False, True),
+    "overlooked": (judge(_truth("single", HEAT), _report("adequate", []), 1.0), False, False),
+    "wrong": (judge(_truth("single", HEAT), _report("explained", ["creep"]), 1.0), False, False),
+}
+
+
+@pytest.mark.parametrize("case", sorted(CASES))
+def test_what_counts_as_right(case: str) -> None:
+    one, effect, equation = CASES[case]
+    assert (one.effect_right, one.equation_right) == (effect, equation)
+
+
+def test_each_kind_has_its_right_answer() -> None:
+    foreign = _truth("outside", {"clamp_node": "heat"}, outside=True)
+    assert judge(_truth("null", {}, strength=0.0), _report("adequate", []), 1.0).right
+    assert not judge(_truth("null", {}, strength=0.0), _report("explained", ["creep"]), 1.0).right
+    assert judge(_truth("absorbed", HEAT), _report("adequate", []), 1.0).right
+    assert judge(foreign, _report("not in the library", []), 1.0).right
+    assert judge(foreign, _report("not in the library", [], unknown="heat"), 1.0).right
+    assert not judge(foreign, _report("not in the library", [], unknown="sensor"), 1.0).right
+    # What the library does not hold is outside of it, whatever the generator calls it.
+    assert judge(_truth("single", {"quantisation": "sensor"}), _report("adequate", []), 1.0).kind == "outside"
+
+
+def test_errors_are_pooled_in_noises_and_kept_whole(tmp_path: Path) -> None:
+    one = CASES["named"][0]
+    assert one.fit_before == pytest.approx((0.5 * (9.0 + 16.0)) ** 0.5)
+    assert one.held_out_before == 5.0
+    assert one.held_out_after == pytest.approx(1.1)
+    save(one, tmp_path / "one.json")
+    assert load(tmp_path / "one.json") == one
+
+
+def test_tables_and_picture(tmp_path: Path) -> None:
+    cases: list[Judged] = [one for one, _, _ in CASES.values()]
+    cases.append(judge(_truth("null", {}, strength=0.0), _report("adequate", []), 130.0))
+    rows, columns, counts = confusion(cases)
+    assert counts[rows.index("heat"), columns.index("heat")] == 3
+    assert counts[rows.index("heat"), columns.index("nothing")] == 1
+    assert counts[rows.index("nothing"), columns.index("nothing")] == 1
+    assert {one.case for one in missed(cases)} == {"rig-single", "rig-pair"}
+    told = {what: measured for what, _, measured in bars(cases)}
+    assert told["both effects of a pair"] == "0 of 1 (0 %)"
+    assert told["a case in under two minutes"] == "7 of 8 (88 %)"
+    assert strength_of(cases[0]) == 10.0
+    assert written(cases, tmp_path) == text(cases)
+    assert (tmp_path / "results.png").stat().st_size > 10_000
