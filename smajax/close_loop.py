@@ -11,8 +11,9 @@ import jax.numpy as jnp
 import numpy as np
 
 from smajax.attribution.bootstrap import bootstrapped
+from smajax.attribution.judging import Evidence, Model, Search
 from smajax.attribution.rivals import rivals
-from smajax.attribution.search import Evidence, Model, Search, scores_at, search
+from smajax.attribution.search import scores_at, search
 from smajax.attribution.unknown import unknown_terms
 from smajax.attribution.unknown_words import told_of
 from smajax.attribution.verdict import cannot_know, shown, summary, unexplained, verdict
@@ -107,7 +108,7 @@ def close_loop(
         progress,
         apart,
     )
-    at_start = sensitivity(job.problem, start, setting.every)
+    at_start = sensitivity(job.problem, start, job.unknowns)
     check = [*experiment.warnings, *identifiability(at_start, job.unknowns, job.bounds)]
     progress("checking what these runs can tell", 1.0)
     for line in check:
@@ -208,7 +209,7 @@ def _told(job: _Job, setting: Search, model: Model, start: np.ndarray) -> _Told:
     """Every free parameter of `model` with its standard error and remark."""
     names = setting.free(model.effects)
     index = job.problem.names.index
-    at: Sensitivity = sensitivity(job.problem, model.values, setting.every)
+    at: Sensitivity = sensitivity(job.problem, model.values, names)
     values = {name: float(model.values[index(name)]) for name in names}
     known = uncertainty(at, names, values, job.bounds)
     table = parameters(job.problem.system)

@@ -77,7 +77,7 @@ def candidate_runs(runs: Sequence[Run]) -> dict[str, dict[str, np.ndarray]]:
 def trial(
     problem: Problem, values: np.ndarray, runs: Sequence[Run]
 ) -> tuple[dict[str, dict[str, np.ndarray]], Problem]:
-    """(candidate runs by what they are in words, the problem that has them as its runs) at the fit `values` (P + 1,)."""
+    """(candidate runs by what they are in words, the problem that has them as its runs) at the fit `values` (P,)."""
     candidates = candidate_runs(runs)
     batch = problem.batch
     series = list(candidates.values())
@@ -98,7 +98,7 @@ def trial(
 def suggestions(
     problem: Problem, values: np.ndarray, names: Sequence[str], runs: Sequence[Run], inflation: float, count: int = 5
 ) -> tuple[Suggestion, ...]:
-    """The `count` best candidates for the parameters `names` at the fit `values` (P + 1,), best first; D-optimal.
+    """The `count` best candidates for the parameters `names` at the fit `values` (P,), best first; D-optimal.
 
     The information of a run is that of its Jacobian at the fit, each run's offset taken off where the experiment has
     one: it holds for the model as fitted, and knows nothing of an effect that the model lacks.

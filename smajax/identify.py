@@ -190,8 +190,8 @@ def _in_full(
     everything: Problem, problem: Problem, values: np.ndarray, own: Mapping[str, float] = MappingProxyType({})
 ) -> np.ndarray:
     """Parameters of the problem of every run from those of the fit runs'; held-out runs' own at their start, or `own`."""
-    start = dict(zip(everything.names, everything.start_values()[:-1].tolist(), strict=True))
-    known = {**start, **dict(zip(problem.names, values[:-1].tolist(), strict=True)), **own}
+    start = dict(zip(everything.names, everything.start_values().tolist(), strict=True))
+    known = {**start, **dict(zip(problem.names, values.tolist(), strict=True)), **own}
     return np.asarray([*(known[name] for name in everything.names), 0.0])
 
 

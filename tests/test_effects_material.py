@@ -13,7 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from smajax.attribution.search import NUDGE
+from smajax.attribution.judging import NUDGE
 from smajax.compiled import simulate_compiled
 from smajax.effects.library import LIBRARY
 from smajax.extended import extended

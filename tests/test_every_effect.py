@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from smajax.attribution.search import NUDGE
+from smajax.attribution.judging import NUDGE
 from smajax.effects.library import LIBRARY
 from smajax.extended import extended
 from smajax.lanes.evaluate import evaluator

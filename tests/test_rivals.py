@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from smajax.attribution.bootstrap import bootstrapped
+from smajax.attribution.judging import Model, Search, Start
 from smajax.attribution.rivals import imitation, rivals, separating_run
-from smajax.attribution.search import Model, Search, Start
 from smajax.experiment.record import Run
 from smajax.extended import extended
 from smajax.fit.batch import RunBatch, simulate_batch

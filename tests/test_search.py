@@ -5,7 +5,7 @@ from __future__ import annotations
 import jax.numpy as jnp
 import numpy as np
 
-from smajax.attribution.search import Fitted, Model, Search
+from smajax.attribution.judging import Fitted, Model, Search
 from smajax.extended import extended
 from smajax.fit.batch import RunBatch, simulate_batch
 from smajax.fit.box import Fit

@@ -13,7 +13,7 @@ import pytest
 from scipy.interpolate import BSpline
 
 from smajax.attribution.formulas import formulas
-from smajax.attribution.search import Model, Search
+from smajax.attribution.judging import Model, Search
 from smajax.attribution.unknown import Terms, unknown_terms, with_terms
 from smajax.attribution.unknown_words import told_of
 from smajax.effects.base import AbstractEffect

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from smajax.attribution.search import LOOSE, Fitted, Model, Search, Start
+from smajax.attribution.judging import LOOSE, Fitted, Model, Search, Start
 
 DRAWS = 32
 INTERVAL = (2.5, 97.5)  # percentiles
@@ -12,14 +12,16 @@ FEWEST = 3  # runs
 
 
 def bootstrapped(setting: Search, model: Model, seed: int) -> dict[str, tuple[float, float]]:
-    """95 % interval of every free parameter over fits to runs drawn with replacement; empty for fewer than 3 runs.
+    """95 % interval of every free parameter over fits to runs drawn with replacement.
+
+    Empty for fewer than 3 runs, and for the base model: the intervals are told of what was added.
 
     The fits are tied to `model` as those with a run left out are (`Search.judged`). With few runs the interval is
     coarse: three runs can be drawn in ten ways.
     """
     count = setting.problem.batch.runs
     names = setting.free(model.effects)
-    if count < FEWEST or not names:
+    if count < FEWEST or not model.effects:
         return {}
     drawn = np.random.default_rng(seed).multinomial(count, np.full(count, 1.0 / count), DRAWS)
     level = setting.levels([Fitted(model.effects, setting.known(model))])[0]

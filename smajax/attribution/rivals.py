@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from smajax.attribution.judging import Fitted, Model, Search, Start, base_value, nudged
 from smajax.attribution.screen import Score, scaled, switches
-from smajax.attribution.search import Fitted, Model, Search, Start, base_value, nudged, start_values
+from smajax.attribution.search import start_values
 from smajax.design import trial
 from smajax.experiment.record import Run
 from smajax.fit.sensitivity import Sensitivity, sensitivity

@@ -16,10 +16,9 @@ import jax.numpy as jnp
 import numpy as np
 
 from smajax.attribution.formulas import formulas
+from smajax.attribution.judging import Fitted, Model, Search, Start
 from smajax.attribution.screen import Score, screen
-from smajax.attribution.search import Fitted, Model, Search, Start
 from smajax.experiment.record import Prior
-from smajax.fit.box import Fit
 from smajax.fit.problem import Problem
 from smajax.fit.sensitivity import sensitivity
 from smajax.fit.shown import misfits
@@ -50,7 +49,7 @@ class Terms(Search):
     """
 
     def restricted(self, effects: Sequence[str]) -> tuple[Problem, list[int]]:
-        return self.problem, list(range(len(self.problem.names) + 1))
+        return self.problem, list(range(len(self.problem.names)))
 
 
 def with_terms(setting: Search, final: Model) -> tuple[Terms, np.ndarray, Sought]:
@@ -100,7 +99,7 @@ def unknown_terms(setting: Search, final: Model) -> tuple[UnknownTerm, ...]:
     search.progress("looking for the equation that lacks something", 1.0)
     if not chosen:
         return ()
-    base = Fitted((), Fit(values, final.cost, True, "", 0))
+    base = Fitted((), search.known(dataclasses.replace(final, values=values)))
     fitted = refitted(search, chosen, values)[:JUDGED]
     present = search.judged([base])[0]
     judged = sorted(search.judged(fitted, present), key=lambda model: model.left_out_rmse)

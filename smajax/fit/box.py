@@ -35,7 +35,7 @@ BLIND = 1e-14  # of the largest squared column: a parameter that nothing depends
 class Fit:
     """One fit ended."""
 
-    values: np.ndarray  # every parameter, and the dummy: shape (P + 1,)
+    values: np.ndarray  # every parameter, shape (P,)
     cost: float  # sum of squared residuals, misfit over noise
     converged: bool
     reason: str

@@ -20,7 +20,7 @@ LEAST = 1e-9  # of an output's largest value: a model that leaves nothing must n
 
 
 def residual_sigmas(problem: Problem, values: np.ndarray, free: int, robust: bool = False) -> np.ndarray:
-    """Sigma of each output (SI) as `values` (P + 1,) leave it, the `free` parameters and the offsets counted off.
+    """Sigma of each output (SI) as `values` (P,) leave it, the `free` parameters and the offsets counted off.
 
     That of the greatest likelihood but for the count; `robust`: from the median, which samples far off do not move.
     """

@@ -103,7 +103,7 @@ def posterior(
     kept: Kept | None = None,
     progress: Progress = quiet,
 ) -> Posterior:
-    """Draws of `names` around the fit `values` (P + 1,), the others held there; even within `bounds` but for the priors.
+    """Draws of `names` around the fit `values` (P,), the others held there; even within `bounds` but for the priors.
 
     `covariance`: Gaussian, that of the fit; `inflation`: variance of an independent sample over the noise's; `draws`: of
     each chain, kept ones. Raises ValueError without blackjax.

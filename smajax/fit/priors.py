@@ -33,7 +33,7 @@ class Priors(eqx.Module):
         return cls(tuple(here), logarithmic, jnp.asarray(means, dtype=float), jnp.asarray(sigmas, dtype=float))
 
     def rows(self, values: ArrayOf) -> ArrayOf:
-        r"""$(\theta - \mu)/\sigma$ or $\ln(\theta/\mu)/\sigma$ of values (P + 1,): (K,).
+        r"""$(\theta - \mu)/\sigma$ or $\ln(\theta/\mu)/\sigma$ of values (P,): (K,).
 
         Their squares are minus twice the log-density. Of numpy's and of JAX's arrays alike.
         """
@@ -45,7 +45,7 @@ class Priors(eqx.Module):
         return xp.where(bent, xp.log(xp.maximum(ratio, LEAST)), at - mean) / sigma
 
     def slopes(self, values: np.ndarray) -> np.ndarray:
-        """Derivative of `rows` by every value, (K, P + 1)."""
+        """Derivative of `rows` by every value, (K, P)."""
         bent, slots = np.asarray(self.logarithmic, dtype=bool), np.asarray(self.slots, dtype=int)
         at = values[slots]
         least = LEAST * np.where(bent, np.asarray(self.mean), 1.0)

@@ -28,7 +28,7 @@ class Lane(NamedTuple):
     slots: np.ndarray  # (F,), index into the parameter vector
     low: np.ndarray  # (F,)
     high: np.ndarray  # (F,)
-    values: np.ndarray  # every parameter of the model, and the dummy at the end, (P + 1,)
+    values: np.ndarray  # every parameter of the problem, (P,)
     weights: np.ndarray  # (R,): 0 leaves a run out
     tie: np.ndarray  # (F,): pull back to the start, in the residual's unit per box
 
@@ -38,7 +38,7 @@ class Lane(NamedTuple):
         return np.clip((self.values[self.slots] - self.low) / (self.high - self.low), 0.0, 1.0)
 
     def at(self, place: np.ndarray) -> np.ndarray:
-        """The whole parameter vector, (P + 1,), at a place of the box."""
+        """The whole parameter vector, (P,), at a place of the box."""
         values = np.array(self.values)
         values[self.slots] = self.low + place * (self.high - self.low)
         return values
@@ -99,8 +99,8 @@ class Problem(eqx.Module):
         return self.names[: len(self.names) - self.own.start.size]
 
     def start_values(self) -> np.ndarray:
-        """The model's own values in the order of `names`, each run's, and the dummy: shape (P + 1,)."""
-        return np.concatenate([np.asarray(get_parameters(self.system, self.shared)), np.ravel(self.own.start), [0.0]])
+        """The model's own values in the order of `names`, and each run's: shape (P,)."""
+        return np.concatenate([np.asarray(get_parameters(self.system, self.shared)), np.ravel(self.own.start)])
 
     def lane(
         self,
@@ -136,7 +136,7 @@ class Problem(eqx.Module):
 
     def own_at(self, values: Float[Array, " parameter"]) -> Float[Array, "run own"]:
         """Each run's own values."""
-        return values[len(self.shared) : -1].reshape(self.own.start.shape)
+        return values[len(self.shared) :].reshape(self.own.start.shape)
 
     def shown(self, values: Float[Array, " parameter"]) -> Float[Array, "series time"]:
         """What the sensors show of the simulated runs."""

@@ -53,7 +53,7 @@ class Sensitivity:
 
 
 def sensitivity(problem: Problem, values: np.ndarray, names: Sequence[str]) -> Sensitivity:
-    """Misfit and Jacobian at `values` (P + 1,), by `names`. One forward-mode pass over all runs."""
+    """Misfit and Jacobian at `values` (P,), by `names`. One forward-mode pass over all runs."""
     towards = np.eye(len(values))[[problem.names.index(name) for name in names]]
     (shown,), (slopes,) = shown_and_slopes(problem, np.asarray(values)[None], towards[None])
     noise = np.asarray(problem.noise)

@@ -81,14 +81,14 @@ def _columns(what: str, rows: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def _of_run(problem: Problem, points: np.ndarray, run: int) -> np.ndarray:
-    """What one run depends on, of points (..., P + 1): the shared values and its own."""
+    """What one run depends on, of points (..., P): the shared values and its own."""
     count, own = len(problem.shared), problem.own.start.shape[1]
     start = count + run * own
     return np.concatenate([points[..., :count], points[..., start : start + own]], axis=-1)
 
 
 def shown_at(problem: Problem, points: Sequence[np.ndarray] | np.ndarray) -> np.ndarray:
-    """What the sensors show at points (M, P + 1): (M, series, N), SI."""
+    """What the sensors show at points (M, P): (M, series, N), SI."""
     asked = np.asarray(points, dtype=float)
     if len(asked) <= FEW:
         nowhere = np.zeros((len(asked), 1, asked.shape[1]))
@@ -109,7 +109,7 @@ def misfits(problem: Problem, points: Sequence[np.ndarray] | np.ndarray) -> np.n
 
 
 def shown_and_slopes(problem: Problem, points: np.ndarray, towards: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """What the sensors show at points (M, P + 1), and its derivatives along (M, S, P + 1).
+    """What the sensors show at points (M, P), and its derivatives along (M, S, P).
 
     Arrays (M, series, N) and (M, S, series, N).
     """

@@ -24,7 +24,7 @@ HOPS = 4  # a power of two, for Sobol's points
 
 
 def box_points(start: np.ndarray, columns: Sequence[int], box: np.ndarray, count: int, seed: int) -> np.ndarray:
-    """`start` (P + 1,) with its `columns` at Sobol points of `box` (C, 2): shape (count, P + 1)."""
+    """`start` (P,) with its `columns` at Sobol points of `box` (C, 2): shape (count, P)."""
     sobol = qmc.Sobol(len(columns), seed=seed).random(count)
     points = np.tile(start, (count, 1))
     points[:, columns] = box[:, 0] + (MARGIN + (1.0 - 2.0 * MARGIN) * sobol) * (box[:, 1] - box[:, 0])

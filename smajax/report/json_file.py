@@ -14,7 +14,6 @@ from smajax.report.findings import (
     EffectFinding,
     Findings,
     ParameterFinding,
-    Portrait,
     RunFinding,
     UnknownTerm,
 )
@@ -87,19 +86,6 @@ def _effect(effect: EffectFinding) -> dict[str, Any]:
     }
 
 
-def _portrait(portrait: Portrait) -> dict[str, Any]:
-    return {
-        "rmse": portrait.rmse,
-        "noise_sigma": portrait.noise_sigma,
-        "ratio": portrait.ratio,
-        "white": portrait.white,
-        "whiteness_p_value": portrait.whiteness_p_value,
-        "by_phase": portrait.by_phase,
-        "correlation": portrait.correlation,
-        "sentences": portrait.sentences,
-    }
-
-
 def _unknown(term: UnknownTerm) -> dict[str, Any]:
     return {
         "name": term.name,
@@ -147,8 +133,8 @@ def findings_to_json(findings: Findings) -> dict[str, Any]:
         "before": {"parameters": {found.name: _parameter(found) for found in findings.before}},
         "after": {"parameters": {found.name: _parameter(found) for found in findings.after}},
         "effects": [_effect(effect) for effect in findings.effects],
-        "portrait_before": _portrait(findings.portrait_before),
-        "portrait_after": _portrait(findings.portrait_after),
+        "portrait_before": dataclasses.asdict(findings.portrait_before),
+        "portrait_after": dataclasses.asdict(findings.portrait_after),
         "rounds": [
             {
                 "number": entry.number,

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from smajax.effects.library import LIBRARY
+from smajax.report.files import replace
 
 # What the library calls the generator's effects, where it calls them otherwise: neither was written with the other in
 # view. The generator's smooth transformation, a share of the wire over a wider range, is the library's of two parts.
@@ -130,6 +131,4 @@ def load(path: Path) -> Judged:
 
 def save(one: Judged, path: Path) -> None:
     """Whole or not at all."""
-    partial = path.with_suffix(".partial")
-    partial.write_text(json.dumps(asdict(one), indent=1) + "\n", encoding="utf-8")
-    partial.replace(path)
+    replace(path, json.dumps(asdict(one), indent=1) + "\n")

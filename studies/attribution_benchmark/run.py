@@ -41,6 +41,7 @@ def closed(case: Case, out: Path) -> Judged:
     from smajax.catalogue import CATALOGUE
     from smajax.close_loop import close_loop
     from smajax.experiment.load import load_experiment
+    from smajax.report.files import replace
     from smajax.report.json_file import findings_to_json
 
     folder = out / "cases" / case.name
@@ -53,7 +54,7 @@ def closed(case: Case, out: Path) -> Judged:
     seconds = clock.monotonic() - began
     report = findings_to_json(findings)
     (out / "reports").mkdir(exist_ok=True)
-    (out / "reports" / f"{case.name}.json").write_text(json.dumps(report, indent=1), encoding="utf-8")
+    replace(out / "reports" / f"{case.name}.json", json.dumps(report, indent=1))
     return judge(truth, report, seconds)
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from smajax.report.files import replace
 from studies.attribution_benchmark.judge import EQUATIONS, NOTHING, OUTSIDE, Judged
 
 STRENGTHS = (1.0, 3.0, 10.0)
@@ -175,6 +176,6 @@ def picture(cases: Sequence[Judged], path: Path) -> None:
 def written(cases: Sequence[Judged], out: Path) -> str:
     """Tables as results.md and the picture as results.png in `out`; the tables."""
     found = text(cases)
-    (out / "results.md").write_text(found + "\n", encoding="utf-8")
+    replace(out / "results.md", found + "\n")
     picture(cases, out / "results.png")
     return found

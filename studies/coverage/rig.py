@@ -65,7 +65,7 @@ class Rig:
 
     problem: Problem
     truth: dict[str, float]
-    start: np.ndarray  # every parameter and the dummy
+    start: np.ndarray  # every parameter
     names: tuple[str, ...]
 
 
