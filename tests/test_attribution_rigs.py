@@ -17,7 +17,7 @@ from studies.attribution_benchmark.kinetics import Curve
 from studies.attribution_benchmark.rigs import RIGS, Rig, actuator_of, show, simulate
 from studies.attribution_benchmark.runs import Clock, Run
 from studies.attribution_benchmark.strength import Ruler
-from studies.attribution_benchmark.write import write
+from studies.attribution_benchmark.write import table_text, write
 from studies.reference.wire_reference import DeadWeightParameters, simulate_dead_weight
 
 SHORT = Clock(0.1, 5, 121)
@@ -147,6 +147,16 @@ def test_a_case_is_the_same_each_time(tmp_path) -> None:
     assert told["kind"] == "outside"
     assert list(told["effects"]) == ["eccentric_encoder"]
     assert not any("truth" in p.name for p in (tmp_path / "one" / case.name).iterdir())
+
+
+@pytest.mark.parametrize("name", sorted(RIGS))
+def test_a_log_has_the_times_and_commands_of_the_simulation(name: str) -> None:
+    rig = RIGS[name]
+    for run in rig.runs(rig.wire):
+        text = table_text(rig, run, np.zeros(rig.clock.count))
+        logged = np.loadtxt(text.splitlines()[1:], delimiter=",")
+        np.testing.assert_allclose(logged[:, 0], rig.clock.times, rtol=0, atol=1e-9 * rig.clock.seconds)
+        np.testing.assert_allclose(logged[:, 1], run.command, rtol=1e-5)
 
 
 def test_what_is_called_absorbed_is_another_value_of_the_unknowns() -> None:

@@ -67,7 +67,7 @@ def measure(case: Case, true: Truth) -> dict[str, Vector]:
 
 
 def table_text(rig: Rig, run: Run, read: Vector) -> str:
-    columns, names = [[f"{t:.2f}" for t in rig.clock.times]], ["time_s"]
+    columns, names = [[f"{t:.3f}" for t in rig.clock.times]], ["time_s"]
     names.append(COMMAND[rig.name][1])
     columns.append([f"{value:.6g}" for value in run.command])
     if run.other is not None:
