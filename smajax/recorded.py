@@ -9,7 +9,7 @@ import jax.numpy as jnp
 from jax import lax
 
 from smajax.effects.base import having
-from smajax.system import System
+from smajax.system import System, recorded_apart
 from smajax.types import Scalar, Series
 
 
@@ -23,13 +23,13 @@ def refuse_lag(system: System, what: str) -> None:
 
 
 def acting_inputs(system: System, series: Mapping[str, Series], dt: Scalar | float) -> dict[str, Series]:
-    """`series` (each of shape (n,), `dt` seconds apart) with the drive's channels as late as the effects say.
+    """`series` (each of shape (n,), `dt` seconds apart) with the channels `recorded_apart` as late as the effects say.
 
-    A lag of a part of a step gives the mean over the step of the input that holds between samples. Beyond its ends a
-    series is as at them.
+    A lag of a part of a step gives the mean over the step of a command that holds between samples, and of what was
+    measured at them the straight line between two. Beyond its ends a series is as at them.
     """
     late, acting = having(system.effects, "input_lag"), dict(series)
-    channels = sorted(system.drive.inputs_required & set(series))
+    channels = sorted(recorded_apart(system) & set(series))
     if not late or not channels:
         return acting
     last = jnp.shape(acting[channels[0]])[0] - 1

@@ -26,6 +26,14 @@ class System(eqx.Module):
     start_fraction: Scalar = parameter("-", 0.0, 1.0, "martensite fraction at the start", default=1.0)
 
 
+def recorded_apart(system: System) -> frozenset[str]:
+    """Channels that another recorder may have kept than the sensor's, and so be late: the drive's; a coupon's temperature.
+
+    A testing machine records stress and strain together, the temperature comes from elsewhere.
+    """
+    return frozenset({"temperature"}) if isinstance(system.load, AbstractCoupon) else system.drive.inputs_required
+
+
 def ambient_temperature(system: System, time: Scalar, inputs: Inputs) -> Scalar:
     """Air temperature, C: the channel `ambient_temperature` if there is one, else the parameter; effects may shift it."""
     ambient = inputs.get("ambient_temperature", system.wire.heat.ambient_temperature)

@@ -234,16 +234,38 @@ def test_a_trained_wire_lengthens_on_cooling_without_a_load():
 
 
 def test_a_held_load_creeps_by_j_times_its_change():
-    """A coupon unloaded at once: strain goes on by J dsigma (1 - exp(-t/tau)), backward Euler to its own accuracy."""
+    """A coupon unloaded over one step: the strain goes on by J dsigma (1 - exp(-t/tau)) after the step's own straight line."""
     stress = np.where(np.arange(400) < 100, 100e6, 40e6)
     inputs = _inputs(temperature=np.full(400, 20.0), stress=stress)
-    compliance, tau, dt = 4e-12, 3.0, 0.02
-    on = {"creep.compliance": compliance, "creep.time_constant": tau}
+    compliance, tau, dt = 4e-12, 3.0, 0.5
+    on = {"creep.martensite": compliance, "creep.time_constant": tau}
     run = simulate_compiled(extended(COUPON, ("creep",), on), inputs, dt)
     plain = simulate_compiled(COUPON, inputs, dt)
-    steps = np.arange(1, 301)
-    expected = np.concatenate([np.zeros(100), -60e6 * compliance * (1.0 - (1.0 + dt / tau) ** -steps)])
+    time = dt * np.arange(1, 301)
+    # The response to a ramp over the first step: of a step, averaged over it.
+    left = tau / dt * (np.exp(dt / tau) - 1.0) * np.exp(-time / tau)
+    expected = np.concatenate([np.zeros(100), -60e6 * compliance * (1.0 - left)])
     np.testing.assert_allclose(run.strain - plain.strain, expected, atol=1e-13)
+
+
+def test_martensite_that_creeps_more_goes_on_after_the_transformation():
+    """Heated through its range at constant stress: retarded strain follows (J_A + (J_M - J_A) xi) sigma with a lag."""
+    temperature = np.concatenate([_ramps(20.0, 120.0, each=401), np.full(400, 120.0)])
+    inputs = _inputs(temperature=temperature, stress=np.full(temperature.size, 80e6))
+    dt, tau, soft, stiff = 0.05, 2.0, 9e-12, 2e-12
+    on = {"creep.martensite": soft, "creep.austenite": stiff, "creep.time_constant": tau}
+    run = simulate_compiled(extended(COUPON, ("creep",), on), inputs, dt)
+    plain = simulate_compiled(COUPON, inputs, dt)
+    xi = np.asarray(run.martensite_fraction)
+    assert xi[0] == 1.0
+    assert xi[-1] == 0.0
+    settled = (stiff + (soft - stiff) * xi) * 80e6
+    late = [settled[0]]
+    for before, now in itertools.pairwise(settled):  # many small steps of the same lag
+        for share in (np.arange(200) + 0.5) / 200:
+            late.append(late[-1] + (before + share * (now - before) - late[-1]) * (1.0 - np.exp(-dt / 200 / tau)))
+    expected = np.asarray(late)[::200] - settled[0]
+    np.testing.assert_allclose(run.strain - plain.strain, expected, atol=1e-4 * np.ptp(expected))
 
 
 def test_a_lagging_transformation_is_late_by_its_time_constant():

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy import optimize, stats
@@ -30,6 +30,9 @@ class Score:
     statistic: float  # gain in units of one sample's variance
     p_value: float
     coefficients: dict[str, float]  # linear estimate by parameter name, inside its bounds
+    place: dict[str, float] = field(
+        default_factory=dict
+    )  # values of the coefficients that are no switches, if not `starts`
 
 
 def switches(effect: str) -> tuple[str, ...]:
@@ -37,13 +40,14 @@ def switches(effect: str) -> tuple[str, ...]:
     return tuple(f"{effect}.{name}" for name in EVERY[effect].switches)
 
 
-def _score(
+def score_of(
     names: tuple[str, ...],
     at: Sensitivity,
     basis: np.ndarray,
     residual: np.ndarray,
     bounds: Mapping[str, tuple[float, float]],
 ) -> Score:
+    """Of one effect or two, in the residual and beside the directions of `without`."""
     coefficients = [name for effect in names for name in switches(effect)]
     # misfit = measured - model: a coefficient lowers it along minus its derivative.
     columns = -at.columns(coefficients)
@@ -76,13 +80,18 @@ def screen(
     at: Sensitivity, fitted: Sequence[str], candidates: Sequence[str], bounds: Mapping[str, tuple[float, float]]
 ) -> tuple[list[Score], list[Score]]:
     """(single effects, pairs), each ranked by gain. `fitted` are the loose parameters at the present fit."""
-    residual = at.residual()
-    basis = np.linalg.qr(scaled(at.columns(fitted)))[0] if fitted else np.zeros((len(residual), 0))
-    residual = residual - basis @ (basis.T @ residual)
-    singles = [_score((name,), at, basis, residual, bounds) for name in candidates]
-    pairs = [_score(two, at, basis, residual, bounds) for two in itertools.combinations(candidates, 2)]
+    basis, residual = without(at, fitted)
+    singles = [score_of((name,), at, basis, residual, bounds) for name in candidates]
+    pairs = [score_of(two, at, basis, residual, bounds) for two in itertools.combinations(candidates, 2)]
     rank = lambda score: -score.gain  # noqa: E731
     return sorted(singles, key=rank), sorted(pairs, key=rank)
+
+
+def without(at: Sensitivity, fitted: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
+    """(directions that the fitted parameters absorb, residual without them)."""
+    residual = at.residual()
+    basis = np.linalg.qr(scaled(at.columns(fitted)))[0] if fitted else np.zeros((len(residual), 0))
+    return basis, residual - basis @ (basis.T @ residual)
 
 
 def scaled(columns: np.ndarray) -> np.ndarray:

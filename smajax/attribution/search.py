@@ -8,21 +8,22 @@ the best candidate does not predict left-out runs better beyond a penalty per co
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from smajax.attribution.judging import PENALTY, Evidence, Fitted, Model, Search, Start, base_value, nudged
+from smajax.attribution.judging import PENALTY, Evidence, Fitted, Model, Search, Start, base_value
+from smajax.attribution.places import Looked, looked_at
 from smajax.attribution.screen import Score, screen, significant, switches
 from smajax.effects.library import LIBRARY
 from smajax.fit.box import Fit
-from smajax.fit.sensitivity import sensitivity
 from smajax.report.findings import Round
 
 SIGNIFICANT = 1e-3  # of the score tests of one round, counted together
 SINGLES, PAIRS = 6, 2  # refitted in a round
-JUDGED = 3  # candidates taken to the left-out runs
-MOST_ROUNDS = 3
+JUDGED = 8  # candidates taken to the left-out runs
+MOST_ROUNDS = 6
 
 
 def start_values(
@@ -34,8 +35,9 @@ def start_values(
     """
     values = np.array(model_values)
     for effect in score.effects:
-        for name, size in LIBRARY[effect].starts.items():
+        for name, start in LIBRARY[effect].starts.items():
             full = f"{effect}.{name}"
+            size = score.place.get(full, start)
             asked = float(np.copysign(size, score.coefficients.get(full, 0.0) or size))
             low, high = bounds[full]
             values[names.index(full)] = asked if full in switches(effect) and low < asked < high else size
@@ -128,8 +130,17 @@ def simplest(setting: Search, judged: Sequence[Model], present: Model) -> tuple[
 
 def scores_at(setting: Search, model: Model, left: Sequence[str]) -> tuple[list[Score], list[Score]]:
     """Score tests of the effects not yet in `model`, at its fit."""
-    at = sensitivity(setting.problem, nudged(setting, model.values, left), setting.every)
-    return screen(at, setting.loose(model.effects, model.values), left, setting.bounds)
+    loose = setting.loose(model.effects, model.values)
+    looked = looked_at(setting, model.values, left, loose)
+    singles, pairs = screen(looked.at, loose, left, setting.bounds)
+    return [placed(score, looked) for score in singles], [placed(score, looked) for score in pairs]
+
+
+def placed(score: Score, looked: Looked) -> Score:
+    """A score with the places at which it was taken; having looked at several of them counts against it."""
+    place = {name: one for effect in score.effects for name, one in looked.place.get(effect, {}).items()}
+    looks = math.prod(looked.looks.get(effect, 1) for effect in score.effects)
+    return dataclasses.replace(score, place=place, p_value=min(1.0, score.p_value * looks))
 
 
 def pruned(setting: Search, model: Model) -> Model:

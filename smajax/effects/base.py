@@ -44,6 +44,14 @@ class AbstractEffect(eqx.Module):
         """The effect at its base value: present in the equations and changing nothing."""
 
     @classmethod
+    def places(cls, seconds: float) -> tuple[dict[str, float], ...]:
+        """Values of the coefficients that are no switches at which the score test looks too, beside `starts`.
+
+        `seconds`: length of a run.
+        """
+        return ()
+
+    @classmethod
     def applies(cls, system: System) -> bool:
         """Whether it can change anything of this wire, load and drive: a candidate that cannot is not looked at."""
         return True
@@ -110,7 +118,7 @@ class AbstractEffect(eqx.Module):
         """Branch conditions that a share of the wire follows in the place of the law's, and that share, -."""
         return None
 
-    def kept_at_start(self, temperature: Scalar, stress: Scalar) -> dict[str, Scalar]:
+    def kept_at_start(self, temperature: Scalar, stress: Scalar, fraction: Scalar) -> dict[str, Scalar]:
         """What it remembers of the wire from step to step, by name, at rest: an entry of `WireState.kept` each."""
         return {}
 

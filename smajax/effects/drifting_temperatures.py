@@ -43,7 +43,7 @@ class DriftingTemperatures(AbstractEffect):
     def base(cls) -> DriftingTemperatures:
         return cls(heating=0.0, cooling=0.0, cycles=5.0)
 
-    def kept_at_start(self, temperature: Scalar, stress: Scalar) -> dict[str, Scalar]:
+    def kept_at_start(self, temperature: Scalar, stress: Scalar, fraction: Scalar) -> dict[str, Scalar]:
         return {TRANSFORMED: jnp.zeros_like(stress)}
 
     def kept_after(self, old: WireState, temperature: Scalar, stress: Scalar, fraction: Scalar) -> dict[str, Scalar]:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import ClassVar
 
-import jax
-
 from smajax.effects.base import AbstractEffect
-from smajax.effects.smooth_transformation import STEEPNESS
 from smajax.parameters import parameter
 from smajax.types import Scalar
+from smajax.wire.shape import Cosine
 
 # Pieces of a zone: (1 - f) at the middle of each, of DEPTH lengths 1/mu in all.
 DEPTH, PIECES = 3.0, 4
@@ -23,7 +22,7 @@ class EndConduction(AbstractEffect):
     A fin between clamps at the temperature of the air has $T - T_\infty$ less by $1 - \cosh(\mu s)/\cosh(\mu l_0/2)$, s from
     the middle, $\mu^2 = 4 h_c/(k d)$; where $\mu l_0 \gg 1$, as for any thin wire, it is $f = 1 - e^{-\zeta}$ at $\zeta/\mu$ from a clamp.
     A zone is three such lengths, so $w = 6/(\mu l_0)$. Its pieces transform at z of their own temperature, q ranges being
-    from the air to the start of the range; S is the cosine's logistic twin.
+    from the air to the start of the range; S is the cosine of eq. 3.3 and 3.5.
 
     Quasi-static, and the same stress everywhere. Neglected: the heat that the clamps take, which is proportional to
     $T - T_\infty$ and counts as convection, and that zones of other temperature have another resistance.
@@ -51,12 +50,12 @@ class EndConduction(AbstractEffect):
     def base(cls) -> EndConduction:
         return cls(share=0.0, above_air_heating=5.0, above_air_cooling=3.0)
 
-    def _mixed(self, z: Scalar, remaining: Scalar, distance: Scalar, steepness: float) -> Scalar:
-        ends = sum(jax.nn.sigmoid(steepness * (z - missing * (z + distance) - 0.5)) for missing in MISSING)
+    def _mixed(self, z: Scalar, remaining: Scalar, distance: Scalar, left: Callable[[Scalar], Scalar]) -> Scalar:
+        ends = sum(left(z - missing * (z + distance)) for missing in MISSING)
         return (1.0 - self.share) * remaining + self.share / PIECES * ends
 
     def heating_shape(self, z: Scalar, remaining: Scalar) -> Scalar:
-        return self._mixed(z, remaining, self.above_air_heating, -STEEPNESS)
+        return self._mixed(z, remaining, self.above_air_heating, Cosine().martensite_left)
 
     def cooling_shape(self, z: Scalar, remaining: Scalar) -> Scalar:
-        return self._mixed(z, remaining, self.above_air_cooling, STEEPNESS)
+        return self._mixed(z, remaining, self.above_air_cooling, Cosine().austenite_left)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, ClassVar
 
 from smajax.effects.base import AbstractEffect
+from smajax.load.coupon import AbstractCoupon
 from smajax.parameters import parameter
 from smajax.types import Scalar
 
@@ -36,7 +37,7 @@ class InputDelay(AbstractEffect):
 
     @classmethod
     def applies(cls, system: System) -> bool:
-        return bool(system.drive.inputs_required)
+        return bool(system.drive.inputs_required) or isinstance(system.load, AbstractCoupon)
 
     def input_lag(self, time: Scalar) -> Scalar | float:
         return self.delay

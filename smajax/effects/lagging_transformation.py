@@ -43,14 +43,14 @@ class LaggingTransformation(AbstractEffect):
     def base(cls) -> LaggingTransformation:
         return cls(time_constant=0.0)
 
-    def kept_at_start(self, temperature: Scalar, stress: Scalar) -> dict[str, Scalar]:
+    def kept_at_start(self, temperature: Scalar, stress: Scalar, fraction: Scalar) -> dict[str, Scalar]:
         return {LAGGING: temperature, DURATION: jnp.zeros_like(temperature)}
 
     def kept_after(self, old: WireState, temperature: Scalar, stress: Scalar, fraction: Scalar) -> dict[str, Scalar]:
-        return {LAGGING: following(old, LAGGING, temperature, self.time_constant)}
+        return {LAGGING: following(old, LAGGING, old.temperature, temperature, self.time_constant)}
 
     def _behind(self, temperature: Scalar, old: WireState) -> Scalar:
-        return following(old, LAGGING, temperature, self.time_constant) - temperature
+        return following(old, LAGGING, old.temperature, temperature, self.time_constant) - temperature
 
     def heating_distance(self, law: Kinetics, z: Scalar, temperature: Scalar, stress: Scalar, old: WireState) -> Scalar:
         return z + self._behind(temperature, old) / heating_width(law)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from smajax.effects.base import AbstractEffect
-from smajax.effects.change import changed
+from smajax.effects.change import changed, during
 from smajax.parameters import parameter
 from smajax.types import Scalar
 
@@ -32,6 +32,10 @@ class LoadShift(AbstractEffect):
     @classmethod
     def base(cls) -> LoadShift:
         return cls(share=0.0, time=2.0, width=1.0)
+
+    @classmethod
+    def places(cls, seconds: float) -> tuple[dict[str, float], ...]:
+        return during(seconds)
 
     def load_change(self, time: Scalar) -> Scalar | float:
         return self.share * changed(time, self.time, self.width)

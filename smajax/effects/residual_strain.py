@@ -35,7 +35,7 @@ class ResidualStrain(AbstractEffect):
     def base(cls) -> ResidualStrain:
         return cls(final=0.0, cycles=5.0)
 
-    def kept_at_start(self, temperature: Scalar, stress: Scalar) -> dict[str, Scalar]:
+    def kept_at_start(self, temperature: Scalar, stress: Scalar, fraction: Scalar) -> dict[str, Scalar]:
         return {TRANSFORMED: jnp.zeros_like(stress)}
 
     def kept_after(self, old: WireState, temperature: Scalar, stress: Scalar, fraction: Scalar) -> dict[str, Scalar]:

@@ -39,7 +39,13 @@ def transformed(old: WireState, fraction: Scalar) -> dict[str, Scalar]:
     return {TRANSFORMED: old.kept[TRANSFORMED] + jnp.abs(fraction - old.martensite_fraction)}
 
 
-def following(old: WireState, name: str, value: Scalar, time_constant: Scalar) -> Scalar:
-    """The entry `name` after a step towards `value` with a time constant (s): backward Euler, `value` itself at 0 s."""
-    duration = jnp.maximum(old.kept[DURATION], 1e-12)
-    return value + time_constant / (time_constant + duration) * (old.kept[name] - value)
+def following(old: WireState, name: str, before: Scalar, now: Scalar, time_constant: Scalar) -> Scalar:
+    r"""The entry `name` after a step in which what it follows went from `before` to `now`, time constant $\tau$ in s.
+
+    Exact for a straight line between the two, $x + (x_{old} - x_{before}) e^{-h/\tau} - (x - x_{before})(1 - e^{-h/\tau})\tau/h$:
+    a lag of a few steps, or of less than one, is as good as a long one. `now` itself at 0 s.
+    """
+    # A time constant of a femtosecond is none, and has a derivative that zero has not.
+    steps = jnp.maximum(old.kept[DURATION], 1e-12) / (time_constant + 1e-15)
+    forgotten = 1.0 - jnp.exp(-steps)
+    return now + (old.kept[name] - before) * (1.0 - forgotten) - (now - before) * forgotten / steps

@@ -45,7 +45,7 @@ def start(
     zero = jnp.zeros_like(stress)
     kept: dict[str, Scalar] = {}
     for effect in effects:
-        kept.update(effect.kept_at_start(temperature, stress))
+        kept.update(effect.kept_at_start(temperature, stress, fraction))
     detwinned = wire.kinetics.variants.detwinned_at_start(stress, fraction)
     whole = WireState(temperature, stress, strain, fraction, zero + 1.0, zero, zero, zero, detwinned + zero, zero, kept)
     h = martensite_left(wire.kinetics, effects, temperature, stress, whole)
