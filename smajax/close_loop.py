@@ -14,7 +14,7 @@ from smajax.attribution.bootstrap import bootstrapped
 from smajax.attribution.judging import Evidence, Model, Search
 from smajax.attribution.rivals import rivals
 from smajax.attribution.search import scores_at, search
-from smajax.attribution.unknown import unknown_terms
+from smajax.attribution.unknown import Lacking, in_place_of, unknown_terms
 from smajax.attribution.unknown_words import told_of
 from smajax.attribution.verdict import cannot_know, shown, summary, unexplained, verdict
 from smajax.catalogue import candidates
@@ -27,6 +27,7 @@ from smajax.fit.kept import Kept
 from smajax.fit.problem import Problem
 from smajax.fit.progress import Progress, quiet
 from smajax.fit.sensitivity import Sensitivity, sensitivity
+from smajax.fit.shown import misfits
 from smajax.fit.uncertainty import Uncertainty, identifiability, uncertainty
 from smajax.load.coupon import AbstractCoupon
 from smajax.made_with import made_with
@@ -39,9 +40,11 @@ from smajax.report.findings import (
     Findings,
     ParameterFinding,
     Portrait,
+    Round,
     RunFinding,
 )
-from smajax.residual.portrait import portrait
+from smajax.residual.noise_like import split_runs
+from smajax.residual.portrait import all_noise, portrait
 from smajax.types import Trajectory
 
 SEED = 2004
@@ -115,6 +118,13 @@ def close_loop(
         progress(f"say: check: {line}", 1.0)
 
     first, final = search(setting, setting.base(start, seed))
+    lacking: Lacking | None = None
+    aside: tuple[str, ...] = ()
+    if final.effects and not _is_noise(job, final):
+        lacking = in_place_of(setting, first, final)
+    if lacking is not None:
+        setting.note(_set_aside(setting, final, lacking))
+        final, aside = first, final.effects
 
     progress("standard errors and pictures", 0.0)
     before = _told(job, setting, first, start)
@@ -126,8 +136,10 @@ def close_loop(
     integration = _integration_error(job, final)
     progress("standard errors and pictures", 1.0)
     answer = verdict(final.effects, portrait_after)
-    unknown = unknown_terms(setting, final) if answer in ("partly explained", "not in the library") else ()
-    opening, *rest = summary(answer, experiment, runs, effects, portrait_after, len(job.candidates))
+    if lacking is None:
+        lacking = unknown_terms(setting, final) if answer in ("partly explained", "not in the library") else Lacking()
+    unknown = lacking.terms
+    opening, *rest = summary(answer, experiment, runs, effects, portrait_after, len(job.candidates), aside)
     return Findings(
         experiment=experiment.name,
         title=experiment.title,
@@ -160,6 +172,27 @@ def close_loop(
         rivals=mistaken,
         unknown=unknown,
         provenance=_provenance(experiment, kept, command, seed, clock.monotonic() - began),
+    )
+
+
+def _is_noise(job: _Job, model: Model) -> bool:
+    """Whether what a model leaves of the fit runs is measurement noise."""
+    (misfit,) = misfits(job.problem, [model.values])
+    return all_noise(split_runs(misfit, np.asarray(job.problem.batch.mask)), job.experiment.noise_sigma)
+
+
+def _set_aside(setting: Search, final: Model, lacking: Lacking) -> Round:
+    """The round in which the library's effects give way to one unknown term."""
+    term = lacking.terms[0]
+    why = (
+        f"set aside: {term.title} alone foretells left-out runs better than all of them, "
+        f"{setting.shown(final.left_out_rmse)} -> {setting.shown(term.left_out_after)}"
+    )
+    return Round(
+        len(setting.rounds) + 1,
+        ((" + ".join(final.effects), final.left_out_rmse),),
+        f"without {' + '.join(final.effects)}",
+        why,
     )
 
 

@@ -11,7 +11,13 @@ from studies.attribution_benchmark.judge import Judged, judge, load, save
 from studies.attribution_benchmark.tables import bars, confusion, missed, strength_of, text, written
 
 
-def _report(verdict: str, added: list[str], rivals: list[tuple[str, float]] = [], unknown: str = "") -> dict[str, Any]:  # noqa: B006
+def _report(
+    verdict: str,
+    added: list[str],
+    rivals: list[tuple[str, float]] = [],  # noqa: B006
+    unknown: str = "",
+    or_else: str = "",
+) -> dict[str, Any]:
     runs = [
         {"role": role, "rmse_before": before, "rmse_after": after, "samples": 100}
         for role, before, after in (("fit", 3.0, 1.0), ("fit", 4.0, 1.0), ("held-out", 5.0, 1.1))
@@ -23,7 +29,12 @@ def _report(verdict: str, added: list[str], rivals: list[tuple[str, float]] = []
         "effects": [{"name": name, "added": True} for name in added] + [{"name": "radiation", "added": False}],
         "rivals": [{"rival": name, "weight": weight} for name, weight in rivals],
         "rounds": [{"alike": []}],
-        "unknown": [{"equation": unknown, "named": True}] if unknown else [],
+        "unknown": [
+            {"name": "one", "equation": unknown, "named": True, "alike": ["other"] if or_else else []},
+            {"name": "other", "equation": or_else, "named": False, "alike": []},
+        ]
+        if unknown
+        else [],
     }
 
 
@@ -76,6 +87,8 @@ def test_each_kind_has_its_right_answer() -> None:
     assert judge(foreign, _report("not in the library", []), 1.0).right
     assert judge(foreign, _report("not in the library", [], unknown="heat"), 1.0).right
     assert not judge(foreign, _report("not in the library", [], unknown="sensor"), 1.0).right
+    assert judge(foreign, _report("not in the library", [], unknown="sensor", or_else="heat"), 1.0).right
+    assert not judge(foreign, _report("partly explained", ["creep"], unknown="sensor", or_else="heat"), 1.0).right
     # What the library does not hold is outside of it, whatever the generator calls it.
     assert judge(_truth("single", {"quantisation": "sensor"}), _report("adequate", []), 1.0).kind == "outside"
 

@@ -173,7 +173,7 @@ HIDDEN: dict[str, type[AbstractEffect]] = {"heat": _JumpingLoss, "constitutive":
 
 @cache
 def _found(equation: str) -> tuple[UnknownTerm, ...]:
-    return unknown_terms(*_setting(HIDDEN[equation].base()))
+    return unknown_terms(*_setting(HIDDEN[equation].base())).terms
 
 
 @pytest.mark.parametrize(("equation", "level"), [("heat", 2.0), ("constitutive", 1.1), ("sensor", 1.1)])
@@ -205,7 +205,7 @@ def test_the_function_learnt_is_the_one_hidden() -> None:
 
 
 def test_where_nothing_is_missing_no_term_is_better_than_none() -> None:
-    terms = unknown_terms(*_setting())
+    terms = unknown_terms(*_setting()).terms
     assert terms
     assert not any(term.named for term in terms)
     assert "Nor do these runs say in which equation" in told_of(terms, str)[0]

@@ -256,7 +256,7 @@ class Search:
         """Does `new` predict left-out runs better, beyond its extra coefficients and beyond `chance` standard errors?"""
         extra = len(self.free(new.effects)) - len(self.free(old.effects))
         gain = 1.0 - (new.left_out_rmse / old.left_out_rmse) ** 2
-        z = _paired(old.left_out, new.left_out, np.asarray(self.problem.batch.mask))
+        z = paired(old.left_out, new.left_out, np.asarray(self.problem.batch.mask))
         # The fit itself must gain as well: a left-out run of its own kind can favour a needless coefficient by luck.
         fitted = 1.0 - new.cost / old.cost if old.cost > 0.0 else 0.0
         enough = min(gain, fitted) > PENALTY * extra and z > chance
@@ -274,7 +274,7 @@ def base_value(coefficient: str) -> float:
     return float(getattr(EVERY[effect].base(), name))
 
 
-def _paired(old: np.ndarray, new: np.ndarray, mask: np.ndarray) -> float:
+def paired(old: np.ndarray, new: np.ndarray, mask: np.ndarray) -> float:
     """Mean drop of the squared error over its standard error, on blocks longer than the residual's memory."""
     gains, block = [], int(np.ceil(2.0 * correlation_time(split_runs(old, mask))))
     for before, after, valid in zip(old, new, mask, strict=True):

@@ -16,7 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from smajax.attribution.formulas import formulas
-from smajax.attribution.judging import Fitted, Model, Search, Start
+from smajax.attribution.judging import Fitted, Model, Search, Start, paired
 from smajax.attribution.screen import Score, screen
 from smajax.experiment.record import Prior
 from smajax.fit.problem import Problem
@@ -31,7 +31,7 @@ from smajax.unknown.spline import design
 from smajax.unknown.terms import UNKNOWN, AbstractUnknown
 
 REFITTED = 6  # terms
-JUDGED = 4  # of them, taken to the left-out runs
+JUDGED = 6  # of them, taken to the left-out runs
 # Standard errors by which a term must do better than none, and than another that does better than none, to be named: of
 # a dozen that were tried the best is one standard error ahead by luck alone.
 APART = 2.0
@@ -84,21 +84,29 @@ def _best_of_each(scores: Sequence[Score], count: int) -> list[Score]:
     return [score for score in [*leading, *rest][:count] if score.gain > 0.0]
 
 
-def unknown_terms(setting: Search, final: Model) -> tuple[UnknownTerm, ...]:
-    """What was learnt of each term that came to the runs left out, best first.
+@dataclass(frozen=True)
+class Lacking:
+    """What was learnt of each term that came to the runs left out, best first; the model with it if the first is named."""
+
+    terms: tuple[UnknownTerm, ...] = ()
+    model: Model | None = None
+
+
+def unknown_terms(setting: Search, final: Model) -> Lacking:
+    """An unknown term in each equation in turn, beside `final`.
 
     The first is `named` when it foretells left-out runs better than the final model does, by `Search.better` and `APART`
     standard errors. Terms that do better than none, too, and that it is not as far ahead of, stand in `alike`.
     """
     search, values, found = with_terms(setting, final)
     if not search.candidates:
-        return ()
+        return Lacking()
     search.progress("looking for the equation that lacks something", 0.0)
     scores = screened(search, values)
     chosen = _best_of_each(scores, REFITTED)
     search.progress("looking for the equation that lacks something", 1.0)
     if not chosen:
-        return ()
+        return Lacking()
     base = Fitted((), search.known(dataclasses.replace(final, values=values)))
     fitted = refitted(search, chosen, values)[:JUDGED]
     present = search.judged([base])[0]
@@ -119,7 +127,19 @@ def unknown_terms(setting: Search, final: Model) -> tuple[UnknownTerm, ...]:
         alike = tuple(rival.effects[0] for rival in rivals) if ahead else ()
         said = why if model is best else ""
         told.append(_learnt(search, found, model, present, gains[model.effects], ahead, alike, said))
-    return tuple(told)
+    return Lacking(tuple(told), best if enough else None)
+
+
+def in_place_of(setting: Search, first: Model, final: Model) -> Lacking | None:
+    """One unknown term in the base model `first` that foretells left-out runs better than all the effects of `final`.
+
+    By `APART` standard errors. Then these are what the library has that comes near it, and none of them is missing.
+    """
+    found = unknown_terms(setting, first)
+    if found.model is None or found.model.left_out_rmse >= final.left_out_rmse:
+        return None
+    ahead = paired(final.left_out, found.model.left_out, np.asarray(setting.problem.batch.mask))
+    return found if ahead > APART else None
 
 
 def refitted(search: Terms, chosen: Sequence[Score], values: np.ndarray) -> list[Fitted]:

@@ -44,8 +44,12 @@ def summary(
     effects: Sequence[EffectFinding],
     after: Portrait,
     tried: int,
+    aside: Sequence[str] = (),
 ) -> tuple[str, ...]:
-    """The verdict in sentences; `tried` is the number of candidate effects that were looked at."""
+    """The verdict in sentences; `tried` is the number of candidate effects that were looked at.
+
+    `aside`: those that were added and gave way to one unknown term.
+    """
     unit, name = experiment.output_unit, experiment.output_name
     added = [effect for effect in effects if effect.added]
     several = sum(run.role == "fit" for run in runs) > 1
@@ -59,6 +63,12 @@ def summary(
         if tried
         else "Something is missing, and no candidate effect was to be tried: the experiment file leaves none.",
     }
+    if aside:
+        titles = and_listed([effect.title for effect in effects if effect.name in aside])
+        opening["not in the library"] = (
+            f"Something is missing, and none of the {tried} candidate effects that were tried accounts for it: {titles} "
+            "comes nearest, and one unknown function in one equation foretells left-out runs better than that."
+        )
     told = [opening[answer]]
     for role, words in (("fit", "fit"), ("held-out", "held-out")):
         before, now = pooled(runs, role, "before"), pooled(runs, role, "after")

@@ -63,10 +63,19 @@ def portrait(
 
 def noise_like(found: Portrait) -> bool:
     """Nothing left to explain: no memory beyond chance, or no more than `LEFT_OVER` of the mean square over the noise."""
-    excess = 1.0 - 1.0 / max(found.ratio, 1e-9) ** 2
-    at_level = excess <= LEFT_OVER
     # White but far above the declared noise: the noise was declared too small, and no model can mend that.
-    return at_level or found.white
+    return at_noise_level(found.ratio) or found.white
+
+
+def at_noise_level(ratio: float) -> bool:
+    """Whether a residual of `ratio` times the noise is no more than it."""
+    return 1.0 - 1.0 / max(ratio, 1e-9) ** 2 <= LEFT_OVER
+
+
+def all_noise(residuals: Sequence[np.ndarray], noise_sigma: float) -> bool:
+    """`noise_like` of residuals (SI, one array of shape (n,) a run) whose portrait nobody needs."""
+    rmse = float(np.sqrt(np.mean(np.concatenate(residuals) ** 2)))
+    return at_noise_level(rmse / noise_sigma) or whiteness_p_value(residuals) > WHITE
 
 
 def _sentences(

@@ -153,6 +153,24 @@ class CoolingCurve(AbstractUnknown):
         return _bent(remaining, self.value(remaining))
 
 
+class BothCurves(AbstractUnknown):
+    """The same of both curves, by what each has left: a material whose range is not traversed evenly either way."""
+
+    effect_name: ClassVar[str] = "unknown_both_curves"
+    title: ClassVar[str] = "another course of the transformation on either way"
+    equation: ClassVar[str] = "kinetics"
+    symbol: ClassVar[str] = "h"
+    state: ClassVar[str] = "share left on the heating or the cooling curve"
+    state_unit: ClassVar[str] = "-"
+    unit: ClassVar[str] = "-"
+
+    def heating_shape(self, z: Scalar, remaining: Scalar) -> Scalar:
+        return _bent(remaining, self.value(remaining))
+
+    def cooling_shape(self, z: Scalar, remaining: Scalar) -> Scalar:
+        return _bent(remaining, self.value(remaining))
+
+
 class StrainOfTemperature(AbstractUnknown):
     """A strain beside eps_L xi_s and the elastic part."""
 
@@ -276,6 +294,7 @@ UNKNOWN: dict[str, type[AbstractUnknown]] = {
         ResistanceOfFraction,
         HeatingCurve,
         CoolingCurve,
+        BothCurves,
         StrainOfTemperature,
         StrainOfStress,
         StrainOfFraction,

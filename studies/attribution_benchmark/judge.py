@@ -43,7 +43,7 @@ class Judged:
     verdict: str
     added: tuple[str, ...]  # the strongest first
     named: tuple[str, ...]  # added, and what the report says could be mistaken for it
-    where: tuple[str, ...]  # equations of what was added, or where an unknown term was found to live
+    where: tuple[str, ...]  # equations of what was added, and where an unknown term may live, the likeliest first
     fit_before: float
     fit_after: float
     held_out_before: float
@@ -71,7 +71,9 @@ class Judged:
         if self.kind in ("null", "absorbed"):
             return self.verdict == "adequate"
         if self.kind == "outside":
-            return self.told in (*self.equations, OUTSIDE)
+            # To name one place and a wrong one is no right answer, though "not in the library" is half of it.
+            alike = not self.added and bool(set(self.where) & set(self.equations))
+            return self.told in (*self.equations, OUTSIDE) or alike
         return self.effect_right
 
 
@@ -83,6 +85,11 @@ def called(name: str) -> tuple[str, ...]:
 def equation_of(group: str) -> str:
     """The library's word for the generator's."""
     return "input" if group == "command" else group
+
+
+def _told_among(term: Mapping[str, Any], terms: Sequence[Mapping[str, Any]]) -> bool:
+    """Whether an unknown term is the one named, or said to do alike."""
+    return term["named"] or any(one["named"] and term["name"] in one["alike"] for one in terms)
 
 
 def _error(runs: Sequence[Mapping[str, Any]], role: str, which: str, noise: float) -> float:
@@ -97,7 +104,7 @@ def judge(truth: Mapping[str, Any], report: Mapping[str, Any], seconds: float) -
     added = tuple(effect["name"] for effect in report["effects"] if effect["added"])
     rivals = [one["rival"] for one in report["rivals"] if one["weight"] >= CONFUSABLE]
     alike = [name for entry in report["rounds"] for model in entry["alike"] for name in model.split(" + ")]
-    unknown = [term["equation"] for term in report["unknown"] if term["named"]]
+    unknown = [term["equation"] for term in report["unknown"] if _told_among(term, report["unknown"])]
     names = tuple(truth["effects"])
     # What the library does not hold is outside, whatever the generator thinks.
     held = all(set(called(name)) & set(LIBRARY) for name in names)
