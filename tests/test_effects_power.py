@@ -93,7 +93,8 @@ def test_a_current_knows_no_leads_and_a_power_none_of_a_sag() -> None:
         np.testing.assert_allclose(same.temperature, plain.temperature, rtol=1e-12)
         assert np.ptp(plain.temperature) > 20.0
     names = candidates(build("flexinol_isobaric", "coupon", "none"), None, ())
-    assert not {"input_level", "input_delay", "input_clock", "slack"} & set(names)
+    assert not {"input_level", "slack"} & set(names)
+    assert {"input_delay", "input_clock"} <= set(names)
     assert "pwm_smoothing" not in candidates(RIGS["dead_weight"][0], None, ())
     assert "nonlinear_spring" not in candidates(RIGS["dead_weight"][0], None, ())
     assert {"pwm_smoothing", "nonlinear_spring"} <= set(candidates(RIGS["bias_spring"][0], None, ()))
@@ -197,6 +198,17 @@ def test_a_delay_of_whole_and_of_half_steps_is_the_shifted_input() -> None:
     mean = 0.5 * (inputs[channel] + inputs[channel][np.clip(np.arange(360) - 1, 0, 359)])
     moved = simulate_compiled(system, {channel: mean}, DT)
     np.testing.assert_allclose(half.reading, moved.reading, rtol=0.0, atol=1e-9 * np.ptp(moved.reading))
+
+
+def test_a_coupons_temperature_is_late_and_its_stress_is_not() -> None:
+    coupon = build("flexinol_isobaric", "coupon", "none")
+    time = DT * np.arange(400)
+    inputs = {"temperature": 70.0 - 50.0 * np.cos(0.35 * time), "stress": 120e6 + 20e6 * np.sin(0.8 * time)}
+    late = simulate_compiled(extended(coupon, ("input_delay",), {"input_delay.delay": 2.5 * DT}), inputs, DT)
+    acted = np.interp(time - 2.5 * DT, time, inputs["temperature"])
+    moved = simulate_compiled(coupon, inputs | {"temperature": acted}, DT)
+    np.testing.assert_allclose(late.strain, moved.strain, rtol=0.0, atol=1e-9)
+    assert np.ptp(moved.martensite_fraction) > 0.5
 
 
 def test_a_clock_that_falls_behind_is_a_delay_that_grows() -> None:

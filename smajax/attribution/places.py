@@ -15,9 +15,11 @@ import numpy as np
 
 from smajax.attribution.judging import Search, nudged
 from smajax.attribution.screen import score_of, switches, without
+from smajax.effects.base import Extent
 from smajax.effects.library import LIBRARY
 from smajax.fit.sensitivity import Sensitivity, sensitivity
 from smajax.fit.shown import shown_and_slopes
+from smajax.measured.levels import likeliest_increment
 
 
 @dataclass(frozen=True)
@@ -29,10 +31,14 @@ class Looked:
     looks: dict[str, int] = field(default_factory=dict)
 
 
-def run_seconds(setting: Search) -> float:
-    """Length of a typical run, s."""
+def extent_of(setting: Search) -> Extent:
+    """Length of a typical run, range of all readings, and the increment at which they lie."""
     batch = setting.problem.batch
-    return float(np.median(np.asarray(batch.mask).sum(axis=1)) * batch.dt)
+    mask = np.asarray(batch.mask) > 0
+    readings = [row[valid] for row, valid in zip(setting.problem.measured, mask, strict=True) if valid.any()]
+    stroke = max(float(np.ptp(one)) for one in readings)
+    increment = likeliest_increment(readings, float(np.median(setting.problem.noise)))
+    return Extent(float(np.median(mask.sum(axis=1)) * batch.dt), stroke, increment)
 
 
 def looked_at(setting: Search, values: np.ndarray, effects: Sequence[str], fitted: Sequence[str]) -> Looked:
@@ -41,10 +47,11 @@ def looked_at(setting: Search, values: np.ndarray, effects: Sequence[str], fitte
     `effects`, which are off, are each at the place whose trace promises most beside what the fitted parameters absorb.
     """
     at = sensitivity(setting.problem, nudged(setting, values, effects), setting.every)
+    extent = extent_of(setting)
     options = [
         (effect, {f"{effect}.{name}": one for name, one in place.items()})
         for effect in effects
-        for place in LIBRARY[effect].places(run_seconds(setting))
+        for place in LIBRARY[effect].places(extent)
     ]
     if not options:
         return Looked(at)

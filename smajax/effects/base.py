@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import abc
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import equinox as eqx
 
@@ -21,6 +21,14 @@ if TYPE_CHECKING:
     from smajax.wire.conditions import AbstractConditions
     from smajax.wire.kinetics import Kinetics
     from smajax.wire.wire import Wire
+
+
+class Extent(NamedTuple):
+    """How far the runs of an experiment go."""
+
+    seconds: float  # length of one
+    stroke: float  # between the smallest and the largest reading of all, SI
+    increment: float  # from one level to the next where the readings lie on levels, SI: the likeliest there is
 
 
 class AbstractEffect(eqx.Module):
@@ -44,11 +52,8 @@ class AbstractEffect(eqx.Module):
         """The effect at its base value: present in the equations and changing nothing."""
 
     @classmethod
-    def places(cls, seconds: float) -> tuple[dict[str, float], ...]:
-        """Values of the coefficients that are no switches at which the score test looks too, beside `starts`.
-
-        `seconds`: length of a run.
-        """
+    def places(cls, extent: Extent) -> tuple[dict[str, float], ...]:
+        """Values of the coefficients that are no switches at which the score test looks too, beside `starts`."""
         return ()
 
     @classmethod

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import jax.numpy as jnp
 
-from smajax.effects.base import AbstractEffect
+from smajax.effects.base import AbstractEffect, Extent
 from smajax.parameters import parameter
 from smajax.types import Scalar, WireState
 from smajax.wire.kept import DURATION, following
@@ -43,8 +43,8 @@ class Creep(AbstractEffect):
         return cls(austenite=0.0, martensite=0.0, time_constant=5.0)
 
     @classmethod
-    def places(cls, seconds: float) -> tuple[dict[str, float], ...]:
-        return tuple({"time_constant": share * seconds} for share in (0.01, 0.05, 0.2))
+    def places(cls, extent: Extent) -> tuple[dict[str, float], ...]:
+        return tuple({"time_constant": share * extent.seconds} for share in (0.01, 0.05, 0.2))
 
     def _settled(self, stress: Scalar, fraction: Scalar) -> Scalar:
         return (self.austenite + (self.martensite - self.austenite) * fraction) * stress

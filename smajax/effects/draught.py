@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from smajax.effects.base import AbstractEffect
+from smajax.effects.base import AbstractEffect, Extent
 from smajax.effects.change import changed, during
 from smajax.parameters import parameter
 from smajax.types import Scalar
@@ -42,9 +42,9 @@ class Draught(AbstractEffect):
         return cls(change=0.0, time=2.0, lasting=NEVER_ENDS, width=1.0)
 
     @classmethod
-    def places(cls, seconds: float) -> tuple[dict[str, float], ...]:
-        ends = {"lasting": NEVER_ENDS}, {"lasting": WHILE * seconds}
-        return tuple(place | end for place in during(seconds) for end in ends)
+    def places(cls, extent: Extent) -> tuple[dict[str, float], ...]:
+        ends = {"lasting": NEVER_ENDS}, {"lasting": WHILE * extent.seconds}
+        return tuple(place | end for place in during(extent.seconds) for end in ends)
 
     def convection_change(self, time: Scalar) -> Scalar | float:
         ended = changed(time, self.time + self.lasting, self.width)

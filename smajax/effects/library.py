@@ -35,6 +35,7 @@ from smajax.effects.sensor_drift import SensorDrift
 from smajax.effects.sensor_gain import SensorGain
 from smajax.effects.sensor_lag import SensorLag
 from smajax.effects.sensor_offset import SensorOffset
+from smajax.effects.sensor_resolution import SensorResolution
 from smajax.effects.series_compliance import SeriesCompliance
 from smajax.effects.slack import Slack
 from smajax.effects.smooth_transformation import SmoothTransformation
@@ -100,6 +101,7 @@ _OWN: dict[str, type[AbstractEffect]] = {
         SensorDrift,
         SensorOffset,
         SensorBacklash,
+        SensorResolution,
     )
 }
 

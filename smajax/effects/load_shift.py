@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from smajax.effects.base import AbstractEffect
+from smajax.effects.base import AbstractEffect, Extent
 from smajax.effects.change import changed, during
 from smajax.parameters import parameter
 from smajax.types import Scalar
@@ -34,8 +34,8 @@ class LoadShift(AbstractEffect):
         return cls(share=0.0, time=2.0, width=1.0)
 
     @classmethod
-    def places(cls, seconds: float) -> tuple[dict[str, float], ...]:
-        return during(seconds)
+    def places(cls, extent: Extent) -> tuple[dict[str, float], ...]:
+        return during(extent.seconds)
 
     def load_change(self, time: Scalar) -> Scalar | float:
         return self.share * changed(time, self.time, self.width)

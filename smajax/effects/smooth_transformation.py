@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from smajax.effects.base import AbstractEffect
+from smajax.effects.base import AbstractEffect, Extent
 from smajax.parameters import parameter
 from smajax.types import Scalar
 from smajax.wire.shape import Cosine
@@ -34,7 +34,7 @@ class SmoothTransformation(AbstractEffect):
         return cls(weight=0.0, width=WIDER)
 
     @classmethod
-    def places(cls, seconds: float) -> tuple[dict[str, float], ...]:
+    def places(cls, extent: Extent) -> tuple[dict[str, float], ...]:
         return {"width": 1.6}, {"width": 5.0}
 
     def heating_shape(self, z: Scalar, remaining: Scalar) -> Scalar:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from smajax.effects.base import AbstractEffect
+from smajax.effects.base import AbstractEffect, Extent
 from smajax.parameters import parameter
 from smajax.types import Scalar
 from smajax.wire.shape import Cosine
@@ -51,7 +51,7 @@ class TwoPartTransformation(AbstractEffect):
         return cls(heating_weight=0.0, cooling_weight=0.0, heating_shift=0.0, cooling_shift=0.0, width=WIDE)
 
     @classmethod
-    def places(cls, seconds: float) -> tuple[dict[str, float], ...]:
+    def places(cls, extent: Extent) -> tuple[dict[str, float], ...]:
         # A second step of its own, before or after the other on either way.
         sides = [(heating, cooling) for heating in (-1.0, 1.0) for cooling in (-1.0, 1.0)]
         return tuple({"heating_shift": one, "cooling_shift": other, "width": 1.0} for one, other in sides)

@@ -142,6 +142,12 @@ class RunSection(Section):
     role: Literal["fit", "held-out"] = Field(description="'fit' or 'held-out'")
     file: str | None = Field(default=None, description="the name of one file with all channels")
     files: dict[str, str] | None = Field(default=None, description="a table of channel = 'file'")
+    start: Quantity | None = Field(
+        default=None, description="a time in the log, 'number unit', before which it is left out"
+    )
+    end: Quantity | None = Field(
+        default=None, description="a time in the log, 'number unit', after which it is left out"
+    )
     parameters: dict[str, Quantity] = Field(default={}, description="a table of name = 'number unit'")
     inputs: dict[str, Quantity] = Field(
         default={}, description="a table of input = 'number unit', constant in this run"

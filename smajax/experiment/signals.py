@@ -166,12 +166,29 @@ def _digest(files: tuple[Path, ...]) -> str:
     return digest.hexdigest()
 
 
+def _kept(path: Path, run: RunSection, start: float, end: float) -> tuple[float, float]:
+    """The part of a log, `start` to `end` in s, that the run's own `start` and `end` leave."""
+    where = f"runs.{run.name}"
+    for key, given in (("start", run.start), ("end", run.end)):
+        if given is None:
+            continue
+        with at_key(path, f"{where}.{key}"):
+            at = parse_quantity(given, "s")
+        if not start < at < end and at != (start if key == "start" else end):
+            raise ExperimentError(
+                path, f"{where}.{key}", f"got {given!r}, expected a time of the log between {start:g} s and {end:g} s"
+            )
+        start, end = (at, end) if key == "start" else (start, at)
+    return start, end
+
+
 def read_run(reading: Reading, run: RunSection, parameters: dict[str, float]) -> ReadRun:
     """Reads one run. Its clock covers the time that all its signals have in common. Raises ExperimentError."""
     where = f"runs.{run.name}"
     signals, files = _read_signals(reading, run)
     start = max(signal.time[0] for signal in signals.values())
     end = min(signal.time[-1] for signal in signals.values())
+    start, end = _kept(reading.path, run, start, end)
     if end <= start:
         spans = ", ".join(f"{name} {s.time[0]:g}..{s.time[-1]:g} s" for name, s in signals.items())
         raise ExperimentError(

@@ -22,6 +22,7 @@ CALLED: dict[str, tuple[str, ...]] = {
     "rate_dependence": ("lagging_transformation",),
     "transformation_drift": ("drifting_temperatures",),
     "dead_band": ("sensor_backlash",),
+    "quantisation": ("sensor_resolution",),
     "input_gain": ("input_level",),
 }
 EQUATIONS = ("heat", "electrical", "kinetics", "constitutive", "mechanics", "sensor", "input")

@@ -23,8 +23,16 @@ def share(cases: Sequence[Judged], holds: Callable[[Judged], bool]) -> str:
 
 
 def strength_of(one: Judged) -> float:
-    """The largest of `STRENGTHS` that the case comes to."""
-    return max([size for size in STRENGTHS if one.strength >= REACHED * size], default=0.0)
+    """The largest of `STRENGTHS` that the case comes to, once the base model is refitted.
+
+    The generator's few steps bound it from above: where the loop's own refit of the base model, which goes to its end,
+    leaves less, that is what there was to see.
+    """
+    if one.kind == "pair" or not np.isfinite(one.fit_before):
+        reached = one.strength
+    else:
+        reached = min(one.strength, float(np.sqrt(max(one.fit_before**2 - 1.0, 0.0))))
+    return max([size for size in STRENGTHS if reached >= REACHED * size], default=0.0)
 
 
 def bars(cases: Sequence[Judged]) -> list[tuple[str, str, str]]:

@@ -1,0 +1,32 @@
+"""Levels on which readings lie: the increment of a sensor whose steps are larger than its noise."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from smajax.measured.table import Array
+
+LEAST = 4.0  # noises: an increment that is smaller leaves no gaps
+FEWEST = 3  # levels over the stroke
+CELL = 0.5  # noises: a cell of the scale counts once, however long the reading rests in it
+FINENESS = 8  # frequencies looked at per turn over the whole stroke
+MOST = 20_000  # of them
+
+
+def likeliest_increment(readings: Sequence[Array], sigma: float) -> float:
+    """The increment at which the cells of the scale that were seen lie most nearly, in the unit of the readings.
+
+    readings: one array (n,) a run, of noise `sigma`. Every run may have its own zero. The periodogram of the cells over
+    the scale: 1 where all lie on levels, about one over the root of their number where the readings go everywhere.
+    """
+    stroke = max(float(np.ptp(one)) for one in readings)
+    finest = max(LEAST * sigma, stroke * FINENESS / MOST)
+    if stroke <= FEWEST * finest:
+        return max(stroke / FEWEST, sigma)
+    frequency = np.arange(FEWEST / stroke, 1.0 / finest, 1.0 / (FINENESS * stroke))
+    cells = [CELL * sigma * np.unique(np.round(one / (CELL * sigma))) for one in readings]
+    seen = sum(len(one) for one in cells)
+    strength = sum(np.abs(np.exp(2j * np.pi * np.outer(frequency, one)).sum(axis=1)) for one in cells) / seen
+    return float(1.0 / frequency[int(np.argmax(strength))])
