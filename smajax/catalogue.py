@@ -50,14 +50,20 @@ CATALOGUE = Catalogue(
 )
 
 
-def candidates(system: System, only: tuple[str, ...] | None, excluded: tuple[str, ...]) -> tuple[str, ...]:
-    """Names of the effects that this system can show: a coupon has no heat balance, no circuit and no guide."""
+def candidates(
+    system: System, only: tuple[str, ...] | None, excluded: tuple[str, ...], clocked: bool = True
+) -> tuple[str, ...]:
+    """Names of the effects that this system can show: a coupon has no heat balance, no circuit and no guide.
+
+    `clocked`: whether the samples have times; where they have not, what is a matter of seconds is tried only if asked for.
+    """
     useless = {"heat", "electrical", "mechanics"} if isinstance(system.load, AbstractCoupon) else set()
     return tuple(
         name
         for name, effect in LIBRARY.items()
         if effect.equation not in useless
         and effect.applies(system)
+        and (clocked or not effect.needs_time or only is not None)
         and name not in excluded
         and (only is None or name in only)
     )

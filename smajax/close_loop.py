@@ -65,7 +65,7 @@ class _Job:
 def _job(experiment: Experiment) -> _Job:
     base = base_model(experiment)
     declared = experiment.declared_effects
-    names = candidates(base, experiment.effects_only, (*experiment.effects_excluded, *declared))
+    names = candidates(base, experiment.effects_only, (*experiment.effects_excluded, *declared), experiment.clocked)
     known = {**experiment.parameters, **{unknown.name: unknown.start for unknown in experiment.unknowns}}
     full = extended(base, (*declared, *names), {name: value for name, value in known.items() if "." in name})
     runs = tuple(run for run in experiment.runs if run.role == "fit")

@@ -94,7 +94,10 @@ def test_a_current_knows_no_leads_and_a_power_none_of_a_sag() -> None:
         assert np.ptp(plain.temperature) > 20.0
     names = candidates(build("flexinol_isobaric", "coupon", "none"), None, ())
     assert not {"input_level", "slack"} & set(names)
-    assert {"input_delay", "input_clock"} <= set(names)
+    assert {"input_delay", "input_clock", "creep"} <= set(names)
+    untimed = candidates(build("flexinol_isobaric", "coupon", "none"), None, (), clocked=False)
+    assert not {"input_delay", "input_clock", "creep", "sensor_drift", "sensor_lag"} & set(untimed)
+    assert {"two_part_transformation", "residual_strain", "sensor_gain"} <= set(untimed)
     assert "pwm_smoothing" not in candidates(RIGS["dead_weight"][0], None, ())
     assert "nonlinear_spring" not in candidates(RIGS["dead_weight"][0], None, ())
     assert {"pwm_smoothing", "nonlinear_spring"} <= set(candidates(RIGS["bias_spring"][0], None, ()))

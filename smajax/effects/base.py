@@ -42,6 +42,8 @@ class AbstractEffect(eqx.Module):
     # Coefficients that switch the effect on: their base value is zero and the score test looks at them. The others
     # (a width, a scale) mean nothing until a switch is off zero and keep their default until then.
     switches: ClassVar[tuple[str, ...]]
+    # Whether it is a matter of seconds: it means nothing where the samples of a log have no times.
+    needs_time: ClassVar[bool] = False
     # Where a refit begins, per coefficient: off the base value, because a coefficient that starts on its bound at
     # zero stays there.
     starts: ClassVar[dict[str, float]]

@@ -36,6 +36,7 @@ class Creep(AbstractEffect):
         "nor temperature changes any more."
     )
     switches: ClassVar[tuple[str, ...]] = ("austenite", "martensite")
+    needs_time: ClassVar[bool] = True
     starts: ClassVar[dict[str, float]] = {"austenite": 5e-12, "martensite": 5e-12, "time_constant": 5.0}
 
     @classmethod

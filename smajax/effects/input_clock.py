@@ -29,6 +29,7 @@ class InputClock(AbstractEffect):
         "Two recorders with two clocks: input and motion fit at the start of a run and drift apart towards its end."
     )
     switches: ClassVar[tuple[str, ...]] = ("rate",)
+    needs_time: ClassVar[bool] = True
     starts: ClassVar[dict[str, float]] = {"rate": 0.005}
 
     @classmethod

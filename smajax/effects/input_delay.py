@@ -29,6 +29,7 @@ class InputDelay(AbstractEffect):
         "The input and the sensor were not logged on the same clock: what the log shows acted a little later (or earlier)."
     )
     switches: ClassVar[tuple[str, ...]] = ("delay",)
+    needs_time: ClassVar[bool] = True
     starts: ClassVar[dict[str, float]] = {"delay": 0.03}
 
     @classmethod

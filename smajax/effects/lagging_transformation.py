@@ -37,6 +37,7 @@ class LaggingTransformation(AbstractEffect):
         "temperature, and goes on for a moment when the temperature stands still."
     )
     switches: ClassVar[tuple[str, ...]] = ("time_constant",)
+    needs_time: ClassVar[bool] = True
     starts: ClassVar[dict[str, float]] = {"time_constant": 0.1}
 
     @classmethod

@@ -20,6 +20,7 @@ class SensorDrift(AbstractEffect):
     formula: ClassVar[str] = "y = x + a t within each run"
     sentence: ClassVar[str] = "The reading walks away with time although the wire does the same in every cycle."
     switches: ClassVar[tuple[str, ...]] = ("rate",)
+    needs_time: ClassVar[bool] = True
     starts: ClassVar[dict[str, float]] = {"rate": 1e-5}
 
     @classmethod

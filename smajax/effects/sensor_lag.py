@@ -22,6 +22,7 @@ class SensorLag(AbstractEffect):
         "The sensor (or its filter) shows the value with a delay: the motion is right, the reading is late."
     )
     switches: ClassVar[tuple[str, ...]] = ("time_constant",)
+    needs_time: ClassVar[bool] = True
     starts: ClassVar[dict[str, float]] = {"time_constant": 0.1}
 
     @classmethod

@@ -226,6 +226,7 @@ def load_experiment(path: str | Path, catalogue: Catalogue) -> Experiment:
         parameters=fixed,
         unknowns=free,
         step=reading.step,
+        clocked=file.time is None or file.time.kind != "sample",
         outputs=tuple(output for output, _ in outputs),
         effects_only=tuple(file.effects.only) if file.effects.only is not None else None,
         effects_excluded=tuple(file.effects.exclude),

@@ -95,6 +95,7 @@ class Experiment:
     parameters: dict[str, float]
     unknowns: tuple[Unknown, ...]
     step: float
+    clocked: bool  # whether the samples have times; False: only their order is known, and a step is one sample
     outputs: tuple[Output, ...]
     effects_only: tuple[str, ...] | None
     effects_excluded: tuple[str, ...]
