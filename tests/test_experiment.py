@@ -445,6 +445,21 @@ def test_samples_at_one_time_are_taken_out_or_refused(bench: Path) -> None:
     assert load(bench).runs[0].time.shape == (100,)
 
 
+def test_a_run_is_the_part_of_its_log_between_its_start_and_end(bench: Path) -> None:
+    whole = load(bench).runs[0]
+    part = load(changed(bench, 'file = "a.csv"', 'file = "a.csv"\nstart = "0.5 s"\nend = "2000 ms"')).runs[0]
+    assert (part.time[0], part.time[-1]) == (pytest.approx(0.5), pytest.approx(2.0))
+    inside = slice(10, 10 + len(part.time) - 1)  # the mean over a step needs what follows the last one
+    np.testing.assert_allclose(part.output[:-1], whole.output[inside], atol=1e-12)
+    np.testing.assert_allclose(part.inputs["duty"][:-1], whole.inputs["duty"][inside], atol=1e-12)
+
+
+@pytest.mark.parametrize("key", ["start", "end"])
+def test_a_run_that_begins_or_ends_outside_of_its_log_is_refused(bench: Path, key: str) -> None:
+    with pytest.raises(ExperimentError, match=rf"runs.A.{key}: got '90 s', expected a time of the log between 0 s and"):
+        load(changed(bench, 'file = "a.csv"', f'file = "a.csv"\n{key} = "90 s"'))
+
+
 def test_an_uneven_clock_is_a_warning(bench: Path) -> None:
     lines = (bench / "a.csv").read_text().splitlines()
     kept = [line for number, line in enumerate(lines) if number % 5 != 2 or number == 0]

@@ -14,7 +14,7 @@ from scipy.interpolate import BSpline
 
 from smajax.attribution.formulas import formulas
 from smajax.attribution.judging import Model, Search
-from smajax.attribution.unknown import Terms, unknown_terms, with_terms
+from smajax.attribution.unknown import Terms, in_place_of, unknown_terms, with_terms
 from smajax.attribution.unknown_words import told_of
 from smajax.effects.base import AbstractEffect
 from smajax.fit.batch import RunBatch, simulate_batch
@@ -202,6 +202,19 @@ def test_the_function_learnt_is_the_one_hidden() -> None:
         return values[seen] - line(best.at[seen])
 
     assert np.sqrt(np.mean((bent(best.values) - bent(truth)) ** 2)) < 0.15 * np.std(bent(truth))
+
+
+@pytest.mark.parametrize(("share", "gives_way"), [(0.95, True), (0.1, False)], ids=["little", "nearly all"])
+def test_effects_that_explain_less_than_one_unknown_function_give_way_to_it(share: float, gives_way: bool) -> None:
+    setting, first = _setting(_BentScale.base())
+    left = share * first.left_out
+    effects = Model(("latent_heat",), first.values, share**2 * first.cost, left, share * first.left_out_rmse)
+    found = in_place_of(setting, first, effects)
+    assert (found is not None) == gives_way
+    if found is not None:
+        assert found.terms[0].equation == "sensor"
+        assert found.model is not None
+        assert found.model.left_out_rmse < 1.1 * NOISE
 
 
 def test_where_nothing_is_missing_no_term_is_better_than_none() -> None:
