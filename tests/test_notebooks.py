@@ -87,3 +87,12 @@ def test_an_effect_and_a_load_of_ones_own(run: Any) -> None:
     assert strokes["still air"][3] == pytest.approx(strokes["still air"][1], rel=1e-3)
     assert strokes["a fan comes on"][3] < strokes["a fan comes on"][0] - 1e-3
     assert told["slope"] < -1e-5
+
+
+def test_the_sources_discovery_is_made_again(run: Any) -> None:
+    told = run(9)
+    assert [effect.name for effect in told["added"]] == ["enhanced_conditions"]
+    assert told["share"] == pytest.approx(1.0, abs=0.01)
+    assert abs(told["net"]) > 0.2
+    assert told["held_out"].rmse_after < 0.1 * told["held_out"].rmse_before
+    assert told["content"].verdict == "adequate"
