@@ -27,7 +27,7 @@ from smajax.parameters import parameters
 from smajax.report.findings import UnknownTerm
 from smajax.residual.noise_like import correlation_time, split_runs
 from smajax.unknown.ranges import Sought, sought
-from smajax.unknown.spline import design
+from smajax.unknown.spline import COUNT, design
 from smajax.unknown.terms import UNKNOWN, AbstractUnknown
 
 REFITTED = 6  # terms
@@ -133,13 +133,15 @@ def unknown_terms(setting: Search, final: Model) -> Lacking:
 def in_place_of(setting: Search, first: Model, final: Model) -> Lacking | None:
     """One unknown term in the base model `first` that foretells left-out runs better than all the effects of `final`.
 
-    By `APART` standard errors. Then these are what the library has that comes near it, and none of them is missing.
+    By `APART` standard errors, or at all where it has no more coefficients than they have. Then these are what the
+    library has that comes near it, and none of them is missing.
     """
     found = unknown_terms(setting, first)
     if found.model is None or found.model.left_out_rmse >= final.left_out_rmse:
         return None
     ahead = paired(final.left_out, found.model.left_out, np.asarray(setting.problem.batch.mask))
-    return found if ahead > APART else None
+    spent = sum(len(setting.coefficients(effect)) for effect in final.effects)
+    return found if ahead > APART or spent >= COUNT else None
 
 
 def refitted(search: Terms, chosen: Sequence[Score], values: np.ndarray) -> list[Fitted]:
