@@ -49,6 +49,15 @@ def test_a_jacobian_without_a_number_is_a_step_that_is_not_taken() -> None:
     assert not walk.reason
 
 
+def test_equations_that_are_singular_to_rounding_are_no_error() -> None:
+    """Two parameters with one trace and next to no damping: a Cholesky factor may exist where a solution does not."""
+    random = np.random.default_rng(0)
+    for _ in range(500):
+        row = random.normal(size=2) * 10.0 ** random.integers(-3, 3, size=2)
+        walk = _Walk(np.full(2, 0.5), 1.0, row, np.outer(row, row), row**2, damping=0.0)
+        assert np.isfinite(_step(walk)).all()
+
+
 def test_two_that_act_by_their_product_are_no_parameters_without_effect() -> None:
     column = np.random.default_rng(0).standard_normal(300)
     at = Sensitivity(("a", "b"), np.zeros((1, 300)), np.stack([column, column], axis=1)[None], np.ones((1, 300)))

@@ -92,9 +92,9 @@ def _step(walk: _Walk) -> np.ndarray:
     high = np.where(walk.place > 1.0 - NEAR, 1.0, 1.0 - (1.0 - AT_MOST) * (1.0 - walk.place)) - walk.place
     try:
         factor = np.linalg.cholesky(damped)
+        free = -np.linalg.solve(damped, walk.slope)
     except np.linalg.LinAlgError:
         return np.zeros_like(walk.place)  # to rounding: more damping makes it positive
-    free = -np.linalg.solve(damped, walk.slope)
     if np.all((low <= free) & (free <= high)):
         return free
     # Without a point between them a bound is no choice.
