@@ -12,6 +12,9 @@ from smajax.residual.noise_like import WHITE, whiteness_p_value
 # A residual may miss the noise level by this share of its mean square and still be called noise: a noise sigma is
 # rarely known better, and no effect worth a name hides in 2 %.
 LEFT_OVER = 0.02
+# A residual without memory of up to so many times the declared noise is noise that was declared too small. One that is
+# larger belongs to data that the model knows nothing of, such as shuffled ones.
+DECLARED_TOO_SMALL = 3.0
 
 
 def phase_of(fraction: np.ndarray, temperature: np.ndarray, ambient: float) -> np.ndarray:
@@ -63,8 +66,7 @@ def portrait(
 
 def noise_like(found: Portrait) -> bool:
     """Nothing left to explain: no memory beyond chance, or no more than `LEFT_OVER` of the mean square over the noise."""
-    # White but far above the declared noise: the noise was declared too small, and no model can mend that.
-    return at_noise_level(found.ratio) or found.white
+    return at_noise_level(found.ratio) or (found.white and found.ratio < DECLARED_TOO_SMALL)
 
 
 def at_noise_level(ratio: float) -> bool:
@@ -75,7 +77,8 @@ def at_noise_level(ratio: float) -> bool:
 def all_noise(residuals: Sequence[np.ndarray], noise_sigma: float) -> bool:
     """`noise_like` of residuals (SI, one array of shape (n,) a run) whose portrait nobody needs."""
     rmse = float(np.sqrt(np.mean(np.concatenate(residuals) ** 2)))
-    return at_noise_level(rmse / noise_sigma) or whiteness_p_value(residuals) > WHITE
+    ratio = rmse / noise_sigma
+    return at_noise_level(ratio) or (ratio < DECLARED_TOO_SMALL and whiteness_p_value(residuals) > WHITE)
 
 
 def _sentences(
