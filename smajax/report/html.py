@@ -61,11 +61,15 @@ def estimate(value: float, error: float | None, unit: str, quantity: str = "") -
 
 
 def picture(png: bytes | None, alt: str, kind: str = "wide") -> Markup:
-    """An image element that carries its own bytes; nothing for a picture that there is none of."""
+    """An image that carries its own bytes; nothing for a picture that there is none of.
+
+    kind: `narrow` or `wide`, or `panels` for what is too wide for a telephone and moves sideways there.
+    """
     if png is None:
         return Markup("")
     data = base64.b64encode(png).decode("ascii")
-    return Markup('<img class="{}" src="data:image/png;base64,{}" alt="{}">').format(kind, data, alt)
+    image = '<div class="scroll"><img class="{}" src="data:image/png;base64,{}" alt="{}"></div>'
+    return Markup(image).format(kind, data, alt)
 
 
 def _parameter_rows(findings: Findings) -> list[dict[str, Any]]:
