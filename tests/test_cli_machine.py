@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 from typer.testing import CliRunner
 
 from smajax import doctor
@@ -108,3 +109,15 @@ def test_what_the_model_needs_and_no_column_gives_is_said(tmp_path: Path) -> Non
     told = run.invoke(app, ["new-experiment", str(tmp_path / "log.csv"), "--out", str(tmp_path / "e.toml")])
     assert told.exit_code == 3
     assert "needs the input 'voltage'" in told.stdout.replace("\n", " ")
+
+
+def test_units_that_a_file_states_come_before_magnitudes(tmp_path: Path) -> None:
+    """A run that `smajax simulate` wrote: its position is an angle, and says so."""
+    time = np.arange(60) / 10.0
+    held = xr.Dataset(
+        {"voltage": ("time", 5.0 * (time > 1.0), {"units": "V"}), "position": ("time", np.sin(time), {"units": "rad"})},
+        {"time": ("time", time, {"units": "s"})},
+    )
+    held.to_netcdf(tmp_path / "run.nc", engine="scipy")
+    found = {one.quantity: (one.key, one.unit) for one in columns_of(read_table(tmp_path / "run.nc"))}
+    assert found == {"time": ("time", "s"), "voltage": ("voltage", "V"), "angle": ("position", "rad")}
