@@ -1,4 +1,4 @@
-"""A single run -> CSV, NetCDF, JSON, a picture and a page."""
+"""A single run -> CSV, NetCDF, JSON, pictures and a page."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 
 from smajax.figures.drawing import BLUE, GREY, RED, named, panels
 from smajax.parameters import parameter_values, parameters
+from smajax.report.animation import animate
 from smajax.report.display import axis_label, digits, display, label
 from smajax.report.files import csv_text, heading, json_text, replace
 from smajax.report.html import picture
@@ -75,8 +76,8 @@ def _inputs(found: xr.Dataset) -> list[str]:
     return [name for name in names[: names.index("temperature")] if name != "wanted"]
 
 
-def drawn(found: xr.Dataset) -> bytes:
-    """Input, position, temperature, fraction and stress over time, and the hysteresis of the position."""
+def drawn(found: xr.Dataset, form: str = "png") -> bytes:
+    """Input, position, temperature, fraction and stress over time, and the hysteresis of the position; `form`: png or svg."""
     inputs = _inputs(found)
     shown = [*inputs[:1], *PLAIN]
     figure = Figure(figsize=(10.0, 8.2))
@@ -101,7 +102,7 @@ def drawn(found: xr.Dataset) -> bytes:
     for spare in axes[len(shown) + 1 :]:
         spare.axis("off")
     image = io.BytesIO()
-    figure.savefig(image, dpi=90, facecolor="white", format="png")
+    figure.savefig(image, dpi=90, facecolor="white", format=form)
     return image.getvalue()
 
 
@@ -163,8 +164,8 @@ def conclusions(ran: Ran) -> list[str]:
     return told
 
 
-def page(ran: Ran, image: bytes, title: str, command: str) -> str:
-    """The whole page, picture inside."""
+def page(ran: Ran, image: bytes, title: str, command: str, moving: bytes | None = None) -> str:
+    """The whole page, pictures inside."""
     table_of = parameters(ran.system)
     values = [
         [name, digits(value, 6), table_of[name].unit, table_of[name].about]
@@ -175,6 +176,7 @@ def page(ran: Ran, image: bytes, title: str, command: str) -> str:
         parts.append(table(["figure of merit", "value", "unit"], merit_rows(ran), (1,)))
     parts += [
         str(picture(image, "the run over time", "panels")),
+        str(picture(moving, "the load moving, beside the wire's path through its phase diagram", "panels")),
         table(["variable", "least", "greatest", "last", "unit"], summary_rows(ran.found), (1, 2, 3)),
         "<h2>Parameters (SI, temperatures in °C, angles in rad)</h2>",
         table(["parameter", "value", "unit", "what it is"], values, (1,)),
@@ -188,14 +190,16 @@ def page(ran: Ran, image: bytes, title: str, command: str) -> str:
     return whole(title, parts)
 
 
-OWN: Sequence[str] = ("simulate.csv", "simulate.nc", "simulate.json", "simulate.png", "simulate.html")
+OWN: Sequence[str] = tuple(f"simulate.{kind}" for kind in ("csv", "nc", "json", "png", "svg", "gif", "html"))
 
 
-def write_run(ran: Ran, folder: Path, title: str, command: str) -> Path:
-    """All files of a run into `folder`, each in one step; the path of the page."""
+def write_run(ran: Ran, folder: Path, title: str, command: str, moving: bool = False) -> Path:
+    """All files of a run into `folder`, each in one step; the path of the page. moving: an animation too (no coupon)."""
     image = drawn(ran.found)
     replace(folder / "simulate.csv", as_csv(ran.found))
     replace(folder / "simulate.nc", as_netcdf(ran.found))
     replace(folder / "simulate.json", json_text(record(ran, command)))
     replace(folder / "simulate.png", image)
-    return replace(folder / "simulate.html", page(ran, image, title, command))
+    replace(folder / "simulate.svg", drawn(ran.found, "svg"))
+    film = animate(ran.system, ran.found, folder / "simulate.gif").read_bytes() if moving else None
+    return replace(folder / "simulate.html", page(ran, image, title, command, film))
