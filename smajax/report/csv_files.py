@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from smajax.experiment.catalogue import INPUT_UNITS
-from smajax.identified import Identified
 from smajax.report.files import csv_text, heading
 from smajax.report.findings import Findings, ParameterFinding
+
+if TYPE_CHECKING:
+    from smajax.identified import Identified  # which is made with words of this package
 
 RUNS, PARAMETERS = "runs.csv", "parameters.csv"
 
