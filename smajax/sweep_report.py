@@ -33,6 +33,7 @@ SHOWN = {
     "switches_per_second": ("switches a second", "1/s", 1.0),
     "peak_temperature": ("peak temperature", "°C", 1.0),
 }
+NOTHING = 1e-6  # below this, in the unit shown, a figure is what rounding leaves of a zero
 MAPPED = ("settling_time", "overshoot", "steady_error", "energy")
 COLOURS = ("#1f6fb2", "#c8553d", "#d9a441", "#3f8f5b", "#7a5195", "#8a8f98", "#1d1d1f", "#2aa5a0")
 
@@ -141,7 +142,8 @@ def draw_comparison(figure: Figure, targets: np.ndarray, merits: Mapping[str, Me
     axes_of = panels(figure, 4, 2)
     for axes, name in zip(axes_of, SHOWN, strict=False):
         for k, (colour, (controller, one)) in enumerate(zip(COLOURS, merits.items(), strict=False)):
-            values = np.where(np.isfinite(_values(one, name)), _values(one, name), np.nan)
+            values = _values(one, name)
+            values = np.where(np.abs(values) < NOTHING, 0.0, np.where(np.isfinite(values), values, np.nan))
             if np.isnan(values).all():
                 nowhere = f"{controller}: nowhere"
                 axes.text(0.03, 0.92 - 0.09 * k, nowhere, color=colour, transform=axes.transAxes, fontsize=9)
@@ -157,7 +159,7 @@ def draw_comparison(figure: Figure, targets: np.ndarray, merits: Mapping[str, Me
 def _cell(value: float) -> str:
     if np.isnan(value):
         return "no number"
-    return "never" if np.isinf(value) else f"{value if abs(value) > 1e-6 else 0.0:.3g}"
+    return "never" if np.isinf(value) else f"{value if abs(value) > NOTHING else 0.0:.3g}"
 
 
 def comparison_rows(targets: np.ndarray, merits: Mapping[str, Merit]) -> list[list[str]]:

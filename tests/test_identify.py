@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import dataclasses
 import json
 import re
@@ -24,6 +25,7 @@ from smajax.fit.robust import huber_weights
 from smajax.fit.sensitivity import Sensitivity
 from smajax.identified import Identified
 from smajax.identify import identify
+from smajax.measured.read import read_table
 from smajax.parameters import set_parameters
 from smajax.presets import build
 from smajax.report.identify_page import page, write_identified
@@ -187,6 +189,14 @@ def test_the_page_and_the_record_say_the_same(found: Identified, tmp_path: Path)
     assert told == json.loads(json.dumps(record(found)))
     assert set(told["parameters"]) == set(TRUTH)
     assert told["runs"]["c"]["role"] == "held-out"
+    with (tmp_path / "parameters.csv").open(encoding="utf-8") as file:
+        values = {row["parameter"]: float(row["estimate"]) for row in csv.DictReader(file)}
+    assert values == {name: pytest.approx(one["value"], rel=1e-9) for name, one in told["parameters"].items()}
+    table = read_table(tmp_path / "runs.csv")
+    left = (table.column("strain measured [1]") - table.column("strain simulated [1]")).reshape(3, -1)
+    errors = [told["runs"][name]["rmse"] for name in ("a", "b", "c")]
+    np.testing.assert_allclose(np.sqrt(np.mean(left**2, axis=1)), errors, rtol=1e-6)
+    np.testing.assert_allclose(table.column("stress [Pa]").reshape(3, -1)[:, 0], [90e6, 150e6, 120e6])
 
 
 def test_the_page_in_a_browser(found: Identified, browser: Any, tmp_path: Path) -> None:
