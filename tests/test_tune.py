@@ -35,6 +35,7 @@ SECONDS, ROWS = 3.0, 10  # as the sweep of test_sweep.py: programs are compiled 
 MEMBERS = tuned_on([0.0, 30.0], {"damping": 0.2}, 0)
 # The preset's loops swing on for a while, and a swing multiplies differences.
 CALM = {"high_voltage": 9.0, "low_voltage": 3.0, "surface_slope": 3.0, "boundary": 1.0}
+COMMAND = f"smajax tune --out {HOSTILE}"  # what somebody typed
 SETTINGS = TuneSettings(
     "vsc3",
     (0.0, 30.0),
@@ -60,7 +61,7 @@ def surface() -> Rig:
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("tune") / "vsc3"
-    tune_into(arm(), SETTINGS, out, f"smajax tune --out {HOSTILE}")
+    tune_into(arm(), SETTINGS, out, COMMAND)
     return out
 
 
@@ -207,7 +208,7 @@ def test_a_tuning_goes_on_to_the_same_end(folder: Path, tmp_path: Path, monkeypa
         tune_into(arm(), SETTINGS, out)
     assert not (out / "gains.json").exists()
     monkeypatch.setattr(Descent, "save", wrote)
-    tune_into(arm(), SETTINGS, out)
+    tune_into(arm(), SETTINGS, out, COMMAND)
     one, other = (json.loads((place / "gains.json").read_text(encoding="utf-8")) for place in (folder, out))
     assert one == other
     ends = load(folder / "state.npz"), load(out / "state.npz")
