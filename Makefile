@@ -5,7 +5,7 @@ VENV  := .venv
 BIN   := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test test-all docs lint format package clean
+.PHONY: demo test test-all coverage docs lint format package clean
 
 demo: $(READY)
 	SMAJAX_PROGRESS=lines $(BIN)/smajax demo --out demo-report
@@ -15,6 +15,10 @@ test: lint
 
 test-all: lint
 	$(BIN)/python -m pytest -n 2 --dist worksteal -m "slow or not slow"
+
+# Lines and branches that no test runs, after the tests; a file that is run whole is left out.
+coverage: $(READY)
+	$(BIN)/python -m pytest -n 2 --dist worksteal --cov=smajax --cov-branch --cov-report=term-missing:skip-covered
 
 # site/index.html; any warning ends it. To search it as well, a browser wants a server: python -m http.server -d site
 docs: $(READY)

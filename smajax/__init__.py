@@ -91,6 +91,8 @@ NAMES = {
     "write_report": ("smajax.report.write", "write_report"),
     "zipped": ("smajax.batch.axes", "zipped"),
 }
+# A public name that was renamed -> (the new one, the version that will not have the old one): it works and warns till then.
+RENAMED: dict[str, tuple[str, str]] = {}
 # Modules that are asked for by their own name.
 MODULES = ("control_presets", "effects", "measure", "presets", "reference", "units")
 
@@ -108,6 +110,12 @@ def __getattr__(name: str) -> Any:
         return version("smajax")
     if name in MODULES:
         return import_module(f"smajax.{name}")
+    if name in RENAMED:
+        import warnings
+
+        now, gone = RENAMED[name]
+        warnings.warn(f"smajax.{name} is smajax.{now} now; it goes in version {gone}", DeprecationWarning, stacklevel=2)
+        return _found(now)
     if name not in NAMES:
         raise AttributeError(
             f"module 'smajax' has no attribute {name!r}; it has {', '.join(sorted([*NAMES, *MODULES]))}"

@@ -13,6 +13,7 @@ from smajax.experiment.record import Run
 from smajax.fit.batch import RunBatch
 from smajax.fit.problem import Problem
 from smajax.fit.sensitivity import sensitivity
+from smajax.report.display import channel, digits, label
 
 LEVELS = (0.4, 0.6, 0.8, 1.0)  # of the range that was applied
 HELD = 3  # values at most of an input that is held
@@ -42,9 +43,15 @@ def _shapes(count: int) -> dict[str, np.ndarray]:
     }
 
 
-def _held(runs: Sequence[Run], channel: str) -> list[float]:
-    values = sorted({round(float(np.median(run.inputs[channel])), 12) for run in runs})
+def _held(runs: Sequence[Run], name: str) -> list[float]:
+    values = sorted({round(float(np.median(run.inputs[name])), 12) for run in runs})
     return values if len(values) <= HELD else [values[0], values[len(values) // 2], values[-1]]
+
+
+def _told(name: str, value: float) -> str:
+    """The value of an input (SI) as a reader sees it: `93 °C`."""
+    shown = channel(name)
+    return f"{digits(shown.of(value))} {shown.unit}".strip()
 
 
 def candidate_runs(runs: Sequence[Run]) -> dict[str, dict[str, np.ndarray]]:
@@ -68,9 +75,12 @@ def candidate_runs(runs: Sequence[Run]) -> dict[str, dict[str, np.ndarray]]:
     for (shape, course), level in itertools.product(_shapes(count).items(), LEVELS):
         for values in itertools.product(*(_held(runs, name) for name in others)):
             top = low + level * (high - low)
-            said = "".join(f", {name} {value:.4g}" for name, value in zip(others, values, strict=True))
+            said = "".join(f", {label(name)} {_told(name, value)}" for name, value in zip(others, values, strict=True))
             series = {name: np.full(count, value) for name, value in zip(others, values, strict=True)}
-            found[f"{main} {shape}, up to {top:.4g}{said}"] = {main: low + course * (top - low), **series}
+            found[f"{label(main)} {shape}, up to {_told(main, top)}{said}"] = {
+                main: low + course * (top - low),
+                **series,
+            }
     return found
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from smajax.measured.headers import time_column, unit_in
+from smajax.measured.headers import time_column, unit_of
 from smajax.measured.read import READERS, read_table
 from smajax.measured.resample import resample_input, resample_output, uniform_clock
 from smajax.measured.table import Array, check_time
@@ -64,7 +64,7 @@ def column(path: Path, key: str | int, unit: str, own: str, time: str = "") -> G
     """
     table = read_table(path)
     values = table.column(key)
-    written = unit or unit_in(table.name_of(key))
+    written = unit or unit_of(table, table.name_of(key))
     if not written and own not in ("1", "-"):
         raise UnitError(
             f"{path}: column {table.name_of(key)!r} does not say its unit; write it behind: {path.name}:{key}:{own}"
@@ -77,7 +77,7 @@ def column(path: Path, key: str | int, unit: str, own: str, time: str = "") -> G
             if name
             else time_column(table)
         )
-        clock, clock_unit = table.column(at), clock_unit or unit_in(at) or "s"
+        clock, clock_unit = table.column(at), clock_unit or unit_of(table, at) or "s"
     check_time(clock, f"{path}: the time of {key!r}", clock_unit, table.place)
     seconds = convert(clock, clock_unit, "s")
     seconds = seconds - seconds[0]

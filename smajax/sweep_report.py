@@ -15,11 +15,13 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FormatStrFormatter
 
 from smajax.control_presets import CONTROLLERS, with_printed_law
-from smajax.figures.drawing import keyed, named, panels
+from smajax.figures.drawing import named, panels
+from smajax.made_with import made_with
 from smajax.merit import Merit
 from smajax.report.html import picture
-from smajax.report.plain_page import table, whole
+from smajax.report.plain_page import bullets, table, whole
 from smajax.sweep import Grid
+from smajax.words import counted
 
 # Figure of merit -> (what it is called, unit shown, factor from SI).
 SHOWN = {
@@ -31,6 +33,7 @@ SHOWN = {
     "switches_per_second": ("switches a second", "1/s", 1.0),
     "peak_temperature": ("peak temperature", "°C", 1.0),
 }
+NOTHING = 1e-6  # below this, in the unit shown, a figure is what rounding leaves of a zero
 MAPPED = ("settling_time", "overshoot", "steady_error", "energy")
 COLOURS = ("#1f6fb2", "#c8553d", "#d9a441", "#3f8f5b", "#7a5195", "#8a8f98", "#1d1d1f", "#2aa5a0")
 
@@ -102,8 +105,13 @@ def draw_maps(figure: Figure, grid: Grid, swept: Swept) -> None:
             axis.set_minor_locator(FixedLocator([]))
         axes.axhline(1.0, color="white", linewidth=1.0, linestyle="--")
         axes.axvline(1.0, color="white", linewidth=1.0, linestyle="--")
-        figure.colorbar(mesh, ax=axes).set_label(f"{label} ({unit}{never})", fontsize=8)
         named(axes, f"{grid.first}, plant / controller", f"{grid.second}, plant / controller", label)
+        if np.isnan(values).all():  # a scale would have nothing to say
+            axes.set_title(f"{label}{never}", fontsize=9.5, loc="left")
+            continue
+        bar = figure.colorbar(mesh, ax=axes)
+        bar.ax.tick_params(labelsize=9)
+        bar.set_label(f"{label} ({unit}{never})", fontsize=9)
 
 
 def over_mismatches(grid: Grid, swept: Swept) -> str:
@@ -123,16 +131,22 @@ def draw_lines(figure: Figure, time: np.ndarray, ratios: Sequence[float], swept:
         for colour, ratio, angle in zip(COLOURS, ratios, angles, strict=False):
             axes.plot(time, np.degrees(angle), color=colour, linewidth=1.2, label=f"{ratio:g}")
         axes.axhline(np.degrees(target), color="#9aa0a8", linewidth=0.8)
-        named(axes, "time (s)", "arm angle (°)", f"{mismatch}: plant / controller")
-        keyed(axes)
+        named(axes, "time (s)", "arm angle (°)", mismatch)
+    # One key for all panels, where it covers no line.
+    handles, labels = axes.get_legend_handles_labels()
+    figure.legend(handles, labels, title="plant / controller", loc="outside lower center", ncols=5, frameon=False)
 
 
 def draw_comparison(figure: Figure, targets: np.ndarray, merits: Mapping[str, Merit]) -> None:
     """Every figure of merit over the set point, one line a controller."""
     axes_of = panels(figure, 4, 2)
     for axes, name in zip(axes_of, SHOWN, strict=False):
-        for colour, (controller, one) in zip(COLOURS, merits.items(), strict=False):
-            values = np.where(np.isfinite(_values(one, name)), _values(one, name), np.nan)
+        for k, (colour, (controller, one)) in enumerate(zip(COLOURS, merits.items(), strict=False)):
+            values = _values(one, name)
+            values = np.where(np.abs(values) < NOTHING, 0.0, np.where(np.isfinite(values), values, np.nan))
+            if np.isnan(values).all():
+                nowhere = f"{controller}: nowhere"
+                axes.text(0.03, 0.92 - 0.09 * k, nowhere, color=colour, transform=axes.transAxes, fontsize=9)
             axes.plot(np.degrees(targets), values, "o-", color=colour, markersize=3, linewidth=1.2, label=controller)
         label, unit, _ = SHOWN[name]
         named(axes, "set point (°)", f"{label} ({unit})")
@@ -145,7 +159,7 @@ def draw_comparison(figure: Figure, targets: np.ndarray, merits: Mapping[str, Me
 def _cell(value: float) -> str:
     if np.isnan(value):
         return "no number"
-    return "never" if np.isinf(value) else f"{value if abs(value) > 1e-6 else 0.0:.3g}"
+    return "never" if np.isinf(value) else f"{value if abs(value) > NOTHING else 0.0:.3g}"
 
 
 def comparison_rows(targets: np.ndarray, merits: Mapping[str, Merit]) -> list[list[str]]:
@@ -170,36 +184,54 @@ def page(
     seconds: float,
     between: str,
     folder: Path,
+    command: str = "",
 ) -> str:
     """One page for a browser, with the pictures that lie in `folder` inside; the rows as CSV lie beside it."""
     say = html.escape
     head = ["controller", "settles at", *(f"{label} ({unit})" for label, unit, _ in SHOWN.values())]
 
     def drawn(name: str, alt: str) -> str:
-        return str(picture((folder / name).read_bytes(), alt))
+        return str(picture((folder / name).read_bytes(), alt, "panels"))
 
     parts = [
-        f"<h2>{say(one.name)}</h2><p>{grid.size:,} closed loops of {seconds:g} s; {failures(one)}. "
-        f"{say(over_mismatches(grid, one))} {say(told(one.name))} "
+        f"<h3>{say(one.name)}</h3><p>{counted(grid.size, 'closed loop')} of {seconds:g} s; {failures(one)}. "
+        f"{say(told(one.name))} "
         f'<a href="{one.name}.csv">every loop as CSV</a></p>'
         + drawn(f"{one.name}_maps.png", f"maps of {one.name}")
         + drawn(f"{one.name}_lines.png", f"lines of {one.name}")
         for one in swept
     ]
     top = (
-        "<h1>Controllers compared</h1><p>The plant as the controller believes it, "
+        f"<h1>Controllers compared</h1>{bullets(conclusions(targets, merits, grid, swept))}<p>The plant as the controller believes it, "
         f"{len(targets)} set points from {np.degrees(targets.min()):.0f}° to {np.degrees(targets.max()):.0f}°; "
         f"median / worst over the set points. Within 1° counts as there. {say(between)}</p>"
     )
     mismatches = (
-        f"<h1>Mismatch of {say(grid.first)} and {say(grid.second)}</h1><p>The plant's value over the one that the "
+        f"<h2>Mismatch of {say(grid.first)} and {say(grid.second)}</h2><p>The plant's value over the one that the "
         "controller believes, where it believes in one. Maps: median over the set points at the preset's gains.</p>"
     )
     compared = [
         table(head, comparison_rows(targets, merits)),
         drawn("comparison.png", "figures of merit over the set point"),
     ]
-    return whole("Controllers compared", [top, *compared, mismatches, *parts])
+    foot = [
+        "<h2>Provenance</h2>",
+        table(["", ""], [["command", command], *map(list, made_with().items())]),
+        "<p class=quiet>The same numbers: sweep.json, and a CSV file for each controller.</p>",
+    ]
+    return whole("Controllers compared", [top, *compared, mismatches, *parts, *foot])
+
+
+def conclusions(targets: np.ndarray, merits: Mapping[str, Merit], grid: Grid, swept: Sequence[Swept]) -> list[str]:
+    """A sentence a controller: where it settles on the plant as believed, and on the others."""
+    told = []
+    for one in swept:
+        settles = int(np.isfinite(_values(merits[one.name], "settling_time")).sum())
+        as_believed = (
+            f"{one.name} settles at {settles} of {counted(len(targets), 'set point')} on the plant as believed."
+        )
+        told.append(f"{as_believed} {over_mismatches(grid, one)}")
+    return told
 
 
 def told(name: str) -> str:
@@ -219,13 +251,21 @@ def failures(one: Swept) -> str:
     )
 
 
-def as_json(targets: np.ndarray, merits: Mapping[str, Merit], grid: Grid, swept: Sequence[Swept], between: str) -> str:
+def as_json(
+    targets: np.ndarray,
+    merits: Mapping[str, Merit],
+    grid: Grid,
+    swept: Sequence[Swept],
+    between: str,
+    command: str = "",
+) -> str:
     """The comparison and what the grid was, SI; infinite times are null."""
 
     def plain(values: np.ndarray) -> list[float | None]:
         return [float(value) if np.isfinite(value) else None for value in np.asarray(values).ravel()]
 
     record = {
+        "conclusions": conclusions(targets, merits, grid, swept),
         "between": between,
         "set_points_rad": plain(targets),
         "controllers": {
@@ -240,5 +280,7 @@ def as_json(targets: np.ndarray, merits: Mapping[str, Merit], grid: Grid, swept:
             "loops": grid.size,
             "failed": {one.name: int(np.isfinite(one.failed_at).sum()) for one in swept},
         },
+        "command": command,
+        "made_with": made_with(),
     }
     return json.dumps(record, indent=2) + "\n"

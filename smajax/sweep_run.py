@@ -133,7 +133,9 @@ def between_in_words(filtered: str, noise: float, period: float, delay: int) -> 
     return f"Controllers are called every {1e3 * period:g} ms{late} and are told {told}, {read}."
 
 
-def run_sweep(system: System, settings: SweepSettings, out: Path, progress: Progress) -> list[list[str]]:
+def run_sweep(
+    system: System, settings: SweepSettings, out: Path, progress: Progress, command: str = ""
+) -> list[list[str]]:
     """Sweep every controller and write the folder; the rows of the comparison come back, for a terminal.
 
     Raises ValueError for a controller or mismatch there is not.
@@ -169,8 +171,9 @@ def run_sweep(system: System, settings: SweepSettings, out: Path, progress: Prog
     comparison = Figure(figsize=(10.0, 11.0))
     draw_comparison(comparison, targets, compared)
     comparison.savefig(out / "comparison.png", dpi=90, facecolor="white")
-    replace(out / "sweep.json", as_json(targets, compared, grid, swept, settings.between))
-    replace(out / "index.html", page(targets, compared, grid, swept, settings.seconds, settings.between, out))
+    replace(out / "sweep.json", as_json(targets, compared, grid, swept, settings.between, command))
+    between, seconds = settings.between, settings.seconds
+    replace(out / "index.html", page(targets, compared, grid, swept, seconds, between, out, command))
     return comparison_rows(targets, compared)
 
 

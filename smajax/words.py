@@ -5,6 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 
+def counted(number: int, what: str) -> str:
+    """`1 closed loop`, `1,066 closed loops`."""
+    return f"{number:,} {what}{'' if number == 1 else 's'}"
+
+
 def and_listed(names: Sequence[str]) -> str:
     """`a, b and c`, with semicolons where a name holds a comma itself; `nothing` for no names."""
     if len(names) < 2:

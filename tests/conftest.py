@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import os
+import shutil
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from smajax.runtime import prepare
+from tests.in_browser import FLAGS
 
 prepare()
 
@@ -19,6 +23,22 @@ def measured_data() -> Path:
     if not folder.is_dir():
         pytest.skip(f"no measured data at {folder}: set SMAJAX_DATA to the folder that holds them")
     return folder
+
+
+@pytest.fixture
+def browser() -> Iterator[Any]:
+    """A headless Chromium with an empty profile; the test skips, saying so, where there is none."""
+    playwright = pytest.importorskip(
+        "playwright.sync_api", reason="playwright is not installed: pip install -e '.[dev]'"
+    )
+    names = ("chromium", "chromium-browser", "google-chrome")
+    found = next((path for name in names if (path := shutil.which(name))), None)
+    if found is None:
+        pytest.skip(f"none of {', '.join(names)} is on the PATH; on Debian: apt-get install chromium")
+    with playwright.sync_playwright() as driver:
+        running = driver.chromium.launch(executable_path=found, args=FLAGS)
+        yield running
+        running.close()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

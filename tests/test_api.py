@@ -31,6 +31,15 @@ def test_every_name_is_there_and_known_to_a_checker() -> None:
         sma.simulat  # noqa: B018
 
 
+def test_a_renamed_name_works_and_warns(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sma.RENAMED, "make_system", ("build", "0.3"))
+    with pytest.warns(
+        DeprecationWarning, match=r"smajax\.make_system is smajax\.build now; it goes in version 0\.3"
+    ) as told:
+        assert sma.make_system is sma.build
+    assert told[0].filename == __file__
+
+
 @pytest.mark.parametrize(
     "first", ["import smajax.simulate, smajax.identify;", "from smajax.close_loop import close_loop;"]
 )

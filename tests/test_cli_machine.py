@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.io
+import xarray as xr
 from typer.testing import CliRunner
 
 from smajax import doctor
@@ -17,6 +19,7 @@ from smajax.experiment.guess import columns_of
 from smajax.experiment.load import load_experiment
 from smajax.experiment.template import begun
 from smajax.measured.read import read_table
+from smajax.measured.table import MeasuredDataError
 
 run = CliRunner()
 DEMO = Path(__file__).parents[1] / "smajax" / "demo" / "latent"
@@ -64,6 +67,54 @@ def test_a_template_loads_as_it_is(tmp_path: Path) -> None:
     assert run.invoke(app, ["new-experiment", *logs, "--out", str(tmp_path / "e.toml")]).exit_code == 2
 
 
+def _block(path: Path, name: str, every: float, values: np.ndarray) -> None:
+    """A Simulink log of one signal, as a "Structure with time"."""
+    time = every * np.arange(values.size)
+    scipy.io.savemat(path, {name: {"time": time[:, None], "signals": {"values": values[:, None]}}})
+
+
+def test_a_run_may_be_a_file_for_each_sensor(tmp_path: Path) -> None:
+    """Pairs of .mat files at different rates, told apart by their names, also when they come in another order."""
+    runs = ("Step01", "Step02_PR", "Ramp01")
+    for k, name in enumerate(runs):
+        _block(tmp_path / f"SensorInput_{name}.mat", "Board_DutyCycle", 0.01, 0.01 * (np.arange(3000) % 900 > 300 + k))
+        moved = 0.004 * np.sin(np.arange(300) / (30 + k)) ** 2 + 1e-5 * np.random.default_rng(k).standard_normal(300)
+        _block(tmp_path / f"SensorPosition_{name}.mat", "SensorPosition", 0.1, moved)
+    logs = [str(tmp_path / f"Sensor{kind}_{name}.mat") for kind in ("Position", "Input") for name in runs]
+    told = run.invoke(app, ["new-experiment", *logs, "--out", str(tmp_path / "e.toml")])
+    assert told.exit_code == 0, told.output
+    assert "Step02_PR of SensorPosition_Step02_PR.mat and SensorInput_Step02_PR.mat" in told.output
+    assert "Board_DutyCycle: duty in 1 (likely" in told.output
+    made = load_experiment(tmp_path / "e.toml", CATALOGUE)
+    assert [(one.name, one.role) for one in made.runs] == list(zip(runs, ("fit", "fit", "held-out"), strict=True))
+    assert made.step == 0.1
+    for k, one in enumerate(made.runs):
+        assert [file.name for file in one.files] == [f"SensorInput_{runs[k]}.mat", f"SensorPosition_{runs[k]}.mat"]
+    alone = run.invoke(app, ["new-experiment", *logs[:-1], "--out", str(tmp_path / "f.toml")])
+    assert isinstance(alone.exception, MeasuredDataError)
+    assert "Ramp01, Step01, Step02_PR among SensorPosition_Step01.mat" in str(alone.exception)
+    assert "Step01, Step02_PR among SensorInput_Step01.mat" in str(alone.exception)
+    assert not (tmp_path / "f.toml").exists()
+
+
+def test_files_of_a_run_may_have_a_time_column_of_one_name(tmp_path: Path) -> None:
+    rows = [(k / 10, 5.0 * (k % 20 > 9), 3.0 * np.sin(k / 9)) for k in range(60)]
+    for name, place in (("U [V]", 1), ("Displ [mm]", 2)):
+        text = "\n".join(f"{row[0]},{row[place]}" for row in rows)
+        (tmp_path / f"{name[0]}.csv").write_text(f"time [s],{name}\n{text}\n")
+    logs = [tmp_path / "U.csv", tmp_path / "D.csv"]
+    text = begun(logs, tmp_path / "e.toml").text
+    assert 'files = { voltage = "U.csv", position = "D.csv" }' in text
+    (tmp_path / "e.toml").write_text(text)
+    (one,) = load_experiment(tmp_path / "e.toml", CATALOGUE).runs
+    assert (one.name, one.inputs["voltage"][15]) == ("run", 5.0)
+    (tmp_path / "D.csv").write_text((tmp_path / "D.csv").read_text().replace("time [s]", "Time [ms]"))
+    with pytest.raises(
+        MeasuredDataError, match=r"its time is 'Time \[ms\]' in ms, that of U\.csv is 'time \[s\]' in s"
+    ):
+        begun(logs, tmp_path / "e.toml")
+
+
 @pytest.mark.parametrize(
     ("head", "row", "expected"),
     [
@@ -108,3 +159,15 @@ def test_what_the_model_needs_and_no_column_gives_is_said(tmp_path: Path) -> Non
     told = run.invoke(app, ["new-experiment", str(tmp_path / "log.csv"), "--out", str(tmp_path / "e.toml")])
     assert told.exit_code == 3
     assert "needs the input 'voltage'" in told.stdout.replace("\n", " ")
+
+
+def test_units_that_a_file_states_come_before_magnitudes(tmp_path: Path) -> None:
+    """A run that `smajax simulate` wrote: its position is an angle, and says so."""
+    time = np.arange(60) / 10.0
+    held = xr.Dataset(
+        {"voltage": ("time", 5.0 * (time > 1.0), {"units": "V"}), "position": ("time", np.sin(time), {"units": "rad"})},
+        {"time": ("time", time, {"units": "s"})},
+    )
+    held.to_netcdf(tmp_path / "run.nc", engine="scipy")
+    found = {one.quantity: (one.key, one.unit) for one in columns_of(read_table(tmp_path / "run.nc"))}
+    assert found == {"time": ("time", "s"), "voltage": ("voltage", "V"), "angle": ("position", "rad")}

@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 import xarray as xr
+from PIL import Image
 from typer.testing import CliRunner
 
 from smajax.cli import app
@@ -19,6 +20,8 @@ from smajax.compose import compose
 from smajax.levels import clock_of, given, levels
 from smajax.parameters import parameter_values, set_parameters
 from smajax.presets import build
+from smajax.report.simulate_page import conclusions
+from smajax.single import Asked, AskedLoop, run_closed
 from smajax.units import UnitError
 
 run = CliRunner()
@@ -29,7 +32,7 @@ HANGING = ("flexinol_table_3_2", "dead_weight", "flexinol_voltage")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("simulated") / "run"
     words = ["simulate", *HANGING, "--step", "5V:2s,0V:1s", "--set", "wire.heat.convection_coefficient=80"]
-    told = run.invoke(app, [*words, "--dt", "10ms", "--out", str(out)])
+    told = run.invoke(app, [*words, "--dt", "10ms", "--gif", "--no-open", "--out", str(out)])
     assert told.exit_code == 0, told.output
     return out
 
@@ -49,7 +52,20 @@ def test_the_run_is_that_of_the_model(folder: Path) -> None:
     assert record["parameters"]["convection_coefficient"] == 80.0
     assert record["summary"]["temperature"]["greatest"] == pytest.approx(float(expected.temperature.max()))
     assert (folder / "simulate.png").stat().st_size > 10_000
-    assert "data:image/png;base64," in (folder / "simulate.html").read_text(encoding="utf-8")
+    page = (folder / "simulate.html").read_text(encoding="utf-8")
+    assert (page.count("data:image/png;base64,"), page.count("data:image/gif;base64,")) == (1, 1)
+    assert f"lies between {float(expected.martensite_fraction.min()):.2f} and 1.00" in page
+    assert (folder / "simulate.svg").read_text(encoding="utf-8").rstrip().endswith("</svg>")
+    with Image.open(folder / "simulate.gif") as film:
+        assert getattr(film, "n_frames", 1) > 40
+
+
+def test_what_happened_is_told_in_words() -> None:
+    told = " ".join(conclusions(run_closed(Asked(dt=0.01), AskedLoop("pid", "30deg:6s"))))
+    assert "It transforms: the martensite fraction lies between 0.42 and 1.00, at the end 0.42." in told
+    assert "The angle starts at -45 deg, lies between -45 deg and 30 deg, and ends at 30 deg." in told
+    assert "The loop settles after 2.17 s." in told
+    assert "The loop never settles." in conclusions(run_closed(Asked(dt=0.01), AskedLoop("pid", "30deg:2s")))
 
 
 def test_what_was_written_is_an_input_again(folder: Path, tmp_path: Path) -> None:
@@ -105,6 +121,7 @@ def test_a_gains_file_closes_the_loop(tmp_path: Path) -> None:
         (["flexinol", "--step", "7V:1s"], "No wire preset"),
         (["--controller", "pdi", "--set-point", "1deg:1s"], "did you mean 'pid'"),
         (["--controller", "pid"], "needs --set-point"),
+        (["flexinol_isobaric", "coupon", "none", "--gif"], "moves nothing"),
         (["flexinol_table_3_2", "coupon", "voltage", "--step", "7V:1s"], "takes the drive `none`"),
         (["--input", "voltage=nowhere.csv:U"], "no such file"),
     ],

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import csv
 import dataclasses
 import json
 import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -23,12 +25,14 @@ from smajax.fit.robust import huber_weights
 from smajax.fit.sensitivity import Sensitivity
 from smajax.identified import Identified
 from smajax.identify import identify
+from smajax.measured.read import read_table
 from smajax.parameters import set_parameters
 from smajax.presets import build
 from smajax.report.identify_page import page, write_identified
 from smajax.report.identify_record import record
 from smajax.report.identify_words import conclusions
 from smajax.simulate import simulate
+from tests.in_browser import HOSTILE, faults
 
 TRUTH = {"austenite_start": 70.0, "austenite_finish": 82.0, "martensite_start": 55.0, "recoverable_strain": 0.044}
 NOISE = 2e-4
@@ -63,7 +67,7 @@ noise = "0.02 %"
 """
 
 
-def _written(folder: Path, noise: float, outliers: int = 0) -> Path:
+def coupon_file(folder: Path, noise: float, outliers: int = 0) -> Path:
     """An experiment of three runs at two stresses, one of them held out."""
     wire = set_parameters(build("flexinol_table_3_2", "coupon", "none"), TRUTH)
     rng = np.random.default_rng(5)
@@ -88,7 +92,7 @@ def _written(folder: Path, noise: float, outliers: int = 0) -> Path:
 
 @pytest.fixture(scope="module")
 def experiment(tmp_path_factory: pytest.TempPathFactory) -> Experiment:
-    return load_experiment(_written(tmp_path_factory.mktemp("coupon"), NOISE), CATALOGUE)
+    return load_experiment(coupon_file(tmp_path_factory.mktemp("coupon"), NOISE), CATALOGUE)
 
 
 @pytest.fixture(scope="module")
@@ -121,14 +125,14 @@ def test_a_profile_is_the_parabola_of_its_standard_error_where_the_problem_is_ne
 
 
 def test_without_noise_every_parameter_comes_back(tmp_path: Path) -> None:
-    exact = load_experiment(_written(tmp_path, 0.0), CATALOGUE)
+    exact = load_experiment(coupon_file(tmp_path, 0.0), CATALOGUE)
     exact = dataclasses.replace(exact, outputs=(dataclasses.replace(exact.outputs[0], noise_sigma=1e-7),))
     for one in identify(exact, starts=16).estimates:
         assert one.value == pytest.approx(TRUTH[one.name], rel=1e-4)
 
 
 def test_samples_far_off_do_not_move_a_robust_fit(tmp_path: Path) -> None:
-    spoilt = load_experiment(_written(tmp_path, NOISE, outliers=12), CATALOGUE)
+    spoilt = load_experiment(coupon_file(tmp_path, NOISE, outliers=12), CATALOGUE)
     plain, robust = (identify(spoilt, starts=0, robust=choice) for choice in (False, True))
 
     def off(result: Identified) -> float:
@@ -185,10 +189,23 @@ def test_the_page_and_the_record_say_the_same(found: Identified, tmp_path: Path)
     assert told == json.loads(json.dumps(record(found)))
     assert set(told["parameters"]) == set(TRUTH)
     assert told["runs"]["c"]["role"] == "held-out"
+    with (tmp_path / "parameters.csv").open(encoding="utf-8") as file:
+        values = {row["parameter"]: float(row["estimate"]) for row in csv.DictReader(file)}
+    assert values == {name: pytest.approx(one["value"], rel=1e-9) for name, one in told["parameters"].items()}
+    table = read_table(tmp_path / "runs.csv")
+    left = (table.column("strain measured [1]") - table.column("strain simulated [1]")).reshape(3, -1)
+    errors = [told["runs"][name]["rmse"] for name in ("a", "b", "c")]
+    np.testing.assert_allclose(np.sqrt(np.mean(left**2, axis=1)), errors, rtol=1e-6)
+    np.testing.assert_allclose(table.column("stress [Pa]").reshape(3, -1)[:, 0], [90e6, 150e6, 120e6])
+
+
+def test_the_page_in_a_browser(found: Identified, browser: Any, tmp_path: Path) -> None:
+    runs = (dataclasses.replace(found.runs[0], name=HOSTILE), *found.runs[1:])
+    assert faults(browser, write_identified(dataclasses.replace(found, title=HOSTILE, runs=runs), tmp_path)) == []
 
 
 def test_an_effect_is_part_of_the_model_when_a_parameter_of_it_is_named(tmp_path: Path) -> None:
-    path = _written(tmp_path, NOISE)
+    path = coupon_file(tmp_path, NOISE)
     text = path.read_text().replace(
         "[sampling]",
         '"thermal_expansion.austenite" = { low = "-5e-5 1/K", high = "5e-5 1/K", start = "0 1/K" }\n[sampling]',
@@ -202,7 +219,7 @@ def test_an_effect_is_part_of_the_model_when_a_parameter_of_it_is_named(tmp_path
 
 
 def test_a_box_without_the_truth_is_said(tmp_path: Path) -> None:
-    path = _written(tmp_path, NOISE)
+    path = coupon_file(tmp_path, NOISE)
     path.write_text(path.read_text().replace('high = "8 %"', 'high = "4 %"'))
     strain = next(
         one
@@ -215,7 +232,7 @@ def test_a_box_without_the_truth_is_said(tmp_path: Path) -> None:
 
 
 def test_the_command_says_what_is_wrong(tmp_path: Path) -> None:
-    path = _written(tmp_path, NOISE)
+    path = coupon_file(tmp_path, NOISE)
 
     def run(*more: str) -> subprocess.CompletedProcess[str]:
         command = [sys.executable, "-m", "smajax", "identify", str(path), "--out", str(tmp_path / "out"), *more]

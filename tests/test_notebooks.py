@@ -35,9 +35,11 @@ def test_every_notebook_is_run_here() -> None:
     assert [name for name in sorted(NOTEBOOKS.glob("*.py")) if f"run({int(name.name[:2])})" not in told] == []
 
 
-@pytest.mark.slow  # the whole loop; test_close_loop.py has the same claim
 def test_the_loop_names_what_is_missing(run: Any) -> None:
-    assert run(1)["findings"].verdict == "explained"
+    told = run(1)
+    assert told["findings"].verdict == "explained"
+    assert {one.name: one.added for one in told["findings"].effects} == {"latent_heat": True, "sensor_lag": False}
+    assert (told["out"] / "report.html").is_file()
 
 
 def test_a_first_simulation(run: Any) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -274,6 +275,36 @@ def test_netcdf_files(tmp_path: Path) -> None:
     np.testing.assert_array_equal(table.column("x"), [1.0, 2.0])
     with pytest.raises(MeasuredDataError, match="no NetCDF file"):
         read_table(written(tmp_path / "no.nc", "x"))
+
+
+def test_netcdf_4_files_are_read_as_those_of_version_3(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("h5netcdf")
+    when = np.array(["2024-05-01T10:00:00", "2024-05-01T10:00:02"], "datetime64[ns]")
+    held = xr.Dataset(
+        {
+            "x": ("time", [1.0, np.nan], {"units": "mm"}),
+            "count": ("time", np.array([3, 4], np.int16)),
+            "label": ("time", ["idle", "hot"]),
+            "wide": (("time", "k"), np.zeros((2, 3))),
+        },
+        {"time": when},
+    )
+    held.to_netcdf(tmp_path / "run.nc", engine="h5netcdf", unlimited_dims=["time"])
+    assert (tmp_path / "run.nc").read_bytes().startswith(b"\x89HDF")
+    table = read_table(tmp_path / "run.nc")
+    assert set(table.columns) == {"time", "x", "count"}
+    np.testing.assert_array_equal(table.column("time"), [0.0, 2.0])
+    np.testing.assert_array_equal(table.column("x", gaps=True), [1.0, np.nan])
+    np.testing.assert_array_equal(table.column("count"), [3.0, 4.0])
+    assert table.units == {"time": "s", "x": "mm"}
+    with pytest.raises(MeasuredDataError, match="expected numbers"):
+        table.column("label")
+    (tmp_path / "cut.nc").write_bytes((tmp_path / "run.nc").read_bytes()[:600])
+    with pytest.raises(MeasuredDataError, match=r"cut\.nc: is no NetCDF file, or a damaged one"):
+        read_table(tmp_path / "cut.nc")
+    monkeypatch.setitem(sys.modules, "h5netcdf", None)  # as where the extra is not installed
+    with pytest.raises(MeasuredDataError, match=r"run\.nc: .* needs h5netcdf: pip install 'smajax\[formats\]'"):
+        read_table(tmp_path / "run.nc")
 
 
 def test_a_library_that_is_missing_is_named(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ import csv
 import dataclasses
 import json
 from pathlib import Path
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -22,6 +23,7 @@ from smajax.parameters import get_parameters, set_parameters
 from smajax.reference import clock, constant
 from smajax.sweep import Grid, Interface, closed_loops, lanes, ratios
 from smajax.sweep_run import SweepSettings, goes_on, run_sweep
+from tests.in_browser import HOSTILE, faults
 
 SETTINGS = SweepSettings(("vsc3",), "payload", "supply", 2, (0.0, 30.0), (1.0,), seconds=3.0)
 
@@ -29,7 +31,7 @@ SETTINGS = SweepSettings(("vsc3",), "payload", "supply", 2, (0.0, 30.0), (1.0,),
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("sweep")
-    run_sweep(arm(), SETTINGS, out, lambda what, share: None)
+    run_sweep(arm(), SETTINGS, out, lambda what, share: None, f"smajax sweep --out {HOSTILE}")
     return out
 
 
@@ -61,6 +63,10 @@ def test_the_folder_is_whole(folder: Path) -> None:
     assert record["sweep"]["loops"] == 8
     assert record["sweep"]["failed"] == {"vsc3": 0}
     assert not list(folder.rglob("*.part*"))
+
+
+def test_the_page_in_a_browser(folder: Path, browser: Any) -> None:
+    assert faults(browser, folder / "index.html") == []
 
 
 def test_what_is_finished_is_kept(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

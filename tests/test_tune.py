@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import csv
 import dataclasses
 import json
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -27,11 +29,13 @@ from smajax.tune.members import between, never_seen, tuned_on
 from smajax.tune.objective import Goal, rank, value_and_slope
 from smajax.tune.settings import TuneSettings
 from smajax.tune.terms import TERMS
+from tests.in_browser import HOSTILE, faults
 
 SECONDS, ROWS = 3.0, 10  # as the sweep of test_sweep.py: programs are compiled once
 MEMBERS = tuned_on([0.0, 30.0], {"damping": 0.2}, 0)
 # The preset's loops swing on for a while, and a swing multiplies differences.
 CALM = {"high_voltage": 9.0, "low_voltage": 3.0, "surface_slope": 3.0, "boundary": 1.0}
+COMMAND = f"smajax tune --out {HOSTILE}"  # what somebody typed
 SETTINGS = TuneSettings(
     "vsc3",
     (0.0, 30.0),
@@ -57,7 +61,7 @@ def surface() -> Rig:
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("tune") / "vsc3"
-    tune_into(arm(), SETTINGS, out)
+    tune_into(arm(), SETTINGS, out, COMMAND)
     return out
 
 
@@ -171,12 +175,24 @@ def test_the_folder_is_whole(folder: Path) -> None:
         "gains.json",
         "tune.html",
         "tune.json",
+        "loops.csv",
         "before_after.png",
         "descent.png",
     }
     page = (folder / "tune.html").read_text(encoding="utf-8")
     assert "overshoot" in page
     assert page.count("data:image/png") == 2
+    record = json.loads((folder / "tune.json").read_text(encoding="utf-8"))["checks"]
+    with (folder / "loops.csv").open(encoding="utf-8") as file:
+        loops = list(csv.DictReader(file))
+    assert len(loops) == 2 * sum(one["loops"] for one in record.values())
+    for check, when in (("tuned on", "before"), ("beyond", "after")):
+        errors = [float(one["steady_error [deg]"]) for one in loops if (one["check"], one["gains"]) == (check, when)]
+        assert max(errors) == pytest.approx(record[check][when]["steady_error"]["worst"])
+
+
+def test_the_page_in_a_browser(folder: Path, browser: Any) -> None:
+    assert faults(browser, folder / "tune.html") == []
 
 
 def test_a_tuning_goes_on_to_the_same_end(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -192,7 +208,7 @@ def test_a_tuning_goes_on_to_the_same_end(folder: Path, tmp_path: Path, monkeypa
         tune_into(arm(), SETTINGS, out)
     assert not (out / "gains.json").exists()
     monkeypatch.setattr(Descent, "save", wrote)
-    tune_into(arm(), SETTINGS, out)
+    tune_into(arm(), SETTINGS, out, COMMAND)
     one, other = (json.loads((place / "gains.json").read_text(encoding="utf-8")) for place in (folder, out))
     assert one == other
     ends = load(folder / "state.npz"), load(out / "state.npz")

@@ -22,7 +22,7 @@ Overwrite = Annotated[
     bool, typer.Option("--overwrite", help="delete another result that smajax wrote into --out, and begin anew")
 ]
 Json = Annotated[bool, typer.Option("--json", help="print the record on stdout as JSON instead of words")]
-Open = Annotated[bool, typer.Option("--open", help="open the page in a browser")]
+Open = Annotated[bool, typer.Option("--open/--no-open", help="open the page in a browser")]
 OpenUnless = Annotated[bool, typer.Option("--open/--no-open", help="open the page in a browser (from a terminal)")]
 
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from smajax.report.findings import Findings
 
 DEMOS = ("latent", "complete")
-OWN = ("report.html", "report.json", "fits")
+OWN = ("report.html", "report.json", "parameters.csv", "runs.csv", "fits")
 
 
 def _loop(experiment: Path, out: Path, command: str, overwrite: bool) -> tuple[Findings, Path]:
@@ -49,7 +49,8 @@ def _say(findings: Findings, page: Path) -> None:
 def close_loop_command(
     experiment: Annotated[Path, typer.Argument(help="experiment.toml, or the folder that holds it")],
     out: Annotated[
-        Path, typer.Option(help="folder for report.html and report.json; finished fits are kept there too")
+        Path,
+        typer.Option(help="folder for report.html, report.json, its tables as CSV; finished fits are kept there too"),
     ] = Path("report"),
     overwrite: Overwrite = False,
     json_out: Json = False,

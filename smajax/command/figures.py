@@ -10,7 +10,7 @@ import typer
 
 from smajax.command.base import UNMET, Json, OpenUnless, Overwrite, browse_from_terminal, console, resumable
 
-OWN = (".made-by", "index.html", "README.md", "[MC][0-9].*", "[MC][0-9][0-9].*")
+OWN = (".made-by", "index.html", "README.md", "figures.csv", "[MC][0-9].*", "[MC][0-9][0-9].*")
 
 
 def figures(

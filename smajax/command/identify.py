@@ -11,7 +11,7 @@ import typer
 
 from smajax.command.base import Json, Open, Overwrite, browse, console, resumable
 
-OWN = ("identify.html", "identify.json", "fits")
+OWN = ("identify.html", "identify.json", "parameters.csv", "runs.csv", "fits")
 
 
 def identify_command(

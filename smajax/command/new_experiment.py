@@ -12,7 +12,10 @@ from smajax.command.base import UNMET, Json
 
 
 def new_experiment(
-    files: Annotated[list[Path], typer.Argument(help="one log a run: CSV, text, .mat, Parquet, NetCDF")],
+    files: Annotated[
+        list[Path],
+        typer.Argument(help="a log a run, or one a sensor, paired by their names: CSV, text, .mat, Parquet, NetCDF"),
+    ],
     out: Annotated[Path, typer.Option(help="the file to write")] = Path("experiment.toml"),
     title: Annotated[str, typer.Option(help="one line; default: the file's name")] = "",
     overwrite: Annotated[bool, typer.Option("--overwrite", help="write over a file that is there")] = False,

@@ -80,7 +80,12 @@ def simulate(
     period: Annotated[float, typer.Option(help="sample time of the controller, s, a multiple of --dt")] = 0.01,
     delay: Annotated[int, typer.Option(min=0, help="control periods until a command arrives")] = 0,
     seed: Annotated[int, typer.Option(help="of the noise")] = 0,
-    out: Annotated[Path, typer.Option(help="folder for simulate.csv, .nc, .json, .png and .html")] = Path("simulated"),
+    gif: Annotated[
+        bool, typer.Option("--gif", help="draw the load moving beside its wire's phase diagram: simulate.gif")
+    ] = False,
+    out: Annotated[Path, typer.Option(help="folder for simulate.csv, .nc, .json, .png, .svg and .html")] = Path(
+        "simulated"
+    ),
     overwrite: Overwrite = False,
     json_out: Json = False,
     open_page: Open = False,
@@ -113,6 +118,8 @@ def simulate(
         raise typer.BadParameter(
             "in a closed loop the controller gives the voltage: leave --step, --input and --tolerance out."
         )
+    if gif and load == "coupon":
+        raise typer.BadParameter("a coupon moves nothing that could be drawn.", param_hint="--gif")
     if not closed and mismatch:
         raise typer.BadParameter("--mismatch is for closed loops; use --set.")
     try:
@@ -159,7 +166,7 @@ def simulate(
         "gains": None if gains is None else gains.read_text(),
     }
     with claimed(out, "simulate", told, OWN, overwrite):
-        page = write_run(ran, out, title, command)
+        page = write_run(ran, out, title, command, gif)
     for note in ran.notes:
         console().print(note, soft_wrap=True, markup=False, highlight=False)
     if json_out:

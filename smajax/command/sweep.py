@@ -7,7 +7,16 @@ from typing import Annotated
 
 import typer
 
-from smajax.command.base import Json, OpenUnless, Overwrite, browse_from_terminal, console, numbers, resumable
+from smajax.command.base import (
+    Json,
+    OpenUnless,
+    Overwrite,
+    browse_from_terminal,
+    command_line,
+    console,
+    numbers,
+    resumable,
+)
 
 SET_POINTS, GAINS = "-40,-20,0,10,20,40,50,60,80", "0.5,0.7,1,1.4,2"
 
@@ -94,7 +103,7 @@ def sweep(
             claimed(out, "sweep", record, own, overwrite, goes_on),
             shown(console()) as progress,
         ):
-            rows = run_sweep(arm(), settings, out, progress)
+            rows = run_sweep(arm(), settings, out, progress, command_line())
     except FolderTaken:
         raise
     except ValueError as error:

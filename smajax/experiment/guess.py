@@ -8,7 +8,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from smajax.measured.headers import is_time, unit_in, words
+from smajax.measured.headers import is_time, unit_of, words
 from smajax.measured.table import Array, Table
 from smajax.units import UnitError, convert
 
@@ -104,9 +104,15 @@ def _by_unit(unit: str) -> str:
     return next((name for name in order if _of_kind(unit, QUANTITIES[name][1])), "")
 
 
+def _unit(table: Table, name: str) -> str:
+    """The column's unit as the unit library has it; empty where neither file nor heading says."""
+    said = unit_of(table, name)
+    return MEANT.get(said, said)
+
+
 def _column(table: Table, key: str | int, name: str) -> Column:
     values = table.columns[name]
-    unit = MEANT.get(unit_in(name), unit_in(name))
+    unit = _unit(table, name)
     said = set(words(name))
     if isinstance(key, int):
         return Column(key, name, "", "", GUESS, "no heading")
@@ -126,7 +132,7 @@ def _column(table: Table, key: str | int, name: str) -> Column:
 def _is_clock(table: Table, name: str, headed: bool) -> bool:
     values = table.columns[name]
     grows = values.size > 1 and bool(np.all(np.diff(values) >= 0.0)) and float(values[-1]) > float(values[0])
-    unit = MEANT.get(unit_in(name), unit_in(name))
+    unit = _unit(table, name)
     if headed:
         return is_time(name) and grows and (not unit or _of_kind(unit, "s"))
     return grows and bool(np.all(np.diff(values) > 0.0))
@@ -159,7 +165,7 @@ def columns_of(table: Table) -> list[Column]:
     clock = None if table.clocks else next((name for name in order if _is_clock(table, name, headed)), None)
     found: list[Column] = []
     if clock is not None:
-        unit = MEANT.get(unit_in(clock), unit_in(clock))
+        unit = _unit(table, clock)
         key: str | int = clock if headed else order.index(clock) + 1
         sure, why = (
             (SURE, "heading and unit")

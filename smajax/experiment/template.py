@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
+from smajax.experiment.grouping import RunFiles, paired
 from smajax.experiment.guess import DRIVES, GUESS, LIKELY, SURE, TIME, Column, columns_of
 from smajax.measured.read import read_table
 from smajax.measured.table import MeasuredDataError, Table
 from smajax.parameters import parameter_values, parameters
 from smajax.presets import build
 from smajax.units import convert
+from smajax.words import and_listed
 
 MOST_SAMPLES = 2000  # of the longest run on the clock
 HELD_OUT_FROM = 3  # runs from which on the last one is held out
@@ -58,16 +60,16 @@ def _model(found: dict[str, Column]) -> _Model:
     return _Model("flexinol_table_3_2", "dead_weight", drive or "voltage", inputs, "position", why)
 
 
-def _key(column: Column, table: Table) -> str:
-    word = "variable" if table.clocks else "column"
+def _key(column: Column, variable: bool) -> str:
+    word = "variable" if variable else "column"
     return f"{word} = {json.dumps(column.key, ensure_ascii=False)}"
 
 
-def _channel(name: str, role: str, column: Column, table: Table, off: bool) -> list[str]:
+def _channel(name: str, role: str, column: Column, variable: bool, off: bool) -> list[str]:
     lines = [
         f"[channels.{name}]  # {column.sure}: {column.why}",
         f'role = "{role}"',
-        _key(column, table),
+        _key(column, variable),
         f"unit = {json.dumps(column.unit, ensure_ascii=False)}",
     ]
     if role == "output":
@@ -110,30 +112,78 @@ def _unknowns(model: _Model) -> list[str]:
     return lines
 
 
+@dataclass(frozen=True)
+class _Logs:
+    """What the files hold: columns of every kind of file, each with the kind that has it, and the runs."""
+
+    columns: tuple[tuple[Column, int], ...]  # each quantity once
+    kinds: tuple[Table, ...]  # a file of each kind
+    runs: tuple[RunFiles, ...]
+
+
+def _logs(files: Sequence[Path], tables: Sequence[Table]) -> _Logs:
+    """One run a file where a file has an input and an output, else one file a sensor. Raises MeasuredDataError."""
+    seen = [columns_of(table) for table in tables]
+    quantities = [frozenset(one.quantity for one in columns) - {"", TIME} for columns in seen]
+    kinds = list(dict.fromkeys(quantities))
+    if len(kinds) == 1 or any(_is_whole(held) for held in quantities):
+        for table in tables[1:]:
+            for one in seen[0]:
+                if one.quantity:
+                    table.name_of(one.key)
+        runs = tuple(RunFiles(file.stem, (file,)) for file in files)
+        return _Logs(tuple((one, 0) for one in seen[0]), (tables[0],), runs)
+    members = [[k for k, held in enumerate(quantities) if held == kind] for kind in kinds]
+    runs = paired([[files[k] for k in several] for several in members])
+    columns: list[tuple[Column, int]] = []
+    for kind, several in enumerate(members):
+        for one in seen[several[0]]:
+            rival = next((other for other, _ in columns if one.quantity and other.quantity == one.quantity), None)
+            if rival is not None and one.quantity != TIME:
+                one = replace(one, quantity="", sure=GUESS, why=f"{rival.name!r} is taken for the {one.quantity}")
+            elif rival is not None and (rival.key, rival.unit) != (one.key, one.unit):
+                raise MeasuredDataError(
+                    f"{files[several[0]]}: its time is {one.name!r} in {one.unit}, that of {files[members[0][0]].name} is "
+                    f"{rival.name!r} in {rival.unit}; an experiment has one name for both: rename one"
+                )
+            if rival is None or one.quantity != TIME:
+                columns.append((one, kind))
+    return _Logs(tuple(columns), tuple(tables[several[0]] for several in members), runs)
+
+
+def _is_whole(quantities: Collection[str]) -> bool:
+    """Whether these are an input and an output of some model."""
+    moves = {"position", "angle"} & set(quantities) and set(DRIVES) & set(quantities)
+    return bool(moves) or {*COUPON, "strain"} <= set(quantities)
+
+
 def _folder(files: Sequence[Path], target: Path) -> Path:
     common = Path(os.path.commonpath([file.resolve().parent for file in files]))
     return Path(os.path.relpath(common, target.resolve().parent))
 
 
 def begun(files: Sequence[Path], target: Path, title: str = "") -> Guessed:
-    """The experiment file `target` for these logs, one run each. Raises MeasuredDataError for a file that cannot be read.
+    """The experiment file `target` for these logs. Raises MeasuredDataError for a file that cannot be read.
 
-    The columns are those of the first file; another file without one of them is refused by name.
+    A file is a run, with the columns of the first one; another file without one of them is refused by name. Where no file
+    has an input and an output, a run is one file of each kind, by their names.
     """
     tables = [read_table(file) for file in files]
-    first = tables[0]
-    columns = columns_of(first)
+    logs = _logs(files, tables)
+    columns = [one for one, _ in logs.columns]
     found = {one.quantity: one for one in columns if one.quantity}
     model = _model(found)
-    for table in tables[1:]:
-        for one in columns:
-            if one.quantity:
-                table.name_of(one.key)
+    kind_of = {one.quantity: kind for one, kind in logs.columns if one.quantity}
+    variable = {quantity: bool(logs.kinds[kind].clocks) for quantity, kind in kind_of.items()}
     told = [f"{one.name}: {one.quantity} in {one.unit} ({one.sure}: {one.why})" for one in columns if one.quantity]
     told += [f"{one.name}: left out ({one.why})" for one in columns if not one.quantity]
     told.append(
         f"model: {model.wire}, {model.load}, {model.drive} ({GUESS}: {model.why}; `smajax presets` has the others)"
     )
+    if len(logs.kinds) > 1:
+        told.append(
+            f"runs: {'; '.join(f'{run.name} of {and_listed([file.name for file in run.files])}' for run in logs.runs)} ({GUESS}: by their names)"
+        )
     missing = [name for name in (*model.inputs, model.output) if name not in found]
     folder = _folder(files, target)
     lines = [
@@ -154,8 +204,10 @@ def begun(files: Sequence[Path], target: Path, title: str = "") -> Guessed:
     lines += ['# load_mass = "75 g"'] if model.load == "dead_weight" and "mass" not in found else []
     lines += ["", "[unknown]  # to be fitted: bounds around the preset's values, and where the search starts"]
     lines += [*_unknowns(model), "", "[nuisance]", "offset = true  # the sensor's zero may move from run to run", ""]
-    clocks = [_clock(table, columns) for table in tables]
-    if clocks[0] is None:
+    clocks = [clock for table in tables if (clock := _clock(table, columns)) is not None]
+    if clocks and len(clocks) < len(tables):
+        raise MeasuredDataError("some of the files have a time and others have none; give all of them one")
+    if not clocks:
         lines += ["[time]  # no column is a time: samples are counted", 'kind = "sample"', ""]
         told.append(f"time: none found, samples are counted ({GUESS})")
     else:
@@ -167,10 +219,10 @@ def begun(files: Sequence[Path], target: Path, title: str = "") -> Guessed:
                 f'unit = "{time.unit}"',
                 "",
             ]
-        known = [clock for clock in clocks if clock is not None]
-        usual = max(float(np.median(np.diff(clock))) for clock in known)
-        step = _round(max(usual, max(float(np.ptp(clock)) for clock in known) / MOST_SAMPLES))
-        irregular = any(np.ptp(np.diff(clock)) > 0.5 * usual for clock in known)
+        periods = [float(np.median(np.diff(clock))) for clock in clocks]
+        usual = max(periods)
+        step = _round(max(usual, max(float(np.ptp(clock)) for clock in clocks) / MOST_SAMPLES))
+        irregular = any(np.ptp(np.diff(clock)) > 0.5 * period for clock, period in zip(clocks, periods, strict=True))
         lines += ["[sampling]  # the clock that all signals are brought to", f'step = "{1e3 * step:g} ms"', ""]
         told.append(
             f"sampling: every {usual:.4g} s{', irregular' if irregular else ''}; the fit takes {step:g} s ({LIKELY})"
@@ -178,9 +230,9 @@ def begun(files: Sequence[Path], target: Path, title: str = "") -> Guessed:
     used = {TIME, *model.inputs, model.output}
     for name in model.inputs:
         if name in found:
-            lines += [*_channel(name, "input", found[name], first, False), ""]
+            lines += [*_channel(name, "input", found[name], variable[name], False), ""]
     if model.output in found:
-        lines += [*_channel(model.output, "output", found[model.output], first, False), ""]
+        lines += [*_channel(model.output, "output", found[model.output], variable[model.output], False), ""]
     for name in missing:
         role = "output" if name == model.output else "input"
         lines += [
@@ -195,20 +247,23 @@ def begun(files: Sequence[Path], target: Path, title: str = "") -> Guessed:
         role = "output" if one.quantity in sensors else "input"
         lines += [
             f"# Not used by this model, or only by `smajax identify`: {one.name}",
-            *_channel(one.quantity, role, one, first, True),
+            *_channel(one.quantity, role, one, variable[one.quantity], True),
             "",
         ]
     lines += ["[data]", f"folder = {json.dumps(str(folder), ensure_ascii=False)}", ""]
     base = (target.resolve().parent / folder).resolve()
-    for number, file in enumerate(files):
-        role = "held-out" if len(files) >= HELD_OUT_FROM and number == len(files) - 1 else "fit"
+    used_here = [name for name in (*model.inputs, model.output) if name in found]
+    for number, run in enumerate(logs.runs):
+        role = "held-out" if len(logs.runs) >= HELD_OUT_FROM and number == len(logs.runs) - 1 else "fit"
+        inside = [json.dumps(str(file.resolve().relative_to(base)), ensure_ascii=False) for file in run.files]
+        by_channel = ", ".join(f"{name} = {inside[kind_of[name]]}" for name in used_here)
         lines += [
             "[[runs]]",
-            f"name = {json.dumps(file.stem, ensure_ascii=False)}",
+            f"name = {json.dumps(run.name, ensure_ascii=False)}",
             f'role = "{role}"' + ("  # never fitted: the error on it is the one to believe" if role != "fit" else ""),
-            f"file = {json.dumps(str(file.resolve().relative_to(base)), ensure_ascii=False)}",
+            f"file = {inside[0]}" if len(inside) == 1 else f"files = {{ {by_channel} }}",
             "",
         ]
-    if len({file.stem for file in files}) < len(files):
-        raise MeasuredDataError(f"two logs have the same name, {', '.join(file.stem for file in files)}: rename one")
+    if len({run.name for run in logs.runs}) < len(logs.runs):
+        raise MeasuredDataError(f"two logs have the same name, {', '.join(run.name for run in logs.runs)}: rename one")
     return Guessed("\n".join(lines), tuple(told))

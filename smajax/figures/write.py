@@ -13,9 +13,10 @@ from matplotlib.figure import Figure
 from smajax.figures.catalogue import every_row
 from smajax.figures.row import Row
 from smajax.fit.progress import Progress
-from smajax.report.files import replace
+from smajax.made_with import made_with
+from smajax.report.files import csv_text, replace
 from smajax.report.html import picture
-from smajax.report.plain_page import whole
+from smajax.report.plain_page import table, whole
 from smajax.source_mark import source_mark
 
 SIZE = (9.0, 5.6)  # inches
@@ -97,9 +98,10 @@ def lying_in(folder: Path) -> list[Drawn]:
 
 
 def write_pages(folder: Path) -> Path:
-    """The table and the pictures of every figure in `folder`, as README.md and index.html; the path of the latter."""
+    """The table and the pictures of every figure in `folder`, as README.md, figures.csv and index.html; the last's path."""
     drawn = lying_in(folder)
     replace(folder / "README.md", as_markdown(drawn))
+    replace(folder / "figures.csv", as_csv(drawn, folder))
     return replace(folder / "index.html", as_page(drawn, folder))
 
 
@@ -141,16 +143,36 @@ def as_page(drawn: Sequence[Drawn], folder: Path) -> str:
     parts = [
         f'<h2 id="{one.row.name}">{one.row.name}: {say(one.row.system)}</h2><p>{say(one.found)}.</p>'
         + (f"<p>Note: {say(one.caveat)}</p>" if one.caveat else "")
-        + picture((folder / f"{one.row.name}.png").read_bytes(), f"{one.row.name}: {one.found}")
+        + str(picture((folder / f"{one.row.name}.png").read_bytes(), f"{one.row.name}: {one.found}", "panels"))
         for one in drawn
     ]
     head = (
         "<style>.fails{color:#c8553d;font-weight:600}</style>"
-        "<h1>Figures of the source, reproduced</h1><p>Source: M. H. Elahinia (2004).</p><table class=sortable><thead><tr>"
+        f"<h1>Figures of the source, reproduced</h1><p>Source: M. H. Elahinia (2004). {say(holding(drawn))}</p>"
+        "<div class=scroll><table class=sortable><thead><tr>"
         "<th>figure</th><th>system</th><th>what the source says</th><th>what was measured</th><th>holds</th></tr></thead>"
-        f"<tbody>{rows}</tbody></table>"
+        f"<tbody>{rows}</tbody></table></div>"
     )
-    return whole("Figures of the source", [head, *parts])
+    foot = [
+        "<h2>Provenance</h2>",
+        table(["", ""], list(map(list, made_with().items()))),
+        "<p class=quiet>The same numbers: figures.csv, and a JSON file for each figure.</p>",
+    ]
+    return whole("Figures of the source", [head, *parts, *foot])
+
+
+def as_csv(drawn: Sequence[Drawn], folder: Path) -> str:
+    """A row a number that proves a claim, as the record of the figure has it."""
+    rows = []
+    for one in drawn:
+        numbers = json.loads((folder / f"{one.row.name}.json").read_text(encoding="utf-8"))["numbers"]
+        rows += [[one.row.name, one.verdict, name, value] for name, value in numbers.items()]
+    return csv_text(["figure", "claim", "number", "value"], rows)
+
+
+def holding(drawn: Sequence[Drawn]) -> str:
+    """How many claims hold."""
+    return f"{sum(one.holds for one in drawn)} of {len(drawn)} hold."
 
 
 def as_text(drawn: Sequence[Drawn]) -> str:
@@ -159,5 +181,5 @@ def as_text(drawn: Sequence[Drawn]) -> str:
     for one in drawn:
         lines += [f"{one.row.name:>4}  {one.row.claim}", f"      {one.verdict}: {one.found}"]
         lines += [f"      note: {one.caveat}"] if one.caveat else []
-    lines.append(f"{sum(one.holds for one in drawn)} of {len(drawn)} hold.")
+    lines.append(holding(drawn))
     return "\n".join(lines)

@@ -11,15 +11,21 @@ from smajax.measured.extras import needed
 from smajax.measured.table import Array, MeasuredDataError, Table
 
 
-def _table(path: Path, given: Mapping[str, np.ndarray]) -> Table:
-    """Numbers as they are, moments as seconds since the first; anything else is said when it is asked for."""
+def _table(path: Path, given: Mapping[str, np.ndarray], stated: Mapping[str, str] | None = None) -> Table:
+    """Numbers as they are, moments as seconds since the first; anything else is said when it is asked for.
+
+    stated: units by name, for the columns that the file gives one.
+    """
     columns: dict[str, Array] = {}
+    units = dict(stated or {})
     unusable: dict[str, str] = {}
     for name, values in given.items():
         if values.dtype.kind == "M":
             columns[name] = (values - values[0]) / np.timedelta64(1, "s") if values.size else np.zeros(0)
+            units[name] = "s"
         elif values.dtype.kind == "m":
             columns[name] = values / np.timedelta64(1, "s")
+            units[name] = "s"
         elif values.dtype.kind in "fiub":
             columns[name] = values.astype(np.float64)
         else:
@@ -28,7 +34,7 @@ def _table(path: Path, given: Mapping[str, np.ndarray]) -> Table:
         raise MeasuredDataError(
             f"{path}: no column of numbers in it{'; ' if unusable else ''}{'; '.join(unusable.values())}"
         )
-    return Table(path=path, columns=columns, unusable=unusable, order=tuple(given))
+    return Table(path=path, columns=columns, unusable=unusable, order=tuple(given), units=units)
 
 
 def read_parquet(path: Path) -> Table:
@@ -42,7 +48,7 @@ def read_parquet(path: Path) -> Table:
 
 
 def read_netcdf(path: Path) -> Table:
-    """Reads every variable with one dimension, coordinates too. Raises MeasuredDataError.
+    """Reads every variable with one dimension, coordinates too, with its attribute `units`. Raises MeasuredDataError.
 
     NetCDF 3 is read by scipy; version 4 needs the extra `formats`.
     """
@@ -55,6 +61,7 @@ def read_netcdf(path: Path) -> Table:
     try:
         with xr.open_dataset(path, engine="h5netcdf" if fourth else "scipy", decode_times=True) as held:
             flat = {str(name): held[name].to_numpy() for name in held.variables if held[name].ndim == 1}
+            units = {name: str(held[name].attrs["units"]) for name in flat if held[name].attrs.get("units")}
     except Exception as error:  # what a damaged file raises is the engine's
         raise MeasuredDataError(f"{path}: is no NetCDF file, or a damaged one ({error})") from error
-    return _table(path, flat)
+    return _table(path, flat, units)

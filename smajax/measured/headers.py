@@ -31,6 +31,11 @@ def unit_in(name: str) -> str:
     return tail if tail in TAILS else ""
 
 
+def unit_of(table: Table, name: str) -> str:
+    """The unit of a column: what the file states, else what the heading has; empty where neither says."""
+    return table.units.get(name) or unit_in(name)
+
+
 TAILS = {
     "s",
     "ms",

@@ -30,6 +30,7 @@ class Table:
     clocks: name -> (n,) times of that signal, seconds, for the signals that carry their own.
     unusable: name -> why that column holds no signal; it is an error only when the column is asked for.
     gappy: of the unusable, those that hold a signal once empty cells are taken as missing: name -> (n,) with nan there.
+    units: name -> the unit that the file itself states beside its name, for those that have one.
     lines: the line of the file, counted from 1, that each sample is from; empty where samples have no lines.
     """
 
@@ -39,6 +40,7 @@ class Table:
     unusable: Mapping[str, str] = field(default_factory=dict)
     gappy: Mapping[str, Array] = field(default_factory=dict)
     order: tuple[str, ...] = ()
+    units: Mapping[str, str] = field(default_factory=dict)
     lines: tuple[int, ...] = ()
 
     def place(self, index: int) -> str:

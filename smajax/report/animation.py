@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import LinearSegmentedColormap
@@ -28,6 +29,7 @@ HOT, COLD = "#c8553d", "#1f6fb2"
 SIZE, DPI = (8.4, 3.9), 80  # inches
 COLOURS = 64  # of the picture file
 SHADE = LinearSegmentedColormap.from_list("phase", [HOT, COLD])  # by the martensite fraction
+Run = Trajectory | xr.Dataset  # as `simulate` or as `simulate_dataset` returns it
 Draw = Callable[[int], list[Any]]  # sets the sample to show; the artists that it changed
 
 
@@ -44,7 +46,7 @@ def animate_run(
     return animate(system, simulate_compiled(system, inputs, dt), path, seconds=seconds, frames=frames)
 
 
-def animate(system: System, run: Trajectory, path: Path | str, *, seconds: float = 6.0, frames: int = 90) -> Path:
+def animate(system: System, run: Run, path: Path | str, *, seconds: float = 6.0, frames: int = 90) -> Path:
     """Write `run` of `system` as an animated GIF that takes `seconds` of the reader's time, and return its path.
 
     Left the load, its wire coloured by the martensite fraction (blue 1, red 0). Right stress over temperature with
@@ -86,7 +88,7 @@ def _gif(images: list[Image.Image], each: int) -> bytes:
     return stream.getvalue()
 
 
-def _arm(axes: Axes, system: System, run: Trajectory) -> Draw:
+def _arm(axes: Axes, system: System, run: Run) -> Draw:
     """The link on its pulley, seen from the side."""
     load = system.load
     assert isinstance(load, Arm)
@@ -112,7 +114,7 @@ def _arm(axes: Axes, system: System, run: Trajectory) -> Draw:
     return draw
 
 
-def _slider(axes: Axes, system: System, run: Trajectory) -> Draw:
+def _slider(axes: Axes, system: System, run: Run) -> Draw:
     """A weight or a slider that its wire pulls up; the stroke is drawn to its own scale."""
     stroke = 1e3 * np.asarray(run.position)
     room = max(float(np.ptp(stroke)), 1e-3)
@@ -134,7 +136,7 @@ def _slider(axes: Axes, system: System, run: Trajectory) -> Draw:
     return draw
 
 
-def _told(run: Trajectory, at: int, where: str) -> str:
+def _told(run: Run, at: int, where: str) -> str:
     return f"{float(run.time[at]):.1f} s   {where}   ξ = {float(run.martensite_fraction[at]):.2f}"
 
 
@@ -149,7 +151,7 @@ def ranges(law: Kinetics, stress: np.ndarray) -> dict[str, np.ndarray]:
     }
 
 
-def _plane(axes: Axes, system: System, run: Trajectory) -> Draw:
+def _plane(axes: Axes, system: System, run: Run) -> Draw:
     """Stress over temperature with both ranges, and the path so far."""
     temperature, stress = np.asarray(run.temperature), 1e-6 * np.asarray(run.stress)
     top = max(1.15 * float(stress.max()), 1.0)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import json
 import math
 import os
 import tempfile
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -36,3 +39,23 @@ def json_text(value: Any) -> str:
         return None if isinstance(part, float) and not math.isfinite(part) else part
 
     return json.dumps(plain(value), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def csv_text(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    """A text table under one line of headings; numbers with ten digits, an empty cell for None and what is no number."""
+
+    def cell(value: object) -> object:
+        if isinstance(value, float):
+            return f"{value:.10g}" if math.isfinite(value) else ""
+        return "" if value is None else value
+
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(head)
+    writer.writerows([cell(value) for value in row] for row in rows)
+    return text.getvalue()
+
+
+def heading(name: str, unit: str) -> str:
+    """`temperature [degC]`, as `smajax` reads it back; a plain number has the unit 1."""
+    return f"{name} [{'1' if unit in ('-', '') else unit}]"

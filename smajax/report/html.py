@@ -60,12 +60,17 @@ def estimate(value: float, error: float | None, unit: str, quantity: str = "") -
     return Shown(with_error(seen.of(value), None if error is None else seen.of(error)), value)
 
 
-def picture(png: bytes | None, alt: str, kind: str = "wide") -> Markup:
-    """An image element that carries its own bytes; nothing for a picture that there is none of."""
-    if png is None:
+def picture(image: bytes | None, alt: str, kind: str = "wide") -> Markup:
+    """An image, PNG or GIF, that carries its own bytes; nothing for a picture that there is none of.
+
+    kind: `narrow` or `wide`, or `panels` for what is too wide for a telephone and moves sideways there.
+    """
+    if image is None:
         return Markup("")
-    data = base64.b64encode(png).decode("ascii")
-    return Markup('<img class="{}" src="data:image/png;base64,{}" alt="{}">').format(kind, data, alt)
+    form = "gif" if image.startswith(b"GIF8") else "png"
+    data = base64.b64encode(image).decode("ascii")
+    element = '<div class="scroll"><img class="{}" src="data:image/{};base64,{}" alt="{}"></div>'
+    return Markup(element).format(kind, form, data, alt)
 
 
 def _parameter_rows(findings: Findings) -> list[dict[str, Any]]:

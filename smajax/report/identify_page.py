@@ -9,6 +9,7 @@ import numpy as np
 
 from smajax.identified import Identified, IdentifiedOutput
 from smajax.report import identify_pictures as draw
+from smajax.report.csv_files import PARAMETERS, RUNS, identified_parameters, identified_runs
 from smajax.report.display import digits, display, label
 from smajax.report.files import json_text, replace
 from smajax.report.html import picture
@@ -61,7 +62,7 @@ def page(found: Identified) -> str:
         parts += [
             "<h2>Profile likelihood</h2><p class=quiet>Each parameter held, all others fitted again: the rise of the cost "
             "(blue), what the standard error stands for (grey), the 95 % line (red).</p>",
-            picture(draw.profile_curves(found), "profiles"),
+            picture(draw.profile_curves(found), "profiles", "panels"),
         ]
     if found.posterior is not None:
         chains = ["parameter", "mean ± standard deviation", "unit", "95 %", "R-hat", "independent draws"]
@@ -71,7 +72,7 @@ def page(found: Identified) -> str:
             f"{digits(found.posterior.inflation, 2)}, as in the standard errors. Histograms: draws; grey: what the standard "
             "error stands for.</p>",
             table(chains, posterior_rows(found), (1, 4, 5)),
-            picture(draw.posterior_histograms(found), "posterior"),
+            picture(draw.posterior_histograms(found), "posterior", "panels"),
         ]
     if found.suggestions:
         rows = [
@@ -111,12 +112,15 @@ def page(found: Identified) -> str:
         "<h2>Checks and provenance</h2>",
         bullets(found.check),
         table(["", ""], list(map(list, found.provenance.items()))),
+        f"<p class=quiet>The same numbers: identify.json, {PARAMETERS}, {RUNS}.</p>",
     ]
     return whole(f"{found.title or found.experiment}", parts)
 
 
 def write_identified(found: Identified, folder: Path) -> Path:
-    """`identify.html` and `identify.json` in `folder`, each whole or not at all; the path of the page."""
+    """`identify.html`, `identify.json` and its tables in `folder`, each whole or not at all; the path of the page."""
     folder.mkdir(parents=True, exist_ok=True)
     replace(folder / "identify.json", json_text(record(found)))
+    replace(folder / PARAMETERS, identified_parameters(found))
+    replace(folder / RUNS, identified_runs(found))
     return replace(folder / "identify.html", page(found))

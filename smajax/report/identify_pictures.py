@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from smajax.identified import Identified, IdentifiedRun
 from smajax.report.display import axis_label, channel, digits, display, label
@@ -85,6 +86,7 @@ def profile_curves(found: Identified) -> bytes | None:
             )
         axes.axhline(3.84, color="#c8553d", linewidth=0.8)
         axes.set_ylim(0.0, 9.0)
+        axes.xaxis.set_major_locator(MaxNLocator(3))  # a narrow interval has long numbers
         axes.set_xlabel(axis_label(one.name, unit), fontsize=8)
         tidy(axes)
     for axes in panels[len(found.profiles) :]:

@@ -13,16 +13,18 @@ CLICKED = (Path(__file__).parent / "interactive.css").read_text(encoding="utf-8"
 STYLE = (
     "body{font:15px/1.5 system-ui,sans-serif;max-width:1080px;margin:2em auto;padding:0 1em;color:#1d1d1f;background:#fff}"
     "td,th{text-align:left;vertical-align:top;padding:.35em .7em;border-bottom:1px solid #e3e5e9}"
-    "table{border-collapse:collapse;font-size:14px;display:block;overflow-x:auto;margin:0 0 1em}"
+    "table{border-collapse:collapse;font-size:14px}td{overflow-wrap:break-word}.scroll{overflow-x:auto;margin:0 0 1em}"
     "td.n,th.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}"
-    "img{max-width:100%;display:block;margin:0 0 1em}.quiet{color:#626973}h2{margin-top:1.6em}"
-    "p,ul{max-width:62em;overflow-wrap:anywhere}"
+    "img{max-width:100%;display:block}.quiet{color:#626973}h2{margin-top:1.6em}"
+    "p,ul{max-width:62em}p,ul,h1,h2,h3{overflow-wrap:anywhere}"
+    # On a telephone a table is as wide as its words want, and moves sideways, rather than a word a line.
+    "@media(max-width:720px){table{width:max-content}td,th{max-width:15em}}"
     "@media(max-width:520px){body{margin:1em auto;padding:0 .6em}td,th{padding:.3em .4em}}"
 )
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequence[int] = ()) -> str:
-    """Cells are text; the columns `numbers` are set to the right."""
+    """Cells are text; the columns `numbers` are set to the right. A head without a word is left out, and nothing sorts."""
 
     def cells(kind: str, row: Sequence[str]) -> str:
         return "".join(
@@ -30,7 +32,8 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequence[
         )
 
     body = "".join(f"<tr>{cells('td', row)}</tr>" for row in rows)
-    return f"<table class=sortable><thead><tr>{cells('th', head)}</tr></thead><tbody>{body}</tbody></table>"
+    top = f"<thead><tr>{cells('th', head)}</tr></thead>" if any(head) else ""
+    return f"<div class=scroll><table{' class=sortable' if top else ''}>{top}<tbody>{body}</tbody></table></div>"
 
 
 def bullets(sentences: Sequence[str]) -> str:

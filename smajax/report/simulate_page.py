@@ -1,8 +1,7 @@
-"""A single run -> CSV, NetCDF, JSON, a picture and a page."""
+"""A single run -> CSV, NetCDF, JSON, pictures and a page."""
 
 from __future__ import annotations
 
-import csv
 import html
 import io
 from collections.abc import Sequence
@@ -15,12 +14,14 @@ from matplotlib.figure import Figure
 
 from smajax.figures.drawing import BLUE, GREY, RED, named, panels
 from smajax.parameters import parameter_values, parameters
+from smajax.report.animation import animate
 from smajax.report.display import axis_label, digits, display, label
-from smajax.report.files import json_text, replace
+from smajax.report.files import csv_text, heading, json_text, replace
 from smajax.report.html import picture
 from smajax.report.plain_page import bullets, table, whole
 from smajax.single import Ran
 
+STILL = 1e-3  # change of the martensite fraction that is none
 PLAIN = ("position", "temperature", "martensite_fraction", "stress")
 MERITS = {
     "reach_time": "s",
@@ -36,15 +37,9 @@ MERITS = {
 
 def as_csv(found: xr.Dataset) -> str:
     """One row a sample, SI, units in the heading: `time [s],voltage [V],...`; smajax reads it back."""
-    text = io.StringIO()
     columns = {"time": found["time"], **found.data_vars}
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(
-        [f"{name} [{'1' if one.attrs['units'] in ('-', '') else one.attrs['units']}]" for name, one in columns.items()]
-    )
-    for row in np.stack([one.to_numpy() for one in columns.values()], axis=1).tolist():
-        writer.writerow([f"{value:.10g}" for value in row])
-    return text.getvalue()
+    head = [heading(str(name), one.attrs["units"]) for name, one in columns.items()]
+    return csv_text(head, np.stack([one.to_numpy() for one in columns.values()], axis=1).tolist())
 
 
 def as_netcdf(found: xr.Dataset) -> bytes:
@@ -60,6 +55,7 @@ def record(ran: Ran, command: str, series: bool = True) -> dict[str, Any]:
         "provenance": {name: value for name, value in found.attrs.items() if name != "parameters (SI)"},
         "parameters": parameter_values(ran.system),
         "notes": list(ran.notes),
+        "conclusions": conclusions(ran),
         "merit": {name: {"value": value, "unit": MERITS[name]} for name, value in ran.merit.items()},
         "summary": {
             str(name): {
@@ -80,8 +76,8 @@ def _inputs(found: xr.Dataset) -> list[str]:
     return [name for name in names[: names.index("temperature")] if name != "wanted"]
 
 
-def drawn(found: xr.Dataset) -> bytes:
-    """Input, position, temperature, fraction and stress over time, and the hysteresis of the position."""
+def drawn(found: xr.Dataset, form: str = "png") -> bytes:
+    """Input, position, temperature, fraction and stress over time, and the hysteresis of the position; `form`: png or svg."""
     inputs = _inputs(found)
     shown = [*inputs[:1], *PLAIN]
     figure = Figure(figsize=(10.0, 8.2))
@@ -106,7 +102,7 @@ def drawn(found: xr.Dataset) -> bytes:
     for spare in axes[len(shown) + 1 :]:
         spare.axis("off")
     image = io.BytesIO()
-    figure.savefig(image, dpi=90, facecolor="white", format="png")
+    figure.savefig(image, dpi=90, facecolor="white", format=form)
     return image.getvalue()
 
 
@@ -114,10 +110,12 @@ def summary_rows(found: xr.Dataset) -> list[list[str]]:
     """A row a variable: least, greatest, last, in the units that a reader sees."""
     rows = []
     for name, one in found.data_vars.items():
-        unit = display(one.attrs["units"], str(name))
-        rows.append(
-            [label(str(name)), *(digits(unit.of(float(value))) for value in (one.min(), one.max(), one[-1])), unit.unit]
-        )
+        unit, values = display(one.attrs["units"], str(name)), one.to_numpy()
+        least, greatest, last = float(values.min()), float(values.max()), float(values[-1])
+        # What rounding leaves of a zero is no number to show.
+        nothing = 1e-12 * max(abs(least), abs(greatest))
+        cells = [digits(unit.of(0.0 if abs(value) < nothing else value)) for value in (least, greatest, last)]
+        rows.append([label(str(name)), *cells, unit.unit])
     return rows
 
 
@@ -130,39 +128,78 @@ def merit_rows(ran: Ran) -> list[list[str]]:
     return rows
 
 
-def page(ran: Ran, image: bytes, title: str, command: str) -> str:
-    """The whole page, picture inside."""
+def conclusions(ran: Ran) -> list[str]:
+    """What happened, in sentences: how hot, what transformed, what moved; whether a closed loop arrived."""
+    found = ran.found
+    if ran.notes and not np.isfinite(found["temperature"]).all():
+        return []
+
+    def at(name: str, value: float) -> str:
+        unit = display(found[name].attrs["units"], name)
+        return f"{digits(unit.of(float(value)), 3)} {unit.unit}".strip()
+
+    degrees, reading = found["temperature"].to_numpy(), found["reading"].to_numpy()
+    hottest = int(degrees.argmax())
+    told = [
+        f"The wire is at most {at('temperature', degrees[hottest])}, {at('time', found['time'].to_numpy()[hottest])} in."
+    ]
+    fraction = found["martensite_fraction"]
+    least, greatest, last = float(fraction.min()), float(fraction.max()), float(fraction[-1])
+    if greatest - least < STILL:
+        told.append(f"It does not transform: the martensite fraction stays at {digits(last, 3)}.")
+    else:
+        told.append(
+            f"It transforms: the martensite fraction lies between {least:.2f} and {greatest:.2f}, at the end {last:.2f}."
+        )
+    name = ran.system.load.reading[0]
+    told.append(
+        f"The {label(name)} starts at {at('reading', reading[0])}, lies between {at('reading', reading.min())} and "
+        f"{at('reading', reading.max())}, and ends at {at('reading', reading[-1])}."
+    )
+    if ran.merit:
+        settles = ran.merit["settling_time"]
+        told.append(
+            f"The loop settles after {digits(settles, 3)} s." if np.isfinite(settles) else "The loop never settles."
+        )
+    return told
+
+
+def page(ran: Ran, image: bytes, title: str, command: str, moving: bytes | None = None) -> str:
+    """The whole page, pictures inside."""
     table_of = parameters(ran.system)
     values = [
         [name, digits(value, 6), table_of[name].unit, table_of[name].about]
         for name, value in parameter_values(ran.system).items()
     ]
-    parts = [f"<h1>{html.escape(title)}</h1>", bullets(ran.notes)]
+    parts = [f"<h1>{html.escape(title)}</h1>", bullets([*ran.notes, *conclusions(ran)])]
     if ran.merit:
-        parts.append(table(["figure of merit", "", "unit"], merit_rows(ran), (1,)))
+        parts.append(table(["figure of merit", "value", "unit"], merit_rows(ran), (1,)))
     parts += [
-        str(picture(image, "the run over time")),
-        table(["", "least", "greatest", "last", "unit"], summary_rows(ran.found), (1, 2, 3)),
+        str(picture(image, "the run over time", "panels")),
+        str(picture(moving, "the load moving, beside the wire's path through its phase diagram", "panels")),
+        table(["variable", "least", "greatest", "last", "unit"], summary_rows(ran.found), (1, 2, 3)),
         "<h2>Parameters (SI, temperatures in °C, angles in rad)</h2>",
         table(["parameter", "value", "unit", "what it is"], values, (1,)),
         "<h2>Provenance</h2>",
         table(
             ["", ""],
-            [["command", command], *([k, str(v)] for k, v in ran.found.attrs.items() if k != "parameters (SI)")],
+            [["command", command], *([k, str(v)] for k, v in ran.found.attrs.items() if v and k != "parameters (SI)")],
         ),
         "<p class=quiet>The same numbers: simulate.csv, simulate.nc, simulate.json.</p>",
     ]
     return whole(title, parts)
 
 
-OWN: Sequence[str] = ("simulate.csv", "simulate.nc", "simulate.json", "simulate.png", "simulate.html")
+OWN: Sequence[str] = tuple(f"simulate.{kind}" for kind in ("csv", "nc", "json", "png", "svg", "gif", "html"))
 
 
-def write_run(ran: Ran, folder: Path, title: str, command: str) -> Path:
-    """All files of a run into `folder`, each in one step; the path of the page."""
+def write_run(ran: Ran, folder: Path, title: str, command: str, moving: bool = False) -> Path:
+    """All files of a run into `folder`, each in one step; the path of the page. moving: an animation too (no coupon)."""
     image = drawn(ran.found)
     replace(folder / "simulate.csv", as_csv(ran.found))
     replace(folder / "simulate.nc", as_netcdf(ran.found))
     replace(folder / "simulate.json", json_text(record(ran, command)))
     replace(folder / "simulate.png", image)
-    return replace(folder / "simulate.html", page(ran, image, title, command))
+    replace(folder / "simulate.svg", drawn(ran.found, "svg"))
+    film = animate(ran.system, ran.found, folder / "simulate.gif").read_bytes() if moving else None
+    return replace(folder / "simulate.html", page(ran, image, title, command, film))

@@ -1,10 +1,11 @@
-"""Writes report.html and report.json into a folder, each whole or not at all."""
+"""Writes report.html, report.json and its tables as CSV into a folder, each whole or not at all."""
 
 from __future__ import annotations
 
 import json
 from pathlib import Path
 
+from smajax.report.csv_files import PARAMETERS, RUNS, findings_parameters, findings_runs
 from smajax.report.files import replace
 from smajax.report.findings import Findings
 from smajax.report.html import findings_to_html
@@ -12,7 +13,7 @@ from smajax.report.json_file import findings_to_json
 
 
 def write_report(findings: Findings, folder: Path) -> Path:
-    """Writes both files into `folder`, creating it, and returns the path of report.html.
+    """Writes the files into `folder`, creating it, and returns the path of report.html.
 
     A reader never sees half a file: each is written beside its place and then put there in one step.
     Raises NotADirectoryError when `folder` or one of its parents is a file.
@@ -28,4 +29,6 @@ def write_report(findings: Findings, folder: Path) -> Path:
     record = json.dumps(findings_to_json(findings), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
     # The record goes first: where the page is, its numbers are too.
     replace(folder / "report.json", record)
+    replace(folder / PARAMETERS, findings_parameters(findings))
+    replace(folder / RUNS, findings_runs(findings))
     return replace(folder / "report.html", page)

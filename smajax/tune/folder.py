@@ -13,13 +13,13 @@ from smajax.made_with import made_with
 from smajax.report.files import json_text, replace
 from smajax.system import System
 from smajax.tune.descent import Descent, load
-from smajax.tune.page import page, record
+from smajax.tune.page import loops, page, record
 from smajax.tune.pictures import before_after, costs_over_loops
 from smajax.tune.settings import TuneSettings
 from smajax.tune.tune import Tuned, tune
 
 ASKED, STATE, GAINS = "asked.json", "state.npz", "gains.json"
-OURS = {ASKED, STATE, GAINS, "tune.html", "tune.json", "before_after.png", "descent.png"}
+OURS = {ASKED, STATE, GAINS, "tune.html", "tune.json", "loops.csv", "before_after.png", "descent.png"}
 
 
 def check_folder(out: Path, asked: dict[str, object]) -> None:
@@ -71,5 +71,6 @@ def tune_into(
         part.write_bytes(png)
         part.replace(out / name)
     replace(out / "tune.json", json_text(record(found, command)))
+    replace(out / "loops.csv", loops(found))
     replace(out / "tune.html", page(found, pictures, command))
     return found

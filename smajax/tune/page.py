@@ -10,12 +10,16 @@ import numpy as np
 
 from smajax.made_with import made_with
 from smajax.report.display import digits
+from smajax.report.files import csv_text, heading
 from smajax.report.html import picture
 from smajax.report.plain_page import bullets, table, whole
+from smajax.sweep import MISMATCHES
 from smajax.tune.terms import TERMS
 from smajax.tune.tune import Check, Tuned
+from smajax.words import counted
 
 EDGE = 0.02  # of the box, by logarithm
+UNITS = {"°": "deg", "°C": "degC"}  # as a file has them
 CHECKS = {
     "tuned on": "tuned on",
     "inside": "never seen: plants within the variation, set points between those tuned",
@@ -105,7 +109,7 @@ def gain_rows(found: Tuned) -> list[list[str]]:
             digits(found.before[name]),
             digits(found.after.values[name]),
             found.units[name],
-            f"{low:g} … {high:g}",
+            f"{digits(low)} … {digits(high)}",
             "at the bound" if name in edge else "",
         ]
         for name, (low, high) in found.box.items()
@@ -113,7 +117,7 @@ def gain_rows(found: Tuned) -> list[list[str]]:
 
 
 def _figures(found: Tuned, check: Check) -> list[list[str]]:
-    """A row a term: median and worst before and after."""
+    """A row a term: median and worst before and after, and the limits where there are some."""
     rows = []
     for column, (name, term) in enumerate(TERMS.items()):
         cells = []
@@ -122,38 +126,55 @@ def _figures(found: Tuned, check: Check) -> list[list[str]]:
             never = 2.0 * found.settings.seconds if name == "settling_time" else np.inf
             for value in (float(np.median(values)), float(np.max(values))):
                 cells.append("never" if value >= never else digits(0.0 if abs(value) < 1e-6 else value, 3))
-        limit = found.settings.limits.get(name)
-        rows.append([f"{term.label} ({term.unit})", *cells, "" if limit is None else f"{limit:g}"])
+        if found.settings.limits:
+            limit = found.settings.limits.get(name)
+            cells.append("" if limit is None else f"{limit:g}")
+        rows.append([f"{term.label} ({term.unit})", *cells])
     return rows
 
 
 def page(found: Tuned, pictures: Mapping[str, bytes], command: str) -> str:
     """The whole page, pictures inside."""
     say, settings = html.escape, found.settings
-    head = ["", "median before", "worst before", "median after", "worst after", "limit"]
+    head = ["figure", "median before", "worst before", "median after", "worst after"]
+    head += ["limit"] if settings.limits else []
     parts = [
         f"<h1>Gains of {say(settings.controller)}, tuned</h1>",
         bullets(conclusions(found)),
         f"<p>Tuned on {say(settings.plants_in_words())}. {say(settings.goal_in_words())}.</p>",
-        picture(pictures["before_after.png"], "angles and figures of merit before and after"),
+        picture(pictures["before_after.png"], "angles and figures of merit before and after", "panels"),
         "<p class=quiet>Above: thick, the plant as believed; thin, plants never seen. Below: from the least to the largest "
         "over the plants at each set point; squares were tuned on, circles never seen.</p>",
         "<h2>Gains</h2>",
-        table(["gain", "before", "after", "unit", "box", ""], gain_rows(found), (1, 2)),
+        table(["gain", "before", "after", "unit", "box", "remark"], gain_rows(found), (1, 2)),
     ]
     for name, check in found.checks.items():
         parts += [
-            f"<h2>{say(CHECKS[name].capitalize())}</h2><p class=quiet>{check.members.size} closed loops of "
-            f"{settings.seconds:g} s.</p>",
-            table(head, _figures(found, check), (1, 2, 3, 4, 5)),
+            f"<h2>{say(CHECKS[name].capitalize())}</h2><p class=quiet>"
+            f"{counted(check.members.size, 'closed loop')} of {settings.seconds:g} s.</p>",
+            table(head, _figures(found, check), range(1, len(head))),
         ]
     parts += [
         "<h2>The search</h2>",
         picture(pictures["descent.png"], "cost over closed loops"),
         f"<p class=quiet>{say(settings.between_in_words())}</p>",
+        "<h2>Provenance</h2>",
         table(["", ""], [["command", command], *map(list, made_with().items())]),
+        "<p class=quiet>The same numbers: tune.json, and loops.csv with every closed loop before and after.</p>",
     ]
     return whole(f"Gains of {settings.controller}", [str(part) for part in parts])
+
+
+def loops(found: Tuned) -> str:
+    """CSV, a row a closed loop: which check, whose gains, plant over what is believed, set point, figures (none: never)."""
+    rows = []
+    for name, check in found.checks.items():
+        for which, when in enumerate(("before", "after")):
+            for plant, figures in zip(check.members.rows.tolist(), check.seen.judged[which], strict=True):
+                told = [_plain(found, term, value) for term, value in zip(TERMS, figures, strict=True)]
+                rows.append([name, when, *plant[:-1], float(np.degrees(plant[-1])), *told])
+    terms = [heading(name, UNITS.get(term.unit, term.unit)) for name, term in TERMS.items()]
+    return csv_text(["check", "gains", *(f"{name} ratio" for name in MISMATCHES), "set point [deg]", *terms], rows)
 
 
 def record(found: Tuned, command: str) -> dict[str, Any]:

@@ -86,7 +86,7 @@ class TuneSettings:
             "mean-variance": "mean of all loops plus one standard deviation",
         }[self.objective]
         limits = [f"{TERMS[name].label} ≤ {limit:g} {TERMS[name].unit}" for name, limit in self.limits.items()]
-        return f"cost: {' + '.join(parts)}, {of}" + (f"; in every loop {', '.join(limits)}" if limits else "")
+        return f"Cost: {' + '.join(parts)}, {of}" + (f"; in every loop {', '.join(limits)}" if limits else "")
 
     def between_in_words(self) -> str:
         """What lies between plant and controller."""

@@ -1,0 +1,83 @@
+"""The numbers of a page as CSV, SI: one row a parameter, and one row a sample of every run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from smajax.experiment.catalogue import INPUT_UNITS
+from smajax.report.files import csv_text, heading
+from smajax.report.findings import Findings, ParameterFinding
+
+if TYPE_CHECKING:
+    from smajax.identified import Identified  # which is made with words of this package
+
+RUNS, PARAMETERS = "runs.csv", "parameters.csv"
+
+
+def findings_parameters(findings: Findings) -> str:
+    """Base model and final model side by side, in the order of the record."""
+    before = {one.name: one for one in findings.before}
+    after = {one.name: one for one in findings.after}
+    rows = []
+    for name in dict.fromkeys([*before, *after]):
+        fitted = [one for which in (before, after) for one in _fitted(which.get(name))]
+        any_ = after.get(name) or before[name]
+        rows.append([name, any_.unit, *fitted, any_.lower, any_.upper, any_.start])
+    head = ["before", "standard error before", "after", "standard error after", "lower", "upper", "start"]
+    return csv_text(["parameter", "unit", *head], rows)
+
+
+def _fitted(found: ParameterFinding | None) -> list[float | None]:
+    return [None, None] if found is None else [found.value, found.standard_error]
+
+
+def findings_runs(findings: Findings) -> str:
+    """Inputs, measurement and both models of every run, one after another."""
+    seen = {name: findings.output_unit for name in ("measured", "before", "after")}
+    series = [
+        (run.name, run.role, {"time": run.time, **run.inputs, **{name: getattr(run, name) for name in seen}})
+        for run in findings.runs
+    ]
+    return _runs(series, seen)
+
+
+def identified_parameters(found: Identified) -> str:
+    """The estimates, in the order of the record."""
+    rows = [
+        [one.name, one.unit, one.value, one.standard_error, one.lower, one.upper, one.start, one.remark]
+        for one in found.estimates
+    ]
+    head = ["parameter", "unit", "estimate", "standard error", "lower", "upper", "start", "remark"]
+    return csv_text(head, rows)
+
+
+def identified_runs(found: Identified) -> str:
+    """Inputs and, sensor by sensor, measurement, simulation and the standard error of that, of every run."""
+    units: dict[str, str] = {}
+    series = []
+    for run in found.runs:
+        columns = {"time": run.time, **run.inputs}
+        for output, one in zip(found.outputs, run.series, strict=True):
+            for what in ("measured", "simulated", "spread"):
+                units[f"{one.output} {what}"] = output.unit
+                columns[f"{one.output} {what}"] = getattr(one, what)
+        series.append((run.name, run.role, columns))
+    return _runs(series, units)
+
+
+def _runs(runs: Sequence[tuple[str, str, Mapping[str, np.ndarray]]], units: Mapping[str, str]) -> str:
+    """(name, role, series by name) of each run as one table; a cell is empty where a run has no such series."""
+    known = {"time": "s", **INPUT_UNITS, **units}
+    names = list(dict.fromkeys(name for _, _, columns in runs for name in columns))
+
+    def rows() -> Iterable[list[object]]:
+        for run, role, columns in runs:
+            blank = np.full(len(columns["time"]), np.nan)
+            cells = np.stack([np.asarray(columns.get(name, blank), dtype=float) for name in names], axis=1)
+            for row in cells.tolist():
+                yield [run, role, *row]
+
+    return csv_text(["run", "role", *(heading(name, known.get(name, "1")) for name in names)], rows())

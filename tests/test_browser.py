@@ -1,0 +1,70 @@
+"""Pages in a browser: whole, readable on a telephone and on a desk, asking nobody for anything; and each fault is seen.
+
+Those of `identify`, `sweep` and `tune` are looked at where they are made: test_identify, test_sweep, test_tune.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+from smajax.figures.catalogue import CHAPTERS
+from smajax.figures.write import Drawn, as_page
+from smajax.report.plain_page import table, whole
+from smajax.report.simulate_page import write_run
+from smajax.report.write import write_report
+from smajax.single import Asked, AskedLoop, run_closed
+from tests.in_browser import HOSTILE, faults
+from tests.made_findings import made_findings
+
+
+def test_the_report_of_a_closed_loop(browser: Any, tmp_path: Path) -> None:
+    found = made_findings()
+    names = ("step", HOSTILE, "sine")
+    runs = tuple(dataclasses.replace(run, name=name) for run, name in zip(found.runs, names, strict=True))
+    assert faults(browser, write_report(dataclasses.replace(found, title=HOSTILE, runs=runs), tmp_path)) == []
+
+
+def test_the_page_of_a_run(browser: Any, tmp_path: Path) -> None:
+    ran = run_closed(Asked(dt=0.01), AskedLoop("pid", "30deg:6s"))
+    assert faults(browser, write_run(ran, tmp_path, HOSTILE, f"smajax simulate --out {HOSTILE}", moving=True)) == []
+
+
+def test_the_page_of_figures(browser: Any, tmp_path: Path) -> None:
+    drawn = [Drawn(row, True, HOSTILE, HOSTILE) for row in CHAPTERS["chapter3"][:4]]
+    page = as_page(drawn, Path(__file__).parents[1] / "studies" / "chapter3")
+    (tmp_path / "index.html").write_text(page, encoding="utf-8")
+    assert faults(browser, tmp_path / "index.html") == []
+
+
+# What is wrong with a page -> what is said of it.
+FAULTS = {
+    "<p style='width:2000px'>wide</p>": "the page is",
+    "<p style='font-size:8px'>small</p>": "text of 8 px",
+    "<img alt=none src='data:image/png;base64,AAAA'>": "cannot be read",
+    "<img alt=white style='width:400px' src=\"data:image/svg+xml,<svg xmlns='http://www.w3.org/2000/svg' width='400' "
+    "height='400'/>\">": "a blank picture",
+    "<img alt=away src='away.png'>": "asked for",
+    "<table><tbody></tbody></table>": "a table without a row",
+    "<table><tbody><tr><td>nan</td></tr></tbody></table>": "a cell says nan",
+    # Too late for what makes tables sort.
+    "<script>addEventListener('load', () => document.body.insertAdjacentHTML('beforeend', '<table class=sortable><thead>"
+    "<tr><th>a</th></tr></thead><tbody><tr><td>1</td></tr></tbody></table>'))</script>": "does not say how it sorts",
+    "<p>&lt;b&gt;</p>": "markup as text: <b>",
+    "<p>&amp;#x27;</p>": "markup as text: &#x27;",
+    "<script>no_such_name()</script>": "error: ",
+    "<script>console.error('lost')</script>": "console: lost",
+    HOSTILE: "ran as a program",
+}
+
+
+def test_a_fault_is_seen(browser: Any, tmp_path: Path) -> None:
+    page, good = tmp_path / "page.html", table(["name", "value"], [["b", "2"], ["a", "10"]], (1,))
+
+    def told(*parts: str) -> list[str]:
+        page.write_text(whole("A page", [good, *parts]), encoding="utf-8")
+        return faults(browser, page, "", (400,))
+
+    assert told() == []
+    assert [part for part, said in FAULTS.items() if not any(said in one for one in told(part))] == []
