@@ -72,7 +72,7 @@ def test_no_point_of_the_declared_box_gives_a_number_that_is_none(rig: str, coun
     box = _whole_box(system, count, 1 if count == FAST else 2)
     measures = [kind(of) for of in ("martensite_fraction", "temperature", "position") for kind in (Smallest, Largest)]
     found = run_batch(
-        system, {channel: levels}, zipped(box), dt=0.02, keep=(), measures=(*measures, Smallest("stress"))
+        system, {channel: jnp.asarray(levels)}, zipped(box), dt=0.02, keep=(), measures=(*measures, Smallest("stress"))
     )
     status = found["status"].values
     assert not (status == NOT_FINITE).any()
