@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
+import jax.numpy as jnp
+import numpy as np
+
 from smajax.effects.library import LIBRARY
-from smajax.experiment.catalogue import Catalogue, ModelDescription, ParameterInfo
+from smajax.experiment.catalogue import Catalogue, ModelDescription, ParameterInfo, Scale
 from smajax.extended import extended
 from smajax.load.coupon import AbstractCoupon
-from smajax.parameters import parameters
+from smajax.parameters import parameters, set_parameters
 from smajax.presets import DRIVES, LOADS, WIRES, build
 from smajax.sensors import sensors_of
-from smajax.system import System
+from smajax.system import System, heating_power
+from smajax.wire.heat import mass_per_metre
 from smajax.wire.laws import LAWS
+from smajax.wire.order import disorder
+from smajax.wire.resistance import resistance_per_metre
 
 
 def check_together(system: System, load: str, drive: str) -> None:
@@ -36,7 +44,35 @@ def describe(wire: str, load: str, drive: str, law: str = "") -> ModelDescriptio
         inputs_optional=system.load.inputs_optional | system.drive.inputs_optional | {"ambient_temperature"},
         outputs=sensors_of(system),
         inputs_squared=system.drive.inputs_squared,
+        heats=system.drive.inputs_required,
+        effects=frozenset(candidates(system, None, ())),
+        scale=None if isinstance(system.load, AbstractCoupon) else lambda values: _scale(_at(system, values)),
+        disorder=lambda values: disorder(_at(system, values)),
         inputs_sampled=system.load.inputs_required if isinstance(system.load, AbstractCoupon) else frozenset(),
+    )
+
+
+def _at(system: System, values: Mapping[str, float]) -> System:
+    """The system without effects at those of the values that are its own."""
+    table = parameters(system)
+    return set_parameters(system, {name: value for name, value in values.items() if name in table})
+
+
+def _scale(system: System) -> Scale:
+    """Of a wire all martensite, in still air: tau = rho c_p d / (4 h), T - T_inf = P / (h pi d) at rest (eq. 3.1)."""
+    wire, heat = system.wire, system.wire.heat
+    resistance = resistance_per_metre(wire, (), heat.ambient_temperature, jnp.ones(()))
+    cooling = heat.convection_coefficient * jnp.pi * wire.wire_diameter
+
+    def warming(inputs: Mapping[str, np.ndarray]) -> np.ndarray:
+        given = {name: jnp.asarray(values) for name, values in inputs.items()}
+        return np.asarray(heating_power(system, resistance, given) / cooling, dtype=np.float64)
+
+    return Scale(
+        float(wire.wire_length),
+        float(heat.ambient_temperature),
+        float(mass_per_metre(wire) * heat.specific_heat / cooling),
+        warming,
     )
 
 

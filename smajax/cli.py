@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 from typing import Annotated
 
 import typer
@@ -25,6 +26,8 @@ which the same command goes on from what is kept.
 A folder that holds another result is refused; --overwrite deletes that result, and nothing else that lies there. Progress
 is drawn in a terminal only; SMAJAX_PROGRESS=lines writes a line a stage to stderr elsewhere.
 """
+
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)  # no room on the disk, in the quota, in a file
 
 app = typer.Typer(
     name="smajax",
@@ -78,7 +81,17 @@ def main() -> None:
         from smajax.plugins import PluginError
         from smajax.units import UnitError
 
-        if not isinstance(error, (ExperimentError, FolderTaken, MeasuredDataError, OSError, PluginError, UnitError)):
+        if isinstance(error, MemoryError):
+            error = MemoryError(
+                f"not enough memory ({error or 'none left'}); take a longer step or shorter runs, or allow more. What was "
+                "finished is kept."
+            )
+        elif isinstance(error, OSError) and error.errno in FULL:
+            error = OSError(
+                f"{error.filename or 'the disk'}: {error.strerror}: free some space and give the same command again. What was "
+                "finished is kept."
+            )
+        elif not isinstance(error, (ExperimentError, FolderTaken, MeasuredDataError, OSError, PluginError, UnitError)):
             raise
         console().print(f"error: {error}", style="red", markup=False, highlight=False, soft_wrap=True)
         raise SystemExit(2) from None

@@ -22,7 +22,7 @@ from smajax.measured_state import Sensor
 from smajax.merit import Merit, merit
 from smajax.recorded import acting_inputs
 from smajax.reference import Reference
-from smajax.simulate import DEFAULT_STEP, check_inputs, first_state, simulate, trajectory
+from smajax.simulate import DEFAULT_STEP, check_inputs, check_scalars, first_state, simulate, trajectory
 from smajax.system import System
 from smajax.types import Scalar, Series, State, Trajectory
 
@@ -67,6 +67,7 @@ def simulate_compiled(
     and for a tolerance that is none; Unsupported for an effect or a load of your own that cannot be translated.
     """
     check_inputs(system, inputs)
+    check_scalars(system, dt, initial)
     if tolerance is not None and (not tolerance > 0.0 or not isinstance(system.load, AbstractMovingLoad)):
         raise ValueError(f"`tolerance` is a positive number, for a load that moves; got {tolerance}. Take 1e-4.")
     series = {name: jnp.asarray(values, dtype=float) for name, values in inputs.items()}

@@ -14,6 +14,7 @@ from smajax.presets import build
 from smajax.system import System
 from smajax.units import UnitError, parse_quantity
 from smajax.wire.laws import under_law
+from smajax.wire.order import check_order
 
 
 def parameter_name(system: System, name: str) -> str:
@@ -57,7 +58,7 @@ def compose(
     values: parameter -> a number (SI, temperatures in degC, angles in rad) or text with a unit (`"80 W/m^2/K"`); by its name
     or its place in the model. An effect is part of the model when one of its parameters is given (`latent_heat.enthalpy`).
     Raises KeyError for a preset, law or effect there is not, ValueError for a parameter there is not, a value out of its
-    bounds, or three presets that do not go together, UnitError for a unit of another kind.
+    bounds, transformation temperatures in the wrong order, or three presets that do not go together, UnitError for a unit of another kind.
     """
     system = build(wire, load, drive)
     check_together(system, load, drive)
@@ -69,4 +70,5 @@ def compose(
     known = {parameter_name(system, name): value for name, value in given.items()}
     system = set_parameters(system, {name: _value(system, name, value) for name, value in known.items()})
     check_bounds(system)
+    check_order(system)
     return system

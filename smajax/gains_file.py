@@ -63,9 +63,9 @@ def read_gains(path: Path, system: System) -> Gains:
         held = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise GainsFileError(f"{where} cannot be read: {error.strerror}.") from None
-    except (json.JSONDecodeError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:  # also of numbers too long and of brackets too deep
         raise GainsFileError(
-            f'{where} is not JSON ({error}); expected what `smajax tune` writes: {{"controller": "pid", "gains": {{...}}}}.'
+            f'{where} is not JSON ({str(error)[:200]}); expected what `smajax tune` writes: {{"controller": "pid", "gains": {{...}}}}.'
         ) from None
     if not isinstance(held, dict) or not isinstance(held.get("gains"), dict) or "controller" not in held:
         raise GainsFileError(
@@ -74,7 +74,7 @@ def read_gains(path: Path, system: System) -> Gains:
     if held.get("format", FORMAT) != FORMAT:
         raise GainsFileError(f"{where} has the format {held['format']!r}; this version reads {FORMAT!r}.")
     name = held["controller"]
-    if name not in CONTROLLERS:
+    if not isinstance(name, str) or name not in CONTROLLERS:
         raise GainsFileError(f"{where}: no controller {name!r}{instead(str(name), CONTROLLERS, 'there are')}.")
     preset = CONTROLLERS[name]
     plant = preset.plant(system)

@@ -14,6 +14,8 @@ from smajax.measured.resample import resample_input, resample_output, uniform_cl
 from smajax.measured.table import Array, check_time
 from smajax.units import UnitError, convert, parse_quantity
 
+MOST_SAMPLES = 20_000_000
+
 
 @dataclass(frozen=True)
 class Given:
@@ -104,6 +106,10 @@ def clock_of(several: Sequence[Given], seconds: float | None, dt: float) -> Arra
             "nothing says how long the run is: give levels with times (6V:5s,0V:10s), a file, or --seconds."
         )
     end = max(lasting) if seconds is None else seconds
+    if not end / dt <= MOST_SAMPLES:
+        raise ValueError(
+            f"{end:g} s at {dt:g} s are over {MOST_SAMPLES:,} samples: take a longer --dt or a shorter run."
+        )
     if end < dt:
         raise ValueError(f"the run lasts {end:g} s, less than a step of {dt:g} s.")
     return uniform_clock(0.0, end, dt)

@@ -7,6 +7,7 @@ import platform
 import resource
 import shutil
 import subprocess
+from contextlib import suppress
 from importlib import metadata
 from pathlib import Path
 
@@ -50,10 +51,32 @@ def peak_memory() -> int:
 
 
 def available_memory() -> int | None:
-    """Bytes that a program may still take without swapping; None where the system does not say."""
+    """Bytes that a program may still take without swapping and within its caps; None where the system does not say."""
+    told = [*_free(), *_below_caps()]
+    return max(0, min(told)) if told else None
+
+
+def _free() -> list[int]:
+    """Of the machine, and of the container that it may be."""
+    found = []
     file = Path("/proc/meminfo")
     if file.exists():
         for line in file.read_text().splitlines():
             if line.startswith("MemAvailable:"):
-                return 1024 * int(line.split()[1])
-    return None
+                found.append(1024 * int(line.split()[1]))
+    group = Path("/sys/fs/cgroup")
+    with suppress(OSError, ValueError):  # no container, or one without a cap
+        found.append(int((group / "memory.max").read_text()) - int((group / "memory.current").read_text()))
+    return found
+
+
+def _below_caps() -> list[int]:
+    """What `ulimit -v` and `ulimit -d` leave to this process."""
+    file, found = Path("/proc/self/statm"), []
+    if file.exists():
+        pages = [int(part) for part in file.read_text().split()]
+        for cap, taken in ((resource.RLIMIT_AS, pages[0]), (resource.RLIMIT_DATA, pages[5])):
+            soft = resource.getrlimit(cap)[0]
+            if soft != resource.RLIM_INFINITY:
+                found.append(soft - taken * resource.getpagesize())
+    return found

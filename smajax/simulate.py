@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import jax
 import jax.numpy as jnp
 from jax import lax
 
 from smajax.load.coupon import AbstractCoupon
+from smajax.parameters import parameters
 from smajax.recorded import acting_inputs
 from smajax.step import step
 from smajax.system import System, initial_state
@@ -32,12 +34,40 @@ def check_inputs(system: System, inputs: Mapping[str, Series]) -> int:
     lengths = {name: jnp.shape(series) for name, series in inputs.items()}
     if not lengths:
         raise ValueError("`inputs` is empty: without one series there is no clock. Give e.g. `ambient_temperature`.")
-    if len(set(lengths.values())) != 1 or len(next(iter(lengths.values()))) != 1:
+    if len(set(lengths.values())) != 1 or len(next(iter(lengths.values()))) != 1 or 0 in next(iter(lengths.values())):
         raise ValueError(
-            f"Every input must be one series of the same length, but the shapes are {lengths}. Use `jax.vmap` over "
+            f"Every input must be one series of the same length, not empty, but the shapes are {lengths}. Use `jax.vmap` over "
             "a batch, and `jnp.full(n, value)` for a constant."
         )
     return next(iter(lengths.values()))[0]
+
+
+def check_scalars(system: System, dt: Scalar | float, initial: State | None = None) -> None:
+    """ValueError that names the number which is a batch, with its shape; and a step that is none."""
+    leaves = {f"`{name}`": leaf for name, leaf in _parameter_leaves(system).items()}
+    leaves |= {
+        f"`initial{jax.tree_util.keystr(path)}`": leaf for path, leaf in jax.tree_util.tree_leaves_with_path(initial)
+    }
+    leaves["`dt`"] = dt
+    wrong = {name: jnp.shape(leaf) for name, leaf in leaves.items() if jnp.shape(leaf) != ()}
+    if wrong:
+        told = "; ".join(f"{name} has the axes {shape}" for name, shape in wrong.items())
+        raise ValueError(
+            f"one run takes one number of each, and {told}. Map over the batch: `jax.vmap(run)(values)` with a `run` that puts "
+            "one value in (`set_parameters`), or name what varies in `run_batch`."
+        )
+    if not isinstance(dt, jax.core.Tracer) and not 0.0 < float(dt) < float("inf"):
+        raise ValueError(f"`dt` is the time between two samples, in seconds and above zero, not {float(dt):g}.")
+
+
+def _parameter_leaves(system: System) -> dict[str, Any]:
+    found = {}
+    for name, entry in parameters(system).items():
+        leaf: Any = system
+        for key in entry.path:
+            leaf = leaf[key] if isinstance(key, int) else getattr(leaf, key)
+        found[name] = leaf
+    return found
 
 
 def first_state(system: System, series: Mapping[str, Series], initial: State | None) -> State:
@@ -66,6 +96,7 @@ def simulate(
     at t_i). `initial` defaults to rest with the first inputs. Raises ValueError for missing or ill-shaped inputs.
     """
     check_inputs(system, inputs)
+    check_scalars(system, dt, initial)
     series = acting_inputs(system, {name: jnp.asarray(values, dtype=float) for name, values in inputs.items()}, dt)
     state = first_state(system, series, initial)
     # Every number of the state then has a derivative where the model has one: a scan some of whose numbers gain theirs

@@ -18,6 +18,7 @@ from smajax.compose import compose
 from smajax.control_presets import CONTROLLERS
 from smajax.dataset import labelled_loop, simulate_dataset
 from smajax.experiment.catalogue import INPUT_UNITS
+from smajax.experiment.magnitude import MELTS
 from smajax.gains_file import Gains, read_gains
 from smajax.levels import clock_of, given
 from smajax.load.base import AbstractMovingLoad
@@ -87,7 +88,11 @@ def _unit(name: str) -> str:
 
 def _notes(found: xr.Dataset) -> list[str]:
     wrong = [str(name) for name in found.data_vars if not np.isfinite(found[name].to_numpy()).all()]
-    return [f"Numbers that are none in {', '.join(wrong)}: is the heat or the step too large?"] if wrong else []
+    told = [f"Numbers that are none in {', '.join(wrong)}: is the heat or the step too large?"] if wrong else []
+    hottest = float(found["temperature"].max())
+    if hottest > MELTS:
+        told.append(f"The wire reaches {hottest:.4g} degC, and it melts at {MELTS:g} degC: is the input's unit right?")
+    return told
 
 
 def run_open(asked: Asked) -> Ran:

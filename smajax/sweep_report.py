@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import dataclasses
 import html
+import io
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -18,6 +19,7 @@ from smajax.control_presets import CONTROLLERS, with_printed_law
 from smajax.figures.drawing import named, panels
 from smajax.made_with import made_with
 from smajax.merit import Merit
+from smajax.report.files import replace
 from smajax.report.html import picture
 from smajax.report.plain_page import bullets, table, whole
 from smajax.sweep import Grid
@@ -60,14 +62,13 @@ def write_rows(path: Path, grid: Grid, swept: Swept) -> None:
     units = {"°": "deg", "°C": "degC", "1/s": "per_s"}
     merits = [f"{name}_{units.get(SHOWN[name][1], SHOWN[name][1])}" for name in SHOWN]
     table = np.stack([_values(swept.merits, name).ravel() for name in SHOWN], axis=1)
-    part = path.with_name(path.name + ".part")
-    with part.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow([*columns, *merits, "failed_at_s"])
-        for lane, row, failed in zip(lanes, table, swept.failed_at.ravel(), strict=True):
-            cells = [*lane[:2], np.degrees(lane[2]), lane[3], *row, failed]
-            writer.writerow([f"{cell:.6g}" if np.isfinite(cell) else "" for cell in cells])
-    part.replace(path)
+    text = io.StringIO(newline="")
+    writer = csv.writer(text)
+    writer.writerow([*columns, *merits, "failed_at_s"])
+    for lane, row, failed in zip(lanes, table, swept.failed_at.ravel(), strict=True):
+        cells = [*lane[:2], np.degrees(lane[2]), lane[3], *row, failed]
+        writer.writerow([f"{cell:.6g}" if np.isfinite(cell) else "" for cell in cells])
+    replace(path, text.getvalue())
 
 
 def _edges(ratios: np.ndarray) -> np.ndarray:

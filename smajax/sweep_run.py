@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,13 +15,14 @@ from matplotlib.figure import Figure
 
 from smajax.batch.provenance import digest
 from smajax.control_presets import CONTROLLERS, FILTERS
+from smajax.fit.kept import arrays
 from smajax.fit.progress import Progress
 from smajax.gains_file import Gains
 from smajax.load.base import AbstractMovingLoad
 from smajax.measured_state import Sensor
 from smajax.merit import Merit
 from smajax.reference import clock
-from smajax.report.files import replace
+from smajax.report.files import replace, writing
 from smajax.sweep import MISMATCHES, Grid, Interface, closed_loops, lanes, positions, ratios
 from smajax.sweep_report import (
     Swept,
@@ -111,7 +113,7 @@ def check_interface(filtered: str, period: float, dt: float) -> None:
     if filtered and filtered not in FILTERS:
         raise ValueError(f"no filter `{filtered}`; there are {', '.join(FILTERS)}.")
     steps = period / dt
-    if steps < 0.5 or abs(steps - round(steps)) > 1e-6:
+    if not 0.5 <= steps < math.inf or abs(steps - round(steps)) > 1e-6:
         raise ValueError(f"a controller's period is a whole number of simulation steps of {dt:g} s, not {period:g} s.")
 
 
@@ -164,13 +166,13 @@ def run_sweep(
         write_rows(out / f"{name}.csv", grid, one)
         maps, over_time = Figure(figsize=(10.0, 7.6)), Figure(figsize=(11.0, 6.2))
         draw_maps(maps, grid, one)
-        maps.savefig(out / f"{name}_maps.png", dpi=90, facecolor="white")
+        _save(maps, out / f"{name}_maps.png")
         draw_lines(over_time, time, LINES, one, float(np.radians(LINE_TARGET)))
-        over_time.savefig(out / f"{name}_lines.png", dpi=90, facecolor="white")
+        _save(over_time, out / f"{name}_lines.png")
         progress(f"say: {name}: {grid.size:,} closed loops; {failures(one)}. {over_mismatches(grid, one)}", 1.0)
     comparison = Figure(figsize=(10.0, 11.0))
     draw_comparison(comparison, targets, compared)
-    comparison.savefig(out / "comparison.png", dpi=90, facecolor="white")
+    _save(comparison, out / "comparison.png")
     replace(out / "sweep.json", as_json(targets, compared, grid, swept, settings.between, command))
     between, seconds = settings.between, settings.seconds
     replace(out / "index.html", page(targets, compared, grid, swept, seconds, between, out, command))
@@ -187,7 +189,8 @@ def _controller(
     own = dataclasses.replace(settings, controllers=(name,), tuned=tuned)
     kept = out / "finished" / f"{name}-{digest(system, [str(own)])[:16]}.npz"
     fields = [field.name for field in dataclasses.fields(Merit)]
-    if not kept.exists():
+    saved = arrays(kept)
+    if saved is None:
         interface = interface_of(
             system, settings.filtered, settings.noise, settings.period, settings.dt, settings.delay
         )
@@ -210,18 +213,22 @@ def _controller(
             record[f"grid_{field}"], record[f"alone_{field}"] = values[inside].reshape(grid.shape), values[alone]
         record |= {f"line_{mismatch}": angles for mismatch, angles in zip(MISMATCHES, drawn, strict=True)}
         kept.parent.mkdir(exist_ok=True)
-        part = kept.with_suffix(".part.npz")
-        np.savez(part, **record)
-        part.replace(kept)
-    with np.load(kept) as saved:
-        one = Swept(
-            name,
-            gain,
-            Merit(**{field: saved[f"grid_{field}"] for field in fields}),
-            saved["failed"],
-            {mismatch: saved[f"line_{mismatch}"] for mismatch in MISMATCHES},
-        )
-        return Merit(**{field: saved[f"alone_{field}"] for field in fields}), one
+        with writing(kept) as file:
+            np.savez(file, **record)
+        saved = record
+    one = Swept(
+        name,
+        gain,
+        Merit(**{field: saved[f"grid_{field}"] for field in fields}),
+        saved["failed"],
+        {mismatch: saved[f"line_{mismatch}"] for mismatch in MISMATCHES},
+    )
+    return Merit(**{field: saved[f"alone_{field}"] for field in fields}), one
+
+
+def _save(figure: Figure, path: Path) -> None:
+    with writing(path) as file:
+        figure.savefig(file, dpi=90, facecolor="white", format="png")
 
 
 def as_text(rows: Sequence[Sequence[str]]) -> str:

@@ -18,6 +18,11 @@ from numpy.typing import NDArray
 
 _NUMBER = re.compile(r"^\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*$")
 _DIMENSIONLESS = {"", "1", "-"}
+LONGEST = 64  # characters of a unit
+# A power that is no small number: the unit library works out "m**9**9**9" before it says that this is no unit.
+_TOWER = re.compile(
+    r"(?:\*\*|\^)(?!\s*\(?\s*[+-]?\d{1,2}(?:[./]\d{1,2})?\s*\)?(?![\d.eE(]|\s*(?:\*\*|\^)))|[\d⁰¹²³⁴⁵⁶⁷⁸⁹]\s*[⁰¹²³⁴⁵⁶⁷⁸⁹]"
+)
 # Spellings that people write and the unit library does not know, or knows as something else.
 _SPELLINGS = (("°C", "degC"), ("ºC", "degC"), ("℃", "degC"), ("°F", "degF"), ("°", "deg"), ("Ohm", "ohm"), ("·", "*"))
 # Units that people write out, to their symbols; with them goes any prefix.
@@ -75,6 +80,8 @@ def _unit(text: str, like: str | None = None) -> Any:
     for found, meant in _SPELLINGS:
         name = name.replace(found, meant)
     try:
+        if len(name) > LONGEST or _TOWER.search(name):
+            raise ValueError("no power of a unit")
         # Inside a compound unit ("J/(kg degC)") a degree is a difference: pint's as_delta.
         return _registry().parse_units(name, as_delta=True)
     except Exception as error:  # besides its own errors the unit library lets those of Python's tokenizer through
@@ -85,7 +92,7 @@ def _unit(text: str, like: str | None = None) -> Any:
             advice = f"expected one like {like!r}"
         else:
             advice = "write it like 'J/(kg K)', 'W/m^2/K', 'MPa/K', 'degC'"
-        raise UnitError(f"unit {text!r} is not known; {advice}") from error
+        raise UnitError(f"unit {text[:LONGEST]!r} is not known; {advice}") from error
 
 
 def _is_absolute(unit: Any) -> bool:

@@ -212,6 +212,8 @@ def test_a_tuning_goes_on_to_the_same_end(folder: Path, tmp_path: Path, monkeypa
     one, other = (json.loads((place / "gains.json").read_text(encoding="utf-8")) for place in (folder, out))
     assert one == other
     ends = load(folder / "state.npz"), load(out / "state.npz")
+    assert ends[0] is not None
+    assert ends[1] is not None
     np.testing.assert_array_equal(ends[0].costs, ends[1].costs)
     assert ends[0].simulations == ends[1].simulations
 

@@ -22,6 +22,7 @@ from smajax.types import Scalar, Series, State
 # Status codes of a member.
 GOOD, NOT_FINITE, RUNAWAY = 0, 1, 2
 HOTTEST = 3000.0  # C: no wire is hotter, it has molten long before
+COLDEST = -273.15  # C
 Values = dict[str, Scalar]
 
 
@@ -52,7 +53,7 @@ def _wrong(state: State) -> tuple[Scalar, Scalar]:
     """(not finite, runaway)."""
     wire, motion = state.wire, state.motion
     total = wire.temperature + wire.stress + wire.martensite_fraction + motion.position + motion.velocity
-    return ~jnp.isfinite(total), jnp.abs(wire.temperature) > HOTTEST
+    return ~jnp.isfinite(total), (wire.temperature > HOTTEST) | (wire.temperature < COLDEST)
 
 
 def member(recipe: Recipe, values: Values) -> dict[str, jax.Array]:

@@ -18,14 +18,22 @@ from smajax.batch.provenance import digest, provenance
 from smajax.batch.store import DIGEST, Store
 from smajax.fit.progress import Progress, quiet
 from smajax.load.coupon import AbstractCoupon
+from smajax.machine import available_memory
 from smajax.measure import SHOWN, AbstractMeasure
 from smajax.parameters import parameters
-from smajax.simulate import DEFAULT_STEP
+from smajax.simulate import DEFAULT_STEP, check_scalars
 from smajax.system import System
 from smajax.types import Series
+from smajax.wire.order import check_order
 
 KEPT = ("position", "temperature", "martensite_fraction", "stress")
 BUDGET = 1 << 30  # bytes
+
+
+def within_memory(budget: int) -> int:
+    """The budget, or half of what this program may still take where that is less: a cap makes chunks smaller."""
+    free = available_memory()
+    return budget if free is None else min(budget, free // 2)
 
 
 def recipe_of(
@@ -47,6 +55,8 @@ def recipe_of(
     known = drive.inputs_required | load.inputs_required | drive.inputs_optional | load.inputs_optional
     known = known | {"ambient_temperature"}
     table = parameters(system)
+    check_scalars(system, dt)
+    check_order(system)
     # A name that is both (ambient_temperature) is the parameter, unless it is an input already.
     channels = tuple(name for name in axes.names if name in known and name not in table)
     unknown = [name for name in axes.names if name not in table and name not in channels]
@@ -135,7 +145,7 @@ def run_batch(
     the samples only, and there is no reverse-mode gradient.
 
     The result has the dimensions of `axes` and `time`, `status` (0 good, 1 a number that is none, 2 runaway heat) and
-    `first_bad_time`. Results take a quarter of `budget` bytes at a time. With `out` they are streamed to a Zarr group
+    `first_bad_time`. Results take a quarter of `budget` bytes at a time, or of half of the memory that is left. With `out` they are streamed to a Zarr group
     there, and the same call goes on where an earlier one was stopped; the data set returned then reads from disk.
 
     On a processor the batch is compiled by `smajax.lanes`, five to twenty times as fast as by XLA; `engine="xla"` asks for the other
@@ -147,7 +157,7 @@ def run_batch(
         system, inputs, axes, seconds=seconds, dt=dt, every=every, keep=keep, measures=measures, tolerance=tolerance
     )
     several = tuple(devices or jax.local_devices())
-    size = chunk_size(member, recipe, axes, budget, several)
+    size = chunk_size(member, recipe, axes, within_memory(budget), several)
     if out is not None:
         store = created_or_opened(Path(out), recipe, axes, size)
         fill(store, recipe, devices, store.missing(), progress, engine)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import shlex
 import sys
@@ -63,11 +64,14 @@ def resumable(kept: str = "Finished fits are kept: the same command goes on from
 
 
 def numbers(option: str, text: str) -> tuple[float, ...]:
-    """`1,2 3` as numbers."""
+    """`1,2 3` as finite numbers."""
     try:
-        return tuple(float(part) for part in text.replace(",", " ").split())
+        found = tuple(float(part) for part in text.replace(",", " ").split())
+        if not all(map(math.isfinite, found)):
+            raise ValueError
+        return found
     except ValueError:
-        raise typer.BadParameter(f"numbers with commas between them, not `{text}`", param_hint=option) from None
+        raise typer.BadParameter(f"finite numbers with commas between them, not `{text}`", param_hint=option) from None
 
 
 def pairs(option: str, several: Sequence[str] | None) -> dict[str, float]:
@@ -81,6 +85,8 @@ def pairs(option: str, several: Sequence[str] | None) -> dict[str, float]:
             if not sign or name in found:
                 raise ValueError
             found[name] = float(value)
+            if not math.isfinite(found[name]):
+                raise ValueError
         except ValueError:
             raise typer.BadParameter(
                 f"each name once with its number, as in `name=0.2,other=1`, not `{part}`", param_hint=option

@@ -6,14 +6,16 @@ the same one asked otherwise, is refused, unless it is to overwrite.
 
 from __future__ import annotations
 
+import fcntl
 import json
+import os
 import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from smajax.report.files import json_text, replace
+from smajax.report.files import json_text, replace, sweep_up
 
 MARK = ".smajax.json"
 # Folders of versions without the mark are known by the file that each command writes last.
@@ -28,7 +30,11 @@ Asked = Mapping[str, Any]
 
 
 class FolderTaken(ValueError):
-    """The output folder holds another result."""
+    """The output folder holds another result, or another program is writing into it."""
+
+
+class FolderUnusable(OSError):
+    """The output folder cannot be written to."""
 
 
 def _same(before: Asked, asked: Asked) -> bool:
@@ -125,7 +131,47 @@ def claimed(
     """
     check_path(out)
     asked = json.loads(json.dumps(dict(asked)))
-    if out.is_dir():
+    there = out.is_dir()
+    try:
+        new = _made(out)
+    except OSError as error:
+        raise FolderUnusable(
+            f"--out {out} cannot be made ({error.strerror}); give the name of another folder"
+        ) from None
+    with _alone(out):
+        yield from _marked(out, command, asked, own, overwrite, goes_on, there, new)
+
+
+@contextmanager
+def _alone(out: Path) -> Iterator[None]:
+    """While it is held no other smajax writes into `out`. A program that ends, however it does, lets go of it."""
+    handle = os.open(out, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise FolderTaken(
+                f"--out {out}: another smajax is writing into it; wait until it has ended, or give the name of another folder."
+            ) from None
+        except OSError:
+            pass  # a file system without locks
+        yield
+    finally:
+        os.close(handle)
+
+
+def _marked(
+    out: Path,
+    command: str,
+    asked: Asked,
+    own: Sequence[str],
+    overwrite: bool,
+    goes_on: Callable[[Asked, Asked], bool],
+    there: bool,
+    new: Sequence[Path],
+) -> Iterator[Path]:
+    """What `claimed` does in a folder that is there and nobody else's."""
+    if there:
         other = _other(out, command, asked, own, goes_on)
         if other and not overwrite:
             raise FolderTaken(
@@ -134,8 +180,15 @@ def claimed(
         if overwrite:
             _clear(out, own)
     marked = (out / MARK).exists()
-    new = _made(out)
-    replace(out / MARK, json_text({"command": command, "asked": asked, "files": list(own)}))
+    sweep_up(out)
+    try:
+        replace(out / MARK, json_text({"command": command, "asked": asked, "files": list(own)}))
+    except OSError as error:
+        if new:
+            _abandon(out, new)
+        raise FolderUnusable(
+            f"--out {out} cannot be written to ({error.strerror}); give the name of another folder, or the right to write there"
+        ) from None
     try:
         yield out
     except BaseException:

@@ -76,7 +76,9 @@ def simulate(
         list[str] | None, typer.Option(help="a parameter of the plant that the controller does not know of, as --set")
     ] = None,
     estimator: Annotated[str, typer.Option(help="`printed` or `model` filter; none: told the true state")] = "",
-    noise: Annotated[float, typer.Option(min=0.0, help="noise of the angle's readings, degrees (1 sigma)")] = 0.0,
+    noise: Annotated[
+        float, typer.Option(min=0.0, max=360.0, help="noise of the angle's readings, degrees (1 sigma)")
+    ] = 0.0,
     period: Annotated[float, typer.Option(help="sample time of the controller, s, a multiple of --dt")] = 0.01,
     delay: Annotated[int, typer.Option(min=0, help="control periods until a command arrives")] = 0,
     seed: Annotated[int, typer.Option(help="of the noise")] = 0,

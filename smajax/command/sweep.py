@@ -43,9 +43,11 @@ def sweep(
     gain_shares: Annotated[
         str | None, typer.Option(help="shares of the controller's main gain; default 0.5,0.7,1,1.4,2")
     ] = None,
-    seconds: Annotated[float, typer.Option(min=0.1, help="length of each closed loop")] = 10.0,
+    seconds: Annotated[float, typer.Option(min=0.1, max=86_400.0, help="length of each closed loop")] = 10.0,
     estimator: Annotated[str, typer.Option(help="`printed` or `model` filter; none: told the true state")] = "",
-    noise: Annotated[float, typer.Option(min=0.0, help="noise of the angle's readings, degrees (1 sigma)")] = 0.0,
+    noise: Annotated[
+        float, typer.Option(min=0.0, max=360.0, help="noise of the angle's readings, degrees (1 sigma)")
+    ] = 0.0,
     period: Annotated[float, typer.Option(help="sample time of the controller, s, a multiple of 0.01")] = 0.01,
     delay: Annotated[int, typer.Option(min=0, help="control periods until a command arrives")] = 0,
     out: Annotated[Path, typer.Option(help="folder for the page, the pictures and the rows")] = Path("sweep"),

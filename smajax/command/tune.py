@@ -47,9 +47,11 @@ def tune(
     ] = None,
     starts: Annotated[int | None, typer.Option(min=1, help="points that gains are moved from; default 6")] = None,
     rounds: Annotated[int | None, typer.Option(min=1, help="steps, at most; default 30")] = None,
-    seconds: Annotated[float, typer.Option(min=0.1, help="length of each closed loop")] = 10.0,
+    seconds: Annotated[float, typer.Option(min=0.1, max=86_400.0, help="length of each closed loop")] = 10.0,
     estimator: Annotated[str, typer.Option(help="`printed` or `model` filter; none: told the true state")] = "",
-    noise: Annotated[float, typer.Option(min=0.0, help="noise of the angle's readings, degrees (1 sigma)")] = 0.0,
+    noise: Annotated[
+        float, typer.Option(min=0.0, max=360.0, help="noise of the angle's readings, degrees (1 sigma)")
+    ] = 0.0,
     period: Annotated[float, typer.Option(help="sample time of the controller, s, a multiple of 0.01")] = 0.01,
     delay: Annotated[int, typer.Option(min=0, help="control periods until a command arrives")] = 0,
     seed: Annotated[int, typer.Option(help="of starts, plants and noise")] = 0,

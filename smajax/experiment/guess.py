@@ -57,7 +57,8 @@ class Column:
 
 def _unit_by_size(quantity: str, values: Array) -> str:
     """The unit in which numbers of this size are usual for a wire."""
-    size = float(np.nanmax(np.abs(values))) if values.size else 0.0
+    values = values[np.isfinite(values)]
+    size = float(np.max(np.abs(values))) if values.size else 0.0
     match quantity:
         case "voltage":
             return "mV" if size > 300.0 else "V"
@@ -74,7 +75,7 @@ def _unit_by_size(quantity: str, values: Array) -> str:
         case "angle":
             return "deg" if size > 7.0 else "rad"
         case "temperature" | "ambient_temperature":
-            return "K" if float(np.nanmin(values)) > 200.0 else "degC"
+            return "K" if values.size and float(np.min(values)) > 200.0 else "degC"
         case "position":
             return "mm" if size > 0.3 else "m"
         case "mass":
@@ -138,7 +139,7 @@ def _is_clock(table: Table, name: str, headed: bool) -> bool:
     return grows and bool(np.all(np.diff(values) > 0.0))
 
 
-def _in_levels(values: Array) -> bool:
+def in_levels(values: Array) -> bool:
     """Whether a signal rests at a few levels, as a command does and a sensor does not."""
     return np.unique(values).size <= max(2, values.size // 20)
 
@@ -148,7 +149,7 @@ def _by_shape(columns: Sequence[Column], table: Table) -> list[Column]:
     found: list[Column] = []
     for one in columns:
         taken = {other.quantity for other in found} | {other.quantity for other in columns if other.quantity}
-        quantity = "voltage" if _in_levels(table.columns[one.name]) else "position"
+        quantity = "voltage" if in_levels(table.columns[one.name]) else "position"
         if one.quantity or not isinstance(one.key, int) or quantity in taken:
             found.append(one)
             continue

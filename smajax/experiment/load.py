@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from functools import lru_cache
+from collections.abc import Mapping, Sequence
+from functools import lru_cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from smajax.experiment.catalogue import Catalogue, ModelDescription
 from smajax.experiment.errors import ExperimentError, at_key, check_name
 from smajax.experiment.folder import data_folder
+from smajax.experiment.magnitude import common_warnings, magnitude_warnings
 from smajax.experiment.plausibility import (
     constant_warnings,
     copy_warnings,
@@ -18,7 +19,6 @@ from smajax.experiment.plausibility import (
     quantum_warning,
     role_warnings,
     run_warnings,
-    size_warnings,
 )
 from smajax.experiment.record import Experiment, Output
 from smajax.experiment.schema import ExperimentFile, read_schema
@@ -168,6 +168,54 @@ def _output(path: Path, file: ExperimentFile, name: str, unit: str, runs: Sequen
     return Output(name, unit, sigma, how, False, offset), float(np.median(sensors))
 
 
+def _check_effects(path: Path, file: ExperimentFile, catalogue: Catalogue) -> None:
+    """Names of effects, and lists of them that contradict each other or the model."""
+    only, excluded = file.effects.only or [], file.effects.exclude
+    for key, effects in (("effects.only", only), ("effects.exclude", excluded)):
+        for effect in effects:
+            check_name(path, key, "effect", effect, catalogue.effects)
+    declared = {name.split(".", 1)[0]: name for name in (*file.model.parameters, *file.unknown) if "." in name}
+    for effect in excluded:
+        if effect in only:
+            raise ExperimentError(
+                path, "effects.exclude", f"{effect!r} is in effects.only too; remove it from one of them"
+            )
+        if effect in declared:
+            raise ExperimentError(
+                path,
+                "effects.exclude",
+                f"{effect!r} is part of the model, since the file names {declared[effect]!r}; remove one of the two",
+            )
+
+
+def _useless(file: ExperimentFile, model: ModelDescription) -> list[str]:
+    """Effects that are asked for and that this model cannot show."""
+    none = [name for name in file.effects.only or [] if model.effects is not None and name not in model.effects]
+    return [
+        f"effects.only names {name!r}, which changes nothing of this load and drive; it is not tried" for name in none
+    ]
+
+
+def _check_order(
+    path: Path, file: ExperimentFile, model: ModelDescription, values: Mapping[str, float], place: str = ""
+) -> None:
+    """ExperimentError where values (known ones, and starts of unknown ones) contradict each other."""
+    found = model.disorder(values)
+    if found is None:
+        return
+    colder, warmer, what = found
+    named = next((name for name in (colder, warmer) if name in file.unknown or name in values), colder)
+    key = place or ("unknown" if named in file.unknown else "model.parameters")
+    raise ExperimentError(path, place if place else f"{key}.{named}", what)
+
+
+def _columns(file: ExperimentFile) -> frozenset[str | int]:
+    """Every column that the file names."""
+    keys = [key for channel in file.channels.values() for key in (channel.column, channel.variable)]
+    keys.append(file.time.column if file.time is not None else None)
+    return frozenset(key for key in keys if key is not None)
+
+
 def load_experiment(path: str | Path, catalogue: Catalogue) -> Experiment:
     """Reads an experiment file (or the folder of an `experiment.toml`) and its runs.
 
@@ -182,15 +230,17 @@ def load_experiment(path: str | Path, catalogue: Catalogue) -> Experiment:
     every = unknowns(path, file, model.parameters)
     fixed |= {unknown.name: unknown.start for unknown in every if file.unknown[unknown.name].fixed}
     free = tuple(unknown for unknown in every if unknown.name not in fixed) + run_starts(path, file, model)
-    for key, effects in (("effects.only", file.effects.only or []), ("effects.exclude", file.effects.exclude)):
-        for effect in effects:
-            check_name(path, key, "effect", effect, catalogue.effects)
+    _check_effects(path, file, catalogue)
+    values = fixed | {unknown.name: unknown.start for unknown in free}
+    _check_order(path, file, model, values)
     output_names, units = _channel_units(path, file, model)
     _check_runs(path, file, model)
     overrides = {
         run.name: given_parameters(path, f"runs.{run.name}.parameters", run.parameters, file, model.parameters)
         for run in file.runs
     }
+    for name, own in overrides.items():
+        _check_order(path, file, model, {**values, **own}, f"runs.{name}.parameters")
     reading = Reading(
         path=path,
         folder=data_folder(path, file.data.folder),
@@ -201,7 +251,7 @@ def load_experiment(path: str | Path, catalogue: Catalogue) -> Experiment:
         inputs_sampled=model.inputs_sampled,
         inputs_squared=model.inputs_squared,
         step=_step(path, file),
-        tables=lru_cache(maxsize=None)(read_table),
+        tables=lru_cache(maxsize=None)(partial(read_table, wanted=_columns(file))),
     )
     runs = [read_run(reading, run, overrides[run.name]) for run in file.runs]
     fit = [read for read in runs if read.run.role == "fit"]
@@ -213,7 +263,10 @@ def load_experiment(path: str | Path, catalogue: Catalogue) -> Experiment:
     for output, sensor_sigma in outputs:
         warnings += quantum_warning(fit, output.name, sensor_sigma, output.unit)
     warnings += copy_warnings(runs)
-    warnings += size_warnings(runs)
+    warnings += common_warnings(runs)
+    heats = sorted(model.heats & runs[0].run.inputs.keys())
+    warnings += magnitude_warnings(runs, None if model.scale is None else model.scale(values), heats, reading.step)
+    warnings += _useless(file, model)
     warnings += role_warnings(file.runs)
     return Experiment(
         name=path.resolve().parent.name if path.name == "experiment.toml" else path.stem,

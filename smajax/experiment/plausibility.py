@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from types import MappingProxyType
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -16,13 +15,11 @@ GAP_STEPS = 5.0
 FLAT_SAMPLES = 5
 # Intervals that differ by more than this share of the usual one, and the share of them that makes a clock uneven.
 UNEVEN, UNEVEN_SHARE = 0.2, 0.1
+# From this share of intervals beyond GAP_STEPS of the usual one they are no gaps, but another sampling rate.
+TWO_RATES = 0.02
 # Seconds: longer than most runs of a wire; a run of eleven seconds lasts that long when its ms are taken for s.
 LONGEST_RUN = 3.0 * 3600.0
 FEWEST_FIT_RUNS = 3
-# Channel -> (more than a wire takes, the program's own unit, the unit that such numbers usually are in).
-LARGEST: Mapping[str, tuple[float, str, str]] = MappingProxyType(
-    {"voltage": (500.0, "V", "mV"), "current": (100.0, "A", "mA")}
-)
 
 
 def _sticks_at(values: Array, extreme: float) -> bool:
@@ -77,6 +74,13 @@ def _time_warnings(run: str, name: str, signal: Signal) -> list[str]:
         )
     if intervals[longest] <= GAP_STEPS * usual:
         return found
+    slow = intervals > GAP_STEPS * usual
+    if slow.mean() > TWO_RATES:
+        return [
+            *found,
+            f"run {run!r}: {name!r} is sampled at two rates, every {usual:.4g} s and every {np.median(intervals[slow]):.4g} s, "
+            f"the latter first at {signal.time[int(np.argmax(slow))]:.6g} s; between samples it is bridged",
+        ]
     return [
         *found,
         f"run {run!r}: {name!r} has a gap of {intervals[longest]:.4g} s at {signal.time[longest]:.6g} s "
@@ -152,17 +156,6 @@ def length_warnings(runs: Sequence[ReadRun], unit: str) -> list[str]:
     return [
         f"run {name!r} lasts {length:.5g} s; {question}" for name, length in lengths.items() if length > LONGEST_RUN
     ]
-
-
-def size_warnings(runs: Sequence[ReadRun]) -> list[str]:
-    """Channels whose values no wire stands, which are mostly numbers in a smaller unit; one sentence a channel."""
-    found: list[str] = []
-    for name, (most, own, smaller) in LARGEST.items():
-        sizes = [np.max(np.abs(read.signals[name].values)) for read in runs if name in read.signals]
-        sizes += [np.max(np.abs(read.run.inputs[name])) for read in runs if name in read.run.inputs]
-        if sizes and max(sizes) > most:
-            found.append(f"the {name} reaches {max(sizes):.5g} {own}; is it in {smaller}?")
-    return found
 
 
 def role_warnings(runs: Sequence[RunSection]) -> list[str]:

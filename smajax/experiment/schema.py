@@ -13,6 +13,8 @@ from smajax.experiment.errors import ExperimentError
 from smajax.measured.names import instead
 
 Quantity = str | float
+LARGEST = 1 << 20  # bytes of an experiment file
+LONGEST = 200  # characters of what was got, in a message
 
 
 class Section(BaseModel):
@@ -247,21 +249,37 @@ def _message(error: Any, content: dict[str, Any]) -> tuple[str, str]:
             return key, str(error["ctx"]["error"])
         case "too_short" | "string_too_short":
             return key, f"is empty; {expected}"
-    return key, f"got {error['input']!r}, {expected}"
+    return key, f"got {shortened(repr(error['input']))}, {expected}"
+
+
+def shortened(text: str) -> str:
+    """What a file holds, as far as a message needs it."""
+    return text if len(text) <= LONGEST else f"{text[:LONGEST]}..."
 
 
 def read_schema(path: Path) -> ExperimentFile:
     """Reads and checks the shape of an experiment file. Raises ExperimentError naming the file and the key."""
     try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
+        if path.exists() and not path.is_file():
+            raise ExperimentError(
+                path, "", "is no file; expected an experiment file, or the folder of an experiment.toml"
+            )
+        if path.stat().st_size > LARGEST:
+            raise ExperimentError(
+                path, "", f"is larger than {LARGEST:,} bytes; expected an experiment file, not the data"
+            )
+        content = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except FileNotFoundError as error:
         raise ExperimentError(path, "", "there is no such file; expected an experiment file") from error
     except OSError as error:
         raise ExperimentError(path, "", f"cannot be read ({error.strerror})") from error
     except UnicodeDecodeError as error:
         raise ExperimentError(path, "", f"is not UTF-8 text ({error.reason} at byte {error.start})") from error
-    except tomllib.TOMLDecodeError as error:
-        raise ExperimentError(path, "", f"is not TOML: {error}") from error
+    except (ValueError, RecursionError) as error:
+        # Beside its own error the parser lets through those of numbers too long and of brackets too deep.
+        if isinstance(error, ExperimentError):
+            raise
+        raise ExperimentError(path, "", f"is not TOML: {shortened(str(error))}") from error
     try:
         return ExperimentFile.model_validate(content)
     except ValidationError as error:

@@ -72,16 +72,37 @@ class Reading:
     tables: Callable[[Path], Table]
 
 
+def _inside(reading: Reading, key: str, name: str) -> Path:
+    """A measured file, which lies in the data folder, also once links are followed: what a file asks for is read from nowhere else."""
+    try:
+        file, folder = reading.folder / name, reading.folder.resolve()
+        if not Path(name).is_absolute() and file.resolve().is_relative_to(folder):
+            return file
+    except (
+        OSError,
+        RuntimeError,
+        ValueError,
+    ) as error:  # a link that leads to itself, a character that no name may have
+        raise ExperimentError(reading.path, key, f"got {name!r}, which is no file's name ({error})") from None
+    raise ExperimentError(
+        reading.path,
+        key,
+        f"got {name!r}, which leads out of the data folder {folder}; expected a file inside of it: put it there, or say under "
+        "[data] folder where the files are",
+    )
+
+
 def _channel_file(reading: Reading, run: RunSection, name: str) -> tuple[str, Path]:
     """(key path, file) of one channel in one run."""
     if run.file is not None:
-        return f"runs.{run.name}.file", reading.folder / run.file
+        return f"runs.{run.name}.file", _inside(reading, f"runs.{run.name}.file", run.file)
     files = run.files or {}
     if name not in files:
         raise ExperimentError(
             reading.path, f"runs.{run.name}.files", f"gives no file for channel {name!r}; add {name} = '...'"
         )
-    return f"runs.{run.name}.files.{name}", reading.folder / files[name]
+    key = f"runs.{run.name}.files.{name}"
+    return key, _inside(reading, key, files[name])
 
 
 def _signal(
@@ -162,7 +183,9 @@ def _read_signals(reading: Reading, run: RunSection) -> tuple[dict[str, Signal],
 def _digest(files: tuple[Path, ...]) -> str:
     digest = hashlib.sha256()
     for file in files:
-        digest.update(file.read_bytes())
+        with file.open("rb") as opened:
+            while part := opened.read(1 << 20):
+                digest.update(part)
     return digest.hexdigest()
 
 
@@ -205,7 +228,8 @@ def read_run(reading: Reading, run: RunSection, parameters: dict[str, float]) ->
         raise ExperimentError(
             reading.path,
             "sampling.step",
-            f"run {run.name!r} lasts {end - start:g} s, less than a step of {reading.step:g} s",
+            f"run {run.name!r} lasts {end - start:g} s, less than a step of {reading.step:g} s; take a shorter step, or correct "
+            "the unit of the time",
         )
     inputs: dict[str, Array] = {}
     for name, signal in signals.items():

@@ -14,7 +14,7 @@ from smajax.figures.catalogue import every_row
 from smajax.figures.row import Row
 from smajax.fit.progress import Progress
 from smajax.made_with import made_with
-from smajax.report.files import csv_text, replace
+from smajax.report.files import csv_text, replace, writing
 from smajax.report.html import picture
 from smajax.report.plain_page import table, whole
 from smajax.source_mark import source_mark
@@ -43,7 +43,10 @@ def _kept(row: Row, folder: Path) -> Drawn | None:
     record, picture = folder / f"{row.name}.json", folder / f"{row.name}.png"
     if not (record.exists() and picture.exists()):
         return None
-    found = json.loads(record.read_text(encoding="utf-8"))
+    try:
+        found = json.loads(record.read_text(encoding="utf-8"))
+    except ValueError:
+        return None  # damaged: drawn again
     return Drawn(row, found["holds"], found["found"], found["caveat"])
 
 
@@ -51,7 +54,8 @@ def _made(row: Row, folder: Path, fast: bool) -> Drawn:
     result = row.work(fast)
     figure = Figure(figsize=SIZE)
     result.draw(figure)
-    figure.savefig(folder / f"{row.name}.png", dpi=DPI, facecolor="white", metadata={"Software": None})
+    with writing(folder / f"{row.name}.png") as file:
+        figure.savefig(file, dpi=DPI, facecolor="white", format="png", metadata={"Software": None})
     record = {
         "id": row.name,
         "where": row.where,
@@ -63,9 +67,7 @@ def _made(row: Row, folder: Path, fast: bool) -> Drawn:
         "caveat": result.caveat,
     }
     # Last and at once: a record means that its picture is there too.
-    part = folder / f"{row.name}.json.part"
-    part.write_text(json.dumps(record, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
-    part.replace(folder / f"{row.name}.json")
+    replace(folder / f"{row.name}.json", json.dumps(record, indent=2, ensure_ascii=False) + "\n")
     return Drawn(row, bool(result.holds), result.found, result.caveat)
 
 
@@ -82,7 +84,7 @@ def draw(rows: Sequence[Row], folder: Path, fast: bool, progress: Progress) -> l
             (folder / name).unlink()
         if stale:
             progress(f"say: {len(stale) // 2} figures of another version of smajax or another setting are gone.", 1.0)
-        mark.write_text(setting, encoding="utf-8")
+        replace(mark, setting)
     drawn = []
     for index, row in enumerate(rows):
         progress(f"{row.name}: {row.system}", 0.0)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import os
 import time as clock
+import zipfile
+import zlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -11,8 +12,18 @@ from typing import Any
 import numpy as np
 
 from smajax.batch.provenance import digest
+from smajax.report.files import writing
 
 SELDOM = 1.0  # s between two states of the same work
+
+
+def arrays(path: Path) -> dict[str, np.ndarray] | None:
+    """Named arrays of a file; None where there is none, or one that was damaged, which is work to be done again."""
+    try:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as kept:
+            return dict(kept)
+    except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile, zlib.error):
+        return None
 
 
 class Kept:
@@ -38,9 +49,9 @@ class Kept:
         path = self._path(key)
         if path is None or not path.exists():
             return None
-        with np.load(path, allow_pickle=False) as kept:
-            self.reused += 1
-            return dict(kept)
+        found = arrays(path)
+        self.reused += found is not None
+        return found
 
     def save(self, key: str, record: Mapping[str, Any], *, last: bool = True) -> None:
         """Keep arrays under `key`, whole or not at all. A state that is not the `last` one is kept once a second."""
@@ -48,9 +59,8 @@ class Kept:
         if path is None or (not last and clock.monotonic() - self._saved < SELDOM):
             return
         path.parent.mkdir(parents=True, exist_ok=True)
-        partial = path.with_suffix(".partial.npz")
-        np.savez(partial, **record)
-        os.replace(partial, path)
+        with writing(path) as file:
+            np.savez(file, **record)
         self._saved = clock.monotonic()
 
     def _path(self, key: str) -> Path | None:

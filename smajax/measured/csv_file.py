@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import codecs
 import csv
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -18,21 +19,53 @@ SEPARATORS = ("\t", ";", ",")
 # A number with a decimal comma, and one of these that may as well be thousands.
 DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
+BLOCK = 20_000  # lines
+CHUNK = 1 << 20  # bytes
+LONGEST_LINE = 1 << 20  # characters
 MISSING = ("", "na", "n/a")  # cells without a sample, where the experiment file allows them; nan is a number to Python
 
 
-def _text(path: Path) -> str:
-    data = path.read_bytes()
-    if data.startswith(b"MATLAB 5.0") or data.startswith(b"\x89HDF"):
-        raise MeasuredDataError(f"{path}: is a MATLAB file, not the text that its suffix says; rename it to .mat")
-    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
-        return data.decode("utf-16", errors="replace")
-    if b"\0" in data:
-        raise MeasuredDataError(f"{path}: is not the text that its suffix says (it holds binary data)")
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        return data.decode("latin-1")  # every byte is a character there: a header's degree sign must not stop the run
+def _encoding(path: Path) -> str:
+    """How the file's bytes are text. Raises MeasuredDataError where they are none; the file is never held as a whole."""
+    with path.open("rb") as file:
+        data = file.read(CHUNK)
+        if data.startswith(b"MATLAB 5.0") or data.startswith(b"\x89HDF"):
+            raise MeasuredDataError(f"{path}: is a MATLAB file, not the text that its suffix says; rename it to .mat")
+        if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+            return "utf-16"
+        decoder, utf8 = codecs.getincrementaldecoder("utf-8")(), True
+        while data:
+            if b"\0" in data:
+                raise MeasuredDataError(f"{path}: is not the text that its suffix says (it holds binary data)")
+            following = file.read(CHUNK)
+            try:
+                if utf8:
+                    decoder.decode(data, final=not following)
+            except UnicodeDecodeError:
+                utf8 = False
+            data = following
+    # Every byte is a character in Latin-1: a header's degree sign must not stop the run.
+    return "utf-8-sig" if utf8 else "latin-1"
+
+
+def _blocks(path: Path) -> Iterator[list[tuple[int, str]]]:
+    """(line number from 1, line) of every line that is neither blank nor a comment, at most BLOCK of them at a time."""
+    block: list[tuple[int, str]] = []
+    with path.open(encoding=_encoding(path), errors="replace") as file:
+        number = 0
+        while line := file.readline(LONGEST_LINE):
+            number += 1
+            if len(line) == LONGEST_LINE:
+                raise MeasuredDataError(
+                    f"{path}: line {number} is longer than {LONGEST_LINE:,} characters; expected a line of numbers a sample"
+                )
+            if line.strip() and not line.lstrip().startswith(COMMENT_MARKS):
+                block.append((number, line))
+            if len(block) == BLOCK:
+                yield block
+                block = []
+    if block:
+        yield block
 
 
 def _separator(lines: Sequence[str]) -> str | None:
@@ -54,33 +87,34 @@ def _blank_separated(line: str) -> bool:
     return len(cells) > 1 and numbers > 0 and all(DECIMAL_COMMA.fullmatch(cell) or _is_number(cell) for cell in cells)
 
 
-def _with_points(rows: list[tuple[int, list[str]]]) -> list[tuple[int, list[str]]]:
-    """Cells with decimal commas as numbers, in a file that has no decimal points and where they cannot be thousands."""
+def _has_decimal_commas(rows: list[tuple[int, list[str]]]) -> bool:
+    """Whether the commas in cells are decimal: in a file that has no decimal points and where they cannot be thousands."""
     cells = [cell for _, row in rows for cell in row]
     commas = [cell for cell in cells if DECIMAL_COMMA.fullmatch(cell)]
     points = any("." in cell and _is_number(cell) for cell in cells)
-    if not commas or points or all(THOUSANDS.fullmatch(cell) for cell in commas):
-        return rows
+    return bool(commas) and not points and not all(THOUSANDS.fullmatch(cell) for cell in commas)
+
+
+def _with_points(rows: list[tuple[int, list[str]]]) -> list[tuple[int, list[str]]]:
+    """Cells with decimal commas as numbers."""
     return [
         (number, [cell.replace(",", ".") if DECIMAL_COMMA.fullmatch(cell) else cell for cell in row])
         for number, row in rows
     ]
 
 
-def _rows(text: str) -> list[tuple[int, list[str]]]:
-    """(line number from 1, cells) of every line that is neither blank nor a comment."""
-    lines = [
-        (number, line)
-        for number, line in enumerate(text.splitlines(), start=1)
-        if line.strip() and not line.lstrip().startswith(COMMENT_MARKS)
-    ]
-    if not lines:
-        return []
-    separator = _separator([line for _, line in lines])
+def _rows(path: Path, lines: list[tuple[int, str]], separator: str | None) -> list[tuple[int, list[str]]]:
+    """(line number, cells) of each line."""
     if separator is None:
         return [(number, line.split()) for number, line in lines]
-    rows = [(number, next(csv.reader([line], delimiter=separator, skipinitialspace=True))) for number, line in lines]
-    return [(number, [cell.strip() for cell in cells]) for number, cells in rows]
+    rows = []
+    for number, line in lines:
+        try:
+            cells = next(csv.reader([line], delimiter=separator, skipinitialspace=True))
+        except csv.Error as error:
+            raise MeasuredDataError(f"{path}: line {number} cannot be cut into cells ({error}); repair it") from error
+        rows.append((number, [cell.strip() for cell in cells]))
+    return rows
 
 
 def _is_number(cell: str) -> bool:
@@ -112,40 +146,76 @@ def _is_units(rows: Sequence[tuple[int, list[str]]]) -> bool:
     return bool(words) and not any(map(_is_number, words)) and any(map(_is_number, second))
 
 
-def _why_unusable(name: str, place: int, rows: Sequence[tuple[int, list[str]]], units: bool) -> str | None:
-    """What keeps the column at that place from being numbers, or None. units: the first line looks like units."""
+def _why_unusable(name: str, place: int, rows: Sequence[tuple[int, list[str]]]) -> str | None:
+    """What keeps the column at that place from being numbers, or None."""
     wrong = next(((number, row[place]) for number, row in rows if not _is_number(row[place])), None)
     if wrong is None:
         return None
     number, cell = wrong
-    got = f"line {number}, column {name!r}: " + (f"{cell!r} is not a number" if cell else "the cell is empty")
-    if units and number == rows[0][0] and all(_is_number(row[place]) for _, row in rows[1:]):
-        return f"{got}; line {number} looks like units: delete it"
+    got = f"line {number}, column {name!r}: " + (f"{cell[:40]!r} is not a number" if cell else "the cell is empty")
     hint = "; its comma may be decimal or set thousands apart: write a decimal point" if "," in cell else ""
     return f"{got}{hint}; expected a number in every line"
 
 
-def read_csv(path: Path) -> Table:
-    """Reads a text table. The first line is a header when one of its cells is not a number.
+class _Column:
+    """One column as it is read: its numbers a block at a time, and what keeps it from being numbers."""
 
-    Columns are named by the header, or "1", "2", ... without one. A column with a cell that is not a number is
-    an error only when it is asked for. Raises MeasuredDataError.
-    """
-    rows = _with_points(_rows(_text(path)))
-    if not rows:
-        raise MeasuredDataError(f"{path}: holds no data line")
-    header: list[str] | None = None
-    if not all(_is_number(cell) for cell in rows[0][1] if cell):
-        header, rows = rows[0][1], rows[1:]
-        if not rows:
-            raise MeasuredDataError(f"{path}: holds a header and no data line")
-    width = _usual_width(rows, header)
+    def __init__(self, name: str, place: int) -> None:
+        self.name, self.place = name, place
+        self.parts: list[Array] = []
+        self.reason: str | None = None
+        self.gappy = True  # whether a missing sample is all that keeps it from being numbers
+        self.beyond_first = 0  # cells that are no numbers, but for the first line's
+
+    def add_numbers(self, values: Array) -> None:
+        self.parts.append(np.ascontiguousarray(values))
+
+    def add(self, rows: Sequence[tuple[int, list[str]]], first: bool) -> None:
+        """first: these rows begin the file."""
+        reason = _why_unusable(self.name, self.place, rows)
+        self.reason = self.reason or reason
+        cells = [row[self.place] for _, row in rows]
+        if reason is not None:
+            self.beyond_first += sum(not _is_number(cell) for cell in cells[1 if first else 0 :])
+            self.gappy = self.gappy and all(cell.lower() in MISSING or _is_number(cell) for cell in cells)
+        if self.gappy:
+            self.parts.append(np.array([float(cell) if _is_number(cell) else np.nan for cell in cells]))
+        else:
+            self.parts.clear()
+
+    @property
+    def values(self) -> Array:
+        return np.concatenate(self.parts) if self.parts else np.zeros(0)
+
+
+def _numbers(lines: list[tuple[int, str]], separator: str | None, width: int) -> Array | None:
+    """All cells of a block of plain numbers, shape (lines, width), without looking at each; None where it is not that."""
+    try:
+        found = np.loadtxt([line for _, line in lines], delimiter=separator, comments=None, ndmin=2)
+    except ValueError:
+        return None
+    return found if found.shape == (len(lines), width) else None
+
+
+def _checked_names(
+    path: Path, header: list[str] | None, rows: Sequence[tuple[int, list[str]]], width: int
+) -> list[str]:
+    """The columns' names, each once. Raises MeasuredDataError."""
     if header is not None and len(header) != width:
         number = next(number for number, cells in rows if len(cells) == width)
         raise MeasuredDataError(
             f"{path}: the header has {_cells(len(header))} ({header}) and line {number} has {width}; "
             "expected as many names as columns"
         )
+    names = header if header is not None else [str(number) for number in range(1, width + 1)]
+    names = [name or str(number) for number, name in enumerate(names, start=1)]
+    repeated = sorted(name for name, count in Counter(names).items() if count > 1)
+    if repeated:
+        raise MeasuredDataError(f"{path}: column name(s) {repeated} given more than once; rename them")
+    return names
+
+
+def _check_width(path: Path, rows: Sequence[tuple[int, list[str]]], width: int) -> None:
     for number, cells in rows:
         if len(cells) != width:
             raise MeasuredDataError(
@@ -153,25 +223,76 @@ def read_csv(path: Path) -> Table:
                 "complete the line or delete it"
             )
 
-    names = header if header is not None else [str(number) for number in range(1, width + 1)]
-    names = [name or str(number) for number, name in enumerate(names, start=1)]
-    repeated = sorted({name for name in names if names.count(name) > 1})
-    if repeated:
-        raise MeasuredDataError(f"{path}: column name(s) {repeated} given more than once; rename them")
+
+def read_csv(path: Path, wanted: Collection[str | int] | None = None) -> Table:
+    """Reads a text table. The first line is a header when one of its cells is not a number.
+
+    Columns are named by the header, or "1", "2", ... without one. A column with a cell that is not a number is
+    an error only when it is asked for. wanted: the names and numbers (from 1) of the columns to keep; None: all.
+    The file goes by in blocks of lines, of which the first tells how it is written; what is kept is 8 bytes a number.
+    Raises MeasuredDataError.
+    """
+    blocks = _blocks(path)
+    lines = next(blocks, [])
+    if not lines:
+        raise MeasuredDataError(f"{path}: holds no data line")
+    separator = _separator([line for _, line in lines])
+    rows = _rows(path, lines, separator)
+    commas = _has_decimal_commas(rows)
+    rows = _with_points(rows) if commas else rows
+    header: list[str] | None = None
+    if not all(_is_number(cell) for cell in rows[0][1] if cell):
+        header, rows = rows[0][1], rows[1:]
+        if not rows:
+            raise MeasuredDataError(f"{path}: holds a header and no data line")
+    width = _usual_width(rows, header)
+    names = _checked_names(path, header, rows, width)
+    _check_width(path, rows, width)
+    units = header is not None and _is_units(rows)
+    first_line = rows[0][0]
+    kept = [
+        _Column(name, place)
+        for place, name in enumerate(names)
+        if wanted is None or name in wanted or place + 1 in wanted
+    ]
+    for column in kept:
+        column.add(rows, first=True)
+    numbers = [np.array([number for number, _ in rows])]
+    for lines in blocks:
+        whole = None if commas else _numbers(lines, separator, width)
+        if whole is None:
+            rows = _rows(path, lines, separator)
+            rows = _with_points(rows) if commas else rows
+            _check_width(path, rows, width)
+        for column in kept:
+            if whole is None:
+                column.add(rows, first=False)
+            elif column.gappy:
+                column.add_numbers(whole[:, column.place])
+        numbers.append(np.array([number for number, _ in lines]))
+
     columns: dict[str, Array] = {}
     unusable: dict[str, str] = {}
     gappy: dict[str, Array] = {}
-    units = header is not None and _is_units(rows)
-    for place, name in enumerate(names):
-        reason = _why_unusable(name, place, rows, units)
-        if reason is None:
-            columns[name] = np.array([row[place] for _, row in rows], dtype=np.float64)
-        else:
-            unusable[name] = reason
-            if all(cell.lower() in MISSING or _is_number(cell) for cell in (row[place] for _, row in rows)):
-                cells = [row[place] for _, row in rows]
-                gappy[name] = np.array([np.nan if cell.lower() in MISSING else float(cell) for cell in cells])
-    if not columns:
+    for column in kept:
+        if column.reason is None:
+            columns[column.name] = column.values
+            continue
+        unusable[column.name] = column.reason
+        if units and not column.beyond_first:
+            got = column.reason.split("; expected")[0]
+            unusable[column.name] = f"{got}; line {first_line} looks like units: delete it"
+        if column.gappy:
+            gappy[column.name] = column.values
+    if not columns and wanted is None:
         raise MeasuredDataError(f"{path}: no column of numbers; {unusable[names[0]]}")
-    lines = tuple(number for number, _ in rows)
-    return Table(path=path, columns=columns, unusable=unusable, gappy=gappy, order=tuple(names), lines=lines)
+    return Table(
+        path=path, columns=columns, unusable=unusable, gappy=gappy, order=tuple(names), lines=_line_numbers(numbers)
+    )
+
+
+def _line_numbers(parts: list[np.ndarray]) -> Sequence[int]:
+    """The line of each sample; a range where no line was passed over, which takes no memory."""
+    first, last = int(parts[0][0]), int(parts[-1][-1])
+    whole = range(first, last + 1)
+    return whole if len(whole) == sum(map(len, parts)) else np.concatenate(parts)  # type: ignore[return-value]

@@ -10,6 +10,7 @@ import numpy as np
 from smajax.measured.extras import needed
 from smajax.measured.table import Array, MeasuredDataError, Table
 
+LARGEST = 1 << 29  # numbers of one variable, 4 GiB
 NUMBERS = {"double", "single", "logical", *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64))}
 
 
@@ -17,6 +18,8 @@ def _numbers(node: Any) -> Array | None:
     """A dataset as one signal a column, shape (n, k); MATLAB's first axis is the file's last. None for what is no number."""
     kind = node.attrs.get("MATLAB_class", b"double") if hasattr(node, "dtype") else b""
     if (kind.decode() if isinstance(kind, bytes) else str(kind)) not in NUMBERS or node.attrs.get("MATLAB_empty", 0):
+        return None
+    if node.size is None or node.size > LARGEST:  # a few bytes of a file may declare any size
         return None
     values = np.squeeze(np.asarray(node[()]))
     if values.dtype.kind not in "fiub" or values.ndim > 2:
@@ -58,7 +61,9 @@ def read_mat73(path: Path) -> Table:
                 columns.update(zip(names, found.T, strict=True))
                 if time is not None:
                     clocks.update(dict.fromkeys(names, time[:, 0]))
-    except OSError as error:
+    except MemoryError:
+        raise
+    except Exception as error:  # a damaged file raises whatever its bytes happen to lead to
         raise MeasuredDataError(f"{path}: the MATLAB 7.3 file is damaged or cut short ({error})") from error
     if not columns:
         raise MeasuredDataError(f"{path}: no signal in it; {'; '.join(unusable.values()) or 'it has no variable'}")

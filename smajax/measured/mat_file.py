@@ -83,6 +83,8 @@ def read_mat(path: Path) -> Table:
         raise MeasuredDataError(f"{path}: is not the MATLAB version 5 file that its suffix says")
     try:
         content = scipy.io.loadmat(path, struct_as_record=True, squeeze_me=False)
+    except MemoryError:
+        raise
     except Exception as error:  # a damaged file raises whatever its bytes happen to lead to
         raise MeasuredDataError(f"{path}: the MATLAB file is damaged or cut short ({error})") from error
 

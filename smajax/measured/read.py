@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from types import MappingProxyType
 
@@ -25,8 +25,11 @@ READERS: Mapping[str, Callable[[Path], Table]] = MappingProxyType(
 )
 
 
-def read_table(path: str | Path) -> Table:
-    """Reads one measured file with the reader for its suffix. Raises MeasuredDataError."""
+def read_table(path: str | Path, wanted: Collection[str | int] | None = None) -> Table:
+    """Reads one measured file with the reader for its suffix. Raises MeasuredDataError.
+
+    wanted: the columns that will be asked for, by name or number from 1; of a text table no others are kept in memory.
+    """
     path = Path(path)
     reader = READERS.get(path.suffix.lower())
     if reader is None:
@@ -41,4 +44,7 @@ def read_table(path: str | Path) -> Table:
         raise MeasuredDataError(f"{path}: is a folder; expected a file")
     if path.stat().st_size == 0:
         raise MeasuredDataError(f"{path}: the file is empty")
-    return reader(path)
+    try:
+        return reader(path) if reader is not read_csv else read_csv(path, wanted)
+    except PermissionError:
+        raise MeasuredDataError(f"{path}: may not be read; give yourself the right to (chmod u+r)") from None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -41,11 +41,11 @@ class Table:
     gappy: Mapping[str, Array] = field(default_factory=dict)
     order: tuple[str, ...] = ()
     units: Mapping[str, str] = field(default_factory=dict)
-    lines: tuple[int, ...] = ()
+    lines: Sequence[int] = ()
 
     def place(self, index: int) -> str:
         """Where in the file the sample with that index, counted from 0, is: what an editor shows, where there is one."""
-        return f"line {self.lines[index]}" if self.lines else _counted(index)
+        return f"line {self.lines[index]}" if len(self.lines) else _counted(index)
 
     def name_of(self, key: str | int, taken: Collection[str | int] = ()) -> str:
         """The column that `key` means: its name, or its number counted from 1. Raises MeasuredDataError.

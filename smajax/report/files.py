@@ -8,24 +8,44 @@ import json
 import math
 import os
 import tempfile
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
+
+UNFINISHED = ".part"  # the end of a hidden file that is being written, or was when its program was killed
 
 
-def replace(path: Path, content: str | bytes) -> Path:
-    """Write `content`, text as UTF-8, to `path` in one step; the path."""
+@contextmanager
+def writing(path: Path) -> Iterator[IO[bytes]]:
+    """A file to write into, which becomes `path` in one step when all is written; if anything fails, `path` is as before."""
     # In the same folder, because a rename is one step only within one file system.
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=UNFINISHED)
     try:
         with os.fdopen(handle, "wb") as file:
-            file.write(content.encode("utf-8") if isinstance(content, str) else content)
+            yield file
+            file.flush()
+            os.fsync(file.fileno())  # else a power cut may leave the new name with nothing behind it
         os.chmod(name, 0o644)  # mkstemp makes a file for its owner alone
         os.replace(name, path)
     except BaseException:
         Path(name).unlink(missing_ok=True)
         raise
+
+
+def replace(path: Path, content: str | bytes) -> Path:
+    """Write `content`, text as UTF-8, to `path` in one step; the path."""
+    with writing(path) as file:
+        file.write(content.encode("utf-8") if isinstance(content, str) else content)
     return path
+
+
+def sweep_up(folder: Path) -> None:
+    """Take away what killed programs left half written in `folder` and below it; nobody else may be writing there."""
+    for one in folder.rglob(f".*{UNFINISHED}"):
+        if one.is_file():
+            with suppress(OSError):
+                one.unlink()
 
 
 def json_text(value: Any) -> str:

@@ -7,7 +7,6 @@ after a round is a whole: a tuning that is interrupted goes on from it to the sa
 from __future__ import annotations
 
 import dataclasses
-import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,9 @@ from typing import Any
 import numpy as np
 from scipy.stats import qmc
 
+from smajax.fit.kept import arrays
 from smajax.measured.names import instead
+from smajax.report.files import writing
 from smajax.tune import adam, trust
 from smajax.tune.evaluate import Rig
 from smajax.tune.members import Members
@@ -65,10 +66,8 @@ class Descent:
         """Whole or not at all."""
         fields = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
         fields |= {f"memory {name}": array for name, array in fields.pop("memory").items()}
-        part = path.with_name(f".{path.name}.part")
-        with part.open("wb") as file:
+        with writing(path) as file:
             np.savez(file, **fields)
-        os.replace(part, path)
 
     @property
     def ended(self) -> bool:
@@ -81,10 +80,11 @@ class Descent:
         return int(self.ran.max(initial=0))
 
 
-def load(path: Path) -> Descent:
-    """What `Descent.save` wrote."""
-    with np.load(path) as saved:
-        whole: dict[str, Any] = {name: saved[name] for name in saved.files}
+def load(path: Path) -> Descent | None:
+    """What `Descent.save` wrote; None where there is nothing, or it is damaged."""
+    whole: dict[str, Any] | None = arrays(path)
+    if whole is None:
+        return None
     memory = {name.removeprefix("memory "): whole.pop(name) for name in list(whole) if name.startswith("memory ")}
     whole |= {name: int(whole[name]) for name in ("round", "left_out", "wild")}
     return Descent(**whole, memory=memory)

@@ -32,7 +32,10 @@ def check_folder(out: Path, asked: dict[str, object]) -> None:
         )
     if not found:
         return
-    before = json.loads((out / ASKED).read_text(encoding="utf-8"))
+    try:
+        before = json.loads((out / ASKED).read_text(encoding="utf-8"))
+    except ValueError:
+        raise ValueError(f"--out {out}: {ASKED} is damaged: give another folder, or --overwrite.") from None
     differ = sorted(name for name in asked.keys() | before.keys() if asked.get(name) != before.get(name))
     if differ:
         told = "; ".join(
@@ -59,7 +62,7 @@ def tune_into(
     def keep(descent: Descent) -> None:
         descent.save(out / STATE)
 
-    after = load(out / STATE) if (out / STATE).exists() else None
+    after = load(out / STATE)
     if after is not None and not after.ended:
         progress(f"say: going on after round {after.round}", 1.0)
     found = tune(system, settings, after=after, keep=keep, progress=progress)
@@ -67,9 +70,7 @@ def tune_into(
     write_gains(out / GAINS, found.after, found.units, told)
     pictures = {"before_after.png": before_after(found), "descent.png": costs_over_loops(found)}
     for name, png in pictures.items():
-        part = out / f".{name}.part"
-        part.write_bytes(png)
-        part.replace(out / name)
+        replace(out / name, png)
     replace(out / "tune.json", json_text(record(found, command)))
     replace(out / "loops.csv", loops(found))
     replace(out / "tune.html", page(found, pictures, command))

@@ -1,0 +1,168 @@
+"""Options that cannot be used, of every other command: one message with what there is instead, exit code 2, nothing written."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.small_bench import log, refused, smajax
+
+WIRE = ("flexinol_table_3_2", "dead_weight", "flexinol_voltage")
+SIMULATE = {
+    "a wire there is none of": (
+        ["flexinol", "--step", "5V:1s"],
+        "No wire preset `flexinol`; there are ['flexinol_ht_500um'",
+    ),
+    "a load there is none of": (
+        [*WIRE[:1], "weight", "voltage", "--step", "5V:1s"],
+        "No load preset `weight`; there are",
+    ),
+    "no time": ([*WIRE, "--step", "5V"], "nothing says how long the run is: give levels with times (6V:5s,0V:10s)"),
+    "a length for a voltage": ([*WIRE, "--step", "5mm:1s"], "got unit 'mm' ([length]), expected one like 'V'"),
+    "no step": ([*WIRE, "--step", "5V:1s", "--dt", "0s"], "--dt: got '0s', expected a time above zero"),
+    "a step that is none": ([*WIRE, "--step", "5V:1s", "--dt", "nan"], "got 'nan', expected a number and a unit like"),
+    "too many steps": ([*WIRE, "--step", "5V:1s", "--dt", "1 fs"], "are over 20,000,000 samples: take a longer --dt"),
+    "too long": ([*WIRE, "--step", "5V:1e300s"], "are over 20,000,000 samples"),
+    "a misspelt parameter": (
+        [*WIRE, "--step", "5V:1s", "--set", "wire_lenght=4"],
+        "no parameter 'wire_lenght'; did you mean 'wire_length'",
+    ),
+    "a negative diameter": (
+        [*WIRE, "--step", "5V:1s", "--set", "wire_diameter=-1mm"],
+        "`wire_diameter` = -0.001 m (from 1e-05",
+    ),
+    "nan": ([*WIRE, "--step", "5V:1s", "--set", "wire_diameter=nan"], "`wire_diameter` = nan m (from"),
+    "A_s above A_f": (
+        [*WIRE, "--step", "5V:1s", "--set", "austenite_start=90"],
+        "= 90 degC is not below `austenite_finish`",
+    ),
+    "a missing file": ([*WIRE, "--input", "voltage=no.csv:U:V"], "no.csv: there is no such file"),
+    "a missing column": ([*WIRE, "--input", "voltage={log}:W:V"], "no column 'W'; it has: t, U, x"),
+    "a column without unit": (
+        [*WIRE, "--input", "voltage={log}:U"],
+        "does not say its unit; write it behind: a.csv:U:V",
+    ),
+    "an input there is none of": ([*WIRE, "--input", "voltag=5V:1s"], "no input 'voltag'; did you mean 'voltage'?"),
+    "a controller there is none of": (
+        ["--controller", "pdi", "--set-point", "4deg:5s"],
+        "no controller 'pdi'; did you mean 'pid'",
+    ),
+    "gains that are not there": (["--gains", "no.json", "--set-point", "4deg:5s"], "gains file no.json cannot be read"),
+}
+
+
+@pytest.mark.parametrize("name", SIMULATE)
+def test_a_simulation_that_cannot_be(tmp_path: Path, name: str) -> None:
+    words, expected = SIMULATE[name]
+    path = log(tmp_path / "a.csv")
+    said = refused("simulate", *[one.format(log=path) for one in words], "--out", tmp_path / "out")
+    assert expected in said
+    assert not (tmp_path / "out").exists()
+
+
+GAINS = {
+    "a list": ("[1]", "must have `controller` and `gains`"),
+    "a controller of another type": ('{"controller": ["pid"], "gains": {}}', "no controller ['pid']"),
+    "brackets without end": ("[" * 100_000, "is not JSON ("),
+    "a number without end": (
+        '{"controller": "pid", "gains": {"proportional_gain": ' + "9" * 5000 + "}}",
+        "is not JSON (",
+    ),
+    "a number that is none": (
+        '{"controller": "pid", "gains": {"proportional_gain": NaN}}',
+        "`proportional_gain` = nan V/rad",
+    ),
+    "text": ('{"controller": "pid", "gains": {"proportional_gain": "3"}}', "must be a number, not '3'"),
+    "a misspelt gain": ('{"controller": "pid", "gains": {"proportional": 3}}', "did you mean 'proportional_gain'"),
+}
+
+
+@pytest.mark.parametrize("name", GAINS)
+def test_gains_that_are_none(tmp_path: Path, name: str) -> None:
+    content, expected = GAINS[name]
+    (tmp_path / "gains.json").write_text(content)
+    for words in (["simulate", "--gains"], ["sweep", "--gains"], ["tune", "pid", "--start"]):
+        more = ["--set-point", "4deg:5s"] if words[0] == "simulate" else []
+        assert expected in refused(*words, tmp_path / "gains.json", *more, "--out", tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+LONG = {
+    "sweep --controllers pdi": "no controller `pdi`; there are pid,",
+    "sweep --controllers pid --over convection,damp": "damp",
+    "sweep --controllers pid --over convection": "two mismatches with a comma between them, not `convection`",
+    "sweep --set-points a": "finite numbers with commas between them, not `a`",
+    "sweep --set-points nan": "finite numbers with commas between them, not `nan`",
+    "sweep --set-points 400": "set points are angles between the arm's stops, -45 to 95 degrees",
+    "sweep --gain-shares 1,inf": "finite numbers with commas between them, not `1,inf`",
+    "sweep --gain-shares=-1": "gains are shares of the preset's, above 0",
+    "sweep --points 1": "greater than or equal to 2",
+    "sweep --seconds inf": "less than or equal to 86400",
+    "sweep --noise nan": "less than or equal to 360",
+    "sweep --period nan": "a whole number of simulation steps of 0.01 s, not nan s",
+    "sweep --period inf": "a whole number of simulation steps of 0.01 s, not inf s",
+    "sweep --estimator kalman": "no filter `kalman`; there are",
+    "tune pdi": "no controller `pdi`; did you mean 'pid'?",
+    "tune pid --variation inertai=0.2": "no variation `inertai`; did you mean 'inertia'?",
+    "tune pid --variation inertia=nan": "each name once with its number",
+    "tune pid --variation inertia=2": "a variation is a share between 0 and 1",
+    "tune pid --limits overshot=2": "no term `overshot`; did you mean 'overshoot'?",
+    "tune pid --limits overshoot=nan": "each name once with its number",
+    "tune pid --weights overshoot=-2": "weights are no less than 0",
+    "tune pid --objective best": "no objective `best`; there are: nominal, worst, mean-variance",
+    "tune pid --by newton": "no rule `newton`; there are: trust-region, adam",
+    "tune pid --seconds inf": "less than or equal to 86400",
+    "figures M99": "No figure `M99`; there are chapter3",
+}
+
+
+@pytest.mark.parametrize("words", LONG)
+def test_long_work_that_cannot_be(tmp_path: Path, words: str) -> None:
+    said = refused(*words.split(), "--out", tmp_path / "out")
+    assert LONG[words] in said
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_new_experiment_of_what_is_no_log(tmp_path: Path) -> None:
+    out = tmp_path / "experiment.toml"
+    for name, content, expected in (
+        ("no.csv", None, "there is no such file"),
+        ("empty.csv", "", "the file is empty"),
+        ("heading.csv", "t,U,x\n", "holds a header and no data line"),
+        ("text.csv", "a,b\nfoo,bar\nfoo,baz\n", "no column of numbers; line 2, column 'a': 'foo' is not a number"),
+        ("log.xlsx", "t,U,x\n0,1,2\n", "files ending in '.xlsx' cannot be read; expected .csv"),
+    ):
+        if content is not None:
+            (tmp_path / name).write_text(content)
+        assert expected in refused("new-experiment", tmp_path / name, "--out", out)
+        assert not out.exists()
+    good = log(tmp_path / "good.csv")
+    assert "the folder" in refused("new-experiment", good, "--out", tmp_path / "no" / "experiment.toml")
+    out.write_text("mine")
+    assert "exists; give another name, or --overwrite" in refused("new-experiment", good, "--out", out)
+    assert out.read_text() == "mine"
+
+
+@pytest.mark.parametrize("cell", ["nan", "inf", "0"])
+def test_a_new_experiment_of_a_strange_log_is_begun_and_says_what_is_wrong(tmp_path: Path, cell: str) -> None:
+    path = tmp_path / "strange.csv"
+    path.write_text("t,U,x\n" + "".join(f"{cell if cell == '0' else k},{cell},{k}\n" for k in range(30)))
+    ended = smajax("new-experiment", path, "--out", tmp_path / "experiment.toml")
+    assert ended.code == 3
+    assert "It does not load yet: " in ended.out
+    assert "Warning" not in ended.said
+
+
+def test_a_logs_name_cannot_become_a_section(tmp_path: Path) -> None:
+    path = log(tmp_path / 'q"\n[model]\nwire = "x.csv')
+    ended = smajax("new-experiment", path, "--out", tmp_path / "experiment.toml", "--json")
+    assert ended.code == 0, ended.out
+    assert (tmp_path / "experiment.toml").read_text().count("\n[model]") == 1
+
+
+def test_a_melting_wire_is_told(tmp_path: Path) -> None:
+    ended = smajax("simulate", *WIRE, "--step", "1000000V:1s", "--out", tmp_path / "out")
+    assert ended.code == 0
+    assert "The wire reaches" in ended.said
+    assert "and it melts at 1310 degC: is the input's unit right?" in ended.said

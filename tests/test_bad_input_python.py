@@ -1,0 +1,83 @@
+"""What the Python API is given in a wrong shape: the error names the leaf, its axes, and what to do."""
+
+from __future__ import annotations
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from smajax.batch.axes import grid, sampled, zipped
+from smajax.batch.run import run_batch
+from smajax.compiled import simulate_compiled
+from smajax.dataset import simulate_dataset
+from smajax.parameters import set_parameters
+from smajax.presets import build
+from smajax.simulate import simulate
+from smajax.system import initial_state
+
+SYSTEM = build("flexinol_table_3_2", "dead_weight", "flexinol_voltage")
+VOLTAGE = {"voltage": jnp.full(50, 5.0)}
+BATCH = set_parameters(SYSTEM, {"convection_coefficient": jnp.array([50.0, 100.0, 150.0])})
+
+
+@pytest.mark.parametrize("run", [simulate, simulate_compiled, simulate_dataset])
+def test_a_batch_where_one_number_is_wanted_names_the_leaf_and_its_axes(run) -> None:
+    words = r"`convection_coefficient` has the axes \(3,\)\. Map over the batch: `jax\.vmap"
+    with pytest.raises(ValueError, match=words):
+        run(BATCH, VOLTAGE)
+    rest = initial_state(SYSTEM, {"voltage": jnp.asarray(5.0)})
+    two = jax.tree.map(lambda leaf: jnp.stack([leaf, leaf]), rest)
+    with pytest.raises(ValueError, match=r"`initial\.wire\.temperature` has the axes \(2,\)"):
+        run(SYSTEM, VOLTAGE, initial=two)
+    with pytest.raises(ValueError, match=r"`dt` has the axes \(3,\)"):
+        run(SYSTEM, VOLTAGE, dt=jnp.ones(3))
+
+
+def test_axes_of_a_batch_that_do_not_match_are_named() -> None:
+    with pytest.raises(ValueError, match=r"`convection_coefficient` has the axes \(3,\)"):
+        run_batch(BATCH, {"voltage": 5.0}, grid(wire_length=[0.5, 0.6]), seconds=0.1)
+    with pytest.raises(
+        ValueError, match=r"zipped lists must be of one length, but there are \{'voltage': 2, 'load_mass': 3\}"
+    ):
+        zipped(voltage=[1.0, 2.0], load_mass=[1.0, 2.0, 3.0])
+    with pytest.raises(
+        ValueError, match=r"an input is a number or a series of shape \(n,\), but \{'voltage': \(3, 50\)\}"
+    ):
+        run_batch(SYSTEM, {"voltage": jnp.ones((3, 50))}, grid(wire_length=[0.5]), seconds=0.1)
+    with pytest.raises(
+        ValueError, match=r"the values of `voltage` must be a list of numbers, but their shape is \(2, 2\)"
+    ):
+        grid(voltage=np.ones((2, 2)))
+    with pytest.raises(ValueError, match="value 1 of `voltage` is not a finite number"):
+        grid(voltage=[1.0, np.nan])
+    with pytest.raises(ValueError, match="bounds are two finite numbers that rise"):
+        sampled(4, voltage=(2.0, 1.0))
+    with pytest.raises(ValueError, match=r"\['wire_lenght'\] are neither parameters"):
+        run_batch(SYSTEM, {"voltage": 5.0}, grid(wire_lenght=[0.5]), seconds=0.1)
+
+
+@pytest.mark.parametrize("run", [simulate, simulate_compiled, simulate_dataset])
+def test_inputs_of_a_wrong_shape_are_named(run) -> None:
+    with pytest.raises(ValueError, match=r"the shapes are \{'voltage': \(3, 50\)\}"):
+        run(SYSTEM, {"voltage": jnp.ones((3, 50))})
+    with pytest.raises(ValueError, match=r"not empty, but the shapes are \{'voltage': \(0,\)\}"):
+        run(SYSTEM, {"voltage": jnp.ones(0)})
+    with pytest.raises(ValueError, match=r"\['voltage'\] are missing and \['volts'\] mean nothing"):
+        run(SYSTEM, {"volts": jnp.ones(3)})
+    for dt in (0.0, -1.0, float("nan"), float("inf")):
+        with pytest.raises(ValueError, match="`dt` is the time between two samples, in seconds and above zero"):
+            run(SYSTEM, VOLTAGE, dt=dt)
+
+
+def test_values_that_cannot_be_are_named_before_a_run() -> None:
+    with pytest.raises(ValueError, match="the input `voltage` is nan at sample 3; give finite numbers"):
+        simulate_dataset(SYSTEM, {"voltage": jnp.array([1.0, 2.0, np.nan])})
+    with pytest.raises(ValueError, match="the input `voltage` is str; expected numbers"):
+        simulate_dataset(SYSTEM, {"voltage": "5 V"})  # type: ignore[dict-item]
+    with pytest.raises(ValueError, match="`martensite_finish` = 70 degC is not below `martensite_start`"):
+        simulate_dataset(set_parameters(SYSTEM, {"martensite_finish": 70.0}), VOLTAGE)
+    with pytest.raises(ValueError, match=r"No parameter named \['austenite_strat'\]; this model has"):
+        set_parameters(SYSTEM, {"austenite_strat": 90.0})
+    with pytest.raises(ValueError, match=r"`wire_diameter` = -1 m \(from"):
+        simulate_dataset(set_parameters(SYSTEM, {"wire_diameter": -1.0}), VOLTAGE)
