@@ -34,7 +34,8 @@ class Grown:
     tried: int  # refits of one effect each
 
 
-def _model(effects: Sequence[str], fit: Fit) -> Model:
+def model_of(effects: Sequence[str], fit: Fit) -> Model:
+    """A fit as a model of which nothing was left out."""
     return Model(tuple(effects), fit.values, fit.cost, np.zeros((0, 0)), float("nan"))
 
 
@@ -57,7 +58,7 @@ def starts_of(bench: Bench, model: Model, effect: str) -> list[Start]:
 
 def grown(bench: Bench, base: Fit, most: int = MOST_ROUNDS) -> Grown:
     """From the refitted base model on, at most as many effects as the loop may add."""
-    model, tried = _model((), base), 0
+    model, tried = model_of((), base), 0
     every = bench.fits.candidates  # one program then serves all refits of all rounds, and all cases of a rig
     fit_error, held_out = bench.errors([base.values], every)[0]
     for _ in range(most):
@@ -76,7 +77,7 @@ def grown(bench: Bench, base: Fit, most: int = MOST_ROUNDS) -> Grown:
         name = min(errors, key=lambda one: errors[one][1])
         if not errors[name][1] < held_out:
             break
-        model = _model((*model.effects, name), best[name])
+        model = model_of((*model.effects, name), best[name])
         fit_error, held_out = errors[name]
     return Grown(model.effects, model.values, fit_error, held_out, tried)
 

@@ -19,9 +19,11 @@ from studies.attribution_benchmark.peers.plain import fit_of
 from studies.benchmarks.peers import run_peer
 
 PACKAGE = "studies.attribution_benchmark.peers"
-PYTHONS = {  # module, and the variable that names an interpreter that can import what it needs
-    "pysindy": ("sindy_peer", "SMAJAX_PYSINDY_PYTHON"),
-    "jax_sysid": ("sysid_peer", "SMAJAX_JAX_SYSID_PYTHON"),
+# Module, variable that names an interpreter that can import what it needs, options.
+PYTHONS: dict[str, tuple[str, str, tuple[str, ...]]] = {
+    "pysindy": ("sindy_peer", "SMAJAX_PYSINDY_PYTHON", ()),
+    "pysindy_sparse": ("sindy_peer", "SMAJAX_PYSINDY_PYTHON", ("--sparse",)),
+    "jax_sysid": ("sysid_peer", "SMAJAX_JAX_SYSID_PYTHON", ()),
 }
 STATES = ("temperature", "stress", "martensite_fraction")
 
@@ -46,7 +48,7 @@ def given_of(bench: Bench, base: Answer) -> Given:
 
 def told_by(peer: str, bench: Bench, base: Answer) -> Answer:
     """What the peer makes of the case, run by the interpreter that the environment names."""
-    module, variable = PYTHONS[peer]
+    module, variable, options = PYTHONS[peer]
     python = os.environ.get(variable)
     if not python:
         return Answer(
@@ -56,7 +58,7 @@ def told_by(peer: str, bench: Bench, base: Answer) -> Answer:
     with TemporaryDirectory() as place:
         file = Path(place) / "given.npz"
         save(file, given_of(bench, base))
-        told = run_peer(module, python, str(file), package=PACKAGE)
+        told = run_peer(module, python, str(file), *options, package=PACKAGE)
     if "reason" in told:
         return Answer(peer, base.case, reason=told["reason"])
     seconds = base.seconds + clock.monotonic() - began

@@ -19,14 +19,14 @@ from pathlib import Path
 from studies.attribution_benchmark.peers.answer import Answer, load, save
 from studies.attribution_benchmark.peers.bench import Bench, opened
 from studies.attribution_benchmark.peers.greedy import chosen
-from studies.attribution_benchmark.peers.handed import told_by
+from studies.attribution_benchmark.peers.handed import PYTHONS, told_by
 from studies.attribution_benchmark.peers.plain import refitted
+from studies.attribution_benchmark.peers.table import written
 
 PEERS: dict[str, Callable[[Bench, Answer], Answer]] = {
     "plain": lambda _bench, base: base,
     "greedy": chosen,
-    "pysindy": partial(told_by, "pysindy"),
-    "jax_sysid": partial(told_by, "jax_sysid"),
+    **{peer: partial(told_by, peer) for peer in PYTHONS},
 }
 
 
@@ -67,6 +67,7 @@ def main() -> None:
                 break
             named = "+".join(one.added) or "+".join(one.where) or "names nothing"
             print(f"{where}: {named}; held out {one.held_out_error:.2f}, {one.seconds:.0f} s {one.said}", flush=True)
+    print(written(given.out))
 
 
 if __name__ == "__main__":

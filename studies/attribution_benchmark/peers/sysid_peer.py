@@ -121,14 +121,14 @@ def off(model: Any, data: Data, runs: Sequence[int]) -> float:
     return error(pairs)
 
 
-def run(given: Given) -> dict[str, Any]:
+def run(given: Given, settings: Sequence[Setting] = SETTINGS) -> dict[str, Any]:
     """What is printed."""
     from importlib.metadata import version
 
     data = data_of(given)
     fit, unseen = ([k for k, one in enumerate(given.runs) if one.fitted is role] for role in (True, False))
     scores = {}
-    for setting in SETTINGS:
+    for setting in settings:
         each = [off(fitted(setting, data, [k for k in fit if k != out], 0), data, [out]) for out in fit]
         scores[setting] = float(np.sqrt(np.mean(np.square(each))))
     best = min(scores, key=lambda one: scores[one])
@@ -136,7 +136,6 @@ def run(given: Given) -> dict[str, Any]:
     model = min(models, key=lambda one: off(one, data, fit))
     kind = f"network of {best.neurons} and {best.neurons} neurons" if best.neurons else "linear"
     return {
-        "peer": "jax_sysid",
         "version": version("jax-sysid"),
         "fit_error": off(model, data, fit),
         "held_out_error": off(model, data, unseen),
@@ -147,13 +146,14 @@ def run(given: Given) -> dict[str, Any]:
 def main() -> None:
     asked = argparse.ArgumentParser(description=__doc__)
     asked.add_argument("file", type=Path)
-    file = asked.parse_args().file
+    asked.add_argument("--linear", action="store_true", help="linear models only")
+    options = asked.parse_args()
     import jax
 
     jax.config.update("jax_enable_x64", True)
     jax.config.update("jax_platforms", "cpu")
     with contextlib.redirect_stdout(io.StringIO()):  # it reports its progress there
-        found = run(load(file))
+        found = run(load(options.file), [one for one in SETTINGS if not (options.linear and one.neurons)])
     print(json.dumps(found))
 
 
