@@ -15,12 +15,13 @@ import numpy as np
 
 from smajax.attribution.judging import Model, Start
 from smajax.attribution.screen import switches
-from smajax.attribution.search import MOST_ROUNDS
 from smajax.effects.library import LIBRARY
 from smajax.fit.box import Fit
 from studies.attribution_benchmark.peers.answer import Answer
 from studies.attribution_benchmark.peers.bench import Bench
 from studies.attribution_benchmark.peers.plain import fit_of
+
+ROUNDS = 3  # effects at most: no case has more than two
 
 
 @dataclass(frozen=True)
@@ -56,8 +57,8 @@ def starts_of(bench: Bench, model: Model, effect: str) -> list[Start]:
     return found
 
 
-def grown(bench: Bench, base: Fit, most: int = MOST_ROUNDS) -> Grown:
-    """From the refitted base model on, at most as many effects as the loop may add."""
+def grown(bench: Bench, base: Fit, most: int = ROUNDS) -> Grown:
+    """From the refitted base model on, `most` effects at most."""
     model, tried = model_of((), base), 0
     every = bench.fits.candidates  # one program then serves all refits of all rounds, and all cases of a rig
     fit_error, held_out = bench.errors([base.values], every)[0]
