@@ -90,7 +90,7 @@ def test_each_kind_has_its_right_answer() -> None:
     assert judge(foreign, _report("not in the library", [], unknown="sensor", or_else="heat"), 1.0).right
     assert not judge(foreign, _report("partly explained", ["creep"], unknown="sensor", or_else="heat"), 1.0).right
     # What the library does not hold is outside of it, whatever the generator calls it.
-    assert judge(_truth("single", {"quantisation": "sensor"}), _report("adequate", []), 1.0).kind == "outside"
+    assert judge(_truth("single", {"cogging": "mechanics"}), _report("adequate", []), 1.0).kind == "outside"
 
 
 def test_errors_are_pooled_in_noises_and_kept_whole(tmp_path: Path) -> None:

@@ -99,6 +99,23 @@ def _error(runs: Sequence[Mapping[str, Any]], role: str, which: str, noise: floa
     return float((squares / max(sum(run["samples"] for run in own), 1)) ** 0.5 / noise)
 
 
+def names_of(truth: Mapping[str, Any]) -> tuple[str, ...]:
+    """The true effects, as the generator calls them."""
+    return tuple(truth["effects"])
+
+
+def equations_of(truth: Mapping[str, Any]) -> tuple[str, ...]:
+    """The equations that lack them."""
+    return tuple(equation_of(entry["group"]) for entry in truth["effects"].values())
+
+
+def kind_of(truth: Mapping[str, Any]) -> str:
+    """The kind of case: what the library does not hold is outside, whatever the generator thinks."""
+    held = all(set(called(name)) & set(LIBRARY) for name in names_of(truth))
+    foreign = not held or any(entry["outside"] for entry in truth["effects"].values())
+    return "outside" if foreign and truth["kind"] != "absorbed" else str(truth["kind"])
+
+
 def judge(truth: Mapping[str, Any], report: Mapping[str, Any], seconds: float) -> Judged:
     """From truth.json and the report's JSON."""
     noise = report["output"]["noise_sigma"]
@@ -106,18 +123,14 @@ def judge(truth: Mapping[str, Any], report: Mapping[str, Any], seconds: float) -
     rivals = [one["rival"] for one in report["rivals"] if one["weight"] >= CONFUSABLE]
     alike = [name for entry in report["rounds"] for model in entry["alike"] for name in model.split(" + ")]
     unknown = [term["equation"] for term in report["unknown"] if _told_among(term, report["unknown"])]
-    names = tuple(truth["effects"])
-    # What the library does not hold is outside, whatever the generator thinks.
-    held = all(set(called(name)) & set(LIBRARY) for name in names)
-    foreign = not held or any(entry["outside"] for entry in truth["effects"].values())
     return Judged(
         case=truth["case"],
-        kind="outside" if foreign and truth["kind"] != "absorbed" else truth["kind"],
+        kind=kind_of(truth),
         rig=truth["rig"],
         asked=truth["strength_asked"],
         strength=truth["strength_together"],
-        truth=names,
-        equations=tuple(equation_of(entry["group"]) for entry in truth["effects"].values()),
+        truth=names_of(truth),
+        equations=equations_of(truth),
         verdict=report["verdict"],
         added=added,
         named=tuple(dict.fromkeys([*added, *rivals, *alike])),

@@ -14,9 +14,11 @@ DIFFRAX_PYTHON = "SMAJAX_DIFFRAX_PYTHON"
 LONGEST = 3600.0  # s
 
 
-def run_peer(name: str, python: str, *options: str, longest: float = LONGEST) -> dict[str, Any]:
-    """What `studies.benchmarks.<name>` prints with these options; or {"peer", "reason"} where it could not run."""
-    command = [python, "-m", f"studies.benchmarks.{name}", *options]
+def run_peer(
+    name: str, python: str, *options: str, longest: float = LONGEST, package: str = "studies.benchmarks"
+) -> dict[str, Any]:
+    """What `<package>.<name>` prints with these options; or {"peer", "reason"} where it could not run."""
+    command = [python, "-m", f"{package}.{name}", *options]
     # Our own search path and XLA's flags are not the peer's.
     environment = {key: value for key, value in os.environ.items() if key not in ("PYTHONPATH", "XLA_FLAGS")}
     try:
