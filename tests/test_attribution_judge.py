@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ def _report(
 ) -> dict[str, Any]:
     runs = [
         {"role": role, "rmse_before": before, "rmse_after": after, "samples": 100}
-        for role, before, after in (("fit", 3.0, 1.0), ("fit", 4.0, 1.0), ("held-out", 5.0, 1.1))
+        for role, before, after in (("fit", 9.0, 1.0), ("fit", 12.0, 1.0), ("held-out", 5.0, 1.1))
     ]
     return {
         "verdict": verdict,
@@ -95,7 +96,7 @@ def test_each_kind_has_its_right_answer() -> None:
 
 def test_errors_are_pooled_in_noises_and_kept_whole(tmp_path: Path) -> None:
     one = CASES["named"][0]
-    assert one.fit_before == pytest.approx((0.5 * (9.0 + 16.0)) ** 0.5)
+    assert one.fit_before == pytest.approx((0.5 * (81.0 + 144.0)) ** 0.5)
     assert one.held_out_before == 5.0
     assert one.held_out_after == pytest.approx(1.1)
     save(one, tmp_path / "one.json")
@@ -114,5 +115,7 @@ def test_tables_and_picture(tmp_path: Path) -> None:
     assert told["both effects of a pair"] == "0 of 1 (0 %)"
     assert told["a case in under two minutes"] == "7 of 8 (88 %)"
     assert strength_of(cases[0]) == 10.0
+    # What the generator calls ten noises, and a refit to its end leaves next to nothing of.
+    assert strength_of(replace(cases[0], fit_before=1.5)) == 1.0
     assert written(cases, tmp_path) == text(cases)
     assert (tmp_path / "results.png").stat().st_size > 10_000
