@@ -30,7 +30,7 @@ from smajax.report.findings import Round
 from smajax.residual.noise_like import correlation_time, split_runs
 
 PENALTY = 0.01  # by how much of its mean square a coefficient must lower the error on left-out runs
-CHANCE = 1.0  # by how many standard errors of the paired difference, too (the one-standard-error rule)
+CHANCE = 0.5  # by how many standard errors of the paired difference, too: with three or four runs that error is wide
 NUDGE = 1e-3  # share of an effect's start at which its score is taken
 INSIDE = 0.03  # a refit starts at least this share of the box away from bounds to which a poorer model was driven
 TOLD = 1.0  # to what share of itself the other runs must tell an effect's size for a left-out run to count

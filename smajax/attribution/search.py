@@ -116,15 +116,17 @@ def refined(setting: Search, model: Model) -> Model:
 
 
 def simplest(setting: Search, judged: Sequence[Model], present: Model) -> tuple[Model, list[Model]]:
-    """Of the models that beat the present one, the one with the fewest coefficients that the best of them does not beat.
+    """Of the models that beat the present one, the best, or the smallest part of it that it does not beat.
 
-    Beside it the others that cannot be told from the best, but for those that only add to it. The best of all when
-    none beats the present one: the caller then says by how much it falls short.
+    Beside it the others that cannot be told from the best, but for those that only add to it. Among these a count of
+    coefficients would prefer a small effect to a large one that is as likely. The best of all when none beats the
+    present one: the caller then says by how much it falls short.
     """
     eligible = [m for m in judged if setting.better(m, present)[0]]
     best = min(eligible or judged, key=lambda m: m.left_out_rmse)
     alike = [m for m in eligible if m is best or not setting.better(best, m)[0]]
-    chosen = min(alike or [best], key=lambda m: (len(setting.free(m.effects)), m.left_out_rmse))
+    parts = [m for m in alike if set(m.effects) <= set(best.effects)]
+    chosen = min(parts or [best], key=lambda m: (len(setting.free(m.effects)), m.left_out_rmse))
     return chosen, [m for m in alike if not set(chosen.effects) <= set(m.effects)]
 
 
