@@ -46,6 +46,7 @@ from smajax.effects.supply_sag import SupplySag
 from smajax.effects.temperature_resistance import TemperatureResistance
 from smajax.effects.thermal_expansion import ThermalExpansion
 from smajax.effects.two_part_transformation import TwoPartTransformation
+from smajax.effects.two_step_transformation import TwoStepTransformation
 from smajax.effects.two_way_memory import TwoWayMemory
 from smajax.effects.unequal_stress_slopes import UnequalStressSlopes
 from smajax.effects.viscous_friction import ViscousFriction
@@ -77,6 +78,7 @@ _OWN: dict[str, type[AbstractEffect]] = {
         SmoothTransformation,
         AsymmetricTransformation,
         TwoPartTransformation,
+        TwoStepTransformation,
         EnhancedConditions,
         UnequalStressSlopes,
         StressDependentWidth,
