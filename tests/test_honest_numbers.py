@@ -265,6 +265,7 @@ def test_data_that_do_not_belong_together_are_not_explained(tmp_path: Path, shuf
     assert after > 50.0 * findings.noise_sigma
     assert after > 0.8 * before
     if shuffled:
+        assert findings.verdict == "not in the library"
         assert not any(one.added for one in findings.effects)
         assert any(
             "times the declared noise: either the noise was declared too small or" in line for line in findings.summary

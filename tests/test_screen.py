@@ -10,6 +10,7 @@ from smajax.attribution.search import start_values
 from smajax.effects.library import LIBRARY
 from smajax.fit.sensitivity import Sensitivity
 from smajax.residual.noise_like import correlation_time, whiteness_p_value
+from smajax.residual.portrait import all_noise
 
 NAMES = ("convection_coefficient", "latent_heat.enthalpy", "ambient_drift.rate", "sensor_lag.time_constant")
 BOUNDS = {NAMES[0]: (1.0, 500.0), NAMES[1]: (0.0, 6e4), NAMES[2]: (-0.1, 0.1), NAMES[3]: (0.0, 3.0)}
@@ -82,3 +83,10 @@ def test_whiteness_and_memory_of_noise() -> None:
     assert whiteness_p_value(smooth) < 1e-12
     assert correlation_time(white) == pytest.approx(1.0, abs=0.4)
     assert correlation_time(smooth) == pytest.approx(10.0, rel=0.4)
+
+
+@pytest.mark.parametrize(("size", "noise"), [(1.0, True), (2.0, True), (20.0, False)])
+def test_what_is_white_is_noise_unless_it_is_far_above_it(size: float, noise: bool) -> None:
+    """Shuffled samples leave no memory, and no model can be content with them."""
+    left = [size * np.random.default_rng(seed).normal(size=400) for seed in range(3)]
+    assert all_noise(left, 1.0) == noise

@@ -89,9 +89,9 @@ def summary(
         )
     if not any(run.role == "held-out" for run in runs):
         told.append("No run was held out, so nothing here was tested on data that the fit never saw.")
-    if noise_like(after) and after.ratio > WRONG_NOISE:
+    if after.white and after.ratio > WRONG_NOISE:
         told.append(
-            f"What is left has no memory but is {after.ratio:.1f} times the declared noise: either the noise was declared too small or something fast is missing."
+            f"What is left has no memory but is {after.ratio:.1f} times the declared noise: either the noise was declared too small or something fast is missing, or the samples are not those of these inputs."
         )
     if after.ratio < 1.0 / WRONG_NOISE:
         told.append(
