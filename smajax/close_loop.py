@@ -12,6 +12,7 @@ import numpy as np
 
 from smajax.attribution.bootstrap import bootstrapped
 from smajax.attribution.judging import Evidence, Model, Search
+from smajax.attribution.places import extent_of
 from smajax.attribution.rivals import rivals
 from smajax.attribution.search import scores_at, search
 from smajax.attribution.unknown import Lacking, in_place_of, unknown_terms
@@ -67,10 +68,17 @@ def _job(experiment: Experiment) -> _Job:
     declared = experiment.declared_effects
     names = candidates(base, experiment.effects_only, (*experiment.effects_excluded, *declared), experiment.clocked)
     known = {**experiment.parameters, **{unknown.name: unknown.start for unknown in experiment.unknowns}}
-    full = extended(base, (*declared, *names), {name: value for name, value in known.items() if "." in name})
     runs = tuple(run for run in experiment.runs if run.role == "fit")
-    batch = pack(runs, experiment.step, parameter_values(full))
-    problem = Problem.build(full, batch, experiment.noise_sigma, experiment.offset)
+
+    def problem_with(effects: tuple[str, ...]) -> Problem:
+        model = extended(base, effects, {name: value for name, value in known.items() if "." in name})
+        batch = pack(runs, experiment.step, parameter_values(model))
+        return Problem.build(model, batch, experiment.noise_sigma, experiment.offset)
+
+    extent = extent_of(problem_with(declared))
+    names = tuple(name for name in names if LIBRARY[name].shows(extent))
+    problem = problem_with((*declared, *names))
+    full = problem.system
     bounds = {entry.name: (entry.low, entry.high) for entry in parameters(full).values()}
     bounds |= {unknown.name: (unknown.low, unknown.high) for unknown in experiment.unknowns}
     return _Job(experiment, runs, problem, tuple(u.name for u in experiment.unknowns), bounds, names)

@@ -151,12 +151,18 @@ def test_at_its_start_it_can_be_seen(effect: str) -> None:
     assert np.abs(told.at_starts - told.at_base).max() > 1e-4 * np.ptp(told.at_base)
 
 
+# Their derivative is that at fixed steps of a staircase (see the effect); a difference sees samples change their step.
+STAIRS = {"sensor_resolution.increment", "sensor_resolution.zero"}
+
+
 @pytest.mark.parametrize("share", [NUDGE, 1.0], ids=["next to nothing", "switched on"])
 @pytest.mark.parametrize("effect", HERE)
 def test_its_derivatives_are_the_differences(effect: str, share: float) -> None:
     """Where its score is taken, and where a refit begins: at exactly zero a tail has no derivative (see `scores_at`)."""
     told = _told(effect)
     for k, name in enumerate(told.names):
+        if name in STAIRS:
+            continue
         forward, difference = told.forward[share][k], told.difference[share][k]
         if _short(name) in LIBRARY[effect].switches:
             assert np.abs(forward).max() > 0.0, f"{name} cannot be told"

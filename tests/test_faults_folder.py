@@ -6,6 +6,7 @@ import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,14 @@ from smajax.report.files import replace, writing
 from tests.small_bench import bench, log, refused, smajax
 
 WIRE = ("flexinol_table_3_2", "dead_weight", "flexinol_voltage", "--step", "5V:1s")
+
+
+@pytest.fixture(autouse=True, scope="module")
+def programs_of_their_own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """A program that is killed, or has no room, may leave half a compiled one behind: not where other tests read theirs."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("JAX_COMPILATION_CACHE_DIR", str(tmp_path_factory.mktemp("programs")))
+        yield
 
 
 def _python(code: str, *words: str | Path, before: str = "", **more: object) -> subprocess.CompletedProcess[str]:

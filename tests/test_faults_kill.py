@@ -11,6 +11,7 @@ import signal
 import subprocess
 import sys
 import time as clock
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,15 @@ import pytest
 
 from smajax.command.folder import MARK
 from tests.small_bench import bench
+
+
+@pytest.fixture(autouse=True, scope="module")
+def programs_of_their_own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """A program that is killed, or has no room, may leave half a compiled one behind: not where other tests read theirs."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("JAX_COMPILATION_CACHE_DIR", str(tmp_path_factory.mktemp("programs")))
+        yield
+
 
 FAST, SLOW = 1, 10  # kills of each command
 ONE_EFFECT = ("[sampling]", '[effects]\nonly = ["latent_heat"]\n[sampling]')

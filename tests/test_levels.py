@@ -27,9 +27,9 @@ def test_the_increment_of_a_staircase_is_found(share: float) -> None:
     assert likeliest_increment(logs, 0.05 * increment) == pytest.approx(increment, rel=0.5 * share)
 
 
-def test_a_smooth_log_has_no_increment_worth_looking_at_but_gets_one() -> None:
+def test_a_smooth_log_has_no_increment() -> None:
     rng = np.random.default_rng(4)
     logs = [stroke + 1e-5 * rng.normal(size=stroke.size) for stroke in _strokes(rng)]
-    assert 0.0 < likeliest_increment(logs, 1e-5) < 1e-2
+    assert likeliest_increment(logs, 1e-5) == 0.0
     still = [1e-6 * rng.normal(size=100)]
-    assert likeliest_increment(still, 1e-6) > 0.0
+    assert likeliest_increment(still, 1e-6) == 0.0

@@ -69,6 +69,6 @@ def test_having_looked_at_many_places_counts_against_a_score() -> None:
     looked = looked_at(setting, _base(setting).values, EFFECTS, ())
     assert looked.looks["draught"] > 5
     assert "radiation" not in looked.looks
-    extent = extent_of(setting)
+    extent = extent_of(setting.problem)
     assert extent.seconds == pytest.approx(DT * SAMPLES)
     assert extent.stroke == pytest.approx(float(np.ptp(setting.problem.measured, axis=1).max()))

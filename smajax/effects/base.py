@@ -28,7 +28,7 @@ class Extent(NamedTuple):
 
     seconds: float  # length of one
     stroke: float  # between the smallest and the largest reading of all, SI
-    increment: float  # from one level to the next where the readings lie on levels, SI: the likeliest there is
+    increment: float  # from one level to the next where the readings lie on levels, SI; 0 where they do not
 
 
 class AbstractEffect(eqx.Module):
@@ -52,6 +52,11 @@ class AbstractEffect(eqx.Module):
     @abc.abstractmethod
     def base(cls) -> AbstractEffect:
         """The effect at its base value: present in the equations and changing nothing."""
+
+    @classmethod
+    def shows(cls, extent: Extent) -> bool:
+        """Whether runs of that extent could show it: a candidate that they cannot is not looked at."""
+        return True
 
     @classmethod
     def places(cls, extent: Extent) -> tuple[dict[str, float], ...]:

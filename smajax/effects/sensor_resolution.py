@@ -37,6 +37,10 @@ class SensorResolution(AbstractEffect):
         return cls(share=0.0, increment=1e-3, zero=0.0)
 
     @classmethod
+    def shows(cls, extent: Extent) -> bool:
+        return extent.increment > 0.0
+
+    @classmethod
     def places(cls, extent: Extent) -> tuple[dict[str, float], ...]:
         # The increment is read off the log; where the levels lie on the model's scale, which has another zero, is not.
         step = extent.increment

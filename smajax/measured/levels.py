@@ -11,12 +11,13 @@ from smajax.measured.table import Array
 LEAST = 4.0  # noises: an increment that is smaller leaves no gaps
 FEWEST = 3  # levels over the stroke
 CELL = 0.5  # noises: a cell of the scale counts once, however long the reading rests in it
+ON_LEVELS = 0.75  # of the periodogram: about that of steps of nine noises; ends of a stroke where it rests make 0.65
 FINENESS = 8  # frequencies looked at per turn over the whole stroke
 MOST = 20_000  # of them
 
 
 def likeliest_increment(readings: Sequence[Array], sigma: float) -> float:
-    """The increment at which the cells of the scale that were seen lie most nearly, in the unit of the readings.
+    """The increment at which the cells of the scale that were seen lie, in the unit of the readings; 0 where they go everywhere.
 
     readings: one array (n,) a run, of noise `sigma`. Every run may have its own zero. The periodogram of the cells over
     the scale: 1 where all lie on levels, about one over the root of their number where the readings go everywhere.
@@ -24,9 +25,10 @@ def likeliest_increment(readings: Sequence[Array], sigma: float) -> float:
     stroke = max(float(np.ptp(one)) for one in readings)
     finest = max(LEAST * sigma, stroke * FINENESS / MOST)
     if stroke <= FEWEST * finest:
-        return max(stroke / FEWEST, sigma)
+        return 0.0
     frequency = np.arange(FEWEST / stroke, 1.0 / finest, 1.0 / (FINENESS * stroke))
     cells = [CELL * sigma * np.unique(np.round(one / (CELL * sigma))) for one in readings]
     seen = sum(len(one) for one in cells)
     strength = sum(np.abs(np.exp(2j * np.pi * np.outer(frequency, one)).sum(axis=1)) for one in cells) / seen
-    return float(1.0 / frequency[int(np.argmax(strength))])
+    best = int(np.argmax(strength))
+    return float(1.0 / frequency[best]) if strength[best] > ON_LEVELS else 0.0
