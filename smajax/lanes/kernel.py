@@ -94,8 +94,11 @@ class Kernel:
             scratch = _aligned(self.translated.scratch)
             self._call(*tables, scratch.ctypes.data, first, last)
 
-        with ThreadPoolExecutor(len(edges) - 1) as pool:
-            list(pool.map(part, edges[:-1].tolist(), edges[1:].tolist()))
+        try:
+            with ThreadPoolExecutor(len(edges) - 1) as pool:
+                list(pool.map(part, edges[:-1].tolist(), edges[1:].tolist()))
+        except RuntimeError:  # no room for another thread under a cap on memory: this one does it all
+            part(0, groups)
         return [one[:members] for one in results]
 
     @staticmethod
