@@ -28,7 +28,6 @@ from smajax.fit.kept import Kept
 from smajax.fit.problem import Problem
 from smajax.fit.progress import Progress, quiet
 from smajax.fit.sensitivity import Sensitivity, sensitivity
-from smajax.fit.shown import misfits
 from smajax.fit.uncertainty import Uncertainty, identifiability, uncertainty
 from smajax.load.coupon import AbstractCoupon
 from smajax.made_with import made_with
@@ -44,8 +43,7 @@ from smajax.report.findings import (
     Round,
     RunFinding,
 )
-from smajax.residual.noise_like import split_runs
-from smajax.residual.portrait import all_noise, portrait
+from smajax.residual.portrait import portrait
 from smajax.types import Trajectory
 
 SEED = 2004
@@ -128,7 +126,7 @@ def close_loop(
     first, final = search(setting, setting.base(start, seed))
     lacking: Lacking | None = None
     aside: tuple[str, ...] = ()
-    if final.effects and not _is_noise(job, final):
+    if final.effects and not setting.is_noise(final.values):
         lacking = in_place_of(setting, first, final)
     if lacking is not None:
         setting.note(_set_aside(setting, final, lacking))
@@ -181,12 +179,6 @@ def close_loop(
         unknown=unknown,
         provenance=_provenance(experiment, kept, command, seed, clock.monotonic() - began),
     )
-
-
-def _is_noise(job: _Job, model: Model) -> bool:
-    """Whether what a model leaves of the fit runs is measurement noise."""
-    (misfit,) = misfits(job.problem, [model.values])
-    return all_noise(split_runs(misfit, np.asarray(job.problem.batch.mask)), job.experiment.noise_sigma)
 
 
 def _set_aside(setting: Search, final: Model, lacking: Lacking) -> Round:

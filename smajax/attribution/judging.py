@@ -28,6 +28,7 @@ from smajax.fit.starts import from_many_starts, hopped
 from smajax.fit.uncertainty import held
 from smajax.report.findings import Round
 from smajax.residual.noise_like import correlation_time, split_runs
+from smajax.residual.portrait import all_noise
 
 PENALTY = 0.01  # by how much of its mean square a coefficient must lower the error on left-out runs
 CHANCE = 0.5  # by how many standard errors of the paired difference, too: with three or four runs that error is wide
@@ -185,6 +186,11 @@ class Search:
     def known(model: Model) -> Fit:
         """A fitted model as a fit that has ended."""
         return Fit(model.values, model.cost, True, "", 0)
+
+    def is_noise(self, values: np.ndarray) -> bool:
+        """Whether what a model leaves of the fit runs is measurement noise."""
+        (misfit,) = misfits(self.problem, [values])
+        return all_noise(split_runs(misfit, np.asarray(self.problem.batch.mask)), float(self.problem.noise_sigma))
 
     def rmse(self, misfit: np.ndarray) -> float:
         return float(np.sqrt((misfit**2).sum() / np.asarray(self.problem.batch.mask).sum()))
