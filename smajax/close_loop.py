@@ -11,8 +11,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from smajax.attribution.bootstrap import bootstrapped
+from smajax.attribution.extent import extent_of
 from smajax.attribution.judging import Evidence, Model, Search
-from smajax.attribution.places import extent_of
 from smajax.attribution.rivals import rivals
 from smajax.attribution.search import scores_at, search
 from smajax.attribution.unknown import Lacking, in_place_of, unknown_terms
@@ -40,7 +40,6 @@ from smajax.report.findings import (
     Findings,
     ParameterFinding,
     Portrait,
-    Round,
     RunFinding,
 )
 from smajax.residual.portrait import portrait
@@ -129,7 +128,6 @@ def close_loop(
     if final.effects and not setting.is_noise(final.values):
         lacking = in_place_of(setting, first, final)
     if lacking is not None:
-        setting.note(_set_aside(setting, final, lacking))
         final, aside = first, final.effects
 
     progress("standard errors and pictures", 0.0)
@@ -178,21 +176,6 @@ def close_loop(
         rivals=mistaken,
         unknown=unknown,
         provenance=_provenance(experiment, kept, command, seed, clock.monotonic() - began),
-    )
-
-
-def _set_aside(setting: Search, final: Model, lacking: Lacking) -> Round:
-    """The round in which the library's effects give way to one unknown term."""
-    term = lacking.terms[0]
-    why = (
-        f"set aside: {term.title} alone foretells left-out runs better than all of them, "
-        f"{setting.shown(final.left_out_rmse)} -> {setting.shown(term.left_out_after)}"
-    )
-    return Round(
-        len(setting.rounds) + 1,
-        ((" + ".join(final.effects), final.left_out_rmse),),
-        f"without {' + '.join(final.effects)}",
-        why,
     )
 
 

@@ -8,8 +8,9 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from smajax.attribution.extent import extent_of
 from smajax.attribution.judging import Model, Search
-from smajax.attribution.places import extent_of, looked_at
+from smajax.attribution.places import looked_at
 from smajax.attribution.search import scores_at, start_values
 from smajax.extended import extended
 from smajax.fit.batch import RunBatch, simulate_batch

@@ -9,13 +9,16 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
+from smajax.attribution.extent import extent_of
 from smajax.attribution.screen import Score, scaled, switches
+from smajax.effects.base import Extent
 from smajax.effects.every import EVERY
 from smajax.effects.library import LIBRARY
 from smajax.fit.box import Fit, fit_in_box
@@ -106,6 +109,11 @@ class Search:
         """Those of them that no bound holds at `values`."""
         place = self.problem.names.index
         return [name for name in self.free(effects) if not held(float(values[place(name)]), *self.bounds[name])]
+
+    @cached_property
+    def extent(self) -> Extent:
+        """How far the runs go; reading the levels of a log takes a while."""
+        return extent_of(self.problem)
 
     @property
     def every(self) -> list[str]:

@@ -15,12 +15,9 @@ import numpy as np
 
 from smajax.attribution.judging import Search, nudged
 from smajax.attribution.screen import score_of, switches, without
-from smajax.effects.base import Extent
 from smajax.effects.library import LIBRARY
-from smajax.fit.problem import Problem
 from smajax.fit.sensitivity import Sensitivity, sensitivity
 from smajax.fit.shown import shown_and_slopes
-from smajax.measured.levels import likeliest_increment
 
 
 @dataclass(frozen=True)
@@ -32,27 +29,16 @@ class Looked:
     looks: dict[str, int] = field(default_factory=dict)
 
 
-def extent_of(problem: Problem) -> Extent:
-    """Length of a typical run, range of all readings, and the increment at which they lie."""
-    batch = problem.batch
-    mask = np.asarray(batch.mask) > 0
-    readings = [row[valid] for row, valid in zip(problem.measured, mask, strict=True) if valid.any()]
-    stroke = max(float(np.ptp(one)) for one in readings)
-    increment = likeliest_increment(readings, float(np.median(problem.noise)))
-    return Extent(float(np.median(mask.sum(axis=1)) * batch.dt), stroke, increment)
-
-
 def looked_at(setting: Search, values: np.ndarray, effects: Sequence[str], fitted: Sequence[str]) -> Looked:
     """Misfit and its derivatives at `values` (P,), where `fitted` are the loose parameters.
 
     `effects`, which are off, are each at the place whose trace promises most beside what the fitted parameters absorb.
     """
     at = sensitivity(setting.problem, nudged(setting, values, effects), setting.every)
-    extent = extent_of(setting.problem)
     options = [
         (effect, {f"{effect}.{name}": one for name, one in place.items()})
         for effect in effects
-        for place in LIBRARY[effect].places(extent)
+        for place in LIBRARY[effect].places(setting.extent)
     ]
     if not options:
         return Looked(at)

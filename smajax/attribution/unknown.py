@@ -24,7 +24,7 @@ from smajax.fit.sensitivity import sensitivity
 from smajax.fit.shown import misfits
 from smajax.fit.uncertainty import covariance_of, uncertainty
 from smajax.parameters import parameters
-from smajax.report.findings import UnknownTerm
+from smajax.report.findings import Round, UnknownTerm
 from smajax.residual.noise_like import correlation_time, split_runs
 from smajax.unknown.ranges import Sought, sought
 from smajax.unknown.spline import COUNT, design
@@ -134,14 +134,22 @@ def in_place_of(setting: Search, first: Model, final: Model) -> Lacking | None:
     """One unknown term in the base model `first` that foretells left-out runs better than all the effects of `final`.
 
     By `APART` standard errors, or at all where it has no more coefficients than they have. Then these are what the
-    library has that comes near it, and none of them is missing.
+    library has that comes near it, and none of them is missing: a round is noted in which they are set aside.
     """
     found = unknown_terms(setting, first)
     if found.model is None or found.model.left_out_rmse >= final.left_out_rmse:
         return None
     ahead = paired(final.left_out, found.model.left_out, np.asarray(setting.problem.batch.mask))
     spent = sum(len(setting.coefficients(effect)) for effect in final.effects)
-    return found if ahead > APART or spent >= COUNT else None
+    if ahead <= APART and spent < COUNT:
+        return None
+    gone, term = " + ".join(final.effects), found.terms[0]
+    why = (
+        f"set aside: {term.title} alone foretells left-out runs better than all of them, "
+        f"{setting.shown(final.left_out_rmse)} -> {setting.shown(term.left_out_after)}"
+    )
+    setting.note(Round(len(setting.rounds) + 1, ((gone, final.left_out_rmse),), f"without {gone}", why))
+    return found
 
 
 def refitted(search: Terms, chosen: Sequence[Score], values: np.ndarray) -> list[Fitted]:

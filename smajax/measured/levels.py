@@ -14,6 +14,7 @@ CELL = 0.5  # noises: a cell of the scale counts once, however long the reading 
 ON_LEVELS = 0.75  # of the periodogram: about that of steps of nine noises; ends of a stroke where it rests make 0.65
 FINENESS = 8  # frequencies looked at per turn over the whole stroke
 MOST = 20_000  # of them
+BLOCK = 64  # at a time
 
 
 def likeliest_increment(readings: Sequence[Array], sigma: float) -> float:
@@ -29,6 +30,14 @@ def likeliest_increment(readings: Sequence[Array], sigma: float) -> float:
     frequency = np.arange(FEWEST / stroke, 1.0 / finest, 1.0 / (FINENESS * stroke))
     cells = [CELL * sigma * np.unique(np.round(one / (CELL * sigma))) for one in readings]
     seen = sum(len(one) for one in cells)
-    strength = sum(np.abs(np.exp(2j * np.pi * np.outer(frequency, one)).sum(axis=1)) for one in cells) / seen
+    # Some at a time: all of them for a long log would not fit in memory.
+    blocks = np.array_split(frequency, -(-len(frequency) // BLOCK))
+    strength = np.concatenate([_strength(block, cells) for block in blocks]) / seen
     best = int(np.argmax(strength))
     return float(1.0 / frequency[best]) if strength[best] > ON_LEVELS else 0.0
+
+
+def _strength(frequency: Array, cells: Sequence[Array]) -> Array:
+    """Size of the sums of turns at each frequency (F,), every run by itself, added up."""
+    turns = (np.exp(2j * np.pi * np.outer(frequency, one)).sum(axis=1) for one in cells)
+    return np.sum([np.abs(one) for one in turns], axis=0)

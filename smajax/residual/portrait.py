@@ -66,19 +66,18 @@ def portrait(
 
 def noise_like(found: Portrait) -> bool:
     """Nothing left to explain: no memory beyond chance, or no more than `LEFT_OVER` of the mean square over the noise."""
-    return at_noise_level(found.ratio) or (found.white and found.ratio < DECLARED_TOO_SMALL)
+    return _is_noise(found.ratio, found.white)
 
 
-def at_noise_level(ratio: float) -> bool:
-    """Whether a residual of `ratio` times the noise is no more than it."""
-    return 1.0 - 1.0 / max(ratio, 1e-9) ** 2 <= LEFT_OVER
+def _is_noise(ratio: float, white: bool) -> bool:
+    excess = 1.0 - 1.0 / max(ratio, 1e-9) ** 2
+    return excess <= LEFT_OVER or (white and ratio < DECLARED_TOO_SMALL)
 
 
 def all_noise(residuals: Sequence[np.ndarray], noise_sigma: float) -> bool:
     """`noise_like` of residuals (SI, one array of shape (n,) a run) whose portrait nobody needs."""
     rmse = float(np.sqrt(np.mean(np.concatenate(residuals) ** 2)))
-    ratio = rmse / noise_sigma
-    return at_noise_level(ratio) or (ratio < DECLARED_TOO_SMALL and whiteness_p_value(residuals) > WHITE)
+    return _is_noise(rmse / noise_sigma, whiteness_p_value(residuals) > WHITE)
 
 
 def _sentences(
