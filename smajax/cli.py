@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import sys
 from typing import Annotated
 
 import typer
@@ -69,11 +70,25 @@ app.command()(bench)
 app.command("new-experiment")(new_experiment)
 
 
+def _no_memory(error: Exception) -> bool:
+    """Whether memory ran out: of a value, or of a part of a library that was to be loaded."""
+    return isinstance(error, MemoryError) or (
+        isinstance(error, ImportError) and ("failed to map" in str(error) or "cannot allocate" in str(error).lower())
+    )
+
+
 def main() -> None:
     """Entry point: errors that a user can mend are said in one paragraph with exit code 2, without a traceback."""
     try:
         app()
     except Exception as error:
+        if _no_memory(error):
+            # Written plainly: what colours a message would have to be loaded, and there is no memory left for it.
+            sys.stderr.write(
+                f"error: not enough memory ({error or 'none left'}); take a longer step or shorter runs, or allow more. "
+                "What was finished is kept.\n"
+            )
+            raise SystemExit(2) from None
         # Imported when there is an error: `--help` does not wait for them.
         from smajax.command.folder import FolderTaken
         from smajax.experiment.errors import ExperimentError
@@ -81,12 +96,7 @@ def main() -> None:
         from smajax.plugins import PluginError
         from smajax.units import UnitError
 
-        if isinstance(error, MemoryError):
-            error = MemoryError(
-                f"not enough memory ({error or 'none left'}); take a longer step or shorter runs, or allow more. What was "
-                "finished is kept."
-            )
-        elif isinstance(error, OSError) and error.errno in FULL:
+        if isinstance(error, OSError) and error.errno in FULL:
             error = OSError(
                 f"{error.filename or 'the disk'}: {error.strerror}: free some space and give the same command again. What was "
                 "finished is kept."

@@ -220,8 +220,9 @@ def test_too_little_memory_is_said(tmp_path: Path) -> None:
     experiment = bench(tmp_path / "bench")
     (experiment.parent / "a.csv").write_text("t,U,x\n" + "".join(f"{k},5,1\n" for k in range(800_000)))
     code = (
-        "import resource, sys\nimport smajax.catalogue, smajax.close_loop, smajax.report.write\n"
+        "import resource, sys\nimport smajax.catalogue, smajax.close_loop, smajax.progress, smajax.report.write\n"
         "from smajax.cli import main\nfrom smajax.runtime import prepare\nprepare()\n"
+        "from smajax.units import to_si\nto_si(1.0, 'W/(m^2 K)')\n"  # what units there are is read once
         "import jax\njax.numpy.zeros(3).sum()\n"  # its threads are there before the cap
         "used = int(open('/proc/self/statm').read().split()[0]) * resource.getpagesize()\n"
         "resource.setrlimit(resource.RLIMIT_AS, (used + (16 << 20),) * 2)\n"

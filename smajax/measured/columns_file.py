@@ -42,6 +42,8 @@ def read_parquet(path: Path) -> Table:
     parquet = needed("pyarrow.parquet", path)
     try:
         held = parquet.read_table(path)
+    except MemoryError:
+        raise
     except Exception as error:  # pyarrow's own kinds of errors
         raise MeasuredDataError(f"{path}: is no Parquet file, or a damaged one ({error})") from error
     return _table(path, {name: held.column(name).to_numpy() for name in held.column_names})
@@ -62,6 +64,8 @@ def read_netcdf(path: Path) -> Table:
         with xr.open_dataset(path, engine="h5netcdf" if fourth else "scipy", decode_times=True) as held:
             flat = {str(name): held[name].to_numpy() for name in held.variables if held[name].ndim == 1}
             units = {name: str(held[name].attrs["units"]) for name in flat if held[name].attrs.get("units")}
+    except MemoryError:
+        raise
     except Exception as error:  # what a damaged file raises is the engine's
         raise MeasuredDataError(f"{path}: is no NetCDF file, or a damaged one ({error})") from error
     return _table(path, flat, units)
