@@ -302,6 +302,24 @@ def test_a_small_loop_begins_its_way_back_earlier_and_a_full_one_where_it_did():
     assert at[0] - at[1] == pytest.approx(earlier, abs=0.05)
 
 
+def test_a_small_loop_may_end_where_the_full_one_does_and_the_smallest_be_shifted_least():
+    inputs = _inputs(temperature=_ramps(20.0, 110.0, 55.0, 110.0, 20.0), stress=np.full(360, 60e6))
+    plain = simulate_compiled(COUPON, inputs, DT)
+    on = {"minor_loops.heating": 0.5, "minor_loops.small": 1.0, "minor_loops.pinned": 1.0}
+    run = simulate_compiled(extended(COUPON, ("minor_loops",), on), inputs, DT)
+    left, back = float(plain.martensite_fraction[179]), slice(180, 270)
+    law = COUPON.wire.kinetics
+    width, early = float(law.austenite_finish - law.austenite_start), 0.5 * (1.0 - left) * left
+
+    def reached(one, fraction):
+        return np.interp(-fraction, -one.martensite_fraction[back], inputs["temperature"][back])
+
+    start = float(law.austenite_start) + 60e6 / float(law.stress_slope_austenite)
+    for share in (0.9, 0.5, 0.1):  # of what was left: the range begins e earlier and ends where it did
+        z = (reached(plain, share * left) - start) / width
+        assert reached(run, share * left) == pytest.approx(start + width * (z * (1.0 + early) - early), abs=0.05)
+
+
 def test_a_sensor_shows_what_its_faults_make_of_the_position():
     """Gain, drift, zero and backlash in the library's order, from the first sample on."""
     names = ("sensor_gain", "sensor_drift", "sensor_offset", "sensor_backlash")

@@ -171,6 +171,7 @@ def picture(cases: Sequence[Judged], path: Path) -> None:
     if nulls:
         right.axhline(np.mean(nulls), color="0.5", ls="--", label=f"false alarms on {len(nulls)} nulls")
     right.set_xscale("log")
+    right.set_xlim(0.8 * min(STRENGTHS), 1.25 * max(STRENGTHS))  # where there are only nulls no point says it
     right.set_xticks(STRENGTHS, [f"{size:g}" for size in STRENGTHS])
     right.set_ylim(-0.02, 1.02)
     right.set_xlabel("strength: noises left after a refit of the base model")
