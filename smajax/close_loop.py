@@ -12,7 +12,7 @@ import numpy as np
 
 from smajax.attribution.bootstrap import bootstrapped
 from smajax.attribution.extent import extent_of
-from smajax.attribution.judging import Evidence, Model, Search
+from smajax.attribution.judging import FORETELLS, Evidence, Model, Search
 from smajax.attribution.rivals import rivals
 from smajax.attribution.search import scores_at, search
 from smajax.attribution.unknown import Lacking, in_place_of, unknown_terms
@@ -40,6 +40,7 @@ from smajax.report.findings import (
     Findings,
     ParameterFinding,
     Portrait,
+    Round,
     RunFinding,
 )
 from smajax.residual.portrait import portrait
@@ -127,8 +128,11 @@ def close_loop(
     aside: tuple[str, ...] = ()
     if final.effects and not setting.is_noise(final.values):
         lacking = in_place_of(setting, first, final)
-    if lacking is not None:
-        final, aside = first, final.effects
+        if lacking is not None:
+            final, aside = first, final.effects
+        elif not setting.foretells(final.left_out_rmse):
+            setting.note(_meaning_nothing(setting, final))
+            final = first
 
     progress("standard errors and pictures", 0.0)
     before = _told(job, setting, first, start)
@@ -142,8 +146,12 @@ def close_loop(
     answer = verdict(final.effects, portrait_after)
     if lacking is None:
         lacking = unknown_terms(setting, final) if answer in ("partly explained", "not in the library") else Lacking()
+    if lacking.terms and not setting.foretells(lacking.terms[0].left_out_after):
+        lacking, aside = Lacking(), ()
     unknown = lacking.terms
-    opening, *rest = summary(answer, experiment, runs, effects, portrait_after, len(job.candidates), aside)
+    blind = answer == "not in the library" and not unknown and not setting.foretells(final.left_out_rmse)
+    foretold = setting.foretold(final.left_out_rmse) if blind else None
+    opening, *rest = summary(answer, experiment, runs, effects, portrait_after, len(job.candidates), aside, foretold)
     return Findings(
         experiment=experiment.name,
         title=experiment.title,
@@ -177,6 +185,16 @@ def close_loop(
         unknown=unknown,
         provenance=_provenance(experiment, kept, command, seed, clock.monotonic() - began),
     )
+
+
+def _meaning_nothing(setting: Search, final: Model) -> Round:
+    """The round in which effects are set aside with which the model still foretells hardly anything."""
+    why = (
+        f"set aside: with it the model foretells {max(setting.foretold(final.left_out_rmse), 0.0):.0%} of the motion in runs "
+        f"left out, and under {FORETELLS:.0%} an effect means nothing"
+    )
+    gone = " + ".join(final.effects)
+    return Round(len(setting.rounds) + 1, ((gone, final.left_out_rmse),), f"without {gone}", why)
 
 
 def _refuse_what_only_identify_does(experiment: Experiment) -> None:

@@ -39,6 +39,7 @@ NUDGE = 1e-3  # share of an effect's start at which its score is taken
 INSIDE = 0.03  # a refit starts at least this share of the box away from bounds to which a poorer model was driven
 TOLD = 1.0  # to what share of itself the other runs must tell an effect's size for a left-out run to count
 LOOSE = 1.0  # how far a fold's parameters may stray for nothing, in logits of the box
+FORETELLS = 0.5  # share of the motion in left-out runs that a model has to foretell for its effects to mean anything
 ENOUGH = 1e-5  # of its cost: where a refit ends
 
 
@@ -202,6 +203,18 @@ class Search:
 
     def rmse(self, misfit: np.ndarray) -> float:
         return float(np.sqrt((misfit**2).sum() / np.asarray(self.problem.batch.mask).sum()))
+
+    def foretold(self, left_out_rmse: float) -> float:
+        """Share of the mean square of the motion in the fit runs, each about its mean, that a left-out error leaves explained."""
+        mask = np.asarray(self.problem.batch.mask)
+        measured = np.asarray(self.problem.measured)
+        mean = (measured * mask).sum(axis=1, keepdims=True) / np.maximum(mask.sum(axis=1, keepdims=True), 1.0)
+        motion = self.rmse((measured - mean) * mask)
+        return 1.0 - (left_out_rmse / motion) ** 2 if motion > 0.0 else 1.0
+
+    def foretells(self, left_out_rmse: float) -> bool:
+        """Whether a model with that error has anything to do with these runs (`FORETELLS`)."""
+        return self.foretold(left_out_rmse) > FORETELLS
 
     def judged(self, fitted: Sequence[Fitted], present: Model | None = None) -> list[Model]:
         """Leave each fit run out in turn, refit to the others, and predict the one left out.

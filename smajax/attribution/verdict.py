@@ -45,10 +45,12 @@ def summary(
     after: Portrait,
     tried: int,
     aside: Sequence[str] = (),
+    foretold: float | None = None,
 ) -> tuple[str, ...]:
     """The verdict in sentences; `tried` is the number of candidate effects that were looked at.
 
-    `aside`: those that were added and gave way to one unknown term.
+    `aside`: those that were added and gave way to one unknown term. `foretold`: share of the motion in left-out runs that
+    the model foretells, where that is so little that nothing is named.
     """
     unit, name = experiment.output_unit, experiment.output_name
     added = [effect for effect in effects if effect.added]
@@ -68,6 +70,12 @@ def summary(
         opening["not in the library"] = (
             f"Something is missing, and none of the {tried} candidate effects that were tried accounts for it: {titles} "
             "comes nearest, and one unknown function in one equation foretells left-out runs better than that."
+        )
+    if foretold is not None:
+        opening["not in the library"] = (
+            f"The model foretells hardly anything of these runs ({max(foretold, 0.0):.0%} of the motion in runs left out), "
+            f"and with none of the {tried} candidate effects that were tried enough for it to mean anything: none is named. Do "
+            "inputs and outputs belong together, and are the samples in order?"
         )
     told = [opening[answer]]
     for role, words in (("fit", "fit"), ("held-out", "held-out")):
