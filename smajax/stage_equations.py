@@ -102,7 +102,13 @@ def equations(system: System, stage: Stage, inputs: Inputs, z: Unknowns) -> Miss
     assert isinstance(load, AbstractMovingLoad)
     heating = _heating(system, stage, inputs, z.temperature, z.fraction)
     capacity = stored_heat(wire, (), jnp.ones_like(z.temperature), z.fraction)
-    heat = (stored_heat(wire, effects, z.temperature, z.fraction) - stage.heat - stage.step * heating) / capacity
+    heat = stored_heat(wire, effects, z.temperature, z.fraction) - stage.heat - stage.step * heating
+    taking = having(effects, "heat_of_change")
+    if taking:
+        taken = sum(effect.heat_of_change(wire, old, z.temperature, z.fraction) for effect in taking)
+        # As a rate over the stage, like all else that heats: a later stage of a step is longer than its own base.
+        heat = heat + taken * stage.step / (stage.time - stage.old.time)
+    heat = heat / capacity
 
     # Projected on the range between the end stops: at a stop the equation reads "position = stop".
     free = _free_position(system, stage, inputs, z)

@@ -21,6 +21,7 @@ from smajax.extended import extended
 from smajax.figures.rigs import arm
 from smajax.presets import build
 from smajax.system import System
+from smajax.wire.heat import mass_per_metre
 
 DT = 0.05
 RIGS = {
@@ -172,6 +173,29 @@ def test_a_specific_heat_by_phase_changes_the_pace_and_not_the_rest() -> None:
         assert run.martensite_fraction[604] < 1e-6
         rates.append(np.log((run.temperature[604] - 23.0) / (run.temperature[600] - 23.0)))
     assert rates[0] / rates[1] == pytest.approx(1.3, rel=1e-3)
+
+
+@pytest.mark.parametrize("share", [0.0, 1.0])
+def test_the_heat_of_transformation_stays_or_follows_kirchhoff(share: float) -> None:
+    """Heat put in over a transformation: that of the phases' specific heats on the way, and k times Kirchhoff's change."""
+    system = RIGS["dead_weight"][0]
+    on = {"phase_specific_heat.contrast": 0.3, "phase_specific_heat.kirchhoff": share}
+    dt, volts = 2e-3, 8.0
+    run = simulate_compiled(
+        extended(system, ("phase_specific_heat",), on), {"voltage": jnp.full(round(20.0 / dt) + 1, volts)}, dt
+    )
+    wire = system.wire
+    assert run.martensite_fraction[-1] < 1e-6
+    temperature, fraction = np.asarray(run.temperature), np.asarray(run.martensite_fraction)
+    power = volts**2 / np.asarray([_ohms(system, one) for one in fraction]) / float(wire.wire_length)
+    given = float(np.trapezoid(power - np.asarray([_lost(system, one) for one in temperature]), dx=dt))
+    m_c = float(mass_per_metre(wire) * wire.heat.specific_heat)
+    law = wire.kinetics
+    neutral = 0.5 * float(law.martensite_start + law.austenite_finish)
+    own = m_c * np.trapezoid(1.0 + 0.3 * (1.0 - fraction), temperature)
+    change = -0.3 * m_c * np.trapezoid(temperature - neutral, fraction)
+    assert abs(change) > 0.01 * own
+    assert given == pytest.approx(own + share * change, rel=1e-3)
 
 
 def test_cool_ends_are_those_of_the_fin() -> None:

@@ -40,6 +40,7 @@ INSIDE = 0.03  # a refit starts at least this share of the box away from bounds 
 TOLD = 1.0  # to what share of itself the other runs must tell an effect's size for a left-out run to count
 LOOSE = 1.0  # how far a fold's parameters may stray for nothing, in logits of the box
 FORETELLS = 0.5  # share of the motion in left-out runs that a model has to foretell for its effects to mean anything
+FOLDS = 12  # at most so many parts of the runs are left out in turn: one run each up to that many
 ENOUGH = 1e-5  # of its cost: where a refit ends
 
 
@@ -217,16 +218,16 @@ class Search:
         return self.foretold(left_out_rmse) > FORETELLS
 
     def judged(self, fitted: Sequence[Fitted], present: Model | None = None) -> list[Model]:
-        """Leave each fit run out in turn, refit to the others, and predict the one left out.
+        """Leave each fit run out in turn, refit to the others, and predict the one left out (of many, `FOLDS` parts).
 
         A fold starts at the fit to all runs and is tied to it, each parameter to within about `LOOSE` of its logit in
         the box: else a direction that the others hardly tell runs wherever the last iteration happened to take it, and
         with it the prediction. In such a direction the fold keeps what the run left out said: where the others do not
         tell the size of what is new (`told_without`), `present`'s error stands and the effect is credited with nothing.
         """
-        runs = self.problem.batch.runs
+        parts = self.parts()
         # With one run nothing can be left out: the fit itself is all there is, and the report says so.
-        folds = list(1.0 - np.eye(runs)) if runs > 1 else [np.ones(1)]
+        folds = list(1.0 - parts) if len(parts) > 1 else [np.ones(1)]
         levels = self.levels(fitted)
         starts = [
             Start(entry.effects, entry.solution.values, weights, np.sqrt(level) / LOOSE)
@@ -237,7 +238,7 @@ class Search:
         models = []
         for place, entry in enumerate(fitted):
             own = found[place * len(folds) : (place + 1) * len(folds)]
-            left_out = np.stack([own[run, run] for run in range(runs)]) if runs > 1 else own[0]
+            left_out = np.stack([own[fold, run] for run, fold in enumerate(parts.argmax(axis=0))])
             model = Model(entry.effects, entry.solution.values, entry.solution.cost, left_out, self.rmse(left_out))
             models.append(model if present is None else self.credited(entry, model, present))
         return models
@@ -271,13 +272,19 @@ class Search:
         at = sensitivity(self.problem, values, [*own, *others])
         level = float(np.mean(at.residual() ** 2)) * correlation_time(split_runs(at.misfit, at.mask))
         told = []
-        for run in range(len(at.mask)):
-            rest = dataclasses.replace(at, mask=at.mask * (np.arange(len(at.mask)) != run)[:, None])
+        parts = self.parts()
+        for part in parts:
+            rest = dataclasses.replace(at, mask=at.mask * (1.0 - part)[:, None])
             trace = rest.columns(own) @ size
             basis = np.linalg.qr(scaled(rest.columns(others)))[0]
             trace = trace - basis @ (basis.T @ trace)
             told.append(float(trace @ trace) * TOLD**2 > level)
-        return np.asarray(told)
+        return np.asarray(told)[parts.argmax(axis=0)]
+
+    def parts(self) -> np.ndarray:
+        """Which runs are left out together, (parts, R) of zeros and ones: each alone, or every `FOLDS`-th of many."""
+        runs = self.problem.batch.runs
+        return np.eye(min(runs, FOLDS))[:, np.arange(runs) % FOLDS]
 
     def better(self, new: Model, old: Model, chance: float = CHANCE) -> tuple[bool, str]:
         """Does `new` predict left-out runs better, beyond its extra coefficients and beyond `chance` standard errors?"""

@@ -72,6 +72,10 @@ class AbstractEffect(eqx.Module):
         """Heat stored per metre beside m c_p T, J/m."""
         return 0.0
 
+    def heat_of_change(self, wire: Wire, old: WireState, temperature: Scalar, fraction: Scalar) -> Scalar | float:
+        """Heat per metre that the way from `old` takes and that is no function of the state, J/m."""
+        return 0.0
+
     def heat_loss(self, wire: Wire, temperature: Scalar, ambient: Scalar) -> Scalar | float:
         """Heat lost per metre beside h_c A_c (T - T_inf), W/m."""
         return 0.0

@@ -1,0 +1,215 @@
+"""Loads beyond a usual study: `python -m studies.benchmarks.load WHAT --count N`; prints time and peak memory as JSON.
+
+`text`: a log of N MB as text with ten columns, of which three are read. `samples`: a run of N samples through `identify`,
+from its text log to its numbers. `day`: N hours of an arm that is simulated at 5 ms and kept every second. `runs`: N runs
+of 300 samples in one experiment through `close_loop`, with a few candidates.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from smajax.machine import peak_memory
+from smajax.runtime import prepare
+
+COLUMNS = 10  # of the text log
+BLOCK = 50_000  # lines written at once
+DAY_STEP = 0.005  # s
+DAY_KEPT = 200  # steps
+STRESSES = 60.0, 180.0  # MPa
+TRUTH = {"recoverable_strain": 0.04, "austenite_finish": 95.0}
+NOISE = 2e-4  # of strain
+RUN_SAMPLES = 300
+CANDIDATES = ("thermal_expansion", "stress_dependent_strain", "stress_dependent_width", "sensor_gain")
+COUPON = """\
+[model]
+wire = "flexinol_isobaric"
+load = "coupon"
+drive = "none"
+[unknown.recoverable_strain]
+low = "1 %"
+high = "8 %"
+start = "3 %"
+[unknown.austenite_finish]
+low = "85 degC"
+high = "120 degC"
+start = "105 degC"
+[nuisance]
+offset = true
+[time]
+kind = "sample"
+[channels.temperature]
+role = "input"
+column = "T"
+unit = "degC"
+[channels.strain]
+role = "output"
+column = "strain"
+unit = "1"
+noise = "{noise}"
+[effects]
+only = [{only}]
+"""
+RUN = '[[runs]]\nname = "{name}"\nrole = "{role}"\nfile = "{name}.csv"\n[runs.inputs]\nstress = "{stress:.3f} MPa"\n'
+
+
+def _text(megabytes: int, place: Path) -> dict[str, float]:
+    from smajax.measured.read import read_table
+
+    draw = np.random.default_rng(0).normal(size=(BLOCK, COLUMNS))
+    names = [f"c{number}" for number in range(COLUMNS)]
+    block = "\n".join(",".join(f"{value:.6f}" for value in row) for row in draw) + "\n"
+    file = place / "log.csv"
+    with file.open("w", encoding="utf-8") as log:
+        log.write(",".join(names) + "\n")
+        for _ in range(-(-megabytes * 10**6 // len(block))):
+            log.write(block)
+    before, begin = peak_memory(), time.perf_counter()
+    rows = read_table(file, set(names[:3])).column("c2").size
+    took = time.perf_counter() - begin
+    size = file.stat().st_size
+    return {
+        "MB": size / 1e6,
+        "rows": rows,
+        "s": took,
+        "MB_per_s": size / 1e6 / took,
+        "grown_MB": (peak_memory() - before) / 1e6,
+    }
+
+
+def _cycles(samples: int, number: int) -> np.ndarray:
+    """Temperature of a coupon, C: heated and cooled, each run to another end."""
+    top = 140.0 - 3.0 * (number % 7)
+    whole = np.linspace(0.0, 4.0 if samples > RUN_SAMPLES else 2.0, samples)
+    return np.asarray(20.0 + (top - 20.0) * np.abs(whole - 2.0 * np.round(whole / 2.0)))
+
+
+def _experiment(place: Path, runs: int, samples: int) -> Path:
+    """An experiment of coupons at several stresses, every tenth run held out."""
+    import jax.numpy as jnp
+
+    from smajax.compiled import simulate_compiled
+    from smajax.parameters import set_parameters
+    from smajax.presets import build
+
+    coupon = set_parameters(build("flexinol_isobaric", "coupon", "none"), TRUTH)
+    random = np.random.default_rng(1)
+    only = ", ".join(f'"{name}"' for name in CANDIDATES)
+    told = [COUPON.format(noise=NOISE, only=only)]
+    for number in range(runs):
+        stress = float(np.interp(number / max(runs - 1, 1), (0.0, 1.0), STRESSES))
+        temperature = _cycles(samples, number)
+        inputs = {"temperature": jnp.asarray(temperature), "stress": jnp.full(samples, stress * 1e6)}
+        strain = simulate_compiled(coupon, inputs, 1.0).reading + random.normal(0.0, NOISE, samples)
+        name = f"run{number:04d}"
+        with (place / f"{name}.csv").open("w", encoding="utf-8") as log:
+            log.write("T,strain\n")
+            for part in np.array_split(np.column_stack((temperature, strain)), -(-samples // BLOCK)):
+                log.write("\n".join(f"{a:.4f},{b:.6f}" for a, b in part) + "\n")
+        role = "held-out" if number % 10 == 9 else "fit"
+        told.append(RUN.format(name=name, role=role, stress=stress))
+    file = place / "experiment.toml"
+    file.write_text("\n".join(told), encoding="utf-8")
+    return file
+
+
+def _samples(count: int, place: Path) -> dict[str, float]:
+    from smajax.catalogue import CATALOGUE
+    from smajax.experiment.load import load_experiment
+    from smajax.identify import identify
+
+    file = _experiment(place, 1, count)
+    before, begin = peak_memory(), time.perf_counter()
+    experiment = load_experiment(file, CATALOGUE)
+    read = time.perf_counter() - begin
+    found = identify(experiment, starts=0)
+    took = time.perf_counter() - begin
+    value = {one.name: one.value for one in found.estimates}["austenite_finish"]
+    return {
+        "samples": count,
+        "read_s": read,
+        "s": took,
+        "grown_MB": (peak_memory() - before) / 1e6,
+        "off": abs(value - TRUTH["austenite_finish"]),
+    }
+
+
+def _runs(count: int, place: Path) -> dict[str, float | str]:
+    from smajax.catalogue import CATALOGUE
+    from smajax.close_loop import close_loop
+    from smajax.experiment.load import load_experiment
+
+    file = _experiment(place, count, RUN_SAMPLES)
+    before, begin = peak_memory(), time.perf_counter()
+    experiment = load_experiment(file, CATALOGUE)
+    read = time.perf_counter() - begin
+    found = close_loop(experiment)
+    took = time.perf_counter() - begin
+    return {
+        "runs": count,
+        "read_s": read,
+        "s": took,
+        "grown_MB": (peak_memory() - before) / 1e6,
+        "verdict": found.verdict,
+    }
+
+
+def _day(hours: int, place: Path) -> dict[str, float]:
+    import jax.numpy as jnp
+
+    from smajax.batch.axes import grid
+    from smajax.batch.run import run_batch
+    from smajax.figures.rigs import arm
+
+    seconds = 3600.0 * hours
+    before, begin = peak_memory(), time.perf_counter()
+    steps = round(seconds / DAY_STEP)
+    # A step of the supply every minute, as a series of the whole day.
+    voltage = np.where((np.arange(steps + 1) // round(60.0 / DAY_STEP)) % 2 == 0, 8.0, 2.0)
+    found = run_batch(
+        arm(),
+        {"voltage": jnp.asarray(voltage)},
+        grid(payload_mass=[0.1]),
+        dt=DAY_STEP,
+        every=DAY_KEPT,
+        out=place / "day",
+    )
+    angle = np.asarray(found["position"]).ravel()
+    took = time.perf_counter() - begin
+    return {
+        "hours": hours,
+        "steps": steps,
+        "s": took,
+        "grown_MB": (peak_memory() - before) / 1e6,
+        "kept_samples": int(np.isfinite(angle).sum()),
+    }
+
+
+WHAT: dict[str, Callable[[int, Path], dict[str, float] | dict[str, float | str]]] = {
+    "text": _text,
+    "samples": _samples,
+    "day": _day,
+    "runs": _runs,
+}
+
+
+def main() -> None:
+    asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    asked.add_argument("what", choices=WHAT)
+    asked.add_argument("--count", type=int, required=True)
+    options = asked.parse_args()
+    prepare()
+    with tempfile.TemporaryDirectory() as place:
+        found = WHAT[options.what](options.count, Path(place))
+    print(json.dumps({"peer": "load", "what": options.what, **found, "peak_memory_MB": peak_memory() / 1e6}))
+
+
+if __name__ == "__main__":
+    main()
