@@ -252,6 +252,16 @@ def test_a_formula_is_of_the_function_even_where_the_parameters_could_take_it_ov
     assert np.corrcoef(best.curve, truth)[0, 1] > 0.95
 
 
+@pytest.mark.parametrize("size", [0.0, 1e-12, 1e12, np.nan])
+@pytest.mark.parametrize("width", [0.0, 1e-9, 1e9])
+def test_no_function_is_too_small_or_too_narrow_for_formulas(size: float, width: float) -> None:
+    """One that stayed at zero, over a state that did not move: there is no formula, and no end of the loop."""
+    coefficients = size * np.random.default_rng(0).normal(size=COUNT)
+    found = formulas(0.3 * width, width, coefficients, 1e-4 * np.eye(COUNT), 100.0, "T")
+    assert all(np.isfinite(one.curve).all() for one in found)
+    assert bool(found) == (width > 0.0 and size > 0.0)
+
+
 def _told(named: bool, *alike: str) -> tuple[str, ...]:
     empty = np.zeros(0)
 

@@ -79,7 +79,12 @@ def _dictionary(low: float, width: float, symbol: str) -> list[_Word]:
 def formulas(
     low: float, width: float, coefficients: np.ndarray, covariance: np.ndarray, samples: float, symbol: str
 ) -> tuple[Formula, ...]:
-    """The best formulas for the spline with these `coefficients` (K,) over low..low + width, in SI, best first."""
+    """The best formulas for the spline with these `coefficients` (K,) over low..low + width, in SI, best first.
+
+    None for a function that is zero, or over no width.
+    """
+    if not (width > 0.0 and np.any(coefficients) and np.isfinite(coefficients).all() and np.isfinite(covariance).all()):
+        return ()
     share = np.linspace(0.0, 1.0, FINE)
     basis = design(share)
     x = low + width * share
@@ -96,6 +101,8 @@ def formulas(
                 continue
             matrix = columns[:, chosen]
             length = np.linalg.norm(matrix, axis=0)
+            if not (np.isfinite(length).all() and length.all()):
+                continue
             factors, _, rank, _ = np.linalg.lstsq(matrix / length, target, rcond=1e-10)
             if rank < count:
                 continue

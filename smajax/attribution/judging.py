@@ -35,6 +35,7 @@ from smajax.residual.portrait import all_noise
 
 PENALTY = 0.01  # by how much of its mean square a coefficient must lower the error on left-out runs
 CHANCE = 0.5  # by how many standard errors of the paired difference, too: with three or four runs that error is wide
+CHANCE_ON_ONE = 2.0  # the same where there is one run and what is compared are fits to it
 NUDGE = 1e-3  # share of an effect's start at which its score is taken
 INSIDE = 0.03  # a refit starts at least this share of the box away from bounds to which a poorer model was driven
 TOLD = 1.0  # to what share of itself the other runs must tell an effect's size for a left-out run to count
@@ -286,8 +287,10 @@ class Search:
         runs = self.problem.batch.runs
         return np.eye(min(runs, FOLDS))[:, np.arange(runs) % FOLDS]
 
-    def better(self, new: Model, old: Model, chance: float = CHANCE) -> tuple[bool, str]:
+    def better(self, new: Model, old: Model, chance: float | None = None) -> tuple[bool, str]:
         """Does `new` predict left-out runs better, beyond its extra coefficients and beyond `chance` standard errors?"""
+        if chance is None:
+            chance = CHANCE if len(old.left_out) > 1 else CHANCE_ON_ONE
         extra = len(self.free(new.effects)) - len(self.free(old.effects))
         gain = 1.0 - (new.left_out_rmse / old.left_out_rmse) ** 2
         z = paired(old.left_out, new.left_out, np.asarray(self.problem.batch.mask))
