@@ -18,6 +18,10 @@ if TYPE_CHECKING:
 
 UNMET = 3  # exit code: the work is done and what was asked of its result is not met
 INTERRUPTED = 130
+HEX = "[0-9a-f]"
+# Folders within a result, and what smajax names its files there; what else is in them is the user's.
+INSIDE = {"fits": f"{HEX * 32}.npz", "finished": f"*-{HEX * 16}.npz"}
+FITS = f"fits/{INSIDE['fits']}"
 
 Overwrite = Annotated[
     bool, typer.Option("--overwrite", help="delete another result that smajax wrote into --out, and begin anew")
