@@ -120,6 +120,7 @@ def _signal(
         if channel.role == "input" or channel.missing == "skip" or not table.has_gaps(key):
             raise
         raise MeasuredDataError(f"{error}; or write missing = 'skip' for this output, which leaves them out") from None
+    values = -values if channel.reversed else values
     clock = table.clock(key)
     where, unit = f"{table.path}: the time of {key!r}", "s"
     if time is not None and time.kind == "sample":

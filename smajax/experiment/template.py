@@ -74,6 +74,7 @@ def _channel(name: str, role: str, column: Column, variable: bool, off: bool) ->
     ]
     if role == "output":
         lines.append('noise = "estimate"  # or its sigma, such as "0.01 mm"')
+        lines += [] if off else ["# reversed = true  # where the sensor counts the other way: down when the wire pulls"]
     return [f"# {line}" if off else line for line in lines]
 
 
