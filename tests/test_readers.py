@@ -10,6 +10,7 @@ import pytest
 import scipy.io
 import xarray as xr
 
+from smajax.measured import headers
 from smajax.measured.extras import needed
 from smajax.measured.read import read_table
 from smajax.measured.repeated import once
@@ -108,13 +109,71 @@ def test_a_cell_that_is_no_number(tmp_path: Path, cell: str, words: str) -> None
         table.column("x")
 
 
-@pytest.mark.parametrize("units", ["s;V", "[s];[V]", "s;-", "s;1"])
-def test_a_line_of_units_is_named(tmp_path: Path, units: str) -> None:
-    path = written(tmp_path / "run.csv", f"time;x\n{units}\n0;1\n1;2\n")
+@pytest.mark.parametrize(
+    ("units", "known"),
+    [
+        ("s;V", {"time": "s", "x": "V"}),
+        ("[s];[V]", {"time": "s", "x": "V"}),
+        ("s;-", {"time": "s", "x": "-"}),
+        ("s;1", {"time": "s", "x": "1"}),
+        ("ms;", {"time": "ms"}),
+    ],
+)
+def test_a_line_of_units_is_read(tmp_path: Path, units: str, known: dict[str, str]) -> None:
+    table = read_table(written(tmp_path / "run.csv", f"time;x\n{units}\n0;1\n1;2\n"))
+    assert table.units == known
+    np.testing.assert_array_equal(table.column("time"), [0.0, 1.0])
+    assert table.place(0) == "line 3"
+
+
+def test_a_line_that_is_like_units_and_is_none_is_named(tmp_path: Path) -> None:
+    path = written(tmp_path / "run.csv", "time;x\nsecs_;V\n0;1\n1;2\n")
     with pytest.raises(
         MeasuredDataError, match=r"line 2, column 'time': .* is not a number; line 2 looks like units: del"
     ):
         read_table(path).column("time")
+
+
+@pytest.mark.parametrize(
+    ("cells", "seconds"),
+    [
+        (["2026-11-12 10:00:00.100", "2026-11-12 10:00:00.350", "2026-11-13 10:00:00.100"], [0.0, 0.25, 86400.0]),
+        (["2026-11-12T23:59:59Z", "2026-11-13T01:00:00+01:00", "2026-11-12T22:00:01-02:00"], [0.0, 1.0, 2.0]),
+        (["10:00:00,100", "10:00:00,350", "10:00:01"], [0.0, 0.25, 0.9]),
+        (["23:59:59.5", "0:00:00.0", "00:00:01.5"], [0.0, 0.5, 2.0]),  # past midnight
+    ],
+)
+@pytest.mark.parametrize("head", ["Uhrzeit;U;x\n", ""])
+def test_clock_times_are_seconds_from_the_first(
+    tmp_path: Path, head: str, cells: list[str], seconds: list[float]
+) -> None:
+    text = head + "".join(f"{cell};0,5;1\n" for cell in cells)
+    table = read_table(written(tmp_path / "run.csv", text))
+    time = table.order[0]
+    np.testing.assert_array_equal(table.column(time), seconds)
+    np.testing.assert_array_equal(table.column(2), [0.5, 0.5, 0.5])
+    assert table.units[time] == "s"
+
+
+@pytest.mark.parametrize("cell", ["2026-13-12 10:00:00", "10:61:00", "10:00", "Ende", "5"])
+def test_a_cell_that_is_no_clock_time_is_named(tmp_path: Path, cell: str) -> None:
+    table = read_table(written(tmp_path / "run.csv", f"t;x\n10:00:00;1\n10:00:01;2\n{cell};3\n"))
+    with pytest.raises(MeasuredDataError, match=rf"line 4, column 't': '{cell}' is not a clock time"):
+        table.column("t")
+
+
+def test_headings_of_tab_separated_decimal_commas_may_hold_blanks(tmp_path: Path) -> None:
+    table = read_table(written(tmp_path / "run.txt", "t [s]\tU [V]\n0,0\t1,5\n0,1\t2,5\n"))
+    np.testing.assert_array_equal(table.column("U [V]"), [1.5, 2.5])
+
+
+def test_units_of_headings() -> None:
+    found = {
+        name: headers.unit_in(name)
+        for name in ("Zeit/s", "U / mV", "s/mm", "T/°C", "x [mm]", "t_ms", "a/b", "/s", "h [W/(m^2 K)]", "x")
+    }
+    assert list(found.values()) == ["s", "mV", "mm", "°C", "mm", "ms", "", "", "W/(m^2 K)", ""]
+    assert (headers.bare("Zeit/s"), headers.bare("a/b"), headers.words("U / mV")) == ("Zeit", "a/b", ["u"])
 
 
 def test_samples_are_placed_by_the_lines_of_their_file(tmp_path: Path) -> None:

@@ -134,6 +134,8 @@ def _is_clock(table: Table, name: str, headed: bool) -> bool:
     values = table.columns[name]
     grows = values.size > 1 and bool(np.all(np.diff(values) >= 0.0)) and float(values[-1]) > float(values[0])
     unit = _unit(table, name)
+    if name in table.moments:
+        return grows
     if headed:
         return is_time(name) and grows and (not unit or _of_kind(unit, "s"))
     return grows and bool(np.all(np.diff(values) > 0.0))
@@ -159,22 +161,40 @@ def _by_shape(columns: Sequence[Column], table: Table) -> list[Column]:
     return found
 
 
+def times_not_read(table: Table) -> list[str]:
+    """Columns that are named like a time, or hold clock times, and that are no clock: each with why, in words."""
+    wrong = []
+    for name in table.order or (*table.columns, *table.unusable):
+        unit = _unit(table, name)
+        if name in table.clocks or not (is_time(name) or name in table.moments) or (unit and not _of_kind(unit, "s")):
+            continue
+        if name in table.unusable:
+            wrong.append(table.unusable[name].split("; expected")[0])
+        elif not _is_clock(table, name, True) and not _column(table, name, name).quantity:
+            wrong.append(f"column {name!r} goes back somewhere, or stands still")
+    return wrong
+
+
 def columns_of(table: Table) -> list[Column]:
     """Every usable column with what it may be, the time first where there is one; each quantity once, by the surest."""
-    order = [name for name in (table.order or tuple(table.columns)) if name in table.columns]
-    headed = not all(name.isdigit() for name in order)
-    clock = None if table.clocks else next((name for name in order if _is_clock(table, name, headed)), None)
+    every = table.order or tuple(table.columns)
+    order = [name for name in every if name in table.columns]
+    headed = not all(name.isdigit() for name in every)
+    clocks = [name for name in order if _is_clock(table, name, headed)]
+    clock = None if table.clocks else next((name for name in clocks if name in table.moments), next(iter(clocks), None))
     found: list[Column] = []
     if clock is not None:
         unit = _unit(table, clock)
-        key: str | int = clock if headed else order.index(clock) + 1
+        key: str | int = clock if headed else every.index(clock) + 1
         sure, why = (
-            (SURE, "heading and unit")
+            (SURE, "clock times, read as seconds from the first one")
+            if clock in table.moments
+            else (SURE, "heading and unit")
             if headed and unit
             else (LIKELY if headed else GUESS, "it only grows; unit by magnitude")
         )
         found.append(Column(key, clock, TIME, unit or time_unit(table.columns[clock]), sure, why))
-    rest = [_column(table, name if headed else order.index(name) + 1, name) for name in order if name != clock]
+    rest = [_column(table, name if headed else every.index(name) + 1, name) for name in order if name != clock]
     rest = _by_shape(rest, table)
     rank = {SURE: 0, LIKELY: 1, GUESS: 2}
     for one in rest:
