@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import shutil
+import warnings
 from importlib import resources
 from pathlib import Path
 
@@ -17,7 +19,7 @@ from smajax.experiment.load import load_experiment
 from smajax.experiment.magnitude import BY_HEAT
 from smajax.presets import LOADS, build
 from smajax.sensors import sensors_of, shown_by
-from tests.small_bench import bench, log, refused, table
+from tests.small_bench import bench, log, refused, smajax, table
 
 PARAMETERS = "[model.parameters]\n{}\n[unknown]"
 REFUSED = {
@@ -125,6 +127,17 @@ def test_identify_says_when_nothing_is_unknown_and_what_cannot_be_profiled(tmp_p
     assert "nothing is declared unknown; add a section [unknown.NAME]" in refused(
         "identify", experiment, "--out", tmp_path / "o"
     )
+
+
+def test_a_handful_of_samples_says_nothing_of_their_distribution(tmp_path: Path) -> None:
+    experiment = bench(tmp_path / "bench")
+    log(experiment.parent / "a.csv", seconds=0.5)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        ended = smajax("identify", experiment, "--starts", "0", "--out", tmp_path / "out", "--json")
+    assert ended.code == 0, ended.said
+    assert json.loads(ended.out)["residual"]["normality_p_value"] is None
+    assert "normally distributed" not in ended.out
 
 
 def _warned(experiment: Path, words: str) -> bool:

@@ -87,13 +87,13 @@ def test_an_experiment_that_was_edited_and_other_data_are_refused(tmp_path: Path
     bench(tmp_path / "bench", ('start = "100', 'start = "90'))
     edited = smajax(*words(path))
     assert edited.code == 2
-    assert "the experiment file has changed, unknown.convection_coefficient.start: '100 W/m^2/K' there" in edited.said
+    assert "changed in the experiment file, unknown.convection_coefficient.start: '100 W/m^2/K' there" in edited.said
     assert "--overwrite" in edited.said
     bench(tmp_path / "bench")
     log(tmp_path / "bench" / "a.csv", top=4.9)
     other = smajax(*words(path))
     assert other.code == 2
-    assert "the data has changed, A: " in other.said
+    assert "changed in the data, A: " in other.said
     assert (tmp_path / "out" / "identify.json").read_bytes() == page
 
 

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from smajax.report.findings import Findings
 
 DEMOS = ("latent", "complete")
+FINISHED_FITS = "Finished fits are kept: the same command goes on from there."
 OWN = ("report.html", "report.json", "parameters.csv", "runs.csv", FITS)
 
 
@@ -44,7 +45,11 @@ def _loop(experiment: Path, out: Path, command: str, overwrite: bool) -> tuple[F
 
     check_path(out)
     loaded = load_experiment(experiment, CATALOGUE)
-    with resumable(), claimed(out, "close-loop", asked_of(loaded), OWN, overwrite), shown(console()) as progress:
+    with (
+        resumable(FINISHED_FITS, out, FITS),
+        claimed(out, "close-loop", asked_of(loaded), OWN, overwrite),
+        shown(console()) as progress,
+    ):
         findings = close_loop(loaded, memory=out / "fits", progress=progress, command=command)
         return findings, write_report(findings, out)
 

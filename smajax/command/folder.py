@@ -48,7 +48,7 @@ def _unlike(before: Asked, asked: Asked) -> Iterator[str]:
     for name in sorted(before.keys() | asked.keys()):
         old, new = before.get(name), asked.get(name)
         if isinstance(old, Mapping) and isinstance(new, Mapping):
-            yield from (f"the {name} has changed, {one}" for one in _unlike(old, new))
+            yield from (f"changed in the {name}, {one}" for one in _unlike(old, new))
         elif old != new:
             yield f"{name}: {_short(old)} there, {_short(new)} asked"
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shlex
 from collections.abc import Mapping
 from pathlib import Path
@@ -54,6 +53,7 @@ def identify_command(
     from smajax.experiment.load import load_experiment
     from smajax.identify import identify
     from smajax.progress import shown
+    from smajax.report.files import json_text
     from smajax.report.identify_page import write_identified
     from smajax.report.identify_record import record
     from smajax.report.identify_words import conclusions, estimate_rows, posterior_rows
@@ -69,7 +69,11 @@ def identify_command(
     asked = {**asked_of(loaded), "--starts": starts, "--robust": robust, "--posterior": posterior}
     kept = "Fits are kept as they go: the same command goes on from there."
     try:
-        with resumable(kept), claimed(out, "identify", asked, OWN, overwrite, _goes_on), shown(console()) as progress:
+        with (
+            resumable(kept, out, FITS),
+            claimed(out, "identify", asked, OWN, overwrite, _goes_on),
+            shown(console()) as progress,
+        ):
             if any((out / "fits").glob("*.npz")):
                 progress(f"say: Fits kept in {out / 'fits'} are gone on with where they are of the same work.", 1.0)
             found = identify(
@@ -89,7 +93,7 @@ def identify_command(
     except ValueError as error:
         raise typer.BadParameter(str(error)) from None
     if json_out:
-        typer.echo(json.dumps(record(found), allow_nan=False))
+        typer.echo(json_text(record(found)), nl=False)
     else:
         typer.echo(f"\n{found.title or found.experiment}")
         for sentence in [*conclusions(found), *found.weak]:
