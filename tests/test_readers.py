@@ -10,6 +10,7 @@ import pytest
 import scipy.io
 import xarray as xr
 
+from smajax.experiment.guess import columns_of
 from smajax.measured import headers
 from smajax.measured.extras import needed
 from smajax.measured.read import read_table
@@ -229,6 +230,64 @@ def test_simulink_structures_carry_their_own_time(tmp_path: Path) -> None:
     np.testing.assert_array_equal(table.column("Pair[2]"), [4.0, 5.0, 6.0])
     np.testing.assert_array_equal(table.column("gain"), [1.0, 2.0])
     assert table.clock("gain") is None
+
+
+def _scope(folder: Path, version: str) -> Path:
+    """What a Scope with three axes and a struct of logged signals leave in a workspace, saved as MATLAB 5 or 7.3."""
+    path, time = folder / "run.mat", np.arange(40.0).reshape(-1, 1) / 10.0
+    shown = [
+        ("", "Voltage [V]", 5.0 * (time > 1.0)),
+        ("Weg/mm", "", np.sin(time)),
+        ("", "", np.hstack([time, 2.0 * time])),
+    ]
+    if version == "5":
+        signals = np.zeros((1, 3), dtype=[("values", object), ("label", object), ("title", object)])
+        for k, (label, title, values) in enumerate(shown):
+            signals[0, k] = (values, label, title)
+        logged = {
+            "force": {"time": time, "values": 3.0 * time},
+            "T": {"Time": time, "Data": 20.0 + time},
+            "name": "logsout",
+        }
+        scipy.io.savemat(path, {"ScopeData": {"time": time, "signals": signals}, "logsout": logged})
+        return path
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(path, "w", userblock_size=512) as file:
+        scope = file.create_group("ScopeData")
+        scope["time"] = time.T
+        held = scope.create_group("signals")
+        for key, place in (("label", 0), ("title", 1), ("values", 2)):
+            references = []
+            for k, one in enumerate(shown):
+                text = isinstance(one[place], str)
+                codes = np.array([[ord(letter)] for letter in str(one[place]) or "\0"], dtype=np.uint16)
+                node = file.create_dataset(f"#refs#/{key}{k}", data=codes if text else np.asarray(one[place]).T)
+                node.attrs["MATLAB_class"] = np.bytes_(b"char" if text else b"double")
+                references.append([node.ref])
+            held.create_dataset(key, data=np.array(references, dtype=object), dtype=h5py.ref_dtype)
+        for name, words, values in (("force", ("time", "values"), 3.0 * time), ("T", ("Time", "Data"), 20.0 + time)):
+            one = file.create_group(f"logsout/{name}")
+            one[words[0]], one[words[1]] = time.T, values.T
+    with path.open("r+b") as raw:
+        raw.write(b"MATLAB 7.3 MAT-file")
+    return path
+
+
+@pytest.mark.parametrize("version", ["5", "7.3"])
+def test_signals_of_a_scope_go_by_their_labels_and_logged_ones_by_their_fields(tmp_path: Path, version: str) -> None:
+    table = read_table(_scope(tmp_path, version))
+    assert sorted(table.columns) == [
+        *("ScopeData.1", "ScopeData.2", "ScopeData.3[1]", "ScopeData.3[2]"),
+        *("logsout.T", "logsout.force"),
+    ]
+    assert table.labels == {"ScopeData.1": "Voltage [V]", "ScopeData.2": "Weg/mm"}
+    np.testing.assert_array_equal(table.column("ScopeData.3[2]"), 2.0 * (np.arange(40.0) / 10.0))
+    np.testing.assert_array_equal(table.column("logsout.force"), 3.0 * (np.arange(40.0) / 10.0))
+    np.testing.assert_array_equal(table.clock("logsout.T"), np.arange(40.0) / 10.0)
+    guessed = {one.quantity: (one.key, one.unit, one.why) for one in columns_of(table)}
+    assert guessed["voltage"] == ("ScopeData.1", "V", "its label 'Voltage [V]' and unit")
+    assert guessed["position"] == ("ScopeData.2", "mm", "its label 'Weg/mm' and unit")
+    assert guessed["force"][0] == "logsout.force"
 
 
 def test_mat_variables_of_another_structure_or_missing(tmp_path: Path) -> None:

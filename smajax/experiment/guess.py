@@ -105,6 +105,14 @@ def _by_unit(unit: str) -> str:
     return next((name for name in order if _of_kind(unit, QUANTITIES[name][1])), "")
 
 
+def _by_words(heading: str, unit: str) -> str:
+    """The quantity that the words of a heading or a label name and that may have this unit, if there is one."""
+    said = set(words(heading))
+    return next(
+        (one for one, (known, own) in QUANTITIES.items() if said & known and (not unit or _of_kind(unit, own))), ""
+    )
+
+
 def _unit(table: Table, name: str) -> str:
     """The column's unit as the unit library has it; empty where neither file nor heading says."""
     said = unit_of(table, name)
@@ -114,16 +122,16 @@ def _unit(table: Table, name: str) -> str:
 def _column(table: Table, key: str | int, name: str) -> Column:
     values = table.columns[name]
     unit = _unit(table, name)
-    said = set(words(name))
     if isinstance(key, int):
         return Column(key, name, "", "", GUESS, "no heading")
-    quantity = next(
-        (one for one, (known, own) in QUANTITIES.items() if said & known and (not unit or _of_kind(unit, own))), ""
-    )
+    label = table.labels.get(name, "")
+    quantity, where = _by_words(name, unit), "heading"
+    if not quantity and label:
+        quantity, where = _by_words(label, unit), f"its label {label!r}"
     if quantity and unit:
-        return Column(key, name, quantity, unit, SURE, "heading and unit")
+        return Column(key, name, quantity, unit, SURE, f"{where} and unit")
     if quantity:
-        return Column(key, name, quantity, _unit_by_size(quantity, values), LIKELY, "heading; unit by magnitude")
+        return Column(key, name, quantity, _unit_by_size(quantity, values), LIKELY, f"{where}; unit by magnitude")
     if unit and unit != "1" and (quantity := _by_unit(unit)):
         return Column(key, name, quantity, unit, LIKELY, "unit in the heading")
     why = "named like a time, and goes back somewhere" if is_time(name) else "nothing tells"

@@ -41,8 +41,8 @@ def unit_in(name: str) -> str:
 
 
 def unit_of(table: Table, name: str) -> str:
-    """The unit of a column: what the file states, else what the heading has; empty where neither says."""
-    return table.units.get(name) or unit_in(name)
+    """The unit of a column: what the file states, else what the heading or the label has; empty where none says."""
+    return table.units.get(name) or unit_in(name) or unit_in(table.labels.get(name, ""))
 
 
 TAILS = {
