@@ -36,6 +36,22 @@ def test_the_same_work_goes_on_and_another_is_refused(tmp_path: Path) -> None:
     assert (out / "simulate.csv").read_text() == "1"
 
 
+def test_what_differs_is_said_and_no_more_of_it_than_a_reader_needs(tmp_path: Path) -> None:
+    before = {"gone": 1, "experiment file": {f"key{k}": k for k in range(9)}}
+    with claimed(tmp_path, "identify", before, []):
+        pass
+    asked = {"new": [0] * 99, "experiment file": {f"key{k}": k + (k > 3) for k in range(9)}}
+    with pytest.raises(FolderTaken) as refused, claimed(tmp_path, "identify", asked, []):
+        pass
+    said = str(refused.value)
+    assert "(changed in the experiment file, key4: 4 there, 5 asked; " in said
+    assert said.endswith("and 3 more): give the name of another folder, or --overwrite to delete that.")
+    del asked["experiment file"]
+    words = r"gone: 1 there, not asked; new: not there, \[0, 0.*\.\.\. asked"
+    with pytest.raises(FolderTaken, match=words), claimed(tmp_path, "identify", asked, []):
+        pass
+
+
 def test_overwriting_leaves_what_is_not_ours(tmp_path: Path) -> None:
     out = tmp_path / "out"
     _done(out)

@@ -50,7 +50,8 @@ def _unlike(before: Asked, asked: Asked) -> Iterator[str]:
         if isinstance(old, Mapping) and isinstance(new, Mapping):
             yield from (f"changed in the {name}, {one}" for one in _unlike(old, new))
         elif old != new:
-            yield f"{name}: {_short(old)} there, {_short(new)} asked"
+            there = f"{_short(old)} there" if name in before else "not there"
+            yield f"{name}: {there}, {_short(new) if name in asked else 'not'} asked"
 
 
 def _short(value: Any) -> str:
