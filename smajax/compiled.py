@@ -64,8 +64,16 @@ def simulate_compiled(
     `inputs` have shape (n,), SI, `dt` seconds apart, and hold from sample to sample. With a `tolerance` (shares of 1 C
     and of 1 % strain a step; 1e-4 is good) a moving load takes as many steps between two samples as its error asks for.
     Compiled once for runs of one length and kind of model, whatever its values. Raises ValueError as `simulate` does,
-    and for a tolerance that is none; Unsupported for an effect or a load of your own that cannot be translated.
+    and for a tolerance that is none; TypeError within `grad`, `jit` and `vmap`; Unsupported for an effect or a load of your
+    own that cannot be translated.
     """
+    if any(
+        isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves((system, dict(inputs), dt, tolerance, initial))
+    ):
+        raise TypeError(
+            "simulate_compiled() is machine code, and no gradient, jit or vmap goes through it: use `smajax.simulate.simulate`, "
+            "which gives the same."
+        )
     check_inputs(system, inputs)
     check_scalars(system, dt, initial)
     if tolerance is not None and (not tolerance > 0.0 or not isinstance(system.load, AbstractMovingLoad)):

@@ -52,14 +52,19 @@ def compose(
     law: str = "",
     effects: Sequence[str] = (),
     values: Mapping[str, str | float] | None = None,
+    **others: object,
 ) -> System:
     """Presets by name, under a kinetics law, with effects and parameters of one's own.
 
     values: parameter -> a number (SI, temperatures in degC, angles in rad) or text with a unit (`"80 W/m^2/K"`); by its name
     or its place in the model. An effect is part of the model when one of its parameters is given (`latent_heat.enthalpy`).
     Raises KeyError for a preset, law or effect there is not, ValueError for a parameter there is not, a value out of its
-    bounds, transformation temperatures in the wrong order, or three presets that do not go together, UnitError for a unit of another kind.
+    bounds, transformation temperatures in the wrong order, or three presets that do not go together, UnitError for a unit of
+    another kind, TypeError for a parameter that is not in `values`.
     """
+    if others:
+        name, value = next(iter(others.items()))
+        raise TypeError(f"compose() has no argument {name!r}; a parameter goes into values={{{name!r}: {value!r}}}")
     system = build(wire, load, drive)
     check_together(system, load, drive)
     if law:

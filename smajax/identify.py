@@ -33,6 +33,7 @@ from smajax.made_with import made_with
 from smajax.residual.noise_like import LAGS, WHITE, correlation_time, split_runs, whiteness_p_value
 
 SEED = 2004
+LEAST_FOR_SHAPE = 8  # samples, for D'Agostino's test
 EDGE = 1e-6  # of the box: a fit in a box comes to a bound itself
 
 
@@ -49,6 +50,11 @@ def _whitened(runs: Sequence[np.ndarray], step: float) -> np.ndarray:
     """Samples so far apart that they are nearly independent, over their own spread."""
     apart = max(1, round(step))
     return np.concatenate([(run[::apart] - run.mean()) / (run.std() or 1.0) for run in runs])
+
+
+def _normality(samples: np.ndarray) -> float:
+    """The chance of such skewness and kurtosis in normal samples (n,); nan of too few, which tell nothing of it."""
+    return float(stats.normaltest(samples).pvalue) if samples.size >= LEAST_FOR_SHAPE else np.nan
 
 
 def identify(
@@ -177,7 +183,7 @@ def identify(
         start_costs=tuple(one.cost / float(problem.batch.mask.sum()) for one in fits),
         ratio=ratio,
         whiteness_p=white,
-        normality_p=float(stats.normaltest(_whitened(residual, independent)).pvalue),
+        normality_p=_normality(_whitened(residual, independent)),
         independent=independent,
         robust=robust,
         runs=_runs(experiment, everywhere, np.asarray(everything.noise), correlated, covariance),

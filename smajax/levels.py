@@ -93,7 +93,7 @@ def given(text: str, own: str, time: str = "") -> Given:
         name, _, unit = rest.partition(":")
         key: str | int = int(name) if name.isdigit() else name
         return column(Path(head), key, unit, own, time)
-    if colon:
+    if colon or "," in text:
         return levels(text, own)
     return Given(np.zeros(1), np.asarray([parse_quantity(text, own)]), None)
 

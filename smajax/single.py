@@ -102,6 +102,12 @@ def run_open(asked: Asked) -> Ran:
     for name in asked.inputs:
         if name not in required | optional:
             raise ValueError(f"no input {name!r}{instead(name, sorted(required | optional), 'this model takes')}")
+    for name in sorted(required - asked.inputs.keys()):
+        alone = "--step LEVEL:TIME,LEVEL:TIME or " if len(required) == 1 else ""
+        example = f"{name}=6{_unit(name)}" if name == "voltage" else f"{name}=LEVEL"
+        raise ValueError(
+            f"the model needs the input {name!r}: give {alone}--input {example}:10s (a file: {name}=log.csv:COLUMN)"
+        )
     several = {name: given(text, _unit(name), asked.time) for name, text in asked.inputs.items()}
     clock = clock_of(list(several.values()), asked.seconds, asked.dt)
     measured = system.load.inputs_required if isinstance(system.load, AbstractCoupon) else frozenset()

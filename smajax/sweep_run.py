@@ -79,7 +79,7 @@ class SweepSettings:
 def files_of(controllers: Sequence[str]) -> list[str]:
     """Names that a sweep of these controllers writes into its folder."""
     own = [f"{name}{end}" for name in controllers for end in (".csv", "_maps.png", "_lines.png")]
-    return ["index.html", "sweep.json", "comparison.png", "finished", *own]
+    return ["index.html", "sweep.json", "comparison.png", f"finished/*-{'[0-9a-f]' * 16}.npz", *own]
 
 
 def goes_on(before: Mapping[str, Any], asked: Mapping[str, Any]) -> bool:

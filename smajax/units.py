@@ -97,6 +97,15 @@ def _unit(text: str, like: str | None = None) -> Any:
         raise UnitError(f"unit {text[:LONGEST]!r} is not known; {advice}") from error
 
 
+def is_unit(text: str) -> bool:
+    """Whether `text` names a unit, or none ("-", "1", "%")."""
+    try:
+        _unit(text)
+    except UnitError:
+        return text.strip() == "%"
+    return True
+
+
 def _is_absolute(unit: Any) -> bool:
     """Whether the unit is one of absolute temperature on a scale with an offset (degC, degF)."""
     return str(unit) in ("degree_Celsius", "degree_Fahrenheit")

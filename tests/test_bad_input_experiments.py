@@ -2,14 +2,24 @@
 
 from __future__ import annotations
 
+import json
+import shutil
+import warnings
+from importlib import resources
 from pathlib import Path
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
 from smajax.catalogue import CATALOGUE
+from smajax.command.close_loop import DEMOS
+from smajax.compiled import simulate_compiled
 from smajax.experiment.load import load_experiment
-from tests.small_bench import bench, log, refused, table
+from smajax.experiment.magnitude import BY_HEAT
+from smajax.presets import LOADS, build
+from smajax.sensors import sensors_of, shown_by
+from tests.small_bench import bench, log, refused, smajax, table
 
 PARAMETERS = "[model.parameters]\n{}\n[unknown]"
 REFUSED = {
@@ -119,6 +129,17 @@ def test_identify_says_when_nothing_is_unknown_and_what_cannot_be_profiled(tmp_p
     )
 
 
+def test_a_handful_of_samples_says_nothing_of_their_distribution(tmp_path: Path) -> None:
+    experiment = bench(tmp_path / "bench")
+    log(experiment.parent / "a.csv", seconds=0.5)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        ended = smajax("identify", experiment, "--starts", "0", "--out", tmp_path / "out", "--json")
+    assert ended.code == 0, ended.said
+    assert json.loads(ended.out)["residual"]["normality_p_value"] is None
+    assert "normally distributed" not in ended.out
+
+
 def _warned(experiment: Path, words: str) -> bool:
     return any(words in one for one in load_experiment(experiment, CATALOGUE).warnings)
 
@@ -169,6 +190,48 @@ def test_an_output_that_does_not_follow_the_heat_is_told(tmp_path: Path, shuffle
         table(tmp_path / name, t, held[:, 1], other)
     assert _warned(experiment, "the output 'position' hardly follows the heat (rank correlation 0.")
     assert not _warned(bench(tmp_path), "hardly follows")
+
+
+@pytest.mark.parametrize("name", DEMOS)
+def test_a_sensor_with_a_turned_sign_is_told_and_turned_back(tmp_path: Path, name: str) -> None:
+    shutil.copytree(Path(str(resources.files("smajax") / "demo" / name)), tmp_path / name)
+    experiment = tmp_path / name / "experiment.toml"
+    before = load_experiment(experiment, CATALOGUE)
+    assert not any("moves against" in one for one in before.warnings)
+    for file in (tmp_path / name).glob("*.csv"):
+        head, *lines = file.read_text().splitlines()
+        place = head.split(",").index("position_mm")
+        cells = [line.split(",") for line in lines]
+        turned = [[*row[:place], str(-float(row[place])), *row[place + 1 :]] for row in cells]
+        file.write_text("\n".join([head, *map(",".join, turned)]))
+    assert _warned(experiment, "the output 'position' moves against the model (rank correlation with the heat -0.")
+    assert _warned(experiment, "reversed = true under [channels.position]")
+    experiment.write_text(experiment.read_text().replace('unit = "mm"', 'unit = "mm"\nreversed = true'))
+    after = load_experiment(experiment, CATALOGUE)
+    assert after.warnings == before.warnings
+    for old, new in zip(before.runs, after.runs, strict=True):
+        np.testing.assert_array_equal(old.output, new.output)
+
+
+def test_only_an_output_can_be_reversed(tmp_path: Path) -> None:
+    said = refused("identify", bench(tmp_path, ('unit = "V"', 'unit = "V"\nreversed = true')))
+    assert "channels.voltage: got reversed for an input" in said
+    assert "did you mean 'reversed'" in refused(
+        "identify", bench(tmp_path, ('unit = "mm"', 'unit = "mm"\nreverse = true'))
+    )
+
+
+@pytest.mark.parametrize("load", [name for name in LOADS if "coupon" not in name])
+def test_heat_moves_outputs_as_the_check_of_signs_has_it(load: str) -> None:
+    system = (
+        build("flexinol_table_3_2", load, "flexinol_voltage")
+        if load != "arm"
+        else build("niti_table_3_1", "arm", "amplified_voltage")
+    )
+    run = simulate_compiled(system, {"voltage": jnp.repeat(jnp.asarray([0.0, 6.0]), 1000)})
+    for name in BY_HEAT.keys() & sensors_of(system).keys():
+        shown = np.asarray(shown_by(system, run, name))
+        assert BY_HEAT[name] * (shown[-1] - shown[900]) > 0.0, (load, name)
 
 
 def test_a_constant_or_cut_off_channel_is_told(tmp_path: Path) -> None:

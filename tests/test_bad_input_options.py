@@ -19,6 +19,11 @@ SIMULATE = {
         "No load preset `weight`; there are",
     ),
     "no time": ([*WIRE, "--step", "5V"], "nothing says how long the run is: give levels with times (6V:5s,0V:10s)"),
+    "levels without times": ([*WIRE, "--step", "6V,0V"], "got '6V', expected LEVEL:TIME, such as '6V:5s'"),
+    "no input": (
+        [*WIRE, "--seconds", "3"],
+        "the model needs the input 'voltage': give --step LEVEL:TIME,LEVEL:TIME or --input voltage=6V:10s",
+    ),
     "a length for a voltage": ([*WIRE, "--step", "5mm:1s"], "got unit 'mm' ([length]), expected one like 'V'"),
     "no step": ([*WIRE, "--step", "5V:1s", "--dt", "0s"], "--dt: got '0s', expected a time above zero"),
     "a step that is none": ([*WIRE, "--step", "5V:1s", "--dt", "nan"], "got 'nan', expected a number and a unit like"),

@@ -10,6 +10,7 @@ import pytest
 from smajax.batch.axes import grid, sampled, zipped
 from smajax.batch.run import run_batch
 from smajax.compiled import simulate_compiled
+from smajax.compose import compose
 from smajax.dataset import simulate_dataset
 from smajax.parameters import set_parameters
 from smajax.presets import build
@@ -81,3 +82,17 @@ def test_values_that_cannot_be_are_named_before_a_run() -> None:
         set_parameters(SYSTEM, {"austenite_strat": 90.0})
     with pytest.raises(ValueError, match=r"`wire_diameter` = -1 m \(from"):
         simulate_dataset(set_parameters(SYSTEM, {"wire_diameter": -1.0}), VOLTAGE)
+
+
+def test_a_parameter_beside_values_is_sent_there() -> None:
+    with pytest.raises(TypeError, match=r"no argument 'damping'; a parameter goes into values=\{'damping': 100.0\}"):
+        compose("flexinol_table_3_2", "dead_weight", "voltage", damping=100.0)
+
+
+def test_a_gradient_through_machine_code_is_sent_to_simulate() -> None:
+    def last(volts: jax.Array) -> jax.Array:
+        return simulate_compiled(SYSTEM, {"voltage": jnp.full(20, volts)}).reading[-1]
+
+    for change in (jax.grad, jax.jit, jax.vmap):
+        with pytest.raises(TypeError, match=r"no gradient, jit or vmap goes through.*use `smajax.simulate.simulate`"):
+            change(last)(jnp.full(2, 3.0) if change is jax.vmap else jnp.asarray(3.0))

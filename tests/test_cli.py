@@ -124,7 +124,38 @@ def test_ctrl_c_is_answered(tmp_path: Path) -> None:
         run.send_signal(signal.SIGINT)
         said = run.stderr.read()
     assert run.returncode == 130, said
-    assert "goes on from there" in said
+    assert "Interrupted. Nothing was finished: the same command begins anew." in said
+
+
+@pytest.mark.parametrize("finished", [True, False])
+def test_what_is_kept_is_said_only_where_something_is(tmp_path: Path, finished: bool) -> None:
+    (tmp_path / "fits").mkdir()
+    if finished:
+        (tmp_path / "fits" / f"{'0f' * 16}.npz").write_text("")
+    code = (
+        "import pathlib, sys\nfrom smajax.command.base import FITS, resumable\n"
+        "with resumable('Kept.', pathlib.Path(sys.argv[1]), FITS):\n    raise KeyboardInterrupt"
+    )
+    told = subprocess.run([sys.executable, "-c", code, str(tmp_path)], capture_output=True, text=True, check=False)
+    assert told.returncode == 130
+    assert ("Interrupted. Kept." in told.stderr) is finished
+
+
+def test_ctrl_c_while_garbage_is_collected_ends_the_command() -> None:
+    """What a callback of the collector raises is dropped by Python: Ctrl-C is given again until it is answered."""
+    code = (
+        "import gc, os, signal, time\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        "from smajax.command.base import resumable\n"
+        "def swallow(phase, info):\n    gc.callbacks.remove(swallow)\n    os.kill(os.getpid(), signal.SIGINT)\n"
+        "    time.sleep(0.1)\n"
+        "with resumable():\n    gc.callbacks.append(swallow)\n    gc.collect()\n    print('went on', flush=True)\n"
+        "    time.sleep(20)"
+    )
+    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert "Exception ignored" in told.stderr
+    assert told.stdout == "went on\n"
+    assert told.returncode == 130
+    assert "Interrupted." in told.stderr
 
 
 def test_progress_is_silent_where_nobody_looks(

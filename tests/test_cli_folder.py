@@ -9,11 +9,13 @@ import pytest
 from typer.testing import CliRunner
 
 from smajax.cli import app
+from smajax.command.base import FITS
 from smajax.command.folder import MARK, FolderTaken, claimed
 from smajax.figures.row import Result, Row
 from smajax.figures.write import MARK as FIGURES_MARK
 from smajax.figures.write import draw, lying_in, write_pages
 from smajax.fit.progress import quiet
+from tests.small_bench import bench, log, smajax
 
 run = CliRunner()
 
@@ -34,6 +36,22 @@ def test_the_same_work_goes_on_and_another_is_refused(tmp_path: Path) -> None:
     assert (out / "simulate.csv").read_text() == "1"
 
 
+def test_what_differs_is_said_and_no_more_of_it_than_a_reader_needs(tmp_path: Path) -> None:
+    before = {"gone": 1, "experiment file": {f"key{k}": k for k in range(9)}}
+    with claimed(tmp_path, "identify", before, []):
+        pass
+    asked = {"new": [0] * 99, "experiment file": {f"key{k}": k + (k > 3) for k in range(9)}}
+    with pytest.raises(FolderTaken) as refused, claimed(tmp_path, "identify", asked, []):
+        pass
+    said = str(refused.value)
+    assert "(changed in the experiment file, key4: 4 there, 5 asked; " in said
+    assert said.endswith("and 3 more): give the name of another folder, or --overwrite to delete that.")
+    del asked["experiment file"]
+    words = r"gone: 1 there, not asked; new: not there, \[0, 0.*\.\.\. asked"
+    with pytest.raises(FolderTaken, match=words), claimed(tmp_path, "identify", asked, []):
+        pass
+
+
 def test_overwriting_leaves_what_is_not_ours(tmp_path: Path) -> None:
     out = tmp_path / "out"
     _done(out)
@@ -48,6 +66,51 @@ def test_a_file_of_the_users_is_not_written_over(tmp_path: Path) -> None:
     assert isinstance(ended.exception, FolderTaken)
     assert "would write over (README.md)" in str(ended.exception)
     assert [one.name for one in tmp_path.iterdir()] == ["README.md"]
+
+
+@pytest.mark.parametrize(
+    ("command", "own"), [("close-loop", "report.html"), ("identify", "identify.html"), ("sweep", "sweep.json")]
+)
+def test_a_users_file_that_is_named_like_a_result_is_refused(tmp_path: Path, command: str, own: str) -> None:
+    (tmp_path / own).write_text("mine")
+    with pytest.raises(FolderTaken, match=f"would write over \\({own}\\)"), claimed(tmp_path, command, {}, [own]):
+        pass
+    assert (tmp_path / own).read_text() == "mine"
+
+
+@pytest.mark.parametrize("marked", [FITS, "fits"])  # as this version writes its mark, and as those before did
+def test_overwriting_leaves_a_users_file_among_the_fits(tmp_path: Path, marked: str) -> None:
+    with claimed(tmp_path, "identify", {}, [marked]):
+        (tmp_path / "fits").mkdir()
+        (tmp_path / "fits" / f"{'0f' * 16}.npz").write_text("a fit")
+        (tmp_path / "fits" / "mine.npz").write_text("mine")
+    with claimed(tmp_path, "simulate", {}, ["simulate.*"], overwrite=True):
+        assert [one.name for one in (tmp_path / "fits").iterdir()] == ["mine.npz"]
+
+
+def test_an_experiment_that_was_edited_and_other_data_are_refused(tmp_path: Path) -> None:
+    def words(path: Path, *more: str) -> list[str | Path]:
+        return ["identify", path, "--starts", "2", "--out", tmp_path / "out", *more]
+
+    path = bench(tmp_path / "bench")
+    assert smajax(*words(path)).code == 0
+    fits = sorted((tmp_path / "out" / "fits").iterdir())
+    path.write_text("# a remark\n" + path.read_text())
+    assert smajax(*words(path)).code == 0  # the same experiment: its fits serve again
+    assert sorted((tmp_path / "out" / "fits").iterdir()) == fits
+    assert "--robust: False there, True asked" in smajax(*words(path, "--robust")).said
+    page = (tmp_path / "out" / "identify.json").read_bytes()
+    bench(tmp_path / "bench", ('start = "100', 'start = "90'))
+    edited = smajax(*words(path))
+    assert edited.code == 2
+    assert "changed in the experiment file, unknown.convection_coefficient.start: '100 W/m^2/K' there" in edited.said
+    assert "--overwrite" in edited.said
+    bench(tmp_path / "bench")
+    log(tmp_path / "bench" / "a.csv", top=4.9)
+    other = smajax(*words(path))
+    assert other.code == 2
+    assert "changed in the data, A: " in other.said
+    assert (tmp_path / "out" / "identify.json").read_bytes() == page
 
 
 def _broken_off(out: Path, wrote: str, error: BaseException) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from smajax import doctor
 from smajax.bench import bench, in_words
 from smajax.catalogue import CATALOGUE
 from smajax.cli import app
+from smajax.experiment.errors import ExperimentError
 from smajax.experiment.guess import columns_of
 from smajax.experiment.load import load_experiment
 from smajax.experiment.template import begun
@@ -150,6 +152,66 @@ def test_units_are_those_of_headings_and_magnitudes(
     ]
     (tmp_path / "log.csv").write_text("\n".join([head, *(row.format(**one) for one in values)]))
     assert {one.quantity: one.unit for one in columns_of(read_table(tmp_path / "log.csv")) if one.quantity} == expected
+
+
+def _bench_log(path: Path, head: str, clock: Callable[[int], str], end: str = "") -> Path:
+    rows = (f"{clock(k)};{5 * (k % 40 > 19)};{10 * np.sin(k / 9):.3f}" for k in range(80))
+    path.write_text("\n".join([head, *rows]) + end, encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("head", "clock", "unit"),
+    [
+        ("Timestamp;U [V];x [mm]", lambda k: f"2026-11-12 10:00:{k // 10:02}.{k % 10}00", "s"),
+        ("Uhrzeit;Spannung/V;Weg/mm", lambda k: f"10:00:{k // 10:02},{k % 10}00", "s"),
+        ("Zeit/ms;U/V;s/mm", lambda k: str(100 * k), "ms"),
+        ("Zeit;U;Weg\nms;V;mm", lambda k: str(100 * k), "ms"),
+    ],
+)
+def test_times_and_units_as_german_loggers_write_them(
+    tmp_path: Path, head: str, clock: Callable[[int], str], unit: str
+) -> None:
+    guessed = begun([_bench_log(tmp_path / "log.csv", head, clock)], tmp_path / "e.toml")
+    (tmp_path / "e.toml").write_text(guessed.text, encoding="utf-8")
+    experiment = load_experiment(tmp_path / "e.toml", CATALOGUE)
+    assert f'unit = "{unit}"' in guessed.text
+    assert experiment.step == 0.1
+    assert experiment.clocked
+    assert np.ptp(experiment.runs[0].output) == pytest.approx(0.02, rel=0.01)
+    assert experiment.runs[0].time[-1] == pytest.approx(7.9)
+
+
+@pytest.mark.parametrize("end", ["\nEnde;5;1", "\n3;5;1"])
+def test_a_time_that_cannot_be_read_is_said_first(tmp_path: Path, end: str) -> None:
+    log = _bench_log(tmp_path / "log.csv", "Zeit;U [V];x [mm]", lambda k: str(k / 10), end)
+    first = begun([log], tmp_path / "e.toml").told[0]
+    assert first.startswith("time: NOT READ, and samples are counted (a guess): ")
+    assert ("line 82, column 'Zeit': 'Ende' is not a number" if "Ende" in end else "'Zeit' goes back") in first
+
+
+def test_every_column_that_is_left_out_is_listed_with_its_line(tmp_path: Path) -> None:
+    log = _bench_log(tmp_path / "log.csv", "Zeit/s;U/V;s/mm", lambda k: str(k / 10))
+    lines = log.read_text().splitlines()
+    more = ["F/N;note", *("oops;warm" if k == 50 else f"{k};warm" for k in range(1, 81))]
+    log.write_text("\n".join(f"{a};{b}" for a, b in zip(lines, more, strict=True)))
+    told = begun([log], tmp_path / "e.toml").told
+    assert any("F/N: left out (line 51, column 'F/N': 'oops' is not a number" in line for line in told)
+    assert any("note: left out (line 2, column 'note': 'warm' is not a number" in line for line in told)
+
+
+def test_files_that_began_at_different_clock_times_are_laid_side_by_side(tmp_path: Path) -> None:
+    for name, late in (("U [V]", 0), ("x [mm]", 20)):
+        rows = [f"10:00:{(k + late) // 10:02}.{(k + late) % 10};{np.sin((k + late) / 9):.3f}" for k in range(60)]
+        (tmp_path / f"{name[0]}.csv").write_text("\n".join([f"time;{name}", *rows]))
+    (tmp_path / "e.toml").write_text(begun([tmp_path / "U.csv", tmp_path / "x.csv"], tmp_path / "e.toml").text)
+    (one,) = load_experiment(tmp_path / "e.toml", CATALOGUE).runs
+    assert (one.time[0], one.time[-1]) == pytest.approx((2.0, 5.9))
+    np.testing.assert_allclose(one.inputs["voltage"], 1e3 * one.output)
+    text = (tmp_path / "e.toml").read_text().replace('unit = "s"', 'unit = "ms"')
+    (tmp_path / "e.toml").write_text(text)
+    with pytest.raises(ExperimentError, match=r"holds clock times, which are read as seconds.*write unit = 's'"):
+        load_experiment(tmp_path / "e.toml", CATALOGUE)
 
 
 def test_what_the_model_needs_and_no_column_gives_is_said(tmp_path: Path) -> None:

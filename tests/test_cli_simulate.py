@@ -91,7 +91,7 @@ def test_the_same_run_may_be_shown_again_and_another_goes_elsewhere(folder: Path
     assert again.exit_code == 0, again.output
     other = run.invoke(app, [*words, "--set", "wire.heat.convection_coefficient=90"])
     assert isinstance(other.exception, FolderTaken)
-    assert "{'wire.heat.convection_coefficient': '80'} there" in str(other.exception)
+    assert "wire.heat.convection_coefficient: 80 there, 90 asked" in str(other.exception)
 
 
 def test_a_gains_file_closes_the_loop(tmp_path: Path) -> None:

@@ -10,6 +10,8 @@ import pytest
 import scipy.io
 import xarray as xr
 
+from smajax.experiment.guess import columns_of
+from smajax.measured import headers
 from smajax.measured.extras import needed
 from smajax.measured.read import read_table
 from smajax.measured.repeated import once
@@ -108,13 +110,71 @@ def test_a_cell_that_is_no_number(tmp_path: Path, cell: str, words: str) -> None
         table.column("x")
 
 
-@pytest.mark.parametrize("units", ["s;V", "[s];[V]", "s;-", "s;1"])
-def test_a_line_of_units_is_named(tmp_path: Path, units: str) -> None:
-    path = written(tmp_path / "run.csv", f"time;x\n{units}\n0;1\n1;2\n")
+@pytest.mark.parametrize(
+    ("units", "known"),
+    [
+        ("s;V", {"time": "s", "x": "V"}),
+        ("[s];[V]", {"time": "s", "x": "V"}),
+        ("s;-", {"time": "s", "x": "-"}),
+        ("s;1", {"time": "s", "x": "1"}),
+        ("ms;", {"time": "ms"}),
+    ],
+)
+def test_a_line_of_units_is_read(tmp_path: Path, units: str, known: dict[str, str]) -> None:
+    table = read_table(written(tmp_path / "run.csv", f"time;x\n{units}\n0;1\n1;2\n"))
+    assert table.units == known
+    np.testing.assert_array_equal(table.column("time"), [0.0, 1.0])
+    assert table.place(0) == "line 3"
+
+
+def test_a_line_that_is_like_units_and_is_none_is_named(tmp_path: Path) -> None:
+    path = written(tmp_path / "run.csv", "time;x\nsecs_;V\n0;1\n1;2\n")
     with pytest.raises(
         MeasuredDataError, match=r"line 2, column 'time': .* is not a number; line 2 looks like units: del"
     ):
         read_table(path).column("time")
+
+
+@pytest.mark.parametrize(
+    ("cells", "seconds"),
+    [
+        (["2026-11-12 10:00:00.100", "2026-11-12 10:00:00.350", "2026-11-13 10:00:00.100"], [0.0, 0.25, 86400.0]),
+        (["2026-11-12T23:59:59Z", "2026-11-13T01:00:00+01:00", "2026-11-12T22:00:01-02:00"], [0.0, 1.0, 2.0]),
+        (["10:00:00,100", "10:00:00,350", "10:00:01"], [0.0, 0.25, 0.9]),
+        (["23:59:59.5", "0:00:00.0", "00:00:01.5"], [0.0, 0.5, 2.0]),  # past midnight
+    ],
+)
+@pytest.mark.parametrize("head", ["Uhrzeit;U;x\n", ""])
+def test_clock_times_are_seconds_from_the_first(
+    tmp_path: Path, head: str, cells: list[str], seconds: list[float]
+) -> None:
+    text = head + "".join(f"{cell};0,5;1\n" for cell in cells)
+    table = read_table(written(tmp_path / "run.csv", text))
+    time = table.order[0]
+    np.testing.assert_array_equal(table.column(time), seconds)
+    np.testing.assert_array_equal(table.column(2), [0.5, 0.5, 0.5])
+    assert table.units[time] == "s"
+
+
+@pytest.mark.parametrize("cell", ["2026-13-12 10:00:00", "10:61:00", "10:00", "Ende", "5"])
+def test_a_cell_that_is_no_clock_time_is_named(tmp_path: Path, cell: str) -> None:
+    table = read_table(written(tmp_path / "run.csv", f"t;x\n10:00:00;1\n10:00:01;2\n{cell};3\n"))
+    with pytest.raises(MeasuredDataError, match=rf"line 4, column 't': '{cell}' is not a clock time"):
+        table.column("t")
+
+
+def test_headings_of_tab_separated_decimal_commas_may_hold_blanks(tmp_path: Path) -> None:
+    table = read_table(written(tmp_path / "run.txt", "t [s]\tU [V]\n0,0\t1,5\n0,1\t2,5\n"))
+    np.testing.assert_array_equal(table.column("U [V]"), [1.5, 2.5])
+
+
+def test_units_of_headings() -> None:
+    found = {
+        name: headers.unit_in(name)
+        for name in ("Zeit/s", "U / mV", "s/mm", "T/°C", "x [mm]", "t_ms", "a/b", "/s", "h [W/(m^2 K)]", "x")
+    }
+    assert list(found.values()) == ["s", "mV", "mm", "°C", "mm", "ms", "", "", "W/(m^2 K)", ""]
+    assert (headers.bare("Zeit/s"), headers.bare("a/b"), headers.words("U / mV")) == ("Zeit", "a/b", ["u"])
 
 
 def test_samples_are_placed_by_the_lines_of_their_file(tmp_path: Path) -> None:
@@ -170,6 +230,64 @@ def test_simulink_structures_carry_their_own_time(tmp_path: Path) -> None:
     np.testing.assert_array_equal(table.column("Pair[2]"), [4.0, 5.0, 6.0])
     np.testing.assert_array_equal(table.column("gain"), [1.0, 2.0])
     assert table.clock("gain") is None
+
+
+def _scope(folder: Path, version: str) -> Path:
+    """What a Scope with three axes and a struct of logged signals leave in a workspace, saved as MATLAB 5 or 7.3."""
+    path, time = folder / "run.mat", np.arange(40.0).reshape(-1, 1) / 10.0
+    shown = [
+        ("", "Voltage [V]", 5.0 * (time > 1.0)),
+        ("Weg/mm", "", np.sin(time)),
+        ("", "", np.hstack([time, 2.0 * time])),
+    ]
+    if version == "5":
+        signals = np.zeros((1, 3), dtype=[("values", object), ("label", object), ("title", object)])
+        for k, (label, title, values) in enumerate(shown):
+            signals[0, k] = (values, label, title)
+        logged = {
+            "force": {"time": time, "values": 3.0 * time},
+            "T": {"Time": time, "Data": 20.0 + time},
+            "name": "logsout",
+        }
+        scipy.io.savemat(path, {"ScopeData": {"time": time, "signals": signals}, "logsout": logged})
+        return path
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(path, "w", userblock_size=512) as file:
+        scope = file.create_group("ScopeData")
+        scope["time"] = time.T
+        held = scope.create_group("signals")
+        for key, place in (("label", 0), ("title", 1), ("values", 2)):
+            references = []
+            for k, one in enumerate(shown):
+                text = isinstance(one[place], str)
+                codes = np.array([[ord(letter)] for letter in str(one[place]) or "\0"], dtype=np.uint16)
+                node = file.create_dataset(f"#refs#/{key}{k}", data=codes if text else np.asarray(one[place]).T)
+                node.attrs["MATLAB_class"] = np.bytes_(b"char" if text else b"double")
+                references.append([node.ref])
+            held.create_dataset(key, data=np.array(references, dtype=object), dtype=h5py.ref_dtype)
+        for name, words, values in (("force", ("time", "values"), 3.0 * time), ("T", ("Time", "Data"), 20.0 + time)):
+            one = file.create_group(f"logsout/{name}")
+            one[words[0]], one[words[1]] = time.T, values.T
+    with path.open("r+b") as raw:
+        raw.write(b"MATLAB 7.3 MAT-file")
+    return path
+
+
+@pytest.mark.parametrize("version", ["5", "7.3"])
+def test_signals_of_a_scope_go_by_their_labels_and_logged_ones_by_their_fields(tmp_path: Path, version: str) -> None:
+    table = read_table(_scope(tmp_path, version))
+    assert sorted(table.columns) == [
+        *("ScopeData.1", "ScopeData.2", "ScopeData.3[1]", "ScopeData.3[2]"),
+        *("logsout.T", "logsout.force"),
+    ]
+    assert table.labels == {"ScopeData.1": "Voltage [V]", "ScopeData.2": "Weg/mm"}
+    np.testing.assert_array_equal(table.column("ScopeData.3[2]"), 2.0 * (np.arange(40.0) / 10.0))
+    np.testing.assert_array_equal(table.column("logsout.force"), 3.0 * (np.arange(40.0) / 10.0))
+    np.testing.assert_array_equal(table.clock("logsout.T"), np.arange(40.0) / 10.0)
+    guessed = {one.quantity: (one.key, one.unit, one.why) for one in columns_of(table)}
+    assert guessed["voltage"] == ("ScopeData.1", "V", "its label 'Voltage [V]' and unit")
+    assert guessed["position"] == ("ScopeData.2", "mm", "its label 'Weg/mm' and unit")
+    assert guessed["force"][0] == "logsout.force"
 
 
 def test_mat_variables_of_another_structure_or_missing(tmp_path: Path) -> None:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 import os
 import shlex
+import signal
 import sys
+import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -18,6 +20,11 @@ if TYPE_CHECKING:
 
 UNMET = 3  # exit code: the work is done and what was asked of its result is not met
 INTERRUPTED = 130
+AGAIN = 1.0  # s after which Ctrl-C that was not answered is given again
+HEX = "[0-9a-f]"
+# Folders within a result, and what smajax names its files there; what else is in them is the user's.
+INSIDE = {"fits": f"{HEX * 32}.npz", "finished": f"*-{HEX * 16}.npz"}
+FITS = f"fits/{INSIDE['fits']}"
 
 Overwrite = Annotated[
     bool, typer.Option("--overwrite", help="delete another result that smajax wrote into --out, and begin anew")
@@ -53,12 +60,40 @@ def command_line() -> str:
 
 
 @contextmanager
-def resumable(kept: str = "Finished fits are kept: the same command goes on from there.") -> Iterator[None]:
-    """Ctrl-C is answered here: typer would end in silence."""
+def _insistent() -> Iterator[None]:
+    """Ctrl-C until it is answered: what is raised while Python collects garbage, as XLA lets it, is printed and dropped."""
+    own = threading.current_thread() is threading.main_thread()
+    if not own or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        yield
+        return
+
+    def interrupt(number: int, frame: object) -> None:
+        signal.setitimer(signal.ITIMER_REAL, AGAIN)
+        raise KeyboardInterrupt
+
+    alarm = signal.signal(signal.SIGALRM, interrupt)
+    signal.signal(signal.SIGINT, interrupt)
     try:
         yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        signal.signal(signal.SIGALRM, alarm or signal.SIG_DFL)
+
+
+@contextmanager
+def resumable(kept: str = "", out: Path | None = None, finished: str = "") -> Iterator[None]:
+    """Ctrl-C is answered here: typer would end in silence.
+
+    kept: what is said where a file of the pattern `finished` lies in `out`; else that there is nothing to go on from.
+    """
+    try:
+        with _insistent():
+            yield
     except KeyboardInterrupt:
-        console().print(f"\nInterrupted. {kept}", soft_wrap=True)
+        there = out is not None and any(out.glob(finished))
+        told = kept if there else "Nothing was finished: the same command begins anew."
+        console().print(f"\nInterrupted. {told}", soft_wrap=True)
         # At once: an interpreter that shuts down in the middle of a compilation can crash.
         os._exit(INTERRUPTED)
 

@@ -10,13 +10,24 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from smajax.command.base import Json, Open, OpenUnless, Overwrite, browse, browse_from_terminal, console, resumable
+from smajax.command.base import (
+    FITS,
+    Json,
+    Open,
+    OpenUnless,
+    Overwrite,
+    browse,
+    browse_from_terminal,
+    console,
+    resumable,
+)
 
 if TYPE_CHECKING:
     from smajax.report.findings import Findings
 
 DEMOS = ("latent", "complete")
-OWN = ("report.html", "report.json", "parameters.csv", "runs.csv", "fits")
+FINISHED_FITS = "Finished fits are kept: the same command goes on from there."
+OWN = ("report.html", "report.json", "parameters.csv", "runs.csv", FITS)
 
 
 def _loop(experiment: Path, out: Path, command: str, overwrite: bool) -> tuple[Findings, Path]:
@@ -27,14 +38,18 @@ def _loop(experiment: Path, out: Path, command: str, overwrite: bool) -> tuple[F
     from smajax.catalogue import CATALOGUE
     from smajax.close_loop import close_loop
     from smajax.command.folder import check_path, claimed
+    from smajax.experiment.asked import asked_of
     from smajax.experiment.load import load_experiment
     from smajax.progress import shown
     from smajax.report.write import write_report
 
     check_path(out)
     loaded = load_experiment(experiment, CATALOGUE)
-    asked = {"experiment": loaded.name}
-    with resumable(), claimed(out, "close-loop", asked, OWN, overwrite), shown(console()) as progress:
+    with (
+        resumable(FINISHED_FITS, out, FITS),
+        claimed(out, "close-loop", asked_of(loaded), OWN, overwrite),
+        shown(console()) as progress,
+    ):
         findings = close_loop(loaded, memory=out / "fits", progress=progress, command=command)
         return findings, write_report(findings, out)
 

@@ -46,7 +46,11 @@ def figures(
         raise typer.BadParameter(error.args[0], param_hint="NAME") from None
     setting = {"setting": "fast" if fast else "full"}
     kept = "Finished figures are kept: the same command goes on."
-    with resumable(kept), claimed(out, "figures", setting, OWN, overwrite), shown(console()) as progress:
+    with (
+        resumable(kept, out, "[MC]*.json"),
+        claimed(out, "figures", setting, OWN, overwrite),
+        shown(console()) as progress,
+    ):
         drawn = draw(list(dict.fromkeys(asked)), out, fast, progress)
         page = write_pages(out)
     if json_out:

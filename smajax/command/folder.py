@@ -15,10 +15,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from smajax.command.base import INSIDE
 from smajax.report.files import json_text, replace, sweep_up
 
 MARK = ".smajax.json"
-# Folders of versions without the mark are known by the file that each command writes last.
+# By the file that each command writes last another one refuses a folder without the mark, which may be the user's own.
 LAST = {
     "report.html": "close-loop",
     "identify.html": "identify",
@@ -26,6 +27,7 @@ LAST = {
     "sweep.json": "sweep",
     ".made-by": "figures",
 }
+MOST_TOLD, LONGEST = 4, 60  # differences in a message, characters of a value in it
 Asked = Mapping[str, Any]
 
 
@@ -41,9 +43,26 @@ def _same(before: Asked, asked: Asked) -> bool:
     return dict(before) == dict(asked)
 
 
+def _unlike(before: Asked, asked: Asked) -> Iterator[str]:
+    """Each entry that differs, in words; of a table in the place of a value, its entries."""
+    for name in sorted(before.keys() | asked.keys()):
+        old, new = before.get(name), asked.get(name)
+        if isinstance(old, Mapping) and isinstance(new, Mapping):
+            yield from (f"changed in the {name}, {one}" for one in _unlike(old, new))
+        elif old != new:
+            there = f"{_short(old)} there" if name in before else "not there"
+            yield f"{name}: {there}, {_short(new) if name in asked else 'not'} asked"
+
+
+def _short(value: Any) -> str:
+    text = "a table" if isinstance(value, Mapping) else "none" if value is None else str(value)
+    return text if len(text) <= LONGEST else f"{text[:LONGEST]}..."
+
+
 def _differences(before: Asked, asked: Asked) -> str:
-    differ = sorted(name for name in before.keys() | asked.keys() if before.get(name) != asked.get(name))
-    return "; ".join(f"{name}: {before.get(name)} there, {asked.get(name)} asked" for name in differ)
+    differ = list(_unlike(before, asked))
+    more = len(differ) - MOST_TOLD
+    return "; ".join([*differ[:MOST_TOLD], *([f"and {more} more"] if more > 0 else [])])
 
 
 def _read(out: Path) -> dict[str, Any] | None:
@@ -58,13 +77,12 @@ def _other(out: Path, command: str, asked: Asked, own: Sequence[str], goes_on: C
     """What else `out` holds, in words; empty where it may be written to."""
     held = _read(out)
     if held is None:
+        there = sorted(str(one.relative_to(out)) for pattern in own for one in out.glob(pattern))
+        if there:
+            return f"what this command would write over ({', '.join(there[:3])})"
         whose = {LAST[name]: name for name in LAST if (out / name).exists()}
-        if command in whose:
-            return ""
-        if whose:
-            return "a result of " + " and ".join(f"`smajax {one}` ({name})" for one, name in whose.items())
-        there = sorted(one.name for pattern in own for one in out.glob(pattern))
-        return f"what this command would write over ({', '.join(there[:3])})" if there else ""
+        told = " and ".join(f"`smajax {one}` ({name})" for one, name in whose.items())
+        return f"what may be a result of {told}" if told else ""
     if held["command"] != command:
         return f"a result of `smajax {held['command']}`"
     if goes_on(held["asked"], asked):
@@ -72,18 +90,29 @@ def _other(out: Path, command: str, asked: Asked, own: Sequence[str], goes_on: C
     return f"another result of `smajax {command}` ({_differences(held['asked'], asked)})"
 
 
+def _names_files(pattern: Any) -> bool:
+    """Whether a pattern of the mark, a file like any other, names files of smajax: not everything, in no other folder."""
+    if not isinstance(pattern, str):
+        return False
+    folder, _, names = pattern.rpartition("/")
+    return INSIDE.get(folder) == names if folder else ".." not in pattern and bool(pattern.strip("*?."))
+
+
 def _clear(out: Path, own: Sequence[str]) -> None:
     """Delete what smajax wrote there; what else is there stays."""
     held = _read(out) or {}
-    # The mark is a file like any other: a pattern in it that means everything, or another folder, is none of ours.
-    named = [name for name in held.get("files", ()) if isinstance(name, str)]
-    kept = [name for name in named if "/" not in name and ".." not in name and name.strip("*?.")]
-    for pattern in {*own, *kept, MARK}:
+    ours: set[Path] = set()
+    for pattern in {*own, *filter(_names_files, held.get("files", ())), MARK}:
         for one in out.glob(pattern):
-            if one.is_dir() and not one.is_symlink():
-                shutil.rmtree(one)
-            else:
-                one.unlink()
+            if one.is_dir() and not one.is_symlink():  # a mark of an earlier version names the folder as a whole
+                ours.update(one.glob(INSIDE[one.name]) if one.name in INSIDE else ())
+            elif one.parent == out or not one.parent.is_symlink():
+                ours.add(one)
+    for one in ours:
+        one.unlink()
+    for folder in {one.parent for one in ours} - {out}:
+        if not any(folder.iterdir()):
+            folder.rmdir()
 
 
 def _made(out: Path) -> list[Path]:

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-import json
 import shlex
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from smajax.command.base import Json, Open, Overwrite, browse, console, resumable
+from smajax.command.base import FITS, Json, Open, Overwrite, browse, console, resumable
 
-OWN = ("identify.html", "identify.json", "parameters.csv", "runs.csv", "fits")
+OWN = ("identify.html", "identify.json", "parameters.csv", "runs.csv", FITS)
+
+
+def _goes_on(before: Mapping[str, Any], asked: Mapping[str, Any]) -> bool:
+    """The same work, or the same with a posterior added."""
+    return before == asked or before == {**asked, "--posterior": 0}
 
 
 def identify_command(
@@ -43,10 +48,12 @@ def identify_command(
     from smajax.catalogue import CATALOGUE
     from smajax.command.folder import FolderTaken, check_path, claimed
     from smajax.declared import free_by_name
+    from smajax.experiment.asked import asked_of
     from smajax.experiment.errors import ExperimentError
     from smajax.experiment.load import load_experiment
     from smajax.identify import identify
     from smajax.progress import shown
+    from smajax.report.files import json_text
     from smajax.report.identify_page import write_identified
     from smajax.report.identify_record import record
     from smajax.report.identify_words import conclusions, estimate_rows, posterior_rows
@@ -58,11 +65,15 @@ def identify_command(
     command = f"smajax identify {shlex.quote(str(experiment))} --out {shlex.quote(str(out))} --starts {starts}"
     command += f" --profile {','.join(profiled)}" * bool(profiled) + " --robust" * robust + " --design" * design
     command += f" --posterior {posterior}" * bool(posterior)
-    # Other options add to the same result: fits that were done without a profile serve with one.
-    asked = {"experiment": loaded.name}
+    # A profile and a design add to the same result, and so does a posterior where there was none: the fits serve again.
+    asked = {**asked_of(loaded), "--starts": starts, "--robust": robust, "--posterior": posterior}
     kept = "Fits are kept as they go: the same command goes on from there."
     try:
-        with resumable(kept), claimed(out, "identify", asked, OWN, overwrite), shown(console()) as progress:
+        with (
+            resumable(kept, out, FITS),
+            claimed(out, "identify", asked, OWN, overwrite, _goes_on),
+            shown(console()) as progress,
+        ):
             if any((out / "fits").glob("*.npz")):
                 progress(f"say: Fits kept in {out / 'fits'} are gone on with where they are of the same work.", 1.0)
             found = identify(
@@ -82,7 +93,7 @@ def identify_command(
     except ValueError as error:
         raise typer.BadParameter(str(error)) from None
     if json_out:
-        typer.echo(json.dumps(record(found), allow_nan=False))
+        typer.echo(json_text(record(found)), nl=False)
     else:
         typer.echo(f"\n{found.title or found.experiment}")
         for sentence in [*conclusions(found), *found.weak]:

@@ -94,7 +94,7 @@ def bench(
     from smajax.progress import shown
     from smajax.report.files import json_text, replace
 
-    with resumable("Nothing was written: run the same command again."), shown(console()) as progress:
+    with resumable(), shown(console()) as progress:
         found = timed(count, min(peers, count), progress)
     if out is not None:
         replace(out, json_text(found))

@@ -138,7 +138,7 @@ def simulate(
                     f"--step is for a model with one required input; this one has {needs}: use --input NAME=..."
                 )
             asked = Asked(**{**vars(asked), "inputs": {**series, next(iter(required)): step}})
-        with resumable("Nothing was written: run the same command again."):
+        with resumable():
             loop: AskedLoop | None = None
             if closed:
                 loop = AskedLoop(

@@ -101,7 +101,7 @@ def sweep(
     record, own = settings.record(), files_of(names)
     try:
         with (
-            resumable(kept),
+            resumable(kept, out, "finished/*.npz"),
             claimed(out, "sweep", record, own, overwrite, goes_on),
             shown(console()) as progress,
         ):

@@ -78,7 +78,7 @@ def tune(
     from smajax.figures.rigs import arm
     from smajax.gains_file import GainsFileError, read_gains
     from smajax.progress import shown
-    from smajax.tune.folder import OURS, tune_into
+    from smajax.tune.folder import OURS, STATE, tune_into
     from smajax.tune.objective import REGULATION
     from smajax.tune.page import conclusions, gain_rows
     from smajax.tune.settings import TuneSettings
@@ -114,7 +114,7 @@ def tune(
     try:
         settings.check(arm())
         with (
-            resumable(kept),
+            resumable(kept, out, STATE),
             claimed(out, "tune", asked, sorted(OURS), overwrite),
             shown(console()) as progress,
         ):

@@ -105,6 +105,14 @@ def _by_unit(unit: str) -> str:
     return next((name for name in order if _of_kind(unit, QUANTITIES[name][1])), "")
 
 
+def _by_words(heading: str, unit: str) -> str:
+    """The quantity that the words of a heading or a label name and that may have this unit, if there is one."""
+    said = set(words(heading))
+    return next(
+        (one for one, (known, own) in QUANTITIES.items() if said & known and (not unit or _of_kind(unit, own))), ""
+    )
+
+
 def _unit(table: Table, name: str) -> str:
     """The column's unit as the unit library has it; empty where neither file nor heading says."""
     said = unit_of(table, name)
@@ -114,16 +122,16 @@ def _unit(table: Table, name: str) -> str:
 def _column(table: Table, key: str | int, name: str) -> Column:
     values = table.columns[name]
     unit = _unit(table, name)
-    said = set(words(name))
     if isinstance(key, int):
         return Column(key, name, "", "", GUESS, "no heading")
-    quantity = next(
-        (one for one, (known, own) in QUANTITIES.items() if said & known and (not unit or _of_kind(unit, own))), ""
-    )
+    label = table.labels.get(name, "")
+    quantity, where = _by_words(name, unit), "heading"
+    if not quantity and label:
+        quantity, where = _by_words(label, unit), f"its label {label!r}"
     if quantity and unit:
-        return Column(key, name, quantity, unit, SURE, "heading and unit")
+        return Column(key, name, quantity, unit, SURE, f"{where} and unit")
     if quantity:
-        return Column(key, name, quantity, _unit_by_size(quantity, values), LIKELY, "heading; unit by magnitude")
+        return Column(key, name, quantity, _unit_by_size(quantity, values), LIKELY, f"{where}; unit by magnitude")
     if unit and unit != "1" and (quantity := _by_unit(unit)):
         return Column(key, name, quantity, unit, LIKELY, "unit in the heading")
     why = "named like a time, and goes back somewhere" if is_time(name) else "nothing tells"
@@ -134,6 +142,8 @@ def _is_clock(table: Table, name: str, headed: bool) -> bool:
     values = table.columns[name]
     grows = values.size > 1 and bool(np.all(np.diff(values) >= 0.0)) and float(values[-1]) > float(values[0])
     unit = _unit(table, name)
+    if name in table.moments:
+        return grows
     if headed:
         return is_time(name) and grows and (not unit or _of_kind(unit, "s"))
     return grows and bool(np.all(np.diff(values) > 0.0))
@@ -159,22 +169,40 @@ def _by_shape(columns: Sequence[Column], table: Table) -> list[Column]:
     return found
 
 
+def times_not_read(table: Table) -> list[str]:
+    """Columns that are named like a time, or hold clock times, and that are no clock: each with why, in words."""
+    wrong = []
+    for name in table.order or (*table.columns, *table.unusable):
+        unit = _unit(table, name)
+        if name in table.clocks or not (is_time(name) or name in table.moments) or (unit and not _of_kind(unit, "s")):
+            continue
+        if name in table.unusable:
+            wrong.append(table.unusable[name].split("; expected")[0])
+        elif not _is_clock(table, name, True) and not _column(table, name, name).quantity:
+            wrong.append(f"column {name!r} goes back somewhere, or stands still")
+    return wrong
+
+
 def columns_of(table: Table) -> list[Column]:
     """Every usable column with what it may be, the time first where there is one; each quantity once, by the surest."""
-    order = [name for name in (table.order or tuple(table.columns)) if name in table.columns]
-    headed = not all(name.isdigit() for name in order)
-    clock = None if table.clocks else next((name for name in order if _is_clock(table, name, headed)), None)
+    every = table.order or tuple(table.columns)
+    order = [name for name in every if name in table.columns]
+    headed = not all(name.isdigit() for name in every)
+    clocks = [name for name in order if _is_clock(table, name, headed)]
+    clock = None if table.clocks else next((name for name in clocks if name in table.moments), next(iter(clocks), None))
     found: list[Column] = []
     if clock is not None:
         unit = _unit(table, clock)
-        key: str | int = clock if headed else order.index(clock) + 1
+        key: str | int = clock if headed else every.index(clock) + 1
         sure, why = (
-            (SURE, "heading and unit")
+            (SURE, "clock times, read as seconds from the first one")
+            if clock in table.moments
+            else (SURE, "heading and unit")
             if headed and unit
             else (LIKELY if headed else GUESS, "it only grows; unit by magnitude")
         )
         found.append(Column(key, clock, TIME, unit or time_unit(table.columns[clock]), sure, why))
-    rest = [_column(table, name if headed else order.index(name) + 1, name) for name in order if name != clock]
+    rest = [_column(table, name if headed else every.index(name) + 1, name) for name in order if name != clock]
     rest = _by_shape(rest, table)
     rank = {SURE: 0, LIKELY: 1, GUESS: 2}
     for one in rest:

@@ -35,6 +35,11 @@ COLDEST_IN_K = 200.0  # degC: where a record never falls below, it is of a furna
 WARMEST_AIR = 60.0  # degC
 IN_COMMON = 0.9
 FOLLOWS, LEAST = 0.2, 20  # rank correlation of heat and output; samples
+AGAINST = 0.5  # rank correlation of heat and output from which on a wrong sign is a sign turned round
+LAGS = (1, 2, 4, 8)  # time constants through which an output may follow: latent heat and hysteresis hold it back
+# Whether heat makes an output rise or fall, on every moving load. Stress, force and resistance do one or the other by the
+# load and the alloy.
+BY_HEAT: Mapping[str, int] = MappingProxyType({"position": 1, "angle": 1, "temperature": 1, "strain": -1})
 MOVES = 0.5  # share of its samples from which on a signal that never repeats a value moves all the time
 
 
@@ -140,12 +145,15 @@ def _exchange_warnings(runs: Sequence[ReadRun], heats: Sequence[str]) -> list[st
     return []
 
 
-def _unrelated_warnings(runs: Sequence[ReadRun], scale: Scale, heats: Sequence[str], step: float) -> list[str]:
-    """Outputs that do not follow the heat: files that do not belong together, or samples out of order.
+def _following(
+    runs: Sequence[ReadRun], scale: Scale, heats: Sequence[str], step: float
+) -> Mapping[str, Sequence[Array]]:
+    """Output -> rank correlations of heat and output, by `LAGS`, in each run that tells them.
 
-    Heat is the power through one time constant of the wire; what follows it rises and falls with it, by whatever curve.
+    Heat is the power through some time constants of the wire; what follows it rises and falls with it, by whatever curve.
     """
-    share = 1.0 - np.exp(-step / scale.time_constant)
+    following: dict[str, Sequence[Array]] = {}
+    shares = [1.0 - np.exp(-step / (lag * scale.time_constant)) for lag in LAGS]
     for name in runs[0].run.outputs:
         found = []
         for read in runs:
@@ -154,15 +162,39 @@ def _unrelated_warnings(runs: Sequence[ReadRun], scale: Scale, heats: Sequence[s
             there = np.isfinite(output)
             if len(given) < len(heats) or there.sum() < LEAST or np.ptp(output[there]) == 0.0:
                 continue
-            warm = lfilter([share], [1.0, share - 1.0], scale.warming(given))[there]
-            if np.ptp(warm) > 0.0:
-                found.append(abs(float(spearmanr(warm, output[there]).statistic)))
-        if found and float(np.median(found)) < FOLLOWS:
+            power = scale.warming(given)
+            warm = [lfilter([share], [1.0, share - 1.0], power)[there] for share in shares]
+            if np.ptp(warm[0]) > 0.0:
+                found.append(np.asarray([spearmanr(one, output[there]).statistic for one in warm]))
+        if found:
+            following[name] = found
+    return following
+
+
+def _unrelated_warnings(following: Mapping[str, Sequence[Array]]) -> list[str]:
+    """Outputs that do not follow the heat: files that do not belong together, or samples out of order."""
+    for name, found in following.items():
+        median = float(np.median([abs(by_lag[0]) for by_lag in found]))
+        if median < FOLLOWS:
             return [
-                f"the output {name!r} hardly follows the heat (rank correlation {np.median(found):.2f} in the median run): do "
+                f"the output {name!r} hardly follows the heat (rank correlation {median:.2f} in the median run): do "
                 "inputs and outputs belong together, and are the samples in order? What is fitted or found would mean nothing"
             ]
     return []
+
+
+def _reversed_warnings(following: Mapping[str, Sequence[Array]]) -> list[str]:
+    """Outputs that move against the heat where the model's move with it, or the other way round."""
+    told = []
+    for name, found in following.items():
+        median = float(np.median([max(by_lag, key=abs) for by_lag in found]))
+        if name in BY_HEAT and BY_HEAT[name] * median < -AGAINST:
+            told.append(
+                f"the output {name!r} moves against the model (rank correlation with the heat {median:.2f} in the median run; "
+                f"the model's {'rises' if BY_HEAT[name] > 0 else 'falls'} with it): is the sensor's sign reversed? Set "
+                f"reversed = true under [channels.{name}], or take it out where it is set"
+            )
+    return told
 
 
 def common_warnings(runs: Sequence[ReadRun]) -> list[str]:
@@ -187,5 +219,10 @@ def magnitude_warnings(runs: Sequence[ReadRun], scale: Scale | None, heats: Sequ
     if scale is not None:
         found += [*_heating_warnings(runs, scale, heats), *_stroke_warnings(runs, scale)]
         if heats:
-            found += [*_dynamics_warnings(runs, scale, step), *_unrelated_warnings(runs, scale, heats, step)]
+            following = _following(runs, scale, heats, step)
+            found += [
+                *_dynamics_warnings(runs, scale, step),
+                *_unrelated_warnings(following),
+                *_reversed_warnings(following),
+            ]
     return found

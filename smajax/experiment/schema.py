@@ -115,6 +115,7 @@ class ChannelSection(Section):
         default=None, description="true or false: goes before [nuisance] offset for this output"
     )
     missing: Literal["refuse", "skip"] = Field(default="refuse", description="'refuse' or 'skip'")
+    reversed: bool = Field(default=False, description="true (the sensor counts the other way round) or false")
 
     @model_validator(mode="after")
     def _one_place(self) -> ChannelSection:
@@ -124,6 +125,8 @@ class ChannelSection(Section):
             raise ValueError("got a noise for an input; noise belongs to the output channel, remove it")
         if self.role == "input" and self.offset is not None:
             raise ValueError("got an offset for an input; offsets are those of outputs, remove it")
+        if self.role == "input" and self.reversed:
+            raise ValueError("got reversed for an input; only an output's sensor can be mounted the other way round")
         if self.role == "input" and self.missing == "skip":
             raise ValueError("got missing = 'skip' for an input; the model needs every sample of it: fill the gaps")
         if self.role == "output" and self.column is None and self.variable is None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -120,6 +120,7 @@ def _signal(
         if channel.role == "input" or channel.missing == "skip" or not table.has_gaps(key):
             raise
         raise MeasuredDataError(f"{error}; or write missing = 'skip' for this output, which leaves them out") from None
+    values = -values if channel.reversed else values
     clock = table.clock(key)
     where, unit = f"{table.path}: the time of {key!r}", "s"
     if time is not None and time.kind == "sample":
@@ -130,6 +131,11 @@ def _signal(
                 f"{table.path}: {key!r} carries no time; add [time] with column = '...', or kind = 'sample'"
             )
         clock, unit = table.column(time.column, {*taken, key}), time.unit
+        if unit != "s" and table.name_of(time.column) in table.moments:
+            raise MeasuredDataError(
+                f"{table.path}: column {time.column!r} holds clock times, which are read as seconds from the first one, and [time] "
+                f"says unit = {unit!r}; write unit = 's'"
+            )
         where = f"{table.path}: time column {table.name_of(time.column)!r}"
     if clock.size != values.size:
         raise MeasuredDataError(f"{table.path}: {key!r} has {values.size} values and its time has {clock.size}")
@@ -160,6 +166,7 @@ def _read_signals(reading: Reading, run: RunSection) -> tuple[dict[str, Signal],
     """Every channel of the run that is not a constant, and the files they are from."""
     signals: dict[str, Signal] = {}
     used: dict[Path, None] = {}
+    first: dict[str, int] = {}  # ns, by the file's clock, since when the channel's times count
     for name, channel in reading.channels.items():
         if name in run.inputs:
             continue
@@ -173,10 +180,15 @@ def _read_signals(reading: Reading, run: RunSection) -> tuple[dict[str, Signal],
             )
         where, file = _channel_file(reading, run, name)
         with at_key(reading.path, where):
-            signals[name] = _signal(
-                reading.tables(file), key, channel, reading.units[name], reading.time, _taken(reading, name)
-            )
+            table = reading.tables(file)
+            signals[name] = _signal(table, key, channel, reading.units[name], reading.time, _taken(reading, name))
+            if table.clock(key) is None and reading.time is not None and reading.time.column is not None:
+                moment = table.moments.get(table.name_of(reading.time.column))
+                first |= {} if moment is None else {name: moment}
         used[file] = None
+    if first.keys() == signals.keys():  # files that began at different times of one clock
+        begun = min(first.values())
+        signals = {name: replace(one, time=one.time + (first[name] - begun) / 1e9) for name, one in signals.items()}
     return signals, tuple(used)
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from smajax.experiment.grouping import RunFiles, paired
-from smajax.experiment.guess import DRIVES, GUESS, LIKELY, SURE, TIME, Column, columns_of
+from smajax.experiment.guess import DRIVES, GUESS, LIKELY, SURE, TIME, Column, columns_of, times_not_read
 from smajax.measured.read import read_table
 from smajax.measured.table import MeasuredDataError, Table
 from smajax.parameters import parameter_values, parameters
@@ -74,6 +74,7 @@ def _channel(name: str, role: str, column: Column, variable: bool, off: bool) ->
     ]
     if role == "output":
         lines.append('noise = "estimate"  # or its sigma, such as "0.01 mm"')
+        lines += [] if off else ["# reversed = true  # where the sensor counts the other way: down when the wire pulls"]
     return [f"# {line}" if off else line for line in lines]
 
 
@@ -177,6 +178,8 @@ def begun(files: Sequence[Path], target: Path, title: str = "") -> Guessed:
     variable = {quantity: bool(logs.kinds[kind].clocks) for quantity, kind in kind_of.items()}
     told = [f"{one.name}: {one.quantity} in {one.unit} ({one.sure}: {one.why})" for one in columns if one.quantity]
     told += [f"{one.name}: left out ({one.why})" for one in columns if not one.quantity]
+    for table in logs.kinds:
+        told += [f"{name}: left out ({why.split('; expected')[0]})" for name, why in table.unusable.items()]
     told.append(
         f"model: {model.wire}, {model.load}, {model.drive} ({GUESS}: {model.why}; `smajax presets` has the others)"
     )
@@ -209,7 +212,12 @@ def begun(files: Sequence[Path], target: Path, title: str = "") -> Guessed:
         raise MeasuredDataError("some of the files have a time and others have none; give all of them one")
     if not clocks:
         lines += ["[time]  # no column is a time: samples are counted", 'kind = "sample"', ""]
-        told.append(f"time: none found, samples are counted ({GUESS})")
+        counted = f"samples are counted ({GUESS})"
+        wrong = [one for table in tables for one in times_not_read(table)]
+        if wrong:
+            told.insert(0, f"time: NOT READ, and {counted}: {wrong[0]}. Repair that and begin again")
+        else:
+            told.append(f"time: none found, {counted}")
     else:
         if TIME in found:
             time = found[TIME]

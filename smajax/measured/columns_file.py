@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from smajax.measured.extras import needed
+from smajax.measured.moments import EPOCH
 from smajax.measured.table import Array, MeasuredDataError, Table
 
 
@@ -19,8 +20,11 @@ def _table(path: Path, given: Mapping[str, np.ndarray], stated: Mapping[str, str
     columns: dict[str, Array] = {}
     units = dict(stated or {})
     unusable: dict[str, str] = {}
+    moments: dict[str, int] = {}
     for name, values in given.items():
         if values.dtype.kind == "M":
+            if values.size and not np.isnat(values[0]):
+                moments[name] = EPOCH + int(values[0].astype("datetime64[ns]").astype(np.int64))
             columns[name] = (values - values[0]) / np.timedelta64(1, "s") if values.size else np.zeros(0)
             units[name] = "s"
         elif values.dtype.kind == "m":
@@ -34,7 +38,7 @@ def _table(path: Path, given: Mapping[str, np.ndarray], stated: Mapping[str, str
         raise MeasuredDataError(
             f"{path}: no column of numbers in it{'; ' if unusable else ''}{'; '.join(unusable.values())}"
         )
-    return Table(path=path, columns=columns, unusable=unusable, order=tuple(given), units=units)
+    return Table(path=path, columns=columns, unusable=unusable, order=tuple(given), units=units, moments=moments)
 
 
 def read_parquet(path: Path) -> Table:

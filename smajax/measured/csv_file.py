@@ -6,12 +6,14 @@ import codecs
 import csv
 import re
 from collections import Counter
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
+from smajax.measured.moments import NANO, moment, past_midnight
 from smajax.measured.table import Array, MeasuredDataError, Table
+from smajax.units import is_unit
 
 COMMENT_MARKS = ("#", "%")
 # In this order, because a column may hold decimal commas where another mark separates.
@@ -83,8 +85,10 @@ def _separator(lines: Sequence[str]) -> str | None:
 def _blank_separated(line: str) -> bool:
     """Whether blanks separate numbers with decimal commas, so that the commas do not separate: `0,5 1,25`."""
     cells = line.split()
+    if [cell.strip() for cell in line.split("\t")] == cells:
+        return False  # one tab between any two: so they may be between the words of a header
     numbers = sum(DECIMAL_COMMA.fullmatch(cell) is not None for cell in cells)
-    return len(cells) > 1 and numbers > 0 and all(DECIMAL_COMMA.fullmatch(cell) or _is_number(cell) for cell in cells)
+    return len(cells) > 1 and numbers > 0 and all(DECIMAL_COMMA.fullmatch(cell) or _is_datum(cell) for cell in cells)
 
 
 def _has_decimal_commas(rows: list[tuple[int, list[str]]]) -> bool:
@@ -125,6 +129,11 @@ def _is_number(cell: str) -> bool:
     return "_" not in cell
 
 
+def _is_datum(cell: str) -> bool:
+    """Whether a cell holds a number or a clock time."""
+    return _is_number(cell) or moment(cell) is not None
+
+
 def _cells(count: int) -> str:
     return f"{count} cell" if count == 1 else f"{count} cells"
 
@@ -143,49 +152,71 @@ def _is_units(rows: Sequence[tuple[int, list[str]]]) -> bool:
         return False
     first, second = rows[0][1], rows[1][1]
     words = [cell for cell in first if cell not in ("", "-", "1")]
-    return bool(words) and not any(map(_is_number, words)) and any(map(_is_number, second))
+    return bool(words) and not any(map(_is_datum, words)) and any(map(_is_number, second))
 
 
-def _why_unusable(name: str, place: int, rows: Sequence[tuple[int, list[str]]]) -> str | None:
-    """What keeps the column at that place from being numbers, or None."""
-    wrong = next(((number, row[place]) for number, row in rows if not _is_number(row[place])), None)
+def _units(names: Sequence[str], cells: Sequence[str]) -> dict[str, str] | None:
+    """Name -> unit by a line of units, `s;[mm];-`; None where a cell of it is none that is known."""
+    bare = [cell.strip("[]() ") for cell in cells]
+    if not all(not unit or is_unit(unit) for unit in bare):
+        return None
+    return {name: unit for name, unit in zip(names, bare, strict=True) if unit}
+
+
+def _why_unusable(
+    name: str, place: int, rows: Sequence[tuple[int, list[str]]], reads: Callable[[str], bool], what: str
+) -> str | None:
+    """What keeps the column at that place from being a signal, or None. reads: whether a cell is `what` it should hold."""
+    wrong = next(((number, row[place]) for number, row in rows if not reads(row[place])), None)
     if wrong is None:
         return None
     number, cell = wrong
-    got = f"line {number}, column {name!r}: " + (f"{cell[:40]!r} is not a number" if cell else "the cell is empty")
+    got = f"line {number}, column {name!r}: " + (f"{cell[:40]!r} is not a {what}" if cell else "the cell is empty")
     hint = "; its comma may be decimal or set thousands apart: write a decimal point" if "," in cell else ""
-    return f"{got}{hint}; expected a number in every line"
+    return f"{got}{hint}; expected a {what} in every line"
 
 
 class _Column:
-    """One column as it is read: its numbers a block at a time, and what keeps it from being numbers."""
+    """One column as it is read: its numbers or clock times a block at a time, and what keeps it from being either."""
 
-    def __init__(self, name: str, place: int) -> None:
+    def __init__(self, name: str, place: int, clock: bool) -> None:
         self.name, self.place = name, place
+        self.clock = clock  # whether it holds clock times
         self.parts: list[Array] = []
+        self.first: int | None = None  # clock time, ns, since when seconds are counted
         self.reason: str | None = None
         self.gappy = True  # whether a missing sample is all that keeps it from being numbers
         self.beyond_first = 0  # cells that are no numbers, but for the first line's
+
+    def reads(self, cell: str) -> bool:
+        return moment(cell) is not None if self.clock else _is_number(cell)
 
     def add_numbers(self, values: Array) -> None:
         self.parts.append(np.ascontiguousarray(values))
 
     def add(self, rows: Sequence[tuple[int, list[str]]], first: bool) -> None:
         """first: these rows begin the file."""
-        reason = _why_unusable(self.name, self.place, rows)
+        reason = _why_unusable(self.name, self.place, rows, self.reads, "clock time" if self.clock else "number")
         self.reason = self.reason or reason
         cells = [row[self.place] for _, row in rows]
         if reason is not None:
-            self.beyond_first += sum(not _is_number(cell) for cell in cells[1 if first else 0 :])
-            self.gappy = self.gappy and all(cell.lower() in MISSING or _is_number(cell) for cell in cells)
-        if self.gappy:
-            self.parts.append(np.array([float(cell) if _is_number(cell) else np.nan for cell in cells]))
-        else:
+            self.beyond_first += sum(not self.reads(cell) for cell in cells[1 if first else 0 :])
+            self.gappy = self.gappy and all(cell.lower() in MISSING or self.reads(cell) for cell in cells)
+        if not self.gappy:
             self.parts.clear()
+        elif self.clock:
+            moments = [moment(cell) for cell in cells]
+            if self.first is None:
+                self.first = moments[0] or 0  # a column is a clock by its first cell
+            origin = self.first
+            self.parts.append(np.array([np.nan if one is None else (one - origin) / NANO for one in moments]))
+        else:
+            self.parts.append(np.array([float(cell) if _is_number(cell) else np.nan for cell in cells]))
 
     @property
     def values(self) -> Array:
-        return np.concatenate(self.parts) if self.parts else np.zeros(0)
+        values = np.concatenate(self.parts) if self.parts else np.zeros(0)
+        return values if self.first is None else past_midnight(values, self.first)
 
 
 def _numbers(lines: list[tuple[int, str]], separator: str | None, width: int) -> Array | None:
@@ -225,9 +256,10 @@ def _check_width(path: Path, rows: Sequence[tuple[int, list[str]]], width: int) 
 
 
 def read_csv(path: Path, wanted: Collection[str | int] | None = None) -> Table:
-    """Reads a text table. The first line is a header when one of its cells is not a number.
+    """Reads a text table. The first line is a header when one of its cells is neither a number nor a clock time.
 
-    Columns are named by the header, or "1", "2", ... without one. A column with a cell that is not a number is
+    Columns are named by the header, or "1", "2", ... without one. A line of units under the header gives them theirs. Clock
+    times are read as seconds from the first one. A column with a cell that is not a number is
     an error only when it is asked for. wanted: the names and numbers (from 1) of the columns to keep; None: all.
     The file goes by in blocks of lines, of which the first tells how it is written; what is kept is 8 bytes a number.
     Raises MeasuredDataError.
@@ -241,7 +273,7 @@ def read_csv(path: Path, wanted: Collection[str | int] | None = None) -> Table:
     commas = _has_decimal_commas(rows)
     rows = _with_points(rows) if commas else rows
     header: list[str] | None = None
-    if not all(_is_number(cell) for cell in rows[0][1] if cell):
+    if not all(_is_datum(cell) for cell in rows[0][1] if cell):
         header, rows = rows[0][1], rows[1:]
         if not rows:
             raise MeasuredDataError(f"{path}: holds a header and no data line")
@@ -249,9 +281,12 @@ def read_csv(path: Path, wanted: Collection[str | int] | None = None) -> Table:
     names = _checked_names(path, header, rows, width)
     _check_width(path, rows, width)
     units = header is not None and _is_units(rows)
+    stated = _units(names, rows[0][1]) if units else None
+    if stated is not None:
+        units, rows = False, rows[1:]
     first_line = rows[0][0]
     kept = [
-        _Column(name, place)
+        _Column(name, place, moment(rows[0][1][place]) is not None)
         for place, name in enumerate(names)
         if wanted is None or name in wanted or place + 1 in wanted
     ]
@@ -259,7 +294,7 @@ def read_csv(path: Path, wanted: Collection[str | int] | None = None) -> Table:
         column.add(rows, first=True)
     numbers = [np.array([number for number, _ in rows])]
     for lines in blocks:
-        whole = None if commas else _numbers(lines, separator, width)
+        whole = None if commas or any(column.clock for column in kept) else _numbers(lines, separator, width)
         if whole is None:
             rows = _rows(path, lines, separator)
             rows = _with_points(rows) if commas else rows
@@ -286,8 +321,16 @@ def read_csv(path: Path, wanted: Collection[str | int] | None = None) -> Table:
             gappy[column.name] = column.values
     if not columns and wanted is None:
         raise MeasuredDataError(f"{path}: no column of numbers; {unusable[names[0]]}")
+    moments = {column.name: column.first for column in kept if column.first is not None and column.name in columns}
     return Table(
-        path=path, columns=columns, unusable=unusable, gappy=gappy, order=tuple(names), lines=_line_numbers(numbers)
+        path=path,
+        columns=columns,
+        unusable=unusable,
+        gappy=gappy,
+        order=tuple(names),
+        units={**(stated or {}), **dict.fromkeys(moments, "s")},
+        moments=moments,
+        lines=_line_numbers(numbers),
     )
 
 

@@ -8,12 +8,17 @@ from smajax.measured.names import listed
 from smajax.measured.table import MeasuredDataError, Table
 
 BRACKETS = re.compile(r"[\[(]\s*([^\[\]()]*(?:\([^()]*\)[^\[\]()]*)?)\s*[\])]\s*$")
-TIMES = {"time", "t", "zeit", "temps", "tiempo", "timestamp", "elapsed", "seconds", "sec", "clock"}
+TIMES = {
+    *("time", "t", "zeit", "temps", "tiempo", "timestamp", "elapsed", "seconds", "sec", "clock"),
+    *("uhrzeit", "zeitstempel", "datetime", "date", "datum"),
+}
 
 
 def bare(name: str) -> str:
-    """The heading without its unit."""
-    return BRACKETS.sub("", name).strip()
+    """The heading without its unit in brackets or, as in DIN, behind a slash."""
+    name = BRACKETS.sub("", name).strip()
+    before, slash, unit = name.partition("/")
+    return before.strip() if slash and before.strip() and unit.strip() in ("", *SLASHED) else name
 
 
 def words(name: str) -> list[str]:
@@ -23,17 +28,21 @@ def words(name: str) -> list[str]:
 
 
 def unit_in(name: str) -> str:
-    """The unit that a heading has in brackets at its end, `U [mV]` or `T (°C)`, or behind an underscore, `time_s`; else empty."""
+    """The unit that a heading has in brackets at its end, `U [mV]` or `T (°C)`, behind a slash, `U/mV`, or behind an
+    underscore, `time_s`; else empty."""
     found = BRACKETS.search(name)
     if found is not None:
         return found.group(1).strip()
+    before, _, unit = name.partition("/")
+    if before.strip() and unit.strip() in SLASHED:
+        return unit.strip()
     tail = name.rsplit("_", 1)[-1] if "_" in name else ""
     return tail if tail in TAILS else ""
 
 
 def unit_of(table: Table, name: str) -> str:
-    """The unit of a column: what the file states, else what the heading has; empty where neither says."""
-    return table.units.get(name) or unit_in(name)
+    """The unit of a column: what the file states, else what the heading or the label has; empty where none says."""
+    return table.units.get(name) or unit_in(name) or unit_in(table.labels.get(name, ""))
 
 
 TAILS = {
@@ -63,6 +72,7 @@ TAILS = {
     "kg",
     "percent",
 }
+SLASHED = TAILS | {"°C", "C", "°", "%", "Ohm", "Ω", "min", "h", "kN", "GPa", "µm", "μm", "kW", "kV", "cm", "1", "-"}
 
 
 def is_time(name: str) -> bool:

@@ -31,6 +31,8 @@ class Table:
     unusable: name -> why that column holds no signal; it is an error only when the column is asked for.
     gappy: of the unusable, those that hold a signal once empty cells are taken as missing: name -> (n,) with nan there.
     units: name -> the unit that the file itself states beside its name, for those that have one.
+    labels: name -> what the file calls the signal beside its name, for those that have one.
+    moments: of columns that the file has as clock times: name -> the first one in ns, since when `columns` counts seconds.
     lines: the line of the file, counted from 1, that each sample is from; empty where samples have no lines.
     """
 
@@ -41,6 +43,8 @@ class Table:
     gappy: Mapping[str, Array] = field(default_factory=dict)
     order: tuple[str, ...] = ()
     units: Mapping[str, str] = field(default_factory=dict)
+    labels: Mapping[str, str] = field(default_factory=dict)
+    moments: Mapping[str, int] = field(default_factory=dict)
     lines: Sequence[int] = ()
 
     def place(self, index: int) -> str:
