@@ -134,6 +134,16 @@ def close_loop(
             setting.note(_meaning_nothing(setting, final))
             final = first
 
+    refused: tuple[tuple[str, ...], float, float] | None = None
+    if final.effects:
+        progress("the runs that were held out", 0.0)
+        without, with_it, confirmed = _on_held_out(job, first, final)
+        if not confirmed:
+            setting.note(_not_confirmed(setting, final, without, with_it))
+            refused = final.effects, without, with_it
+            final = first
+        progress("the runs that were held out", 1.0)
+
     progress("standard errors and pictures", 0.0)
     before = _told(job, setting, first, start)
     after = _told(job, setting, final, start) if final.effects else before
@@ -151,7 +161,20 @@ def close_loop(
     unknown = lacking.terms
     blind = answer == "not in the library" and not unknown and not setting.foretells(final.left_out_rmse)
     foretold = setting.foretold(final.left_out_rmse) if blind else None
-    opening, *rest = summary(answer, experiment, runs, effects, portrait_after, len(job.candidates), aside, foretold)
+    added = tuple(f"{name}." for name in final.effects)
+    opening, *rest = summary(
+        answer,
+        experiment,
+        runs,
+        effects,
+        portrait_after,
+        len(job.candidates),
+        aside,
+        foretold,
+        refused,
+        [one.name for one in after.parameters if one.name.startswith(added) and one.remark.startswith("at its")],
+        [one for one in mistaken if one.weight > 0.5],
+    )
     return Findings(
         experiment=experiment.name,
         title=experiment.title,
@@ -185,6 +208,32 @@ def close_loop(
         unknown=unknown,
         provenance=_provenance(experiment, kept, command, seed, clock.monotonic() - began),
     )
+
+
+def _on_held_out(job: _Job, first: Model, final: Model) -> tuple[float, float, bool]:
+    """(rms error of the held-out runs by the base model, by the final one, whether that is less); no such run: (nan, nan, True).
+
+    They have had no part in anything before, and choose nothing here: they can only refuse.
+    """
+    experiment = job.experiment
+    held_out = tuple(run for run in experiment.runs if run.role != "fit")
+    if not held_out:
+        return float("nan"), float("nan"), True
+    batch = pack(held_out, experiment.step, parameter_values(job.problem.system))
+    misfit = []
+    for model in (first, final):
+        reading = np.asarray(_simulated(job.problem, model.values, batch).reading)
+        left = [run.output - row[: len(run.time)] for run, row in zip(held_out, reading, strict=True)]
+        misfit.append(np.concatenate([one - one.mean() if experiment.offset else one for one in left]))
+    without, with_it = (float(np.sqrt(np.mean(one**2))) for one in misfit)
+    return without, with_it, with_it < without
+
+
+def _not_confirmed(setting: Search, final: Model, without: float, with_it: float) -> Round:
+    """The round in which the held-out runs refuse what was found."""
+    gone = " + ".join(final.effects)
+    why = f"set aside: error on the held-out runs {setting.shown(without)} -> {setting.shown(with_it)}"
+    return Round(len(setting.rounds) + 1, ((gone, final.left_out_rmse),), f"without {gone}", why)
 
 
 def _meaning_nothing(setting: Search, final: Model) -> Round:

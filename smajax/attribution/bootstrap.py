@@ -12,12 +12,12 @@ FEWEST = 3  # runs
 
 
 def bootstrapped(setting: Search, model: Model, seed: int) -> dict[str, tuple[float, float]]:
-    """95 % interval of every free parameter over fits to runs drawn with replacement.
+    """Where the middle 95 % of fits to runs drawn with replacement lie, of every free parameter.
 
     Empty for fewer than 3 runs, and for the base model: the intervals are told of what was added.
 
     The fits are tied to `model` as those with a run left out are (`Search.judged`). With few runs the interval is
-    coarse: three runs can be drawn in ten ways.
+    coarse, and holds the truth less often than that: three runs can be drawn in ten ways.
     """
     count = setting.problem.batch.runs
     names = setting.free(model.effects)

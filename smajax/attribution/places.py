@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from smajax.attribution.judging import Search, nudged
-from smajax.attribution.screen import score_of, switches, without
+from smajax.attribution.screen import memory_of, score_of, switches, without
 from smajax.effects.library import LIBRARY
 from smajax.fit.sensitivity import Sensitivity, sensitivity
 from smajax.fit.shown import shown_and_slopes
@@ -57,13 +57,14 @@ def looked_at(setting: Search, values: np.ndarray, effects: Sequence[str], fitte
     jacobian = at.jacobian.copy()
     found = Looked(dataclasses.replace(at, jacobian=jacobian))
     basis, residual = without(at, fitted)
-    best = {effect: score_of((effect,), at, basis, residual, setting.bounds).gain for effect, _ in options}
+    memory = memory_of(at)
+    best = {effect: score_of((effect,), at, basis, residual, setting.bounds, memory).gain for effect, _ in options}
     for number, (effect, place) in enumerate(options):
         found.looks[effect] = found.looks.get(effect, 1) + 1
         own = [(k, name) for k, (whom, name) in enumerate(whose) if whom == number]
         rows = columns[[k for k, _ in own]]
         there = Sensitivity(tuple(name for _, name in own), at.misfit, np.moveaxis(rows, 0, -1), at.mask)
-        score = score_of((effect,), there, basis, residual, setting.bounds)
+        score = score_of((effect,), there, basis, residual, setting.bounds, memory)
         if score.gain > best[effect]:
             best[effect], found.place[effect] = score.gain, place
             for k, name in own:

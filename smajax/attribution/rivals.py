@@ -14,10 +14,12 @@ from smajax.experiment.record import Run
 from smajax.fit.sensitivity import Sensitivity, sensitivity
 from smajax.fit.shown import shown_at
 from smajax.report.findings import Rival
+from smajax.residual.noise_like import correlation_time, split_runs
 
 ALIKE = 0.7  # of an effect's trace: from here on a rival is worth a refit
 REFITTED = 3  # rivals of each effect
 ABSORBED = 1e-6  # of itself: all that is left of a trace that other parameters make as well
+DRAWS = 2000  # of the weights of blocks
 LIKELY = 0.01  # weight from which on a run that tells the two apart is looked for
 
 
@@ -39,9 +41,11 @@ def imitation(at: Sensitivity, trace: np.ndarray, others: Sequence[str], rival: 
 def rivals(setting: Search, model: Model, runs: Sequence[Run]) -> tuple[Rival, ...]:
     """For each effect of `model` the candidates that leave nearly the same trace, refitted in its place.
 
-    A weight is that of the model with the rival among all of them, `model` too: exp(-C/2) with C the squared error on
-    runs left out in turn over the variance of an independent sample of what `model` leaves. It is a probability only as
-    far as one of them is true and none was likelier before.
+    A weight is that of the model with the rival among `model` and the rivals of the same effect: exp(-C/2), with C the
+    squared error on runs left out in turn over the variance of an independent sample of what `model` leaves, averaged
+    over draws of the weights of blocks of samples (a Bayesian bootstrap; Yao et al. 2018, "pseudo-BMA+"). Without that a
+    difference of the size of its own error would decide. It is a probability only as far as one of them is true and none
+    was likelier before.
     """
     outside = [name for name in setting.candidates if name not in model.effects]
     if not model.effects or not outside:
@@ -71,14 +75,34 @@ def rivals(setting: Search, model: Model, runs: Sequence[Run]) -> tuple[Rival, .
     whole = Fitted(model.effects, setting.known(model))
     judged = setting.judged([whole, *fitted])
     level = setting.levels([whole])[0] * float(setting.problem.noise_sigma) ** 2
-    cost = np.asarray([float((one.left_out**2).sum()) / level for one in judged])
-    weight = np.exp(-0.5 * (cost - cost.min()))
-    weight /= weight.sum()
+    costs = blocks([one.left_out for one in judged], np.asarray(setting.problem.batch.mask)) / level
     told = []
-    for (effect, rival, alike), one, share in zip(found, judged[1:], weight[1:], strict=True):
+    for place, ((effect, rival, alike), one) in enumerate(zip(found, judged[1:], strict=True), 1):
+        same = [0, *(k for k, (whose, _, _) in enumerate(found, 1) if whose == effect)]
+        share = float(weights(costs[same])[same.index(place)])
         what, apart = separating_run(setting, model, one, runs) if share > LIKELY else ("", float("nan"))
-        told.append(Rival(effect, rival, alike, float(share), one.left_out_rmse, what, apart))
+        told.append(Rival(effect, rival, alike, share, one.left_out_rmse, what, apart))
     return tuple(sorted(told, key=lambda one: -one.weight))
+
+
+def blocks(left_out: Sequence[np.ndarray], mask: np.ndarray) -> np.ndarray:
+    """Squared error of each model in each block of samples, (models, blocks); blocks are longer than the first's memory."""
+    rows: list[list[float]] = [[] for _ in left_out]
+    length = 2.0 * correlation_time(split_runs(left_out[0], mask))
+    for run, valid in enumerate(mask > 0):
+        count = max(1, int(valid.sum() / length))
+        for row, one in zip(rows, left_out, strict=True):
+            row += [float((part**2).sum()) for part in np.array_split(one[run][valid], count)]
+    return np.asarray(rows)
+
+
+def weights(costs: np.ndarray) -> np.ndarray:
+    """Of models with these costs in blocks, (models, blocks): exp(-C/2), the blocks weighed anew in each of `DRAWS` draws."""
+    count = costs.shape[1]
+    drawn = count * np.random.default_rng(0).dirichlet(np.ones(count), DRAWS)
+    cost = drawn @ costs.T
+    share = np.exp(-0.5 * (cost - cost.min(axis=1, keepdims=True)))
+    return np.asarray((share / share.sum(axis=1, keepdims=True)).mean(axis=0))
 
 
 def separating_run(setting: Search, one: Model, other: Model, runs: Sequence[Run]) -> tuple[str, float]:

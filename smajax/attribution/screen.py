@@ -3,7 +3,8 @@
 Each coefficient is looked at where it is switched off. The columns of the fitted parameters are projected out first:
 what they can absorb is no evidence for an effect. What remains of the coefficient's column against what remains of the
 residual gives the gain that a small coefficient would bring, its sign, and a p-value under the hypothesis that nothing
-is missing: then the residual is white noise, and the statistic is chi-square. Where something is missing every effect
+is missing: then the residual is noise, of as many independent samples as its memory leaves (`memory_of`), and the
+statistic is chi-square. Where something is missing every effect
 that is not orthogonal to it stands out, so the p-value says *whether* to search; *what* is found is judged on runs
 left out.
 """
@@ -19,6 +20,7 @@ from scipy import optimize, stats
 
 from smajax.effects.every import EVERY
 from smajax.fit.sensitivity import Sensitivity
+from smajax.residual.noise_like import correlation_time, split_runs
 
 
 @dataclass(frozen=True)
@@ -27,7 +29,7 @@ class Score:
 
     effects: tuple[str, ...]
     gain: float  # share of the residual's square that the linear model would take away, 0..1
-    statistic: float  # gain in units of one sample's variance
+    statistic: float  # gain in units of one independent sample's variance
     p_value: float
     coefficients: dict[str, float]  # linear estimate by parameter name, inside its bounds
     place: dict[str, float] = field(
@@ -46,8 +48,9 @@ def score_of(
     basis: np.ndarray,
     residual: np.ndarray,
     bounds: Mapping[str, tuple[float, float]],
+    memory: float,
 ) -> Score:
-    """Of one effect or two, in the residual and beside the directions of `without`."""
+    """Of one effect or two, in the residual and beside the directions of `without`; `memory`: of `memory_of`."""
     coefficients = [name for effect in names for name in switches(effect)]
     # misfit = measured - model: a coefficient lowers it along minus its derivative.
     columns = -at.columns(coefficients)
@@ -66,7 +69,7 @@ def score_of(
     before = float(residual @ residual)
     after = residual - columns @ found
     gain = max(0.0, 1.0 - float(after @ after) / before) if before else 0.0
-    statistic = gain * len(residual)
+    statistic = gain * len(residual) / memory
     return Score(
         names,
         gain,
@@ -81,8 +84,9 @@ def screen(
 ) -> tuple[list[Score], list[Score]]:
     """(single effects, pairs), each ranked by gain. `fitted` are the loose parameters at the present fit."""
     basis, residual = without(at, fitted)
-    singles = [score_of((name,), at, basis, residual, bounds) for name in candidates]
-    pairs = [score_of(two, at, basis, residual, bounds) for two in itertools.combinations(candidates, 2)]
+    memory = memory_of(at)
+    singles = [score_of((name,), at, basis, residual, bounds, memory) for name in candidates]
+    pairs = [score_of(two, at, basis, residual, bounds, memory) for two in itertools.combinations(candidates, 2)]
     rank = lambda score: -score.gain  # noqa: E731
     return sorted(singles, key=rank), sorted(pairs, key=rank)
 
@@ -92,6 +96,15 @@ def without(at: Sensitivity, fitted: Sequence[str]) -> tuple[np.ndarray, np.ndar
     residual = at.residual()
     basis = np.linalg.qr(scaled(at.columns(fitted)))[0] if fitted else np.zeros((len(residual), 0))
     return basis, residual - basis @ (basis.T @ residual)
+
+
+def memory_of(at: Sensitivity) -> float:
+    """Samples per independent one, as far as noise accounts for them: with a memory it is matched by a slow trace far more easily.
+
+    What is larger than the noise is no noise, and its memory no reason for doubt.
+    """
+    noise = min(1.0, 1.0 / max(float(np.mean(at.residual() ** 2)), 1e-300))
+    return 1.0 + noise * (correlation_time(split_runs(at.misfit, at.mask)) - 1.0)
 
 
 def scaled(columns: np.ndarray) -> np.ndarray:

@@ -51,7 +51,7 @@ def search(setting: Search, base: Fit) -> tuple[Model, Model]:
     model = first
     for number in range(1, MOST_ROUNDS + 1):
         # The verdict will be that nothing more is missing: what could still be added would stand in for a run's chance.
-        if model.effects and setting.is_noise(model.values):
+        if setting.is_noise(model.values):
             setting.note(Round(number, (), "", "what is left of the fit runs is measurement noise"))
             break
         left = [name for name in setting.candidates if name not in model.effects]

@@ -46,11 +46,16 @@ def summary(
     tried: int,
     aside: Sequence[str] = (),
     foretold: float | None = None,
+    refused: tuple[Sequence[str], float, float] | None = None,
+    at_bound: Sequence[str] = (),
+    likelier: Sequence[Rival] = (),
 ) -> tuple[str, ...]:
     """The verdict in sentences; `tried` is the number of candidate effects that were looked at.
 
     `aside`: those that were added and gave way to one unknown term. `foretold`: share of the motion in left-out runs that
-    the model foretells, where that is so little that nothing is named.
+    the model foretells, where that is so little that nothing is named. `refused`: effects that the held-out runs did not
+    confirm, with the error there without and with them. `at_bound`: coefficients of what was added that end at a bound.
+    `likelier`: rivals that left-out runs prefer to what was added.
     """
     unit, name = experiment.output_unit, experiment.output_name
     added = [effect for effect in effects if effect.added]
@@ -58,7 +63,7 @@ def summary(
     judged_on = "on runs left out as well as on the fit" if several else "on the one fit run itself"
     opening = {
         "adequate": "Nothing is missing that the fit runs can show: on them the base model leaves nothing but measurement noise.",
-        "explained": f"The base model lacks {_listed(added)}. With it, what is left on the fit runs is measurement noise.",
+        "explained": _explained(added, several, any(run.role == "held-out" for run in runs)),
         "partly explained": _partly(added, runs, experiment),
         "not in the library": f"Something is missing, and none of the {tried} candidate effects that were tried accounts "
         f"for it: none lowers the error enough, {judged_on}."
@@ -78,6 +83,14 @@ def summary(
             "inputs and outputs belong together, and are the samples in order?"
         )
     told = [opening[answer]]
+    if refused is not None:
+        told = [
+            f"{and_listed([effect.title for effect in effects if effect.name in refused[0]])} would lower the error "
+            f"{judged_on}, but not on the runs that were held out ({shown(refused[1], unit, name)} without, "
+            f"{shown(refused[2], unit, name)} with): it is not confirmed, and not named.",
+            *told,
+        ]
+        told[0] = told[0][0].upper() + told[0][1:]
     for role, words in (("fit", "fit"), ("held-out", "held-out")):
         before, now = pooled(runs, role, "before"), pooled(runs, role, "after")
         if np.isfinite(before):
@@ -86,6 +99,16 @@ def summary(
                 + (f" before, {shown(now, unit, name)} after." if added else ".")
             )
     told.append(f"Measurement noise: {shown(experiment.noise_sigma, unit, name)} ({experiment.noise_how}).")
+    if at_bound:
+        told.append(
+            f"Mind: {and_listed(at_bound)} {'ends' if len(at_bound) == 1 else 'end'} at a bound. The runs ask for more of the "
+            "effect than is likely: it may stand in for another."
+        )
+    title_of = {effect.name: effect.title for effect in effects}
+    told += [
+        f"Mind: runs left out speak for {title_of[one.rival]} rather than {title_of[one.effect]} (weight {one.weight:.2f})."
+        for one in likelier
+    ]
     told += [effect.sentence for effect in added]
     told += _held_out_warnings(runs, experiment)
     if not several:
@@ -120,11 +143,21 @@ def _partly(added: Sequence[EffectFinding], runs: Sequence[RunFinding], experime
     if np.isfinite(alone) and others:
         told += f": alone it takes the fit runs from {shown(pooled(runs, 'fit', 'before'), unit, name)} to {shown(alone, unit, name)}"
     if not others:
-        return f"{told}. That explains part of the misfit; more is missing."
+        return f"{told}. That explains part of the misfit: what is left is more than noise."
     return (
         f"{told}. The error on runs left out is lowered further by {_listed(others)}. More than noise is still left: "
-        "something that the library does not hold is missing too, and "
+        "something that the library does not hold may be missing too, and "
         f"{'these' if len(others) > 1 else 'this'} may in part stand in for it."
+    )
+
+
+def _explained(added: Sequence[EffectFinding], several: bool, tested: bool) -> str:
+    """As sure as the runs allow: one fit run and none held out confirm nothing."""
+    if several or tested:
+        return f"The base model lacks {_listed(added)}. With it, what is left on the fit runs is measurement noise."
+    return (
+        f"The base model may lack {_listed(added)}: with it, what is left on the one fit run is measurement noise. No run was "
+        "left out or held out, so nothing confirms it."
     )
 
 
@@ -133,8 +166,8 @@ def _held_out_warnings(runs: Sequence[RunFinding], experiment: Experiment) -> li
     level = max(2.0 * pooled(runs, "fit", "after"), 2.0 * experiment.noise_sigma)
     return [
         f"{run.name}, which was held out, is off by {shown(run.rmse_after, experiment.output_unit, experiment.output_name)}, "
-        f"{run.rmse_after / pooled(runs, 'fit', 'after'):.1f} times the fit runs' error: something differs between that run "
-        "and them (another day, another state of the wire) which the model does not have."
+        f"{run.rmse_after / pooled(runs, 'fit', 'after'):.1f} times the fit runs' error: the model misses what shows "
+        "there and not in them, or something was different then (another day, another state of the wire)."
         for run in runs
         if run.role == "held-out" and run.rmse_after > level
     ]
@@ -178,7 +211,7 @@ def cannot_know(
     added = {effect.name for effect in effects if effect.added}
     told = [
         f"Whether it is {named(entry.chosen)}, or {' or '.join(named(model) for model in entry.alike)}: runs left out do "
-        "not tell them apart. The one with the fewest coefficients was taken."
+        "not tell them apart. The one that foretells them best was taken, or a part of it that does as well."
         for entry in rounds
         if entry.alike and set(entry.chosen.split(" + ")) <= added
     ]
@@ -193,7 +226,16 @@ def cannot_know(
         for one in rivals
         if one.weight > MENTIONED
     ]
-    told += [f"{p.name}: {p.remark}; its value is not measured by these runs." for p in parameters if p.remark]
+    told += [
+        f"{p.name}: {p.remark}"
+        + (
+            "; its value is not measured by these runs."
+            if p.standard_error is None
+            else ": known less well than alone."
+        )
+        for p in parameters
+        if p.remark
+    ]
     if fit_runs == 2:
         told.append("With two fit runs the left-out test is weak: give at least three of different kinds.")
     elif fit_runs == 1:

@@ -12,7 +12,7 @@ from smajax.types import Scalar
 class AmbientDrift(AbstractEffect):
     r"""$T_\infty(t) = T_\infty + a t$ from the start of each run."""
 
-    rate: Scalar = parameter("K/s", -0.1, 0.1, "a: rise of the ambient temperature during a run; a box warms by less")
+    rate: Scalar = parameter("K/s", -0.5, 0.5, "a: rise of the ambient temperature during a run; a box warms by less")
 
     effect_name: ClassVar[str] = "ambient_drift"
     title: ClassVar[str] = "ambient drift"

@@ -15,12 +15,13 @@ if TYPE_CHECKING:
 
 
 class NonlinearSpring(AbstractEffect):
-    r"""$F \mathrel{+}= a k x^3/(x^2 + x_r^2)$: cubic at first, and a stiffness of $(1 + a) k$ far beyond $x_r$, positive for a > -1.
+    r"""$F \mathrel{+}= a k x^3/(x^2 + x_r^2)$: cubic at first, and a stiffness of $(1 + a) k$ far beyond $x_r$. It is steepest at $3 x_r^2 = x^2$,
+    by 9/8 of a, so the spring stays one for a > -8/9.
 
     A cubic without end would turn a softening spring around.
     """
 
-    change: Scalar = parameter("-", -0.9, 5.0, "a: relative change of the stiffness; > 0: it stiffens")
+    change: Scalar = parameter("-", -0.88, 5.0, "a: relative change of the stiffness; > 0: it stiffens")
     displacement: Scalar = parameter("m", 1e-3, 0.2, "x_r: displacement from the start over which it changes")
 
     effect_name: ClassVar[str] = "nonlinear_spring"

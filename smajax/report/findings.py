@@ -51,7 +51,7 @@ class CoefficientFinding:
     value: float
     standard_error: float | None
     unit: str
-    by_runs: tuple[float, float] | None = None  # 95 % interval over fits to runs drawn anew
+    by_runs: tuple[float, float] | None = None  # where 95 % of fits to runs drawn anew lie: no interval of confidence
 
 
 @dataclass(frozen=True)
