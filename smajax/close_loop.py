@@ -20,6 +20,7 @@ from smajax.attribution.unknown_words import told_of
 from smajax.attribution.verdict import cannot_know, shown, summary, unexplained, verdict
 from smajax.catalogue import candidates
 from smajax.effects.library import LIBRARY
+from smajax.effects.neutral import check_neutral
 from smajax.experiment.errors import ExperimentError
 from smajax.experiment.record import RUN_STARTS, Experiment, Run
 from smajax.extended import base_model, extended
@@ -95,13 +96,15 @@ def close_loop(
 
     `memory` is a folder for finished fits: a loop that was interrupted goes on from there. `apart`: of `Search`. Held-out runs are simulated
     once, at the very end. The caller chooses precision; anything but float64 is refused with a ValueError, because the
-    differences that decide here are far below float32's rounding over a run.
+    differences that decide here are far below float32's rounding over a run. Raises PluginError for an effect of another
+    package that changes the model at its base value: every verdict would be wrong.
     """
     if jnp.zeros(()).dtype != jnp.float64:
         raise ValueError(
             "close_loop needs float64, but JAX runs in float32. Call `jax.config.update('jax_enable_x64', True)` first."
         )
     _refuse_what_only_identify_does(experiment)
+    check_neutral()
     began = clock.monotonic()
     job = _job(experiment)
     kept = Kept(memory)

@@ -6,6 +6,7 @@ out is said beside the number.
 
 from __future__ import annotations
 
+import inspect
 import math
 from collections.abc import Callable
 from typing import Any
@@ -23,7 +24,7 @@ from smajax.load.coupon import AbstractCoupon, Coupon, StrainCoupon
 from smajax.load.dead_weight import DeadWeight
 from smajax.parameters import set_parameters
 from smajax.plugins import LOADS as PLUGGED
-from smajax.plugins import brought
+from smajax.plugins import PluginError, brought, points_of, whose
 from smajax.system import System
 from smajax.wire.conditions import Enhanced
 from smajax.wire.constitutive import Constitutive
@@ -216,11 +217,35 @@ _LOADS: dict[str, Callable[[], AbstractMovingLoad | AbstractCoupon]] = {
 }
 
 
+WANTED_LOAD = "expected a function without arguments that returns a load (`def my_load(): return MyLoad(...)`)"
+
+
 def _wrong(name: str, load: Any) -> str:
     """What keeps a function of another package from being the preset of a load."""
     if not callable(load):
-        return f"is {load!r}; expected a function without arguments that returns a load"
+        return f"is {load!r}; {WANTED_LOAD}"
+    try:
+        inspect.signature(load).bind()
+    except TypeError as error:
+        what = f"the class {load.__name__}" if isinstance(load, type) else repr(load)
+        return f"is {what}, which cannot be called without arguments ({error}); {WANTED_LOAD}"
+    except ValueError:
+        pass  # no signature to look at: it is seen when it is called
     return ""
+
+
+def made_load(name: str) -> AbstractMovingLoad | AbstractCoupon:
+    """The load of a preset. Raises PluginError where another package's function fails or returns something else."""
+    if name in _LOADS:
+        return _LOADS[name]()
+    point = next((whose(one) for one in points_of(PLUGGED) if one.name == name), name)
+    try:
+        load = LOADS[name]()
+    except Exception as error:
+        raise PluginError(f"{point} fails when it is called ({error!r}); {WANTED_LOAD}.") from error
+    if not isinstance(load, (AbstractMovingLoad, AbstractCoupon)):
+        raise PluginError(f"{point} returns {load!r}; {WANTED_LOAD}.")
+    return load
 
 
 # Ours, then those of other packages (`smajax.plugins`); one is made when it is asked for.
@@ -242,4 +267,4 @@ def build(wire: str, load: str, drive: str, law: str = "") -> System:
         if name not in table:
             raise KeyError(f"No {kind} preset `{name}`; there are {sorted(table)}.")
     made = WIRES[wire]()
-    return System(under_law(made, law) if law else made, LOADS[load](), DRIVES[drive]())
+    return System(under_law(made, law) if law else made, made_load(load), DRIVES[drive]())
