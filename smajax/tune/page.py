@@ -14,6 +14,7 @@ from smajax.report.files import csv_text, heading
 from smajax.report.html import picture
 from smajax.report.plain_page import bullets, table, whole
 from smajax.sweep import MISMATCHES
+from smajax.tune.pictures import before_after
 from smajax.tune.terms import TERMS
 from smajax.tune.tune import Check, Tuned
 from smajax.words import counted
@@ -142,7 +143,12 @@ def page(found: Tuned, pictures: Mapping[str, bytes], command: str) -> str:
         f"<h1>Gains of {say(settings.controller)}, tuned</h1>",
         bullets(conclusions(found)),
         f"<p>Tuned on {say(settings.plants_in_words())}. {say(settings.goal_in_words())}.</p>",
-        picture(pictures["before_after.png"], "angles and figures of merit before and after", "panels"),
+        picture(
+            pictures["before_after.png"],
+            "angles and figures of merit before and after",
+            "panels",
+            before_after(found, upright=True),
+        ),
         "<p class=quiet>Above: thick, the plant as believed; thin, plants never seen. Below: from the least to the largest "
         "over the plants at each set point; squares were tuned on, circles never seen.</p>",
         "<h2>Gains</h2>",
