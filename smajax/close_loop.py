@@ -48,6 +48,7 @@ from smajax.residual.portrait import portrait
 from smajax.types import Trajectory
 
 SEED = 2004
+LOGGED = {"mass": "load_mass", "ambient_temperature": "ambient_temperature"}  # input channel -> what it replaces
 
 
 @dataclass(frozen=True)
@@ -226,9 +227,10 @@ def _refuse_what_only_identify_does(experiment: Experiment) -> None:
 
 
 def _preset(job: _Job) -> dict[str, str]:
-    """Parameters of the base model that are not fitted: name -> value and unit as a reader sees them."""
+    """Parameters of the base model that are not fitted and that no log gives: name -> value and unit as a reader sees them."""
     model = base_model(job.experiment)
-    table = {name: entry for name, entry in parameters(model).items() if name not in job.unknowns}
+    logged = {own for channel, own in LOGGED.items() if all(channel in run.inputs for run in job.experiment.runs)}
+    table = {name: entry for name, entry in parameters(model).items() if name not in {*job.unknowns, *logged}}
     values = np.asarray(get_parameters(model, list(table))) if table else ()
     return {
         name: f"{digits(display(entry.unit, name).of(float(value)))} {display(entry.unit, name).unit}".strip()

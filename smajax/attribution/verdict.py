@@ -58,7 +58,7 @@ def summary(
     judged_on = "on runs left out as well as on the fit" if several else "on the one fit run itself"
     opening = {
         "adequate": "Nothing is missing that the fit runs can show: on them the base model leaves nothing but measurement noise.",
-        "explained": f"The base model lacks {_listed(added)}. With it, what is left on the fit runs is measurement noise.",
+        "explained": f"The base model lacks: {_listed(added)}. With it, what is left on the fit runs is measurement noise.",
         "partly explained": _partly(added, runs, experiment),
         "not in the library": f"Something is missing, and none of the {tried} candidate effects that were tried accounts "
         f"for it: none lowers the error enough, {judged_on}."
@@ -116,9 +116,9 @@ def _partly(added: Sequence[EffectFinding], runs: Sequence[RunFinding], experime
     first, others = added[0], added[1:]
     unit, name = experiment.output_unit, experiment.output_name
     alone = first.evidence.get("alone_rmse_fit", float("nan"))
-    told = f"The base model lacks {first.title}"
+    told = f"The base model lacks: {first.title}"
     if np.isfinite(alone) and others:
-        told += f": alone it takes the fit runs from {shown(pooled(runs, 'fit', 'before'), unit, name)} to {shown(alone, unit, name)}"
+        told += f"; alone it takes the fit runs from {shown(pooled(runs, 'fit', 'before'), unit, name)} to {shown(alone, unit, name)}"
     if not others:
         return f"{told}. That explains part of the misfit; more is missing."
     return (
