@@ -178,22 +178,43 @@ def arm() -> Arm:
 
 
 def voltage() -> Voltage:
-    """No amplifier, and no limit that a bench would meet."""
+    """Voltage on the wire itself: no amplifier, and no limit that a bench would meet."""
     return Voltage(amplifier_gain=1.0, amplifier_limit=1e3)
 
 
 def amplified_voltage() -> Voltage:
-    """The arm's amplifier: 2 in the source's reading of eq. 4.28 (V^2/R with the R of one metre), so 2 l_0 here."""
+    """Voltage of the command, which the arm's amplifier puts on the wire 1.8 times.
+
+    It is 2 in the source's reading of eq. 4.28 (V^2/R with the R of one metre), so 2 l_0 here.
+    """
     return Voltage(amplifier_gain=1.8, amplifier_limit=1e3)
 
 
 def flexinol_voltage() -> Voltage:
-    """The dead weight's amplifier ("amplified before being applied", sec. 3.5): 1.6 puts the onset just above 4 V (M11)."""
+    """Voltage of the command, which the dead weight's amplifier puts on the wire 1.6 times.
+
+    "Amplified before being applied" (sec. 3.5): 1.6 puts the onset just above 4 V (M11).
+    """
     return Voltage(amplifier_gain=1.6, amplifier_limit=1e3)
 
 
+def current() -> Current:
+    """Current through the wire, of a controlled source."""
+    return Current()
+
+
+def power() -> Power:
+    """Electrical power into the wire, of a controlled source."""
+    return Power()
+
+
+def undriven() -> NoDrive:
+    """No heating: for a coupon, whose temperature is prescribed."""
+    return NoDrive()
+
+
 def duty() -> Duty:
-    """A 25 V supply switched by a duty cycle."""
+    """Duty cycle, 0 to 1, of a switched supply of 25 V."""
     return Duty(supply_voltage=25.0)
 
 
@@ -254,10 +275,10 @@ DRIVES: dict[str, Callable[[], AbstractDrive]] = {
     "voltage": voltage,
     "amplified_voltage": amplified_voltage,
     "flexinol_voltage": flexinol_voltage,
-    "current": Current,
-    "power": Power,
+    "current": current,
+    "power": power,
     "duty": duty,
-    "none": NoDrive,
+    "none": undriven,
 }
 
 
