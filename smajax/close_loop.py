@@ -20,6 +20,7 @@ from smajax.attribution.unknown_words import told_of
 from smajax.attribution.verdict import cannot_know, shown, summary, unexplained, verdict
 from smajax.catalogue import candidates
 from smajax.effects.library import LIBRARY
+from smajax.effects.neutral import check_neutral
 from smajax.experiment.errors import ExperimentError
 from smajax.experiment.record import RUN_STARTS, Experiment, Run
 from smajax.extended import base_model, extended
@@ -47,6 +48,7 @@ from smajax.residual.portrait import portrait
 from smajax.types import Trajectory
 
 SEED = 2004
+LOGGED = {"mass": "load_mass", "ambient_temperature": "ambient_temperature"}  # input channel -> what it replaces
 
 
 @dataclass(frozen=True)
@@ -95,13 +97,15 @@ def close_loop(
 
     `memory` is a folder for finished fits: a loop that was interrupted goes on from there. `apart`: of `Search`. Held-out runs are simulated
     once, at the very end. The caller chooses precision; anything but float64 is refused with a ValueError, because the
-    differences that decide here are far below float32's rounding over a run.
+    differences that decide here are far below float32's rounding over a run. Raises PluginError for an effect of another
+    package that changes the model at its base value: every verdict would be wrong.
     """
     if jnp.zeros(()).dtype != jnp.float64:
         raise ValueError(
             "close_loop needs float64, but JAX runs in float32. Call `jax.config.update('jax_enable_x64', True)` first."
         )
     _refuse_what_only_identify_does(experiment)
+    check_neutral()
     began = clock.monotonic()
     job = _job(experiment)
     kept = Kept(memory)
@@ -272,9 +276,10 @@ def _refuse_what_only_identify_does(experiment: Experiment) -> None:
 
 
 def _preset(job: _Job) -> dict[str, str]:
-    """Parameters of the base model that are not fitted: name -> value and unit as a reader sees them."""
+    """Parameters of the base model that are not fitted and that no log gives: name -> value and unit as a reader sees them."""
     model = base_model(job.experiment)
-    table = {name: entry for name, entry in parameters(model).items() if name not in job.unknowns}
+    logged = {own for channel, own in LOGGED.items() if all(channel in run.inputs for run in job.experiment.runs)}
+    table = {name: entry for name, entry in parameters(model).items() if name not in {*job.unknowns, *logged}}
     values = np.asarray(get_parameters(model, list(table))) if table else ()
     return {
         name: f"{digits(display(entry.unit, name).of(float(value)))} {display(entry.unit, name).unit}".strip()

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from smajax.machine import available_memory, machine
-from smajax.plugins import versions
+from smajax.plugins import PluginError, versions
 from smajax.runtime import TRIED, kept_programs
 
 PACKAGE = "smajax"
@@ -58,11 +58,37 @@ def _lanes() -> dict[str, Any]:
         return {"works": False, "vector_bits": None, "why": repr(error)}
 
 
+def _plugin_faults() -> list[str]:
+    """What is wrong with the parts that other packages bring: the effects, the loads, and what each does when it is used."""
+    faults: list[str] = []
+    # Each is imported, and so loads what is plugged in, by itself: one that fails must not hide the other.
+    try:
+        from smajax.presets import LOADS, made_load
+
+        for name in LOADS:
+            try:
+                made_load(name)
+            except PluginError as error:
+                faults += str(error).splitlines()
+    except PluginError as error:
+        faults += str(error).splitlines()
+    try:
+        import smajax.effects.library  # noqa: F401
+    except PluginError as error:
+        return faults + str(error).splitlines()
+    if not faults:  # a run needs a load
+        from smajax.effects.neutral import not_neutral
+
+        faults += not_neutral()
+    return faults
+
+
 def examined(lanes: bool = True) -> dict[str, Any]:
     """Versions, machine, devices, cache and memory. `lanes`: also compile and run a small model."""
     import jax
 
     cache = kept_programs()
+    faults = _plugin_faults()
     return {
         "smajax": {"version": _version(PACKAGE), "folder": str(Path(__file__).parent)},
         "machine": machine(),
@@ -70,7 +96,8 @@ def examined(lanes: bool = True) -> dict[str, Any]:
         "packages of extras": {name: _version(name) for name, extra in _requirements().items() if extra},
         "devices": [f"{one.platform}: {one.device_kind}" for one in jax.devices()],
         "float64": bool(jax.config.read("jax_enable_x64")),
-        "lanes": _lanes() if lanes else {},
+        # Without the tables of parts there is no model to try.
+        "lanes": _lanes() if lanes and not faults else {},
         "compiled programs": {
             "folder": str(cache),
             "bytes": _size(cache),
@@ -81,12 +108,16 @@ def examined(lanes: bool = True) -> dict[str, Any]:
         },
         "memory": {"available_bytes": available_memory()},
         "plug-ins": list(versions()),
+        "plug-in faults": faults,
     }
 
 
 def remarks(found: dict[str, Any]) -> list[str]:
     """What is likely to give trouble, each with what to do."""
     told = [
+        f"plug-in: {fault} Until then the commands that need it refuse to work." for fault in found["plug-in faults"]
+    ]
+    told += [
         f"{name} is not installed: pip install '{PACKAGE}'"
         for name, version in found["packages"].items()
         if not version

@@ -94,4 +94,6 @@ class Identified:
     robust: bool
     runs: tuple[IdentifiedRun, ...]
     suggestions: tuple[Suggestion, ...]
+    step: float  # s from sample to sample of every run; one where only the order of the samples is known
+    clocked: bool  # whether the samples have times
     provenance: dict[str, str]

@@ -188,6 +188,8 @@ def identify(
         robust=robust,
         runs=_runs(experiment, everywhere, np.asarray(everything.noise), correlated, covariance),
         suggestions=ideas,
+        step=experiment.step,
+        clocked=experiment.clocked,
         provenance=_provenance(command, seed, starts, clock.monotonic() - began, kept),
     )
 

@@ -3,8 +3,12 @@
     [project.entry-points."smajax.effects"]
     my_effect = "my_package.my_effect:MyEffect"
 
-They are loaded with the table that they belong to. A name that is taken is refused, and a package that cannot be loaded is
-named: a study that went on without a part that it asks for would say something else than it seems to.
+    [project.entry-points."smajax.loads"]
+    my_load = "my_package.my_load:my_load"
+
+An effect is a class; a load is a function without arguments that returns one. They are loaded with the table that they
+belong to. A name that is taken is refused, and a package that cannot be loaded is named: a study that went on without a
+part that it asks for would say something else than it seems to.
 """
 
 from __future__ import annotations
@@ -22,31 +26,39 @@ class PluginError(RuntimeError):
     """An entry point that cannot be used: which, of which package, why, what to do."""
 
 
-def _whose(point: EntryPoint) -> str:
+def whose(point: EntryPoint) -> str:
+    """The entry point in words: name, place, package, group."""
     package = f" of {point.dist.name} {point.dist.version}" if point.dist is not None else ""
     return f"the entry point `{point.name} = {point.value}`{package} in the group {point.group!r}"
+
+
+def points_of(group: str) -> list[EntryPoint]:
+    """The entry points of a group, in the order of their names."""
+    return sorted(entry_points(group=group), key=lambda one: (one.name, one.value))
 
 
 def brought(group: str, own: Mapping[str, Part], check: Callable[[str, Any], str]) -> dict[str, Part]:
     """What other packages bring to the table `own`, by name, in the order of the names.
 
-    check(name, part) says what is wrong with a part, or nothing. Raises PluginError for a part that cannot be loaded, is
-    not what it should be, or has a name that is taken.
+    check(name, part) says what is wrong with a part, or nothing. Raises PluginError, a line each, for parts that cannot be
+    loaded, are not what they should be, or have a name that is taken.
     """
     found: dict[str, Part] = {}
-    for point in sorted(entry_points(group=group), key=lambda one: (one.name, one.value)):
+    faults = []
+    for point in points_of(group):
         try:
             part = point.load()
         except Exception as error:
-            raise PluginError(
-                f"{_whose(point)} cannot be loaded ({error!r}): mend or uninstall that package."
-            ) from error
+            faults.append(f"{whose(point)} cannot be loaded ({error!r}): mend or uninstall that package.")
+            continue
         if point.name in own or point.name in found:
-            raise PluginError(f"{_whose(point)} has a name that is taken: rename it there, or uninstall that package.")
-        wrong = check(point.name, part)
-        if wrong:
-            raise PluginError(f"{_whose(point)} {wrong}.")
-        found[point.name] = part
+            faults.append(f"{whose(point)} has a name that is taken: rename it there, or uninstall that package.")
+        elif wrong := check(point.name, part):
+            faults.append(f"{whose(point)} {wrong}.")
+        else:
+            found[point.name] = part
+    if faults:
+        raise PluginError("\n".join(faults))
     return found
 
 

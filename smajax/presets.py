@@ -6,6 +6,7 @@ out is said beside the number.
 
 from __future__ import annotations
 
+import inspect
 import math
 from collections.abc import Callable
 from typing import Any
@@ -23,7 +24,7 @@ from smajax.load.coupon import AbstractCoupon, Coupon, StrainCoupon
 from smajax.load.dead_weight import DeadWeight
 from smajax.parameters import set_parameters
 from smajax.plugins import LOADS as PLUGGED
-from smajax.plugins import brought
+from smajax.plugins import PluginError, brought, points_of, whose
 from smajax.system import System
 from smajax.wire.conditions import Enhanced
 from smajax.wire.constitutive import Constitutive
@@ -177,22 +178,43 @@ def arm() -> Arm:
 
 
 def voltage() -> Voltage:
-    """No amplifier, and no limit that a bench would meet."""
+    """Voltage on the wire itself: no amplifier, and no limit that a bench would meet."""
     return Voltage(amplifier_gain=1.0, amplifier_limit=1e3)
 
 
 def amplified_voltage() -> Voltage:
-    """The arm's amplifier: 2 in the source's reading of eq. 4.28 (V^2/R with the R of one metre), so 2 l_0 here."""
+    """Voltage of the command, which the arm's amplifier puts on the wire 1.8 times.
+
+    It is 2 in the source's reading of eq. 4.28 (V^2/R with the R of one metre), so 2 l_0 here.
+    """
     return Voltage(amplifier_gain=1.8, amplifier_limit=1e3)
 
 
 def flexinol_voltage() -> Voltage:
-    """The dead weight's amplifier ("amplified before being applied", sec. 3.5): 1.6 puts the onset just above 4 V (M11)."""
+    """Voltage of the command, which the dead weight's amplifier puts on the wire 1.6 times.
+
+    "Amplified before being applied" (sec. 3.5): 1.6 puts the onset just above 4 V (M11).
+    """
     return Voltage(amplifier_gain=1.6, amplifier_limit=1e3)
 
 
+def current() -> Current:
+    """Current through the wire, of a controlled source."""
+    return Current()
+
+
+def power() -> Power:
+    """Electrical power into the wire, of a controlled source."""
+    return Power()
+
+
+def undriven() -> NoDrive:
+    """No heating: for a coupon, whose temperature is prescribed."""
+    return NoDrive()
+
+
 def duty() -> Duty:
-    """A 25 V supply switched by a duty cycle."""
+    """Duty cycle, 0 to 1, of a switched supply of 25 V."""
     return Duty(supply_voltage=25.0)
 
 
@@ -216,11 +238,35 @@ _LOADS: dict[str, Callable[[], AbstractMovingLoad | AbstractCoupon]] = {
 }
 
 
+WANTED_LOAD = "expected a function without arguments that returns a load (`def my_load(): return MyLoad(...)`)"
+
+
 def _wrong(name: str, load: Any) -> str:
     """What keeps a function of another package from being the preset of a load."""
     if not callable(load):
-        return f"is {load!r}; expected a function without arguments that returns a load"
+        return f"is {load!r}; {WANTED_LOAD}"
+    try:
+        inspect.signature(load).bind()
+    except TypeError as error:
+        what = f"the class {load.__name__}" if isinstance(load, type) else repr(load)
+        return f"is {what}, which cannot be called without arguments ({error}); {WANTED_LOAD}"
+    except ValueError:
+        pass  # no signature to look at: it is seen when it is called
     return ""
+
+
+def made_load(name: str) -> AbstractMovingLoad | AbstractCoupon:
+    """The load of a preset. Raises PluginError where another package's function fails or returns something else."""
+    if name in _LOADS:
+        return _LOADS[name]()
+    point = next((whose(one) for one in points_of(PLUGGED) if one.name == name), name)
+    try:
+        load = LOADS[name]()
+    except Exception as error:
+        raise PluginError(f"{point} fails when it is called ({error!r}); {WANTED_LOAD}.") from error
+    if not isinstance(load, (AbstractMovingLoad, AbstractCoupon)):
+        raise PluginError(f"{point} returns {load!r}; {WANTED_LOAD}.")
+    return load
 
 
 # Ours, then those of other packages (`smajax.plugins`); one is made when it is asked for.
@@ -229,10 +275,10 @@ DRIVES: dict[str, Callable[[], AbstractDrive]] = {
     "voltage": voltage,
     "amplified_voltage": amplified_voltage,
     "flexinol_voltage": flexinol_voltage,
-    "current": Current,
-    "power": Power,
+    "current": current,
+    "power": power,
     "duty": duty,
-    "none": NoDrive,
+    "none": undriven,
 }
 
 
@@ -242,4 +288,4 @@ def build(wire: str, load: str, drive: str, law: str = "") -> System:
         if name not in table:
             raise KeyError(f"No {kind} preset `{name}`; there are {sorted(table)}.")
     made = WIRES[wire]()
-    return System(under_law(made, law) if law else made, LOADS[load](), DRIVES[drive]())
+    return System(under_law(made, law) if law else made, made_load(load), DRIVES[drive]())

@@ -247,6 +247,10 @@ def test_a_constant_or_cut_off_channel_is_told(tmp_path: Path) -> None:
             table(tmp_path / name, t, *given)
         assert _warned(experiment, words), words
     assert _warned(experiment, "runs 'A' and 'B' have the same data")
+    # Another constant in each run is what was changed between them.
+    for name, level in (("a.csv", 5.0), ("b.csv", 6.0)):
+        table(tmp_path / name, t, 0.0 * t + level, x)
+    assert not _warned(experiment, "never changes")
 
 
 def test_a_run_or_a_step_against_the_dynamics_is_told(tmp_path: Path) -> None:

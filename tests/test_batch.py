@@ -19,6 +19,7 @@ import xarray as xr
 
 from smajax.batch.axes import Axes, grid, sampled, zipped
 from smajax.batch.member import NOT_FINITE, RUNAWAY, member
+from smajax.batch.provenance import provenance
 from smajax.batch.run import good, opened, recipe_of, run_batch, told_of
 from smajax.checkpointed import checkpointed_scan
 from smajax.measure import Largest, Last, Mean, MeanSquare, Smallest, TimeAbove
@@ -190,8 +191,14 @@ def test_a_grid_comes_back_from_disk_as_a_grid(tmp_path: Path) -> None:
     kept, held = _batch(out=tmp_path / "grid"), _batch()
     xr.testing.assert_equal(kept, held)
     assert kept["stress"].attrs == held["stress"].attrs
-    for name in ("version of smajax", "git", "parameters (SI)", "input voltage"):
+    for name in ("version of smajax", "parameters (SI)", "input voltage"):
         assert name in kept.attrs or name == "input voltage"
+
+
+def test_a_result_names_a_commit_or_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("GIT_CEILING_DIRECTORIES", str(tmp_path.parent))
+    assert "git" not in provenance(build("flexinol_table_3_2", "dead_weight", "voltage"))
 
 
 def test_another_batch_in_the_folder_is_not_touched(tmp_path: Path) -> None:

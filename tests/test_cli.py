@@ -43,6 +43,9 @@ def test_effects_and_presets_are_listed_for_machines(tmp_path: Path) -> None:
     assert effects["latent_heat"]["parameters"]["latent_heat.enthalpy"]["unit"] == "J/kg"
     presets = json.loads(_run("presets", "--json", cwd=tmp_path).stdout)
     assert {"arm", "dead_weight", "bias_spring"} <= set(presets["loads"])
+    told = _run("presets", cwd=tmp_path).stdout.splitlines()
+    lines = [next(line for line in told if line.startswith(f"  {drive}: ")) for drive in presets["drives"]]
+    assert len({line.split(": ", 1)[1] for line in lines}) == len(lines)
 
 
 def test_missing_experiment_file(tmp_path: Path) -> None:

@@ -53,7 +53,11 @@ def test_the_run_is_that_of_the_model(folder: Path) -> None:
     assert record["summary"]["temperature"]["greatest"] == pytest.approx(float(expected.temperature.max()))
     assert (folder / "simulate.png").stat().st_size > 10_000
     page = (folder / "simulate.html").read_text(encoding="utf-8")
-    assert (page.count("data:image/png;base64,"), page.count("data:image/gif;base64,")) == (1, 1)
+    images = [
+        page.count(f'{where}="data:image/{form};base64,')
+        for where, form in (("src", "png"), ("srcset", "png"), ("src", "gif"))
+    ]
+    assert images == [1, 1, 1]  # the picture, the same for a telephone, the animation
     assert f"lies between {float(expected.martensite_fraction.min()):.2f} and 1.00" in page
     assert (folder / "simulate.svg").read_text(encoding="utf-8").rstrip().endswith("</svg>")
     with Image.open(folder / "simulate.gif") as film:

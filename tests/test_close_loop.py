@@ -6,13 +6,15 @@ import json
 import tomllib
 from importlib import resources
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
 from smajax.attribution.verdict import pooled
 from smajax.catalogue import CATALOGUE
-from smajax.close_loop import close_loop
+from smajax.close_loop import _preset, close_loop
 from smajax.experiment.load import load_experiment
 from smajax.extended import base_model, extended
 from smajax.fit.batch import pack, simulate_batch
@@ -21,6 +23,15 @@ from smajax.report.findings import Findings
 
 STUDIES = Path(__file__).parents[1] / "studies"
 BENCH = STUDIES / "bias_spring_bench"
+
+
+def test_a_parameter_that_the_log_gives_is_not_left_open() -> None:
+    """The demo's mass is logged, so the preset's is used nowhere; its length is the preset's."""
+    with resources.as_file(resources.files("smajax") / "demo" / "latent") as folder:
+        experiment = load_experiment(folder / "experiment.toml", CATALOGUE)
+    told = _preset(cast(Any, SimpleNamespace(experiment=experiment, unknowns=())))
+    assert "load_mass" not in told
+    assert {"wire_length", "damping"} <= set(told)
 
 
 def _added(findings: Findings) -> set[str]:

@@ -183,8 +183,10 @@ def test_the_page_and_the_record_say_the_same(found: Identified, tmp_path: Path)
     text = written.read_text(encoding="utf-8")
     assert text == page(found)
     assert "Coupon &lt;of&gt; test" in text
-    assert text.count("data:image/png") == 3 + 1 + 1 + 1  # runs, correlation, profiles, suggestions
+    assert text.count('src="data:image/png') == 3 + 1 + 1 + 1  # runs, correlation, profiles, suggestions
     assert not re.search(r">\s*nan\b", text.lower())
+    assert "The residual is as large as the noise" in " ".join(conclusions(dataclasses.replace(found, ratio=1.004)))
+    assert "The residual is 1.4 times the noise" in " ".join(conclusions(dataclasses.replace(found, ratio=1.4)))
     told = json.loads((tmp_path / "identify.json").read_text(encoding="utf-8"))
     assert told == json.loads(json.dumps(record(found)))
     assert set(told["parameters"]) == set(TRUTH)

@@ -192,6 +192,10 @@ def test_a_prior_pulls_by_what_it_knows(tmp_path: Path) -> None:
     assert pulled.value - value == pytest.approx(expected - value, rel=0.05)
     assert pulled.standard_error == pytest.approx((error**-2 + sigma**-2) ** -0.5, rel=0.05)
     assert "known before" in page(found)
+    # At 1.2 of 6 errors on the way to the mean: 4.8 errors, 2.4 sigma, are left.
+    (said,) = (sentence for sentence in conclusions(found) if "speak against that prior" in sentence)
+    assert "2.4 standard deviations below what was known before" in said
+    assert not any("speak against" in sentence for sentence in conclusions(plain))
     assert record(found)["parameters"]["recoverable_strain"]["prior"]["mean"] == mean
     # The same on the logarithm: narrow, so nearly the same pull.
     known = f', prior = {{ mean = "{mean!r} 1", log_sigma = {sigma / mean!r} }}'

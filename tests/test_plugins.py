@@ -43,6 +43,17 @@ def bucket():
     return DeadWeight(load_mass=1.0, damping=20.0)
 
 
+def heap():
+    return 3.0
+
+
+class Gale(Breeze):
+    effect_name: ClassVar[str] = "gale"
+
+    def heat_loss(self, wire, temperature, ambient):
+        return self.strength * (temperature - ambient) + 1.0
+
+
 nothing = 3
 """
 LOOK = """
@@ -67,6 +78,10 @@ def _installed(folder: Path, points: str) -> dict[str, str]:
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: airflow\nVersion: 1.2\n")
     (info / "entry_points.txt").write_text(points)
+    return _with(folder)
+
+
+def _with(folder: Path) -> dict[str, str]:
     return {**os.environ, "PYTHONPATH": os.pathsep.join([str(folder), os.environ.get("PYTHONPATH", "")])}
 
 
@@ -109,6 +124,50 @@ def test_what_cannot_be_used_is_refused_by_name(
     monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(PluginError, match=re.escape(told)):
         brought(EFFECTS, _OWN, _wrong)
+
+
+@pytest.mark.parametrize(
+    ("points", "told"),
+    [
+        ("[smajax.effects]\ngale = airflow:Gale\n", "the effect 'gale', which must change nothing at its base value"),
+        ("[smajax.effects]\ndraft = airflow:Breeze\n", "calls itself 'breeze'"),
+        ("[smajax.effects]\nbreeze = nowhere:Breeze\n", "cannot be loaded (ModuleNotFoundError"),
+        ("[smajax.loads]\nbucket = nowhere:bucket\n", "cannot be loaded (ModuleNotFoundError"),
+        ("[smajax.loads]\nweight = airflow:DeadWeight\n", "is the class DeadWeight, which cannot be called without"),
+        ("[smajax.loads]\nheap = airflow:heap\n", "returns 3.0; expected a function without arguments"),
+    ],
+)
+def test_the_doctor_says_what_is_wrong_with_a_plug_in_and_blames_nothing_else(
+    points: str, told: str, tmp_path: Path
+) -> None:
+    code = "import sys; sys.argv = ['smajax', 'doctor']; from smajax.cli import main; main()"
+    ended = _asked(code, _installed(tmp_path, points), tmp_path)
+    assert ended.returncode == 3, ended.stderr
+    assert told in ended.stdout
+    assert "several times slower" not in ended.stdout
+    assert "1 remark." in ended.stdout
+
+
+def test_the_loop_refuses_an_effect_that_is_not_neutral_and_says_by_how_much(tmp_path: Path) -> None:
+    demo = Path(__file__).parents[1] / "smajax" / "demo" / "latent" / "experiment.toml"
+    code = f"import sys; sys.argv = ['smajax', 'close-loop', {str(demo)!r}]; from smajax.cli import main; main()"
+    ended = _asked(code, _installed(tmp_path, "[smajax.effects]\ngale = airflow:Gale\n"), tmp_path)
+    assert ended.returncode == 2, ended.stderr
+    assert re.search(r"changes the position by up to [0-9.]+ mm, the temperature by up to [0-9.]+ °C", ended.stderr)
+    assert "Traceback" not in ended.stderr
+    neutral = "from smajax.runtime import prepare; prepare(); from smajax.effects.neutral import check_neutral; check_neutral()"
+    (tmp_path / "airflow-1.2.dist-info" / "entry_points.txt").write_text("[smajax.effects]\nbreeze = airflow:Breeze\n")
+    ended = _asked(neutral, _with(tmp_path), tmp_path)
+    assert ended.returncode == 0, ended.stderr
+
+
+def test_a_load_that_is_no_preset_is_refused_without_a_traceback(tmp_path: Path) -> None:
+    environment = _installed(tmp_path, "[smajax.loads]\nweight = airflow:DeadWeight\n")
+    code = "import sys; sys.argv = ['smajax', 'simulate', 'flexinol_table_3_2', 'weight', 'voltage', '--step', '3V:1s']; from smajax.cli import main; main()"
+    ended = _asked(code, environment, tmp_path)
+    assert ended.returncode == 2, ended.stderr
+    assert "cannot be called without arguments" in ended.stderr
+    assert "Traceback" not in ended.stderr
 
 
 def test_the_command_line_says_it_without_a_traceback(tmp_path: Path) -> None:

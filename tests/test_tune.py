@@ -8,6 +8,7 @@ import json
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,7 @@ from smajax.tune.evaluate import STEP, Rig
 from smajax.tune.folder import tune_into
 from smajax.tune.members import between, never_seen, tuned_on
 from smajax.tune.objective import Goal, rank, value_and_slope
+from smajax.tune.page import price
 from smajax.tune.settings import TuneSettings
 from smajax.tune.terms import TERMS
 from tests.in_browser import HOSTILE, faults
@@ -181,7 +183,8 @@ def test_the_folder_is_whole(folder: Path) -> None:
     }
     page = (folder / "tune.html").read_text(encoding="utf-8")
     assert "overshoot" in page
-    assert page.count("data:image/png") == 2
+    assert page.count('src="data:image/png') == 2
+    assert page.count('srcset="data:image/png') == 1  # the same for a telephone
     record = json.loads((folder / "tune.json").read_text(encoding="utf-8"))["checks"]
     with (folder / "loops.csv").open(encoding="utf-8") as file:
         loops = list(csv.DictReader(file))
@@ -189,6 +192,26 @@ def test_the_folder_is_whole(folder: Path) -> None:
     for check, when in (("tuned on", "before"), ("beyond", "after")):
         errors = [float(one["steady_error [deg]"]) for one in loops if (one["check"], one["gains"]) == (check, when)]
         assert max(errors) == pytest.approx(record[check][when]["steady_error"]["worst"])
+
+
+def test_what_the_gains_cost_is_said_with_both_numbers() -> None:
+    """Energy by less than half more, chatter four times as much, switches from none to three a second."""
+    columns = list(TERMS)
+    judged = np.ones((2, 3, len(columns)))
+    judged[:, :, columns.index("energy")] = [[40.0], [50.0]]
+    judged[:, :, columns.index("chatter")] = [[2.5], [10.0]]
+    switches = np.asarray([[0.0, 0.0, 0.0], [2.0, 3.0, 4.0]])
+
+    def tuned(after: int) -> Any:
+        seen = SimpleNamespace(
+            judged=judged[[0, after]], merits=SimpleNamespace(switches_per_second=switches[[0, after]])
+        )
+        return SimpleNamespace(checks={"tuned on": SimpleNamespace(seen=seen)})
+
+    (said,) = price(tuned(1))
+    assert "chatter of the command (V/s) from 2.5 to 10; switches of the command (1/s) from 0 to 3." in said
+    assert "energy" not in said
+    assert price(tuned(0)) == []
 
 
 def test_the_page_in_a_browser(folder: Path, browser: Any) -> None:

@@ -139,9 +139,9 @@ def _partly(added: Sequence[EffectFinding], runs: Sequence[RunFinding], experime
     first, others = added[0], added[1:]
     unit, name = experiment.output_unit, experiment.output_name
     alone = first.evidence.get("alone_rmse_fit", float("nan"))
-    told = f"The base model lacks {first.title}"
+    told = f"The base model lacks: {first.title}"
     if np.isfinite(alone) and others:
-        told += f": alone it takes the fit runs from {shown(pooled(runs, 'fit', 'before'), unit, name)} to {shown(alone, unit, name)}"
+        told += f"; alone it takes the fit runs from {shown(pooled(runs, 'fit', 'before'), unit, name)} to {shown(alone, unit, name)}"
     if not others:
         return f"{told}. That explains part of the misfit: what is left is more than noise."
     return (
@@ -154,9 +154,9 @@ def _partly(added: Sequence[EffectFinding], runs: Sequence[RunFinding], experime
 def _explained(added: Sequence[EffectFinding], several: bool, tested: bool) -> str:
     """As sure as the runs allow: one fit run and none held out confirm nothing."""
     if several or tested:
-        return f"The base model lacks {_listed(added)}. With it, what is left on the fit runs is measurement noise."
+        return f"The base model lacks: {_listed(added)}. With it, what is left on the fit runs is measurement noise."
     return (
-        f"The base model may lack {_listed(added)}: with it, what is left on the one fit run is measurement noise. No run was "
+        f"The base model may lack: {_listed(added)}. With it, what is left on the one fit run is measurement noise. No run was "
         "left out or held out, so nothing confirms it."
     )
 

@@ -60,3 +60,6 @@ def presets(json_out: Json = False) -> None:
         return
     for kind, names in told.items():
         typer.echo(f"{kind}: {', '.join(names)}")
+        if kind == "drives":  # several are a voltage
+            for name, drive in DRIVES.items():
+                typer.echo(f"  {name}: {(drive.__doc__ or '').splitlines()[0]}")

@@ -25,6 +25,7 @@ def doctor(
 
     prepare()
     from smajax import doctor as surgery
+    from smajax.words import counted
 
     freed = surgery.clear_cache() if clear_cache else None
     found = surgery.examined()
@@ -38,7 +39,7 @@ def doctor(
             typer.echo(line)
         for line in wrong:
             typer.echo(f"! {line}")
-        typer.echo("Nothing is wrong." if not wrong else f"{len(wrong)} remarks.")
+        typer.echo("Nothing is wrong." if not wrong else f"{counted(len(wrong), 'remark')}.")
     if wrong:
         raise typer.Exit(UNMET)
 
@@ -62,7 +63,9 @@ def told(found: dict[str, object]) -> list[str]:
         f"smajax {one['smajax']['version']} in {one['smajax']['folder']}",
         f"python {here['python']}, {here['system']}, {here['processor']}, {here['cores']} cores",
         f"devices: {', '.join(one['devices'])}; float64 {'on' if one['float64'] else 'off'}",
-        f"machine code for a batch: {'works' if lanes['works'] else 'does not work'}, vectors of {lanes['vector_bits']} bits",
+        f"machine code for a batch: {'works' if lanes['works'] else 'does not work'}, vectors of {lanes['vector_bits']} bits"
+        if lanes
+        else "machine code for a batch: not tried, because of the plug-ins",
         f"memory free: {'unknown' if memory is None else f'{memory / 1e9:.1f} GB'}",
         f"compiled programs: {cache['folder']}, {cache['bytes'] / 1e6:.1f} MB; to clear: {cache['clear']}",
         f"packages: {versions(one['packages'])}",

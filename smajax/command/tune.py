@@ -80,7 +80,7 @@ def tune(
     from smajax.progress import shown
     from smajax.tune.folder import OURS, STATE, tune_into
     from smajax.tune.objective import REGULATION
-    from smajax.tune.page import conclusions, gain_rows
+    from smajax.tune.page import conclusions, gain_rows, price
     from smajax.tune.settings import TuneSettings
 
     try:
@@ -124,11 +124,15 @@ def tune(
     except ValueError as error:
         raise typer.BadParameter(str(error)) from None
     page = out / "tune.html"
+    dear = price(found)
+    for sentence in dear:
+        typer.echo(sentence, err=True)
     if json_out:
         typer.echo((out / "tune.json").read_text(encoding="utf-8"), nl=False)
     else:
         for sentence in conclusions(found):
-            typer.echo(sentence)
+            if sentence not in dear:  # said already
+                typer.echo(sentence)
         for row in gain_rows(found):
             typer.echo(f"  {row[0]:<24} {row[1]:>10} -> {row[2]:<10} {row[3]}" + (f"  ({row[5]})" if row[5] else ""))
         typer.echo(f"Gains: {(out / 'gains.json').resolve()}")

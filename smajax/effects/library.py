@@ -116,7 +116,7 @@ def _wrong(name: str, effect: Any) -> str:
     if lacking:
         return f"lacks {', '.join(lacking)}, which every effect says of itself"
     if effect.effect_name != name:
-        return f"calls itself {effect.effect_name!r}: give both the same name"
+        return f"calls itself {effect.effect_name!r}: give the entry point and the effect the same name"
     if effect.equation not in EQUATIONS:
         return f"is in the equation {effect.equation!r}; expected one of {', '.join(EQUATIONS)}"
     return ""
@@ -124,6 +124,11 @@ def _wrong(name: str, effect: Any) -> str:
 
 # Ours, then those of other packages (`smajax.plugins`), in the order of their names.
 LIBRARY: dict[str, type[AbstractEffect]] = {**_OWN, **brought(EFFECTS, _OWN, _wrong)}
+
+
+def of_others() -> dict[str, type[AbstractEffect]]:
+    """The effects that other packages bring, by name."""
+    return {name: effect for name, effect in LIBRARY.items() if name not in _OWN}
 
 
 def at_base(names: Sequence[str]) -> tuple[AbstractEffect, ...]:

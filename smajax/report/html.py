@@ -15,6 +15,7 @@ from markupsafe import Markup
 from smajax.report import pictures
 from smajax.report.display import chance, correlation, digits, display, label, p_value, share, with_error
 from smajax.report.findings import Findings, ParameterFinding
+from smajax.report.plain_page import breakable
 from smajax.report.unknown_pictures import function_learnt, units
 
 VERDICTS = {
@@ -60,17 +61,25 @@ def estimate(value: float, error: float | None, unit: str, quantity: str = "") -
     return Shown(with_error(seen.of(value), None if error is None else seen.of(error)), value)
 
 
-def picture(image: bytes | None, alt: str, kind: str = "wide") -> Markup:
+def _data(image: bytes) -> str:
+    """An image, PNG or GIF, as an address that holds its bytes."""
+    form = "gif" if image.startswith(b"GIF8") else "png"
+    return f"data:image/{form};base64,{base64.b64encode(image).decode('ascii')}"
+
+
+def picture(image: bytes | None, alt: str, kind: str = "wide", upright: bytes | None = None) -> Markup:
     """An image, PNG or GIF, that carries its own bytes; nothing for a picture that there is none of.
 
-    kind: `narrow` or `wide`, or `panels` for what is too wide for a telephone and moves sideways there.
+    kind: `narrow` or `wide`, or `panels` for what is too wide for a telephone and moves sideways there; `upright` is shown
+    there instead, the same panels one below the other.
     """
     if image is None:
         return Markup("")
-    form = "gif" if image.startswith(b"GIF8") else "png"
-    data = base64.b64encode(image).decode("ascii")
-    element = '<div class="scroll"><img class="{}" src="data:image/{};base64,{}" alt="{}"></div>'
-    return Markup(element).format(kind, form, data, alt)
+    element = Markup('<img class="{}" src="{}" alt="{}">').format(kind, _data(image), alt)
+    if upright is not None:
+        other = Markup('<source media="(max-width: 720px)" srcset="{}">').format(_data(upright))
+        element = Markup("<picture>{}{}</picture>").format(other, element)
+    return Markup('<div class="scroll">{}</div>').format(element)
 
 
 def _parameter_rows(findings: Findings) -> list[dict[str, Any]]:
@@ -212,6 +221,7 @@ def findings_to_html(findings: Findings) -> str:
         p_value=p_value,
         unit_of=lambda unit, name="": display(unit, name).unit,
         label=label,
+        breakable=lambda text: Markup(breakable(text)),
         single=pictures.nothing_added(findings),
         # Without offsets in the fit they are exactly zero.
         offsets=any(run.offset_before or run.offset_after for run in findings.runs),

@@ -62,7 +62,7 @@ def page(found: Identified) -> str:
         parts += [
             "<h2>Profile likelihood</h2><p class=quiet>Each parameter held, all others fitted again: the rise of the cost "
             "(blue), what the standard error stands for (grey), the 95 % line (red).</p>",
-            picture(draw.profile_curves(found), "profiles", "panels"),
+            picture(draw.profile_curves(found), "profiles", "panels", draw.profile_curves(found, upright=True)),
         ]
     if found.posterior is not None:
         chains = ["parameter", "mean ± standard deviation", "unit", "95 %", "R-hat", "independent draws"]
@@ -72,7 +72,9 @@ def page(found: Identified) -> str:
             f"{digits(found.posterior.inflation, 2)}, as in the standard errors. Histograms: draws; grey: what the standard "
             "error stands for.</p>",
             table(chains, posterior_rows(found), (1, 4, 5)),
-            picture(draw.posterior_histograms(found), "posterior", "panels"),
+            picture(
+                draw.posterior_histograms(found), "posterior", "panels", draw.posterior_histograms(found, upright=True)
+            ),
         ]
     if found.suggestions:
         rows = [
@@ -80,7 +82,7 @@ def page(found: Identified) -> str:
                 str(number),
                 one.what,
                 digits(one.information, 3),
-                ", ".join(f"{name} × {digits(share, 2)}" for name, share in one.shrinks.items()),
+                ", ".join(f"{label(name)} × {digits(share, 2)}" for name, share in one.shrinks.items()),
             ]
             for number, one in enumerate(found.suggestions, start=1)
         ]

@@ -61,19 +61,21 @@ def correlations(found: Identified) -> bytes | None:
     return as_png(figure)
 
 
-def _panels(count: int, height: float) -> tuple[Figure, np.ndarray]:
-    """A figure with room for `count` panels of a height (inch), three a row."""
-    columns = min(3, count)
+def _panels(count: int, height: float, upright: bool) -> tuple[Figure, np.ndarray]:
+    """A figure with room for `count` panels of a height (inch), three a row, or two for a telephone."""
+    columns = min(2 if upright else 3, count)
     rows = -(-count // columns)
-    figure = new_figure(height * rows + 0.5, width=2.4 * columns + 0.6)
+    figure = new_figure(height * rows + 0.5, width=2.3 * columns + 0.4 if upright else 2.7 * columns + 0.6)
+    # Room between the numbers at the ends of two axes side by side.
+    figure.get_layout_engine().set(w_pad=0.12, h_pad=0.08)  # type: ignore[union-attr, call-arg]
     return figure, figure.subplots(rows, columns, squeeze=False).ravel()
 
 
-def profile_curves(found: Identified) -> bytes | None:
+def profile_curves(found: Identified, upright: bool = False) -> bytes | None:
     """Rise of the cost over each profiled parameter, with the parabola that its standard error stands for."""
     if not found.profiles:
         return None
-    figure, panels = _panels(len(found.profiles), 2.5)
+    figure, panels = _panels(len(found.profiles), 2.5, upright)
     estimates = {one.name: one for one in found.estimates}
     for axes, one in zip(panels, found.profiles, strict=False):
         estimate = estimates[one.name]
@@ -86,7 +88,8 @@ def profile_curves(found: Identified) -> bytes | None:
             )
         axes.axhline(3.84, color="#c8553d", linewidth=0.8)
         axes.set_ylim(0.0, 9.0)
-        axes.xaxis.set_major_locator(MaxNLocator(3))  # a narrow interval has long numbers
+        # A narrow interval has long numbers: few of them, and none beyond the panel's own width.
+        axes.xaxis.set_major_locator(MaxNLocator(3, prune="both"))
         axes.set_xlabel(axis_label(one.name, unit), fontsize=8)
         tidy(axes)
     for axes in panels[len(found.profiles) :]:
@@ -95,12 +98,12 @@ def profile_curves(found: Identified) -> bytes | None:
     return as_png(figure)
 
 
-def posterior_histograms(found: Identified) -> bytes | None:
+def posterior_histograms(found: Identified, upright: bool = False) -> bytes | None:
     """Each parameter's draws beside the Gaussian of its standard error."""
     drawn = found.posterior
     if drawn is None:
         return None
-    figure, panels = _panels(len(drawn.names), 2.2)
+    figure, panels = _panels(len(drawn.names), 2.2, upright)
     estimates = {one.name: one for one in found.estimates}
     for axes, name, draws in zip(panels, drawn.names, drawn.flat.T, strict=False):
         estimate = estimates[name]
@@ -114,6 +117,7 @@ def posterior_histograms(found: Identified) -> bytes | None:
             axes.plot(fine, height, color=QUIET, linewidth=1.1)
         axes.set_xlabel(axis_label(name, unit), fontsize=8)
         axes.set_yticks([])
+        axes.xaxis.set_major_locator(MaxNLocator(3, prune="both"))
         tidy(axes)
     for axes in panels[len(drawn.names) :]:
         axes.set_visible(False)
@@ -129,9 +133,10 @@ def suggested_inputs(found: Identified) -> bytes | None:
     for number, (axes, one) in enumerate(zip(panels, found.suggestions, strict=True), start=1):
         name = max(one.inputs, key=lambda channel_: float(np.ptp(one.inputs[channel_])))
         unit = channel(name)
-        axes.plot(unit.of(one.inputs[name]), color="#5b6470", linewidth=1.1)
+        time = np.arange(len(one.inputs[name])) * found.step
+        axes.plot(time, unit.of(one.inputs[name]), color="#5b6470", linewidth=1.1)
         axes.set_title(f"{number}. {digits(one.information, 3)} nats", fontsize=8, loc="left", pad=2)
         axes.set_ylabel(f"{label(name)}" + (f"\n({unit.unit})" if unit.unit else ""), fontsize=7)
         tidy(axes)
-    panels[-1].set_xlabel("sample", fontsize=8)
+    panels[-1].set_xlabel("time (s)" if found.clocked else "sample", fontsize=8)
     return as_png(figure)

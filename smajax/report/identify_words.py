@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from smajax.report.display import digits, display, label, p_value, with_error
 from smajax.residual.noise_like import WHITE
 from smajax.words import and_listed
 
+FAR = 2.0  # standard deviations of what was known before, from which on an estimate contradicts it
 OFF = 1.25  # ratio of residual to noise that is worth a sentence
 
 
@@ -22,13 +24,13 @@ def conclusions(found: Identified) -> list[str]:
     given = [one.noise_before is None for one in found.outputs]
     if found.whiteness_p < WHITE:
         told.append(
-            f"The residual is {_times(found)} the noise and has a memory ({p_value(found.whiteness_p)}; one "
+            f"The residual is {_times(found)} and has a memory ({p_value(found.whiteness_p)}; one "
             f"sample in {found.independent:.0f} is independent): the model lacks something, and the standard errors allow "
             "for the memory but not for what that does to the values. `smajax close-loop` looks for what it is."
         )
     else:
         told.append(
-            f"The residual is {_times(found)} the noise, and no memory was found in it "
+            f"The residual is {_times(found)}, and no memory was found in it "
             f"({p_value(found.whiteness_p)}): nothing in these runs speaks against the model."
         )
         wrong = [
@@ -52,6 +54,7 @@ def conclusions(found: Identified) -> list[str]:
             f"It is not normally distributed ({p_value(found.normality_p)}): if single samples are far off, fit by Huber's "
             "loss (`--robust`)."
         )
+    told += [said for one in found.estimates if (said := _contradicted(one))]
     edge = [one.name for one in found.estimates if "bound" in one.remark and one.standard_error is None]
     silent = [one.name for one in found.estimates if one.standard_error is None and one.name not in edge]
     if edge:
@@ -70,10 +73,34 @@ def conclusions(found: Identified) -> list[str]:
 
 
 def _times(found: Identified) -> str:
-    """`1.1 times`, or by output where the fit did not make it one."""
+    """`1.1 times the noise`, or by output where the fit did not make it one."""
+
+    def told(ratio: float) -> str:
+        return "as large as the noise" if f"{ratio:.2g}" == "1" else f"{ratio:.2g} times the noise"
+
     if len(found.outputs) == 1:
-        return f"{found.ratio:.2g} times"
-    return and_listed([f"{one.ratio:.2g} times ({one.name})" for one in found.outputs])
+        return told(found.ratio)
+    return and_listed([f"{told(one.ratio)} ({one.name})" for one in found.outputs])
+
+
+def _contradicted(one: Estimate) -> str:
+    """What is said of an estimate that lies far from what was known before; nothing for one that does not."""
+    known: Prior | None = one.prior
+    if known is None:
+        return ""
+    if known.logarithmic:
+        off = math.log(max(one.value / known.mean, sys.float_info.min)) / known.sigma
+    else:
+        off = (one.value - known.mean) / known.sigma
+    if abs(off) <= FAR:
+        return ""
+    unit = display(one.unit, one.name)
+    return (
+        f"{one.name} ends at {digits(unit.of(one.value), 3)} {unit.unit}".rstrip()
+        + f", {abs(off):.1f} standard deviations "
+        f"{'above' if off > 0.0 else 'below'} what was known before ({prior_shown(one)}): the runs speak against that prior. "
+        "Either it is wrong, or the model or the runs are; without the prior the estimate would lie further off still."
+    )
 
 
 def rms_by_role(found: Identified, output: int) -> dict[str, float]:

@@ -31,6 +31,7 @@ document.querySelectorAll("img").forEach(image => {
     large.className = "zoom";
     const copy = image.cloneNode();
     copy.className = "";
+    copy.src = image.currentSrc || image.src; // what is shown, where a telephone has a picture of its own
     large.append(copy);
     large.addEventListener("click", () => large.close());
     large.addEventListener("close", () => large.remove());

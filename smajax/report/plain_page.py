@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -11,25 +12,39 @@ SCRIPT = (Path(__file__).parent / "interactive.js").read_text(encoding="utf-8")
 CLICKED = (Path(__file__).parent / "interactive.css").read_text(encoding="utf-8")
 
 STYLE = (
-    "body{font:15px/1.5 system-ui,sans-serif;max-width:1080px;margin:2em auto;padding:0 1em;color:#1d1d1f;background:#fff}"
+    "body{font:15px/1.5 system-ui,sans-serif;max-width:1000px;margin:2em auto;padding:0 1em;color:#1d1d1f;background:#fff}"
     "td,th{text-align:left;vertical-align:top;padding:.35em .7em;border-bottom:1px solid #e3e5e9}"
-    "table{border-collapse:collapse;font-size:14px}td{overflow-wrap:break-word}.scroll{overflow-x:auto;margin:0 0 1em}"
+    "table{border-collapse:collapse;font-size:14px;width:100%}td{overflow-wrap:break-word}.scroll{overflow-x:auto;margin:0 0 1em}"
+    "table:not(.sortable) td+td{overflow-wrap:anywhere}table:not(.sortable) td:first-child{min-width:7em}"
     "td.n,th.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}"
-    "img{max-width:100%;display:block}.quiet{color:#626973}h2{margin-top:1.6em}"
-    "p,ul{max-width:62em}p,ul,h1,h2,h3{overflow-wrap:anywhere}"
-    # On a telephone a table is as wide as its words want, and moves sideways, rather than a word a line.
-    "@media(max-width:720px){table{width:max-content}td,th{max-width:15em}}"
-    "@media(max-width:520px){body{margin:1em auto;padding:0 .6em}td,th{padding:.3em .4em}}"
+    "th.n{white-space:normal}img{max-width:100%;display:block;margin:0 auto}.quiet{color:#626973}h2{margin-top:1.6em}"
+    "p,ul,h1,h2,h3{overflow-wrap:anywhere}"
+    # On a telephone names and numbers break where they may, so that the numbers are on the screen; sentences keep some width,
+    # and only a table that is too wide even so moves sideways.
+    "@media(max-width:720px){td.w{white-space:normal!important}td.t{min-width:9em}}"
+    "@media(min-width:721px){wbr{display:none}}"
+    "@media(max-width:520px){body{margin:1em auto;padding:0 .6em}table{font-size:13px}td,th{padding:.3em .35em}}"
 )
+
+
+SENTENCE = 30  # characters from which on a cell is no name
+
+
+def breakable(text: str) -> str:
+    """Escaped; a long name may go on in the next line after a `_`, `eps_L` may not."""
+    return re.sub(r"_(?=\w{3})", "_<wbr>", html.escape(text))
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequence[int] = ()) -> str:
     """Cells are text; the columns `numbers` are set to the right. A head without a word is left out, and nothing sorts."""
 
     def cells(kind: str, row: Sequence[str]) -> str:
-        return "".join(
-            f"<{kind}{' class=n' if k in numbers else ''}>{html.escape(cell)}</{kind}>" for k, cell in enumerate(row)
-        )
+        return "".join(f"<{kind}{_class(k, cell)}>{breakable(cell)}</{kind}>" for k, cell in enumerate(row))
+
+    def _class(k: int, cell: str) -> str:
+        if k in numbers:
+            return ' class="n w"' if len(cell.split()) > 2 else " class=n"
+        return " class=t" if len(cell) > SENTENCE else ""
 
     body = "".join(f"<tr>{cells('td', row)}</tr>" for row in rows)
     top = f"<thead><tr>{cells('th', head)}</tr></thead>" if any(head) else ""

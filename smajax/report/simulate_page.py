@@ -76,12 +76,15 @@ def _inputs(found: xr.Dataset) -> list[str]:
     return [name for name in names[: names.index("temperature")] if name != "wanted"]
 
 
-def drawn(found: xr.Dataset, form: str = "png") -> bytes:
-    """Input, position, temperature, fraction and stress over time, and the hysteresis of the position; `form`: png or svg."""
+def drawn(found: xr.Dataset, form: str = "png", upright: bool = False) -> bytes:
+    """Input, position, temperature, fraction and stress over time, and the hysteresis of the position; `form`: png or svg.
+
+    upright: one below the other, for a telephone.
+    """
     inputs = _inputs(found)
     shown = [*inputs[:1], *PLAIN]
-    figure = Figure(figsize=(10.0, 8.2))
-    axes = panels(figure, 3, 2)
+    figure = Figure(figsize=(4.6, 14.0) if upright else (10.0, 8.2))
+    axes = panels(figure, 6, 1) if upright else panels(figure, 3, 2)
     time = found["time"].to_numpy()
 
     def values(name: str) -> tuple[Any, str]:
@@ -102,7 +105,7 @@ def drawn(found: xr.Dataset, form: str = "png") -> bytes:
     for spare in axes[len(shown) + 1 :]:
         spare.axis("off")
     image = io.BytesIO()
-    figure.savefig(image, dpi=90, facecolor="white", format=form)
+    figure.savefig(image, dpi=150, facecolor="white", format=form)
     return image.getvalue()
 
 
@@ -175,7 +178,7 @@ def page(ran: Ran, image: bytes, title: str, command: str, moving: bytes | None 
     if ran.merit:
         parts.append(table(["figure of merit", "value", "unit"], merit_rows(ran), (1,)))
     parts += [
-        str(picture(image, "the run over time", "panels")),
+        str(picture(image, "the run over time", "panels", drawn(ran.found, upright=True))),
         str(picture(moving, "the load moving, beside the wire's path through its phase diagram", "panels")),
         table(["variable", "least", "greatest", "last", "unit"], summary_rows(ran.found), (1, 2, 3)),
         "<h2>Parameters (SI, temperatures in °C, angles in rad)</h2>",

@@ -14,11 +14,14 @@ from smajax.report.files import csv_text, heading
 from smajax.report.html import picture
 from smajax.report.plain_page import bullets, table, whole
 from smajax.sweep import MISMATCHES
+from smajax.tune.pictures import before_after
 from smajax.tune.terms import TERMS
 from smajax.tune.tune import Check, Tuned
 from smajax.words import counted
 
 EDGE = 0.02  # of the box, by logarithm
+GROWN = 1.5  # times as much as before
+LEAST_PRICE = 0.1  # J, V/s, 1/s: what is less is nothing, however it grew
 UNITS = {"°": "deg", "°C": "degC"}  # as a file has them
 CHECKS = {
     "tuned on": "tuned on",
@@ -54,6 +57,25 @@ def broken(found: Tuned, check: Check) -> list[str]:
     return told
 
 
+def price(found: Tuned) -> list[str]:
+    """What the tuned gains cost beside what they were tuned for: energy, chatter or switching that grew by over half."""
+    seen = found.checks["tuned on"].seen
+    columns = list(TERMS)
+    figures = {
+        f"{TERMS[name].label} ({TERMS[name].unit})": seen.judged[..., columns.index(name)]
+        for name in ("energy", "chatter")
+    }
+    figures["switches of the command (1/s)"] = np.asarray(seen.merits.switches_per_second)
+    grown = []
+    for label, values in figures.items():
+        before, after = (float(np.mean(one[np.isfinite(one)])) for one in values)
+        if after > GROWN * before and after > LEAST_PRICE:
+            grown.append(f"{label} from {digits(before, 3)} to {digits(after, 3)}")
+    if not grown:
+        return []
+    return [f"The tuned gains have their price, in the mean of the closed loops tuned on: {'; '.join(grown)}."]
+
+
 def conclusions(found: Tuned) -> list[str]:
     """What came out, in sentences that say no more than the numbers."""
     before, after = found.costs
@@ -84,6 +106,7 @@ def conclusions(found: Tuned) -> list[str]:
             told.append(
                 f"Loops that settle, {CHECKS[name]}: {100 * settled[0]:.0f} % before, {100 * settled[1]:.0f} % after."
             )
+    told += price(found)
     if edge := at_the_edge(found):
         told.append(f"At a bound of the box, beyond which better gains may lie: {', '.join(edge)}.")
     descent = found.descent
@@ -142,7 +165,12 @@ def page(found: Tuned, pictures: Mapping[str, bytes], command: str) -> str:
         f"<h1>Gains of {say(settings.controller)}, tuned</h1>",
         bullets(conclusions(found)),
         f"<p>Tuned on {say(settings.plants_in_words())}. {say(settings.goal_in_words())}.</p>",
-        picture(pictures["before_after.png"], "angles and figures of merit before and after", "panels"),
+        picture(
+            pictures["before_after.png"],
+            "angles and figures of merit before and after",
+            "panels",
+            before_after(found, upright=True),
+        ),
         "<p class=quiet>Above: thick, the plant as believed; thin, plants never seen. Below: from the least to the largest "
         "over the plants at each set point; squares were tuned on, circles never seen.</p>",
         "<h2>Gains</h2>",

@@ -14,12 +14,21 @@ WIDE = 9.6  # inches
 COLUMNS = list(TERMS)
 
 
-def before_after(found: Tuned) -> bytes:
-    """Angles over time with the preset's gains and with the tuned ones, and what was asked for over the set point."""
+def before_after(found: Tuned, upright: bool = False) -> bytes:
+    """Angles over time with the preset's gains and with the tuned ones, and what was asked for over the set point.
+
+    upright: one below the other, for a telephone.
+    """
     asked = [name for name in ("settling_time", "overshoot", "steady_error") if name in TERMS]
-    figure = new_figure(7.4, width=WIDE)
-    top, below = np.asarray(figure.subfigures(2, 1, height_ratios=[1.15, 1.0]))
-    left, right = top.subplots(1, 2, sharey=True)
+    if upright:
+        figure = new_figure(13.0, width=4.6)
+        left, right, *below = figure.subplots(2 + len(asked), 1)
+        right.sharey(left)
+    else:
+        figure = new_figure(7.4, width=WIDE)
+        top, bottom = np.asarray(figure.subfigures(2, 1, height_ratios=[1.15, 1.0]))
+        left, right = top.subplots(1, 2, sharey=True)
+        below = list(bottom.subplots(1, len(asked)))
     lines = found.lines
     alone = len(np.unique(lines.targets))
     for axes, angles, colour, name in (
@@ -40,12 +49,13 @@ def before_after(found: Tuned) -> bytes:
         axes.set_title(name, fontsize=9.5, loc="left")
         axes.set_xlabel("time (s)", fontsize=9)
         tidy(axes)
-    left.set_ylabel("arm angle (°)", fontsize=9)
+    for axes in (left, right) if upright else (left,):
+        axes.set_ylabel("arm angle (°)", fontsize=9)
     if len(lines.targets) > alone:
         right.plot([], [], color=MEASURED, linewidth=1.5, label="plant as believed")
         right.plot([], [], color=MEASURED, linewidth=0.5, label="plants never seen")
         right.legend(frameon=False, fontsize=8, loc="lower right")
-    for axes, name in zip(below.subplots(1, 3), asked, strict=True):
+    for axes, name in zip(below, asked, strict=True):
         _over_set_points(axes, found, name)
     return as_png(figure)
 
