@@ -218,7 +218,7 @@ def test_a_long_log_is_read_in_little_memory(tmp_path: Path) -> None:
 def test_too_little_memory_is_said(tmp_path: Path) -> None:
     """A cap on memory while the log is read: one message, no traceback."""
     experiment = bench(tmp_path / "bench")
-    (experiment.parent / "a.csv").write_text("t,U,x\n" + "".join(f"{k},5,1\n" for k in range(800_000)))
+    (experiment.parent / "a.csv").write_text("t,U,x\n" + "".join(f"{k},5,1\n" for k in range(2_500_000)))
     code = (
         "import resource, sys\nimport smajax.catalogue, smajax.close_loop, smajax.progress, smajax.report.write\n"
         "from smajax.cli import main\nfrom smajax.runtime import prepare\nprepare()\n"

@@ -6,9 +6,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
+from scipy import stats
 
 from smajax.report.files import replace
-from studies.attribution_benchmark.judge import EQUATIONS, NOTHING, OUTSIDE, Judged
+from studies.attribution_benchmark.judge import EQUATIONS, NOTHING, OUTSIDE, Judged, called
 
 STRENGTHS = (1.0, 3.0, 10.0)
 REACHED = 0.8  # of the strength asked for: a case that comes to less is counted where it comes to
@@ -41,8 +42,13 @@ def bars(cases: Sequence[Judged]) -> list[tuple[str, str, str]]:
     strong = [one for one in cases if one.kind == "single" and strength_of(one) == 10.0]
     pairs = [one for one in cases if one.kind == "pair"]
     outside = [one for one in cases if one.kind == "outside" and strength_of(one) == 10.0]
+    asked = [one for one in cases if one.kind == "single" and one.asked == 10.0 and one.strength >= REACHED * 10.0]
     return [
-        ("nothing is missing, and it says so", "95 %", share(nulls, lambda one: one.verdict == "adequate")),
+        (
+            f"nothing is missing, and it says so (false alarms: at most {most_alarms(nulls):.1%} at 95 %)",
+            "95 %",
+            share(nulls, lambda one: one.verdict == "adequate"),
+        ),
         (
             "what other values of the unknowns imitate: nothing is missing",
             "–",
@@ -50,6 +56,13 @@ def bars(cases: Sequence[Judged]) -> list[tuple[str, str, str]]:
         ),
         ("10 times the noise: right equation", "95 %", share(strong, lambda one: one.equation_right)),
         ("10 times the noise: right effect, or named beside it", "90 %", share(strong, lambda one: one.effect_right)),
+        (
+            "the same of all that were written with 10 noises: equation",
+            "–",
+            share(asked, lambda one: one.equation_right),
+        ),
+        ("the same of all that were written with 10 noises: effect", "–", share(asked, lambda one: one.effect_right)),
+        ("of all effects that were added to singles and pairs, those that are there", "–", precision(cases)),
         ("both effects of a pair", "70 %", share(pairs, lambda one: one.effect_right)),
         (
             "outside the library, 10 times: said so, or the right equation",
@@ -63,6 +76,19 @@ def bars(cases: Sequence[Judged]) -> list[tuple[str, str, str]]:
         ),
         ("a case in under two minutes", "all", share(cases, lambda one: one.seconds < 120.0)),
     ]
+
+
+def most_alarms(nulls: Sequence[Judged]) -> float:
+    """Upper end of the 95 % interval of the rate of false alarms (Clopper and Pearson 1934)."""
+    alarms = sum(one.verdict != "adequate" for one in nulls)
+    return float(stats.beta.ppf(0.975, alarms + 1, len(nulls) - alarms)) if alarms < len(nulls) else 1.0
+
+
+def precision(cases: Sequence[Judged]) -> str:
+    """Of what was added, how much is true: "31 of 36 (86 %)"."""
+    added = [(one, name) for one in cases if one.kind in ("single", "pair") for name in one.added]
+    true = [name for one, name in added if any(name in called(effect) for effect in one.truth)]
+    return f"{len(true)} of {len(added)} ({100.0 * len(true) / len(added):.0f} %)" if added else "nothing added"
 
 
 def confusion(cases: Sequence[Judged]) -> tuple[list[str], list[str], np.ndarray]:
