@@ -9,7 +9,16 @@ from typing import Any
 import pytest
 
 from studies.attribution_benchmark.judge import Judged, judge, load, save
-from studies.attribution_benchmark.tables import bars, confusion, missed, strength_of, text, written
+from studies.attribution_benchmark.tables import (
+    bars,
+    confusion,
+    missed,
+    most_alarms,
+    precision,
+    strength_of,
+    text,
+    written,
+)
 
 
 def _report(
@@ -18,6 +27,7 @@ def _report(
     rivals: list[tuple[str, float]] = [],  # noqa: B006
     unknown: str = "",
     or_else: str = "",
+    likened: list[str] = [],  # noqa: B006
 ) -> dict[str, Any]:
     runs = [
         {"role": role, "rmse_before": before, "rmse_after": after, "samples": 100}
@@ -29,7 +39,7 @@ def _report(
         "runs": runs,
         "effects": [{"name": name, "added": True} for name in added] + [{"name": "radiation", "added": False}],
         "rivals": [{"rival": name, "weight": weight} for name, weight in rivals],
-        "rounds": [{"alike": []}],
+        "rounds": [{"chosen": " + ".join(added), "alike": likened}, {"chosen": "drag", "alike": ["latent_heat"]}],
         "unknown": [
             {"name": "one", "equation": unknown, "named": True, "alike": ["other"] if or_else else []},
             {"name": "other", "equation": or_else, "named": False, "alike": []},
@@ -63,6 +73,11 @@ CASES = {
         False,
         True,
     ),
+    "likened to it in the round that added it, and not in one that did not last": (
+        judge(_truth("single", HEAT), _report("explained", ["creep"], likened=["radiation + latent_heat"]), 1.0),
+        True,
+        False,
+    ),
     "called otherwise": (
         judge(_truth("single", {"dead_band": "sensor"}), _report("explained", ["sensor_backlash"]), 1.0),
         True,
@@ -89,6 +104,8 @@ def test_each_kind_has_its_right_answer() -> None:
     assert judge(foreign, _report("not in the library", [], unknown="heat"), 1.0).right
     assert not judge(foreign, _report("not in the library", [], unknown="sensor"), 1.0).right
     assert judge(foreign, _report("not in the library", [], unknown="sensor", or_else="heat"), 1.0).right
+    assert judge(foreign, _report("partly explained", ["latent_heat"]), 1.0).right
+    assert not judge(foreign, _report("explained", ["latent_heat"]), 1.0).right
     assert not judge(foreign, _report("partly explained", ["creep"], unknown="sensor", or_else="heat"), 1.0).right
     # What the library does not hold is outside of it, whatever the generator calls it.
     assert judge(_truth("single", {"cogging": "mechanics"}), _report("adequate", []), 1.0).kind == "outside"
@@ -108,12 +125,14 @@ def test_tables_and_picture(tmp_path: Path) -> None:
     cases.append(judge(_truth("null", {}, strength=0.0), _report("adequate", []), 130.0))
     rows, columns, counts = confusion(cases)
     assert counts[rows.index("heat"), columns.index("heat")] == 3
+    assert precision(cases) == "3 of 7 (43 %)"  # latent heat, play, and creep of the pair
+    assert most_alarms([cases[-1]] * 75) == pytest.approx(1.0 - 0.025 ** (1.0 / 75.0))
     assert counts[rows.index("heat"), columns.index("nothing")] == 1
     assert counts[rows.index("nothing"), columns.index("nothing")] == 1
     assert {one.case for one in missed(cases)} == {"rig-single", "rig-pair"}
     told = {what: measured for what, _, measured in bars(cases)}
     assert told["both effects of a pair"] == "0 of 1 (0 %)"
-    assert told["a case in under two minutes"] == "7 of 8 (88 %)"
+    assert told["a case in under two minutes"] == "8 of 9 (89 %)"
     assert strength_of(cases[0]) == 10.0
     # What the generator calls ten noises, and a refit to its end leaves next to nothing of.
     assert strength_of(replace(cases[0], fit_before=1.5)) == 1.0

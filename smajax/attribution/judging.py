@@ -312,19 +312,17 @@ def base_value(coefficient: str) -> float:
 
 
 def paired(old: np.ndarray, new: np.ndarray, mask: np.ndarray) -> float:
-    """Mean drop of the squared error over its standard error: the larger of two, over blocks and over runs.
+    """Mean drop of the squared error over its standard error, on blocks longer than the residual's memory.
 
-    Blocks are longer than the residual's memory. Runs count where there are three or more: all samples of a left-out run
-    share the error of the one fit that foretells it.
+    All samples of a left-out run share the error of the one fit that foretells it, which blocks do not see. Over three or
+    four runs that cannot be told from an effect that shows in one of them alone: the held-out runs have to.
     """
     gains, block = [], int(np.ceil(2.0 * correlation_time(split_runs(old, mask))))
-    drops = [(before**2 - after**2)[valid > 0] for before, after, valid in zip(old, new, mask, strict=True)]
-    for drop in drops:
+    for before, after, valid in zip(old, new, mask, strict=True):
+        drop = (before**2 - after**2)[valid > 0]
         width = min(block, max(1, len(drop) // 4))
         gains += [float(piece.mean()) for piece in np.array_split(drop, max(1, len(drop) // width))]
-    by_run = [float(drop.mean()) for drop in drops]
-    spreads = [np.std(one, ddof=1) / np.sqrt(len(one)) for one, least in ((gains, 2), (by_run, 3)) if len(one) >= least]
-    spread = max(spreads, default=np.inf)
+    spread = np.std(gains, ddof=1) / np.sqrt(len(gains)) if len(gains) > 1 else np.inf
     return float(np.mean(gains) / spread) if spread > 0.0 else 0.0
 
 
