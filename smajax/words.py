@@ -10,6 +10,12 @@ def counted(number: int, what: str) -> str:
     return f"{number:,} {what}{'' if number == 1 else 's'}"
 
 
+def times_noise(ratio: float, whose: str = "the noise") -> str:
+    """`as large as the noise`, `1.1 times the noise`, `12.5 times the noise`, `1,250 times the noise`."""
+    count = f"{ratio:.2g}" if ratio < 10.0 else f"{ratio:,.{1 if ratio < 100.0 else 0}f}"
+    return f"as large as {whose}" if count == "1" else f"{count} times {whose}"
+
+
 def and_listed(names: Sequence[str]) -> str:
     """`a, b and c`, with semicolons where a name holds a comma itself; `nothing` for no names."""
     if len(names) < 2:

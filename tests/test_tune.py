@@ -209,7 +209,10 @@ def test_what_the_gains_cost_is_said_with_both_numbers() -> None:
         return SimpleNamespace(checks={"tuned on": SimpleNamespace(seen=seen)})
 
     (said,) = price(tuned(1))
-    assert "chatter of the command (V/s) from 2.5 to 10; switches of the command (1/s) from 0 to 3." in said
+    assert (
+        "chatter of the command from 2.5 to 10 V/s in the median loop; switches of the command from 0 to 3 a second"
+        in said
+    )
     assert "energy" not in said
     assert price(tuned(0)) == []
 

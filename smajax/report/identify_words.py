@@ -12,7 +12,7 @@ from smajax.fit.posterior import Posterior
 from smajax.identified import Estimate, Identified
 from smajax.report.display import digits, display, label, p_value, with_error
 from smajax.residual.noise_like import WHITE
-from smajax.words import and_listed
+from smajax.words import and_listed, times_noise
 
 FAR = 2.0  # standard deviations of what was known before, from which on an estimate contradicts it
 OFF = 1.25  # ratio of residual to noise that is worth a sentence
@@ -74,13 +74,9 @@ def conclusions(found: Identified) -> list[str]:
 
 def _times(found: Identified) -> str:
     """`1.1 times the noise`, or by output where the fit did not make it one."""
-
-    def told(ratio: float) -> str:
-        return "as large as the noise" if f"{ratio:.2g}" == "1" else f"{ratio:.2g} times the noise"
-
     if len(found.outputs) == 1:
-        return told(found.ratio)
-    return and_listed([f"{told(one.ratio)} ({one.name})" for one in found.outputs])
+        return times_noise(found.ratio)
+    return and_listed([f"{times_noise(one.ratio)} ({one.name})" for one in found.outputs])
 
 
 def _contradicted(one: Estimate) -> str:

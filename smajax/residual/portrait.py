@@ -8,6 +8,7 @@ import numpy as np
 
 from smajax.report.findings import Portrait
 from smajax.residual.noise_like import WHITE, whiteness_p_value
+from smajax.words import times_noise
 
 # A residual may miss the noise level by this share of its mean square and still be called noise: a noise sigma is
 # rarely known better, and no effect worth a name hides in 2 %.
@@ -84,7 +85,7 @@ def _sentences(
     ratio: float, white: bool, by_phase: Mapping[str, Mapping[str, float]], correlation: Mapping[str, float]
 ) -> tuple[str, ...]:
     told = [
-        f"The residual is {ratio:.1f} times the measurement noise and {'has no memory' if white else 'has a memory: one sample tells the next'}."
+        f"The residual is {times_noise(ratio, 'the measurement noise')} and {'has no memory' if white else 'has a memory: one sample tells the next'}."
     ]
     if white:
         return tuple(told)
