@@ -5,7 +5,7 @@ VENV  := .venv
 BIN   := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test test-all coverage docs lint format package clean
+.PHONY: demo test test-all coverage audit docs lint format package clean
 
 demo: $(READY)
 	SMAJAX_PROGRESS=lines $(BIN)/smajax demo --out demo-report
@@ -19,6 +19,11 @@ test-all: lint
 # Lines and branches that no test runs, after the tests; a file that is run whole is left out.
 coverage: $(READY)
 	$(BIN)/python -m pytest -n 2 --dist worksteal --cov=smajax --cov-branch --cov-report=term-missing:skip-covered
+
+# Known faults of what is installed here, asked of the public list: the one target that needs a network beyond packages.
+audit: $(READY)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check pip-audit
+	$(BIN)/pip-audit --local --skip-editable
 
 # site/index.html; any warning ends it. To search it as well, a browser wants a server: python -m http.server -d site
 docs: $(READY)

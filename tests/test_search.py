@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import jax.numpy as jnp
 import numpy as np
+import pytest
 
-from smajax.attribution.judging import Fitted, Model, Search
+from smajax.attribution.judging import FOLDS, Fitted, Model, Search
 from smajax.extended import extended
 from smajax.fit.batch import RunBatch, simulate_batch
 from smajax.fit.box import Fit
@@ -58,3 +59,16 @@ def test_a_model_that_predicts_left_out_runs_worse_is_not_better() -> None:
         Model(("latent_heat",), old.values, 0.1, small, setting.rmse(small)),
         Model((), old.values, 1.0, large, setting.rmse(large)),
     )[0]
+
+
+@pytest.mark.parametrize("runs", [1, 5, FOLDS, 500])
+def test_every_run_is_left_out_once_and_never_in_more_than_so_many_parts(runs: int) -> None:
+    setting = _setting()
+    blank = setting.problem.batch
+    many = RunBatch(
+        {"voltage": jnp.zeros((runs, 3))}, jnp.zeros((runs, 3)), jnp.ones((runs, 3)), jnp.zeros((runs, 0)), (), blank.dt
+    )
+    setting.problem = Problem.build(setting.problem.system, many, NOISE, False)
+    parts = setting.parts()
+    assert parts.shape == (min(runs, FOLDS), runs)
+    np.testing.assert_array_equal(parts.sum(axis=0), 1.0)

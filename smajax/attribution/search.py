@@ -21,8 +21,8 @@ from smajax.fit.box import Fit
 from smajax.report.findings import Round
 
 SIGNIFICANT = 1e-3  # of the score tests of one round, counted together
-SINGLES, PAIRS = 6, 2  # refitted in a round
-JUDGED = 8  # candidates taken to the left-out runs
+SINGLES, PAIRS = 8, 2  # refitted in a round
+JUDGED = 10  # candidates taken to the left-out runs
 MOST_ROUNDS = 6
 
 
