@@ -109,7 +109,11 @@ class Ruler:
         for _ in range(TRIALS):
             try:
                 trials.append((size, miss(size)))
-            except (ValueError, RuntimeError):  # no such wire: the ranges meet, or the modes chatter
+            except (
+                ValueError,
+                RuntimeError,
+                ZeroDivisionError,
+            ):  # no such wire: ranges meet or vanish, or the modes chatter
                 largest = size - CLOSER
                 size = largest
                 continue
