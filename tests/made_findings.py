@@ -70,6 +70,7 @@ def made_portrait(rmse: float, white: bool, sentences: tuple[str, ...], moved: f
         ratio=rmse / NOISE,
         white=white,
         whiteness_p_value=0.41 if white else 1.2e-48,
+        independent=1500.0 if white else 60.0,
         by_phase={
             "heating, transforming": {
                 "samples": 310.0,

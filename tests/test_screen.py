@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from smajax.attribution.screen import Score, screen
 from smajax.attribution.search import start_values
@@ -90,3 +91,15 @@ def test_what_is_white_is_noise_unless_it_is_far_above_it(size: float, noise: bo
     """Shuffled samples leave no memory, and no model can be content with them."""
     left = [size * np.random.default_rng(seed).normal(size=400) for seed in range(3)]
     assert all_noise(left, 1.0) == noise
+
+
+def test_noise_with_a_memory_may_miss_its_level_by_what_its_memory_accounts_for() -> None:
+    rng = np.random.default_rng(1)
+    drawn = rng.normal(size=(40, 4, 900))
+    slow = lfilter([0.6], [1.0, -0.8], drawn, axis=2)[..., 500:]  # of size one, and eight samples of memory
+    answers = [all_noise(list(runs), 1.0) for runs in slow]
+    assert sum(answers) >= 30
+    assert not any(all_noise(list(1.3 * runs), 1.0) for runs in slow)
+    # Of what a slow trace adds to white noise no more than a tenth of the mean square passes.
+    white, trace = drawn[0, :, :400], np.sin(np.linspace(0.0, 6.0, 400))
+    assert not all_noise(list(white + 0.6 * trace), 1.0)

@@ -77,6 +77,7 @@ class Portrait:
     ratio: float  # rmse / noise_sigma
     white: bool
     whiteness_p_value: float
+    independent: float  # samples that its memory leaves
     by_phase: dict[str, dict[str, float]]  # "heating, transforming" -> {samples, share_of_squared_error, mean, rmse}
     correlation: dict[str, float]  # with time, input, temperature, martensite_fraction, stress, rate
     sentences: tuple[str, ...]

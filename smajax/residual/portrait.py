@@ -7,12 +7,15 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from smajax.report.findings import Portrait
-from smajax.residual.noise_like import WHITE, whiteness_p_value
+from smajax.residual.noise_like import WHITE, correlation_time, whiteness_p_value
 from smajax.words import times_noise
 
 # A residual may miss the noise level by this share of its mean square and still be called noise: a noise sigma is
 # rarely known better, and no effect worth a name hides in 2 %.
 LEFT_OVER = 0.02
+# A noise with a memory misses its own level by more: by so many standard errors of its mean square it is still noise, but
+# not by more than the second share. A third of the noise may hide in that.
+ERRORS, MOST_LEFT_OVER = 2.0, 0.1
 # A residual without memory of up to so many times the declared noise is noise that was declared too small. One that is
 # larger belongs to data that the model knows nothing of, such as shuffled ones.
 DECLARED_TOO_SMALL = 3.0
@@ -61,24 +64,34 @@ def portrait(
     ratio = rmse / noise_sigma
     white = p_value > WHITE
     return Portrait(
-        rmse, noise_sigma, ratio, white, p_value, by_phase, correlation, _sentences(ratio, white, by_phase, correlation)
+        rmse,
+        noise_sigma,
+        ratio,
+        white,
+        p_value,
+        len(everything) / correlation_time(residuals),
+        by_phase,
+        correlation,
+        _sentences(ratio, white, by_phase, correlation),
     )
 
 
 def noise_like(found: Portrait) -> bool:
-    """Nothing left to explain: no memory beyond chance, or no more than `LEFT_OVER` of the mean square over the noise."""
-    return _is_noise(found.ratio, found.white)
+    """Nothing left to explain: no memory beyond chance, or no larger than the noise but for what its memory accounts for."""
+    return _is_noise(found.ratio, found.white, found.independent)
 
 
-def _is_noise(ratio: float, white: bool) -> bool:
+def _is_noise(ratio: float, white: bool, independent: float) -> bool:
     excess = 1.0 - 1.0 / max(ratio, 1e-9) ** 2
-    return excess <= LEFT_OVER or (white and ratio < DECLARED_TOO_SMALL)
+    chance = ERRORS * float(np.sqrt(2.0 / max(independent, 1.0)))
+    return excess <= min(max(LEFT_OVER, chance), MOST_LEFT_OVER) or (white and ratio < DECLARED_TOO_SMALL)
 
 
 def all_noise(residuals: Sequence[np.ndarray], noise_sigma: float) -> bool:
     """`noise_like` of residuals (SI, one array of shape (n,) a run) whose portrait nobody needs."""
-    rmse = float(np.sqrt(np.mean(np.concatenate(residuals) ** 2)))
-    return _is_noise(rmse / noise_sigma, whiteness_p_value(residuals) > WHITE)
+    everything = np.concatenate(residuals)
+    ratio = float(np.sqrt(np.mean(everything**2))) / noise_sigma
+    return _is_noise(ratio, whiteness_p_value(residuals) > WHITE, len(everything) / correlation_time(residuals))
 
 
 def _sentences(

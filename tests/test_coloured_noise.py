@@ -1,0 +1,56 @@
+"""Noise with a memory, and held-out runs that do not bear out what was found: no effect is named for either."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from smajax.catalogue import CATALOGUE
+from smajax.close_loop import close_loop
+from smajax.experiment.load import load_experiment
+from smajax.experiment.record import Experiment
+from studies.attribution_benchmark.cases import cases
+from studies.attribution_benchmark.rigs import show
+from studies.attribution_benchmark.write import write
+
+MEMORY = 0.8  # from one sample to the next
+
+
+def _coupon(folder: Path, seed: int, trend: float = 0.0) -> Experiment:
+    """A coupon by the independent generator that lacks nothing. `trend`: of the fit runs' readings over a run, in noises."""
+    true = write(next(case for case in cases() if case.name == "coupon-null-0-00"), folder)
+    experiment = load_experiment(folder / "coupon-null-0-00" / "experiment.toml", CATALOGUE)
+    random, sigma = np.random.default_rng(seed), experiment.noise_sigma
+    shown = {run.name: show(true.rig, true.wire, run, {}) for run in true.rig.runs(true.wire)}
+    runs = []
+    for run in experiment.runs:
+        drawn = random.normal(size=run.output.size + 200)
+        slow = sigma * np.sqrt(1.0 - MEMORY**2) * lfilter([1.0], [1.0, -MEMORY], drawn)[200:]
+        if run.role == "fit":
+            slow += trend * sigma * np.linspace(-0.5, 0.5, slow.size)
+        else:
+            slow -= trend * sigma * np.linspace(-0.5, 0.5, slow.size)
+        runs.append(dataclasses.replace(run, outputs={experiment.output_name: shown[run.name] + slow}))
+    return dataclasses.replace(experiment, runs=tuple(runs))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_noise_with_a_memory_gets_no_effect(seed: int, tmp_path: Path) -> None:
+    findings = close_loop(_coupon(tmp_path, seed))
+    assert not any(effect.added for effect in findings.effects)
+    assert not any(term.named for term in findings.unknown)
+
+
+def test_what_the_held_out_runs_do_not_bear_out_is_not_named(tmp_path: Path) -> None:
+    """All fit runs drift upwards and the held-out ones downwards: a drift that is found is no property of the bench."""
+    findings = close_loop(_coupon(tmp_path, 0, trend=12.0))
+    assert not any(effect.added for effect in findings.effects)
+    assert findings.verdict == "not in the library"
+    assert any("set aside: error on the held-out runs" in entry.why for entry in findings.rounds)
+    assert "not confirmed" in findings.summary[0]
+    held_out = [run for run in findings.runs if run.role == "held-out"]
+    assert all(run.rmse_after == run.rmse_before for run in held_out)
