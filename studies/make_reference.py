@@ -12,6 +12,7 @@ import smajax
 from smajax.effects.library import EQUATIONS, LIBRARY, of_others
 
 FOLDER = Path(__file__).parents[1] / "docs" / "reference"
+NAMES = "names.md"
 MADE = "Made from the package by `python -m studies.make_reference`; do not edit."
 # What a name is that has no docstring, or one that says too little by itself.
 SAID = {
@@ -23,7 +24,7 @@ SAID = {
     "effects": "The effects, each in a module of its own.",
     "load_experiment": "Read an experiment file and its runs, with the presets, effects and parameters that there are.",
 }
-# (heading, names): every public name once.
+# (heading, names) of the public names.
 STAGES = (
     (
         "A model",
@@ -36,8 +37,6 @@ STAGES = (
     ("Measured runs", ("load_experiment", "identify", "write_identified", "close_loop", "write_report")),
     ("Parts of one's own", ("AbstractEffect", "AbstractMovingLoad", "parameter", "effects")),
 )
-# Modules that have no page but this one.
-SHOWN_HERE = ("smajax.compose", "smajax.dataset", "smajax.open_experiment")
 
 
 def _cell(text: str) -> str:
@@ -52,13 +51,17 @@ def _first_paragraph(of: Any) -> str:
 
 
 def _page_of(module: str) -> str:
-    """The page of the reference that shows a module, or this one."""
-    if module in SHOWN_HERE:
-        return ""
-    for page in sorted(FOLDER.glob("*.md")):
-        if re.search(rf"^::: {re.escape(module)}$", page.read_text(encoding="utf-8"), re.MULTILINE):
-            return page.name
-    raise ValueError(f"no page of {FOLDER} shows {module}; add `::: {module}` to one, or to SHOWN_HERE")
+    """The page of the reference that shows a module; "" for that of the public names, which shows what no other does."""
+    shows = re.compile(rf"^::: {re.escape(module)}$", re.MULTILINE)
+    others = (page for page in sorted(FOLDER.glob("*.md")) if page.name != NAMES)
+    return next((page.name for page in others if shows.search(page.read_text(encoding="utf-8"))), "")
+
+
+def _stages() -> list[tuple[str, tuple[str, ...]]]:
+    """`STAGES`, and last the names that are in none of them."""
+    told = {name for _, members in STAGES for name in members}
+    left = tuple(name for name in sorted([*smajax.NAMES, *smajax.MODULES]) if name not in told)
+    return [*STAGES, *([("More", left)] if left else [])]
 
 
 def _row(name: str) -> str:
@@ -85,10 +88,14 @@ def names() -> str:
         "",
         'JAX\'s precision is yours to set, before the first array: `jax.config.update("jax_enable_x64", True)`.',
     ]
-    for heading, members in STAGES:
+    for heading, members in _stages():
         lines += ["", f"## {heading}", "", "| name | | |", "|---|---|---|", *(_row(name) for name in members)]
-    for module in SHOWN_HERE:
-        lines += ["", f"::: {module}"]
+    modules = dict.fromkeys(
+        smajax.NAMES[name][0] for _, members in _stages() for name in members if name in smajax.NAMES
+    )
+    for module in modules:
+        if not _page_of(module):
+            lines += ["", f"::: {module}"]
     return "\n".join(lines) + "\n"
 
 
@@ -117,7 +124,7 @@ def effects() -> str:
     return "\n".join(lines) + "\n"
 
 
-PAGES = {"effects.md": effects, "names.md": names}
+PAGES = {"effects.md": effects, NAMES: names}
 
 
 if __name__ == "__main__":
