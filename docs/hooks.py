@@ -22,6 +22,7 @@ ROOT = Path(__file__).parents[1]
 TAKEN = (
     "studies/*.md",
     "studies/*/README.md",
+    "studies/attribution_benchmark/results*.md",
     "studies/benchmarks/results/*/README.md",
     "CHANGELOG.md",
     "CONTRIBUTING.md",
@@ -130,9 +131,10 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str
 def on_page_content(content: str, page: Any, config: Any, files: Files) -> str:
     """LaTeX as MathML, which browsers draw by themselves."""
 
-    def drawn(match: re.Match[str]) -> str:
+    def shown(match: re.Match[str]) -> str:
         text = html.unescape(match[2]).strip()
         block = text.startswith("\\[")
-        return convert(text[2:-2].strip(), display="block" if block else "inline")
+        drawn = convert(text[2:-2].strip(), display="block" if block else "inline")
+        return f'<div class="maths">{drawn}</div>' if block else drawn
 
-    return MATHS.sub(drawn, content)
+    return MATHS.sub(shown, content)

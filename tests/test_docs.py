@@ -12,7 +12,9 @@ from pathlib import Path
 
 import pytest
 
+import smajax
 from smajax import __version__
+from smajax.effects.library import LIBRARY, of_others
 
 ROOT = Path(__file__).parents[1]
 PAGES = [*sorted((ROOT / "docs" / "how-to").glob("*.md")), ROOT / "CONTRIBUTING.md"]
@@ -87,6 +89,18 @@ def test_the_reference_names_no_module_that_is_gone() -> None:
         for name in re.findall(r"^::: smajax\.(\S+)$", page.read_text(encoding="utf-8"), re.MULTILINE):
             place = ROOT / "smajax" / name.replace(".", "/")
             assert place.is_dir() or place.with_suffix(".py").is_file(), f"{page.name}: {name}"
+
+
+def test_the_reference_has_every_public_name_and_every_effect_as_the_package_tells_them() -> None:
+    """`python -m studies.make_reference` writes the pages anew."""
+    from studies.make_reference import FOLDER, PAGES
+
+    for page, make in PAGES.items():
+        assert (FOLDER / page).read_text(encoding="utf-8") == make(), page
+    told = (FOLDER / "names.md").read_text(encoding="utf-8")
+    assert [name for name in (*smajax.NAMES, *smajax.MODULES) if told.count(f"\n| [`{name}`](") != 1] == []
+    told = (FOLDER / "effects.md").read_text(encoding="utf-8")
+    assert [name for name in LIBRARY.keys() - of_others().keys() if told.count(f"\n| [`{name}`](") != 1] == []
 
 
 def test_every_link_of_a_page_leads_to_a_file() -> None:

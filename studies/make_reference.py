@@ -1,0 +1,132 @@
+"""Write the reference's pages of public names and of effects from the package itself: `python -m studies.make_reference`."""
+
+from __future__ import annotations
+
+import html
+import inspect
+import re
+from pathlib import Path
+from typing import Any
+
+import smajax
+from smajax.effects.library import EQUATIONS, LIBRARY, of_others
+
+FOLDER = Path(__file__).parents[1] / "docs" / "reference"
+NAMES = "names.md"
+MADE = "Made from the package by `python -m studies.make_reference`; do not edit."
+# What a name is that has no docstring, or one that says too little by itself.
+SAID = {
+    "CONTROLLERS": "Presets of controllers by name.",
+    "DRIVES": "Presets of drives by name.",
+    "EFFECTS": "The library of effects by name.",
+    "LOADS": "Presets of loads by name.",
+    "WIRES": "Presets of wires by name.",
+    "effects": "The effects, each in a module of its own.",
+    "load_experiment": "Read an experiment file and its runs, with the presets, effects and parameters that there are.",
+}
+# (heading, names) of the public names.
+STAGES = (
+    (
+        "A model",
+        ("compose", "build", "under_law", "extended", "System", "WIRES", "LOADS", "DRIVES", "EFFECTS", "presets"),
+    ),
+    ("Its parameters", ("parameter_values", "get_parameters", "set_parameters", "units")),
+    ("One run", ("simulate_dataset", "simulate_compiled", "simulate")),
+    ("Many runs", ("run_batch", "grid", "zipped", "sampled", "good", "measure")),
+    ("A closed loop", ("simulate_closed_loop", "merit", "CONTROLLERS", "control_presets", "reference")),
+    ("Measured runs", ("load_experiment", "identify", "write_identified", "close_loop", "write_report")),
+    ("Parts of one's own", ("AbstractEffect", "AbstractMovingLoad", "parameter", "effects")),
+)
+
+
+def _cell(text: str) -> str:
+    """Plain text as code in a table. A bar would end the cell, and is shown with its stroke where it is escaped."""
+    shown = " ".join(text.split())
+    return f"<code>{html.escape(shown).replace('|', '&#124;')}</code>" if "|" in shown else f"`{shown}`"
+
+
+def _first_paragraph(of: Any) -> str:
+    told = " ".join((inspect.getdoc(of) or "").split("\n\n")[0].split())
+    return told.replace("|", "\\|")
+
+
+def _page_of(module: str) -> str:
+    """The page of the reference that shows a module; "" for that of the public names, which shows what no other does."""
+    shows = re.compile(rf"^::: {re.escape(module)}$", re.MULTILINE)
+    others = (page for page in sorted(FOLDER.glob("*.md")) if page.name != NAMES)
+    return next((page.name for page in others if shows.search(page.read_text(encoding="utf-8"))), "")
+
+
+def _stages() -> list[tuple[str, tuple[str, ...]]]:
+    """`STAGES`, and last the names that are in none of them."""
+    told = {name for _, members in STAGES for name in members}
+    left = tuple(name for name in sorted([*smajax.NAMES, *smajax.MODULES]) if name not in told)
+    return [*STAGES, *([("More", left)] if left else [])]
+
+
+def _row(name: str) -> str:
+    if name in smajax.MODULES:
+        module = f"smajax.{name}"
+        page = "effects.md" if name == "effects" else f"{_page_of(module)}#{module}"
+        return f"| [`{name}`]({page}) | module | {SAID.get(name) or _first_paragraph(getattr(smajax, name))} |"
+    module, own = smajax.NAMES[name]
+    found = getattr(smajax, name)
+    kind = "class" if inspect.isclass(found) else "function" if callable(found) else "table"
+    about = SAID.get(name) or _first_paragraph(found)
+    return f"| [`{name}`]({_page_of(module)}#{module}{'' if kind == 'table' else '.' + own}) | {kind} | {about} |"
+
+
+def names() -> str:
+    """The page of `import smajax as sma`."""
+    lines = [
+        "# Public names",
+        "",
+        MADE,
+        "",
+        "`import smajax as sma` has these, as `sma.compose` and so on. What else there is lies in modules, on the pages that these lead to.",
+        "A name here is not changed at once: the old one goes on working for a minor version, with a warning.",
+        "",
+        'JAX\'s precision is yours to set, before the first array: `jax.config.update("jax_enable_x64", True)`.',
+    ]
+    for heading, members in _stages():
+        lines += ["", f"## {heading}", "", "| name | | |", "|---|---|---|", *(_row(name) for name in members)]
+    modules = dict.fromkeys(
+        smajax.NAMES[name][0] for _, members in _stages() for name in members if name in smajax.NAMES
+    )
+    for module in modules:
+        if not _page_of(module):
+            lines += ["", f"::: {module}"]
+    return "\n".join(lines) + "\n"
+
+
+def effects() -> str:
+    """The page of the library: a table by equation, and the class of each."""
+    own = {name: effect for name, effect in LIBRARY.items() if name not in of_others()}
+    lines = [
+        "# Effects",
+        "",
+        MADE,
+        "",
+        f"What the base model may lack: {len(own)} effects, one class each, and one method an equation. An effect of your own:",
+        "[how to](../how-to/add-an-effect.md).",
+    ]
+    for equation in EQUATIONS:
+        lines += ["", f"## {equation.capitalize()}", "", "| effect | what it is | what it changes |", "|---|---|---|"]
+        for name, effect in own.items():
+            if effect.equation == equation:
+                lines.append(f"| [`{name}`](#{effect.__module__}) | {effect.title} | {_cell(effect.formula)} |")
+    modules = dict.fromkeys(
+        effect.__module__ for equation in EQUATIONS for effect in own.values() if effect.equation == equation
+    )
+    lines += ["", "## Their classes"]
+    for module in ("smajax.effects.base", "smajax.effects.library", "smajax.extended", *modules):
+        lines += ["", f"::: {module}"]
+    return "\n".join(lines) + "\n"
+
+
+PAGES = {"effects.md": effects, NAMES: names}
+
+
+if __name__ == "__main__":
+    for page, make in PAGES.items():
+        (FOLDER / page).write_text(make(), encoding="utf-8")
