@@ -75,6 +75,44 @@ def test_a_data_set_has_units_and_can_be_drawn() -> None:
     matplotlib.pyplot.close("all")
 
 
+def test_a_loop_is_composed_in_a_line_and_run_in_another() -> None:
+    names = ("niti_table_3_1", "arm", "amplified_voltage")
+    loop = sma.compose(*names, effects=["latent_heat"], values={"damping": "0.004 N m s"}, controller="vsc3")
+    found = sma.simulate_loop_dataset(loop, "5 deg", seconds=5.0)
+    units = {name: found[name].attrs["units"] for name in ("voltage", "position", "wanted", "temperature", "time")}
+    assert units == {"voltage": "V", "position": "rad", "wanted": "rad", "temperature": "degC", "time": "s"}
+    assert abs(np.degrees(float(found["position"][-1])) - 5.0) < 1.0
+    assert '"latent_heat.enthalpy"' in found.attrs["parameters (SI)"]
+    # The same as the parts by hand, and the same by name as by the controller itself.
+    by_hand = sma.simulate_closed_loop(
+        loop.system, loop.controller, jnp.full(found.sizes["time"], np.radians(5.0)), 0.005, 2
+    )
+    np.testing.assert_allclose(found["position"], by_hand.run.position, rtol=0.0, atol=1e-9)
+    own = sma.compose(*names, effects=["latent_heat"], values={"damping": "0.004 N m s"}, controller=loop.controller)
+    target = sma.reference.constant(sma.reference.clock(5.0, 0.005), np.radians(5.0))
+    np.testing.assert_array_equal(sma.simulate_loop_dataset(own, target)["position"], found["position"])
+    # Each set point holds from its instant on.
+    wanted = np.degrees(sma.simulate_loop_dataset(loop, "0deg:1s,10deg:1s")["wanted"])
+    np.testing.assert_allclose([*wanted[199:201], wanted[-1]], [0.0, 10.0, 10.0], atol=1e-12)
+
+
+def test_what_a_composed_loop_refuses() -> None:
+    arm = ("niti_table_3_1", "arm", "amplified_voltage")
+    loop = sma.compose(*arm, controller="pid")
+    with pytest.raises(KeyError, match="no controller 'pdi'; did you mean 'pid'"):
+        sma.compose(*arm, controller="pdi")
+    with pytest.raises(ValueError, match=r"give the load 'arm', not 'dead_weight'"):
+        sma.compose(*HANGING, controller="pid")
+    with pytest.raises(TypeError, match=r"expected a Loop, got System"):
+        sma.simulate_loop_dataset(loop.system, 0.5, seconds=1.0)
+    with pytest.raises(ValueError, match="give `seconds`"):
+        sma.simulate_loop_dataset(loop, 0.5)
+    with pytest.raises(ValueError, match="whole number of simulation steps"):
+        sma.simulate_loop_dataset(loop, 0.5, seconds=1.0, period=0.012)
+    with pytest.raises(sma.units.UnitError, match="degC"):
+        sma.simulate_loop_dataset(loop, "40 degC", seconds=1.0)
+
+
 def test_simulate_is_pure_inside_anybodys_transformations() -> None:
     coupon = sma.build("flexinol_isobaric", "coupon", "none")
     inputs = {"temperature": jnp.linspace(30.0, 95.0, 66), "stress": jnp.full(66, 100e6)}
