@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from smajax.parameters import parameter as parameter
     from smajax.parameters import parameter_values as parameter_values
     from smajax.parameters import set_parameters as set_parameters
+    from smajax.plot import plot as plot
     from smajax.presets import DRIVES as DRIVES
     from smajax.presets import LOADS as LOADS
     from smajax.presets import WIRES as WIRES
@@ -82,6 +83,7 @@ NAMES = {
     "merit": ("smajax.merit", "merit"),
     "parameter": ("smajax.parameters", "parameter"),
     "parameter_values": ("smajax.parameters", "parameter_values"),
+    "plot": ("smajax.plot", "plot"),
     "run_batch": ("smajax.batch.run", "run_batch"),
     "sampled": ("smajax.batch.axes", "sampled"),
     "set_parameters": ("smajax.parameters", "set_parameters"),

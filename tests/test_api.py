@@ -51,7 +51,7 @@ def test_a_function_goes_before_the_module_of_its_name(first: str) -> None:
 
 
 def test_importing_the_package_imports_nothing_heavy() -> None:
-    code = "import sys, smajax; print(sorted({'jax', 'numpy', 'importlib.metadata', 'typer'} & set(sys.modules)))"
+    code = "import sys, smajax; print(sorted({'jax', 'matplotlib', 'numpy', 'importlib.metadata', 'typer'} & set(sys.modules)))"
     told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)
     assert told.stdout.strip() == "[]"
 
@@ -73,6 +73,39 @@ def test_a_data_set_has_units_and_can_be_drawn() -> None:
     assert line.axes.get_ylabel() == "position [m]"
     assert line.axes.get_xlabel() == "time [s]"
     matplotlib.pyplot.close("all")
+
+
+def test_a_run_at_a_glance_has_labels_with_units() -> None:
+    matplotlib.use("agg")
+    try:
+        hanging = sma.simulate_dataset(sma.compose(*HANGING), {"voltage": jnp.full(201, 5.0)}, dt=0.01)
+        axes = sma.plot(hanging).axes
+        assert [one.get_ylabel() for one in axes] == [
+            "voltage (V)",
+            "position (mm)",
+            "temperature (°C)",
+            "martensite fraction",
+            "stress (MPa)",
+        ]
+        assert axes[-1].get_xlabel() == "time (s)"
+        np.testing.assert_allclose(np.asarray(axes[1].lines[0].get_ydata()), 1e3 * hanging["position"])
+        pulled = {"temperature": jnp.linspace(30.0, 95.0, 66), "stress": jnp.full(66, 100e6)}
+        coupon = sma.simulate_dataset(sma.compose("flexinol_isobaric", "coupon", "none"), pulled, dt=1.0)
+        assert [one.get_ylabel() for one in sma.plot(coupon).axes][:3] == [
+            "temperature (°C)",
+            "stress (MPa)",
+            "strain (%)",
+        ]
+        loop = sma.compose("niti_table_3_1", "arm", "amplified_voltage", controller="vsc3")
+        (panel,) = sma.plot(sma.simulate_loop_dataset(loop, "5 deg", seconds=1.0), ["position"]).axes
+        assert panel.get_ylabel() == "position (deg)"
+        np.testing.assert_allclose(np.asarray(panel.lines[1].get_ydata()), 5.0)
+        with pytest.raises(ValueError, match="no series 'postion'; did you mean 'position'"):
+            sma.plot(hanging, ["postion"])
+        with pytest.raises(ValueError, match=r"dimensions sample, time, expected time alone"):
+            sma.plot(hanging.expand_dims("sample"))
+    finally:
+        matplotlib.pyplot.close("all")
 
 
 def test_a_loop_is_composed_in_a_line_and_run_in_another() -> None:
