@@ -105,6 +105,7 @@ def simulate(
     prepare()
     from smajax.command.folder import check_path, claimed
     from smajax.gains_file import GainsFileError
+    from smajax.progress import shown
     from smajax.report.files import json_text
     from smajax.report.simulate_page import OWN, merit_rows, record, summary_rows, write_run
     from smajax.single import Asked, AskedLoop, channels, run_closed, run_open
@@ -138,7 +139,8 @@ def simulate(
                     f"--step is for a model with one required input; this one has {needs}: use --input NAME=..."
                 )
             asked = Asked(**{**vars(asked), "inputs": {**series, next(iter(required)): step}})
-        with resumable():
+        with resumable(), shown(console()) as progress:
+            progress("simulating the run", 0.0)
             loop: AskedLoop | None = None
             if closed:
                 loop = AskedLoop(
@@ -155,6 +157,7 @@ def simulate(
                 ran = run_closed(asked, loop)
             else:
                 ran = run_open(asked)
+            progress("simulating the run", 1.0)
     except KeyError as error:
         raise typer.BadParameter(error.args[0]) from None
     except (ValueError, GainsFileError) as error:
@@ -167,8 +170,8 @@ def simulate(
         **(vars(loop) if loop is not None else {}),
         "gains": None if gains is None else gains.read_text(),
     }
-    with claimed(out, "simulate", told, OWN, overwrite):
-        page = write_run(ran, out, title, command, gif)
+    with resumable(), claimed(out, "simulate", told, OWN, overwrite), shown(console()) as progress:
+        page = write_run(ran, out, title, command, gif, progress)
     for note in ran.notes:
         console().print(note, soft_wrap=True, markup=False, highlight=False)
     if json_out:
