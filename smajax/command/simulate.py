@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from smajax.command import complete
 from smajax.command.base import (
     Json,
     Open,
@@ -31,10 +32,13 @@ def _texts(option: str, several: Sequence[str] | None) -> dict[str, str]:
 
 
 def simulate(
-    wire: Annotated[str, typer.Argument(help="a wire of `smajax presets`")] = "niti_table_3_1",
-    load: Annotated[str, typer.Argument(help="a load of `smajax presets`")] = "arm",
+    wire: Annotated[
+        str, typer.Argument(help="a wire of `smajax presets`", autocompletion=complete.wires)
+    ] = "niti_table_3_1",
+    load: Annotated[str, typer.Argument(help="a load of `smajax presets`", autocompletion=complete.loads)] = "arm",
     drive: Annotated[
-        str, typer.Argument(help="a drive of `smajax presets`; `none` for a coupon")
+        str,
+        typer.Argument(help="a drive of `smajax presets`; `none` for a coupon", autocompletion=complete.drives),
     ] = "amplified_voltage",
     step: Annotated[
         str | None, typer.Option(help="levels of the drive's input, each with its time: 6V:5s,0V:10s")
@@ -57,7 +61,9 @@ def simulate(
             "latent_heat.enthalpy='20 J/g', which adds that effect; repeat",
         ),
     ] = None,
-    law: Annotated[str, typer.Option(help="kinetics: tanaka, liang, brinson or enhanced")] = "",
+    law: Annotated[
+        str, typer.Option(help="kinetics: tanaka, liang, brinson or enhanced", autocompletion=complete.laws)
+    ] = "",
     seconds: Annotated[
         float | None, typer.Option(min=0.0, help="length of the run; default: that of the inputs")
     ] = None,
@@ -68,14 +74,19 @@ def simulate(
     gains: Annotated[
         Path | None, typer.Option(help="gains.json of `smajax tune`: a closed loop of the arm by that controller")
     ] = None,
-    controller: Annotated[str, typer.Option(help="a closed loop by this controller's preset gains")] = "",
+    controller: Annotated[
+        str, typer.Option(help="a closed loop by this controller's preset gains", autocompletion=complete.controllers)
+    ] = "",
     set_point: Annotated[
         str | None, typer.Option(help="what the loop is to reach: 40deg:5s,10deg:5s, or a file")
     ] = None,
     mismatch: Annotated[
         list[str] | None, typer.Option(help="a parameter of the plant that the controller does not know of, as --set")
     ] = None,
-    estimator: Annotated[str, typer.Option(help="`printed` or `model` filter; none: told the true state")] = "",
+    estimator: Annotated[
+        str,
+        typer.Option(help="`printed` or `model` filter; none: told the true state", autocompletion=complete.estimators),
+    ] = "",
     noise: Annotated[
         float, typer.Option(min=0.0, max=360.0, help="noise of the angle's readings, degrees (1 sigma)")
     ] = 0.0,
