@@ -2,7 +2,7 @@
 # # Close the loop on a measured bench, from the log to the conclusion
 #
 # A wire against a bias spring, driven by duty cycle, its slider's position logged: an openly published teaching bench (folder named by `SMAJAX_DATA`). The
-# whole loop takes a quarter of an hour,
+# whole loop takes some minutes,
 #
 #     smajax close-loop studies/bias_spring_bench/experiment.toml --out report
 #

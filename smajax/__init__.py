@@ -38,12 +38,15 @@ if TYPE_CHECKING:
     from smajax.extended import extended as extended
     from smajax.identify import identify as identify
     from smajax.load.base import AbstractMovingLoad as AbstractMovingLoad
+    from smajax.loop import Loop as Loop
+    from smajax.loop import simulate_loop_dataset as simulate_loop_dataset
     from smajax.merit import merit as merit
     from smajax.open_experiment import open_experiment as open_experiment
     from smajax.parameters import get_parameters as get_parameters
     from smajax.parameters import parameter as parameter
     from smajax.parameters import parameter_values as parameter_values
     from smajax.parameters import set_parameters as set_parameters
+    from smajax.plot import plot as plot
     from smajax.presets import DRIVES as DRIVES
     from smajax.presets import LOADS as LOADS
     from smajax.presets import WIRES as WIRES
@@ -65,6 +68,7 @@ NAMES = {
     "DRIVES": ("smajax.presets", "DRIVES"),
     "EFFECTS": ("smajax.effects.library", "LIBRARY"),
     "LOADS": ("smajax.presets", "LOADS"),
+    "Loop": ("smajax.loop", "Loop"),
     "System": ("smajax.system", "System"),
     "WIRES": ("smajax.presets", "WIRES"),
     "build": ("smajax.presets", "build"),
@@ -79,6 +83,7 @@ NAMES = {
     "merit": ("smajax.merit", "merit"),
     "parameter": ("smajax.parameters", "parameter"),
     "parameter_values": ("smajax.parameters", "parameter_values"),
+    "plot": ("smajax.plot", "plot"),
     "run_batch": ("smajax.batch.run", "run_batch"),
     "sampled": ("smajax.batch.axes", "sampled"),
     "set_parameters": ("smajax.parameters", "set_parameters"),
@@ -86,6 +91,7 @@ NAMES = {
     "simulate_closed_loop": ("smajax.closed_loop", "simulate_closed_loop"),
     "simulate_compiled": ("smajax.compiled", "simulate_compiled"),
     "simulate_dataset": ("smajax.dataset", "simulate_dataset"),
+    "simulate_loop_dataset": ("smajax.loop", "simulate_loop_dataset"),
     "under_law": ("smajax.wire.laws", "under_law"),
     "write_identified": ("smajax.report.identify_page", "write_identified"),
     "write_report": ("smajax.report.write", "write_report"),

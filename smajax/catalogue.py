@@ -11,6 +11,7 @@ from smajax.effects.library import LIBRARY
 from smajax.experiment.catalogue import Catalogue, ModelDescription, ParameterInfo, Scale
 from smajax.extended import extended
 from smajax.load.coupon import AbstractCoupon
+from smajax.measured.names import listed
 from smajax.parameters import parameters, set_parameters
 from smajax.presets import DRIVES, LOADS, WIRES, build
 from smajax.sensors import sensors_of
@@ -26,7 +27,7 @@ def check_together(system: System, load: str, drive: str) -> None:
     if isinstance(system.load, AbstractCoupon) != (drive == "none"):
         raise ValueError(
             f"load `{load}` with drive `{drive}`: a coupon's temperature is prescribed, so it takes the drive `none`; "
-            f"every other load is heated and takes one of {sorted(set(DRIVES) - {'none'})}."
+            f"every other load is heated and takes one of {listed(sorted(set(DRIVES) - {'none'}))}."
         )
 
 

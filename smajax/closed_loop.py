@@ -14,6 +14,7 @@ from jax import lax
 
 from smajax.controller.base import AbstractController
 from smajax.estimator.base import AbstractEstimator
+from smajax.measured.names import listed
 from smajax.measured_state import MeasuredState, Sensor, truth
 from smajax.parameters import check_bounds, inside_bounds
 from smajax.recorded import refuse_lag
@@ -161,7 +162,7 @@ def _run(
         if name not in system.load.inputs_optional | {"ambient_temperature"}:
             raise ValueError(
                 f"`{name}` is no disturbance of this system; there are "
-                f"{sorted(system.load.inputs_optional | {'ambient_temperature'})}."
+                f"{listed(sorted(system.load.inputs_optional | {'ambient_temperature'}))}."
             )
         if series.shape != (count,):
             raise ValueError(f"disturbance `{name}` has the shape {series.shape}, `wanted` has {count} samples.")

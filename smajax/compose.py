@@ -1,13 +1,18 @@
-"""A model from names: wire, load, drive, kinetics law, effects, and values that differ from the presets'."""
+"""A model from names: wire, load, drive, law, effects, values that differ from the presets', and a controller around it."""
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
+from typing import overload
 
 from smajax.catalogue import check_together
+from smajax.control_presets import CONTROLLERS
+from smajax.controller.base import AbstractController
 from smajax.effects.library import LIBRARY
 from smajax.extended import extended
+from smajax.load.base import AbstractMovingLoad
+from smajax.loop import Loop
 from smajax.measured.names import instead
 from smajax.parameters import check_bounds, parameters, set_parameters
 from smajax.presets import build
@@ -44,6 +49,7 @@ def _value(system: System, name: str, value: str | float) -> float:
         raise UnitError(f"{name}: {error}") from None
 
 
+@overload
 def compose(
     wire: str,
     load: str,
@@ -52,14 +58,44 @@ def compose(
     law: str = "",
     effects: Sequence[str] = (),
     values: Mapping[str, str | float] | None = None,
+    controller: None = None,
     **others: object,
-) -> System:
-    """Presets by name, under a kinetics law, with effects and parameters of one's own.
+) -> System: ...
+
+
+@overload
+def compose(
+    wire: str,
+    load: str,
+    drive: str,
+    *,
+    law: str = "",
+    effects: Sequence[str] = (),
+    values: Mapping[str, str | float] | None = None,
+    controller: str | AbstractController,
+    **others: object,
+) -> Loop: ...
+
+
+def compose(
+    wire: str,
+    load: str,
+    drive: str,
+    *,
+    law: str = "",
+    effects: Sequence[str] = (),
+    values: Mapping[str, str | float] | None = None,
+    controller: str | AbstractController | None = None,
+    **others: object,
+) -> System | Loop:
+    """Presets by name, under a kinetics law, with effects and parameters of one's own: a system, or a loop around it.
 
     values: parameter -> a number (SI, temperatures in degC, angles in rad) or text with a unit (`"80 W/m^2/K"`); by its name
     or its place in the model. An effect is part of the model when one of its parameters is given (`latent_heat.enthalpy`).
-    Raises KeyError for a preset, law or effect there is not, ValueError for a parameter there is not, a value out of its
-    bounds, transformation temperatures in the wrong order, or three presets that do not go together, UnitError for a unit of
+    controller: the name of one in `CONTROLLERS` with its preset gains, which knows this system, or one of one's own; what
+    comes back is then a `Loop`, for `simulate_loop_dataset`.
+    Raises KeyError for a preset, law, effect or controller there is not, ValueError for a parameter there is not, a value out of its
+    bounds, transformation temperatures in the wrong order, or presets that do not go together, UnitError for a unit of
     another kind, TypeError for a parameter that is not in `values`.
     """
     if others:
@@ -76,4 +112,19 @@ def compose(
     system = set_parameters(system, {name: _value(system, name, value) for name, value in known.items()})
     check_bounds(system)
     check_order(system)
-    return system
+    return system if controller is None else _around(system, controller, load)
+
+
+def _around(system: System, controller: str | AbstractController, load: str) -> Loop:
+    """The loop; a preset is made for the system, and takes the plant that its section is written for."""
+    if isinstance(controller, AbstractController):
+        return Loop(system, controller)
+    if controller not in CONTROLLERS:
+        raise KeyError(f"no controller {controller!r}{instead(controller, CONTROLLERS, 'there are')}")
+    if not isinstance(system.load, AbstractMovingLoad) or system.load.reading[1] != "rad":
+        raise ValueError(
+            f"controllers by name have gains for the arm: give the load 'arm', not {load!r}, or a controller of your own."
+        )
+    preset = CONTROLLERS[controller]
+    plant = preset.plant(system)
+    return Loop(plant, preset.make(plant))

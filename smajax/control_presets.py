@@ -22,6 +22,7 @@ from smajax.estimator.model_filter import ModelFilter
 from smajax.estimator.printed_filter import PrintedFilter
 from smajax.load.arm import Arm
 from smajax.load.base import AbstractMovingLoad
+from smajax.measured.names import listed
 from smajax.parameters import set_parameters
 from smajax.system import System
 from smajax.types import Scalar
@@ -100,7 +101,7 @@ def pid(system: System) -> Pid:
 def pid_tuned_at(system: System, degrees: int) -> Pid:
     """PID without anti-windup, which the source does not name, tuned at 0, 10 or 40 deg only (Fig. 4.3-4.5)."""
     if degrees not in PID_TUNED_AT:
-        raise ValueError(f"PID gains were searched at {sorted(PID_TUNED_AT)} deg, not at {degrees}.")
+        raise ValueError(f"PID gains were searched at {listed(map(str, sorted(PID_TUNED_AT)))} deg, not at {degrees}.")
     return Pid(**PID_TUNED_AT[degrees], largest_voltage=10.0, unwinding_time=1e9)
 
 

@@ -82,7 +82,7 @@ def simulate_dataset(
     tolerance: float | None = None,
     initial: State | None = None,
 ) -> xr.Dataset:
-    """`simulate` as an `xarray.Dataset`: `found["position"].plot()` has axes with units.
+    """`simulate` as an `xarray.Dataset`: `found["position"].plot()` has axes with units, `sma.plot(found)` draws them all.
 
     Arguments as `simulate_compiled`'s, which does the work where it can; a model that it cannot translate is XLA's, without
     a `tolerance`. For a call by itself: inside `jit`, `vmap` and `grad` take `simulate`. Raises ValueError as these do, and

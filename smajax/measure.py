@@ -8,6 +8,7 @@ from typing import Any
 import equinox as eqx
 import jax.numpy as jnp
 
+from smajax.measured.names import listed
 from smajax.types import Inputs, Scalar, Series, State
 
 # What a state shows by name, and its unit; a reading has the load's own.
@@ -25,7 +26,7 @@ SHOWN = {
 def value_of(state: State, name: str) -> Scalar:
     """The named value of a state. KeyError lists the names there are."""
     if name not in SHOWN:
-        raise KeyError(f"a state shows {sorted(SHOWN)}, not `{name}`.")
+        raise KeyError(f"a state shows {listed(sorted(SHOWN))}, not `{name}`.")
     for part in (state, state.motion, state.wire):
         if hasattr(part, name):
             return getattr(part, name)

@@ -13,6 +13,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
+from smajax.measured.names import instead
+
 Module = TypeVar("Module", bound=eqx.Module)
 
 
@@ -82,7 +84,7 @@ def _select(model: eqx.Module, names: Sequence[str]) -> list[Parameter]:
     table = parameters(model)
     unknown = [name for name in names if name not in table]
     if unknown:
-        raise ValueError(f"No parameter named {unknown}; this model has {sorted(table)}.")
+        raise ValueError(f"No parameter `{unknown[0]}`{instead(unknown[0], sorted(table), 'this model has')}.")
     return [table[name] for name in names]
 
 

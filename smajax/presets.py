@@ -22,6 +22,7 @@ from smajax.load.base import AbstractMovingLoad
 from smajax.load.bias_spring import BiasSpring
 from smajax.load.coupon import AbstractCoupon, Coupon, StrainCoupon
 from smajax.load.dead_weight import DeadWeight
+from smajax.measured.names import instead
 from smajax.parameters import set_parameters
 from smajax.plugins import LOADS as PLUGGED
 from smajax.plugins import PluginError, brought, points_of, whose
@@ -286,6 +287,6 @@ def build(wire: str, load: str, drive: str, law: str = "") -> System:
     """A system by preset names, its wire under the named kinetics law or its own; KeyError lists the names there are."""
     for kind, name, table in (("wire", wire, WIRES), ("load", load, LOADS), ("drive", drive, DRIVES)):
         if name not in table:
-            raise KeyError(f"No {kind} preset `{name}`; there are {sorted(table)}.")
+            raise KeyError(f"No {kind} preset `{name}`{instead(name, sorted(table), 'there are')}.")
     made = WIRES[wire]()
     return System(under_law(made, law) if law else made, made_load(load), DRIVES[drive]())

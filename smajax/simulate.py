@@ -10,6 +10,7 @@ import jax.numpy as jnp
 from jax import lax
 
 from smajax.load.coupon import AbstractCoupon
+from smajax.measured.names import listed
 from smajax.parameters import parameters
 from smajax.recorded import acting_inputs
 from smajax.step import step
@@ -28,8 +29,8 @@ def check_inputs(system: System, inputs: Mapping[str, Series]) -> int:
     missing, unknown = sorted(required - set(inputs)), sorted(set(inputs) - allowed)
     if missing or unknown:
         raise ValueError(
-            f"`inputs` must have the channels {sorted(required)} and may have {sorted(allowed - required)}, but "
-            f"{missing} are missing and {unknown} mean nothing to this load and drive."
+            f"`inputs` must have the channels {listed(sorted(required))} and may have {listed(sorted(allowed - required))}, but "
+            f"missing: {listed(missing)}; of no meaning to this load and drive: {listed(unknown)}."
         )
     lengths = {name: jnp.shape(series) for name, series in inputs.items()}
     if not lengths:

@@ -12,7 +12,7 @@ from PIL import Image
 
 from smajax.compiled import simulate_compiled
 from smajax.presets import build
-from smajax.report.animation import animate, animate_run, ranges
+from smajax.report.animation import animate, animate_run, moving, ranges
 from smajax.types import Trajectory
 from smajax.wire.kinetics import heating_temperature
 
@@ -50,6 +50,25 @@ def test_an_arm_moves_beside_its_phase_diagram(up_and_down: Trajectory, tmp_path
     # The path only grows.
     drawn = [float((picture[:, half:].sum(axis=2) < 200.0).sum()) for picture in pictures]
     assert drawn[-1] > 1.2 * drawn[0]
+
+
+def test_upright_it_fits_a_telephone_and_says_how_far_it_is(up_and_down: Trajectory, tmp_path: Path) -> None:
+    said: list[tuple[str, float]] = []
+    path = tmp_path / "upright.gif"
+    path.write_bytes(
+        moving(ARM, up_and_down, frames=5, upright=True, progress=lambda what, share: said.append((what, share)))
+    )
+    pictures = frames(path)
+    height, width = pictures[0].shape[:2]
+    assert width < 360
+    assert height > 1.5 * width
+    for half in (slice(None, height // 2), slice(height // 2, None)):
+        assert pictures[0][half].std() > 5.0
+        assert np.abs(pictures[2][half] - pictures[0][half]).mean() > 0.5
+    assert {what for what, _ in said} == {"drawing the load moving, for telephones"}
+    shares = [share for _, share in said]
+    assert shares == sorted(shares)
+    assert shares[-1] == 1.0
 
 
 def test_a_weight_is_drawn_from_its_inputs(tmp_path: Path) -> None:

@@ -51,7 +51,7 @@ def test_a_function_goes_before_the_module_of_its_name(first: str) -> None:
 
 
 def test_importing_the_package_imports_nothing_heavy() -> None:
-    code = "import sys, smajax; print(sorted({'jax', 'numpy', 'importlib.metadata', 'typer'} & set(sys.modules)))"
+    code = "import sys, smajax; print(sorted({'jax', 'matplotlib', 'numpy', 'importlib.metadata', 'typer'} & set(sys.modules)))"
     told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)
     assert told.stdout.strip() == "[]"
 
@@ -73,6 +73,77 @@ def test_a_data_set_has_units_and_can_be_drawn() -> None:
     assert line.axes.get_ylabel() == "position [m]"
     assert line.axes.get_xlabel() == "time [s]"
     matplotlib.pyplot.close("all")
+
+
+def test_a_run_at_a_glance_has_labels_with_units() -> None:
+    matplotlib.use("agg")
+    try:
+        hanging = sma.simulate_dataset(sma.compose(*HANGING), {"voltage": jnp.full(201, 5.0)}, dt=0.01)
+        axes = sma.plot(hanging).axes
+        assert [one.get_ylabel() for one in axes] == [
+            "voltage (V)",
+            "position (mm)",
+            "temperature (°C)",
+            "martensite fraction",
+            "stress (MPa)",
+        ]
+        assert axes[-1].get_xlabel() == "time (s)"
+        np.testing.assert_allclose(np.asarray(axes[1].lines[0].get_ydata()), 1e3 * hanging["position"])
+        pulled = {"temperature": jnp.linspace(30.0, 95.0, 66), "stress": jnp.full(66, 100e6)}
+        coupon = sma.simulate_dataset(sma.compose("flexinol_isobaric", "coupon", "none"), pulled, dt=1.0)
+        assert [one.get_ylabel() for one in sma.plot(coupon).axes][:3] == [
+            "temperature (°C)",
+            "stress (MPa)",
+            "strain (%)",
+        ]
+        loop = sma.compose("niti_table_3_1", "arm", "amplified_voltage", controller="vsc3")
+        (panel,) = sma.plot(sma.simulate_loop_dataset(loop, "5 deg", seconds=1.0), ["position"]).axes
+        assert panel.get_ylabel() == "position (deg)"
+        np.testing.assert_allclose(np.asarray(panel.lines[1].get_ydata()), 5.0)
+        with pytest.raises(ValueError, match="no series 'postion'; did you mean 'position'"):
+            sma.plot(hanging, ["postion"])
+        with pytest.raises(ValueError, match=r"dimensions sample, time, expected time alone"):
+            sma.plot(hanging.expand_dims("sample"))
+    finally:
+        matplotlib.pyplot.close("all")
+
+
+def test_a_loop_is_composed_in_a_line_and_run_in_another() -> None:
+    names = ("niti_table_3_1", "arm", "amplified_voltage")
+    loop = sma.compose(*names, effects=["latent_heat"], values={"damping": "0.004 N m s"}, controller="vsc3")
+    found = sma.simulate_loop_dataset(loop, "5 deg", seconds=5.0)
+    units = {name: found[name].attrs["units"] for name in ("voltage", "position", "wanted", "temperature", "time")}
+    assert units == {"voltage": "V", "position": "rad", "wanted": "rad", "temperature": "degC", "time": "s"}
+    assert abs(np.degrees(float(found["position"][-1])) - 5.0) < 1.0
+    assert '"latent_heat.enthalpy"' in found.attrs["parameters (SI)"]
+    # The same as the parts by hand, and the same by name as by the controller itself.
+    by_hand = sma.simulate_closed_loop(
+        loop.system, loop.controller, jnp.full(found.sizes["time"], np.radians(5.0)), 0.005, 2
+    )
+    np.testing.assert_allclose(found["position"], by_hand.run.position, rtol=0.0, atol=1e-9)
+    own = sma.compose(*names, effects=["latent_heat"], values={"damping": "0.004 N m s"}, controller=loop.controller)
+    target = sma.reference.constant(sma.reference.clock(5.0, 0.005), np.radians(5.0))
+    np.testing.assert_array_equal(sma.simulate_loop_dataset(own, target)["position"], found["position"])
+    # Each set point holds from its instant on.
+    wanted = np.degrees(sma.simulate_loop_dataset(loop, "0deg:1s,10deg:1s")["wanted"])
+    np.testing.assert_allclose([*wanted[199:201], wanted[-1]], [0.0, 10.0, 10.0], atol=1e-12)
+
+
+def test_what_a_composed_loop_refuses() -> None:
+    arm = ("niti_table_3_1", "arm", "amplified_voltage")
+    loop = sma.compose(*arm, controller="pid")
+    with pytest.raises(KeyError, match="no controller 'pdi'; did you mean 'pid'"):
+        sma.compose(*arm, controller="pdi")
+    with pytest.raises(ValueError, match=r"give the load 'arm', not 'dead_weight'"):
+        sma.compose(*HANGING, controller="pid")
+    with pytest.raises(TypeError, match=r"expected a Loop, got System"):
+        sma.simulate_loop_dataset(loop.system, 0.5, seconds=1.0)
+    with pytest.raises(ValueError, match="give `seconds`"):
+        sma.simulate_loop_dataset(loop, 0.5)
+    with pytest.raises(ValueError, match="whole number of simulation steps"):
+        sma.simulate_loop_dataset(loop, 0.5, seconds=1.0, period=0.012)
+    with pytest.raises(sma.units.UnitError, match="degC"):
+        sma.simulate_loop_dataset(loop, "40 degC", seconds=1.0)
 
 
 def test_simulate_is_pure_inside_anybodys_transformations() -> None:

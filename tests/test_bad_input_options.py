@@ -12,11 +12,11 @@ WIRE = ("flexinol_table_3_2", "dead_weight", "flexinol_voltage")
 SIMULATE = {
     "a wire there is none of": (
         ["flexinol", "--step", "5V:1s"],
-        "No wire preset `flexinol`; there are ['flexinol_ht_500um'",
+        "No wire preset `flexinol`; did you mean 'flexinol_ht_500um'? There are: flexinol_ht_500um, ",
     ),
     "a load there is none of": (
         [*WIRE[:1], "weight", "voltage", "--step", "5V:1s"],
-        "No load preset `weight`; there are",
+        "No load preset `weight`; did you mean 'dead_weight'? There are: arm",
     ),
     "no time": ([*WIRE, "--step", "5V"], "nothing says how long the run is: give levels with times (6V:5s,0V:10s)"),
     "levels without times": ([*WIRE, "--step", "6V,0V"], "got '6V', expected LEVEL:TIME, such as '6V:5s'"),

@@ -172,3 +172,27 @@ def test_progress_is_silent_where_nobody_looks(
         said = capsys.readouterr().err
         assert told in said
         assert bool(said) is bool(told)
+
+
+@pytest.mark.parametrize(
+    ("typed", "offered"),
+    [
+        ("tune v", ["vsc1", "vsc2", "vsc3"]),
+        ("sweep --controllers pid,vsc1,vsc", ["pid,vsc1,vsc2", "pid,vsc1,vsc3"]),
+        ("figures M1", [f"M{number}" for number in (1, *range(10, 20))]),
+        ("simulate flexinol_table_3_2 dead", ["dead_weight"]),
+    ],
+)
+def test_the_tab_key_offers_the_names_there_are(typed: str, offered: list[str]) -> None:
+    words = f"smajax {typed}"
+    asked = {"_SMAJAX_COMPLETE": "complete_bash", "COMP_WORDS": words, "COMP_CWORD": str(len(words.split()) - 1)}
+    code = "import sys; sys.argv[0] = 'smajax'; from smajax.cli import main; main()"
+    told = subprocess.run(
+        [sys.executable, "-c", code],
+        env={**os.environ, **asked},
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert told.stdout.split() == offered, told.stderr

@@ -67,7 +67,6 @@ def test_a_measured_wire_is_identified(run: Any, measured_data: Path) -> None:
     assert {role for role, error in run(5)["errors"].values() if error < 0.06} == {"fit", "held-out"}
 
 
-@pytest.mark.slow  # half a minute; test_tune.py has the same claim
 def test_gains_are_tuned(run: Any) -> None:
     found = run(6)["found"]
     assert found.within_limits

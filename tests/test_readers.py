@@ -47,6 +47,16 @@ def test_a_text_table_without_header_has_numbered_columns(tmp_path: Path) -> Non
     np.testing.assert_array_equal(table.column(2), [1.5, 2.5])
 
 
+@pytest.mark.parametrize("suffix", [".dat", ".log", ".tab", ".ASC"])
+def test_instruments_have_their_own_endings_for_text_tables(tmp_path: Path, suffix: str) -> None:
+    table = read_table(written(tmp_path / f"run{suffix}", "time [s];force [N]\n0;1,5\n0,1;2,5\n"), ["force [N]"])
+    np.testing.assert_array_equal(table.column("force [N]"), [1.5, 2.5])
+    assert list(table.columns) == ["force [N]"]
+    (tmp_path / f"other{suffix}").write_bytes(b"MDF \0\0\1\2")
+    with pytest.raises(MeasuredDataError, match="binary data"):
+        read_table(tmp_path / f"other{suffix}")
+
+
 def test_a_header_may_hold_another_encoding_and_commas(tmp_path: Path) -> None:
     path = tmp_path / "run.txt"
     path.write_bytes("T(°C),in strain\n20 0.1\n30 0.2\n".encode("latin-1"))

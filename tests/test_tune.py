@@ -28,7 +28,7 @@ from smajax.tune.evaluate import STEP, Rig
 from smajax.tune.folder import tune_into
 from smajax.tune.members import between, never_seen, tuned_on
 from smajax.tune.objective import Goal, rank, value_and_slope
-from smajax.tune.page import price
+from smajax.tune.page import met, price
 from smajax.tune.settings import TuneSettings
 from smajax.tune.terms import TERMS
 from tests.in_browser import HOSTILE, faults
@@ -215,6 +215,24 @@ def test_what_the_gains_cost_is_said_with_both_numbers() -> None:
     )
     assert "energy" not in said
     assert price(tuned(0)) == []
+
+
+def test_a_limit_that_is_kept_by_never_arriving_is_said_to_be() -> None:
+    settles, never = [2.0, 2.5], [np.inf, np.inf]
+
+    def told(before: list[float], after: list[float], limits: dict[str, float]) -> str:
+        seen = SimpleNamespace(merits=SimpleNamespace(settling_time=np.asarray([before, after])))
+        found: Any = SimpleNamespace(settings=SimpleNamespace(limits=limits))
+        check: Any = SimpleNamespace(members=SimpleNamespace(size=2), seen=seen)
+        return met(found, check, "tuned on")
+
+    overshoot, both = {"overshoot": 0.1}, {"overshoot": 0.1, "settling_time": 4.0}
+    plain = "Every limit is met in all 2 closed loops tuned on"
+    assert told(settles, settles, overshoot) == f"{plain}."
+    assert told(settles, settles, both) == f"{plain}."
+    assert told(settles, never, overshoot).startswith(f"{plain}, but none of them settles (2 with the preset's gains)")
+    assert "but only 1 of them settles (2 with" in told(settles, [2.0, np.inf], overshoot)
+    assert "none of them settles (0 with" in told(never, never, overshoot)
 
 
 def test_the_page_in_a_browser(folder: Path, browser: Any) -> None:

@@ -20,6 +20,7 @@ from smajax.fit.progress import Progress, quiet
 from smajax.load.coupon import AbstractCoupon
 from smajax.machine import available_memory
 from smajax.measure import SHOWN, AbstractMeasure
+from smajax.measured.names import listed
 from smajax.parameters import parameters
 from smajax.simulate import DEFAULT_STEP, check_scalars
 from smajax.system import System
@@ -62,17 +63,17 @@ def recipe_of(
     unknown = [name for name in axes.names if name not in table and name not in channels]
     if unknown:
         raise ValueError(
-            f"{unknown} are neither parameters ({sorted(table)}) nor inputs ({sorted(known)}) of the system."
+            f"{listed(unknown)}: neither parameters ({listed(sorted(table))}) nor inputs ({listed(sorted(known))}) of the system."
         )
     twice = sorted(set(channels) & set(inputs))
     if twice:
-        raise ValueError(f"{twice} are varied by `axes` and given in `inputs` as well: leave them out of one.")
+        raise ValueError(f"{listed(twice)}: varied by `axes` and given in `inputs` as well: leave them out of one.")
     given = set(inputs) | set(channels)
     required = drive.inputs_required | load.inputs_required
     if not required <= given or not given <= known:
         raise ValueError(
-            f"the system needs the inputs {sorted(required)} and may have {sorted(known - required)}, but there are "
-            f"{sorted(given)}, from `inputs` and `axes`."
+            f"the system needs the inputs {listed(sorted(required))} and may have {listed(sorted(known - required))}, but there are "
+            f"{listed(sorted(given))}, from `inputs` and `axes`."
         )
     series = {name: jnp.asarray(values, dtype=float) for name, values in inputs.items() if np.ndim(values) == 1}
     constants = {name: jnp.asarray(values, dtype=float) for name, values in inputs.items() if np.ndim(values) == 0}
@@ -93,7 +94,7 @@ def recipe_of(
         raise ValueError(f"{steps} steps cannot be kept every {every}: give a divisor of the number of steps.")
     wrong = sorted(set(keep) - set(SHOWN))
     if wrong:
-        raise ValueError(f"`keep` names what a state shows, {sorted(SHOWN)}, not {wrong}.")
+        raise ValueError(f"`keep` names what a state shows, {listed(sorted(SHOWN))}, not {listed(wrong)}.")
     names = [one.name for one in measures]
     if len(set(names)) < len(names):
         raise ValueError(f"measures must have names of their own, but there are {names}.")

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from smajax.command import complete
 from smajax.command.base import UNMET, Json, OpenUnless, Overwrite, browse_from_terminal, console, resumable
 
 OWN = (".made-by", "index.html", "README.md", "figures.csv", "[MC][0-9].*", "[MC][0-9][0-9].*")
@@ -15,7 +16,11 @@ OWN = (".made-by", "index.html", "README.md", "figures.csv", "[MC][0-9].*", "[MC
 
 def figures(
     names: Annotated[
-        list[str] | None, typer.Argument(help="chapters (chapter3, chapter4) and single figures (M7 C12); default all")
+        list[str] | None,
+        typer.Argument(
+            help="chapters (chapter3, chapter4) and single figures (M7 C12); default all",
+            autocompletion=complete.figures,
+        ),
     ] = None,
     out: Annotated[Path, typer.Option(help="folder for the pictures, the numbers (JSON) and the table")] = Path(
         "figures"

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from smajax.command import complete
 from smajax.command.base import (
     Json,
     Open,
@@ -31,10 +32,13 @@ def _texts(option: str, several: Sequence[str] | None) -> dict[str, str]:
 
 
 def simulate(
-    wire: Annotated[str, typer.Argument(help="a wire of `smajax presets`")] = "niti_table_3_1",
-    load: Annotated[str, typer.Argument(help="a load of `smajax presets`")] = "arm",
+    wire: Annotated[
+        str, typer.Argument(help="a wire of `smajax presets`", autocompletion=complete.wires)
+    ] = "niti_table_3_1",
+    load: Annotated[str, typer.Argument(help="a load of `smajax presets`", autocompletion=complete.loads)] = "arm",
     drive: Annotated[
-        str, typer.Argument(help="a drive of `smajax presets`; `none` for a coupon")
+        str,
+        typer.Argument(help="a drive of `smajax presets`; `none` for a coupon", autocompletion=complete.drives),
     ] = "amplified_voltage",
     step: Annotated[
         str | None, typer.Option(help="levels of the drive's input, each with its time: 6V:5s,0V:10s")
@@ -57,7 +61,9 @@ def simulate(
             "latent_heat.enthalpy='20 J/g', which adds that effect; repeat",
         ),
     ] = None,
-    law: Annotated[str, typer.Option(help="kinetics: tanaka, liang, brinson or enhanced")] = "",
+    law: Annotated[
+        str, typer.Option(help="kinetics: tanaka, liang, brinson or enhanced", autocompletion=complete.laws)
+    ] = "",
     seconds: Annotated[
         float | None, typer.Option(min=0.0, help="length of the run; default: that of the inputs")
     ] = None,
@@ -68,14 +74,19 @@ def simulate(
     gains: Annotated[
         Path | None, typer.Option(help="gains.json of `smajax tune`: a closed loop of the arm by that controller")
     ] = None,
-    controller: Annotated[str, typer.Option(help="a closed loop by this controller's preset gains")] = "",
+    controller: Annotated[
+        str, typer.Option(help="a closed loop by this controller's preset gains", autocompletion=complete.controllers)
+    ] = "",
     set_point: Annotated[
         str | None, typer.Option(help="what the loop is to reach: 40deg:5s,10deg:5s, or a file")
     ] = None,
     mismatch: Annotated[
         list[str] | None, typer.Option(help="a parameter of the plant that the controller does not know of, as --set")
     ] = None,
-    estimator: Annotated[str, typer.Option(help="`printed` or `model` filter; none: told the true state")] = "",
+    estimator: Annotated[
+        str,
+        typer.Option(help="`printed` or `model` filter; none: told the true state", autocompletion=complete.estimators),
+    ] = "",
     noise: Annotated[
         float, typer.Option(min=0.0, max=360.0, help="noise of the angle's readings, degrees (1 sigma)")
     ] = 0.0,
@@ -105,6 +116,7 @@ def simulate(
     prepare()
     from smajax.command.folder import check_path, claimed
     from smajax.gains_file import GainsFileError
+    from smajax.progress import shown
     from smajax.report.files import json_text
     from smajax.report.simulate_page import OWN, merit_rows, record, summary_rows, write_run
     from smajax.single import Asked, AskedLoop, channels, run_closed, run_open
@@ -138,7 +150,8 @@ def simulate(
                     f"--step is for a model with one required input; this one has {needs}: use --input NAME=..."
                 )
             asked = Asked(**{**vars(asked), "inputs": {**series, next(iter(required)): step}})
-        with resumable():
+        with resumable(), shown(console()) as progress:
+            progress("simulating the run", 0.0)
             loop: AskedLoop | None = None
             if closed:
                 loop = AskedLoop(
@@ -155,6 +168,7 @@ def simulate(
                 ran = run_closed(asked, loop)
             else:
                 ran = run_open(asked)
+            progress("simulating the run", 1.0)
     except KeyError as error:
         raise typer.BadParameter(error.args[0]) from None
     except (ValueError, GainsFileError) as error:
@@ -167,8 +181,8 @@ def simulate(
         **(vars(loop) if loop is not None else {}),
         "gains": None if gains is None else gains.read_text(),
     }
-    with claimed(out, "simulate", told, OWN, overwrite):
-        page = write_run(ran, out, title, command, gif)
+    with resumable(), claimed(out, "simulate", told, OWN, overwrite), shown(console()) as progress:
+        page = write_run(ran, out, title, command, gif, progress)
     for note in ran.notes:
         console().print(note, soft_wrap=True, markup=False, highlight=False)
     if json_out:

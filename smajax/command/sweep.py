@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from smajax.command import complete
 from smajax.command.base import (
     Json,
     OpenUnless,
@@ -26,7 +27,8 @@ def sweep(
         str | None,
         typer.Option(
             help="pid, vsc1, vsc2, vsc3, nvsc, sld, backstepping1, backstepping2 (with commas), or `all`; default all, "
-            "or those of the gains files"
+            "or those of the gains files",
+            autocompletion=complete.several_controllers,
         ),
     ] = None,
     over: Annotated[str, typer.Option(help="the two mismatches of the maps")] = "convection,damping",
@@ -44,7 +46,10 @@ def sweep(
         str | None, typer.Option(help="shares of the controller's main gain; default 0.5,0.7,1,1.4,2")
     ] = None,
     seconds: Annotated[float, typer.Option(min=0.1, max=86_400.0, help="length of each closed loop")] = 10.0,
-    estimator: Annotated[str, typer.Option(help="`printed` or `model` filter; none: told the true state")] = "",
+    estimator: Annotated[
+        str,
+        typer.Option(help="`printed` or `model` filter; none: told the true state", autocompletion=complete.estimators),
+    ] = "",
     noise: Annotated[
         float, typer.Option(min=0.0, max=360.0, help="noise of the angle's readings, degrees (1 sigma)")
     ] = 0.0,

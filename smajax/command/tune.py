@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from smajax.command import complete
 from smajax.command.base import (
     UNMET,
     Json,
@@ -24,7 +25,12 @@ TUNED_AT = "-40,-20,0,20,40,60,85"
 
 
 def tune(
-    controller: Annotated[str, typer.Argument(help="pid, vsc1, vsc2, vsc3, nvsc, sld, backstepping1 or backstepping2")],
+    controller: Annotated[
+        str,
+        typer.Argument(
+            help="pid, vsc1, vsc2, vsc3, nvsc, sld, backstepping1 or backstepping2", autocompletion=complete.controllers
+        ),
+    ],
     set_points: Annotated[str | None, typer.Option(help="degrees, with commas; default -40,-20,0,20,40,60,85")] = None,
     variation: Annotated[
         list[str] | None,
@@ -48,7 +54,10 @@ def tune(
     starts: Annotated[int | None, typer.Option(min=1, help="points that gains are moved from; default 6")] = None,
     rounds: Annotated[int | None, typer.Option(min=1, help="steps, at most; default 30")] = None,
     seconds: Annotated[float, typer.Option(min=0.1, max=86_400.0, help="length of each closed loop")] = 10.0,
-    estimator: Annotated[str, typer.Option(help="`printed` or `model` filter; none: told the true state")] = "",
+    estimator: Annotated[
+        str,
+        typer.Option(help="`printed` or `model` filter; none: told the true state", autocompletion=complete.estimators),
+    ] = "",
     noise: Annotated[
         float, typer.Option(min=0.0, max=360.0, help="noise of the angle's readings, degrees (1 sigma)")
     ] = 0.0,

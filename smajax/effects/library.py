@@ -51,6 +51,7 @@ from smajax.effects.two_way_memory import TwoWayMemory
 from smajax.effects.unequal_stress_slopes import UnequalStressSlopes
 from smajax.effects.viscous_friction import ViscousFriction
 from smajax.effects.wrong_load import WrongLoad
+from smajax.measured.names import instead
 from smajax.plugins import EFFECTS, brought
 
 EQUATIONS = ("heat", "electrical", "kinetics", "constitutive", "mechanics", "sensor", "input")
@@ -139,5 +140,5 @@ def at_base(names: Sequence[str]) -> tuple[AbstractEffect, ...]:
     """
     unknown = [name for name in names if name not in LIBRARY]
     if unknown:
-        raise KeyError(f"No effect named {unknown} in the library; it has {sorted(LIBRARY)}.")
+        raise KeyError(f"No effect `{unknown[0]}`{instead(unknown[0], sorted(LIBRARY), 'the library has')}.")
     return tuple(effect.base() for name, effect in LIBRARY.items() if name in names)

@@ -140,7 +140,11 @@ def _column(table: Table, key: str | int, name: str) -> Column:
 
 def _is_clock(table: Table, name: str, headed: bool) -> bool:
     values = table.columns[name]
-    grows = values.size > 1 and bool(np.all(np.diff(values) >= 0.0)) and float(values[-1]) > float(values[0])
+    grows = (
+        values.size > 1
+        and bool(np.isfinite(values).all() and np.all(np.diff(values) >= 0.0))
+        and float(values[-1]) > float(values[0])
+    )
     unit = _unit(table, name)
     if name in table.moments:
         return grows

@@ -12,12 +12,12 @@ from smajax.measured.mat_file import read_mat
 from smajax.measured.names import listed, nearest
 from smajax.measured.table import MeasuredDataError, Table
 
+# Endings of text tables; how one is written its first lines say.
+TEXT = (".csv", ".txt", ".tsv", ".tab", ".dat", ".asc", ".log")
 # A new file kind is one line here.
 READERS: Mapping[str, Callable[[Path], Table]] = MappingProxyType(
     {
-        ".csv": read_csv,
-        ".txt": read_csv,
-        ".tsv": read_csv,
+        **dict.fromkeys(TEXT, read_csv),
         ".mat": read_mat,
         ".parquet": read_parquet,
         ".nc": read_netcdf,

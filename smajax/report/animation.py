@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from smajax.compiled import simulate_compiled
+from smajax.fit.progress import Progress, quiet
 from smajax.load.arm import Arm
 from smajax.load.base import AbstractMovingLoad
 from smajax.report.files import replace
@@ -26,7 +27,7 @@ from smajax.types import Series, Trajectory
 from smajax.wire.kinetics import Kinetics
 
 HOT, COLD = "#c8553d", "#1f6fb2"
-SIZE, DPI = (8.4, 3.9), 80  # inches
+SIZE, UPRIGHT, DPI = (8.4, 3.9), (4.4, 7.6), 80  # inches
 COLOURS = 64  # of the picture file
 SHADE = LinearSegmentedColormap.from_list("phase", [HOT, COLD])  # by the martensite fraction
 Run = Trajectory | xr.Dataset  # as `simulate` or as `simulate_dataset` returns it
@@ -47,38 +48,59 @@ def animate_run(
 
 
 def animate(system: System, run: Run, path: Path | str, *, seconds: float = 6.0, frames: int = 90) -> Path:
-    """Write `run` of `system` as an animated GIF that takes `seconds` of the reader's time, and return its path.
+    """Write `run` of `system` as the animated GIF of `moving`, and return its path.
+
+    Raises as that, and ValueError for a file that is no `.gif`. The file is there whole or not at all.
+    """
+    path = Path(path)
+    if path.suffix != ".gif":
+        raise ValueError(f"the picture is a GIF, so its name ends in .gif; got `{path.name}`.")
+    return replace(path, moving(system, run, seconds=seconds, frames=frames))
+
+
+def moving(
+    system: System,
+    run: Run,
+    *,
+    seconds: float = 6.0,
+    frames: int = 90,
+    upright: bool = False,
+    progress: Progress = quiet,
+) -> bytes:
+    """`run` of `system` as an animated GIF that takes `seconds` of the reader's time.
 
     Left the load, its wire coloured by the martensite fraction (blue 1, red 0). Right stress over temperature with
     the transformation ranges A_s' to A_f' and M_f' to M_s', each moved by sigma/C (eq. 3.4, 3.6), and the path so
-    far. Raises ValueError for a coupon, which moves nothing, for a file that is no `.gif`, and for fewer than 2 frames
-    or samples. The file is there whole or not at all.
+    far. upright: one below the other, for a telephone. Raises ValueError for a coupon, which moves nothing, and for fewer
+    than 2 frames or samples.
     """
-    path = Path(path)
     if not isinstance(system.load, AbstractMovingLoad):
         raise ValueError(f"a {type(system.load).__name__} moves nothing: draw a run of an arm, a weight or a spring.")
-    if path.suffix != ".gif":
-        raise ValueError(f"the picture is a GIF, so its name ends in .gif; got `{path.name}`.")
     samples = np.size(run.time)
     if min(frames, samples) < 2 or not seconds > 0.0:
         raise ValueError(
             f"got {frames} frames of {samples} samples in {seconds:g} s: give at least 2 of each, and a time above 0."
         )
+    stage = "drawing the load moving" + (", for telephones" if upright else "")
+    progress(stage, 0.0)
     shown = np.unique(np.linspace(0, samples - 1, frames).round().astype(int))
-    figure = Figure(figsize=SIZE, dpi=DPI, layout="constrained")
+    figure = Figure(figsize=UPRIGHT if upright else SIZE, dpi=DPI, layout="constrained")
     canvas = FigureCanvasAgg(figure)
-    left, right = figure.subplots(1, 2, width_ratios=[1.0, 1.25])
-    draws = [(_arm if isinstance(system.load, Arm) else _slider)(left, system, run), _plane(right, system, run)]
+    load, plane = figure.subplots(2, 1) if upright else figure.subplots(1, 2, width_ratios=[1.0, 1.25])
+    draws = [(_arm if isinstance(system.load, Arm) else _slider)(load, system, run), _plane(plane, system, run)]
     canvas.draw()
     images = []
     background = canvas.copy_from_bbox(figure.bbox)
-    for sample in shown:
+    for number, sample in enumerate(shown):
         canvas.restore_region(background)
         for draw in draws:
             for artist in draw(int(sample)):
                 figure.draw_artist(artist)
         images.append(Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB").quantize(COLOURS))
-    return replace(path, _gif(images, round(1e3 * seconds / len(images))))
+        progress(stage, 0.8 * (number + 1) / len(shown))
+    film = _gif(images, round(1e3 * seconds / len(images)))
+    progress(stage, 1.0)
+    return film
 
 
 def _gif(images: list[Image.Image], each: int) -> bytes:

@@ -13,8 +13,9 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from smajax.figures.drawing import BLUE, GREY, RED, named, panels
+from smajax.fit.progress import Progress, quiet
 from smajax.parameters import parameter_values, parameters
-from smajax.report.animation import animate
+from smajax.report.animation import moving
 from smajax.report.display import axis_label, digits, display, label
 from smajax.report.files import csv_text, heading, json_text, replace
 from smajax.report.html import picture
@@ -167,8 +168,8 @@ def conclusions(ran: Ran) -> list[str]:
     return told
 
 
-def page(ran: Ran, image: bytes, title: str, command: str, moving: bytes | None = None) -> str:
-    """The whole page, pictures inside."""
+def page(ran: Ran, image: bytes, title: str, command: str, films: Sequence[bytes] = ()) -> str:
+    """The whole page, pictures inside. films: the animation as wide and as upright as a window, if there is one."""
     table_of = parameters(ran.system)
     values = [
         [name, digits(value, 6), table_of[name].unit, table_of[name].about]
@@ -177,9 +178,10 @@ def page(ran: Ran, image: bytes, title: str, command: str, moving: bytes | None 
     parts = [f"<h1>{html.escape(title)}</h1>", bullets([*ran.notes, *conclusions(ran)])]
     if ran.merit:
         parts.append(table(["figure of merit", "value", "unit"], merit_rows(ran), (1,)))
+    film, upright = films or (None, None)
     parts += [
         str(picture(image, "the run over time", "panels", drawn(ran.found, upright=True))),
-        str(picture(moving, "the load moving, beside the wire's path through its phase diagram", "panels")),
+        str(picture(film, "the load moving, beside the wire's path through its phase diagram", "panels", upright)),
         table(["variable", "least", "greatest", "last", "unit"], summary_rows(ran.found), (1, 2, 3)),
         "<h2>Parameters (SI, temperatures in °C, angles in rad)</h2>",
         table(["parameter", "value", "unit", "what it is"], values, (1,)),
@@ -196,13 +198,21 @@ def page(ran: Ran, image: bytes, title: str, command: str, moving: bytes | None 
 OWN: Sequence[str] = tuple(f"simulate.{kind}" for kind in ("csv", "nc", "json", "png", "svg", "gif", "html"))
 
 
-def write_run(ran: Ran, folder: Path, title: str, command: str, moving: bool = False) -> Path:
-    """All files of a run into `folder`, each in one step; the path of the page. moving: an animation too (no coupon)."""
+def write_run(
+    ran: Ran, folder: Path, title: str, command: str, animated: bool = False, progress: Progress = quiet
+) -> Path:
+    """All files of a run into `folder`, each in one step; the path of the page. animated: a film too (no coupon)."""
+    progress("pictures", 0.0)
     image = drawn(ran.found)
     replace(folder / "simulate.csv", as_csv(ran.found))
     replace(folder / "simulate.nc", as_netcdf(ran.found))
     replace(folder / "simulate.json", json_text(record(ran, command)))
     replace(folder / "simulate.png", image)
     replace(folder / "simulate.svg", drawn(ran.found, "svg"))
-    film = animate(ran.system, ran.found, folder / "simulate.gif").read_bytes() if moving else None
-    return replace(folder / "simulate.html", page(ran, image, title, command, film))
+    progress("pictures", 1.0)
+    films = (
+        [moving(ran.system, ran.found, upright=each, progress=progress) for each in (False, True)] if animated else []
+    )
+    if films:
+        replace(folder / "simulate.gif", films[0])
+    return replace(folder / "simulate.html", page(ran, image, title, command, films))

@@ -57,6 +57,23 @@ def broken(found: Tuned, check: Check) -> list[str]:
     return told
 
 
+def met(found: Tuned, check: Check, where: str) -> str:
+    """That every limit is met, and where that says little: a loop that stays short of its set point overshoots nothing."""
+    told = f"Every limit is met in all {check.members.size} closed loops {where}"
+    settled = np.isfinite(np.asarray(check.seen.merits.settling_time)).sum(axis=1)
+    if "settling_time" in found.settings.limits or (settled[1] >= settled[0] and settled[1] > 0):
+        return f"{told}."
+    after = (
+        "none of them settles"
+        if settled[1] == 0
+        else f"only {settled[1]} of them {'settles' if settled[1] == 1 else 'settle'}"
+    )
+    return (
+        f"{told}, but {after} ({settled[0]} with the preset's gains): what never comes to rest at its set point can keep such "
+        "a limit; limit settling_time as well."
+    )
+
+
 def price(found: Tuned) -> list[str]:
     """What the tuned gains cost: energy, chatter or switching whose median or worst, as the table has them, grew by over half."""
     seen = found.checks["tuned on"].seen
@@ -86,16 +103,12 @@ def conclusions(found: Tuned) -> list[str]:
         told = ["Nothing better than the preset's gains was found."]
     if found.settings.limits:
         missed = broken(found, tuned)
-        told.append(
-            f"Not every limit is met: {'; '.join(missed)}."
-            if missed
-            else f"Every limit is met in all {tuned.members.size} closed loops tuned on."
-        )
+        told.append(f"Not every limit is met: {'; '.join(missed)}." if missed else met(found, tuned, "tuned on"))
         missed = broken(found, inside)
         told.append(
             f"In plants within the variation that were never seen: {'; '.join(missed)}."
             if missed
-            else f"Every limit is met in all {inside.members.size} closed loops of plants and set points never seen, within the variation."
+            else met(found, inside, "of plants and set points never seen, within the variation")
         )
         if "beyond" in found.checks and (missed := broken(found, found.checks["beyond"])):
             told.append(f"With a parameter wrong that was not varied: {'; '.join(missed)}.")

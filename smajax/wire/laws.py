@@ -6,6 +6,7 @@ import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from smajax.measured.names import instead
 from smajax.wire.conditions import AbstractConditions, Brinson, Enhanced, Liang
 from smajax.wire.shape import AbstractShape, Cosine, Exponential
 from smajax.wire.variants import AbstractVariants, Single, Split
@@ -39,7 +40,7 @@ LAWS: dict[str, Law] = {
 def under_law(wire: Wire, name: str) -> Wire:
     """The same wire under the named law; everything it is made of stays. KeyError lists the laws there are."""
     if name not in LAWS:
-        raise KeyError(f"No kinetics law `{name}`; there are {sorted(LAWS)}.")
+        raise KeyError(f"No kinetics law `{name}`{instead(name, sorted(LAWS), 'there are')}.")
     law = LAWS[name]
     kinetics = dataclasses.replace(wire.kinetics, shape=law.shape, conditions=law.conditions, variants=law.variants())
     return dataclasses.replace(wire, kinetics=kinetics)
