@@ -31,9 +31,20 @@ STAGES = (
         ("compose", "build", "under_law", "extended", "System", "WIRES", "LOADS", "DRIVES", "EFFECTS", "presets"),
     ),
     ("Its parameters", ("parameter_values", "get_parameters", "set_parameters", "units")),
-    ("One run", ("simulate_dataset", "simulate_compiled", "simulate")),
+    ("One run", ("simulate_dataset", "plot", "simulate_compiled", "simulate")),
     ("Many runs", ("run_batch", "grid", "zipped", "sampled", "good", "measure")),
-    ("A closed loop", ("simulate_closed_loop", "merit", "CONTROLLERS", "control_presets", "reference")),
+    (
+        "A closed loop",
+        (
+            "Loop",
+            "simulate_loop_dataset",
+            "simulate_closed_loop",
+            "merit",
+            "CONTROLLERS",
+            "control_presets",
+            "reference",
+        ),
+    ),
     ("Measured runs", ("load_experiment", "identify", "write_identified", "close_loop", "write_report")),
     ("Parts of one's own", ("AbstractEffect", "AbstractMovingLoad", "parameter", "effects")),
 )

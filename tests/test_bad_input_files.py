@@ -82,7 +82,7 @@ def test_a_log_of_another_kind_is_named(tmp_path: Path, name: str) -> None:
     ("variables", "words"),
     [
         ({"x": np.zeros((2, 3, 4))}, "variable 'x' is an array of float64; expected real numbers"),
-        ({"x": {"time": np.arange(3.0), "data": np.arange(3.0)}}, "expected 'time' and 'signals.values'"),
+        ({"x": {"time": np.arange(3.0), "label": "stroke"}}, "expected 'time' and 'signals.values'"),
         ({"x": np.array([1j, 2j])}, "variable 'x' is an array of complex128; expected real numbers"),
         ({"x": "text"}, "expected real numbers"),
         ({"y": np.arange(3.0)}, "no column 'x'; it has: y"),
@@ -217,13 +217,14 @@ def test_a_long_log_is_read_in_little_memory(tmp_path: Path) -> None:
 
 def test_too_little_memory_is_said(tmp_path: Path) -> None:
     """A cap on memory while the log is read: one message, no traceback."""
-    experiment = bench(tmp_path / "bench")
+    experiment, small = bench(tmp_path / "bench"), bench(tmp_path / "small")
     (experiment.parent / "a.csv").write_text("t,U,x\n" + "".join(f"{k},5,1\n" for k in range(2_500_000)))
     code = (
         "import resource, sys\nimport smajax.catalogue, smajax.close_loop, smajax.progress, smajax.report.write\n"
         "from smajax.cli import main\nfrom smajax.runtime import prepare\nprepare()\n"
-        "from smajax.units import to_si\nto_si(1.0, 'W/(m^2 K)')\n"  # what units there are is read once
-        "import jax\njax.numpy.zeros(3).sum()\n"  # its threads are there before the cap
+        # Units, threads and compiled programs are there before the cap: LLVM ends a program that it has no memory for.
+        "from smajax.catalogue import CATALOGUE\nfrom smajax.experiment.load import load_experiment\n"
+        f"load_experiment({str(small)!r}, CATALOGUE)\n"
         "used = int(open('/proc/self/statm').read().split()[0]) * resource.getpagesize()\n"
         "resource.setrlimit(resource.RLIMIT_AS, (used + (16 << 20),) * 2)\n"
         "main()"
