@@ -17,7 +17,7 @@ from smajax.attribution.rivals import rivals
 from smajax.attribution.search import scores_at, search
 from smajax.attribution.unknown import Lacking, in_place_of, unknown_terms
 from smajax.attribution.unknown_words import told_of
-from smajax.attribution.verdict import cannot_know, shown, summary, unexplained, verdict
+from smajax.attribution.verdict import cannot_know, pooled, shown, summary, unexplained, verdict
 from smajax.catalogue import candidates
 from smajax.effects.library import LIBRARY
 from smajax.effects.neutral import check_neutral
@@ -41,7 +41,6 @@ from smajax.report.findings import (
     Findings,
     ParameterFinding,
     Portrait,
-    Round,
     RunFinding,
 )
 from smajax.residual.portrait import portrait
@@ -96,7 +95,7 @@ def close_loop(
     """Fit the base model, look at what it leaves, find what it lacks, and judge on runs the fit never saw.
 
     `memory` is a folder for finished fits: a loop that was interrupted goes on from there. `apart`: of `Search`. Held-out runs are simulated
-    once, at the very end. The caller chooses precision; anything but float64 is refused with a ValueError, because the
+    when the search is over: they can refuse what it found, and choose nothing. The caller chooses precision; anything but float64 is refused with a ValueError, because the
     differences that decide here are far below float32's rounding over a run. Raises PluginError for an effect of another
     package that changes the model at its base value: every verdict would be wrong.
     """
@@ -135,18 +134,19 @@ def close_loop(
         if lacking is not None:
             final, aside = first, final.effects
         elif not setting.foretells(final.left_out_rmse):
-            setting.note(_meaning_nothing(setting, final))
+            share = max(setting.foretold(final.left_out_rmse), 0.0)
+            why = f"with it the model foretells {share:.0%} of the motion in runs left out, and under {FORETELLS:.0%} an effect means nothing"
+            setting.set_aside(final, why)
             final = first
 
+    # The held-out runs have had no part in anything before, and choose nothing here: they can only refuse.
+    compared = _compare(job, first, final)
+    without, with_it = (pooled(compared[0], "held-out", which) for which in ("before", "after"))
     refused: tuple[tuple[str, ...], float, float] | None = None
-    if final.effects:
-        progress("the runs that were held out", 0.0)
-        without, with_it, confirmed = _on_held_out(job, first, final)
-        if not confirmed:
-            setting.note(_not_confirmed(setting, final, without, with_it))
-            refused = final.effects, without, with_it
-            final = first
-        progress("the runs that were held out", 1.0)
+    if final.effects and with_it >= without:
+        setting.set_aside(final, f"error on the held-out runs {setting.shown(without)} -> {setting.shown(with_it)}")
+        refused, final = (final.effects, without, with_it), first
+        compared = _compare(job, first, final)
 
     progress("standard errors and pictures", 0.0)
     before = _told(job, setting, first, start)
@@ -154,7 +154,7 @@ def close_loop(
     intervals = bootstrapped(setting, final, seed)
     effects = _effects(job, setting, final, after, intervals)
     mistaken = rivals(setting, final, job.fit_runs)
-    runs, portrait_before, portrait_after = _compare(job, first, final)
+    runs, portrait_before, portrait_after = compared
     integration = _integration_error(job, final)
     progress("standard errors and pictures", 1.0)
     answer = verdict(final.effects, portrait_after)
@@ -212,42 +212,6 @@ def close_loop(
         unknown=unknown,
         provenance=_provenance(experiment, kept, command, seed, clock.monotonic() - began),
     )
-
-
-def _on_held_out(job: _Job, first: Model, final: Model) -> tuple[float, float, bool]:
-    """(rms error of the held-out runs by the base model, by the final one, whether that is less); no such run: (nan, nan, True).
-
-    They have had no part in anything before, and choose nothing here: they can only refuse.
-    """
-    experiment = job.experiment
-    held_out = tuple(run for run in experiment.runs if run.role != "fit")
-    if not held_out:
-        return float("nan"), float("nan"), True
-    batch = pack(held_out, experiment.step, parameter_values(job.problem.system))
-    misfit = []
-    for model in (first, final):
-        reading = np.asarray(_simulated(job.problem, model.values, batch).reading)
-        left = [run.output - row[: len(run.time)] for run, row in zip(held_out, reading, strict=True)]
-        misfit.append(np.concatenate([one - one.mean() if experiment.offset else one for one in left]))
-    without, with_it = (float(np.sqrt(np.mean(one**2))) for one in misfit)
-    return without, with_it, with_it < without
-
-
-def _not_confirmed(setting: Search, final: Model, without: float, with_it: float) -> Round:
-    """The round in which the held-out runs refuse what was found."""
-    gone = " + ".join(final.effects)
-    why = f"set aside: error on the held-out runs {setting.shown(without)} -> {setting.shown(with_it)}"
-    return Round(len(setting.rounds) + 1, ((gone, final.left_out_rmse),), f"without {gone}", why)
-
-
-def _meaning_nothing(setting: Search, final: Model) -> Round:
-    """The round in which effects are set aside with which the model still foretells hardly anything."""
-    why = (
-        f"set aside: with it the model foretells {max(setting.foretold(final.left_out_rmse), 0.0):.0%} of the motion in runs "
-        f"left out, and under {FORETELLS:.0%} an effect means nothing"
-    )
-    gone = " + ".join(final.effects)
-    return Round(len(setting.rounds) + 1, ((gone, final.left_out_rmse),), f"without {gone}", why)
 
 
 def _refuse_what_only_identify_does(experiment: Experiment) -> None:

@@ -104,6 +104,12 @@ class Search:
         told = f"round {done.number}: {done.chosen or 'nothing added'}; {done.why}"
         self.progress(f"say: {told}", 1.0)
 
+    def set_aside(self, model: Model, why: str) -> None:
+        """Note a round in which all that was added goes."""
+        gone = " + ".join(model.effects)
+        tried = ((gone, model.left_out_rmse),)
+        self.note(Round(len(self.rounds) + 1, tried, f"without {gone}", f"set aside: {why}"))
+
     def free(self, effects: Sequence[str]) -> list[str]:
         """Every free parameter of a model with `effects`."""
         return [*self.unknowns, *(name for effect in effects for name in self.coefficients(effect))]

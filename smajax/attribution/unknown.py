@@ -24,7 +24,7 @@ from smajax.fit.sensitivity import sensitivity
 from smajax.fit.shown import misfits
 from smajax.fit.uncertainty import covariance_of, uncertainty
 from smajax.parameters import parameters
-from smajax.report.findings import Round, UnknownTerm
+from smajax.report.findings import UnknownTerm
 from smajax.residual.noise_like import correlation_time, split_runs
 from smajax.unknown.ranges import Sought, sought
 from smajax.unknown.spline import COUNT, design
@@ -143,12 +143,12 @@ def in_place_of(setting: Search, first: Model, final: Model) -> Lacking | None:
     spent = sum(len(setting.coefficients(effect)) for effect in final.effects)
     if ahead <= APART and spent < COUNT:
         return None
-    gone, term = " + ".join(final.effects), found.terms[0]
-    why = (
-        f"set aside: {term.title} alone foretells left-out runs better than all of them, "
-        f"{setting.shown(final.left_out_rmse)} -> {setting.shown(term.left_out_after)}"
+    term = found.terms[0]
+    setting.set_aside(
+        final,
+        f"{term.title} alone foretells left-out runs better than all of them, "
+        f"{setting.shown(final.left_out_rmse)} -> {setting.shown(term.left_out_after)}",
     )
-    setting.note(Round(len(setting.rounds) + 1, ((gone, final.left_out_rmse),), f"without {gone}", why))
     return found
 
 
