@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from smajax.effects.base import AbstractEffect, Extent
+from smajax.effects.base import Extent
+from smajax.effects.second_range import AbstractSecondRange
 from smajax.parameters import parameter
 from smajax.types import Scalar
 from smajax.wire.shape import Cosine
@@ -12,31 +13,22 @@ from smajax.wire.shape import Cosine
 WIDE = 5.0  # ranges: where a search begins
 
 
-class TwoStepTransformation(AbstractEffect):
+class TwoStepTransformation(AbstractSecondRange):
     r"""$h = (1 - w) h(z) + w h_{cos}\big((z - 1/2 - s)/b + 1/2\big)$ with its own w and s by branch and one width b.
 
-    As by the R-phase on cooling: `cooling_weight` of the wire transforms in a range of its own, `cooling_shift` ranges from
-    the other. Only its strain is that of martensite here. The second range ends like the first: with a tail without an end,
+    The second range ends like the first: with a tail without an end,
     as `two_part_transformation` has it, every warming transforms something, and the wire forgets where its cooling stopped.
     """
 
-    heating_weight: Scalar = parameter("-", 0.0, 0.8, "w on heating: share of the wire with the second range")
-    cooling_weight: Scalar = parameter("-", 0.0, 0.8, "w on cooling")
-    heating_shift: Scalar = parameter(
-        "-", -3.0, 3.0, "s on heating: centre of the second range, in ranges from mid-range"
-    )
-    cooling_shift: Scalar = parameter("-", -3.0, 3.0, "s on cooling")
     width: Scalar = parameter("-", 0.3, 25.0, "b: width of the second range, in transformation ranges")
 
     effect_name: ClassVar[str] = "two_step_transformation"
     title: ClassVar[str] = "transformation in two steps"
-    equation: ClassVar[str] = "kinetics"
     formula: ClassVar[str] = "h = (1 - w) h(z) + w h_cos((z - 1/2 - s)/b + 1/2) in eq. 3.3 and 3.5, w and s by branch"
     sentence: ClassVar[str] = (
         "A part of the wire transforms in a range of its own, before or after the rest: an intermediate phase, or grains and "
         "grips under another stress."
     )
-    switches: ClassVar[tuple[str, ...]] = ("heating_weight", "cooling_weight")
     starts: ClassVar[dict[str, float]] = {
         "heating_weight": 0.15,
         "cooling_weight": 0.15,
@@ -55,10 +47,5 @@ class TwoStepTransformation(AbstractEffect):
         sides = [(heating, cooling) for heating in (-1.0, 1.0) for cooling in (-1.0, 1.0)]
         return tuple({"heating_shift": one, "cooling_shift": other, "width": 1.0} for one, other in sides)
 
-    def heating_shape(self, z: Scalar, remaining: Scalar) -> Scalar:
-        tail = Cosine().martensite_left((z - 0.5 - self.heating_shift) / self.width + 0.5)
-        return (1.0 - self.heating_weight) * remaining + self.heating_weight * tail
-
-    def cooling_shape(self, z: Scalar, remaining: Scalar) -> Scalar:
-        tail = Cosine().austenite_left((z - 0.5 - self.cooling_shift) / self.width + 0.5)
-        return (1.0 - self.cooling_weight) * remaining + self.cooling_weight * tail
+    def second(self, beyond: Scalar) -> Scalar:
+        return Cosine().martensite_left(beyond + 0.5)

@@ -60,7 +60,11 @@ only = [{only}]
 RUN = '[[runs]]\nname = "{name}"\nrole = "{role}"\nfile = "{name}.csv"\n[runs.inputs]\nstress = "{stress:.3f} MPa"\n'
 
 
-def _text(megabytes: int, place: Path) -> dict[str, float]:
+Told = dict[str, float | str]
+Work = Callable[[], Told]
+
+
+def _text(megabytes: int, place: Path) -> Work:
     from smajax.measured.read import read_table
 
     draw = np.random.default_rng(0).normal(size=(BLOCK, COLUMNS))
@@ -71,16 +75,9 @@ def _text(megabytes: int, place: Path) -> dict[str, float]:
         log.write(",".join(names) + "\n")
         for _ in range(-(-megabytes * 10**6 // len(block))):
             log.write(block)
-    before, begin = peak_memory(), time.perf_counter()
-    rows = read_table(file, set(names[:3])).column("c2").size
-    took = time.perf_counter() - begin
-    size = file.stat().st_size
-    return {
-        "MB": size / 1e6,
-        "rows": rows,
-        "s": took,
-        "MB_per_s": size / 1e6 / took,
-        "grown_MB": (peak_memory() - before) / 1e6,
+    return lambda: {
+        "MB": file.stat().st_size / 1e6,
+        "rows": read_table(file, set(names[:3])).column("c2").size,
     }
 
 
@@ -120,79 +117,50 @@ def _experiment(place: Path, runs: int, samples: int) -> Path:
     return file
 
 
-def _samples(count: int, place: Path) -> dict[str, float]:
+def _samples(count: int, place: Path) -> Work:
     from smajax.catalogue import CATALOGUE
     from smajax.experiment.load import load_experiment
     from smajax.identify import identify
 
     file = _experiment(place, 1, count)
-    before, begin = peak_memory(), time.perf_counter()
-    experiment = load_experiment(file, CATALOGUE)
-    read = time.perf_counter() - begin
-    found = identify(experiment, starts=0)
-    took = time.perf_counter() - begin
-    value = {one.name: one.value for one in found.estimates}["austenite_finish"]
-    return {
-        "samples": count,
-        "read_s": read,
-        "s": took,
-        "grown_MB": (peak_memory() - before) / 1e6,
-        "off": abs(value - TRUTH["austenite_finish"]),
-    }
+
+    def work() -> Told:
+        found = {one.name: one.value for one in identify(load_experiment(file, CATALOGUE), starts=0).estimates}
+        return {"samples": count, "off": abs(found["austenite_finish"] - TRUTH["austenite_finish"])}
+
+    return work
 
 
-def _runs(count: int, place: Path) -> dict[str, float | str]:
+def _runs(count: int, place: Path) -> Work:
     from smajax.catalogue import CATALOGUE
     from smajax.close_loop import close_loop
     from smajax.experiment.load import load_experiment
 
     file = _experiment(place, count, RUN_SAMPLES)
-    before, begin = peak_memory(), time.perf_counter()
-    experiment = load_experiment(file, CATALOGUE)
-    read = time.perf_counter() - begin
-    found = close_loop(experiment)
-    took = time.perf_counter() - begin
-    return {
-        "runs": count,
-        "read_s": read,
-        "s": took,
-        "grown_MB": (peak_memory() - before) / 1e6,
-        "verdict": found.verdict,
-    }
+    return lambda: {"runs": count, "verdict": close_loop(load_experiment(file, CATALOGUE)).verdict}
 
 
-def _day(hours: int, place: Path) -> dict[str, float]:
+def _day(hours: int, place: Path) -> Work:
     import jax.numpy as jnp
 
     from smajax.batch.axes import grid
     from smajax.batch.run import run_batch
     from smajax.figures.rigs import arm
 
-    seconds = 3600.0 * hours
-    before, begin = peak_memory(), time.perf_counter()
-    steps = round(seconds / DAY_STEP)
+    steps = round(3600.0 * hours / DAY_STEP)
     # A step of the supply every minute, as a series of the whole day.
     voltage = np.where((np.arange(steps + 1) // round(60.0 / DAY_STEP)) % 2 == 0, 8.0, 2.0)
-    found = run_batch(
-        arm(),
-        {"voltage": jnp.asarray(voltage)},
-        grid(payload_mass=[0.1]),
-        dt=DAY_STEP,
-        every=DAY_KEPT,
-        out=place / "day",
-    )
-    angle = np.asarray(found["position"]).ravel()
-    took = time.perf_counter() - begin
-    return {
-        "hours": hours,
-        "steps": steps,
-        "s": took,
-        "grown_MB": (peak_memory() - before) / 1e6,
-        "kept_samples": int(np.isfinite(angle).sum()),
-    }
+    inputs, members, out = {"voltage": jnp.asarray(voltage)}, grid(payload_mass=[0.1]), place / "day"
+
+    def work() -> Told:
+        found = run_batch(arm(), inputs, members, dt=DAY_STEP, every=DAY_KEPT, out=out)
+        kept = int(np.isfinite(np.asarray(found["position"])).sum())
+        return {"hours": hours, "steps": steps, "kept_samples": kept}
+
+    return work
 
 
-WHAT: dict[str, Callable[[int, Path], dict[str, float] | dict[str, float | str]]] = {
+WHAT: dict[str, Callable[[int, Path], Work]] = {
     "text": _text,
     "samples": _samples,
     "day": _day,
@@ -207,8 +175,12 @@ def main() -> None:
     options = asked.parse_args()
     prepare()
     with tempfile.TemporaryDirectory() as place:
-        found = WHAT[options.what](options.count, Path(place))
-    print(json.dumps({"peer": "load", "what": options.what, **found, "peak_memory_MB": peak_memory() / 1e6}))
+        work = WHAT[options.what](options.count, Path(place))
+        before, begin = peak_memory(), time.perf_counter()
+        found = work()
+        took, grown = time.perf_counter() - begin, peak_memory() - before
+    told = {"peer": "load", "what": options.what, **found, "s": took, "grown_MB": grown / 1e6}
+    print(json.dumps({**told, "peak_memory_MB": peak_memory() / 1e6}))
 
 
 if __name__ == "__main__":
