@@ -15,6 +15,7 @@ from smajax.command.identify import identify_command
 from smajax.command.listing import effects, presets
 from smajax.command.machine import bench, doctor
 from smajax.command.new_experiment import new_experiment
+from smajax.command.renamed import as_now
 from smajax.command.simulate import simulate
 from smajax.command.sweep import sweep
 from smajax.command.tune import tune
@@ -79,8 +80,11 @@ def _no_memory(error: Exception) -> bool:
 
 def main() -> None:
     """Entry point: errors that a user can mend are said in one paragraph with exit code 2, without a traceback."""
+    typed, told = as_now(sys.argv[1:])
+    for sentence in told:
+        sys.stderr.write(f"deprecated: {sentence}\n")
     try:
-        app()
+        app(typed)
     except Exception as error:
         if _no_memory(error):
             # Written plainly: what colours a message would have to be loaded, and there is no memory left for it.

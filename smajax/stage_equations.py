@@ -60,7 +60,7 @@ def friction_limit(system: System, velocity: Scalar) -> Scalar | None:
 def _heating(system: System, stage: Stage, inputs: Inputs, temperature: Scalar, fraction: Scalar) -> Scalar:
     wire, effects = system.wire, system.effects
     ohms = resistance_per_metre(wire, effects, temperature, fraction)
-    power = heating_power(system, ohms, inputs)
+    power = heating_power(system, ohms, inputs, stage.old.wire)
     ambient = ambient_temperature(system, stage.time, inputs)
     return heat_rate(wire, effects, temperature, ambient, power, stage.time)
 

@@ -31,7 +31,7 @@ from smajax.load.coupon import Coupon, StrainCoupon
 from smajax.reading import followed, reading_of, time_constant
 from smajax.stage_equations import Stage, Unknowns, equations, friction_in_use, motion_rates
 from smajax.stage_solver import Solution, solve, solved_linear
-from smajax.system import System
+from smajax.system import System, supplied
 from smajax.types import Inputs, Motion, Scalar, State, WireState
 from smajax.wire.constitutive import strain_at, stress_at
 from smajax.wire.heat import stored_heat
@@ -137,6 +137,7 @@ def _stage(system: System, stage: Stage, inputs: Inputs) -> tuple[State, Scalar,
     begun = over(stage.old.wire, stage.time - stage.old.time)
     stage = dataclasses.replace(stage, old=dataclasses.replace(stage.old, wire=begun))
     wire, position, free = _ended(system, stage, inputs)
+    wire = supplied(system, inputs, begun, wire)
     lower, upper = load.limits()
     below, above = free < lower, free > upper
     velocity, acceleration = motion_rates(stage, position)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import equinox as eqx
 import jax.numpy as jnp
 
@@ -11,8 +13,9 @@ from smajax.load.base import AbstractMovingLoad
 from smajax.load.coupon import AbstractCoupon, StrainCoupon
 from smajax.parameters import parameter
 from smajax.reading import first_reading
-from smajax.types import Inputs, Motion, Scalar, State
+from smajax.types import Inputs, Motion, Scalar, State, WireState
 from smajax.wire.heat import cross_section
+from smajax.wire.resistance import resistance_per_metre
 from smajax.wire.wire import Wire, start
 
 
@@ -40,15 +43,45 @@ def ambient_temperature(system: System, time: Scalar, inputs: Inputs) -> Scalar:
     return ambient + sum(effect.ambient_shift(time) for effect in system.effects)
 
 
-def heating_power(system: System, resistance: Scalar, inputs: Inputs) -> Scalar:
+def heating_power(system: System, resistance: Scalar, inputs: Inputs, before: WireState | None = None) -> Scalar:
     """Electrical power in each metre of wire, W/m: what the drive gives, less what effects lose before the wire.
 
-    `resistance` is the wire's, ohm/m.
+    `resistance` is the wire's, ohm/m. `before`: the wire before the step, for a supply that remembers; None: a rested one.
     """
-    drive, effects, length = system.drive, system.effects, system.wire.wire_length
+    power = _of_rested_supply(system, resistance, inputs)
+    tiring = having(system.effects, "supply_drop")
+    if not tiring or before is None:
+        return power
+    voltage, current, per_volt = _supply(system, resistance, inputs, power)
+    lost = sum(effect.supply_drop(before, current, per_volt) for effect in tiring)
+    share = 1.0 - lost / jnp.where(voltage > 0.0, voltage, 1.0)
+    return power * jnp.where(share > 0.0, share, 0.0) ** 2
+
+
+def supplied(system: System, inputs: Inputs, before: WireState, after: WireState) -> WireState:
+    """`after`, at the end of a step from `before`, with what the supply remembers of that step."""
+    remembering = having(system.effects, "kept_after_current")
+    if not remembering:
+        return after
+    ohms = resistance_per_metre(system.wire, system.effects, after.temperature, after.martensite_fraction)
+    _, *given = _supply(system, ohms, inputs, _of_rested_supply(system, ohms, inputs))
+    kept = dict(after.kept)
+    for effect in remembering:
+        kept |= effect.kept_after_current(before, *given)
+    return dataclasses.replace(after, kept=kept)
+
+
+def _acting(system: System, inputs: Inputs) -> Inputs:
+    """The inputs as the drive makes something of them."""
     acting = dict(inputs)
-    for effect in having(effects, "command"):
-        acting |= {channel: effect.command(channel, acting[channel]) for channel in drive.inputs_required}
+    for effect in having(system.effects, "command"):
+        acting |= {channel: effect.command(channel, acting[channel]) for channel in system.drive.inputs_required}
+    return acting
+
+
+def _of_rested_supply(system: System, resistance: Scalar, inputs: Inputs) -> Scalar:
+    drive, effects, length = system.drive, system.effects, system.wire.wire_length
+    acting = _acting(system, inputs)
     power = drive.power(resistance, length, acting)
     behind, sagging = having(effects, "series_resistance"), having(effects, "current_sag")
     series = sum(effect.series_resistance() for effect in behind)
@@ -58,6 +91,17 @@ def heating_power(system: System, resistance: Scalar, inputs: Inputs) -> Scalar:
         asked = drive.drawn_current(resistance * length + series, acting)
         power = power / (1.0 + sum(effect.current_sag() for effect in sagging) * asked) ** 2
     return power
+
+
+def _supply(system: System, resistance: Scalar, inputs: Inputs, power: Scalar) -> tuple[Scalar, Scalar, Scalar]:
+    """(voltage while it is on, V; mean current, A; its fall per volt lost, A/V) of a rested supply that gives `power`, W/m."""
+    length = system.wire.wire_length
+    whole = resistance * length + sum(e.series_resistance() for e in having(system.effects, "series_resistance"))
+    voltage = system.drive.drawn_current(whole, _acting(system, inputs)) * whole
+    on = voltage > 0.0
+    # The wire's power is that of pulses of voltage / whole, for the share of the time that they last.
+    current = jnp.where(on, power * whole / (jnp.where(on, voltage, 1.0) * resistance), 0.0)
+    return voltage, current, current / jnp.where(on, voltage, 1.0)
 
 
 def load_resistance(system: System, time: Scalar, position: Scalar, velocity: Scalar, inputs: Inputs) -> Scalar:

@@ -197,6 +197,6 @@ def test_every_true_value_lies_inside_the_bounds_and_off_the_start() -> None:
 def test_states_are_only_those_that_the_effects_need() -> None:
     rig = RIGS["arm"]
     assert rig.load is not None
-    plain = Actuator(rig.wire, rig.load(0.0), {"coulomb_friction": 0.0}, 10.0, 7.0)
+    plain = Actuator(rig.wire, rig.load(0.0), {"coulomb_friction": 0.0}, 10.0, 7.0, 1e8)
     assert "friction" not in plain.names
-    assert "friction" in Actuator(rig.wire, rig.load(0.0), {"coulomb_friction": 0.1}, 10.0, 7.0).names
+    assert "friction" in Actuator(rig.wire, rig.load(0.0), {"coulomb_friction": 0.1}, 10.0, 7.0, 1e8).names

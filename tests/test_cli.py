@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from smajax.cli import main
+from smajax.command import renamed
 from smajax.command.base import console
 from smajax.progress import VARIABLE, shown
 
@@ -196,3 +198,33 @@ def test_the_tab_key_offers_the_names_there_are(typed: str, offered: list[str]) 
         check=False,
     )
     assert told.stdout.split() == offered, told.stderr
+
+
+OLD = {("sweep", "--targets"): ("--set-points", "0.3"), ("", "robustness"): ("sweep", "0.4")}
+
+
+@pytest.mark.parametrize(
+    ("typed", "now", "told"),
+    [
+        ("sweep --targets 20,40 --out x", "sweep --set-points 20,40 --out x", ["--targets is --set-points now"]),
+        ("robustness --targets=20", "sweep --set-points=20", ["robustness is sweep now", "--targets is --set-points"]),
+        ("tune --targets 20", "tune --targets 20", []),  # of another command
+        ("sweep --out robustness -- --targets", "sweep --out robustness -- --targets", []),
+        ("--version", "--version", []),
+    ],
+)
+def test_an_old_name_is_taken_for_the_new_one_and_told(typed: str, now: str, told: list[str]) -> None:
+    found, said = renamed.as_now(typed.split(), OLD)
+    assert found == now.split()
+    assert [part in one for part, one in zip(told, said, strict=True)] == [True] * len(told)
+
+
+def test_an_old_command_works_and_warns(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr("smajax.cli.as_now", lambda typed: renamed.as_now(typed, {("", "wires"): ("presets", "0.3")}))
+    monkeypatch.setattr("sys.argv", ["smajax", "wires"])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    out, err = capsys.readouterr()
+    assert not ended.value.code
+    assert "flexinol_table_3_2" in out
+    assert err == "deprecated: wires is presets now; the old name goes in version 0.3\n"

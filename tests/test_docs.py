@@ -116,6 +116,13 @@ def test_every_link_of_a_page_leads_to_a_file() -> None:
     assert lost == []
 
 
+def test_every_link_of_a_page_that_a_command_wrote_leads_to_a_file() -> None:
+    for page in (ROOT / "studies").rglob("*.html"):
+        linked = re.findall(r'(?:href|src)="([^"#]+)"', page.read_text(encoding="utf-8"))
+        lost = [one for one in linked if not one.startswith(("http", "data:")) and not (page.parent / one).exists()]
+        assert lost == [], page
+
+
 def test_every_page_is_in_the_sites_list() -> None:
     listed = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
     docs = ROOT / "docs"

@@ -72,6 +72,7 @@ RIGS = {
         ),
     ),
     "unloaded": (_under(DEAD_WEIGHT, "liang"), UNLOADED, ("enhanced_conditions",)),
+    "unloaded, enhanced": (_under(DEAD_WEIGHT, "enhanced"), UNLOADED, ("liang_conditions",)),
     "split": (_under(COUPON, "brinson"), UNSTRESSED, ("two_way_memory",)),
 }
 
@@ -172,7 +173,7 @@ def test_steps_of_their_own_carry_what_effects_remember():
     assert np.abs(own.reading - fixed.reading[::10]).max() < 2e-2 * np.ptp(fixed.reading)
 
 
-def test_a_share_of_one_is_the_enhanced_law_and_one_of_zero_is_liangs():
+def test_a_share_of_one_is_the_other_law_and_one_of_zero_is_the_models_own():
     """On the weights of M13 and on a coupon, where the stress falls while the temperature falls or stands still."""
     cooler = _inputs(
         temperature=_ramps(23.0, 84.0, 80.0, 80.0, 23.0), stress=1e6 * _ramps(60.0, 60.0, 20.0, 60.0, 60.0)
@@ -181,15 +182,16 @@ def test_a_share_of_one_is_the_enhanced_law_and_one_of_zero_is_liangs():
         liang, enhanced = _under(system, "liang"), _under(system, "enhanced")
         ends = [simulate_compiled(model, inputs, DT) for model in (liang, enhanced)]
         assert _gap(ends[0], ends[1], "martensite_fraction") > 0.1
-        for share, known in zip((0.0, 1.0), ends, strict=True):
-            run = simulate_compiled(
-                extended(liang, ("enhanced_conditions",), {"enhanced_conditions.share": share}), inputs, DT
-            )
-            for which in ("temperature", "stress", "strain", "martensite_fraction", "reading"):
-                assert _gap(run, known, which) < 1e-9, (share, which)
-        half = {"enhanced_conditions.share": 0.4}
-        already = simulate_compiled(extended(enhanced, ("enhanced_conditions",), half), inputs, DT)
-        assert _gap(already, ends[1], "martensite_fraction") < 1e-11
+        ways = ((liang, "enhanced_conditions", ends), (enhanced, "liang_conditions", ends[::-1]))
+        for model, name, known in ways:
+            for share, expected in zip((0.0, 1.0), known, strict=True):
+                run = simulate_compiled(extended(model, (name,), {f"{name}.share": share}), inputs, DT)
+                for which in ("temperature", "stress", "strain", "martensite_fraction", "reading"):
+                    assert _gap(run, expected, which) < 1e-9, (name, share, which)
+            other = next(one for _, one, _ in ways if one != name)
+            assert LIBRARY[name].applies(model)
+            assert not LIBRARY[other].applies(model)
+    half = {"enhanced_conditions.share": 0.4}
     # A coupon's temperature and stress are prescribed: the fraction in between is the mean.
     between = simulate_compiled(extended(_under(COUPON, "liang"), ("enhanced_conditions",), half), cooler, DT)
     mean = 0.6 * ends[0].martensite_fraction + 0.4 * ends[1].martensite_fraction
@@ -283,6 +285,22 @@ def test_a_lagging_transformation_is_late_by_its_time_constant():
             for one in (plain, run)
         ]
         assert half[1] - half[0] == pytest.approx(towards * tau * rate, abs=1e-3)
+
+
+def test_a_lagging_transformation_follows_the_stress_late_too():
+    """Loaded at a steady rate at one temperature: the whole curve is tau dsigma/dt further on."""
+    rate, tau, dt = 4e6, 1.5, 0.05
+    stress = np.concatenate([np.full(80, 20e6), 20e6 + rate * dt * np.arange(2000)])
+    heated = np.concatenate([_ramps(20.0, 120.0, 60.0, each=40), np.full(2000, 60.0)])
+    inputs = _inputs(temperature=heated, stress=stress)
+    plain = simulate_compiled(COUPON, inputs, dt)
+    on = {"lagging_transformation.time_constant": tau}
+    run = simulate_compiled(extended(COUPON, ("lagging_transformation",), on), inputs, dt)
+    part = slice(120, None)
+    assert plain.martensite_fraction[120] < 0.05
+    assert plain.martensite_fraction[-1] > 0.95
+    half = [np.interp(0.5, one.martensite_fraction[part], stress[part]) for one in (plain, run)]
+    assert half[1] - half[0] == pytest.approx(tau * rate, rel=2e-3)
 
 
 def test_a_small_loop_begins_its_way_back_earlier_and_a_full_one_where_it_did():

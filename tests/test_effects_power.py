@@ -8,6 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from smajax.batch.axes import grid
 from smajax.batch.run import run_batch
@@ -19,6 +20,7 @@ from smajax.effects.end_conduction import DEPTH, EndConduction
 from smajax.effects.library import LIBRARY
 from smajax.extended import extended
 from smajax.figures.rigs import arm
+from smajax.parameters import set_parameters
 from smajax.presets import build
 from smajax.system import System
 from smajax.wire.heat import mass_per_metre
@@ -42,11 +44,13 @@ def _lost(system: System, temperature: float) -> float:
     return float(heat.convection_coefficient) * surface * (temperature - float(heat.ambient_temperature))
 
 
-def _settled(effect: str, values: dict[str, float], rig: str = "dead_weight", **held: float) -> tuple[System, Any]:
-    """(system, its state at the end) after a minute with inputs held, from cold."""
+def _settled(
+    effect: str, values: dict[str, float], rig: str = "dead_weight", seconds: int = 60, **held: float
+) -> tuple[System, Any]:
+    """(system, its state at the end) after a while with inputs held, from cold."""
     system = RIGS[rig][0]
     full = extended(system, (effect,), {f"{effect}.{name}": value for name, value in values.items()})
-    run = simulate_compiled(full, {name: jnp.full(601, value) for name, value in held.items()}, 0.1)
+    run = simulate_compiled(full, {name: jnp.full(10 * seconds + 1, value) for name, value in held.items()}, 0.1)
     return full, jax.tree.map(lambda series: float(series[-1]), run)
 
 
@@ -70,6 +74,57 @@ def test_a_resistance_that_rises_with_temperature_settles_where_loss_is_power() 
     own = _ohms(system, end.martensite_fraction) * (1.0 + alpha * (end.temperature - 20.0))
     power = volts**2 / own / float(system.wire.wire_length)
     assert _lost(system, end.temperature) == pytest.approx(power, rel=1e-6)
+
+
+def test_a_supply_with_a_memory_is_the_circuit_of_its_equations() -> None:
+    """Against scipy on the same circuit with the wire's own resistance, which is constant here; at rest a plain divider."""
+    volts, inner, tau, dt = 8.0, 2.0, 1.5, 0.02
+    system = RIGS["dead_weight"][0]
+    law = system.wire.resistance
+    same = set_parameters(system, {"resistivity_austenite": float(law.resistivity_martensite)})
+    own, length = _ohms(same, 1.0), float(same.wire.wire_length)
+    on = {"supply_memory.resistance": inner, "supply_memory.time_constant": tau}
+    voltage = volts * np.where(np.arange(1001) < 700, 1.0, 0.3)
+    run = simulate_compiled(extended(same, ("supply_memory",), on), {"voltage": jnp.asarray(voltage)}, dt)
+    heat, ambient = same.wire.heat, float(same.wire.heat.ambient_temperature)
+    stored = float(mass_per_metre(same.wire) * heat.specific_heat)
+
+    def rates(_: float, y: np.ndarray, level: float) -> list[float]:
+        current = (level - inner * y[0]) / own
+        return [(current - y[0]) / tau, (current**2 * own / length - _lost(same, y[1])) / stored]
+
+    y, warm = np.array([0.0, ambient]), [ambient]
+    for level in voltage[:-1]:
+        y = solve_ivp(rates, (0.0, dt), y, args=(level,), rtol=1e-9, atol=1e-9).y[:, -1]
+        warm.append(y[1])
+    plain = simulate_compiled(same, {"voltage": jnp.asarray(voltage)}, dt)
+    assert np.ptp(np.asarray(plain.temperature) - np.asarray(warm)) > 5.0
+    np.testing.assert_allclose(run.temperature, warm, atol=2e-3 * np.ptp(warm))
+    _, end = _settled("supply_memory", {"resistance": inner, "time_constant": tau}, voltage=volts)
+    whole = _ohms(system, end.martensite_fraction)
+    power = (volts / (whole + inner)) ** 2 * whole / float(system.wire.wire_length)
+    assert _lost(system, end.temperature) == pytest.approx(power, rel=1e-6)
+
+
+def test_a_supply_with_a_memory_gives_pulses_their_mean_current() -> None:
+    duty, inner = 0.3, 2.0
+    system, end = _settled("supply_memory", {"resistance": inner, "time_constant": 1.0}, "bias_spring", 300, duty=duty)
+    own, volts = _ohms(system, end.martensite_fraction), float(RIGS["bias_spring"][0].drive.supply_voltage)
+    on = volts / (own + duty * inner)  # the drop is that of the mean current
+    power = duty * on**2 * own / float(system.wire.wire_length)
+    assert _lost(system, end.temperature) == pytest.approx(power, rel=1e-6)
+
+
+def test_pulses_recorded_as_their_mean_heat_by_their_mean_square() -> None:
+    """Pulses of 12 V, 40 % of whose variance reaches the wire: but for one factor those of 10 V with another share."""
+    supply, left = 12.0, 0.4
+    share = supply * left / (supply * left + 10.0 * (1.0 - left))
+    factors = []
+    for volts in (3.0, 6.0):
+        system, end = _settled("pulsed_voltage", {"share": share}, voltage=volts)
+        power = _lost(system, end.temperature) * float(system.wire.wire_length)
+        factors.append(power * _ohms(system, end.martensite_fraction) / (volts**2 + left * volts * (supply - volts)))
+    assert factors == pytest.approx([(1.0 - share) / (1.0 - left)] * 2, rel=1e-6)
 
 
 def test_a_sagging_supply_gives_less_than_its_largest_current() -> None:

@@ -104,6 +104,17 @@ class AbstractEffect(eqx.Module):
         """Relative fall of the supply per ampere that it is asked for, 1/A."""
         return 0.0
 
+    def supply_drop(self, old: WireState, current: Scalar, per_volt: Scalar) -> Scalar | float:
+        """Voltage that the supply has lost at the end of a step from `old`, V.
+
+        `current` (A, the mean) is what a rested supply gives, `per_volt` (A/V) by how much that falls per volt lost.
+        """
+        return 0.0
+
+    def kept_after_current(self, old: WireState, current: Scalar, per_volt: Scalar) -> dict[str, Scalar]:
+        """What it remembers of the current after such a step: entries of `WireState.kept` that `kept_after` leaves alone."""
+        return {}
+
     def heating_shape(self, z: Scalar, remaining: Scalar) -> Scalar:
         """Share of martensite left at the reduced distance z = (y_A - A_s)/(A_f - A_s); 1 far below, 0 far above."""
         return remaining

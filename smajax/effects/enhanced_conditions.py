@@ -10,6 +10,7 @@ from smajax.types import Scalar
 from smajax.wire.conditions import Enhanced
 
 if TYPE_CHECKING:
+    from smajax.system import System
     from smajax.wire.conditions import AbstractConditions
 
 
@@ -17,8 +18,8 @@ class EnhancedConditions(AbstractEffect):
     r"""$\xi = (1 - s)\,\xi_{law} + s\,\xi_{enh}$: the share s of the wire asks for $\dot T - \dot\sigma/C$ in the place of $\dot T$.
 
     On a wire under Liang's conditions (eq. 3.11) s = 0 is Liang's law and s = 1 the enhanced one (eq. 3.17, 3.18). Each
-    part carries its own amplitudes; temperature, stress and strain are common. Under the enhanced conditions already
-    both parts are alike and no s changes anything.
+    part carries its own amplitudes; temperature, stress and strain are common. For a model that is under the enhanced
+    conditions already there is `liang_conditions`.
 
     Why a share of the wire, not of the rate: with $\dot T - s \dot\sigma/C > 0$ as the condition no step depends on s
     but by a jump, so that its derivative says nothing; and a wire unloaded at a held temperature (Fig. 3.11c)
@@ -44,6 +45,10 @@ class EnhancedConditions(AbstractEffect):
     @classmethod
     def base(cls) -> EnhancedConditions:
         return cls(share=0.0)
+
+    @classmethod
+    def applies(cls, system: System) -> bool:
+        return not isinstance(system.wire.kinetics.conditions, Enhanced)
 
     def second_conditions(self) -> tuple[AbstractConditions, Scalar] | None:
         return Enhanced(), self.share

@@ -21,11 +21,13 @@ from smajax.effects.input_level import InputLevel
 from smajax.effects.lagging_transformation import LaggingTransformation
 from smajax.effects.latent_heat import LatentHeat
 from smajax.effects.lead_resistance import LeadResistance
+from smajax.effects.liang_conditions import LiangConditions
 from smajax.effects.load_shift import LoadShift
 from smajax.effects.minor_loops import MinorLoops
 from smajax.effects.nonlinear_spring import NonlinearSpring
 from smajax.effects.phase_resistance import PhaseResistance
 from smajax.effects.phase_specific_heat import PhaseSpecificHeat
+from smajax.effects.pulsed_voltage import PulsedVoltage
 from smajax.effects.pwm_smoothing import PwmSmoothing
 from smajax.effects.radiation import Radiation
 from smajax.effects.residual_strain import ResidualStrain
@@ -42,6 +44,7 @@ from smajax.effects.smooth_transformation import SmoothTransformation
 from smajax.effects.stress_dependent_strain import StressDependentStrain
 from smajax.effects.stress_dependent_width import StressDependentWidth
 from smajax.effects.stribeck_friction import StribeckFriction
+from smajax.effects.supply_memory import SupplyMemory
 from smajax.effects.supply_sag import SupplySag
 from smajax.effects.temperature_resistance import TemperatureResistance
 from smajax.effects.thermal_expansion import ThermalExpansion
@@ -74,13 +77,16 @@ _OWN: dict[str, type[AbstractEffect]] = {
         TemperatureResistance,
         LeadResistance,
         SupplySag,
+        SupplyMemory,
         DeadZone,
         PwmSmoothing,
+        PulsedVoltage,
         SmoothTransformation,
         AsymmetricTransformation,
         TwoPartTransformation,
         TwoStepTransformation,
         EnhancedConditions,
+        LiangConditions,
         UnequalStressSlopes,
         StressDependentWidth,
         MinorLoops,

@@ -28,8 +28,8 @@ class MinorLoops(AbstractEffect):
     printed model begins every way back at A_s' or M_s', however little of the wire had transformed.
     """
 
-    heating: Scalar = parameter("-", -0.8, 2.0, "a: earlier start of heating in a small loop, in transformation ranges")
-    cooling: Scalar = parameter("-", -0.8, 2.0, "b: earlier start of cooling in a small loop, in transformation ranges")
+    heating: Scalar = parameter("-", -0.8, 4.0, "a: earlier start of heating in a small loop, in transformation ranges")
+    cooling: Scalar = parameter("-", -0.8, 4.0, "b: earlier start of cooling in a small loop, in transformation ranges")
     small: Scalar = parameter(
         "-", 0.0, 1.0, "r: how much less the smallest loops are shifted than those of half a stroke"
     )

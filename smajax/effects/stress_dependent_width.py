@@ -19,8 +19,8 @@ class StressDependentWidth(AbstractEffect):
     """
 
     # With -5e-10 the range is half as wide at 1 GPa, which no wire stands.
-    heating: Scalar = parameter("1/Pa", -5e-10, 2e-8, "a: relative widening of A_f' - A_s' per stress")
-    cooling: Scalar = parameter("1/Pa", -5e-10, 2e-8, "b: relative widening of M_s' - M_f' per stress")
+    heating: Scalar = parameter("1/Pa", -5e-10, 5e-8, "a: relative widening of A_f' - A_s' per stress")
+    cooling: Scalar = parameter("1/Pa", -5e-10, 5e-8, "b: relative widening of M_s' - M_f' per stress")
 
     effect_name: ClassVar[str] = "stress_dependent_width"
     title: ClassVar[str] = "transformation range depending on stress"

@@ -47,7 +47,7 @@ SCALES |= {"friction": 1e-2, "late_temperature": 1.0, "late_stress": 1e6, "clamp
 class Actuator:
     """One run: the discrete modes, and the rates of the state between their switches."""
 
-    def __init__(self, wire: Wire, load: Load, effects: Effects, seconds: float, largest: float) -> None:
+    def __init__(self, wire: Wire, load: Load, effects: Effects, seconds: float, largest: float, level: float) -> None:
         effects = {name: value for name, value in effects.items() if value != 0}
         self.names = STATES + tuple(n for n, needs in EXTRAS.items() if any(e in effects for e in needs))
         self.at = {name: i for i, name in enumerate(self.names)}
@@ -55,8 +55,7 @@ class Actuator:
         self.command = 0.0
         self.heat, self.electricity = Heat(wire, effects, seconds), Electricity(wire, effects, largest)
         self.mechanics, self.strains = Mechanics(wire, load, effects), Strains(wire, effects)
-        stress = load.resistance(load.start) / (load.ratio * wire.area)
-        self.branches = branches(wire, effects, stress)
+        self.branches = branches(wire, effects, level)
         self.lag = effects.get("rate_dependence", 0.0)
         self.share = 1.0 - effects.get("stress_rate_share", 0.0)  # of the stress rate in eq. 3.17, 3.18; 1: as printed
         self.active: Branch | None = None

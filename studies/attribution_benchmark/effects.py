@@ -38,7 +38,7 @@ EFFECTS: dict[str, Effect] = {
     "temperature_resistance": Effect("electrical", 2e-4, 4e-3, "1/K"),
     "lead_resistance": Effect("electrical", 0.02, 0.5, "of the cold wire's"),
     "supply_sag": Effect("electrical", 0.01, 0.3, "of the cold wire's resistance, behind 4 s"),
-    "drive_dead_zone": Effect("electrical", 0.005, 0.3, "of the run's largest command"),
+    "drive_dead_zone": Effect("electrical", 0.005, 0.3, "of the largest command of all runs"),
     "pwm": Effect("electrical", 0.01, 1.0, "share of the power that goes as the mean, not as the square"),
     # kinetics
     "stress_rate_share": Effect("kinetics", 1.0, 1.0, "taken off the stress rate's share 1 in eq. 3.17, 3.18"),
@@ -46,7 +46,7 @@ EFFECTS: dict[str, Effect] = {
     "smooth_transformation": Effect("kinetics", 0.02, 0.8, "share of the wire over three times the range"),
     "asymmetric_transformation": Effect("kinetics", 0.05, 0.9, "a of h + a h (1 - h); -a on cooling"),
     "two_part_transformation": Effect("kinetics", 0.02, 0.4, "share that goes first on cooling, last on heating"),
-    "stress_dependent_width": Effect("kinetics", 0.05, 1.0, "of the width per start's stress"),
+    "stress_dependent_width": Effect("kinetics", 0.05, 1.0, "of the width per stress of the lightest load at rest"),
     "minor_loops": Effect("kinetics", 0.5, 10.0, "K by which the way back starts earlier after half a transformation"),
     "rate_dependence": Effect("kinetics", 0.02, 2.0, "s by which the transformation is late"),
     "transformation_drift": Effect("kinetics", 0.1, 4.0, "K down per transformation passed"),

@@ -12,7 +12,7 @@ DRAUGHT_AT = (0.35, 0.6)  # share of a run between which the draught blows
 REGIME_AT = 45.0  # K above ambient at which the flow around the wire changes
 CLAMP_TIME = 12.0  # s
 SAG_TIME = 4.0  # s
-PWM_SUPPLY = 2.0  # supply's volts over the run's largest command
+PWM_SUPPLY = 2.0  # supply's volts over the largest command of all runs
 
 
 class Heat:
@@ -59,7 +59,7 @@ class Heat:
 
 
 class Electricity:
-    """Power per metre from the command (eq. 3.1, 3.15) with the effects of the truth. `largest`: of the run's command."""
+    """Power per metre from the command (eq. 3.1, 3.15) with the effects of the truth. `largest`: command of all runs."""
 
     def __init__(self, wire: Wire, effects: Effects, largest: float) -> None:
         get = effects.get

@@ -15,8 +15,9 @@ from smajax.report.files import replace
 # view; some of the library's forms were widened after cases that it missed (README.md). The generator's smooth transformation, a share of the wire over a wider range, is the library's of two parts.
 CALLED: dict[str, tuple[str, ...]] = {
     "drive_dead_zone": ("dead_zone",),
-    "pwm": ("pwm_smoothing",),
-    "stress_rate_share": ("enhanced_conditions",),
+    "supply_sag": ("supply_sag", "supply_memory"),
+    "pwm": ("pwm_smoothing", "pulsed_voltage"),
+    "stress_rate_share": ("enhanced_conditions", "liang_conditions"),
     "different_slopes": ("unequal_stress_slopes",),
     "smooth_transformation": ("smooth_transformation", "two_step_transformation", "two_part_transformation"),
     "two_part_transformation": ("two_step_transformation", "two_part_transformation"),

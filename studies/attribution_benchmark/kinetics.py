@@ -103,7 +103,7 @@ class Branch:
 
 
 def branches(wire: Wire, effects: Effects, level: float) -> tuple[Branch, Branch]:
-    """Heating and cooling branch of a wire that is all martensite; `level`: stress at the start, Pa."""
+    """Heating and cooling branch of a wire that is all martensite; `level`: stress at which widths are as given, Pa."""
     get = effects.get
     smooth, second = get("smooth_transformation", 0.0), get("two_part_transformation", 0.0)
     asymmetry, bump = get("asymmetric_transformation", 0.0), get("bumped_transformation", 0.0)

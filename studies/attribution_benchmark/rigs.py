@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.attribution_benchmark.actuator import Actuator
-from studies.attribution_benchmark.coupon import strain
+from studies.attribution_benchmark.coupon import LEVEL, strain
 from studies.attribution_benchmark.march import march
 from studies.attribution_benchmark.parameters import GRAVITY, Effects, Load, Wire
 from studies.attribution_benchmark.runs import Clock, Run, heated, powered
@@ -194,7 +194,21 @@ def actuator_of(rig: Rig, wire: Wire, run: Run, effects: Effects) -> Actuator:
     load = rig.load(wrong * (float(run.other[0]) if run.other is not None else rig.mass))
     if run.other is None:
         load = replace(load, weight=load.weight * wrong, force=load.force * wrong)
-    return Actuator(wire, load, effects, rig.clock.seconds, float(run.command.max()))
+    return Actuator(wire, load, effects, rig.clock.seconds, largest_command(rig, wire), level(rig, wire))
+
+
+def largest_command(rig: Rig, wire: Wire) -> float:
+    """Of all runs: a supply, a dead zone and a limit are the same in each of them."""
+    return max(float(run.command.max()) for run in rig.runs(wire))
+
+
+def level(rig: Rig, wire: Wire) -> float:
+    """Stress, Pa, at which widths are as given: that of the lightest load at rest, in all runs."""
+    if rig.load is None:
+        return LEVEL
+    masses = [float(run.other.min()) for run in rig.runs(wire) if run.other is not None]
+    load = rig.load(min(masses, default=rig.mass))
+    return load.resistance(load.start) / (load.ratio * wire.area)
 
 
 def value(rig: Rig, wire: Wire, run: Run, effects: Effects) -> Vector:
