@@ -57,7 +57,7 @@ def simulate_loop_dataset(
         )
     check_bounds(system)
     check_order(system)
-    check_interface("", period, dt)
+    check_interface("", 0.0, period, dt)
     every = round(period / dt)
     wanted = _wanted(set_point, system.load.reading[1], seconds, dt)
     samples = (wanted.position.shape[0] - 1) // every * every + 1

@@ -129,7 +129,7 @@ def run_closed(asked: Asked, loop: AskedLoop) -> Ran:
         raise ValueError(f"no controller {gains.controller!r}{instead(gains.controller, CONTROLLERS, 'there are')}")
     preset = CONTROLLERS[gains.controller]
     believed, plant = preset.plant(believed), preset.plant(plant)
-    check_interface(loop.estimator, loop.period, asked.dt)
+    check_interface(loop.estimator, loop.noise, loop.period, asked.dt)
     between = interface_of(believed, loop.estimator, loop.noise, loop.period, asked.dt, loop.delay)
     wanted = given(loop.set_points, "rad", asked.time)
     clock = clock_of([wanted], asked.seconds, asked.dt)

@@ -108,8 +108,10 @@ def check_set_points(system: System, set_points: Sequence[float]) -> None:
         )
 
 
-def check_interface(filtered: str, period: float, dt: float) -> None:
-    """ValueError for a filter there is not, or a period (s) that is no whole number of steps of `dt`."""
+def check_interface(filtered: str, noise: float, period: float, dt: float) -> None:
+    """ValueError for a filter there is not, a noise (degrees) that is no size, or a period (s) of no whole steps of `dt`."""
+    if not 0.0 <= noise < math.inf:
+        raise ValueError(f"a noise is a number of degrees, 0 or more; not {noise:g}.")
     if filtered and filtered not in FILTERS:
         raise ValueError(f"no filter `{filtered}`; there are {', '.join(FILTERS)}.")
     steps = period / dt
@@ -148,7 +150,7 @@ def run_sweep(
     check_set_points(system, settings.set_points)
     if not settings.gains or min(settings.gains) <= 0.0:
         raise ValueError(f"gains are shares of the preset's, above 0, at least one; not {settings.gains}.")
-    check_interface(settings.filtered, settings.period, settings.dt)
+    check_interface(settings.filtered, settings.noise, settings.period, settings.dt)
     spare = [gains.controller for gains in settings.tuned if gains.controller not in settings.controllers]
     if spare:
         raise ValueError(

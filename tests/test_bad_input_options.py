@@ -102,9 +102,9 @@ LONG = {
     "sweep --set-points 400": "set points are angles between the arm's stops, -45 to 95 degrees",
     "sweep --gain-shares 1,inf": "finite numbers with commas between them, not `1,inf`",
     "sweep --gain-shares=-1": "gains are shares of the preset's, above 0",
-    "sweep --points 1": "greater than or equal to 2",
-    "sweep --seconds inf": "less than or equal to 86400",
-    "sweep --noise nan": "less than or equal to 360",
+    "sweep --points 1": "'--points': 2 or more, not `1`",
+    "sweep --seconds inf": "'--seconds': 0.1 to 86400, not `inf`",
+    "sweep --noise nan": "'--noise': 0 to 360, not `nan`",
     "sweep --period nan": "a whole number of simulation steps of 0.01 s, not nan s",
     "sweep --period inf": "a whole number of simulation steps of 0.01 s, not inf s",
     "sweep --estimator kalman": "no filter `kalman`; there are",
@@ -117,7 +117,7 @@ LONG = {
     "tune pid --weights overshoot=-2": "weights are no less than 0",
     "tune pid --objective best": "no objective `best`; there are: nominal, worst, mean-variance",
     "tune pid --by newton": "no rule `newton`; there are: trust-region, adam",
-    "tune pid --seconds inf": "less than or equal to 86400",
+    "tune pid --seconds inf": "'--seconds': 0.1 to 86400, not `inf`",
     "figures M99": "No figure `M99`; there are chapter3",
 }
 

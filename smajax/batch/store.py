@@ -62,7 +62,10 @@ class Store:
         values = group.create_group(AXES)
         for one in axes.dimensions:
             for name, series in one.values.items():
-                values.create_array(name, data=np.asarray(series, dtype=float), dimension_names=[one.name])
+                points = np.asarray(series, dtype=float)
+                values.create_array(name, shape=points.shape, dtype=points.dtype, dimension_names=[one.name])[:] = (
+                    points
+                )
         group.create_array(MARK, shape=(count,), chunks=(1,), dtype="uint8", fill_value=0, dimension_names=["chunk"])
         order = [[one.name, list(one.values)] for one in axes.dimensions]
         group.attrs.update({**attributes, CHUNK: chunk, AXES: json.dumps(order)})

@@ -8,7 +8,7 @@ import shlex
 import signal
 import sys
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -107,6 +107,18 @@ def numbers(option: str, text: str) -> tuple[float, ...]:
         return found
     except ValueError:
         raise typer.BadParameter(f"finite numbers with commas between them, not `{text}`", param_hint=option) from None
+
+
+def within(low: float, high: float = math.inf) -> Callable[[float | None], float | None]:
+    """The callback of an option that takes numbers from `low` to `high`: says what was got, as a library's would not."""
+
+    def checked(value: float | None) -> float | None:
+        if value is not None and not low <= value <= high:
+            asked = f"{low:g} or more" if high == math.inf else f"{low:g} to {high:g}"
+            raise typer.BadParameter(f"{asked}, not `{value:g}`")
+        return value
+
+    return checked
 
 
 def pairs(option: str, several: Sequence[str] | None) -> dict[str, float]:

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from smajax.command.base import FITS, Json, Open, Overwrite, browse, console, resumable
+from smajax.command.base import FITS, Json, Open, Overwrite, browse, console, resumable, within
 
 OWN = ("identify.html", "identify.json", "parameters.csv", "runs.csv", FITS)
 
@@ -24,12 +24,15 @@ def identify_command(
     out: Annotated[
         Path, typer.Option(help="folder for identify.html and identify.json; fits are kept there as they go")
     ] = Path("identified"),
-    starts: Annotated[int, typer.Option(min=0, help="points of the box that fits may start from; 0: as declared")] = 64,
+    starts: Annotated[
+        int, typer.Option(callback=within(0), help="points of the box that fits may start from; 0: as declared")
+    ] = 64,
     profile: Annotated[str, typer.Option(help="parameters to draw a profile of, with commas, or `all`")] = "",
     robust: Annotated[bool, typer.Option("--robust", help="Huber's loss: samples far off count less")] = False,
     design: Annotated[bool, typer.Option("--design", help="say which run to do next")] = False,
     posterior: Annotated[
-        int, typer.Option(min=0, help="draws of each of 8 Markov chains, 1000 or so; needs the extra `bayes`")
+        int,
+        typer.Option(callback=within(0), help="draws of each of 8 Markov chains, 1000 or so; needs the extra `bayes`"),
     ] = 0,
     overwrite: Overwrite = False,
     json_out: Json = False,

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from smajax.command.base import UNMET, Json, console, resumable
+from smajax.command.base import UNMET, Json, console, resumable, within
 
 
 def doctor(
@@ -75,8 +75,8 @@ def told(found: dict[str, object]) -> list[str]:
 
 
 def bench(
-    count: Annotated[int, typer.Option(min=64, help="trajectories by smajax")] = 8192,
-    peers: Annotated[int, typer.Option(min=1, help="of them by scipy too")] = 16,
+    count: Annotated[int, typer.Option(callback=within(64), help="trajectories by smajax")] = 8192,
+    peers: Annotated[int, typer.Option(callback=within(1), help="of them by scipy too")] = 16,
     out: Annotated[Path | None, typer.Option(help="file to write the numbers to, JSON")] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="write over that file")] = False,
     json_out: Json = False,

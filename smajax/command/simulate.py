@@ -17,6 +17,7 @@ from smajax.command.base import (
     command_line,
     console,
     resumable,
+    within,
 )
 
 
@@ -65,7 +66,7 @@ def simulate(
         str, typer.Option(help="kinetics: tanaka, liang, brinson or enhanced", autocompletion=complete.laws)
     ] = "",
     seconds: Annotated[
-        float | None, typer.Option(min=0.0, help="length of the run; default: that of the inputs")
+        float | None, typer.Option(callback=within(0), help="length of the run; default: that of the inputs")
     ] = None,
     dt: Annotated[str, typer.Option(help="time between samples")] = "5ms",
     tolerance: Annotated[
@@ -88,10 +89,10 @@ def simulate(
         typer.Option(help="`printed` or `model` filter; none: told the true state", autocompletion=complete.estimators),
     ] = "",
     noise: Annotated[
-        float, typer.Option(min=0.0, max=360.0, help="noise of the angle's readings, degrees (1 sigma)")
+        float, typer.Option(callback=within(0, 360.0), help="noise of the angle's readings, degrees (1 sigma)")
     ] = 0.0,
     period: Annotated[float, typer.Option(help="sample time of the controller, s, a multiple of --dt")] = 0.01,
-    delay: Annotated[int, typer.Option(min=0, help="control periods until a command arrives")] = 0,
+    delay: Annotated[int, typer.Option(callback=within(0), help="control periods until a command arrives")] = 0,
     seed: Annotated[int, typer.Option(help="of the noise")] = 0,
     gif: Annotated[
         bool, typer.Option("--gif", help="draw the load moving beside its wire's phase diagram: simulate.gif")

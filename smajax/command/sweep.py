@@ -17,6 +17,7 @@ from smajax.command.base import (
     console,
     numbers,
     resumable,
+    within,
 )
 
 SET_POINTS, GAINS = "-40,-20,0,10,20,40,50,60,80", "0.5,0.7,1,1.4,2"
@@ -33,7 +34,8 @@ def sweep(
     ] = None,
     over: Annotated[str, typer.Option(help="the two mismatches of the maps")] = "convection,damping",
     points: Annotated[
-        int | None, typer.Option(min=2, help="mismatches from 0.5 to 2 along each side of a map; default 15")
+        int | None,
+        typer.Option(callback=within(2), help="mismatches from 0.5 to 2 along each side of a map; default 15"),
     ] = None,
     set_points: Annotated[
         str | None, typer.Option(help="degrees, with commas; default -40,-20,0,10,20,40,50,60,80")
@@ -45,16 +47,16 @@ def sweep(
     gain_shares: Annotated[
         str | None, typer.Option(help="shares of the controller's main gain; default 0.5,0.7,1,1.4,2")
     ] = None,
-    seconds: Annotated[float, typer.Option(min=0.1, max=86_400.0, help="length of each closed loop")] = 10.0,
+    seconds: Annotated[float, typer.Option(callback=within(0.1, 86_400.0), help="length of each closed loop")] = 10.0,
     estimator: Annotated[
         str,
         typer.Option(help="`printed` or `model` filter; none: told the true state", autocompletion=complete.estimators),
     ] = "",
     noise: Annotated[
-        float, typer.Option(min=0.0, max=360.0, help="noise of the angle's readings, degrees (1 sigma)")
+        float, typer.Option(callback=within(0, 360.0), help="noise of the angle's readings, degrees (1 sigma)")
     ] = 0.0,
     period: Annotated[float, typer.Option(help="sample time of the controller, s, a multiple of 0.01")] = 0.01,
-    delay: Annotated[int, typer.Option(min=0, help="control periods until a command arrives")] = 0,
+    delay: Annotated[int, typer.Option(callback=within(0), help="control periods until a command arrives")] = 0,
     out: Annotated[Path, typer.Option(help="folder for the page, the pictures and the rows")] = Path("sweep"),
     fast: Annotated[
         bool, typer.Option("--fast", help="by default 3 x 3 mismatches, set points -20,20,60, gain 1")

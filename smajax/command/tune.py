@@ -19,6 +19,7 @@ from smajax.command.base import (
     numbers,
     pairs,
     resumable,
+    within,
 )
 
 TUNED_AT = "-40,-20,0,20,40,60,85"
@@ -51,18 +52,20 @@ def tune(
     start: Annotated[
         Path | None, typer.Option(help="gains.json to begin from, in the place of the preset's gains")
     ] = None,
-    starts: Annotated[int | None, typer.Option(min=1, help="points that gains are moved from; default 6")] = None,
-    rounds: Annotated[int | None, typer.Option(min=1, help="steps, at most; default 30")] = None,
-    seconds: Annotated[float, typer.Option(min=0.1, max=86_400.0, help="length of each closed loop")] = 10.0,
+    starts: Annotated[
+        int | None, typer.Option(callback=within(1), help="points that gains are moved from; default 6")
+    ] = None,
+    rounds: Annotated[int | None, typer.Option(callback=within(1), help="steps, at most; default 30")] = None,
+    seconds: Annotated[float, typer.Option(callback=within(0.1, 86_400.0), help="length of each closed loop")] = 10.0,
     estimator: Annotated[
         str,
         typer.Option(help="`printed` or `model` filter; none: told the true state", autocompletion=complete.estimators),
     ] = "",
     noise: Annotated[
-        float, typer.Option(min=0.0, max=360.0, help="noise of the angle's readings, degrees (1 sigma)")
+        float, typer.Option(callback=within(0, 360.0), help="noise of the angle's readings, degrees (1 sigma)")
     ] = 0.0,
     period: Annotated[float, typer.Option(help="sample time of the controller, s, a multiple of 0.01")] = 0.01,
-    delay: Annotated[int, typer.Option(min=0, help="control periods until a command arrives")] = 0,
+    delay: Annotated[int, typer.Option(callback=within(0), help="control periods until a command arrives")] = 0,
     seed: Annotated[int, typer.Option(help="of starts, plants and noise")] = 0,
     out: Annotated[Path, typer.Option(help="folder for gains.json, the page, the pictures and the numbers")] = Path(
         "tune"

@@ -56,7 +56,7 @@ class TuneSettings:
         if len(set(self.set_points)) < len(self.set_points):
             raise ValueError(f"every set point once, not {', '.join(f'{angle:g}' for angle in self.set_points)}.")
         check_variation(self.variation)
-        check_interface(self.filtered, self.period, STEP)
+        check_interface(self.filtered, self.noise, self.period, STEP)
         steps = self.seconds / self.period
         if steps < 1.0 or abs(steps - round(steps)) > 1e-6:
             raise ValueError(
