@@ -37,6 +37,19 @@ class Merit(eqx.Module):
     peak_temperature: Scalar  # C
 
 
+# Of an arm; the lengths of another load are in m.
+MERIT_UNITS = {
+    "reach_time": "s",
+    "settling_time": "s",
+    "overshoot": "rad",
+    "steady_error": "rad",
+    "steady_offset": "rad",
+    "energy": "J",
+    "switches_per_second": "1/s",
+    "peak_temperature": "degC",
+}
+
+
 def band_of(system: System) -> Scalar:
     """One degree for an angle, one per cent of the stroke for a length; rad or m."""
     load = system.load

@@ -218,7 +218,7 @@ def page(
     foot = [
         "<h2>Provenance</h2>",
         table(["", ""], [["command", command], *map(list, made_with().items())]),
-        "<p class=quiet>The same numbers: sweep.json, and a CSV file for each controller.</p>",
+        "<p class=quiet>The same numbers: sweep.json, sweep.nc (every loop, with named axes and units), and a CSV file for each controller.</p>",
     ]
     return whole("Controllers compared", [top, *compared, mismatches, *parts, *foot])
 

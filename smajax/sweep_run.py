@@ -22,8 +22,9 @@ from smajax.load.base import AbstractMovingLoad
 from smajax.measured_state import Sensor
 from smajax.merit import Merit
 from smajax.reference import clock
-from smajax.report.files import replace, writing
+from smajax.report.files import as_netcdf, replace, writing
 from smajax.sweep import MISMATCHES, Grid, Interface, closed_loops, lanes, positions, ratios
+from smajax.sweep_dataset import as_dataset
 from smajax.sweep_report import (
     Swept,
     as_json,
@@ -79,7 +80,7 @@ class SweepSettings:
 def files_of(controllers: Sequence[str]) -> list[str]:
     """Names that a sweep of these controllers writes into its folder."""
     own = [f"{name}{end}" for name in controllers for end in (".csv", "_maps.png", "_lines.png")]
-    return ["index.html", "sweep.json", "comparison.png", f"finished/*-{'[0-9a-f]' * 16}.npz", *own]
+    return ["index.html", "sweep.json", "sweep.nc", "comparison.png", f"finished/*-{'[0-9a-f]' * 16}.npz", *own]
 
 
 def goes_on(before: Mapping[str, Any], asked: Mapping[str, Any]) -> bool:
@@ -176,6 +177,7 @@ def run_sweep(
     draw_comparison(comparison, targets, compared)
     _save(comparison, out / "comparison.png")
     replace(out / "sweep.json", as_json(targets, compared, grid, swept, settings.between, command))
+    replace(out / "sweep.nc", as_netcdf(as_dataset(grid, swept, settings.between, command)))
     between, seconds = settings.between, settings.seconds
     replace(out / "index.html", page(targets, compared, grid, swept, seconds, between, out, command))
     return comparison_rows(targets, compared)

@@ -12,19 +12,21 @@ import equinox as eqx
 import jax
 import numpy as np
 import pytest
+import xarray as xr
 
 from smajax.closed_loop import simulate_closed_loop
 from smajax.control_presets import CONTROLLERS
 from smajax.figures.rigs import arm
 from smajax.gains_file import Gains
 from smajax.measured_state import Sensor
-from smajax.merit import merit
+from smajax.merit import MERIT_UNITS, Merit, merit
 from smajax.parameters import get_parameters, set_parameters
 from smajax.reference import clock, constant
 from smajax.sweep import Grid, Interface, closed_loops, lanes, ratios
 from smajax.sweep_run import SweepSettings, goes_on, run_sweep
 from tests.in_browser import HOSTILE, faults
 
+RATIOS = ("payload_ratio", "supply_ratio")
 SETTINGS = SweepSettings(("vsc3",), "payload", "supply", 2, (0.0, 30.0), (1.0,), seconds=3.0)
 
 
@@ -63,6 +65,21 @@ def test_the_folder_is_whole(folder: Path) -> None:
     assert record["sweep"]["loops"] == 8
     assert record["sweep"]["failed"] == {"vsc3": 0}
     assert not list(folder.rglob("*.part*"))
+
+
+def test_the_data_set_holds_every_row(folder: Path) -> None:
+    with xr.open_dataset(folder / "sweep.nc", engine="scipy") as found, open(folder / "vsc3.csv") as file:
+        rows = list(csv.DictReader(file))
+        assert found["overshoot"].size == len(rows) == 8
+        for row in rows:
+            (gain,) = (float(row[name]) for name in row if name.endswith("_ratio") and name not in RATIOS)
+            at = {name: float(row[name]) for name in RATIOS} | {"gain_ratio": gain}
+            at["set_point"] = np.radians(float(row["set_point_deg"]))
+            one = found.sel(controller="vsc3").sel(at, method="nearest")
+            assert float(one["energy"]) == pytest.approx(float(row["energy_J"]), rel=1e-5)
+            assert np.degrees(float(one["overshoot"])) == pytest.approx(float(row["overshoot_deg"]), rel=1e-5, abs=1e-6)
+        assert {name: one.attrs["units"] for name, one in found.data_vars.items()} == {**MERIT_UNITS, "failed_at": "s"}
+        assert [field.name for field in dataclasses.fields(Merit)] == list(MERIT_UNITS)
 
 
 def test_the_page_in_a_browser(folder: Path, browser: Any) -> None:

@@ -11,7 +11,10 @@ import tempfile
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 UNFINISHED = ".part"  # the end of a hidden file that is being written, or was when its program was killed
 
@@ -79,3 +82,8 @@ def csv_text(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
 def heading(name: str, unit: str) -> str:
     """`temperature [degC]`, as `smajax` reads it back; a plain number has the unit 1."""
     return f"{name} [{'1' if unit in ('-', '') else unit}]"
+
+
+def as_netcdf(found: xr.Dataset) -> bytes:
+    """NetCDF 3, which every reader knows."""
+    return bytes(found.to_netcdf(engine="scipy"))

@@ -14,26 +14,17 @@ from matplotlib.figure import Figure
 
 from smajax.figures.drawing import BLUE, GREY, RED, named, panels
 from smajax.fit.progress import Progress, quiet
+from smajax.merit import MERIT_UNITS
 from smajax.parameters import parameter_values, parameters
 from smajax.report.animation import moving
 from smajax.report.display import axis_label, digits, display, label
-from smajax.report.files import csv_text, heading, json_text, replace
+from smajax.report.files import as_netcdf, csv_text, heading, json_text, replace
 from smajax.report.html import picture
 from smajax.report.plain_page import bullets, table, whole
 from smajax.single import Ran
 
 STILL = 1e-3  # change of the martensite fraction that is none
 PLAIN = ("position", "temperature", "martensite_fraction", "stress")
-MERITS = {
-    "reach_time": "s",
-    "settling_time": "s",
-    "overshoot": "rad",
-    "steady_error": "rad",
-    "steady_offset": "rad",
-    "energy": "J",
-    "switches_per_second": "1/s",
-    "peak_temperature": "degC",
-}
 
 
 def as_csv(found: xr.Dataset) -> str:
@@ -41,11 +32,6 @@ def as_csv(found: xr.Dataset) -> str:
     columns = {"time": found["time"], **found.data_vars}
     head = [heading(str(name), one.attrs["units"]) for name, one in columns.items()]
     return csv_text(head, np.stack([one.to_numpy() for one in columns.values()], axis=1).tolist())
-
-
-def as_netcdf(found: xr.Dataset) -> bytes:
-    """NetCDF 3, which every reader knows."""
-    return bytes(found.to_netcdf(engine="scipy"))
 
 
 def record(ran: Ran, command: str, series: bool = True) -> dict[str, Any]:
@@ -57,7 +43,7 @@ def record(ran: Ran, command: str, series: bool = True) -> dict[str, Any]:
         "parameters": parameter_values(ran.system),
         "notes": list(ran.notes),
         "conclusions": conclusions(ran),
-        "merit": {name: {"value": value, "unit": MERITS[name]} for name, value in ran.merit.items()},
+        "merit": {name: {"value": value, "unit": MERIT_UNITS[name]} for name, value in ran.merit.items()},
         "summary": {
             str(name): {
                 "unit": one.attrs["units"],
@@ -127,7 +113,7 @@ def merit_rows(ran: Ran) -> list[list[str]]:
     """A row a figure of merit."""
     rows = []
     for name, value in ran.merit.items():
-        unit = display(MERITS[name], name)
+        unit = display(MERIT_UNITS[name], name)
         rows.append([label(name), "never" if np.isinf(value) else digits(unit.of(value), 3), unit.unit])
     return rows
 
