@@ -46,15 +46,19 @@ def friction_in_use(stage: Stage, position: Scalar) -> tuple[Scalar, Scalar]:
     return jnp.clip(raw, -1.0, 1.0), raw
 
 
-def friction_limit(system: System, velocity: Scalar) -> Scalar | None:
+def friction_limit(system: System, velocity: Scalar, inputs: Inputs) -> Scalar | None:
     """Largest friction in the unit of the load's resistance; None where no effect has friction."""
     load = system.load
     assert isinstance(load, AbstractMovingLoad)
-    rubbing = having(system.effects, "friction_limit")
-    if not rubbing:
+    rubbing, bearing = having(system.effects, "friction_limit"), having(system.effects, "friction_share")
+    if not rubbing and not bearing:
         return None
     speed = load.lever() * velocity
-    return jnp.sum(jnp.stack([jnp.asarray(effect.friction_limit(speed)) for effect in rubbing]))
+    limits = [effect.friction_limit(speed) for effect in rubbing]
+    if bearing:
+        at_rest = jnp.abs(load.resistance(load.start(), jnp.zeros_like(velocity), inputs))
+        limits += [effect.friction_share(speed) * at_rest for effect in bearing]
+    return jnp.sum(jnp.stack([jnp.asarray(one) for one in limits]))
 
 
 def _heating(system: System, stage: Stage, inputs: Inputs, temperature: Scalar, fraction: Scalar) -> Scalar:
@@ -77,7 +81,7 @@ def _free_position(system: System, stage: Stage, inputs: Inputs, z: Unknowns) ->
     assert isinstance(load, AbstractMovingLoad)
     velocity, acceleration = motion_rates(stage, z.position)
     inertia = load.inertia(inputs)
-    limit = friction_limit(system, velocity)
+    limit = friction_limit(system, velocity, inputs)
     friction = 0.0 if limit is None else limit * friction_in_use(stage, z.position)[0]
     pull = load.lever() * cross_section(system.wire) * z.stress
     resisting = load_resistance(system, stage.time, z.position, velocity, inputs) + friction

@@ -147,7 +147,7 @@ def solve(system: System, stage: Stage, inputs: Inputs) -> Solution:
     law, effects, old = system.wire.kinetics, system.effects, stage.old.wire
     xi = old.martensite_fraction
     open_at_start = open_branches(law, effects, old)
-    slips = friction_limit(system, jnp.zeros_like(xi))
+    slips = friction_limit(system, jnp.zeros_like(xi), inputs)
     sticks = stage.old.motion.position - PRESLIDING * stage.old.motion.friction
     tolerance = max(stage.enough, ROUNDINGS * float(jnp.finfo(xi.dtype).eps))
 

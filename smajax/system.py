@@ -14,6 +14,7 @@ from smajax.load.coupon import AbstractCoupon, StrainCoupon
 from smajax.parameters import parameter
 from smajax.reading import first_reading
 from smajax.types import Inputs, Motion, Scalar, State, WireState
+from smajax.wire.constitutive import young_modulus
 from smajax.wire.heat import cross_section
 from smajax.wire.resistance import resistance_per_metre
 from smajax.wire.wire import Wire, start
@@ -138,6 +139,13 @@ def initial_state(system: System, inputs: Inputs) -> State:
         at_rest = load_resistance(system, at_once, position, jnp.zeros_like(position), inputs)
         # An end stop may carry part of the load, the wire the rest; what the wire carries is what pulls on it.
         stress = jnp.maximum(at_rest / (system.load.lever() * cross_section(system.wire)), 0.0)
+        loose = having(system.effects, "loose_length")
+        if loose:
+            # What the wire is too long by takes the elastic strain first, and then the stop has the load.
+            modulus = young_modulus(system.wire, system.start_fraction)
+            too_long = sum(effect.loose_length() for effect in loose) / system.wire.wire_length
+            strain = jnp.maximum(too_long - stress / modulus, 0.0)
+            stress = jnp.maximum(stress - modulus * too_long, 0.0)
     temperature, stress, strain, position, reading, fraction = jnp.broadcast_arrays(
         temperature, stress, strain, position, reading, system.start_fraction
     )

@@ -209,7 +209,7 @@ def test_residual_strain_and_drift_after_n_cycles_are_those_of_the_formula():
         ("residual_strain", "drifting_temperatures"),
         {"residual_strain.cycles": scale, "drifting_temperatures.cycles": scale},
     )
-    run = simulate_compiled(set_parameters(full, {"residual_strain.final": most}), inputs, DT)
+    run = simulate_compiled(set_parameters(full, {"residual_strain.first": most / scale}), inputs, DT)
     ends = 2 * each * np.arange(1, n + 1)
     done = 1.0 - np.exp(-np.arange(1, n + 1) / scale)
     np.testing.assert_allclose(run.strain[ends] - plain.strain[ends], most * done, rtol=1e-9)

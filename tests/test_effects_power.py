@@ -22,7 +22,7 @@ from smajax.extended import extended
 from smajax.figures.rigs import arm
 from smajax.parameters import set_parameters
 from smajax.presets import build
-from smajax.system import System
+from smajax.system import System, initial_state
 from smajax.wire.heat import mass_per_metre
 
 DT = 0.05
@@ -125,6 +125,58 @@ def test_pulses_recorded_as_their_mean_heat_by_their_mean_square() -> None:
         power = _lost(system, end.temperature) * float(system.wire.wire_length)
         factors.append(power * _ohms(system, end.martensite_fraction) / (volts**2 + left * volts * (supply - volts)))
     assert factors == pytest.approx([(1.0 - share) / (1.0 - left)] * 2, rel=1e-6)
+
+
+def test_a_friction_that_grows_with_the_load_is_that_share_of_each_weight() -> None:
+    """The same wire under two weights: a friction of one size, chosen for the one, is wrong for the other by their ratio."""
+    system = RIGS["dead_weight"][0]
+    voltage = jnp.asarray(np.concatenate([np.full(300, 7.4), np.zeros(300)]))
+
+    def moved(effect: str, value: float, mass: float) -> np.ndarray:
+        full = extended(system, (effect,), {effect + {"p": ".share", "c": ".limit"}[effect[0]]: value})
+        return np.asarray(simulate_compiled(full, {"voltage": voltage, "mass": jnp.full(600, mass)}, DT).position)
+
+    for mass in (0.07, 0.12):
+        shared = moved("pulley_friction", 0.1, mass)
+        np.testing.assert_allclose(shared, moved("coulomb_friction", 0.1 * mass * 9.81, mass), atol=1e-12)
+        assert np.abs(shared - moved("coulomb_friction", 0.0, mass)).max() > 1e-5
+
+
+def test_a_loose_wire_leaves_the_arm_on_its_stop_until_it_has_taken_up_its_length() -> None:
+    """The temperature at which it leaves is that of the strain s/l_0; from there on both run in parallel."""
+    system, length = build("niti_table_3_1", "arm", "amplified_voltage"), 6e-3
+    assert LIBRARY["loose_start"].applies(system)
+    voltage = {"voltage": jnp.concatenate([jnp.full(600, 7.5), jnp.zeros(900)])}
+    plain, loose = (
+        simulate_compiled(one, voltage, 0.01)
+        for one in (system, extended(system, ("loose_start",), {"loose_start.length": length}))
+    )
+    stop = float(system.load.lower_stop)
+    on_stop = np.asarray(loose.position) <= stop + 1e-9
+    leaves = int(np.argmin(on_stop))
+    assert leaves > 10
+    assert float(loose.stress[0]) == 0.0
+    # The stop lets go when the wire pulls as hard as the load at rest does on a taut one.
+    assert float(loose.stress[leaves - 1]) == pytest.approx(float(plain.stress[0]), rel=0.05)
+    # What the wire is too long by, less the elastic strain at rest, is the strain that it takes up on the stop.
+    span, modulus = float(system.wire.wire_length), float(system.wire.constitutive.young_modulus_martensite)
+    assert float(loose.strain[0]) == pytest.approx(length / span - float(plain.stress[0]) / modulus, rel=1e-6)
+    assert float(loose.strain[leaves - 1]) == pytest.approx(0.0, abs=2e-5)
+    geometric = -float(system.load.contraction(system.wire)) * (np.asarray(loose.position) - stop)
+    taut = np.asarray(loose.stress) > 0.0
+    np.testing.assert_allclose(np.asarray(loose.strain)[taut], geometric[taut], atol=1e-9)
+    assert on_stop[-1]
+    assert 0.2 < np.asarray(loose.position).max() - stop < np.asarray(plain.position).max() - stop
+
+
+def test_a_stretch_below_the_elastic_one_is_taken_off_the_stress() -> None:
+    system = build("niti_table_3_1", "arm", "amplified_voltage")
+    modulus, span = float(system.wire.constitutive.young_modulus_martensite), float(system.wire.wire_length)
+    at_rest = float(initial_state(system, {"voltage": jnp.zeros(())}).wire.stress)
+    half = 0.5 * at_rest / modulus * span
+    begun = initial_state(extended(system, ("loose_start",), {"loose_start.length": half}), {"voltage": jnp.zeros(())})
+    assert float(begun.wire.stress) == pytest.approx(0.5 * at_rest, rel=1e-9)
+    assert float(begun.wire.strain) == 0.0
 
 
 def test_a_sagging_supply_gives_less_than_its_largest_current() -> None:

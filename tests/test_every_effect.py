@@ -26,6 +26,7 @@ DT = 0.05
 RIGS: dict[str, tuple[System, str, float]] = {
     "dead_weight": (build("flexinol_table_3_2", "dead_weight", "voltage"), "voltage", 7.4),
     "bias_spring": (build("flexinol_ht_500um", "bias_spring", "duty"), "duty", 0.35),
+    "arm": (build("niti_table_3_1", "arm", "amplified_voltage"), "voltage", 7.0),
 }
 # Those of kinetics, constitutive law and sensor are together in one model a rig in `test_effects_material`.
 HERE = sorted(set(LIBRARY) - {name for *_, names in ELSEWHERE.values() for name in names})

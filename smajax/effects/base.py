@@ -167,6 +167,14 @@ class AbstractEffect(eqx.Module):
         """Largest friction of the load, N (N m for an arm), at a speed of the wire's moving end, m/s."""
         return 0.0
 
+    def friction_share(self, speed: Scalar) -> Scalar | float:
+        """Largest friction that grows with the load, over the load at rest at its start, -."""
+        return 0.0
+
+    def loose_length(self) -> Scalar | float:
+        """By how much the wire is longer than its way at the start of a run, m; of a load that rests on its end stop."""
+        return 0.0
+
     def resisting_force(self, load: AbstractMovingLoad, displacement: Scalar, speed: Scalar) -> Scalar | float:
         """Force against contraction beside the load's, N; displacement (m) and speed (m/s) are the wire's moving end's."""
         return 0.0

@@ -21,8 +21,8 @@ class Creep(AbstractEffect):
     more. Under a held strain the stress relaxes. A run begins at rest.
     """
 
-    austenite: Scalar = parameter("1/Pa", 0.0, 1e-10, "J_A: retarded strain per stress; 1/E is 1.3e-11 to 3.6e-11")
-    martensite: Scalar = parameter("1/Pa", 0.0, 1e-10, "J_M")
+    austenite: Scalar = parameter("1/Pa", 0.0, 5e-10, "J_A: retarded strain per stress; 1/E is 1.3e-11 to 3.6e-11")
+    martensite: Scalar = parameter("1/Pa", 0.0, 5e-10, "J_M")
     time_constant: Scalar = parameter("s", 0.1, 1e4, "tau: retardation time")
 
     effect_name: ClassVar[str] = "creep"

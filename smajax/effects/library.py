@@ -23,10 +23,12 @@ from smajax.effects.latent_heat import LatentHeat
 from smajax.effects.lead_resistance import LeadResistance
 from smajax.effects.liang_conditions import LiangConditions
 from smajax.effects.load_shift import LoadShift
+from smajax.effects.loose_start import LooseStart
 from smajax.effects.minor_loops import MinorLoops
 from smajax.effects.nonlinear_spring import NonlinearSpring
 from smajax.effects.phase_resistance import PhaseResistance
 from smajax.effects.phase_specific_heat import PhaseSpecificHeat
+from smajax.effects.pulley_friction import PulleyFriction
 from smajax.effects.pulsed_voltage import PulsedVoltage
 from smajax.effects.pwm_smoothing import PwmSmoothing
 from smajax.effects.radiation import Radiation
@@ -98,10 +100,12 @@ _OWN: dict[str, type[AbstractEffect]] = {
         ResidualStrain,
         Creep,
         CoulombFriction,
+        PulleyFriction,
         StribeckFriction,
         ViscousFriction,
         SeriesCompliance,
         Slack,
+        LooseStart,
         NonlinearSpring,
         WrongLoad,
         LoadShift,

@@ -1,16 +1,15 @@
-"""A bias spring that is no straight line."""
+"""A spring of the load that is no straight line."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, ClassVar
 
 from smajax.effects.base import AbstractEffect
-from smajax.load.bias_spring import BiasSpring
+from smajax.load.base import AbstractMovingLoad
 from smajax.parameters import parameter
 from smajax.types import Scalar
 
 if TYPE_CHECKING:
-    from smajax.load.base import AbstractMovingLoad
     from smajax.system import System
 
 
@@ -21,13 +20,15 @@ class NonlinearSpring(AbstractEffect):
     A cubic without end would turn a softening spring around.
     """
 
-    change: Scalar = parameter("-", -0.88, 5.0, "a: relative change of the stiffness; > 0: it stiffens")
+    change: Scalar = parameter("-", -0.88, 20.0, "a: relative change of the stiffness; > 0: it stiffens")
     displacement: Scalar = parameter("m", 1e-3, 0.2, "x_r: displacement from the start over which it changes")
 
     effect_name: ClassVar[str] = "nonlinear_spring"
-    title: ClassVar[str] = "nonlinear bias spring"
+    title: ClassVar[str] = "nonlinear spring"
     equation: ClassVar[str] = "mechanics"
-    formula: ClassVar[str] = "F_0 + k x + a k x^3/(x^2 + x_r^2) in the place of F_0 + k x (a cubic that levels off)"
+    formula: ClassVar[str] = (
+        "k x + a k x^3/(x^2 + x_r^2) in the place of k x in eq. 3.8, 3.13 (a cubic that levels off)"
+    )
     sentence: ClassVar[str] = (
         "The spring gets stiffer (or softer) as it is stretched: the end of the stroke is shorter (or longer) than its "
         "beginning promises."
@@ -41,10 +42,9 @@ class NonlinearSpring(AbstractEffect):
 
     @classmethod
     def applies(cls, system: System) -> bool:
-        return isinstance(system.load, BiasSpring)
+        load = system.load
+        return isinstance(load, AbstractMovingLoad) and type(load).spring_rate is not AbstractMovingLoad.spring_rate
 
     def resisting_force(self, load: AbstractMovingLoad, displacement: Scalar, speed: Scalar) -> Scalar | float:
-        if not isinstance(load, BiasSpring):
-            return 0.0
         square = displacement**2
-        return self.change * load.spring_stiffness * displacement * square / (square + self.displacement**2)
+        return self.change * load.spring_rate() * displacement * square / (square + self.displacement**2)

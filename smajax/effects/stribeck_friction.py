@@ -18,7 +18,7 @@ class StribeckFriction(AbstractEffect):
     """
 
     excess: Scalar = parameter("N", 0.0, 5.0, "F_s: friction at rest beyond that in motion (N m on an arm)")
-    speed: Scalar = parameter("m/s", 1e-3, 1.0, "v_s: speed of the wire's moving end at which the excess has gone")
+    speed: Scalar = parameter("m/s", 1e-5, 1.0, "v_s: speed of the wire's moving end at which the excess has gone")
 
     effect_name: ClassVar[str] = "stribeck_friction"
     title: ClassVar[str] = "Stribeck friction"

@@ -60,5 +60,8 @@ class Arm(AbstractMovingLoad):
     def lever(self) -> Scalar | float:
         return 2.0 * self.pulley_radius
 
+    def spring_rate(self) -> Scalar:
+        return self.spring_stiffness * (self.spring_lever / self.lever()) ** 2
+
     def contraction(self, wire: Wire) -> Scalar:
         return 2.0 * self.pulley_radius / wire.wire_length

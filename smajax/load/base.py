@@ -48,6 +48,10 @@ class AbstractMovingLoad(eqx.Module):
     def lever(self) -> Scalar | float:
         """Force on +position per newton in the wire: 1, or 2 r (m) for an arm."""
 
+    def spring_rate(self) -> Scalar | float:
+        """Stiffness of its spring as the wire's moving end feels it, N/m; 0 without one."""
+        return 0.0
+
     @abc.abstractmethod
     def contraction(self, wire: Wire) -> Scalar:
         """Strain lost per unit of position: 1/l_0, or 2 r / l_0 for an arm (eq. 3.7, 3.14)."""

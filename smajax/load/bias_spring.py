@@ -39,5 +39,8 @@ class BiasSpring(AbstractMovingLoad):
     def lever(self) -> Scalar | float:
         return 1.0
 
+    def spring_rate(self) -> Scalar:
+        return self.spring_stiffness
+
     def contraction(self, wire: Wire) -> Scalar:
         return 1.0 / wire.wire_length

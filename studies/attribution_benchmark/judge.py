@@ -23,6 +23,8 @@ CALLED: dict[str, tuple[str, ...]] = {
     "two_part_transformation": ("two_step_transformation", "two_part_transformation"),
     "rate_dependence": ("lagging_transformation",),
     "transformation_drift": ("drifting_temperatures",),
+    "coulomb_friction": ("coulomb_friction", "pulley_friction"),
+    "slack": ("slack", "loose_start"),
     "dead_band": ("sensor_backlash",),
     "quantisation": ("sensor_resolution",),
     "input_gain": ("input_level",),
