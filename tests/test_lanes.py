@@ -17,7 +17,7 @@ from smajax.batch.engine import Engine, chunks
 from smajax.batch.run import run_batch
 from smajax.figures.rigs import arm
 from smajax.lanes.evaluate import evaluator
-from smajax.lanes.kernel import Kernel
+from smajax.lanes.kernel import Kernel, compiled
 from smajax.lanes.text import Unsupported
 from smajax.lanes.translate import translate
 from smajax.measure import Largest, Last, Mean, MeanSquare
@@ -29,7 +29,8 @@ ODD = [0.0, -0.0, 1.0, -1.0, 0.5, 2.5, -2.5, 1e-300, -1e300, 1e308, np.inf, -np.
 def by_lanes(function: Function, *own: np.ndarray, lanes: int = 8, wide: bool = False) -> np.ndarray:
     """`function` of every member by the translator."""
     program = jax.make_jaxpr(function)(*(jnp.zeros((), one.dtype) for one in own))
-    kernel = Kernel(translate(program, [True] * len(own), lanes, wide))
+    translated = translate(program, [True] * len(own), lanes, wide)
+    kernel = Kernel(compiled(translated), translated.lanes, translated.results, translated.scratch)
     return kernel([], [np.ascontiguousarray(one) for one in own], threads=1)[0]
 
 

@@ -10,7 +10,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from smajax.lanes.kernel import Kernel, has_wide_vectors, vector_bits
+from smajax.lanes import disk
+from smajax.lanes.kernel import Kernel, compiled, has_wide_vectors, vector_bits
 from smajax.lanes.text import Unsupported
 from smajax.lanes.translate import translate
 
@@ -115,8 +116,15 @@ def evaluator(function: Callable[[Any, Any], Any], model: Any, names: tuple[str,
 
     def made() -> Evaluator | str:
         arrays, static = eqx.partition(model, _is_array)
+        key = disk.key_of(function, model, names) if disk.folder() else None
+        known = disk.load(key) if key else None
+        if known is not None:
+            return _evaluator(known, names)
         try:
-            return _compiled(function, arrays, static, names)
+            program = _compiled(function, arrays, static, names)
+            if key:
+                disk.save(key, program)
+            return _evaluator(program, names)
         except Unsupported as reason:
             return str(reason)
 
@@ -126,7 +134,13 @@ def evaluator(function: Callable[[Any, Any], Any], model: Any, names: tuple[str,
     return found
 
 
-def _compiled(function: Callable[[Any, Any], Any], arrays: Any, static: Any, names: tuple[str, ...]) -> Evaluator:
+def _evaluator(program: disk.Stored, names: tuple[str, ...]) -> Evaluator:
+    kernel = Kernel(program.code, program.lanes, program.results, program.scratch)
+    shared = [np.dtype(kind) for kind in program.shared]
+    return Evaluator(kernel, program.tree, names, np.dtype(jnp.zeros(()).dtype), shared)
+
+
+def _compiled(function: Callable[[Any, Any], Any], arrays: Any, static: Any, names: tuple[str, ...]) -> disk.Stored:
     leaves, tree = jax.tree.flatten(arrays)
     none = jnp.zeros(())
     shape: list[Any] = []
@@ -144,8 +158,8 @@ def _compiled(function: Callable[[Any, Any], Any], arrays: Any, static: Any, nam
     own = [False] * len(leaves) + [True] * len(names)
     translated = translate(program, own, lanes_of(dtypes), has_wide_vectors())
     try:
-        kernel = Kernel(translated)
+        code = compiled(translated)
     except RuntimeError as reason:  # LLVM's words for a text that makes no sense to it
         raise Unsupported(f"something in this program ({str(reason).splitlines()[-1]})") from None
-    shared = [np.dtype(aval.dtype) for aval in program.in_avals[: len(leaves)]]
-    return Evaluator(kernel, shape[0], names, np.dtype(none.dtype), shared)
+    shared = tuple(str(aval.dtype) for aval in program.in_avals[: len(leaves)])
+    return disk.Stored(code, translated.lanes, translated.results, translated.scratch, shared, shape[0])

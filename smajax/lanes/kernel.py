@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from smajax.lanes.text import NAME
+from smajax.lanes.text import NAME, Array
 from smajax.lanes.translate import Translated
 
 ALIGNED = 64  # bytes
@@ -57,23 +57,39 @@ def _aligned(count: int) -> np.ndarray:
     return raw[start : start + count]
 
 
-class Kernel:
-    """A translated program as a function of whole arrays. Threads share nothing but what they read."""
+def processor() -> str:
+    """Its name and what it can do: machine code is of one kind of processor."""
+    import llvmlite.binding as llvm
 
-    def __init__(self, translated: Translated) -> None:
+    able = ",".join(name for name, has in sorted(_features().items()) if has)
+    return f"{llvm.get_default_triple()} {llvm.get_host_cpu_name()} {able}"
+
+
+def compiled(translated: Translated) -> bytes:
+    """The machine code of a translated program, an object file."""
+    import llvmlite.binding as llvm
+
+    machine = _machine()
+    module = llvm.parse_assembly(translated.text)
+    module.triple, module.data_layout = machine.triple, str(machine.target_data)
+    module.verify()
+    # Every instruction is on a whole vector already, and a step is long enough as it is.
+    options = llvm.create_pipeline_tuning_options(speed_level=3)
+    options.loop_vectorization = options.slp_vectorization = options.loop_unrolling = False
+    builder = llvm.create_pass_builder(machine, options)
+    builder.getModulePassManager().run(module, builder)
+    return bytes(machine.emit_object(module))
+
+
+class Kernel:
+    """Machine code as a function of whole arrays. Threads share nothing but what they read."""
+
+    def __init__(self, code: bytes, lanes: int, results: Sequence[Array], scratch: int) -> None:
         import llvmlite.binding as llvm
 
-        self.translated = translated
-        machine = _machine()
-        module = llvm.parse_assembly(translated.text)
-        module.triple, module.data_layout = machine.triple, str(machine.target_data)
-        module.verify()
-        # Every instruction is on a whole vector already, and a step is long enough as it is.
-        options = llvm.create_pipeline_tuning_options(speed_level=3)
-        options.loop_vectorization = options.slp_vectorization = options.loop_unrolling = False
-        builder = llvm.create_pass_builder(machine, options)
-        builder.getModulePassManager().run(module, builder)
-        self._engine = llvm.create_mcjit_compiler(module, machine)
+        self._lanes, self._results, self._scratch = lanes, tuple(results), scratch
+        self._engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _machine())
+        self._engine.add_object_file(llvm.ObjectFileRef.from_data(code))
         self._engine.finalize_object()
         pointer, number = ctypes.c_void_p, ctypes.c_int64
         kind = ctypes.CFUNCTYPE(None, pointer, pointer, pointer, pointer, number, number)
@@ -81,17 +97,17 @@ class Kernel:
 
     def __call__(self, shared: Sequence[np.ndarray], own: Sequence[np.ndarray], threads: int) -> list[np.ndarray]:
         """`own` are arrays of shape (members,), `shared` of the shapes traced; results have shape (members, ...)."""
-        lanes = self.translated.lanes
+        lanes = self._lanes
         members = len(own[0])
         groups = -(-members // lanes)
         room = groups * lanes
         filled = [np.concatenate([one, np.full(room - members, one[-1])]) for one in own]
-        results = [np.empty((room, *one.shape), one.dtype) for one in self.translated.results]
+        results = [np.empty((room, *one.shape), one.dtype) for one in self._results]
         tables = [self._pointers(arrays) for arrays in (shared, filled, results)]
         edges = np.linspace(0, groups, min(threads, groups) + 1).astype(int)
 
         def part(first: int, last: int) -> None:
-            scratch = _aligned(self.translated.scratch)
+            scratch = _aligned(self._scratch)
             self._call(*tables, scratch.ctypes.data, first, last)
 
         try:

@@ -171,3 +171,11 @@ class Text:
         here = self.scratch
         self.scratch += -(-count * self.lanes * self.bytes(dtype) // 64) * 64
         return self.assign(f"getelementptr inbounds i8, ptr %scratch, i64 {here}")
+
+
+@dataclass(frozen=True)
+class Array:
+    """An argument or a result: shape of one member's, and numpy's kind of number."""
+
+    shape: tuple[int, ...]
+    dtype: str

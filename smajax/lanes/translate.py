@@ -14,7 +14,7 @@ from jax.interpreters import partial_eval
 from smajax.lanes.arithmetic import ELEMENTWISE, exact_quotient, select
 from smajax.lanes.loop import Loop
 from smajax.lanes.memory import copy, in_memory, in_registers, mapped, row, write
-from smajax.lanes.text import NAME, Lane, Text, Unsupported, scalar_type
+from smajax.lanes.text import NAME, Array, Lane, Text, Unsupported, scalar_type
 from smajax.lanes.values import SMALL, Filled, Held, Stored, Value, held, is_known, size_of
 
 CALLS = {  # primitives that stand for a program of their own, and where it is kept
@@ -55,14 +55,6 @@ REDUCTIONS = {
     "reduce_and": "and",
     "reduce_or": "or",
 }
-
-
-@dataclass(frozen=True)
-class Array:
-    """An argument or a result: shape of one member's, and numpy's kind of number."""
-
-    shape: tuple[int, ...]
-    dtype: str
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,243 @@
+"""Machine code on disk, under a key of everything that it was made from, so that a process need not make it again.
+
+Where JAX keeps its compiled programs (`jax_compilation_cache_dir`, which our commands set), and only there: without such
+a folder nothing is kept. Only programs made of this package's own parts are: what another package or a notebook defines may
+have been edited since under the same name. Nothing is unpickled.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import os
+import platform
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+from functools import cache
+from importlib import import_module
+from importlib.metadata import version
+from pathlib import Path
+from types import FunctionType, ModuleType
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from smajax.lanes.kernel import processor
+from smajax.lanes.text import Array
+from smajax.report.files import writing
+
+PACKAGE = "smajax"
+MOST = 2**30  # bytes in the folder: beyond, what was not used longest goes
+HEAD = b"smajax program 1\n"
+
+
+class Untold(Exception):
+    """Something that no key can stand for."""
+
+
+class Stored(NamedTuple):
+    """A compiled program and what is needed to call it."""
+
+    code: bytes
+    lanes: int
+    results: tuple[Array, ...]
+    scratch: int
+    shared: tuple[str, ...]  # kinds of the arrays that all members share
+    tree: Any  # a `jax.tree_util.PyTreeDef`
+
+
+def folder() -> Path | None:
+    """Where programs are kept; None where JAX keeps none."""
+    values = jax.config.values
+    place = values["jax_compilation_cache_dir"]
+    return Path(place) / "lanes" if place and values["jax_enable_compilation_cache"] else None
+
+
+def key_of(function: Callable[..., Any], model: Any, names: tuple[str, ...]) -> str | None:
+    """Of a program and of all that it is made from; None where it is not ours alone."""
+    modules: set[str] = set()
+    try:
+        said = [_said(function, modules), _said(model, modules), list(names), str(jnp.zeros(()).dtype)]
+    except Untold:
+        return None
+    return hashlib.sha256(json.dumps([*said, _constants(modules), _surroundings()]).encode()).hexdigest()
+
+
+def load(key: str) -> Stored | None:
+    """What was kept under a key; None where there is nothing whole."""
+    place = folder()
+    if place is None:
+        return None
+    path = place / key
+    with suppress(OSError, ValueError, KeyError, TypeError, AttributeError, ImportError):
+        raw = path.read_bytes()
+        digest, rest = raw[len(HEAD) : len(HEAD) + 32], raw[len(HEAD) + 32 :]
+        if not raw.startswith(HEAD) or hashlib.sha256(rest).digest() != digest:
+            return None
+        told, _, code = rest.partition(b"\n")
+        record = json.loads(told)
+        results = tuple(Array(tuple(shape), kind) for shape, kind in record["results"])
+        leaves, tree = jax.tree.flatten(_made(record["tree"]))
+        if leaves != list(range(len(results))):
+            return None
+        os.utime(path)
+        return Stored(code, record["lanes"], results, record["scratch"], tuple(record["shared"]), tree)
+    return None
+
+
+def save(key: str, program: Stored) -> None:
+    """Keep a program; where that cannot be done, it is made anew the next time."""
+    place = folder()
+    if place is None:
+        return
+    with suppress(OSError, Untold):
+        record = {
+            "lanes": program.lanes,
+            "results": [[one.shape, one.dtype] for one in program.results],
+            "scratch": program.scratch,
+            "shared": program.shared,
+            "tree": _shape(jax.tree.unflatten(program.tree, range(len(program.results)))),
+        }
+        rest = json.dumps(record).encode() + b"\n" + program.code
+        place.mkdir(parents=True, exist_ok=True)
+        with writing(place / key) as file:
+            file.write(HEAD + hashlib.sha256(rest).digest() + rest)
+        _make_room(place)
+
+
+def _make_room(place: Path) -> None:
+    known = sorted(((one.stat().st_mtime, one.stat().st_size, one) for one in place.iterdir()), reverse=True)
+    total = 0
+    for _, size, path in known:
+        total += size
+        if total > MOST:
+            path.unlink(missing_ok=True)
+
+
+def _own(value: type | FunctionType) -> str:
+    """`module:name` of a class or function of this package, where that is where it is found."""
+    module, name = value.__module__, value.__qualname__
+    if module.partition(".")[0] != PACKAGE or _found(module, name) is not value:
+        raise Untold(f"{module}.{name}")
+    return f"{module}:{name}"
+
+
+def _found(module: str, name: str) -> Any:
+    found: Any = sys.modules.get(module) or import_module(module)
+    for part in name.split("."):
+        found = getattr(found, part, None)
+    return found
+
+
+def _said(value: Any, modules: set[str]) -> Any:
+    """A value as JSON: arrays by their kind, all else by what it is; `modules` gets those of its classes. Untold: not ours."""
+
+    def named(own: type | FunctionType) -> str:
+        told = _own(own)
+        modules.add(own.__module__)
+        return told
+
+    def said(one: Any) -> Any:
+        return _said(one, modules)
+
+    if isinstance(value, jax.Array | np.ndarray):
+        return ["array", list(value.shape), str(value.dtype), bool(getattr(value, "weak_type", False))]
+    if value is None or isinstance(value, bool | int | float | complex | str):
+        return [type(value).__name__, repr(value)]
+    if isinstance(value, type | FunctionType):
+        return ["named", named(value)]
+    if isinstance(value, dict):
+        return ["dict", [[said(name), said(one)] for name, one in sorted(value.items())]]
+    if isinstance(value, frozenset):
+        return ["set", sorted(json.dumps(said(one)) for one in value)]
+    if isinstance(value, eqx.Module):
+        fields = [field.name for field in dataclasses.fields(value)]
+        return ["module", named(type(value)), [[name, said(getattr(value, name))] for name in fields]]
+    if isinstance(value, tuple | list):
+        kind = type(value).__name__ if type(value) in (tuple, list) else named(type(value))
+        return [kind, [said(one) for one in value]]
+    raise Untold(repr(type(value)))
+
+
+def _shape(value: Any) -> Any:
+    """A tree whose leaves are their numbers as JSON, from which `_made` makes it again."""
+    if value is None or type(value) is int:
+        return value
+    if type(value) is tuple or type(value) is list:
+        return [type(value).__name__, [_shape(one) for one in value]]
+    if type(value) is dict and all(isinstance(name, str) for name in value):
+        return ["dict", {name: _shape(one) for name, one in value.items()}]
+    if isinstance(value, tuple):
+        return ["named", _own(type(value)), [_shape(one) for one in value]]
+    if isinstance(value, eqx.Module):
+        fields = dataclasses.fields(value)
+        if any(field.metadata.get("static", False) for field in fields):
+            raise Untold(repr(type(value)))
+        return ["module", _own(type(value)), {field.name: _shape(getattr(value, field.name)) for field in fields}]
+    raise Untold(repr(type(value)))
+
+
+def _made(told: Any) -> Any:
+    if told is None or isinstance(told, int):
+        return told
+    kind, *rest = told
+    if kind in ("tuple", "list"):
+        return {"tuple": tuple, "list": list}[kind]([_made(one) for one in rest[0]])
+    if kind == "dict":
+        return {name: _made(one) for name, one in rest[0].items()}
+    module, _, name = rest[0].partition(":")
+    if module.partition(".")[0] != PACKAGE:
+        raise ValueError(module)
+    made = _found(module, name)
+    if kind == "named":
+        return made(*(_made(one) for one in rest[1]))
+    found = object.__new__(made)
+    for field, one in rest[1].items():
+        object.__setattr__(found, field, _made(one))
+    return found
+
+
+@cache
+def _surroundings() -> str:
+    """Our own code, that of those that trace and compile it, and the processor."""
+    code = hashlib.sha256()
+    root = Path(__file__).parents[1]
+    for path in sorted(root.rglob("*.py")):
+        code.update(path.relative_to(root).as_posix().encode() + path.read_bytes())
+    packages = ("jax", "jaxlib", "equinox", "numpy", "llvmlite")
+    versions = [f"{name} {version(name)}" for name in packages]
+    return " ".join([code.hexdigest(), platform.python_version(), *versions, processor()])
+
+
+def _constants(roots: set[str]) -> str:
+    """Plain values and functions of the modules behind a program as they are now: a test, or a user, may have put others in."""
+    told = hashlib.sha256()
+    waiting, seen = sorted(roots), set(roots)
+    while waiting:
+        name = waiting.pop(0)
+        for own, value in sorted(vars(sys.modules[name]).items()):
+            if own.startswith("__"):
+                continue
+            if isinstance(value, ModuleType):
+                behind = value.__name__
+            elif isinstance(value, FunctionType | type):
+                behind = value.__module__
+                told.update(f"{name}.{own}:{behind}.{value.__qualname__};".encode())
+            else:
+                behind = ""
+                told.update(f"{name}.{own}={value!r};".encode() if _plain(value) else b"")
+            if behind.partition(".")[0] == PACKAGE and behind not in seen and behind in sys.modules:
+                seen.add(behind)
+                waiting.append(behind)
+    return told.hexdigest()
+
+
+def _plain(value: Any) -> bool:
+    if isinstance(value, tuple):
+        return all(map(_plain, value))
+    return value is None or isinstance(value, bool | int | float | str)
