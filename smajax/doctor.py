@@ -144,7 +144,7 @@ def clear_cache() -> int:
     """Delete the compiled programs, and nothing else that may lie in their folder; the bytes that are free again."""
     folder = kept_programs()
     before = _size(folder)
-    for ending in ("-cache", "-atime"):
-        for one in folder.glob(f"*{ending}"):
+    for kind in ("*-cache", "*-atime", f"lanes/{'[0-9a-f]' * 64}"):
+        for one in folder.glob(kind):
             one.unlink(missing_ok=True)
     return before - _size(folder)

@@ -44,9 +44,12 @@ def test_the_doctor_finds_what_is_missing() -> None:
 def test_only_compiled_programs_are_cleared(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("JAX_COMPILATION_CACHE_DIR", str(tmp_path))
     (tmp_path / "jit_f-abc-cache").write_bytes(b"x" * 1000)
+    (tmp_path / "lanes").mkdir()
+    (tmp_path / "lanes" / ("0a" * 32)).write_bytes(b"x" * 500)
+    (tmp_path / "lanes" / "notes").write_text("mine")
     (tmp_path / "thesis.tex").write_text("mine")
-    assert doctor.clear_cache() == 1000
-    assert [one.name for one in tmp_path.iterdir()] == ["thesis.tex"]
+    assert doctor.clear_cache() == 1500
+    assert sorted(one.name for one in tmp_path.rglob("*")) == ["lanes", "notes", "thesis.tex"]
 
 
 def test_the_bench_compares_the_same_trajectories() -> None:
