@@ -176,7 +176,7 @@ def close_loop(
         aside,
         foretold,
         refused,
-        [one.name for one in after.parameters if one.name.startswith(added) and one.remark.startswith("at its")],
+        [one.name for one in after.parameters if one.name.startswith(added) and _asks_for_more(one)],
         [one for one in mistaken if one.weight > 0.5],
     )
     return Findings(
@@ -249,6 +249,11 @@ def _preset(job: _Job) -> dict[str, str]:
         name: f"{digits(display(entry.unit, name).of(float(value)))} {display(entry.unit, name).unit}".strip()
         for (name, entry), value in zip(table.items(), values, strict=True)
     }
+
+
+def _asks_for_more(one: ParameterFinding) -> bool:
+    """Whether a parameter is at a bound that it might lie beyond: a share of all or of nothing is not."""
+    return one.remark.startswith("at its") and (one.unit, one.low, one.high) != ("-", 0.0, 1.0)
 
 
 @dataclass(frozen=True)

@@ -7,35 +7,42 @@ from typing import TYPE_CHECKING, ClassVar
 from smajax.effects.base import AbstractEffect
 from smajax.parameters import parameter
 from smajax.types import Scalar, WireState
-from smajax.wire.kinetics import cooling_width
+from smajax.wire.kinetics import cooling_width, heating_width
 
 if TYPE_CHECKING:
     from smajax.wire.kinetics import Kinetics
 
 
 class UnequalStressSlopes(AbstractEffect):
-    r"""$y_M = T - (1 + a) \sigma/C_M$: stress moves the range of cooling by another amount than that of heating.
+    r"""$y_A = T - (1 + a) \sigma/C_A$, $y_M = T - (1 + b) \sigma/C_M$: stress moves each range by an amount of its own.
 
-    C_A and C_M are parameters of the base model and equal in every preset; this says that they differ, with one number
-    and without freeing either. Where C_M is fitted, that parameter tells it all and this effect nothing.
+    C_A and C_M are parameters of the base model and equal in every preset; this says that they differ, from the preset's
+    and from each other. Where an experiment fits one of them, that parameter tells it all and the coefficient nothing.
     """
 
-    excess: Scalar = parameter("-", -0.8, 3.0, "a: how much more the cooling range moves with stress than C_M says")
+    heating: Scalar = parameter("-", -0.8, 3.0, "a: how much more the heating range moves with stress than C_A says")
+    cooling: Scalar = parameter("-", -0.8, 3.0, "b: how much more the cooling range moves with stress than C_M says")
 
     effect_name: ClassVar[str] = "unequal_stress_slopes"
     title: ClassVar[str] = "unequal stress slopes"
     equation: ClassVar[str] = "kinetics"
-    formula: ClassVar[str] = "y_M = T - (1 + a) sigma/C_M in eq. 3.5 (C_A and C_M of their own: Liang and Rogers 1990)"
+    formula: ClassVar[str] = (
+        "y_A = T - (1 + a) sigma/C_A in eq. 3.3, y_M = T - (1 + b) sigma/C_M in eq. 3.5 (C_A and C_M of their own: Liang and "
+        "Rogers 1990)"
+    )
     sentence: ClassVar[str] = (
         "A heavier load moves the cooling stroke by another number of degrees than the heating stroke: the hysteresis "
         "gets wider or narrower with the load."
     )
-    switches: ClassVar[tuple[str, ...]] = ("excess",)
-    starts: ClassVar[dict[str, float]] = {"excess": 0.1}
+    switches: ClassVar[tuple[str, ...]] = ("heating", "cooling")
+    starts: ClassVar[dict[str, float]] = {"heating": 0.1, "cooling": 0.1}
 
     @classmethod
     def base(cls) -> UnequalStressSlopes:
-        return cls(excess=0.0)
+        return cls(heating=0.0, cooling=0.0)
+
+    def heating_distance(self, law: Kinetics, z: Scalar, temperature: Scalar, stress: Scalar, old: WireState) -> Scalar:
+        return z - self.heating * stress / (law.stress_slope_austenite * heating_width(law))
 
     def cooling_distance(self, law: Kinetics, z: Scalar, temperature: Scalar, stress: Scalar, old: WireState) -> Scalar:
-        return z - self.excess * stress / (law.stress_slope_martensite * cooling_width(law))
+        return z - self.cooling * stress / (law.stress_slope_martensite * cooling_width(law))

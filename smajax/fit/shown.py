@@ -23,6 +23,7 @@ from smajax.parameters import set_vector
 from smajax.system import System
 from smajax.types import Series
 
+ROOM = 2**28  # bytes of what is shown at once: of long runs some points after the others
 FEW = 256  # points whose derivatives nobody asked for: sooner had than a second program that has none
 
 
@@ -90,6 +91,10 @@ def _of_run(problem: Problem, points: np.ndarray, run: int) -> np.ndarray:
 def shown_at(problem: Problem, points: Sequence[np.ndarray] | np.ndarray) -> np.ndarray:
     """What the sensors show at points (M, P): (M, series, N), SI."""
     asked = np.asarray(points, dtype=float)
+    at_once = max(1, ROOM // max(problem.measured.nbytes, 1))
+    if len(asked) > at_once:
+        parts = [shown_at(problem, asked[start : start + at_once]) for start in range(0, len(asked), at_once)]
+        return np.concatenate(parts)
     if len(asked) <= FEW:
         nowhere = np.zeros((len(asked), 1, asked.shape[1]))
         return shown_and_slopes(problem, asked, nowhere)[0]
@@ -106,6 +111,14 @@ def shown_at(problem: Problem, points: Sequence[np.ndarray] | np.ndarray) -> np.
 def misfits(problem: Problem, points: Sequence[np.ndarray] | np.ndarray) -> np.ndarray:
     """Misfit (SI) of every series at every point, shape (M, series, N)."""
     return problem.centred(problem.measured - shown_at(problem, points))
+
+
+def squares(problem: Problem, points: Sequence[np.ndarray] | np.ndarray) -> np.ndarray:
+    """Sum of the squared misfits over the noise at every point, (M,): of long runs no more than some are held at once."""
+    asked = np.asarray(points, dtype=float)
+    at_once = max(1, ROOM // max(problem.measured.nbytes, 1))
+    parts = [misfits(problem, asked[start : start + at_once]) for start in range(0, len(asked), at_once)]
+    return np.concatenate([((one / np.asarray(problem.noise)) ** 2).sum(axis=(1, 2)) for one in parts])
 
 
 def shown_and_slopes(problem: Problem, points: np.ndarray, towards: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

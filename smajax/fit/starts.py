@@ -12,7 +12,7 @@ from smajax.fit.box import ENOUGH, Fit, fit_in_box
 from smajax.fit.kept import Kept
 from smajax.fit.problem import Lane, Problem
 from smajax.fit.progress import Progress, quiet
-from smajax.fit.shown import misfits
+from smajax.fit.shown import squares
 
 MARGIN = 0.02  # share of the box that is kept from its bounds
 TRIED = 64
@@ -37,9 +37,8 @@ def _costs(problem: Problem, points: np.ndarray, kept: Kept) -> np.ndarray:
     known = kept.load(key)
     if known is not None:
         return known["cost"]
-    squares = (misfits(problem, points) / np.asarray(problem.noise)) ** 2
     before = np.stack([problem.priors.rows(point) for point in points]) ** 2
-    cost = np.nan_to_num(squares.sum(axis=(1, 2)) + before.sum(axis=1), nan=np.inf)
+    cost = np.nan_to_num(squares(problem, points) + before.sum(axis=1), nan=np.inf)
     kept.save(key, {"cost": cost})
     return cost
 

@@ -12,6 +12,7 @@ import json
 import tempfile
 import time
 from collections.abc import Callable
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +28,8 @@ STRESSES = 60.0, 180.0  # MPa
 TRUTH = {"recoverable_strain": 0.04, "austenite_finish": 95.0}
 NOISE = 2e-4  # of strain
 RUN_SAMPLES = 300
+CYCLE = 1_000_000  # samples of a run that are simulated
+LONGEST = 2_000_000  # steps of a run that smajax takes at most
 CANDIDATES = ("thermal_expansion", "stress_dependent_strain", "stress_dependent_width", "sensor_gain")
 COUPON = """\
 [model]
@@ -43,8 +46,6 @@ high = "120 degC"
 start = "105 degC"
 [nuisance]
 offset = true
-[time]
-kind = "sample"
 [channels.temperature]
 role = "input"
 column = "T"
@@ -89,7 +90,18 @@ def _cycles(samples: int, number: int) -> np.ndarray:
 
 
 def _experiment(place: Path, runs: int, samples: int) -> Path:
+    """`_written`, by a process of its own: the memory that takes is not what is measured here."""
+    writer = get_context("spawn").Process(target=_written, args=(place, runs, samples))
+    writer.start()
+    writer.join()
+    if writer.exitcode:
+        raise RuntimeError(f"the experiment could not be written (exit code {writer.exitcode})")
+    return place / "experiment.toml"
+
+
+def _written(place: Path, runs: int, samples: int) -> None:
     """An experiment of coupons at several stresses, every tenth run held out."""
+    prepare()
     import jax.numpy as jnp
 
     from smajax.compiled import simulate_compiled
@@ -100,21 +112,29 @@ def _experiment(place: Path, runs: int, samples: int) -> Path:
     random = np.random.default_rng(1)
     only = ", ".join(f'"{name}"' for name in CANDIDATES)
     told = [COUPON.format(noise=NOISE, only=only)]
+    if samples > LONGEST:  # a step of several samples
+        step = -(-samples // LONGEST)
+        told.append(f'[time]\ncolumn = "t"\nunit = "s"\n[sampling]\nstep = "{step} s"')
+    else:
+        told.append('[time]\nkind = "sample"')
     for number in range(runs):
         stress = float(np.interp(number / max(runs - 1, 1), (0.0, 1.0), STRESSES))
-        temperature = _cycles(samples, number)
-        inputs = {"temperature": jnp.asarray(temperature), "stress": jnp.full(samples, stress * 1e6)}
-        strain = simulate_compiled(coupon, inputs, 1.0).reading + random.normal(0.0, NOISE, samples)
+        # A whole number of cycles ends where it began: a longer run is the same again, with other noise.
+        each = min(samples, CYCLE)
+        temperature = _cycles(each, number)
+        inputs = {"temperature": jnp.asarray(temperature), "stress": jnp.full(each, stress * 1e6)}
+        strain = np.asarray(simulate_compiled(coupon, inputs, 1.0).reading)
         name = f"run{number:04d}"
         with (place / f"{name}.csv").open("w", encoding="utf-8") as log:
-            log.write("T,strain\n")
-            for part in np.array_split(np.column_stack((temperature, strain)), -(-samples // BLOCK)):
-                log.write("\n".join(f"{a:.4f},{b:.6f}" for a, b in part) + "\n")
+            log.write("t,T,strain\n")
+            for cycle in range(samples // each):
+                shown = strain + random.normal(0.0, NOISE, each)
+                clock = cycle * each + np.arange(each)
+                for part in np.array_split(np.column_stack((clock, temperature, shown)), -(-each // BLOCK)):
+                    log.write("\n".join(f"{t:.0f},{a:.4f},{b:.6f}" for t, a, b in part) + "\n")
         role = "held-out" if number % 10 == 9 else "fit"
         told.append(RUN.format(name=name, role=role, stress=stress))
-    file = place / "experiment.toml"
-    file.write_text("\n".join(told), encoding="utf-8")
-    return file
+    (place / "experiment.toml").write_text("\n".join(told), encoding="utf-8")
 
 
 def _samples(count: int, place: Path) -> Work:
