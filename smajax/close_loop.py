@@ -253,7 +253,7 @@ def _preset(job: _Job) -> dict[str, str]:
 
 def _asks_for_more(one: ParameterFinding) -> bool:
     """Whether a parameter is at a bound that it might lie beyond: a share of all or of nothing is not."""
-    return one.remark.startswith("at its") and (one.unit, one.low, one.high) != ("-", 0.0, 1.0)
+    return one.remark.startswith("at its") and (one.unit, one.lower, one.upper) != ("-", 0.0, 1.0)
 
 
 @dataclass(frozen=True)
