@@ -121,6 +121,17 @@ def load_resistance(system: System, time: Scalar, position: Scalar, velocity: Sc
     return resisting
 
 
+def _stretch(system: System, temperature: Scalar, stress: Scalar) -> Scalar:
+    """Strain that goes when the stress does: the wire's own, and that of whatever is in series with it."""
+    fraction = system.start_fraction
+    straining = having(system.effects, "strain")
+
+    def series(at: Scalar) -> Scalar | float:
+        return sum(effect.strain(system.wire, temperature, at, fraction, fraction) for effect in straining)
+
+    return stress / young_modulus(system.wire, fraction) + series(stress) - series(jnp.zeros_like(stress))
+
+
 def initial_state(system: System, inputs: Inputs) -> State:
     """At rest with the first inputs: a moving load in equilibrium at ambient temperature, a coupon as prescribed."""
     strain = jnp.zeros_like(system.start_fraction)
@@ -142,10 +153,10 @@ def initial_state(system: System, inputs: Inputs) -> State:
         loose = having(system.effects, "loose_length")
         if loose:
             # What the wire is too long by takes the elastic strain first, and then the stop has the load.
-            modulus = young_modulus(system.wire, system.start_fraction)
+            elastic = _stretch(system, temperature, stress)
             too_long = sum(effect.loose_length() for effect in loose) / system.wire.wire_length
-            strain = jnp.maximum(too_long - stress / modulus, 0.0)
-            stress = jnp.maximum(stress - modulus * too_long, 0.0)
+            strain = jnp.maximum(too_long - elastic, 0.0)
+            stress = stress * jnp.maximum(1.0 - too_long / jnp.where(elastic > 0.0, elastic, jnp.inf), 0.0)
     temperature, stress, strain, position, reading, fraction = jnp.broadcast_arrays(
         temperature, stress, strain, position, reading, system.start_fraction
     )

@@ -270,6 +270,27 @@ def test_martensite_that_creeps_more_goes_on_after_the_transformation():
     np.testing.assert_allclose(run.strain - plain.strain, expected, atol=1e-4 * np.ptp(expected))
 
 
+@pytest.mark.parametrize("share", [0.0, 0.05, 0.5, 1.0])
+def test_strain_that_formed_under_one_stress_goes_under_another_as_its_share_says(share):
+    """Formed at 200 MPa, heated out at 20: what is left behind is 1 - b of the difference, in few steps as in many."""
+    gain, scale = 0.02, 1e8
+    high, low = (gain * (1.0 - np.exp(-stress / scale)) for stress in (200e6, 20e6))
+    on = {"stress_dependent_strain.gain": gain, "stress_dependent_strain.scale": scale}
+    system = extended(COUPON, ("stress_dependent_strain",), {**on, "stress_dependent_strain.returned": share})
+    for each in (40, 400):
+        heated = _ramps(20.0, 130.0, 20.0, 130.0, each=each)
+        stress = np.where(np.arange(3 * each) < 2 * each, 200e6, 20e6)
+        inputs = _inputs(temperature=heated, stress=stress)
+        run, plain = simulate_compiled(system, inputs, DT), simulate_compiled(COUPON, inputs, DT)
+        assert run.martensite_fraction[2 * each - 1] == pytest.approx(1.0)
+        assert run.martensite_fraction[-1] == pytest.approx(0.0)
+        kept = np.asarray(run.strain - plain.strain)
+        assert kept[2 * each - 1] - kept[0] == pytest.approx(0.0, abs=1e-12)
+        assert kept[-1] - kept[each - 1] == pytest.approx(
+            (1.0 - share) * (high - low), rel=0.02 if each < 100 else 2e-3
+        )
+
+
 def test_a_lagging_transformation_is_late_by_its_time_constant():
     """Heated at a steady rate: the whole curve is tau dT/dt higher, and lower on cooling."""
     rate, tau = 2.0, 1.5

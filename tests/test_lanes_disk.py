@@ -15,7 +15,10 @@ import numpy as np
 import pytest
 
 import smajax.stage_equations
+import smajax.stage_solver
+import smajax.system
 from smajax.compiled import simulate_compiled
+from smajax.drive.voltage import Voltage
 from smajax.effects.base import AbstractEffect
 from smajax.extended import extended
 from smajax.lanes import disk, evaluate
@@ -137,6 +140,38 @@ def test_a_key_is_of_kinds_and_settings_and_not_of_values(monkeypatch: pytest.Mo
     traced = disk.key_of(simulate_compiled, ARM, ("a",))
     monkeypatch.setattr(smajax.stage_equations, "PRESLIDING", 3e-5)
     assert disk.key_of(simulate_compiled, ARM, ("a",)) != traced
+
+
+def test_what_somebody_put_in_our_place_is_not_kept_under_our_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    key = disk.key_of(simulate_compiled, ARM, ())
+    assert key is not None
+    power, equation = Voltage.power, smajax.system.heating_power
+
+    def doubled(*given: object) -> object:
+        return 2.0 * equation(*given)  # type: ignore[arg-type]
+
+    for place, name, other in (
+        (Voltage, "power", lambda *given: 2.0 * power(*given)),
+        (smajax.stage_equations, "heating_power", doubled),
+        (smajax.stage_equations, "heating_power", smajax.system.ambient_temperature),
+        (smajax.stage_solver, "INNER", (1, 1)),
+    ):
+        with monkeypatch.context() as patched:
+            patched.setattr(place, name, other)
+            assert disk.key_of(simulate_compiled, ARM, ()) != key, name
+        assert disk.key_of(simulate_compiled, ARM, ()) == key
+    # Edited, or upgraded, after it was imported: what runs is not what lies there.
+    monkeypatch.setattr(disk, "CHANGED", disk.CHANGED - 1.0)
+    assert disk.key_of(simulate_compiled, ARM, ()) is None
+
+
+def test_a_bucket_somewhere_is_no_folder() -> None:
+    before = jax.config.values["jax_compilation_cache_dir"]
+    jax.config.update("jax_compilation_cache_dir", "gs://bucket/programs")
+    try:
+        assert disk.folder() is None
+    finally:
+        jax.config.update("jax_compilation_cache_dir", before)
 
 
 def test_nothing_is_kept_without_a_folder(tmp_path: Path) -> None:

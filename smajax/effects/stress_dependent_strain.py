@@ -10,16 +10,17 @@ from smajax.effects.base import AbstractEffect, Extent
 from smajax.parameters import parameter
 from smajax.types import Scalar, WireState
 
-ORIENTED = "oriented_strain"
+BY_STRESS, AS_FORMED = "strain_by_stress", "strain_as_formed"
 
 
 class StressDependentStrain(AbstractEffect):
-    r"""$\dot\varepsilon = H(\sigma)\,\dot\xi$ as martensite forms, $[(1 - b) H(\sigma) + b\,\varepsilon/\xi]\,\dot\xi$ as it goes.
+    r"""$\varepsilon = b\,\varepsilon_f + (1 - b)\,\varepsilon_r$, $\dot\varepsilon_r = H\dot\xi$; $\dot\varepsilon_f = H\dot\xi$ forming, $\varepsilon_f\dot\xi/\xi$ going.
 
     $H = g [1 - e^{-\sigma/\sigma_k}]$. Martensite that is there keeps its strain when the stress changes. With b = 1 it
     gives back what it formed with (Lagoudas et al. 2012, forward and reverse transformation), with b = 0 what the stress
-    of that moment asks for: eq. 3.2 in rate form with an eps_L that depends on stress. Under a constant stress the two are
-    one. A run begins with what its first stress orients.
+    of that moment asks for: eq. 3.2 in rate form with an eps_L that depends on stress, in which cycles that form under one
+    stress and go under another leave strain behind. Under a constant stress the two are one. A run begins with what its
+    first stress orients.
     """
 
     # Not negative: a strain that falls with stress faster than the elastic one rises is no material.
@@ -52,17 +53,22 @@ class StressDependentStrain(AbstractEffect):
         return ({"returned": 0.05}, {"returned": 0.95})
 
     def _of(self, stress: Scalar) -> Scalar:
-        return self.gain * (1.0 - jnp.exp(-stress / self.scale))
+        # A solver may try a negative stress, of which the exponential knows no end.
+        return self.gain * (1.0 - jnp.exp(-jnp.where(stress < 0.0, 0.0, stress) / self.scale))
 
     def kept_at_start(self, temperature: Scalar, stress: Scalar, fraction: Scalar) -> dict[str, Scalar]:
-        return {ORIENTED: self._of(stress) * fraction}
+        begun = self._of(stress) * fraction
+        return {BY_STRESS: begun, AS_FORMED: begun}
 
     def kept_after(self, old: WireState, temperature: Scalar, stress: Scalar, fraction: Scalar) -> dict[str, Scalar]:
-        before, kept = old.martensite_fraction, old.kept[ORIENTED]
+        before, formed = old.martensite_fraction, old.kept[AS_FORMED]
         change = fraction - before
         asked = 0.5 * (self._of(old.stress) + self._of(stress)) * change
-        given_back = kept * change / jnp.where(before > 0.0, before, 1.0)
-        return {ORIENTED: kept + asked + jnp.where(change < 0.0, self.returned, 0.0) * (given_back - asked)}
+        given_back = formed * change / jnp.where(before > 0.0, before, 1.0)
+        return {
+            BY_STRESS: old.kept[BY_STRESS] + asked,
+            AS_FORMED: formed + jnp.where(change < 0.0, given_back, asked),
+        }
 
     def kept_strain(self, at: WireState) -> Scalar | float:
-        return at.kept[ORIENTED]
+        return self.returned * at.kept[AS_FORMED] + (1.0 - self.returned) * at.kept[BY_STRESS]

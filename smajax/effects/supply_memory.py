@@ -10,7 +10,7 @@ from smajax.drive.base import AbstractDrive
 from smajax.effects.base import AbstractEffect, Extent
 from smajax.parameters import parameter
 from smajax.types import Scalar, WireState
-from smajax.wire.kept import DURATION
+from smajax.wire.kept import DURATION, forgotten
 
 if TYPE_CHECKING:
     from smajax.system import System
@@ -21,8 +21,8 @@ REMEMBERED = "supply_current"
 class SupplyMemory(AbstractEffect):
     r"""$U = U_0 - r I_m$, $\tau \dot I_m + I_m = I$: a resistance that the supply shows a time constant late.
 
-    A battery (polarisation), a capacitor behind a weak charger, a supply with a slow regulator. The mean current counts
-    where it is pulsed. A run begins rested. The energy that a closed loop's figures of merit count is that of a rested supply.
+    A battery (polarisation), a capacitor behind a weak charger, a supply with a slow regulator. Of a duty the mean current
+    counts, of a voltage with `pulsed_voltage` the one that heats as much. A run begins rested. The energy that a closed loop's figures of merit count is that of a rested supply.
     """
 
     resistance: Scalar = parameter("ohm", 0.0, 10.0, "r: fall of the voltage per ampere given for long")
@@ -59,11 +59,14 @@ class SupplyMemory(AbstractEffect):
         return {REMEMBERED: none, DURATION: none}
 
     def _remembered(self, old: WireState, current: Scalar, per_volt: Scalar) -> Scalar:
-        """I_m at the end of a step in which a rested supply would give `current`: implicit in what it loses meanwhile."""
-        stays = jnp.exp(-old.kept[DURATION] / self.time_constant)
-        return (old.kept[REMEMBERED] * stays + current * (1.0 - stays)) / (
-            1.0 + self.resistance * per_volt * (1.0 - stays)
-        )
+        """I_m at the end of a step in which a rested supply would give `current`, exact for a resistance that stays.
+
+        It recovers no faster than without any current: a wire gives none back.
+        """
+        before, steps = old.kept[REMEMBERED], old.kept[DURATION] / self.time_constant
+        falls = 1.0 + self.resistance * per_volt
+        nearer = before + (current / falls - before) * forgotten(steps * falls)
+        return jnp.maximum(nearer, before * (1.0 - forgotten(steps)))
 
     def supply_drop(self, old: WireState, current: Scalar, per_volt: Scalar) -> Scalar:
         return self.resistance * self._remembered(old, current, per_volt)

@@ -1,18 +1,21 @@
 """Machine code on disk, under a key of everything that it was made from, so that a process need not make it again.
 
 Where JAX keeps its compiled programs (`jax_compilation_cache_dir`, which our commands set), and only there: without such
-a folder nothing is kept. Only programs made of this package's own parts are: what another package or a notebook defines may
-have been edited since under the same name. Nothing is unpickled.
+a folder nothing is kept. Only programs made of this package's own parts are, as they lie in its files: what another package
+or a notebook defines, or has put in the place of something here, may be another thing tomorrow under the same name. Nothing
+is kept by a process whose package was edited or upgraded under it. Nothing is unpickled.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import hashlib
+import inspect
 import json
 import os
 import platform
 import sys
+import sysconfig
 from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
@@ -32,6 +35,10 @@ from smajax.lanes.text import Array
 from smajax.report.files import writing
 
 PACKAGE = "smajax"
+ROOT = Path(__file__).parents[1]
+BELOW = tuple(
+    Path(package.__file__).parent for package in (jax, eqx) if package.__file__
+)  # what classes here inherit from
 MOST = 2**30  # bytes in the folder: beyond, what was not used longest goes
 HEAD = b"smajax program 1\n"
 
@@ -55,7 +62,9 @@ def folder() -> Path | None:
     """Where programs are kept; None where JAX keeps none."""
     values = jax.config.values
     place = values["jax_compilation_cache_dir"]
-    return Path(place) / "lanes" if place and values["jax_enable_compilation_cache"] else None
+    if not place or "://" in place or not values["jax_enable_compilation_cache"]:  # a bucket somewhere is JAX's alone
+        return None
+    return Path(place) / "lanes"
 
 
 def key_of(function: Callable[..., Any], model: Any, names: tuple[str, ...]) -> str | None:
@@ -63,9 +72,10 @@ def key_of(function: Callable[..., Any], model: Any, names: tuple[str, ...]) -> 
     modules: set[str] = set()
     try:
         said = [_said(function, modules), _said(model, modules), list(names), str(jnp.zeros(()).dtype)]
-    except Untold:
+        said += [_constants(modules), _surroundings()]
+    except (Untold, TypeError):
         return None
-    return hashlib.sha256(json.dumps([*said, _constants(modules), _surroundings()]).encode()).hexdigest()
+    return hashlib.sha256(json.dumps(said).encode()).hexdigest()
 
 
 def load(key: str) -> Stored | None:
@@ -85,7 +95,8 @@ def load(key: str) -> Stored | None:
         leaves, tree = jax.tree.flatten(_made(record["tree"]))
         if leaves != list(range(len(results))):
             return None
-        os.utime(path)
+        with suppress(OSError):  # a folder that others may read only
+            os.utime(path)
         return Stored(code, record["lanes"], results, record["scratch"], tuple(record["shared"]), tree)
     return None
 
@@ -202,20 +213,35 @@ def _made(told: Any) -> Any:
     return found
 
 
+def _code() -> tuple[str, float]:
+    """(digest of our own code as it lies on the disk, when it was last changed, s)."""
+    code, latest = hashlib.sha256(), 0.0
+    for path in sorted(ROOT.rglob("*.py")):
+        code.update(path.relative_to(ROOT).as_posix().encode() + path.read_bytes())
+        latest = max(latest, path.stat().st_ctime)  # which nobody can set back
+    return code.hexdigest(), latest
+
+
+# Of the code that this process runs: read when the first of it that can trace anything is imported.
+CODE, CHANGED = _code()
+
+
 @cache
-def _surroundings() -> str:
-    """Our own code, that of those that trace and compile it, and the processor."""
-    code = hashlib.sha256()
-    root = Path(__file__).parents[1]
-    for path in sorted(root.rglob("*.py")):
-        code.update(path.relative_to(root).as_posix().encode() + path.read_bytes())
+def _others() -> str:
     packages = ("jax", "jaxlib", "equinox", "numpy", "llvmlite")
-    versions = [f"{name} {version(name)}" for name in packages]
-    return " ".join([code.hexdigest(), platform.python_version(), *versions, processor()])
+    return " ".join([platform.python_version(), *(f"{name} {version(name)}" for name in packages), processor()])
+
+
+def _surroundings() -> str:
+    """Our own code, that of those that trace and compile it, and the processor. Untold where our code is changing."""
+    latest = max(path.stat().st_ctime for path in ROOT.rglob("*.py"))
+    if latest != CHANGED:
+        raise Untold("the package was edited or upgraded after it was imported")
+    return f"{CODE} {_others()}"
 
 
 def _constants(roots: set[str]) -> str:
-    """Plain values and functions of the modules behind a program as they are now: a test, or a user, may have put others in."""
+    """Values, functions and classes of the modules behind a program, as they are now. Untold where one is not ours."""
     told = hashlib.sha256()
     waiting, seen = sorted(roots), set(roots)
     while waiting:
@@ -223,21 +249,91 @@ def _constants(roots: set[str]) -> str:
         for own, value in sorted(vars(sys.modules[name]).items()):
             if own.startswith("__"):
                 continue
+            behind = ""
             if isinstance(value, ModuleType):
                 behind = value.__name__
             elif isinstance(value, FunctionType | type):
                 behind = value.__module__
                 told.update(f"{name}.{own}:{behind}.{value.__qualname__};".encode())
-            else:
-                behind = ""
-                told.update(f"{name}.{own}={value!r};".encode() if _plain(value) else b"")
+                if behind == name:
+                    told.update(_body(value).encode())
+                elif isinstance(value, FunctionType):
+                    _imported(value)
+            elif _plain(value):
+                told.update(f"{name}.{own}={_ordered(value)!r};".encode())
+            elif isinstance(value, np.ndarray):
+                told.update(f"{name}.{own}={value.dtype}{value.tolist()};".encode())
             if behind.partition(".")[0] == PACKAGE and behind not in seen and behind in sys.modules:
                 seen.add(behind)
                 waiting.append(behind)
     return told.hexdigest()
 
 
+def _body(value: FunctionType | type) -> str:
+    """What a function, or the methods of a class, consist of. Untold where they do not come from this package's files."""
+    if isinstance(value, FunctionType):
+        return _function(value)
+    told = []
+    for own, entry in sorted(vars(value).items()):
+        found = _behind(entry)
+        generated = own.startswith("__") and found is not None and found.__code__.co_filename == "<string>"
+        if found is not None and not generated:  # what a data class is given follows from its fields
+            told.append(f"{own}:{_function(found)}")
+        elif _plain(entry):
+            told.append(f"{own}={_ordered(entry)!r}")
+    return ";".join(told)
+
+
+def _imported(value: FunctionType) -> None:
+    """Untold for a function that somebody's own program has put into one of our modules."""
+    if value.__module__.partition(".")[0] == PACKAGE:
+        _own(value)
+    elif "site-packages" not in Path(inspect.unwrap(value).__code__.co_filename).parts:
+        _function(value)
+
+
+def _behind(entry: Any) -> FunctionType | None:
+    """The function of a method, property or what wraps it."""
+    for _ in range(5):
+        if entry is None:
+            return None
+        if isinstance(entry, FunctionType):
+            return inspect.unwrap(entry)
+        found = (getattr(entry, name, None) for name in ("__wrapped__", "__func__", "fget", "method"))
+        entry = next((one for one in found if one is not None), None)
+    return None
+
+
+def _function(value: FunctionType) -> str:
+    code = inspect.unwrap(value).__code__
+    if not _known(code.co_filename):
+        raise Untold(f"{value.__module__}.{value.__qualname__}, of {code.co_filename}")
+    return f"{value.__module__}.{value.__qualname__}:{code.co_filename}:{code.co_firstlineno}"
+
+
+@cache
+def _known(file: str) -> bool:
+    """Whether a file is this package's, or of what stands in the key by its version."""
+    path = Path(file)
+    if path.is_relative_to(ROOT) or any(path.is_relative_to(one) for one in BELOW):
+        return True
+    return path.is_relative_to(sysconfig.get_path("stdlib")) and "site-packages" not in path.parts
+
+
 def _plain(value: Any) -> bool:
-    if isinstance(value, tuple):
+    if isinstance(value, tuple | list | frozenset | set):
         return all(map(_plain, value))
+    if isinstance(value, dict):
+        return all(_plain(name) and _plain(one) for name, one in value.items())
     return value is None or isinstance(value, bool | int | float | str)
+
+
+def _ordered(value: Any) -> Any:
+    """The same with sets as sorted lists: their own order is another one in every process."""
+    if isinstance(value, set | frozenset):
+        return sorted(map(repr, value))
+    if isinstance(value, tuple | list):
+        return [_ordered(one) for one in value]
+    if isinstance(value, dict):
+        return [(name, _ordered(one)) for name, one in value.items()]
+    return value

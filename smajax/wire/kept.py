@@ -39,6 +39,13 @@ def transformed(old: WireState, fraction: Scalar) -> dict[str, Scalar]:
     return {TRANSFORMED: old.kept[TRANSFORMED] + jnp.abs(fraction - old.martensite_fraction)}
 
 
+def forgotten(steps: Scalar) -> Scalar:
+    """1 - exp(-steps), without the cancellation that leaves single precision nothing of a small one."""
+    small = steps < 1e-3
+    short = jnp.where(small, steps, 0.0)
+    return jnp.where(small, short * (1.0 - 0.5 * short * (1.0 - short / 3.0)), 1.0 - jnp.exp(-steps))
+
+
 def following(old: WireState, name: str, before: Scalar, now: Scalar, time_constant: Scalar) -> Scalar:
     r"""The entry `name` after a step in which what it follows went from `before` to `now`, time constant $\tau$ in s.
 
@@ -47,5 +54,5 @@ def following(old: WireState, name: str, before: Scalar, now: Scalar, time_const
     """
     # A time constant of a femtosecond is none, and has a derivative that zero has not.
     steps = jnp.maximum(old.kept[DURATION], 1e-12) / (time_constant + 1e-15)
-    forgotten = 1.0 - jnp.exp(-steps)
-    return now + (old.kept[name] - before) * (1.0 - forgotten) - (now - before) * forgotten / steps
+    gone = forgotten(steps)
+    return now + (old.kept[name] - before) * (1.0 - gone) - (now - before) * gone / steps

@@ -38,9 +38,12 @@ class Given:
         """How many members, from the first on, have an exact solution."""
         return len(self.angle)
 
-    def errors(self, angle: np.ndarray, fraction: np.ndarray) -> tuple[float, float]:
-        """Largest errors of angle (degrees) and fraction over the solved members; infinite where one is not finite."""
-        off = np.abs(angle - self.angle).max(), np.abs(fraction - self.fraction).max()
+    def errors(self, angle: np.ndarray, fraction: np.ndarray, every: int = 1) -> tuple[float, float]:
+        """Largest errors of angle (degrees) and fraction over the solved members; infinite where one is not finite.
+
+        `every`: given at every so many of the times.
+        """
+        off = np.abs(angle - self.angle[:, ::every]).max(), np.abs(fraction - self.fraction[:, ::every]).max()
         return (float(off[0]), float(off[1])) if np.isfinite(off).all() else (float("inf"), float("inf"))
 
     def meets(self, off: tuple[float, float]) -> bool:

@@ -1,6 +1,6 @@
 """smajax on the problem of the peers, every core: `python -m studies.benchmarks.throughput FILE`; prints JSON.
 
-With the default step, or with `--tolerance` and samples of 50 ms; that it is accurate enough is checked on the solved
+With the default step, or with `--tolerance` and samples `--dt` apart, between which it takes steps of its own; that it is accurate enough is checked on the solved
 members. What is timed is `run_batch`
 as a user calls it, measures of each run and no trajectory, the compilation apart.
 """
@@ -33,10 +33,11 @@ REPEATS = 3
 
 def _errors(given: Given, dt: float, tolerance: float | None) -> tuple[float, float]:
     axes = zipped(problem.axes(len(given.voltage)).members(0, given.solved))
-    every = round(problem.EVERY / dt)
+    every = max(1, round(problem.EVERY / dt))
     keep = ("position", "martensite_fraction")
     found = run_batch(arm(), {}, axes, seconds=given.seconds, dt=dt, every=every, keep=keep, tolerance=tolerance)
-    return given.errors(np.degrees(found["position"].to_numpy()), found["martensite_fraction"].to_numpy())
+    compared = max(1, round(dt / problem.EVERY))
+    return given.errors(np.degrees(found["position"].to_numpy()), found["martensite_fraction"].to_numpy(), compared)
 
 
 def run(given: Given, dt: float, tolerance: float | None, count: int) -> dict[str, Any]:
