@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from smajax.compose import compose as compose
     from smajax.control_presets import CONTROLLERS as CONTROLLERS
     from smajax.dataset import simulate_dataset as simulate_dataset
+    from smajax.controller.base import AbstractController as AbstractController
     from smajax.effects.base import AbstractEffect as AbstractEffect
     from smajax.effects.library import LIBRARY as LIBRARY
     from smajax.extended import extended as extended
@@ -62,6 +63,7 @@ if TYPE_CHECKING:
 
 # Name -> the module that has it, and its name there.
 NAMES = {
+    "AbstractController": ("smajax.controller.base", "AbstractController"),
     "AbstractEffect": ("smajax.effects.base", "AbstractEffect"),
     "AbstractMovingLoad": ("smajax.load.base", "AbstractMovingLoad"),
     "CONTROLLERS": ("smajax.control_presets", "CONTROLLERS"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import jax
 import numpy as np
 import xarray as xr
 
@@ -88,6 +89,11 @@ def simulate_dataset(
     a `tolerance`. For a call by itself: inside `jit`, `vmap` and `grad` take `simulate`. Raises ValueError as these do, and
     for a parameter out of its bounds.
     """
+    if any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves((system, dict(inputs), dt, initial))):
+        raise TypeError(
+            "simulate_dataset() gives labelled numbers, and no gradient, jit or vmap goes through it: use `sma.simulate`, which "
+            "gives the same series."
+        )
     check_bounds(system)
     check_order(system)
     _check_finite(inputs)

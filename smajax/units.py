@@ -183,6 +183,8 @@ def parse_quantity(value: str | float, expected: str, difference: bool = False) 
         if match is None:
             raise UnitError(f"got {value!r}, expected a number and a unit like '1.5 {_plain(_unit(expected))}'")
         number, unit = float(match.group(1)), match.group(2)
+        if re.match(r",\d", unit):
+            raise UnitError(f"got {value!r}, expected a decimal point; write {value.replace(',', '.', 1)!r}")
     else:
         number, unit = float(value), ""
     if not math.isfinite(number):

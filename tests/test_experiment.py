@@ -562,3 +562,10 @@ def test_every_input_of_every_load_and_drive_has_a_unit() -> None:
         own = made()
         for name in own.inputs_required | own.inputs_optional:
             assert convert(1.0, INPUT_UNITS[name], INPUT_UNITS[name]) == 1.0, name
+
+
+@pytest.mark.parametrize("content", [b"Zeit;Weg\n0;1\n", "Zeit;Weg/µm\n0;1\n".encode("latin-1")])
+def test_a_log_in_the_place_of_an_experiment_file_is_told_what_begins_one(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "log.csv").write_bytes(content)
+    with pytest.raises(ExperimentError, match=r"`smajax new-experiment log\.csv` begins one from it"):
+        load_experiment(tmp_path / "log.csv", CATALOGUE)

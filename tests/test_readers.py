@@ -32,6 +32,9 @@ def written(path: Path, text: str) -> Path:
         "time pos\r\n 0   1.5\r\n 1   2.5\r\n\r\n",
         '# a comment\n"time", "pos"\n0, 1.5\n\n1, 2.5e0\n',
         "\ufefftime,pos\n0,1.5\n1,2.5",
+        "time|pos\n0|1.5\n1|2.5\n",
+        "Logger 5\nSerial,123,B\n\ntime,pos\n0,1.5\n1,2.5\n",
+        "Logger\tA\tB\nmade on a bench\ntime\tpos\n0\t1.5\n1\t2.5\n",
     ],
 )
 def test_text_tables_of_any_separator(tmp_path: Path, text: str) -> None:
@@ -185,6 +188,28 @@ def test_units_of_headings() -> None:
     }
     assert list(found.values()) == ["s", "mV", "mm", "°C", "mm", "ms", "", "", "W/(m^2 K)", ""]
     assert (headers.bare("Zeit/s"), headers.bare("a/b"), headers.words("U / mV")) == ("Zeit", "a/b", ["u"])
+
+
+@pytest.mark.parametrize(
+    ("heading", "unit", "name"),
+    [
+        ("Weg in µm", "µm", "Weg"),
+        ("Zeit in s", "s", "Zeit"),
+        ("Spannung, V", "V", "Spannung"),
+        ("Time{s}", "s", "Time"),
+        ("Pos um", "um", "Pos"),
+        ("Phase A", "", "Phase A"),  # a name, it may be
+        ("in s", "", "in s"),
+        ("duty, -", "", "duty, -"),
+    ],
+)
+def test_units_behind_words_and_in_braces(heading: str, unit: str, name: str) -> None:
+    assert (headers.unit_in(heading), headers.bare(heading)) == (unit, name)
+
+
+def test_lines_above_a_table_without_a_line_of_names_are_no_preamble(tmp_path: Path) -> None:
+    with pytest.raises(MeasuredDataError, match="the header has 1 cell"):
+        read_table(written(tmp_path / "run.csv", "Logger 5\n0,1.5\n1,2.5\n"))
 
 
 def test_samples_are_placed_by_the_lines_of_their_file(tmp_path: Path) -> None:

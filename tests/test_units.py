@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -91,3 +92,9 @@ def test_to_si_takes_a_number_in_a_unit_or_text_of_the_same_kind() -> None:
 
 def test_arrays_keep_their_shape() -> None:
     np.testing.assert_allclose(convert(np.array([[0.0, 100.0]]), "degF", "degC"), [[-160 / 9, 340 / 9]])
+
+
+@pytest.mark.parametrize("text", ["0,31 mm", "1,5", "-2,5e1 V"])
+def test_a_decimal_comma_is_told_as_such(text: str) -> None:
+    with pytest.raises(UnitError, match=f"expected a decimal point; write '{re.escape(text.replace(',', '.'))}'"):
+        parse_quantity(text, "mm")

@@ -14,6 +14,8 @@ from smajax.words import and_listed
 
 # A residual this many times the declared noise, or the other way round, says that the noise was declared wrongly.
 WRONG_NOISE = 1.2
+# A held-out run is off where its error is so much larger than that of the fit runs; few samples may be so by chance.
+FURTHER, CHANCE = 1.3, 5.0
 MENTIONED = 0.05  # weight from which on a rival is named
 
 
@@ -163,13 +165,13 @@ def _explained(added: Sequence[EffectFinding], several: bool, tested: bool) -> s
 
 def _held_out_warnings(runs: Sequence[RunFinding], experiment: Experiment) -> list[str]:
     """One sentence for each held-out run that the final model predicts clearly worse than it fits."""
-    level = max(2.0 * pooled(runs, "fit", "after"), 2.0 * experiment.noise_sigma)
+    level = max(pooled(runs, "fit", "after"), experiment.noise_sigma)
     return [
         f"{run.name}, which was held out, is off by {shown(run.rmse_after, experiment.output_unit, experiment.output_name)}, "
         f"{run.rmse_after / pooled(runs, 'fit', 'after'):.1f} times the fit runs' error: the model misses what shows "
         "there and not in them, or something was different then (another day, another state of the wire)."
         for run in runs
-        if run.role == "held-out" and run.rmse_after > level
+        if run.role == "held-out" and run.rmse_after > (FURTHER + CHANCE / np.sqrt(2.0 * len(run.time))) * level
     ]
 
 

@@ -11,6 +11,7 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from types import FrameType
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
 UNMET = 3  # exit code: the work is done and what was asked of its result is not met
 INTERRUPTED = 130
 AGAIN = 1.0  # s after which Ctrl-C that was not answered is given again
+SOON = 0.02  # s, where it came at a moment at which nothing can be raised
+CALLBACKS = ("_xla_gc_callback",)  # what is raised in them goes nowhere
 HEX = "[0-9a-f]"
 # Folders within a result, and what smajax names its files there; what else is in them is the user's.
 INSIDE = {"fits": f"{HEX * 32}.npz", "finished": f"*-{HEX * 16}.npz"}
@@ -61,15 +64,17 @@ def command_line() -> str:
 
 @contextmanager
 def _insistent() -> Iterator[None]:
-    """Ctrl-C until it is answered: what is raised while Python collects garbage, as XLA lets it, is printed and dropped."""
+    """Ctrl-C until it is answered: what is raised while Python collects garbage, where XLA calls back, is printed and dropped."""
     own = threading.current_thread() is threading.main_thread()
     if not own or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
         yield
         return
 
-    def interrupt(number: int, frame: object) -> None:
-        signal.setitimer(signal.ITIMER_REAL, AGAIN)
-        raise KeyboardInterrupt
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        called_back = frame is not None and frame.f_code.co_name in CALLBACKS
+        signal.setitimer(signal.ITIMER_REAL, SOON if called_back else AGAIN)
+        if not called_back:
+            raise KeyboardInterrupt
 
     alarm = signal.signal(signal.SIGALRM, interrupt)
     signal.signal(signal.SIGINT, interrupt)

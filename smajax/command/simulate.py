@@ -128,7 +128,8 @@ def simulate(
     if gains is not None and controller:
         raise typer.BadParameter("--gains names its controller; leave --controller out.")
     if closed != (set_point is not None):
-        raise typer.BadParameter("a closed loop needs --set-point, and --gains or --controller.")
+        lacking = "--set-point" if closed else "--gains or --controller beside --set-point"
+        raise typer.BadParameter(f"a closed loop needs {lacking}.")
     if closed and (series or step or tolerance is not None):
         raise typer.BadParameter(
             "in a closed loop the controller gives the voltage: leave --step, --input and --tolerance out."

@@ -260,6 +260,13 @@ def shortened(text: str) -> str:
     return text if len(text) <= LONGEST else f"{text[:LONGEST]}..."
 
 
+def _begin(path: Path) -> str:
+    """What to do with a log that was given in the place of an experiment file."""
+    if path.suffix.lower() == ".toml":
+        return ""
+    return f"; an experiment file is a .toml: if this is a log, `smajax new-experiment {path.name}` begins one from it"
+
+
 def read_schema(path: Path) -> ExperimentFile:
     """Reads and checks the shape of an experiment file. Raises ExperimentError naming the file and the key."""
     try:
@@ -277,12 +284,14 @@ def read_schema(path: Path) -> ExperimentFile:
     except OSError as error:
         raise ExperimentError(path, "", f"cannot be read ({error.strerror})") from error
     except UnicodeDecodeError as error:
-        raise ExperimentError(path, "", f"is not UTF-8 text ({error.reason} at byte {error.start})") from error
+        raise ExperimentError(
+            path, "", f"is not UTF-8 text ({error.reason} at byte {error.start}){_begin(path)}"
+        ) from error
     except (ValueError, RecursionError) as error:
         # Beside its own error the parser lets through those of numbers too long and of brackets too deep.
         if isinstance(error, ExperimentError):
             raise
-        raise ExperimentError(path, "", f"is not TOML: {shortened(str(error))}") from error
+        raise ExperimentError(path, "", f"is not TOML: {shortened(str(error))}{_begin(path)}") from error
     try:
         return ExperimentFile.model_validate(content)
     except ValidationError as error:

@@ -1,4 +1,4 @@
-"""Text tables: comma, tab, semicolon or whitespace separated, with decimal points or commas, with or without a header line."""
+"""Text tables: comma, tab, semicolon, bar or whitespace separated, with decimal points or commas, with or without a header line."""
 
 from __future__ import annotations
 
@@ -17,10 +17,11 @@ from smajax.units import is_unit
 
 COMMENT_MARKS = ("#", "%")
 # In this order, because a column may hold decimal commas where another mark separates.
-SEPARATORS = ("\t", ";", ",")
+SEPARATORS = ("\t", ";", "|", ",")
 # A number with a decimal comma, and one of these that may as well be thousands.
 DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
+PREAMBLE = 100  # lines above a header
 BLOCK = 20_000  # lines
 CHUNK = 1 << 20  # bytes
 LONGEST_LINE = 1 << 20  # characters
@@ -144,6 +145,17 @@ def _usual_width(rows: Sequence[tuple[int, list[str]]], header: Sequence[str] | 
     most = max(counts.values())
     usual = [width for width, count in counts.items() if count == most]
     return len(header) if header is not None and len(header) in usual else usual[0]
+
+
+def _without_preamble(rows: list[tuple[int, list[str]]]) -> list[tuple[int, list[str]]]:
+    """Without what a logger says of itself above the header: lines of another length than a header and the data below it.
+
+    Where no line of names follows them, everything stays, for the message that says so.
+    """
+    width = _usual_width(rows, None)
+    begins = next((place for place, (_, cells) in enumerate(rows[:PREAMBLE]) if len(cells) == width), 0)
+    header = rows[begins][1]
+    return rows[begins:] if width > 1 and not any(map(_is_datum, header)) and all(header) else rows
 
 
 def _is_units(rows: Sequence[tuple[int, list[str]]]) -> bool:
@@ -272,6 +284,7 @@ def read_csv(path: Path, wanted: Collection[str | int] | None = None) -> Table:
     rows = _rows(path, lines, separator)
     commas = _has_decimal_commas(rows)
     rows = _with_points(rows) if commas else rows
+    rows = _without_preamble(rows)
     header: list[str] | None = None
     if not all(_is_datum(cell) for cell in rows[0][1] if cell):
         header, rows = rows[0][1], rows[1:]

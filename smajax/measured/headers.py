@@ -7,7 +7,9 @@ import re
 from smajax.measured.names import listed
 from smajax.measured.table import MeasuredDataError, Table
 
-BRACKETS = re.compile(r"[\[(]\s*([^\[\]()]*(?:\([^()]*\)[^\[\]()]*)?)\s*[\])]\s*$")
+BRACKETS = re.compile(r"[\[({]\s*([^\[\](){}]*(?:\([^()]*\)[^\[\](){}]*)?)\s*[\])}]\s*$")
+# `Weg in µm`, `Weg, µm`; behind a blank alone, where a single letter may as well be a name: `Pos um`, not `Phase A`.
+BEHIND = re.compile(r"^(.*\S)(?:\s+in\s+|\s*,\s*)(\S+)$|^(.*\S)\s+(\S{2,})$")
 TIMES = {
     *("time", "t", "zeit", "temps", "tiempo", "timestamp", "elapsed", "seconds", "sec", "clock"),
     *("uhrzeit", "zeitstempel", "datetime", "date", "datum"),
@@ -17,8 +19,20 @@ TIMES = {
 def bare(name: str) -> str:
     """The heading without its unit in brackets or, as in DIN, behind a slash."""
     name = BRACKETS.sub("", name).strip()
+    behind = _behind(name)
+    if behind is not None:
+        return behind[0]
     before, slash, unit = name.partition("/")
     return before.strip() if slash and before.strip() and unit.strip() in ("", *SLASHED) else name
+
+
+def _behind(name: str) -> tuple[str, str] | None:
+    """(the name, the unit) of a heading with a unit behind a word, a comma or a blank."""
+    found = BEHIND.match(name.strip())
+    if found is None:
+        return None
+    before, unit = (found[1], found[2]) if found[1] else (found[3], found[4])
+    return (before, unit) if unit in SLASHED and unit not in ("1", "-") else None
 
 
 def words(name: str) -> list[str]:
@@ -33,6 +47,9 @@ def unit_in(name: str) -> str:
     found = BRACKETS.search(name)
     if found is not None:
         return found.group(1).strip()
+    behind = _behind(name)
+    if behind is not None:
+        return behind[1]
     before, _, unit = name.partition("/")
     if before.strip() and unit.strip() in SLASHED:
         return unit.strip()
