@@ -32,8 +32,8 @@ if TYPE_CHECKING:
     from smajax.compiled import simulate_compiled as simulate_compiled
     from smajax.compose import compose as compose
     from smajax.control_presets import CONTROLLERS as CONTROLLERS
-    from smajax.dataset import simulate_dataset as simulate_dataset
     from smajax.controller.base import AbstractController as AbstractController
+    from smajax.dataset import simulate_dataset as simulate_dataset
     from smajax.effects.base import AbstractEffect as AbstractEffect
     from smajax.effects.library import LIBRARY as LIBRARY
     from smajax.extended import extended as extended
