@@ -19,6 +19,9 @@ from smajax.wire.heat import cross_section
 from smajax.wire.resistance import resistance_per_metre
 from smajax.wire.wire import Wire, start
 
+# V: less than this heats nothing. A quotient by its square, which a derivative takes, would have no number.
+NO_VOLTAGE = 1e-9
+
 
 class System(eqx.Module):
     """One actuator (or one coupon) with the effects that its equations carry."""
@@ -55,7 +58,7 @@ def heating_power(system: System, resistance: Scalar, inputs: Inputs, before: Wi
         return power
     voltage, current, per_volt = _supply(system, resistance, inputs, power)
     lost = sum(effect.supply_drop(before, current, per_volt) for effect in tiring)
-    share = 1.0 - lost / jnp.where(voltage > 0.0, voltage, 1.0)
+    share = jnp.where(voltage > NO_VOLTAGE, 1.0 - lost / jnp.where(voltage > NO_VOLTAGE, voltage, 1.0), 1.0)
     return power * jnp.where(share > 0.0, share, 0.0) ** 2
 
 
@@ -99,7 +102,7 @@ def _supply(system: System, resistance: Scalar, inputs: Inputs, power: Scalar) -
     length = system.wire.wire_length
     whole = resistance * length + sum(e.series_resistance() for e in having(system.effects, "series_resistance"))
     voltage = system.drive.drawn_current(whole, _acting(system, inputs)) * whole
-    on = voltage > 0.0
+    on = voltage > NO_VOLTAGE
     # The wire's power is that of pulses of voltage / whole, for the share of the time that they last.
     current = jnp.where(on, power * whole / (jnp.where(on, voltage, 1.0) * resistance), 0.0)
     return voltage, current, current / jnp.where(on, voltage, 1.0)

@@ -106,7 +106,7 @@ def test_a_supply_with_a_memory_is_the_circuit_of_its_equations() -> None:
     assert _lost(system, end.temperature) == pytest.approx(power, rel=1e-6)
 
 
-@pytest.mark.parametrize("volts", [0.0, 1e-6, 0.5])
+@pytest.mark.parametrize("volts", [0.0, 1e-215, 1e-6, 0.5])
 def test_a_tired_supply_recovers_no_faster_because_little_is_asked_of_it(volts: float) -> None:
     """Below what it has lost it gives nothing, and the wire gives nothing back."""
     system = extended(
