@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -52,14 +53,14 @@ def heating_power(system: System, resistance: Scalar, inputs: Inputs, before: Wi
 
     `resistance` is the wire's, ohm/m. `before`: the wire before the step, for a supply that remembers; None: a rested one.
     """
-    power = _of_rested_supply(system, resistance, inputs)
+    rested = _rested(system, resistance, inputs)
     tiring = having(system.effects, "supply_drop")
     if not tiring or before is None:
-        return power
-    voltage, current, per_volt = _supply(system, resistance, inputs, power)
+        return rested.power
+    voltage, current, per_volt = _given(system, resistance, rested)
     lost = sum(effect.supply_drop(before, current, per_volt) for effect in tiring)
     share = jnp.where(voltage > NO_VOLTAGE, 1.0 - lost / jnp.where(voltage > NO_VOLTAGE, voltage, 1.0), 1.0)
-    return power * jnp.where(share > 0.0, share, 0.0) ** 2
+    return rested.power * jnp.where(share > 0.0, share, 0.0) ** 2
 
 
 def supplied(system: System, inputs: Inputs, before: WireState, after: WireState) -> WireState:
@@ -68,24 +69,26 @@ def supplied(system: System, inputs: Inputs, before: WireState, after: WireState
     if not remembering:
         return after
     ohms = resistance_per_metre(system.wire, system.effects, after.temperature, after.martensite_fraction)
-    _, *given = _supply(system, ohms, inputs, _of_rested_supply(system, ohms, inputs))
+    _, *given = _given(system, ohms, _rested(system, ohms, inputs))
     kept = dict(after.kept)
     for effect in remembering:
         kept |= effect.kept_after_current(before, *given)
     return dataclasses.replace(after, kept=kept)
 
 
-def _acting(system: System, inputs: Inputs) -> Inputs:
-    """The inputs as the drive makes something of them."""
-    acting = dict(inputs)
-    for effect in having(system.effects, "command"):
-        acting |= {channel: effect.command(channel, acting[channel]) for channel in system.drive.inputs_required}
-    return acting
+class _Rested(NamedTuple):
+    """What a supply that has given nothing yet gives."""
+
+    power: Scalar  # W per metre of wire
+    acting: Inputs  # as the drive makes something of them
+    series: Scalar | float  # ohm before the wire
 
 
-def _of_rested_supply(system: System, resistance: Scalar, inputs: Inputs) -> Scalar:
+def _rested(system: System, resistance: Scalar, inputs: Inputs) -> _Rested:
     drive, effects, length = system.drive, system.effects, system.wire.wire_length
-    acting = _acting(system, inputs)
+    acting = dict(inputs)
+    for effect in having(effects, "command"):
+        acting |= {channel: effect.command(channel, acting[channel]) for channel in drive.inputs_required}
     power = drive.power(resistance, length, acting)
     behind, sagging = having(effects, "series_resistance"), having(effects, "current_sag")
     series = sum(effect.series_resistance() for effect in behind)
@@ -94,17 +97,16 @@ def _of_rested_supply(system: System, resistance: Scalar, inputs: Inputs) -> Sca
     if sagging:
         asked = drive.drawn_current(resistance * length + series, acting)
         power = power / (1.0 + sum(effect.current_sag() for effect in sagging) * asked) ** 2
-    return power
+    return _Rested(power, acting, series)
 
 
-def _supply(system: System, resistance: Scalar, inputs: Inputs, power: Scalar) -> tuple[Scalar, Scalar, Scalar]:
-    """(voltage while it is on, V; mean current, A; its fall per volt lost, A/V) of a rested supply that gives `power`, W/m."""
-    length = system.wire.wire_length
-    whole = resistance * length + sum(e.series_resistance() for e in having(system.effects, "series_resistance"))
-    voltage = system.drive.drawn_current(whole, _acting(system, inputs)) * whole
+def _given(system: System, resistance: Scalar, rested: _Rested) -> tuple[Scalar, Scalar, Scalar]:
+    """(voltage while it is on, V; mean current, A; its fall per volt lost, A/V) of a rested supply."""
+    whole = resistance * system.wire.wire_length + rested.series
+    voltage = system.drive.drawn_current(whole, rested.acting) * whole
     on = voltage > NO_VOLTAGE
     # The wire's power is that of pulses of voltage / whole, for the share of the time that they last.
-    current = jnp.where(on, power * whole / (jnp.where(on, voltage, 1.0) * resistance), 0.0)
+    current = jnp.where(on, rested.power * whole / (jnp.where(on, voltage, 1.0) * resistance), 0.0)
     return voltage, current, current / jnp.where(on, voltage, 1.0)
 
 

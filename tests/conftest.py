@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,7 @@ from typing import Any
 import pytest
 
 from smajax.runtime import prepare
-from tests.in_browser import FLAGS
+from tests.in_browser import FLAGS, NONE, chromium
 
 prepare()
 
@@ -31,10 +30,9 @@ def browser() -> Iterator[Any]:
     playwright = pytest.importorskip(
         "playwright.sync_api", reason="playwright is not installed: pip install -e '.[dev]'"
     )
-    names = ("chromium", "chromium-browser", "google-chrome")
-    found = next((path for name in names if (path := shutil.which(name))), None)
+    found = chromium()
     if found is None:
-        pytest.skip(f"none of {', '.join(names)} is on the PATH; on Debian: apt-get install chromium")
+        pytest.skip(NONE)
     with playwright.sync_playwright() as driver:
         running = driver.chromium.launch(executable_path=found, args=FLAGS)
         yield running

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,14 @@ CHECKS = Path(__file__).with_suffix(".js").read_text(encoding="utf-8")
 HOSTILE = """<script>window.hacked=1</script><img src=x onerror="window.hacked=1"> "quoted" & 'so'"""
 # As root a browser has no sandbox; the pages are our own.
 FLAGS = ["--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-background-networking", "--disable-sync"]
+
+NAMES = ("chromium", "chromium-browser", "google-chrome")
+NONE = f"none of {', '.join(NAMES)} is on the PATH; on Debian: apt-get install chromium"
+
+
+def chromium() -> str | None:
+    """Path of the browser that there is."""
+    return next((path for name in NAMES if (path := shutil.which(name))), None)
 
 
 def faults(browser: Any, page: Path, hostile: str = HOSTILE, widths: Sequence[int] = WIDTHS) -> list[str]:

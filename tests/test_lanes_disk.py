@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import equinox as eqx
@@ -31,17 +32,25 @@ OTHER = build("niti_table_3_1", "dead_weight", "voltage")
 HEATED = {"voltage": jnp.full(120, 7.0)}
 
 
+@contextmanager
+def _programs_in(place: str | None) -> Iterator[None]:
+    before = jax.config.values["jax_compilation_cache_dir"]
+    jax.config.update("jax_compilation_cache_dir", place)
+    try:
+        yield
+    finally:
+        jax.config.update("jax_compilation_cache_dir", before)
+
+
 @pytest.fixture
 def programs(tmp_path: Path) -> Iterator[Path]:
     """An empty folder for programs, and nothing remembered of them in this process."""
-    before = jax.config.values["jax_compilation_cache_dir"]
-    jax.config.update("jax_compilation_cache_dir", str(tmp_path))
     remembered = dict(evaluate._kept)
     evaluate._kept.clear()
-    yield tmp_path / "lanes"
+    with _programs_in(str(tmp_path)):
+        yield tmp_path / "lanes"
     evaluate._kept.clear()
     evaluate._kept.update(remembered)
-    jax.config.update("jax_compilation_cache_dir", before)
 
 
 def _run(system: System = ARM) -> Trajectory:
@@ -165,22 +174,10 @@ def test_what_somebody_put_in_our_place_is_not_kept_under_our_name(monkeypatch: 
     assert disk.key_of(simulate_compiled, ARM, ()) is None
 
 
-def test_a_bucket_somewhere_is_no_folder() -> None:
-    before = jax.config.values["jax_compilation_cache_dir"]
-    jax.config.update("jax_compilation_cache_dir", "gs://bucket/programs")
-    try:
+@pytest.mark.parametrize("place", [None, "gs://bucket/programs"])
+def test_nothing_is_kept_without_a_folder_of_this_machine(place: str | None) -> None:
+    with _programs_in(place):
         assert disk.folder() is None
-    finally:
-        jax.config.update("jax_compilation_cache_dir", before)
-
-
-def test_nothing_is_kept_without_a_folder(tmp_path: Path) -> None:
-    before = jax.config.values["jax_compilation_cache_dir"]
-    jax.config.update("jax_compilation_cache_dir", None)
-    try:
-        assert disk.folder() is None
-    finally:
-        jax.config.update("jax_compilation_cache_dir", before)
 
 
 def test_the_oldest_programs_make_room(programs: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -18,7 +18,7 @@ from scipy.optimize import lsq_linear
 from smajax.fit.kept import Kept
 from smajax.fit.problem import Lane, Problem
 from smajax.fit.progress import Progress, quiet
-from smajax.fit.shown import shown_and_slopes
+from smajax.fit.shown import in_parts, shown_and_slopes
 
 MOST_STEPS = 120
 ENOUGH = 1e-8  # of the cost: what a step that is the last one may still lower it by, and promise to; scipy's too
@@ -27,7 +27,6 @@ DAMPED = 1e-1  # share of the squared columns that damping begins with
 HOPELESS = 1e10  # damping at which no step is a better one
 AT_MOST = 0.7  # of the way to a bound
 NEAR = 1e-3  # of the box: from here on the bound itself may be reached
-ROOM = 2**28  # bytes of derivatives at once
 BLIND = 1e-14  # of the largest squared column: a parameter that nothing depends on
 
 
@@ -168,15 +167,14 @@ def fit_in_box(
     is is written as it goes, and the same call goes on from there to the same end. `outputs`, (lanes, series, N):
     measured outputs of each lane's own, as in repeated experiments.
     """
-    size = max([len(lane.slots) for lane in lanes], default=1) * problem.measured.nbytes
-    at_once = max(1, ROOM // max(size, 1))
+    directions = max([len(lane.slots) for lane in lanes], default=1)
 
     def evaluated(some: Sequence[int], places: Sequence[np.ndarray]) -> list[Equations]:
         found: list[Equations] = []
-        for start in range(0, len(some), at_once):
-            part = list(some[start : start + at_once])
+        for cut in in_parts(problem, len(some), directions):
+            part = list(some[cut])
             own = None if outputs is None else outputs[np.asarray(part)]
-            found += _normal_equations(problem, [lanes[k] for k in part], places[start : start + at_once], own)
+            found += _normal_equations(problem, [lanes[k] for k in part], places[cut], own)
         return found
 
     everyone = range(len(lanes))

@@ -88,13 +88,18 @@ def _of_run(problem: Problem, points: np.ndarray, run: int) -> np.ndarray:
     return np.concatenate([points[..., :count], points[..., start : start + own]], axis=-1)
 
 
+def in_parts(problem: Problem, count: int, directions: int = 1) -> list[slice]:
+    """`count` points, with so many series each, cut so that the series of a part have room at once."""
+    at_once = max(1, ROOM // max(directions * problem.measured.nbytes, 1))
+    return [slice(start, start + at_once) for start in range(0, count, at_once)]
+
+
 def shown_at(problem: Problem, points: Sequence[np.ndarray] | np.ndarray) -> np.ndarray:
     """What the sensors show at points (M, P): (M, series, N), SI."""
     asked = np.asarray(points, dtype=float)
-    at_once = max(1, ROOM // max(problem.measured.nbytes, 1))
-    if len(asked) > at_once:
-        parts = [shown_at(problem, asked[start : start + at_once]) for start in range(0, len(asked), at_once)]
-        return np.concatenate(parts)
+    parts = in_parts(problem, len(asked))
+    if len(parts) > 1:
+        return np.concatenate([shown_at(problem, asked[part]) for part in parts])
     if len(asked) <= FEW:
         nowhere = np.zeros((len(asked), 1, asked.shape[1]))
         return shown_and_slopes(problem, asked, nowhere)[0]
@@ -116,9 +121,8 @@ def misfits(problem: Problem, points: Sequence[np.ndarray] | np.ndarray) -> np.n
 def squares(problem: Problem, points: Sequence[np.ndarray] | np.ndarray) -> np.ndarray:
     """Sum of the squared misfits over the noise at every point, (M,): of long runs no more than some are held at once."""
     asked = np.asarray(points, dtype=float)
-    at_once = max(1, ROOM // max(problem.measured.nbytes, 1))
-    parts = [misfits(problem, asked[start : start + at_once]) for start in range(0, len(asked), at_once)]
-    return np.concatenate([((one / np.asarray(problem.noise)) ** 2).sum(axis=(1, 2)) for one in parts])
+    found = (misfits(problem, asked[part]) / np.asarray(problem.noise) for part in in_parts(problem, len(asked)))
+    return np.concatenate([(one**2).sum(axis=(1, 2)) for one in found])
 
 
 def shown_and_slopes(problem: Problem, points: np.ndarray, towards: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

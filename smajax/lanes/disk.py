@@ -73,7 +73,7 @@ def key_of(function: Callable[..., Any], model: Any, names: tuple[str, ...]) -> 
     try:
         said = [_said(function, modules), _said(model, modules), list(names), str(jnp.zeros(()).dtype)]
         said += [_constants(modules), _surroundings()]
-    except (Untold, TypeError):
+    except (Untold, TypeError, OSError):  # a source that is gone
         return None
     return hashlib.sha256(json.dumps(said).encode()).hexdigest()
 
@@ -216,12 +216,13 @@ def _made(told: Any) -> Any:
 def _code() -> tuple[str, float]:
     """(digest of our own code as it lies on the disk, when it was last changed, s)."""
     code, latest = hashlib.sha256(), 0.0
-    for path in sorted(ROOT.rglob("*.py")):
+    for path in SOURCES:
         code.update(path.relative_to(ROOT).as_posix().encode() + path.read_bytes())
         latest = max(latest, path.stat().st_ctime)  # which nobody can set back
     return code.hexdigest(), latest
 
 
+SOURCES = sorted(ROOT.rglob("*.py"))
 # Of the code that this process runs: read when the first of it that can trace anything is imported.
 CODE, CHANGED = _code()
 
@@ -234,8 +235,7 @@ def _others() -> str:
 
 def _surroundings() -> str:
     """Our own code, that of those that trace and compile it, and the processor. Untold where our code is changing."""
-    latest = max(path.stat().st_ctime for path in ROOT.rglob("*.py"))
-    if latest != CHANGED:
+    if max(path.stat().st_ctime for path in SOURCES) != CHANGED:
         raise Untold("the package was edited or upgraded after it was imported")
     return f"{CODE} {_others()}"
 

@@ -18,21 +18,18 @@ TIMES = {
 
 def bare(name: str) -> str:
     """The heading without its unit in brackets or, as in DIN, behind a slash."""
-    name = BRACKETS.sub("", name).strip()
-    behind = _behind(name)
-    if behind is not None:
-        return behind[0]
-    before, slash, unit = name.partition("/")
-    return before.strip() if slash and before.strip() and unit.strip() in ("", *SLASHED) else name
+    return _behind(BRACKETS.sub("", name).strip())[0]
 
 
-def _behind(name: str) -> tuple[str, str] | None:
-    """(the name, the unit) of a heading with a unit behind a word, a comma or a blank."""
+def _behind(name: str) -> tuple[str, str]:
+    """(the name, the unit) of a heading without brackets: the unit behind a word, a comma, a blank or a slash; else empty."""
     found = BEHIND.match(name.strip())
-    if found is None:
-        return None
-    before, unit = (found[1], found[2]) if found[1] else (found[3], found[4])
-    return (before, unit) if unit in SLASHED and unit not in ("1", "-") else None
+    if found is not None:
+        before, unit = (found[1], found[2]) if found[1] else (found[3], found[4])
+        if unit in SLASHED and unit not in ("1", "-"):
+            return before, unit
+    before, slash, unit = (part.strip() for part in name.partition("/"))
+    return (before, unit) if slash and before and unit in ("", *SLASHED) else (name, "")
 
 
 def words(name: str) -> list[str]:
@@ -47,12 +44,8 @@ def unit_in(name: str) -> str:
     found = BRACKETS.search(name)
     if found is not None:
         return found.group(1).strip()
-    behind = _behind(name)
-    if behind is not None:
-        return behind[1]
-    before, _, unit = name.partition("/")
-    if before.strip() and unit.strip() in SLASHED:
-        return unit.strip()
+    if unit := _behind(name)[1]:
+        return unit
     tail = name.rsplit("_", 1)[-1] if "_" in name else ""
     return tail if tail in TAILS else ""
 

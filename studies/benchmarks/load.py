@@ -29,7 +29,6 @@ TRUTH = {"recoverable_strain": 0.04, "austenite_finish": 95.0}
 NOISE = 2e-4  # of strain
 RUN_SAMPLES = 300
 CYCLE = 1_000_000  # samples of a run that are simulated
-LONGEST = 2_000_000  # steps of a run that smajax takes at most
 CANDIDATES = ("thermal_expansion", "stress_dependent_strain", "stress_dependent_width", "sensor_gain")
 COUPON = """\
 [model]
@@ -105,6 +104,7 @@ def _written(place: Path, runs: int, samples: int) -> None:
     import jax.numpy as jnp
 
     from smajax.compiled import simulate_compiled
+    from smajax.experiment.signals import MOST_SAMPLES
     from smajax.parameters import set_parameters
     from smajax.presets import build
 
@@ -112,8 +112,8 @@ def _written(place: Path, runs: int, samples: int) -> None:
     random = np.random.default_rng(1)
     only = ", ".join(f'"{name}"' for name in CANDIDATES)
     told = [COUPON.format(noise=NOISE, only=only)]
-    if samples > LONGEST:  # a step of several samples
-        step = -(-samples // LONGEST)
+    if samples > MOST_SAMPLES:  # a step of several samples
+        step = -(-samples // MOST_SAMPLES)
         told.append(f'[time]\ncolumn = "t"\nunit = "s"\n[sampling]\nstep = "{step} s"')
     else:
         told.append('[time]\nkind = "sample"')

@@ -1,6 +1,6 @@
 """Opens every page of the built site in headless Chromium, as a telephone and as a desk show it, and says what is wrong.
 
-    python .ci/check_site.py site
+    python -m tests.site_in_browser site
 
 Passes, saying so, where there is no Chromium. Links between pages are looked at as files; `mkdocs --strict` has checked the rest.
 """
@@ -10,7 +10,6 @@ from __future__ import annotations
 import functools
 import http.server
 import re
-import shutil
 import sys
 import threading
 from collections.abc import Sequence
@@ -18,8 +17,8 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urldefrag, urljoin, urlparse
 
-WIDTHS = (400, 1400)  # px
-FLAGS = ["--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-background-networking", "--disable-sync"]
+from tests.in_browser import FLAGS, NONE, WIDTHS, chromium
+
 HREF = re.compile(r'<(?:a|link|img|script)\b[^>]*?\b(?:href|src)="([^"]+)"')
 # Tables and code move sideways within their boxes; the page itself must not.
 CHECKS = """async () => {
@@ -104,10 +103,9 @@ def looked_at(site: Path) -> list[str]:
     """Every page but the sources of the repository, opened."""
     from playwright.sync_api import sync_playwright
 
-    names = ("chromium", "chromium-browser", "google-chrome")
-    found = next((path for name in names if (path := shutil.which(name))), None)
+    found = chromium()
     if found is None:
-        print(f"none of {', '.join(names)} is on the PATH, so no page of the site is opened")
+        print(f"{NONE}. No page of the site is opened.")
         return []
     pages = [page.relative_to(site).as_posix() for page in sorted(site.rglob("*.html"))]
     pages = [page for page in pages if not page.startswith("repository/") and page != "404.html"]
