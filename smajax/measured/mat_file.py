@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from smajax.measured.mat73_file import read_mat73
+from smajax.measured.mat_sound import check_sound
 from smajax.measured.table import Array, MeasuredDataError, Table
 
 _MAGIC = b"MATLAB "
@@ -138,6 +139,7 @@ def read_mat(path: Path) -> Table:
     if not start.startswith(_MAGIC):
         raise MeasuredDataError(f"{path}: is not the MATLAB version 5 file that its suffix says")
     try:
+        check_sound(path.read_bytes())
         content = scipy.io.loadmat(path, struct_as_record=True, squeeze_me=False)
     except MemoryError:
         raise
