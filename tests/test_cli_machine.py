@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -20,8 +21,11 @@ from smajax.experiment.errors import ExperimentError
 from smajax.experiment.guess import columns_of
 from smajax.experiment.load import load_experiment
 from smajax.experiment.template import begun
+from smajax.extended import base_model
 from smajax.measured.read import read_table
 from smajax.measured.table import MeasuredDataError
+from smajax.parameters import parameter_values
+from smajax.presets import build
 
 run = CliRunner()
 DEMO = Path(__file__).parents[1] / "smajax" / "demo" / "latent"
@@ -70,6 +74,31 @@ def test_a_template_loads_as_it_is(tmp_path: Path) -> None:
     np.testing.assert_array_equal(begun_as.runs[0].inputs["voltage"], made.runs[0].inputs["voltage"])
     np.testing.assert_array_equal(begun_as.runs[0].outputs["position"], made.runs[0].outputs["position"])
     assert run.invoke(app, ["new-experiment", *logs, "--out", str(tmp_path / "e.toml")]).exit_code == 2
+
+
+@pytest.mark.parametrize(
+    ("heading", "asked"),
+    [("displacement [mm]", "damping"), ("angle [deg]", "pulley_radius"), ("mass [g]", "wire_length")],
+)
+def test_a_template_lists_what_a_bench_should_tell(tmp_path: Path, heading: str, asked: str) -> None:
+    """With the preset's values, which may be taken as they stand."""
+    headings = ["time [s]", "U [V]", heading] + ["displacement [mm]"] * heading.startswith("mass")
+    rows = [[k / 10, 5.0 * (k % 20 > 9), *[3.0 + np.sin(k / 9)] * (len(headings) - 2)] for k in range(200)]
+    log = "\n".join([",".join(headings), *(",".join(map(str, row)) for row in rows)])
+    (tmp_path / "log.csv").write_text(log)
+    guessed = begun([tmp_path / "log.csv"], tmp_path / "e.toml")
+    assert any("the bench: the preset's wire_length" in line for line in guessed.told)
+    head, _, rest = guessed.text.partition("[model.parameters]")
+    known, _, tail = rest.partition("[unknown]")
+    said = head + "[model.parameters]" + known.replace("\n# ", "\n")
+    assert f"\n{asked} = " in said
+    assert ("\nload_mass = " in said) == heading.startswith("displacement")
+    (tmp_path / "e.toml").write_text(f"{said}[unknown]{tail}")
+    model = tomllib.loads(said)["model"]
+    before = parameter_values(build(model["wire"], model["load"], model["drive"]))
+    after = parameter_values(base_model(load_experiment(tmp_path / "e.toml", CATALOGUE)))
+    for name in model["parameters"]:
+        assert after[name] == pytest.approx(before[name], rel=1e-3)
 
 
 def _block(path: Path, name: str, every: float, values: np.ndarray) -> None:

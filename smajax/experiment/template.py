@@ -92,6 +92,22 @@ def _clock(table: Table, columns: Sequence[Column]) -> np.ndarray | None:
     return None if time is None else convert(table.columns[time.name], time.unit, "s")
 
 
+def _known(model: _Model) -> dict[str, tuple[str, str]]:
+    """What a ruler, a balance or a data sheet tells of the bench: name -> (the preset's value, what it is)."""
+    system = build(model.wire, model.load, model.drive)
+    table, values = parameters(system), parameter_values(system)
+    heated, given = model.drive != "none", {"load_mass"} if "mass" in model.inputs else set()
+    sizes = ["wire_length", "wire_diameter", *["ambient_temperature"] * heated] if model.load != "coupon" else []
+    names = [*sizes, *(name for name, one in table.items() if one.path[0] in ("load", "drive") and name not in given)]
+    return {
+        name: (
+            f"{values[name]:.4g} {table[name].unit.replace('(', '').replace(')', '').replace('-', '')}".strip(),
+            table[name].about,
+        )
+        for name in names
+    }
+
+
 def _unknowns(model: _Model) -> list[str]:
     """The parameters that no sheet tells, with bounds around the preset's."""
     system = build(model.wire, model.load, model.drive)
@@ -200,11 +216,15 @@ def begun(files: Sequence[Path], target: Path, title: str = "") -> Guessed:
         f'drive = "{model.drive}"',
         "",
         "[model.parameters]  # what is known of your bench, each with its unit; the rest is the preset's",
-        '# wire_length = "537 mm"',
-        '# wire_diameter = "150 um"',
     ]
-    lines += ['# ambient_temperature = "23 degC"'] if model.drive != "none" else []
-    lines += ['# load_mass = "75 g"'] if model.load == "dead_weight" and "mass" not in found else []
+    known = _known(model)
+    lines += [f'# {name} = "{value}"  # {about}' for name, (value, about) in known.items()]
+    if known:
+        some = ", ".join(f"{name} {value}" for name, (value, _) in list(known.items())[:4])
+        told.append(
+            f"the bench: the preset's {some}{' and others' if len(known) > 4 else ''} until [model.parameters] has yours; a "
+            "wrong one shows up as a wrong fitted value"
+        )
     lines += ["", "[unknown]  # to be fitted: bounds around the preset's values, and where the search starts"]
     lines += [*_unknowns(model), "", "[nuisance]", "offset = true  # the sensor's zero may move from run to run", ""]
     clocks = [clock for table in tables if (clock := _clock(table, columns)) is not None]
