@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from smajax.batch.axes import zipped as zipped
     from smajax.batch.run import good as good
     from smajax.batch.run import run_batch as run_batch
+    from smajax.batch.run import told_of as told_of
     from smajax.close_loop import close_loop as close_loop
     from smajax.closed_loop import simulate_closed_loop as simulate_closed_loop
     from smajax.compiled import simulate_compiled as simulate_compiled
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
     from smajax.load.base import AbstractMovingLoad as AbstractMovingLoad
     from smajax.loop import Loop as Loop
     from smajax.loop import simulate_loop_dataset as simulate_loop_dataset
+    from smajax.measured_state import Sensor as Sensor
     from smajax.merit import merit as merit
     from smajax.open_experiment import open_experiment as open_experiment
     from smajax.parameters import get_parameters as get_parameters
@@ -71,6 +73,7 @@ NAMES = {
     "EFFECTS": ("smajax.effects.library", "LIBRARY"),
     "LOADS": ("smajax.presets", "LOADS"),
     "Loop": ("smajax.loop", "Loop"),
+    "Sensor": ("smajax.measured_state", "Sensor"),
     "System": ("smajax.system", "System"),
     "WIRES": ("smajax.presets", "WIRES"),
     "build": ("smajax.presets", "build"),
@@ -94,6 +97,7 @@ NAMES = {
     "simulate_compiled": ("smajax.compiled", "simulate_compiled"),
     "simulate_dataset": ("smajax.dataset", "simulate_dataset"),
     "simulate_loop_dataset": ("smajax.loop", "simulate_loop_dataset"),
+    "told_of": ("smajax.batch.run", "told_of"),
     "under_law": ("smajax.wire.laws", "under_law"),
     "write_identified": ("smajax.report.identify_page", "write_identified"),
     "write_report": ("smajax.report.write", "write_report"),
