@@ -9,7 +9,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import BarColumn, Progress, ProgressColumn, Task, TaskID, TextColumn, TimeElapsedColumn
+from rich.text import Text
 
 from smajax.fit.progress import Progress as Report
 from smajax.fit.progress import quiet
@@ -44,9 +45,21 @@ def _lines(console: Console) -> Report:
     return line
 
 
+class _Left(ProgressColumn):
+    """Time left at the pace of the whole stage: steps of a minute each have no pace within the last seconds."""
+
+    def render(self, task: Task) -> Text:
+        """Counts down between two shares; nothing is promised before the first."""
+        share, now, at = task.completed, task.elapsed or 0.0, float(task.fields["at"])
+        if task.finished or not 0.0 < share < 1.0:
+            return Text("")
+        left = max(at * (1.0 - share) / share - (now - at), 0.0)
+        return Text(f"about {left:.0f} s left" if left < 90.0 else f"about {left / 60.0:.0f} min left")
+
+
 @contextmanager
 def _bars(console: Console) -> Iterator[Report]:
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), TimeRemainingColumn())
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), _Left())
     with Progress(*columns, console=console) as bar:
         open_tasks: dict[str, TaskID] = {}
 
@@ -55,8 +68,9 @@ def _bars(console: Console) -> Iterator[Report]:
                 bar.console.print(what.removeprefix("say: "), markup=False, highlight=False)
                 return
             if what not in open_tasks:
-                open_tasks[what] = bar.add_task(what, total=1.0)
-            bar.update(open_tasks[what], completed=share)
+                open_tasks[what] = bar.add_task(what, total=1.0, at=0.0)
+            task = open_tasks[what]
+            bar.update(task, completed=share, at=next(one.elapsed or 0.0 for one in bar.tasks if one.id == task))
             if share >= 1.0:
                 open_tasks.pop(what)
 

@@ -10,11 +10,14 @@ import sys
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
-from smajax.cli import main
+from smajax.cli import app, main
 from smajax.command import renamed
 from smajax.command.base import console
 from smajax.progress import VARIABLE, shown
+
+DEMO = Path(__file__).parents[1] / "smajax" / "demo" / "latent"
 
 
 def _run(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
@@ -183,21 +186,28 @@ def test_progress_is_silent_where_nobody_looks(
         ("sweep --controllers pid,vsc1,vsc", ["pid,vsc1,vsc2", "pid,vsc1,vsc3"]),
         ("figures M1", [f"M{number}" for number in (1, *range(10, 20))]),
         ("simulate flexinol_table_3_2 dead", ["dead_weight"]),
+        (
+            "simulate flexinol_table_3_2 dead_weight voltage --set martensite_",
+            ["martensite_start=", "martensite_finish="],
+        ),
+        ("sweep --over convection,a", ["convection,ambient"]),
+        ("tune sld --variation inertia=0.2,c", ["inertia=0.2,convection="]),
+        ("tune sld --limits s", ["settling_time=", "steady_error="]),
+        ("tune sld --objective w", ["worst"]),
+        ("tune sld --by a", ["adam"]),
+        ("demo --only l", ["latent"]),
+        (
+            f"identify {DEMO} --profile martensite_finish,a",
+            ["martensite_finish,austenite_start", "martensite_finish,austenite_finish", "martensite_finish,all"],
+        ),
+        ("identify nowhere.toml --profile a", []),
     ],
 )
 def test_the_tab_key_offers_the_names_there_are(typed: str, offered: list[str]) -> None:
     words = f"smajax {typed}"
     asked = {"_SMAJAX_COMPLETE": "complete_bash", "COMP_WORDS": words, "COMP_CWORD": str(len(words.split()) - 1)}
-    code = "import sys; sys.argv[0] = 'smajax'; from smajax.cli import main; main()"
-    told = subprocess.run(
-        [sys.executable, "-c", code],
-        env={**os.environ, **asked},
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-    )
-    assert told.stdout.split() == offered, told.stderr
+    told = CliRunner().invoke(app, [], env=asked, prog_name="smajax")
+    assert told.stdout.split() == offered, told.output
 
 
 OLD = {("sweep", "--targets"): ("--set-points", "0.3"), ("", "robustness"): ("sweep", "0.4")}

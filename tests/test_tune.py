@@ -239,12 +239,15 @@ def test_the_page_in_a_browser(folder: Path, browser: Any) -> None:
     assert faults(browser, folder / "tune.html") == []
 
 
-def test_a_tuning_goes_on_to_the_same_end(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("finished", [0, 2])
+def test_a_tuning_goes_on_to_the_same_end(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, finished: int
+) -> None:
     out, wrote = tmp_path / "again", Descent.save
 
     def interrupted(self: Descent, path: Path) -> None:
         wrote(self, path)
-        if self.round == 2:
+        if self.round == finished:
             raise KeyboardInterrupt
 
     monkeypatch.setattr(Descent, "save", interrupted)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from smajax.command import complete
 from smajax.command.base import (
     FITS,
     Json,
@@ -91,7 +92,7 @@ def close_loop_command(
 
 def demo(
     out: Annotated[Path, typer.Option(help="folder for the reports")] = Path("demo-report"),
-    only: Annotated[str | None, typer.Option(help=f"one of {', '.join(DEMOS)}")] = None,
+    only: Annotated[str | None, typer.Option(help=f"one of {', '.join(DEMOS)}", autocompletion=complete.demos)] = None,
     overwrite: Overwrite = False,
     json_out: Json = False,
     open_page: OpenUnless = True,

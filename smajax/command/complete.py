@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import dataclasses
+import tomllib
 from collections.abc import Iterable
+from pathlib import Path
+
+import typer
 
 
 def _offered(names: Iterable[str], begun: str) -> list[str]:
@@ -39,10 +44,80 @@ def controllers(incomplete: str) -> list[str]:
     return _offered(CONTROLLERS, incomplete)
 
 
-def several_controllers(incomplete: str) -> list[str]:
-    """After the last comma; none twice."""
+def _after_commas(names: Iterable[str], incomplete: str, end: str = "") -> list[str]:
+    """After the last comma; none twice. `end` follows each name."""
     *done, begun = incomplete.split(",")
-    return [",".join([*done, name]) for name in controllers(begun) if name not in done]
+    there = {one.partition("=")[0] for one in done}
+    return [",".join([*done, name + end]) for name in _offered(names, begun) if name not in there]
+
+
+def several_controllers(incomplete: str) -> list[str]:
+    return _after_commas(controllers(""), incomplete)
+
+
+def mismatches(incomplete: str) -> list[str]:
+    from smajax.sweep import MISMATCHES
+
+    return _after_commas(MISMATCHES, incomplete)
+
+
+def shares_of_mismatches(incomplete: str) -> list[str]:
+    from smajax.sweep import MISMATCHES
+
+    return _after_commas(MISMATCHES, incomplete, "=")
+
+
+def terms(incomplete: str) -> list[str]:
+    from smajax.tune.terms import TERMS
+
+    return _after_commas(TERMS, incomplete, "=")
+
+
+def objectives(incomplete: str) -> list[str]:
+    from smajax.tune.objective import OBJECTIVES
+
+    return _offered(OBJECTIVES, incomplete)
+
+
+def rules(incomplete: str) -> list[str]:
+    from smajax.tune.descent import RULES
+
+    return _offered(RULES, incomplete)
+
+
+def _before(ctx: typer.Context) -> list[str]:
+    """The words before, where an option that still lacks its value keeps them from being read."""
+    return [str(word) for word in (*ctx.params.values(), *ctx.args) if isinstance(word, (str, Path))]
+
+
+def values(ctx: typer.Context, incomplete: str) -> list[str]:
+    """Parameters of the model that the words before name."""
+    from smajax.parameters import parameters
+    from smajax.presets import DRIVES, LOADS, WIRES
+    from smajax.single import Asked
+
+    kinds = {"wire": WIRES, "load": LOADS, "drive": DRIVES}
+    # The last one named: what is typed comes behind the defaults.
+    named = {kind: word for kind, there in kinds.items() for word in _before(ctx) if word in there}
+    model = dataclasses.replace(Asked(), **named).system()  # type: ignore[arg-type]
+    return [f"{name}=" for name in _offered(parameters(model), incomplete)]
+
+
+def unknowns_declared(ctx: typer.Context, incomplete: str) -> list[str]:
+    """What the experiment before is to find; nothing where it cannot be read: the command will say why."""
+    for path in map(Path, _before(ctx)):
+        try:
+            told = tomllib.loads((path / "experiment.toml" if path.is_dir() else path).read_text(encoding="utf-8"))
+            return _after_commas([*told["unknown"], "all"], incomplete)
+        except (KeyError, OSError, TypeError, ValueError):
+            continue
+    return []
+
+
+def demos(incomplete: str) -> list[str]:
+    from smajax.command.close_loop import DEMOS
+
+    return _offered(DEMOS, incomplete)
 
 
 def estimators(incomplete: str) -> list[str]:

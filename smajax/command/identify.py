@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
+from smajax.command import complete
 from smajax.command.base import FITS, Json, Open, Overwrite, browse, console, resumable, within
 
 OWN = ("identify.html", "identify.json", "parameters.csv", "runs.csv", FITS)
@@ -27,7 +28,12 @@ def identify_command(
     starts: Annotated[
         int, typer.Option(callback=within(0), help="points of the box that fits may start from; 0: as declared")
     ] = 64,
-    profile: Annotated[str, typer.Option(help="parameters to draw a profile of, with commas, or `all`")] = "",
+    profile: Annotated[
+        str,
+        typer.Option(
+            help="parameters to draw a profile of, with commas, or `all`", autocompletion=complete.unknowns_declared
+        ),
+    ] = "",
     robust: Annotated[bool, typer.Option("--robust", help="Huber's loss: samples far off count less")] = False,
     design: Annotated[bool, typer.Option("--design", help="say which run to do next")] = False,
     posterior: Annotated[

@@ -60,6 +60,7 @@ def simulate(
             "--set",
             help="a parameter: wire.heat.convection_coefficient=80, convection_coefficient='80 W/m^2/K' or "
             "latent_heat.enthalpy='20 J/g', which adds that effect; repeat",
+            autocompletion=complete.values,
         ),
     ] = None,
     law: Annotated[
@@ -82,7 +83,11 @@ def simulate(
         str | None, typer.Option(help="what the loop is to reach: 40deg:5s,10deg:5s, or a file")
     ] = None,
     mismatch: Annotated[
-        list[str] | None, typer.Option(help="a parameter of the plant that the controller does not know of, as --set")
+        list[str] | None,
+        typer.Option(
+            help="a parameter of the plant that the controller does not know of, as --set",
+            autocompletion=complete.values,
+        ),
     ] = None,
     estimator: Annotated[
         str,

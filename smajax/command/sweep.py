@@ -32,7 +32,9 @@ def sweep(
             autocompletion=complete.several_controllers,
         ),
     ] = None,
-    over: Annotated[str, typer.Option(help="the two mismatches of the maps")] = "convection,damping",
+    over: Annotated[
+        str, typer.Option(help="the two mismatches of the maps", autocompletion=complete.mismatches)
+    ] = "convection,damping",
     points: Annotated[
         int | None,
         typer.Option(callback=within(2), help="mismatches from 0.5 to 2 along each side of a map; default 15"),
@@ -57,7 +59,12 @@ def sweep(
     ] = 0.0,
     period: Annotated[float, typer.Option(help="sample time of the controller, s, a multiple of 0.01")] = 0.01,
     delay: Annotated[int, typer.Option(callback=within(0), help="control periods until a command arrives")] = 0,
-    out: Annotated[Path, typer.Option(help="folder for the page, the pictures and the rows")] = Path("sweep"),
+    out: Annotated[
+        Path,
+        typer.Option(
+            help="folder for index.html, the pictures, sweep.json, sweep.nc (every loop) and a CSV a controller"
+        ),
+    ] = Path("sweep"),
     fast: Annotated[
         bool, typer.Option("--fast", help="by default 3 x 3 mismatches, set points -20,20,60, gain 1")
     ] = False,

@@ -35,20 +35,27 @@ def tune(
     set_points: Annotated[str | None, typer.Option(help="degrees, with commas; default -40,-20,0,20,40,60,85")] = None,
     variation: Annotated[
         list[str] | None,
-        typer.Option(help="how wrong the plant may be: inertia=0.2,convection=0.2; may be repeated"),
+        typer.Option(
+            help="how wrong the plant may be: inertia=0.2,convection=0.2; may be repeated",
+            autocompletion=complete.shares_of_mismatches,
+        ),
     ] = None,
-    objective: Annotated[str, typer.Option(help="nominal, worst or mean-variance")] = "worst",
+    objective: Annotated[
+        str, typer.Option(help="nominal, worst or mean-variance", autocompletion=complete.objectives)
+    ] = "worst",
     weights: Annotated[
         list[str] | None,
         typer.Option(
             help="of tracking_error, overshoot, settling_time, steady_error, energy, chatter, peak_temperature; default "
-            "settling_time=1,overshoot=1,steady_error=2 (a second, a degree, half a degree)"
+            "settling_time=1,overshoot=1,steady_error=2 (a second, a degree, half a degree)",
+            autocompletion=complete.terms,
         ),
     ] = None,
     limits: Annotated[
-        list[str] | None, typer.Option(help="of the same, met in every loop: settling_time=4,overshoot=2")
+        list[str] | None,
+        typer.Option(help="of the same, met in every loop: settling_time=4,overshoot=2", autocompletion=complete.terms),
     ] = None,
-    by: Annotated[str, typer.Option(help="trust-region or adam")] = "trust-region",
+    by: Annotated[str, typer.Option(help="trust-region or adam", autocompletion=complete.rules)] = "trust-region",
     start: Annotated[
         Path | None, typer.Option(help="gains.json to begin from, in the place of the preset's gains")
     ] = None,

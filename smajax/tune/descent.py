@@ -59,6 +59,7 @@ class Descent:
     costs: np.ndarray  # (rounds, S) judged cost of each round; nan where not run
     excesses: np.ndarray  # (rounds, S)
     ran: np.ndarray  # (rounds,) closed loops up to the end of each round
+    begun: int  # closed loops until there were starts
     left_out: int  # loops whose numbers were none
     wild: int  # loops whose slopes were of no use
 
@@ -77,16 +78,17 @@ class Descent:
     @property
     def simulations(self) -> int:
         """Closed loops so far."""
-        return int(self.ran.max(initial=0))
+        return int(self.ran.max(initial=self.begun))
 
 
 def load(path: Path) -> Descent | None:
     """What `Descent.save` wrote; None where there is nothing, or it is damaged."""
     whole: dict[str, Any] | None = arrays(path)
-    if whole is None:
+    own = {field.name for field in dataclasses.fields(Descent)} - {"memory"}
+    if whole is None or not own <= whole.keys():
         return None
     memory = {name.removeprefix("memory "): whole.pop(name) for name in list(whole) if name.startswith("memory ")}
-    whole |= {name: int(whole[name]) for name in ("round", "left_out", "wild")}
+    whole |= {name: int(whole[name]) for name in ("round", "begun", "left_out", "wild")}
     return Descent(**whole, memory=memory)
 
 
@@ -115,6 +117,7 @@ def begin(rig: Rig, goal: Goal, members: Members, effort: Effort, given: np.ndar
         empty,
         empty.copy(),
         np.zeros(effort.rounds, int),
+        rig.simulations,
         0,
         0,
     )
@@ -152,4 +155,4 @@ def one_round(rig: Rig, goal: Goal, members: Members, effort: Effort, now: Desce
         alive[who[np.argsort(best_rank[who], kind="stable")[-(-len(who) // 2) :]]] = False
     left_out = now.left_out + int(seen.failed.sum())
     wild = now.wild + int(seen.wild(goal.used).sum())
-    return Descent(number + 1, points, alive, memory, best, best_rank, costs, excesses, ran, left_out, wild)
+    return Descent(number + 1, points, alive, memory, best, best_rank, costs, excesses, ran, now.begun, left_out, wild)

@@ -64,7 +64,7 @@ def tune_into(
 
     after = load(out / STATE)
     if after is not None and not after.ended:
-        progress(f"say: going on after round {after.round}", 1.0)
+        progress(f"say: going on after round {after.round}" if after.round else "say: going on from the starts", 1.0)
     found = tune(system, settings, after=after, keep=keep, progress=progress)
     told = {"tuned": settings.record(), "command": command, **made_with()}
     write_gains(out / GAINS, found.after, found.units, told)

@@ -85,7 +85,7 @@ def tune(
     keep: Callable[[Descent], object] = lambda descent: None,
     progress: Progress = quiet,
 ) -> Tuned:
-    """Tune, from the preset's gains and the best of points of the box, or on from `after`; `keep` gets every round's end.
+    """Tune, from the preset's gains and the best of points of the box, or on from `after`; `keep` gets the starts and every round's end.
 
     Raises ValueError for settings that make no sense.
     """
@@ -96,6 +96,7 @@ def tune(
     if after is None:
         progress(f"{what}: {settings.tried} points of the box", 0.0)
         now = begin(rig, goal, members, effort, rig.point(settings.start) if settings.start else rig.before)
+        keep(now)
         progress(f"{what}: {settings.tried} points of the box", 1.0)
     else:
         now, rig.simulations = after, after.simulations
