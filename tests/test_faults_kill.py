@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import io
 import json
 import os
 import random
@@ -17,6 +18,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from smajax.command.folder import MARK
 from tests.small_bench import bench
@@ -77,6 +79,8 @@ def check_whole(out: Path) -> None:
                 case ".npz":
                     with np.load(path, allow_pickle=False) as held:
                         assert all(held[name] is not None for name in held.files)
+                case ".nc":
+                    xr.load_dataset(io.BytesIO(content), engine="scipy")
                 case ".csv" | ".md":
                     assert content.endswith(b"\n"), path
                 case other:
@@ -97,6 +101,9 @@ def result(out: Path) -> dict[str, Any]:
             found[path.name] = _without(json.loads(path.read_text(encoding="utf-8")))
         elif path.suffix in (".csv", ".md", ".png"):
             found[path.name] = path.read_bytes()
+        elif path.suffix == ".nc":
+            read = xr.load_dataset(path, engine="scipy")
+            found[path.name] = {name: read[name].to_numpy().tolist() for name in read.variables}
         elif path.suffix == ".npz":
             with np.load(path) as held:
                 found[path.name] = {name: held[name].tolist() for name in held.files}

@@ -153,11 +153,18 @@ class Search:
         return problem, [self.problem.names.index(name) for name in problem.names]
 
     def fit(
-        self, starts: Sequence[Start], what: str, *, enough: float = ENOUGH, hops: bool = False
+        self,
+        starts: Sequence[Start],
+        what: str,
+        *,
+        enough: float = ENOUGH,
+        hops: bool = False,
+        carried: Sequence[str] = (),
     ) -> tuple[list[Fit], np.ndarray]:
         """Fit every start: (fits with full parameter vectors, misfit of all runs at each, (S, R, N)).
 
-        `hops`: each from points near its end as well (`fit.starts.hopped`).
+        `hops`: each from points near its end as well (`fit.starts.hopped`). `carried`: effects that the model holds besides,
+        as it did in the fits before, whose program then serves again.
         """
         sets = sorted({start.effects for start in starts})
         if self.apart and len(sets) > 1:
@@ -166,7 +173,7 @@ class Search:
             order = np.argsort(np.concatenate(places))
             together = [one for part, _ in parts for one in part]
             return [together[k] for k in order], np.concatenate([found for _, found in parts])[order]
-        problem, index = self.restricted([name for start in starts for name in start.effects])
+        problem, index = self.restricted([*carried, *(name for start in starts for name in start.effects)])
         lanes = [
             problem.lane(self.free(start.effects), self.bounds, start.values[index], start.weights, start.tie)
             for start in starts
@@ -224,7 +231,9 @@ class Search:
         """Whether a model with that error has anything to do with these runs (`FORETELLS`)."""
         return self.foretold(left_out_rmse) > FORETELLS
 
-    def judged(self, fitted: Sequence[Fitted], present: Model | None = None) -> list[Model]:
+    def judged(
+        self, fitted: Sequence[Fitted], present: Model | None = None, carried: Sequence[str] = ()
+    ) -> list[Model]:
         """Leave each fit run out in turn, refit to the others, and predict the one left out (of many, `FOLDS` parts).
 
         A fold starts at the fit to all runs and is tied to it, each parameter to within about `LOOSE` of its logit in
@@ -241,7 +250,7 @@ class Search:
             for entry, level in zip(fitted, levels, strict=True)
             for weights in folds
         ]
-        _, found = self.fit(starts, "predicting runs left out")
+        _, found = self.fit(starts, "predicting runs left out", carried=carried)
         models = []
         for place, entry in enumerate(fitted):
             own = found[place * len(folds) : (place + 1) * len(folds)]

@@ -22,7 +22,7 @@ from smajax.report.findings import Round
 
 SIGNIFICANT = 1e-3  # of the score tests of one round, counted together
 SINGLES, PAIRS = 8, 2  # refitted in a round
-JUDGED = 10  # candidates taken to the left-out runs
+BEHIND = 2.0  # times the best one's sum of squares: from the second round on a candidate farther behind is not judged
 MOST_ROUNDS = 6
 
 
@@ -84,11 +84,14 @@ def search(setting: Search, base: Fit) -> tuple[Model, Model]:
         weighed = sorted(
             fitted, key=lambda entry: entry.solution.cost * (1.0 + PENALTY * len(setting.free(entry.effects)))
         )
-        taken = weighed[:JUDGED]
+        # It would have to foretell left-out runs better than it follows those it was fitted to.
+        most = BEHIND * weighed[0].solution.cost if number > 1 else math.inf
+        taken = [entry for entry in weighed if entry.solution.cost <= most]
         alone = next((entry for entry in weighed if len(entry.effects) == len(model.effects) + 1), taken[0])
         if alone not in taken:  # a pair is never added without its best single effect having had its chance
-            taken = [*taken[:-1], alone]
-        judged = setting.judged(taken, model)
+            taken = [*taken, alone]
+        carried = [effect for begun in starts for effect in begun.effects]
+        judged = setting.judged(taken, model, carried)
         if number == 1 and problem.batch.output.shape[0] > 1:
             for entry in judged:
                 if len(entry.effects) == 1:
