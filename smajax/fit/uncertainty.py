@@ -9,7 +9,7 @@ import numpy as np
 from scipy.sparse.csgraph import connected_components
 
 from smajax.fit.sensitivity import Sensitivity
-from smajax.residual.noise_like import WHITE, correlation_time, split_runs, whiteness_p_value
+from smajax.residual.noise_like import WHITE, bartlett_sum, correlation_time, split_runs, whiteness_p_value
 from smajax.words import and_listed
 
 # A fitted value nearer to a bound than this share of the box counts as held by it.
@@ -66,10 +66,7 @@ def _covariance(
     for run in runs:
         scores = scaled[start : start + len(run)] * run[:, None]
         start += len(run)
-        meat += scores.T @ scores
-        for lag in range(1, min(reach, len(run) // 4) + 1):
-            cross = scores[:-lag].T @ scores[lag:]
-            meat += (1.0 - lag / (reach + 1.0)) * (cross + cross.T)
+        meat += bartlett_sum(scores, reach, min(reach, len(run) // 4))
     sandwich = bread @ meat @ bread + before
     least = np.sqrt(np.maximum(np.diag(plain), 0.0) / np.maximum(np.diag(sandwich), 1e-300))
     raised = np.maximum(least, 1.0)

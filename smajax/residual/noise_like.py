@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy import stats
+from scipy import fft, stats
 
 LAGS = 20
+MANY = (
+    10**7
+)  # products from which on sums over lags are taken by Fourier transform: they grow as the square of the samples
 WHITE = 0.01  # a residual whose whiteness has a smaller p-value has structure
 
 
@@ -18,6 +21,10 @@ def autocorrelation(series: np.ndarray, lags: int) -> np.ndarray:
     if power == 0.0:
         return np.concatenate([[1.0], np.zeros(lags)])
     reach = min(lags, len(series) - 1)
+    if reach * len(series) > MANY:
+        size = fft.next_fast_len(len(series) + reach, real=True)
+        sums = fft.irfft(np.abs(fft.rfft(centred, size)) ** 2, size)[: reach + 1]
+        return np.concatenate([sums / power, np.zeros(lags - reach)])
     found = [1.0] + [float(centred[:-lag] @ centred[lag:]) / power for lag in range(1, reach + 1)]
     return np.asarray(found + [0.0] * (lags - reach))
 
@@ -49,6 +56,27 @@ def correlation_time(runs: Sequence[np.ndarray]) -> float:
         total += len(run) * (1.0 + 2.0 * float(r[:stop].sum()))
         weight += len(run)
     return max(1.0, total / weight)
+
+
+def bartlett_sum(scores: np.ndarray, reach: int, lags: int) -> np.ndarray:
+    r"""$\sum_{|l| \le K} (1 - |l| / (L + 1)) \sum_t s_t s_{t+l}^T$ of one run's scores (n, p): (p, p).
+
+    L is `reach` and K `lags`, fewer than n.
+    """
+    count = len(scores)
+    weights = 1.0 - np.arange(lags + 1) / (reach + 1.0)
+    if lags * scores.size > MANY:
+        size = fft.next_fast_len(count + lags, real=True)
+        around = np.zeros(size)
+        around[: lags + 1], around[size - lags :] = weights, weights[:0:-1]
+        near = fft.irfft(fft.rfft(scores, size, axis=0) * fft.rfft(around)[:, None], size, axis=0)[:count]
+        found = scores.T @ near
+        return np.asarray(0.5 * (found + found.T))
+    total = scores.T @ scores
+    for lag in range(1, lags + 1):
+        cross = scores[:-lag].T @ scores[lag:]
+        total += weights[lag] * (cross + cross.T)
+    return np.asarray(total)
 
 
 def split_runs(misfit: np.ndarray, mask: np.ndarray) -> list[np.ndarray]:

@@ -119,7 +119,7 @@ def _written(place: Path, runs: int, samples: int) -> None:
         told.append('[time]\nkind = "sample"')
     for number in range(runs):
         stress = float(np.interp(number / max(runs - 1, 1), (0.0, 1.0), STRESSES))
-        # A whole number of cycles ends where it began: a longer run is the same again, with other noise.
+        # A cycle ends where it began, but for a strain that the law keeps of each: a longer run is the same again on top of it.
         each = min(samples, CYCLE)
         temperature = _cycles(each, number)
         inputs = {"temperature": jnp.asarray(temperature), "stress": jnp.full(each, stress * 1e6)}
@@ -128,7 +128,7 @@ def _written(place: Path, runs: int, samples: int) -> None:
         with (place / f"{name}.csv").open("w", encoding="utf-8") as log:
             log.write("t,T,strain\n")
             for cycle in range(samples // each):
-                shown = strain + random.normal(0.0, NOISE, each)
+                shown = strain + cycle * strain[-1] + random.normal(0.0, NOISE, each)
                 clock = cycle * each + np.arange(each)
                 for part in np.array_split(np.column_stack((clock, temperature, shown)), -(-each // BLOCK)):
                     log.write("\n".join(f"{t:.0f},{a:.4f},{b:.6f}" for t, a, b in part) + "\n")
@@ -199,7 +199,7 @@ def main() -> None:
         before, begin = peak_memory(), time.perf_counter()
         found = work()
         took, grown = time.perf_counter() - begin, peak_memory() - before
-    told = {"peer": "load", "what": options.what, **found, "s": took, "grown_MB": grown / 1e6}
+    told = {"peer": "load", "what": options.what, "count": options.count, **found, "s": took, "grown_MB": grown / 1e6}
     print(json.dumps({**told, "peak_memory_MB": peak_memory() / 1e6}))
 
 

@@ -29,6 +29,16 @@ SOLVED = 64
 Part = dict[str, Any]
 
 
+# What is thrown at it, and how much: `studies.benchmarks.load`.
+LOADS = {
+    "text": (1000, 5000),
+    "samples": (10**5, 10**6, 10**7),
+    "day": (6, 24),
+    "runs": (100, 500),
+}
+FEW_LOADS = {"text": (20,), "samples": (10**4,), "day": (1,), "runs": (10,)}
+
+
 class Plan:
     """How much is measured."""
 
@@ -39,6 +49,7 @@ class Plan:
         self.diffrax_members = 2048 if fast else 8192
         self.steps = (1000, 4000) if fast else (1000, 10_000, 100_000, 1_000_000)
         self.counts = (10**3, 10**4) if fast else (10**4, 10**5, 10**6)
+        self.loads = FEW_LOADS if fast else LOADS
 
     def file(self) -> Path:
         """The problem, solved once and kept beside the results."""
@@ -96,6 +107,10 @@ PARTS: dict[str, Callable[[Plan], Part]] = {
     "scale": lambda plan: {
         "peer": "scale",
         "runs": [plan.own("scale", "--count", count) for count in plan.counts],
+    },
+    "loads": lambda plan: {
+        "peer": "loads",
+        "runs": [plan.own("load", what, "--count", count) for what, counts in plan.loads.items() for count in counts],
     },
 }
 

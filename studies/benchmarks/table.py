@@ -6,6 +6,12 @@ from collections.abc import Mapping
 from typing import Any
 
 Found = Mapping[str, Mapping[str, Any]]
+LOADS = {
+    "text": "text, MB of a log, three of whose ten columns are read",
+    "samples": "samples, of one run through identify (from 2,000,000 on several to a step)",
+    "day": "day, hours of an arm at 5 ms, kept every second",
+    "runs": "runs, of 300 samples in one experiment through close-loop",
+}
 
 
 def _each(found: Found, name: str, *way: str) -> float | None:
@@ -123,6 +129,20 @@ def _growth(found: Found) -> list[str]:
         ]
         lines += [
             f"| {one['members']:,} | {one['s']:.1f} | {one['ms_per_trajectory']:.3g} | {one['peak_memory_MB']:.0f} | {one['imports_MB']:.0f} | {one['store_MB']:.1f} |"
+            for one in runs
+        ]
+        lines.append("")
+    if runs := [one for one in found.get("loads", {}).get("runs", []) if "count" in one]:
+        lines += [
+            "## Loads",
+            "",
+            "`python -m studies.benchmarks.load WHAT --count N`, each in a process of its own.",
+            "",
+            "| what | N | s | peak memory, MB | of it grown by the work |",
+            "|---|---|---|---|---|",
+        ]
+        lines += [
+            f"| {LOADS[one['what']]} | {one['count']:,} | {one['s']:.1f} | {one['peak_memory_MB']:.0f} | {one['grown_MB']:.0f} |"
             for one in runs
         ]
         lines.append("")

@@ -1,0 +1,45 @@
+"""Sums over lags of a residual: of a long one by Fourier transform, the same numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from smajax.residual import noise_like
+from smajax.residual.noise_like import autocorrelation, bartlett_sum
+
+SERIES = np.random.default_rng(3).normal(size=(997, 3)).cumsum(axis=0)
+
+
+@pytest.mark.parametrize(
+    "asked",
+    [
+        lambda: autocorrelation(SERIES[:, 0], 0),
+        lambda: autocorrelation(SERIES[:, 0], 249),
+        lambda: autocorrelation(SERIES[:40, 0], 60),
+        lambda: bartlett_sum(SERIES, 12, 0),
+        lambda: bartlett_sum(SERIES, 700, 249),
+        lambda: bartlett_sum(SERIES[:7], 6, 6),
+    ],
+)
+def test_a_long_residual_is_summed_to_the_same_numbers(
+    monkeypatch: pytest.MonkeyPatch, asked: Callable[[], np.ndarray]
+) -> None:
+    found = []
+    for many in (np.inf, -1):
+        monkeypatch.setattr(noise_like, "MANY", many)
+        found.append(asked())
+    np.testing.assert_allclose(found[1], found[0], rtol=1e-9, atol=1e-12 * np.abs(found[0]).max())
+
+
+def test_the_weighted_sum_is_what_its_formula_says() -> None:
+    some = SERIES[:30]
+    said = sum(
+        max(1.0 - abs(i - j) / 6.0, 0.0) * np.outer(some[i], some[j])
+        for i in range(30)
+        for j in range(30)
+        if abs(i - j) <= 4
+    )
+    np.testing.assert_allclose(bartlett_sum(some, 5, 4), said, rtol=1e-12)
