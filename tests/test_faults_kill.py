@@ -103,7 +103,8 @@ def result(out: Path) -> dict[str, Any]:
             found[path.name] = path.read_bytes()
         elif path.suffix == ".nc":
             read = xr.load_dataset(path, engine="scipy")
-            found[path.name] = {name: read[name].to_numpy().tolist() for name in read.variables}
+            # As text: "never" is a nan there, which is no other nan.
+            found[path.name] = {name: repr(read[name].to_numpy().tolist()) for name in read.variables}
         elif path.suffix == ".npz":
             with np.load(path) as held:
                 found[path.name] = {name: held[name].tolist() for name in held.files}
