@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import subprocess
 import sys
@@ -17,7 +18,9 @@ import pytest
 
 import smajax.stage_equations
 import smajax.stage_solver
+import smajax.step
 import smajax.system
+import smajax.wire.shape
 from smajax.compiled import simulate_compiled
 from smajax.drive.voltage import Voltage
 from smajax.effects.base import AbstractEffect
@@ -164,6 +167,11 @@ def test_what_somebody_put_in_our_place_is_not_kept_under_our_name(monkeypatch: 
         (smajax.stage_equations, "heating_power", doubled),
         (smajax.stage_equations, "heating_power", smajax.system.ambient_temperature),
         (smajax.stage_solver, "INNER", (1, 1)),
+        (smajax.stage_solver, "DRIVING", (lambda *_: 5.0, smajax.stage_solver.DRIVING[1])),
+        (smajax.wire.shape, "quarter_cosine", jax.custom_jvp(lambda share: 1.0 - share**2)),
+        (smajax.wire.shape, "quarter_cosine", functools.partial(lambda power, share: 1.0 - share**power, 2)),
+        (smajax.step, "_solved", eqx.filter_custom_jvp(lambda given: given)),
+        (smajax.step, "_solved", object()),
     ):
         with monkeypatch.context() as patched:
             patched.setattr(place, name, other)

@@ -14,15 +14,16 @@ import inspect
 import json
 import os
 import platform
+import re
 import sys
 import sysconfig
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
-from functools import cache
+from functools import cache, partial
 from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
-from types import FunctionType, ModuleType
+from types import BuiltinFunctionType, FunctionType, ModuleType
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -41,6 +42,8 @@ BELOW = tuple(
 )  # what classes here inherit from
 MOST = 2**30  # bytes in the folder: beyond, what was not used longest goes
 HEAD = b"smajax program 1\n"
+# What a process remembers of its own work: no program depends on it.
+REMEMBERED = ("smajax.lanes.evaluate._kept", "smajax.batch.engine._shapes")
 
 
 class Untold(Exception):
@@ -247,26 +250,72 @@ def _constants(roots: set[str]) -> str:
     while waiting:
         name = waiting.pop(0)
         for own, value in sorted(vars(sys.modules[name]).items()):
-            if own.startswith("__"):
+            if own.startswith("__") or f"{name}.{own}" in REMEMBERED:
                 continue
-            behind = ""
-            if isinstance(value, ModuleType):
-                behind = value.__name__
-            elif isinstance(value, FunctionType | type):
-                behind = value.__module__
-                told.update(f"{name}.{own}:{behind}.{value.__qualname__};".encode())
-                if behind == name:
-                    told.update(_body(value).encode())
-                elif isinstance(value, FunctionType):
-                    _imported(value)
-            elif _plain(value):
-                told.update(f"{name}.{own}={_ordered(value)!r};".encode())
-            elif isinstance(value, np.ndarray):
-                told.update(f"{name}.{own}={value.dtype}{value.tolist()};".encode())
-            if behind.partition(".")[0] == PACKAGE and behind not in seen and behind in sys.modules:
-                seen.add(behind)
-                waiting.append(behind)
+            behind: set[str] = set()
+            told.update(f"{name}.{own}={_entry(value, name, behind)};".encode())
+            for module in sorted(behind):
+                if module.partition(".")[0] == PACKAGE and module not in seen and module in sys.modules:
+                    seen.add(module)
+                    waiting.append(module)
     return told.hexdigest()
+
+
+def _entry(value: Any, name: str, behind: set[str], within: tuple[FunctionType, ...] = ()) -> str:
+    """What stands under a name of the module `name`, as text; `behind` gets the modules that it is from. Untold: not ours."""
+
+    def entry(one: Any) -> str:
+        return _entry(one, name, behind, within)
+
+    if _plain(value) or isinstance(value, bytes | Path | re.Pattern):
+        return repr(_ordered(value))
+    if isinstance(value, np.ndarray | jax.Array):
+        return f"{value.dtype}{np.asarray(value).tolist()}"
+    if isinstance(value, ModuleType):
+        behind.add(value.__name__)
+        return value.__name__
+    if isinstance(value, type):
+        behind.add(value.__module__)
+        told = f"{value.__module__}.{value.__qualname__}"
+        if _lies(value.__module__) is None:
+            raise Untold(told)
+        return f"{told}:{_body(value)}" if value.__module__ == name else told
+    if isinstance(value, FunctionType):
+        behind.add(value.__module__)
+        code = inspect.unwrap(value).__code__
+        installed = "site-packages" in Path(code.co_filename).parts and not _known(code.co_filename)
+        told = f"{value.__module__}.{value.__qualname__}" if installed else _function(value)
+        if value in within:
+            return told
+        held = [cell.cell_contents for cell in value.__closure__ or ()]
+        return f"{told}({','.join(_entry(one, name, behind, (*within, value)) for one in held)})"
+    if isinstance(value, Mapping):
+        return "".join(sorted(f"{entry(key)}:{entry(one)}," for key, one in value.items()))
+    if isinstance(value, tuple | list | set | frozenset):
+        several = [entry(one) for one in value]
+        return f"({','.join(several if isinstance(value, tuple | list) else sorted(several))})"
+    if isinstance(value, partial):
+        return f"partial {entry(value.func)} {entry(value.args)} {entry(value.keywords)}"
+    if type(value).__module__ in ("typing", "types", "collections.abc", "__future__", "jaxtyping"):
+        return repr(value)
+    if isinstance(value, BuiltinFunctionType) or type(value).__name__ == "cython_function_or_method":
+        return f"{value.__module__}.{value.__qualname__}"
+    if layers := _layers(value):
+        # What wraps a function: a form of it that is compiled, or has a derivative of its own.
+        return f"{type(value).__module__}.{type(value).__qualname__}({','.join(map(entry, layers))})"
+    if dataclasses.is_dataclass(value):
+        return f"{_own(type(value))}({', '.join(entry(getattr(value, one.name)) for one in dataclasses.fields(value))})"
+    raise Untold(f"{name}: {type(value)}")
+
+
+def _lies(module: str) -> str | None:
+    """Whose code a module is: ours or that of a package that is installed; None for what a program or a notebook defines."""
+    if module.partition(".")[0] == PACKAGE or module in sys.builtin_module_names:
+        return module
+    file = getattr(sys.modules.get(module), "__file__", None)
+    if module == "__main__" or file is None:
+        return None
+    return module if "site-packages" in Path(file).parts or _known(file) else None
 
 
 def _body(value: FunctionType | type) -> str:
@@ -284,12 +333,21 @@ def _body(value: FunctionType | type) -> str:
     return ";".join(told)
 
 
-def _imported(value: FunctionType) -> None:
-    """Untold for a function that somebody's own program has put into one of our modules."""
-    if value.__module__.partition(".")[0] == PACKAGE:
-        _own(value)
-    elif "site-packages" not in Path(inspect.unwrap(value).__code__.co_filename).parts:
-        _function(value)
+def _layers(value: Any) -> list[FunctionType]:
+    """The function that something wraps, and the rules for its derivative on the way there; none where it wraps none."""
+    found: list[FunctionType] = []
+    for _ in range(5):
+        if isinstance(value, FunctionType):
+            return [*found, value]
+        rules = (getattr(value, way, None) for way in ("jvp", "fwd", "bwd"))
+        found += [one for one in rules if isinstance(one, FunctionType)]
+        value = _inner(value)
+    return []
+
+
+def _inner(value: Any) -> Any:
+    found = (getattr(value, name, None) for name in ("__wrapped__", "__func__", "fget", "method", "fun", "fn"))
+    return next((one for one in found if one is not None), None)
 
 
 def _behind(entry: Any) -> FunctionType | None:
@@ -299,8 +357,7 @@ def _behind(entry: Any) -> FunctionType | None:
             return None
         if isinstance(entry, FunctionType):
             return inspect.unwrap(entry)
-        found = (getattr(entry, name, None) for name in ("__wrapped__", "__func__", "fget", "method"))
-        entry = next((one for one in found if one is not None), None)
+        entry = _inner(entry)
     return None
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from smajax.measured.mat73_file import read_mat73
-from smajax.measured.mat_sound import check_sound
+from smajax.measured.mat_sound import sound_arrays
 from smajax.measured.table import Array, MeasuredDataError, Table
 
 _MAGIC = b"MATLAB "
@@ -139,8 +139,9 @@ def read_mat(path: Path) -> Table:
     if not start.startswith(_MAGIC):
         raise MeasuredDataError(f"{path}: is not the MATLAB version 5 file that its suffix says")
     try:
-        check_sound(path.read_bytes())
-        content = scipy.io.loadmat(path, struct_as_record=True, squeeze_me=False)
+        sound = sound_arrays(path.read_bytes())
+        readable = [name for name, whole in sound.items() if whole and name]
+        content = scipy.io.loadmat(path, struct_as_record=True, squeeze_me=False, variable_names=readable)
     except MemoryError:
         raise
     except Exception as error:  # a damaged file raises whatever its bytes happen to lead to
@@ -148,9 +149,14 @@ def read_mat(path: Path) -> Table:
 
     found = Signals()
     columns = found.columns
-    unusable: dict[str, str] = {}
+    unusable: dict[str, str] = {
+        name: f"variable {name!r} is or holds an object of MATLAB's (a string, table, time series, function); expected numbers "
+        "or a struct: save those"
+        for name, whole in sound.items()
+        if not whole and name
+    }
     for name, raw in content.items():
-        if name.startswith("__"):
+        if name.startswith("__") or name in unusable:
             continue
         value = np.asarray(_plain(raw))
         if value.dtype.names:

@@ -19,13 +19,17 @@ NAME, LENGTH = (1, 2, 16), (5, 6)
 ARRAY, COMPRESSED = 14, 15
 CELL, STRUCTURE, OBJECT, CHARACTERS, SPARSE = 1, 2, 3, 4, 5
 NUMBERS = range(6, 16)
-OPAQUE = (16, 17)  # functions, and objects of MATLAB's own making: nothing of theirs is read
+OPAQUE = (16, 17)  # functions, and objects of MATLAB's own making, such as strings, tables and time series
 IMAGINARY = 0x800
 Element = tuple[int, memoryview]  # its type and its content
 
 
 class Damaged(ValueError):
     """What does not fit."""
+
+
+class Opaque(ValueError):
+    """An array holds what only MATLAB knows how it lies."""
 
 
 def _elements(content: memoryview, order: str) -> Iterator[Element]:
@@ -73,11 +77,9 @@ def _array(content: memoryview, order: str, depth: int = 0) -> None:
     word, _ = struct.unpack_from(f"{order}II", flags)
     kind, imaginary = word & 0xFF, bool(word & IMAGINARY)
     if kind in OPAQUE:
-        for _ in parts:
-            pass
-        return
+        raise Opaque
     sizes = _next(parts, *LENGTH)
-    if len(sizes) < 8 or len(sizes) % 4:
+    if len(sizes) < 4 or len(sizes) % 4:
         raise Damaged(f"the dimensions of an array have {len(sizes)} bytes")
     dimensions = struct.unpack(f"{order}{len(sizes) // 4}i", sizes)
     if min(dimensions) < 0 or len(dimensions) > 32:
@@ -92,8 +94,8 @@ def _array(content: memoryview, order: str, depth: int = 0) -> None:
         long = _next(parts, *LENGTH)
         names = _next(parts, *NAME)
         length = struct.unpack_from(f"{order}i", long)[0] if len(long) == 4 else 0
-        if length < 1 or len(names) % length:
-            raise Damaged(f"{len(names)} bytes of names of fields, {length} each")
+        if length < 1 or len(names) % length or count > len(content):
+            raise Damaged(f"{len(names)} bytes of names of fields, {length} each, of {count} structs")
         _arrays(parts, order, count * (len(names) // length), depth)
     elif kind == CHARACTERS:
         if count > max(len(text := _next(parts, *TEXT)), 1):
@@ -108,22 +110,42 @@ def _array(content: memoryview, order: str, depth: int = 0) -> None:
         raise Damaged(f"an array is of class {kind}, which there is not")
 
 
-def check_sound(content: bytes) -> None:
-    """Raises Damaged where an element of a MATLAB 5 file is larger than what holds it, or is not what is announced."""
+def _name(content: memoryview, order: str) -> str:
+    """That of an array of a file: the first text in it."""
+    for kind, held in _elements(content, order):
+        if kind in NAME:
+            return bytes(held).decode("latin-1")
+    return ""
+
+
+def _whole(kind: int, element: memoryview, order: str) -> memoryview:
+    """An array of a file, unpacked."""
+    if kind == COMPRESSED:
+        try:
+            inside = _elements(memoryview(zlib.decompressobj().decompress(element)), order)
+        except zlib.error as error:
+            raise Damaged(f"what is compressed cannot be read ({error})") from None
+        kind, element = next(inside, (0, memoryview(b"")))
+    if kind != ARRAY:
+        raise Damaged(f"an element of type {kind} stands where an array should")
+    return element
+
+
+def sound_arrays(content: bytes) -> dict[str, bool]:
+    """The arrays of a MATLAB 5 file by their names, and whether a reader may go through each: not where one is opaque.
+
+    Raises Damaged where an element is larger than what holds it, or is not what is announced.
+    """
     if len(content) < HEADING or content[126:128] not in (b"IM", b"MI"):
         raise Damaged(f"a heading of {HEADING} bytes that ends in IM or MI should begin it")
     order = "<" if content[126:128] == b"IM" else ">"
-    for kind, element in _elements(memoryview(content)[HEADING:], order):
-        if kind == ARRAY:
+    found: dict[str, bool] = {}
+    for kind, packed in _elements(memoryview(content)[HEADING:], order):
+        element = _whole(kind, packed, order)
+        name = _name(element, order)
+        try:
             _array(element, order)
-        elif kind == COMPRESSED:
-            try:
-                inside = memoryview(zlib.decompress(element))
-            except zlib.error as error:
-                raise Damaged(f"what is compressed cannot be read ({error})") from None
-            for one, held in _elements(inside, order):
-                if one != ARRAY:
-                    raise Damaged(f"an element of type {one} is compressed where an array should be")
-                _array(held, order)
-        else:
-            raise Damaged(f"an element of type {kind} stands where an array should")
+            found[name] = found.get(name, True)
+        except Opaque:
+            found[name] = False
+    return found
