@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from smajax.command.base import console
+from smajax.command.base import console, insistent
 from smajax.command.close_loop import close_loop_command, demo
 from smajax.command.figures import figures
 from smajax.command.identify import identify_command
@@ -84,7 +84,8 @@ def main() -> None:
     for sentence in told:
         sys.stderr.write(f"deprecated: {sentence}\n")
     try:
-        app(typed)
+        with insistent():  # from here on: what a command imports calls back too
+            app(typed)
     except Exception as error:
         if _no_memory(error):
             # Written plainly: what colours a message would have to be loaded, and there is no memory left for it.

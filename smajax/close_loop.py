@@ -124,7 +124,7 @@ def close_loop(
     check = [*experiment.warnings, *identifiability(at_start, job.unknowns, job.bounds)]
     progress("checking what these runs can tell", 1.0)
     for line in check:
-        progress(f"say: check: {line}", 1.0)
+        progress(f"{'warn' if line in experiment.warnings else 'say'}: check: {line}", 1.0)
 
     first, final = search(setting, setting.base(start, seed))
     lacking: Lacking | None = None

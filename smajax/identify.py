@@ -104,7 +104,7 @@ def identify(
     can_tell = identifiability(_of_fit_runs(at_start, experiment, problem), names, bounds)
     check = [*experiment.warnings, *(line for line in can_tell if "move together" not in line)]
     for line in check:
-        progress(f"say: check: {line}", 1.0)
+        progress(f"{'warn' if line in experiment.warnings else 'say'}: check: {line}", 1.0)
     fits = from_many_starts(problem, names, bounds, seed, starts, progress, kept)
 
     def again(what: str) -> Callable[[Problem, np.ndarray], Fit]:

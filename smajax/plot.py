@@ -21,13 +21,18 @@ def plot(found: xr.Dataset, names: Sequence[str] = ()) -> Figure:
 
     found: of `simulate_dataset` or `simulate_loop_dataset`. names: by default what the drive is given, position (with the set
     point, dashed), temperature, martensite fraction and stress; of a coupon temperature, stress, strain and fraction. Raises
-    ValueError for a name that the data set has not, and for one that is no series over time, such as a whole batch.
+    ValueError for a name that the data set has not, and for one that is no series over time, such as a whole batch; TypeError for what is no data set.
     """
     import matplotlib.pyplot as plt
 
     from smajax.figures.drawing import BLUE, GREY, RED, named, styled
     from smajax.report.display import axis_label, display
 
+    if not hasattr(found, "data_vars"):
+        raise TypeError(
+            f"plot takes a data set, of `simulate_dataset` or `simulate_loop_dataset`, not a {type(found).__name__}, whose arrays are "
+            "its attributes."
+        )
     chosen = [*names] or main_series(found)
     for name in chosen:
         if name not in found:

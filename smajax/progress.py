@@ -13,7 +13,6 @@ from rich.progress import BarColumn, Progress, ProgressColumn, Task, TaskID, Tex
 from rich.text import Text
 
 from smajax.fit.progress import Progress as Report
-from smajax.fit.progress import quiet
 
 # Where stderr is no terminal nothing is said, so that a program that calls us has a clean one; with `lines` a log of a
 # build has a line for each stage.
@@ -22,14 +21,31 @@ VARIABLE = "SMAJAX_PROGRESS"
 
 @contextmanager
 def shown(console: Console) -> Iterator[Report]:
-    """Yields `report(what, share)`; share 1 closes the stage. What begins with "say: " is a sentence, not a stage."""
+    """Yields `report(what, share)`; share 1 closes the stage.
+
+    What begins with "say: " is a sentence, not a stage; what begins with "warn: " is said wherever stderr goes.
+    """
     if sys.stderr.isatty():
         with _bars(console) as report:
             yield report
     elif os.environ.get(VARIABLE) == "lines":
         yield _lines(console)
     else:
-        yield quiet
+        yield _warnings(console)
+
+
+def _sentence(what: str) -> str:
+    """What is told and is no stage; empty for a stage."""
+    kind, _, told = what.partition(": ")
+    return told if kind in ("say", "warn") else ""
+
+
+def _warnings(console: Console) -> Report:
+    def warned(what: str, share: float) -> None:
+        if what.startswith("warn: "):
+            console.print(f"warning: {_sentence(what)}", markup=False, highlight=False, soft_wrap=True)
+
+    return warned
 
 
 def _lines(console: Console) -> Report:
@@ -37,8 +53,8 @@ def _lines(console: Console) -> Report:
 
     def line(what: str, share: float) -> None:
         nonlocal last
-        if what.startswith("say: ") or (what != last and share < 1.0):
-            told = what.removeprefix("say: ")
+        if _sentence(what) or (what != last and share < 1.0):
+            told = _sentence(what) or what
             console.print(f"[{clock.monotonic() - began:6.1f} s] {told}", markup=False, highlight=False, soft_wrap=True)
             last = what
 
@@ -64,8 +80,8 @@ def _bars(console: Console) -> Iterator[Report]:
         open_tasks: dict[str, TaskID] = {}
 
         def move(what: str, share: float) -> None:
-            if what.startswith("say: "):
-                bar.console.print(what.removeprefix("say: "), markup=False, highlight=False)
+            if told := _sentence(what):
+                bar.console.print(told, markup=False, highlight=False)
                 return
             if what not in open_tasks:
                 open_tasks[what] = bar.add_task(what, total=1.0, at=0.0)

@@ -209,7 +209,7 @@ def page(
     )
     mismatches = (
         f"<h2>Mismatch of {say(grid.first)} and {say(grid.second)}</h2><p>The plant's value over the one that the "
-        "controller believes, where it believes in one. Maps: median over the set points at the preset's gains.</p>"
+        "controller believes, where it believes in one. Maps: median over the set points, at the gains that each controller begins with.</p>"
     )
     compared = [
         table(head, comparison_rows(targets, merits)),

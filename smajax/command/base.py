@@ -63,7 +63,7 @@ def command_line() -> str:
 
 
 @contextmanager
-def _insistent() -> Iterator[None]:
+def insistent() -> Iterator[None]:
     """Ctrl-C until it is answered: what is raised while Python collects garbage, where XLA calls back, is printed and dropped."""
     own = threading.current_thread() is threading.main_thread()
     if not own or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
@@ -87,13 +87,23 @@ def _insistent() -> Iterator[None]:
 
 
 @contextmanager
+def until_nobody_reads() -> Iterator[None]:
+    """A list that goes into `head`: when that has seen enough, all is well."""
+    try:
+        yield
+        sys.stdout.flush()
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what Python still holds goes nowhere
+
+
+@contextmanager
 def resumable(kept: str = "", out: Path | None = None, finished: str = "") -> Iterator[None]:
     """Ctrl-C is answered here: typer would end in silence.
 
     kept: what is said where a file of the pattern `finished` lies in `out`; else that there is nothing to go on from.
     """
     try:
-        with _insistent():
+        with insistent():
             yield
     except KeyboardInterrupt:
         there = out is not None and any(out.glob(finished))

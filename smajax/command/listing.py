@@ -6,7 +6,7 @@ import json
 
 import typer
 
-from smajax.command.base import Json
+from smajax.command.base import Json, until_nobody_reads
 
 
 def effects(json_out: Json = False) -> None:
@@ -33,10 +33,11 @@ def effects(json_out: Json = False) -> None:
     if json_out:
         typer.echo(json.dumps(told))
         return
-    for name, one in told.items():
-        typer.echo(f"{name}  [{one['equation']}]\n  {one['title']}: {one['formula']}\n  {one['meaning']}")
-        for full, entry in one["parameters"].items():  # type: ignore[attr-defined]
-            typer.echo(f"    {full}: {entry['bounds'][0]:g} to {entry['bounds'][1]:g} {entry['unit']}")
+    with until_nobody_reads():
+        for name, one in told.items():
+            typer.echo(f"{name}  [{one['equation']}]\n  {one['title']}: {one['formula']}\n  {one['meaning']}")
+            for full, entry in one["parameters"].items():  # type: ignore[attr-defined]
+                typer.echo(f"    {full}: {entry['bounds'][0]:g} to {entry['bounds'][1]:g} {entry['unit']}")
 
 
 def presets(json_out: Json = False) -> None:

@@ -86,7 +86,7 @@ def tune(
 
     Variations: inertia, damping, convection, ambient, payload, supply. The gains are checked on plants and set points that
     tuning never saw. `smajax sweep --gains tune/gains.json` reads them. Exit code 3 when a limit is not met. Ctrl-C loses
-    nothing: the same command goes on.
+    the round under way alone: the same command goes on.
 
     Example:  smajax tune sld --variation inertia=0.2,damping=0.2,convection=0.2 --limits settling_time=4,overshoot=2
     """

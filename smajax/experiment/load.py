@@ -20,7 +20,7 @@ from smajax.experiment.plausibility import (
     role_warnings,
     run_warnings,
 )
-from smajax.experiment.record import Experiment, Output
+from smajax.experiment.record import Experiment, Output, Unknown
 from smajax.experiment.schema import ExperimentFile, read_schema
 from smajax.experiment.signals import Reading, ReadRun, read_run
 from smajax.experiment.unknowns import given_parameters, run_starts, unknowns
@@ -30,6 +30,8 @@ from smajax.measured.read import read_table
 from smajax.units import UnitError, convert, parse_quantity
 
 ESTIMATE = "estimate"
+# Times the largest reading below which, and times the range above which, a noise is none.
+FINEST, COARSEST = 1e-12, 1e3
 # A noise that a sensor may have, as an example, where the channel's own unit is too large for one or shows none.
 _EXAMPLES = {"m": "0.01 mm", "Pa": "0.1 MPa", "rad": "0.1 deg", "1": "0.01 %", "-": "0.01 %"}
 
@@ -150,6 +152,14 @@ def _output(path: Path, file: ExperimentFile, name: str, unit: str, runs: Sequen
             raise ExperimentError(
                 path, key, f"got {given!r}, expected a noise above zero like '{example}', or '{ESTIMATE}'"
             )
+        readings = np.concatenate([read.signals[name].measured for read in fit])
+        if sensor < FINEST * float(np.abs(readings).max()) or 0.0 < COARSEST * float(np.ptp(readings)) < sensor:
+            raise ExperimentError(
+                path,
+                key,
+                f"got {given!r}, and the readings go from {readings.min():.4g} to {readings.max():.4g} {unit}".rstrip()
+                + f": no sensor has that noise there; expected one like '{example}', or '{ESTIMATE}'",
+            )
         how = f"given as {given}" + (f", times {gain:.3g} for the average over a step" if gain < 1.0 else "")
         return Output(name, unit, sensor * gain, how, True, offset), sensor
     for read in fit:
@@ -166,6 +176,17 @@ def _output(path: Path, file: ExperimentFile, name: str, unit: str, runs: Sequen
         raise ExperimentError(path, key, f"no noise can be seen in {name!r}; give it as text like '{example}'")
     how = f"estimated from {len(fit)} fit run{'s' if len(fit) > 1 else ''} (median)"
     return Output(name, unit, sigma, how, False, offset), float(np.median(sensors))
+
+
+def _untold(file: ExperimentFile, free: Sequence[Unknown]) -> list[str]:
+    """That no size of the bench is given: the preset's are another bench's."""
+    sizes = {"wire_length", "wire_diameter"}
+    if file.model.load == "coupon" or file.model.parameters or sizes & {one.name for one in free}:
+        return []
+    return [
+        f"[model.parameters] gives nothing of this bench: the length and diameter of the preset wire {file.model.wire!r} and the rest "
+        "of the presets are taken. Where yours differ, a wrong value is fitted or a missing effect named"
+    ]
 
 
 def _check_effects(path: Path, file: ExperimentFile, catalogue: Catalogue) -> None:
@@ -266,7 +287,7 @@ def load_experiment(path: str | Path, catalogue: Catalogue) -> Experiment:
     warnings += common_warnings(runs)
     heats = sorted(model.heats & runs[0].run.inputs.keys())
     warnings += magnitude_warnings(runs, None if model.scale is None else model.scale(values), heats, reading.step)
-    warnings += _useless(file, model)
+    warnings += _useless(file, model) + _untold(file, free)
     warnings += role_warnings(file.runs)
     return Experiment(
         name=path.resolve().parent.name if path.name == "experiment.toml" else path.stem,

@@ -105,7 +105,7 @@ def _stroke_warnings(runs: Sequence[ReadRun], scale: Scale) -> list[str]:
     if ends is None:
         return []
     share = (ends[1] - ends[0]) / scale.wire_length
-    told = f"the output 'position' moves by {ends[1] - ends[0]:.3g} m, {share:.3g} of the wire's length of {scale.wire_length:.3g} m"
+    told = f"the output 'position' moves by {ends[1] - ends[0]:.3g} m, {share:.3g} times the wire's length of {scale.wire_length:.3g} m"
     if share > LARGEST_STROKE:
         return [f"{told}; is it in mm, or is `wire_length` another?"]
     if 0.0 < share < SMALLEST_STROKE:

@@ -9,6 +9,7 @@ import numpy as np
 from smajax.experiment.schema import RunSection
 from smajax.experiment.signals import ReadRun, Signal
 from smajax.measured.table import Array
+from smajax.words import counted
 
 FEW_SAMPLES = 20
 GAP_STEPS = 5.0
@@ -20,6 +21,8 @@ TWO_RATES = 0.02
 # Seconds: longer than most runs of a wire; a run of eleven seconds lasts that long when its ms are taken for s.
 LONGEST_RUN = 3.0 * 3600.0
 FEWEST_FIT_RUNS = 3
+# Times the width of what nearly all samples lie in from which on one is far off, and the share of a run that may be.
+FAR_OFF, FEW_FAR = 10.0, 0.01
 
 
 def _sticks_at(values: Array, extreme: float) -> bool:
@@ -40,16 +43,32 @@ def _sticks_at(values: Array, extreme: float) -> bool:
     return False
 
 
+def _far_off(run: str, name: str, signal: Signal) -> list[str]:
+    """Single samples far from all others: a sensor that dropped out, a number that stands for none."""
+    times, values = signal.time[np.isfinite(signal.values)], signal.measured
+    low, middle, high = np.percentile(values, [1.0, 50.0, 99.0])
+    far = np.abs(values - middle) > FAR_OFF * (high - low)
+    if high == low or not 0 < far.sum() <= max(1.0, FEW_FAR * values.size):
+        return []
+    first = int(np.argmax(far))
+    return [
+        f"run {run!r}: {counted(int(far.sum()), 'sample')} of the output {name!r} {'lies' if far.sum() == 1 else 'lie'} far from all "
+        f"others, the first at {times[first]:.6g} s with {values[first]:.5g} (the others from {low:.4g} to {high:.4g}): did the sensor "
+        "drop out?"
+    ]
+
+
 def _output_warnings(run: str, name: str, signal: Signal) -> list[str]:
     values = signal.measured
     if not values.size:
         return [f"run {run!r}: the output {name!r} has no sample"]
     if np.ptp(values) == 0.0:
         return [f"run {run!r}: the output {name!r} is constant ({values[0]:g}); nothing can be learnt from it"]
+    found = _far_off(run, name, signal)
     cut = [
         word for word, extreme in (("highest", values.max()), ("lowest", values.min())) if _sticks_at(values, extreme)
     ]
-    return [
+    return found + [
         f"run {run!r}: the output {name!r} runs into its {word} value and stays exactly there; "
         "is the sensor at the end of its range, or the load at a stop?"
         for word in cut

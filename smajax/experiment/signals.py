@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from smajax.experiment.errors import ExperimentError, at_key
+from smajax.experiment.readings import check_readings
 from smajax.experiment.record import Run
 from smajax.experiment.schema import ChannelSection, RunSection, TimeSection
 from smajax.measured.noise import detect_quantum
@@ -107,6 +108,7 @@ def _channel_file(reading: Reading, run: RunSection, name: str) -> tuple[str, Pa
 
 def _signal(
     table: Table,
+    name: str,
     key: str | int,
     channel: ChannelSection,
     own_unit: str,
@@ -120,6 +122,7 @@ def _signal(
         if channel.role == "input" or channel.missing == "skip" or not table.has_gaps(key):
             raise
         raise MeasuredDataError(f"{error}; or write missing = 'skip' for this output, which leaves them out") from None
+    check_readings(name, values, f"{table.path}: column {table.name_of(key, taken)!r}", table.place)
     values = -values if channel.reversed else values
     clock = table.clock(key)
     where, unit = f"{table.path}: the time of {key!r}", "s"
@@ -181,7 +184,7 @@ def _read_signals(reading: Reading, run: RunSection) -> tuple[dict[str, Signal],
         where, file = _channel_file(reading, run, name)
         with at_key(reading.path, where):
             table = reading.tables(file)
-            signals[name] = _signal(table, key, channel, reading.units[name], reading.time, _taken(reading, name))
+            signals[name] = _signal(table, name, key, channel, reading.units[name], reading.time, _taken(reading, name))
             if table.clock(key) is None and reading.time is not None and reading.time.column is not None:
                 moment = table.moments.get(table.name_of(reading.time.column))
                 first |= {} if moment is None else {name: moment}
@@ -254,6 +257,7 @@ def read_run(reading: Reading, run: RunSection, parameters: dict[str, float]) ->
     for name, value in run.inputs.items():
         with at_key(reading.path, f"{where}.inputs.{name}"):
             inputs[name] = np.full(clock.size, parse_quantity(value, reading.units[name]))
+            check_readings(name, inputs[name][:1], f"got {value!r}, which", lambda _: "the program's own unit")
     skipping = frozenset(name for name in reading.output_names if reading.channels[name].missing == "skip")
     outputs = {
         name: (resample_with_gaps if name in skipping else resample_output)(

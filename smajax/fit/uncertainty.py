@@ -133,7 +133,8 @@ def uncertainty(
     for index, name in enumerate(loose):
         blind = not seen[index]
         lost = unseen[index, index] > SHARE**2
-        errors[name] = None if blind or lost else float(error[index] / scale[index])
+        known = covariance[index, index] > 0.0 and np.isfinite(error[index])
+        errors[name] = float(error[index] / scale[index]) if known and not blind and not lost else None
         if blind:
             remark[name] = "no effect on these runs"
         elif lost:
@@ -141,6 +142,8 @@ def uncertainty(
             remark[name] = f"the runs see only a combination of it with {', '.join(others)}"
         elif priors[:, index].any() and error[index] / scale[index] > BARELY / np.linalg.norm(priors[:, index]):
             remark[name] = "known from its prior; the runs add next to nothing"
+        elif not known:
+            remark[name] = "its variance comes out as no number"
     clear = [index for index, name in enumerate(loose) if not remark[name]]
     for index, name in enumerate(loose):
         room = bounds[name][1] - bounds[name][0]
@@ -194,6 +197,11 @@ def identifiability(at: Sensitivity, names: Sequence[str], bounds: Mapping[str, 
     told = [_shown(rank, len(names), len(boxed))]
     blind = [name for index, name in enumerate(names) if not np.any(columns[:, index])]
     told += [f"{name}: nothing in these runs depends on it; fix it or measure something else." for name in blind]
+    if len(blind) > 0:
+        told.append(
+            "So it is where the search starts: a model that never transforms there shows nothing of its transformation. Where that "
+            "surprises, look at the bench's sizes, the drive and the starts first."
+        )
     seen = [name for name in names if name not in blind]
     if not seen:
         return told

@@ -22,7 +22,9 @@ def conclusions(found: Identified) -> list[str]:
     """What was found, in sentences that say no more than the numbers."""
     told = [found.stopped, *(_error(found, k) for k in range(len(found.outputs)))]
     given = [one.noise_before is None for one in found.outputs]
-    if found.whiteness_p < WHITE:
+    if not all(np.isfinite(one.ratio) for one in found.outputs):
+        told.append("What the model leaves of these runs is no number: nothing can be said of it, nor of the values.")
+    elif found.whiteness_p < WHITE:
         told.append(
             f"The residual is {_times(found)} and has a memory ({p_value(found.whiteness_p)}; one "
             f"sample in {found.independent:.0f} is independent): the model lacks something, and the standard errors allow "

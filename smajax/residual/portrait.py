@@ -82,7 +82,7 @@ def noise_like(found: Portrait) -> bool:
 
 
 def _is_noise(ratio: float, white: bool, independent: float) -> bool:
-    excess = 1.0 - 1.0 / max(ratio, 1e-9) ** 2
+    excess = 1.0 - (1.0 / max(ratio, 1e-9)) ** 2
     chance = ERRORS * float(np.sqrt(2.0 / max(independent, 1.0)))
     return excess <= min(max(LEFT_OVER, chance), MOST_LEFT_OVER) or (white and ratio < DECLARED_TOO_SMALL)
 
