@@ -24,7 +24,7 @@ from smajax.fit.posterior import library, posterior
 from smajax.fit.problem import Problem
 from smajax.fit.profile import ALIKE, profiles
 from smajax.fit.progress import Progress, quiet
-from smajax.fit.robust import NORMAL, robust_fit, robust_variance, unweighted_misfit
+from smajax.fit.robust import NORMAL, bent, robust_fit, robust_variance, unweighted_misfit
 from smajax.fit.sensitivity import Sensitivity, sensitivity
 from smajax.fit.starts import TRIED, from_many_starts
 from smajax.fit.uncertainty import covariance_of, held, identifiability, uncertainty
@@ -133,8 +133,9 @@ def identify(
     at = _of_fit_runs(everywhere, experiment, problem)
     misfit = unweighted_misfit(weighted, best.values) if robust else at.misfit
     residual = split_runs(misfit, at.mask)
-    white = whiteness_p_value(residual, LAGS)
-    independent = 1.0 if white > WHITE else correlation_time(residual)
+    judged = [bent(one) for one in residual] if robust else residual
+    white = whiteness_p_value(judged, LAGS)
+    independent = 1.0 if white > WHITE else correlation_time(judged)
     together = np.concatenate(residual)
     # Of a sample over the noise's: what counts of samples far off is what Huber's loss makes of them.
     variance = robust_variance(together) * independent if robust else None

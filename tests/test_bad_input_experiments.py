@@ -15,6 +15,7 @@ import pytest
 from smajax.catalogue import CATALOGUE
 from smajax.command.close_loop import DEMOS
 from smajax.compiled import simulate_compiled
+from smajax.experiment.errors import ExperimentError
 from smajax.experiment.load import load_experiment
 from smajax.experiment.magnitude import BY_HEAT
 from smajax.presets import LOADS, build
@@ -145,8 +146,9 @@ def _warned(experiment: Path, words: str) -> bool:
 
 
 def test_the_sound_experiment_is_warned_of_its_few_runs_alone(tmp_path: Path) -> None:
-    (only,) = load_experiment(bench(tmp_path), CATALOGUE).warnings
-    assert only.startswith("only 1 fit run")
+    sizes, few = load_experiment(bench(tmp_path), CATALOGUE).warnings
+    assert sizes.startswith("[model.parameters] gives nothing of this bench")
+    assert few.startswith("only 1 fit run")
 
 
 def test_a_duty_declared_as_a_voltage_is_told_by_its_heat(tmp_path: Path) -> None:
@@ -165,7 +167,10 @@ def test_an_input_that_heats_nothing_is_told(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("unit", "words"),
-    [("m", "moves by 18.2 m, 34 of the wire's length of 0.537 m; is it in mm"), ("um", "was the wire heated at all?")],
+    [
+        ("m", "moves by 18.2 m, 34 times the wire's length of 0.537 m; is it in mm"),
+        ("um", "was the wire heated at all?"),
+    ],
 )
 def test_a_stroke_in_another_unit_is_told_by_the_wires_length(tmp_path: Path, unit: str, words: str) -> None:
     changes = (('unit = "mm"', f'unit = "{unit}"'), ('noise = "0.1 mm"', 'noise = "estimate"'))
@@ -296,3 +301,56 @@ def test_an_effect_that_the_load_cannot_show_is_told(tmp_path: Path) -> None:
     experiment = bench(tmp_path, ("[sampling]", '[effects]\nonly = ["nonlinear_spring", "latent_heat"]\n[sampling]'))
     assert _warned(experiment, "effects.only names 'nonlinear_spring', which changes nothing of this load and drive")
     assert not _warned(experiment, "effects.only names 'latent_heat'")
+
+
+def _with_line(path: Path, number: int, text: str) -> None:
+    lines = path.read_text().splitlines()
+    lines[number - 1] = text
+    path.write_text("\n".join(lines) + "\n")
+
+
+@pytest.mark.parametrize("reading", ["1e300", "-1.7976931348623157e308", "1e155"])
+def test_a_reading_beyond_any_sensor_is_refused(tmp_path: Path, reading: str) -> None:
+    experiment = bench(tmp_path)
+    _with_line(tmp_path / "a.csv", 50, f"2.4,5,{reading}")
+    with pytest.raises(
+        ExperimentError, match=r"a.csv: column 'x' is .*e\+\d+ in line 50; no sensor shows more than 1e\+15"
+    ):
+        load_experiment(experiment, CATALOGUE)
+
+
+@pytest.mark.parametrize(("mass", "line"), [("0", 30), ("-75", 40)])
+def test_a_load_without_mass_is_refused(tmp_path: Path, mass: str, line: int) -> None:
+    channel = '[channels.mass]\nrole = "input"\ncolumn = "m"\nunit = "g"\n[[runs]]'
+    experiment = bench(tmp_path, ("[[runs]]", channel))
+    for name in ("a.csv", "b.csv"):
+        lines = (tmp_path / name).read_text().splitlines()
+        (tmp_path / name).write_text("\n".join([f"{lines[0]},m", *(f"{one},75" for one in lines[1:])]) + "\n")
+    load_experiment(experiment, CATALOGUE)
+    _with_line(tmp_path / "a.csv", line, f"{0.05 * (line - 2)},5,3,{mass}")
+    with pytest.raises(ExperimentError, match=rf"a.csv: column 'm' is .* in line {line}; expected more than 0 kg"):
+        load_experiment(experiment, CATALOGUE)
+
+
+def test_a_constant_below_absolute_zero_is_refused(tmp_path: Path) -> None:
+    air = '[channels.ambient_temperature]\nrole = "input"\nunit = "degC"\n[[runs]]'
+    place = 'file = "a.csv"\n', 'file = "a.csv"\n[runs.inputs]\nambient_temperature = "-300 degC"\n'
+    other = 'file = "b.csv"\n', 'file = "b.csv"\n[runs.inputs]\nambient_temperature = "23 degC"\n'
+    experiment = bench(tmp_path, ("[[runs]]", air), place, other)
+    with pytest.raises(ExperimentError, match=r"got '-300 degC'.* expected more than -273.15 degC"):
+        load_experiment(experiment, CATALOGUE)
+
+
+@pytest.mark.parametrize("noise", ["1e-160 m", "1e200 m"])
+def test_a_noise_that_no_sensor_has_is_refused(tmp_path: Path, noise: str) -> None:
+    experiment = bench(tmp_path, ('noise = "0.1 mm"', f'noise = "{noise}"'))
+    with pytest.raises(ExperimentError, match=r"channels.position.noise: got '1e.* no sensor has that noise there"):
+        load_experiment(experiment, CATALOGUE)
+
+
+def test_a_single_sample_far_off_is_warned_of(tmp_path: Path) -> None:
+    experiment = bench(tmp_path)
+    _with_line(tmp_path / "a.csv", 50, "2.4,5,9999")
+    assert _warned(
+        experiment, "run 'A': 1 sample of the output 'position' lies far from all others, the first at 2.4 s with 9.999"
+    )

@@ -179,6 +179,23 @@ def test_progress_is_silent_where_nobody_looks(
         assert bool(said) is bool(told)
 
 
+def test_a_warning_is_said_wherever_stderr_leads(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv(VARIABLE, "")
+    with shown(console()) as progress:
+        progress("fitting", 0.0)
+        progress("warn: check: is it in mm?", 1.0)
+    assert capsys.readouterr().err == "warning: check: is it in mm?\n"
+
+
+def test_a_list_may_be_cut_short(tmp_path: Path) -> None:
+    shell = f"{sys.executable} -m smajax effects | head -n 1; exit ${{PIPESTATUS[0]}}"
+    told = subprocess.run(["bash", "-c", shell], cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False)
+    assert told.returncode == 0, told.stderr
+    assert told.stdout.count("\n") == 1
+
+
 @pytest.mark.parametrize(
     ("typed", "offered"),
     [

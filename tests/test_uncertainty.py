@@ -149,3 +149,39 @@ def test_how_many_unknowns_show_is_said_first(names: str, rank: int, told: str) 
     columns[:, rank:] = columns[:, :1] if rank else 0.0
     line = identifiability(_sensitivity(columns, rng.normal(size=500)), names, BOUNDS)[0]
     assert line.startswith(told)
+
+
+def test_a_weak_parameter_within_a_degeneracy_has_no_error_either() -> None:
+    """Its own column is short beside those it goes with: the way along what nobody sees moves it all the same."""
+    rng = np.random.default_rng(11)
+    columns = rng.normal(size=(400, 3)) * [1.0, 0.02, 1.0]
+    columns[:, 2] = columns[:, 0] + columns[:, 1]  # (1, 1, -1) is seen by nothing
+    found = uncertainty(_sensitivity(columns, 1e-3 * rng.normal(size=400)), "abc", VALUES, BOUNDS)
+    assert set(found.standard_error.values()) == {None}
+
+
+def test_no_variance_of_a_residual_with_a_memory_is_below_zero() -> None:
+    rng = np.random.default_rng(12)
+    for _ in range(300):
+        columns = rng.normal(size=(24, 2))
+        residual = rng.normal(size=24)
+        for k in range(1, 24):
+            residual[k] += 0.95 * residual[k - 1]
+        errors = uncertainty(_sensitivity(columns, residual), "ab", VALUES, BOUNDS).standard_error
+        assert all(error is None or error > 0.0 for error in errors.values())
+
+
+def test_few_independent_samples_make_no_small_error() -> None:
+    """A coupon of 240 samples whose residual has a memory: a slow column tells no more than its independent samples."""
+    rng = np.random.default_rng(13)
+    column = np.linspace(-1.0, 1.0, 240)[:, None]
+    z = []
+    for _ in range(200):
+        noise = rng.normal(size=240)
+        for k in range(1, 240):
+            noise[k] += 0.8 * noise[k - 1]
+        estimate = float(column[:, 0] @ noise / (column[:, 0] @ column[:, 0]))
+        error = uncertainty(_sensitivity(column, noise), "a", VALUES, BOUNDS).standard_error["a"]
+        assert error is not None
+        z.append(estimate / error)
+    assert 0.9 < np.mean(np.abs(z) < 1.96) <= 1.0

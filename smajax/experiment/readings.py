@@ -9,7 +9,7 @@ import numpy as np
 from smajax.measured.table import Array, MeasuredDataError
 
 LARGEST = 1e15  # in the program's own units: a thousand times any stress in Pa
-# Channel -> (least value, what it is, whether it may be reached). A load without mass has no motion to integrate.
+# Input -> (least value, what it is, whether it may be reached). A load without mass has no motion to integrate.
 LEAST = {
     "mass": (0.0, "kg", False),
     "power": (0.0, "W", True),
@@ -18,14 +18,14 @@ LEAST = {
 }
 
 
-def check_readings(name: str, values: Array, where: str, place: Callable[[int], str]) -> None:
+def check_readings(name: str, given: bool, values: Array, where: str, place: Callable[[int], str]) -> None:
     """Raises MeasuredDataError for the first value (n,), SI and degC, that the channel `name` cannot have; nan is a gap.
 
-    where: the file and its column; place: where in it a sample is.
+    given: an input, and no sensor, which may be off by its noise. where: the file and its column; place: where in it a sample is.
     """
     wrong = np.abs(values) > LARGEST
     why = f"no sensor shows more than {LARGEST:g}"
-    if name in LEAST:
+    if given and name in LEAST:
         least, unit, reached = LEAST[name]
         below = values < least if reached else values <= least
         if below.any() and not wrong.any():

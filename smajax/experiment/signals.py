@@ -122,7 +122,9 @@ def _signal(
         if channel.role == "input" or channel.missing == "skip" or not table.has_gaps(key):
             raise
         raise MeasuredDataError(f"{error}; or write missing = 'skip' for this output, which leaves them out") from None
-    check_readings(name, values, f"{table.path}: column {table.name_of(key, taken)!r}", table.place)
+    check_readings(
+        name, channel.role == "input", values, f"{table.path}: column {table.name_of(key, taken)!r}", table.place
+    )
     values = -values if channel.reversed else values
     clock = table.clock(key)
     where, unit = f"{table.path}: the time of {key!r}", "s"
@@ -257,7 +259,7 @@ def read_run(reading: Reading, run: RunSection, parameters: dict[str, float]) ->
     for name, value in run.inputs.items():
         with at_key(reading.path, f"{where}.inputs.{name}"):
             inputs[name] = np.full(clock.size, parse_quantity(value, reading.units[name]))
-            check_readings(name, inputs[name][:1], f"got {value!r}, which", lambda _: "the program's own unit")
+            check_readings(name, True, inputs[name][:1], f"got {value!r}, which", lambda _: "the program's own unit")
     skipping = frozenset(name for name in reading.output_names if reading.channels[name].missing == "skip")
     outputs = {
         name: (resample_with_gaps if name in skipping else resample_output)(

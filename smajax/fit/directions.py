@@ -28,7 +28,7 @@ class Direction:
         if self.relative_error >= UNBOUND:
             if len(named) == 1:
                 return f"Nothing in these runs depends on {next(iter(named))}."
-            return f"The runs show {and_listed(list(named))} in one combination only: no one of them by itself."
+            return f"The runs do not see {and_listed(list(named))} move together: no one of them is known by itself."
         size = 100.0 * self.relative_error
         if len(named) == 1:
             return f"{next(iter(named))} is known to {size:.2g} % only."

@@ -39,6 +39,12 @@ def _crossing(values: np.ndarray, root: np.ndarray) -> float | None:
     return float(np.interp(WITHIN, root[k - 1 : k + 1], values[k - 1 : k + 1]))
 
 
+def _parts(problem: Problem, fit: Fit) -> tuple[float, float]:
+    """(squares of what runs leave, of what is known before)."""
+    known = float(np.sum(np.square(problem.priors.rows(fit.values))))
+    return fit.cost - known, known
+
+
 def profiles(
     problem: Problem,
     asked: Sequence[str],
@@ -66,10 +72,12 @@ def profiles(
     solved = fit_in_box(problem, lanes, kept=kept, progress=progress, what="profiles") if lanes else []
     found = []
     for name in asked:
-        tried = [(value, one.cost) for (of, value), one in zip(points, solved, strict=True) if of == name]
-        tried = sorted([*tried, (float(best.values[index(name)]), best.cost)])
-        values, cost = np.asarray(tried).T
-        rise = (cost - best.cost) / inflation
+        tried = [(value, *_parts(problem, one)) for (of, value), one in zip(points, solved, strict=True) if of == name]
+        tried = sorted([*tried, (float(best.values[index(name)]), *_parts(problem, best))])
+        values, cost, known = np.asarray(tried).T
+        least, before = _parts(problem, best)
+        # What is known before is known as it was said, whatever the residual's noise turns out to be.
+        rise = (cost - least) / inflation + known - before
         middle = int(np.argmin(np.abs(values - best.values[index(name)])))
         root = np.sqrt(np.maximum(rise, 0.0))
         down = _crossing(values[middle::-1], root[middle::-1])

@@ -53,6 +53,12 @@ def robust_fit(problem: Problem, first: Fit, fit: Callable[[Problem, np.ndarray]
     return weighted, found
 
 
+def bent(misfit: np.ndarray) -> np.ndarray:
+    """A residual with what is far off brought to where it counts no more: outliers hide a memory."""
+    most = BEND * NORMAL * float(np.median(np.abs(misfit)))
+    return np.clip(misfit, -most, most)
+
+
 def robust_variance(misfit: np.ndarray) -> float:
     """Of an M-estimate by these residuals, over that of the design alone: mean psi^2 / (mean psi')^2 (Huber 1981)."""
     spread = NORMAL * float(np.median(np.abs(misfit)))

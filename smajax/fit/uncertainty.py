@@ -16,14 +16,15 @@ from smajax.words import and_listed
 AT_BOUND = 2e-3
 # Two parameters whose estimates are correlated more than this move together: the runs see one combination of them.
 TOGETHER = 0.98
-# A direction in which the scaled columns are shorter than this share of the longest is one the runs do not see; a
-# parameter with more than `SHARE` of its own in such directions has no standard error.
+# A direction in which the scaled columns are shorter than this share of the longest is one the runs do not see. One that a
+# way through the whole box along such directions moves by more than this share of its standard error has none.
 UNSEEN = 1e-5
-SHARE = 0.1
+MOVED = 0.1
 # A predicted standard error beyond this share of the allowed box: the runs say nothing that the box does not.
 VAGUE = 0.25
 # A standard error above this share of the prior's: what is known of the parameter was known before.
 BARELY = 0.95
+FEW = 50  # independent samples that tell a parameter
 
 
 @dataclass(frozen=True)
@@ -46,8 +47,9 @@ def _covariance(
     """(covariance, scale of each column). A prior counts as one sample more, whose noise is one.
 
     That of least squares where the residual is white. Where it has a memory, Newey-West's over each run, no variance of
-    it below that of least squares: it is taken from the scores of the few samples that tell a parameter, and for few it
-    comes out too small (by a factor of 2.7 in a coupon of 600 samples).
+    it below that of least squares; and where fewer than `FEW` independent samples tell a parameter, not below that of least
+    squares with no more samples than are independent: from so few Newey-West's comes out too small (by a factor of 2.7 in a
+    coupon of 600 samples).
     """
     scale = np.linalg.norm(np.concatenate([columns, priors]), axis=0)
     scale = np.where(scale > 0.0, scale, 1.0)
@@ -61,23 +63,34 @@ def _covariance(
     if whiteness_p_value(runs) > WHITE:
         return plain, scale
     meat = np.zeros_like(bread)
-    reach = int(np.ceil(3.0 * correlation_time(runs)))
+    independent = correlation_time(runs)
+    telling = (scaled**2).sum(axis=0) ** 2 / np.maximum((scaled**4).sum(axis=0), 1e-300)
+    few = telling < FEW * independent
+    floor = np.diag(np.where(few, independent, 1.0) * each * (bread - before) + before)
+    reach = int(np.ceil(3.0 * independent))
     start = 0
     for run in runs:
         scores = scaled[start : start + len(run)] * run[:, None]
         start += len(run)
-        meat += bartlett_sum(scores, reach, min(reach, len(run) // 4))
+        # Weights that fall to zero within the lags taken: others make variances below zero.
+        meat += bartlett_sum(scores, min(reach, len(run) // 4))
     sandwich = bread @ meat @ bread + before
-    least = np.sqrt(np.maximum(np.diag(plain), 0.0) / np.maximum(np.diag(sandwich), 1e-300))
+    least = np.sqrt(np.maximum(floor, 0.0) / np.maximum(np.diag(sandwich), 1e-300))
     raised = np.maximum(least, 1.0)
     return sandwich * np.outer(raised, raised), scale
 
 
 def _unseen(scaled: np.ndarray) -> np.ndarray:
-    """Projector on the directions that the runs do not see, (parameters, parameters)."""
+    """Directions that the runs do not see, (directions, parameters)."""
     _, singular, directions = np.linalg.svd(scaled, full_matrices=False)
-    unseen = directions[singular <= UNSEEN * singular[:1]]
-    return np.asarray(unseen.T @ unseen)
+    return np.asarray(directions[singular <= UNSEEN * singular[:1]])
+
+
+def _ways(unseen: np.ndarray, scale: np.ndarray, room: np.ndarray) -> np.ndarray:
+    """How far each parameter goes along those directions, (directions, parameters), until one has crossed its box."""
+    ways = unseen / scale
+    longest = np.abs(ways / room).max(axis=1, keepdims=True, initial=0.0)
+    return np.asarray(ways / np.where(longest > 0.0, longest, 1.0))
 
 
 def _correlation(covariance: np.ndarray) -> np.ndarray:
@@ -127,27 +140,35 @@ def uncertainty(
     covariance, scale = _covariance(columns, priors, split_runs(at.misfit, at.mask), variance)
     whole = np.concatenate([columns, priors])
     seen = np.any(whole, axis=0)
-    unseen = np.zeros((len(loose), len(loose)))
-    unseen[np.ix_(seen, seen)] = _unseen(whole[:, seen] / scale[seen])
+    room = np.asarray([bounds[name][1] - bounds[name][0] for name in loose])
+    lost_ways = _unseen(whole[:, seen] / scale[seen])
+    ways = np.zeros((len(lost_ways), len(loose)))
+    ways[:, seen] = _ways(lost_ways, scale[seen], room[seen])
     error = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     for index, name in enumerate(loose):
         blind = not seen[index]
-        lost = unseen[index, index] > SHARE**2
+        along = np.abs(ways[:, index]) > MOVED * error[index] / scale[index]
+        lost = bool(along.any())
         known = covariance[index, index] > 0.0 and np.isfinite(error[index])
         errors[name] = float(error[index] / scale[index]) if known and not blind and not lost else None
         if blind:
             remark[name] = "no effect on these runs"
         elif lost:
-            others = [loose[k] for k in np.flatnonzero(np.abs(unseen[index]) > SHARE**2) if k != index]
-            remark[name] = f"the runs see only a combination of it with {', '.join(others)}"
+            farther = (np.abs(ways[along]) > MOVED * error / scale).any(axis=0)
+            others = [loose[k] for k in np.flatnonzero(farther) if k != index]
+            remark[name] = (
+                f"the runs see only a combination of it with {', '.join(others)}"
+                if others
+                else "the runs do not see it"
+            )
         elif priors[:, index].any() and error[index] / scale[index] > BARELY / np.linalg.norm(priors[:, index]):
             remark[name] = "known from its prior; the runs add next to nothing"
         elif not known:
             remark[name] = "its variance comes out as no number"
     clear = [index for index, name in enumerate(loose) if not remark[name]]
     for index, name in enumerate(loose):
-        room = bounds[name][1] - bounds[name][0]
-        if not remark[name] and error[index] / scale[index] > room:
+        span = bounds[name][1] - bounds[name][0]
+        if not remark[name] and error[index] / scale[index] > span:
             errors[name], remark[name] = None, "the runs leave all of its range open"
     for cluster in _clusters(covariance[np.ix_(clear, clear)]):
         members = [loose[clear[index]] for index in cluster]

@@ -58,13 +58,10 @@ def correlation_time(runs: Sequence[np.ndarray]) -> float:
     return max(1.0, total / weight)
 
 
-def bartlett_sum(scores: np.ndarray, reach: int, lags: int) -> np.ndarray:
-    r"""$\sum_{|l| \le K} (1 - |l| / (L + 1)) \sum_t s_t s_{t+l}^T$ of one run's scores (n, p): (p, p).
-
-    L is `reach` and K `lags`, fewer than n.
-    """
+def bartlett_sum(scores: np.ndarray, lags: int) -> np.ndarray:
+    r"""$\sum_{|l| \le L} (1 - |l| / (L + 1)) \sum_t s_t s_{t+l}^T$ of one run's scores (n, p), L `lags`, fewer than n: (p, p)."""
     count = len(scores)
-    weights = 1.0 - np.arange(lags + 1) / (reach + 1.0)
+    weights = 1.0 - np.arange(lags + 1) / (lags + 1.0)
     if lags * scores.size > MANY:
         size = fft.next_fast_len(count + lags, real=True)
         around = np.zeros(size)
