@@ -21,7 +21,7 @@ from smajax.levels import clock_of, given, levels
 from smajax.parameters import parameter_values, set_parameters
 from smajax.presets import build
 from smajax.report.simulate_page import conclusions
-from smajax.single import Asked, AskedLoop, run_closed
+from smajax.single import Asked, AskedLoop, run_closed, run_open
 from smajax.units import UnitError
 
 run = CliRunner()
@@ -181,3 +181,12 @@ def test_a_coupon_is_given_its_temperature_and_stress(tmp_path: Path) -> None:
     assert record["series"]["stress"] == [100e6] * 21
     assert record["series"]["martensite_fraction"][-1] == pytest.approx(0.0, abs=1e-6)
     assert record["series"]["reading"][0] - record["series"]["reading"][-1] == pytest.approx(0.04, abs=5e-3)
+
+
+def test_a_stop_and_a_slack_wire_are_told() -> None:
+    told = " ".join(conclusions(run_open(Asked(dt=0.01, inputs={"voltage": "9V:5s,0V:5s"}))))
+    assert "It runs into its upper stop, first 1.8" in told
+    assert "The wire goes slack, first 1.8" in told
+    told = " ".join(conclusions(run_open(Asked(dt=0.01, inputs={"voltage": "5V:5s"}))))
+    assert "stop" not in told
+    assert "slack" not in told

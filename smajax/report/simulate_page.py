@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 
 from smajax.figures.drawing import BLUE, GREY, RED, named, panels
 from smajax.fit.progress import Progress, quiet
+from smajax.load.base import AbstractMovingLoad
 from smajax.merit import MERIT_UNITS
 from smajax.parameters import parameter_values, parameters
 from smajax.report.animation import moving
@@ -23,6 +24,7 @@ from smajax.report.html import picture
 from smajax.report.plain_page import bullets, table, whole
 from smajax.single import Ran
 
+AT_STOP = 1e-3  # of the way moved: nearer is at a stop
 STILL = 1e-3  # change of the martensite fraction that is none
 PLAIN = ("position", "temperature", "martensite_fraction", "stress")
 
@@ -146,11 +148,34 @@ def conclusions(ran: Ran) -> list[str]:
         f"The {label(name)} starts at {at('reading', reading[0])}, lies between {at('reading', reading.min())} and "
         f"{at('reading', reading.max())}, and ends at {at('reading', reading[-1])}."
     )
+    told += _at_ends(ran)
     if ran.merit:
         settles = ran.merit["settling_time"]
         told.append(
             f"The loop settles after {digits(settles, 3)} s." if np.isfinite(settles) else "The loop never settles."
         )
+    return told
+
+
+def _at_ends(ran: Ran) -> list[str]:
+    """That the load reaches a stop on its way, and that its wire goes slack."""
+    load, time = ran.system.load, ran.found["time"].to_numpy()
+    if not isinstance(load, AbstractMovingLoad):
+        return []
+    reading, stress = ran.found["reading"].to_numpy(), ran.found["stress"].to_numpy()
+    room = AT_STOP * max(float(np.ptp(reading)), 1e-12)
+    told = []
+    for word, stop, sign in zip(("lower", "upper"), load.limits(), (-1.0, 1.0), strict=True):
+        there = sign * (reading - float(stop)) > -room
+        if np.isfinite(float(stop)) and there.any() and not there[0]:
+            first = time[int(there.argmax())]
+            told.append(
+                f"It runs into its {word} stop, first {first:.3g} s in, and is there for {there.mean() * time[-1]:.3g} s."
+            )
+    slack = stress <= 0.0
+    if slack[1:].any():
+        first = time[1 + int(slack[1:].argmax())]
+        told.append(f"The wire goes slack, first {first:.3g} s in, for {slack.mean() * time[-1]:.3g} s in all.")
     return told
 
 
