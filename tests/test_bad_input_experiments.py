@@ -314,7 +314,7 @@ def test_a_reading_beyond_any_sensor_is_refused(tmp_path: Path, reading: str) ->
     experiment = bench(tmp_path)
     _with_line(tmp_path / "a.csv", 50, f"2.4,5,{reading}")
     with pytest.raises(
-        ExperimentError, match=r"a.csv: column 'x' is .*e\+\d+ in line 50; no sensor shows more than 1e\+15"
+        ExperimentError, match=r"a.csv: column 'x' is .*e\+\d+ mm in line 50; no sensor shows more than 1e\+15"
     ):
         load_experiment(experiment, CATALOGUE)
 

@@ -18,10 +18,10 @@ LEAST = {
 }
 
 
-def check_readings(name: str, given: bool, values: Array, where: str, place: Callable[[int], str]) -> None:
+def check_readings(name: str, given: bool, values: Array, told: Callable[[int], str]) -> None:
     """Raises MeasuredDataError for the first value (n,), SI and degC, that the channel `name` cannot have; nan is a gap.
 
-    given: an input, and no sensor, which may be off by its noise. where: the file and its column; place: where in it a sample is.
+    given: an input, and no sensor, which may be off by its noise. told: where a sample is, and what is written there.
     """
     wrong = np.abs(values) > LARGEST
     why = f"no sensor shows more than {LARGEST:g}"
@@ -34,6 +34,5 @@ def check_readings(name: str, given: bool, values: Array, where: str, place: Cal
         first = int(np.argmax(wrong))
         more = int(wrong.sum()) - 1
         raise MeasuredDataError(
-            f"{where} is {values[first]:g} in {place(first)}{f' and in {more} more' if more else ''}; {why}: take such samples "
-            "out, or correct the unit or the sign"
+            f"{told(first)}{f' and in {more} more' if more else ''}; {why}: take such samples out, or correct the unit or the sign"
         )

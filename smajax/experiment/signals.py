@@ -117,13 +117,18 @@ def _signal(
 ) -> Signal:
     """One channel from its table. taken: the columns of the time and the other channels. Raises MeasuredDataError."""
     try:
-        values = convert(table.column(key, taken, gaps=channel.missing == "skip"), channel.unit, own_unit)
+        written = table.column(key, taken, gaps=channel.missing == "skip")
+        values = convert(written, channel.unit, own_unit)
     except MeasuredDataError as error:
         if channel.role == "input" or channel.missing == "skip" or not table.has_gaps(key):
             raise
         raise MeasuredDataError(f"{error}; or write missing = 'skip' for this output, which leaves them out") from None
+    column = f"{table.path}: column {table.name_of(key, taken)!r}"
     check_readings(
-        name, channel.role == "input", values, f"{table.path}: column {table.name_of(key, taken)!r}", table.place
+        name,
+        channel.role == "input",
+        values,
+        lambda at: f"{column} is {written[at]:g} {channel.unit} in {table.place(at)}",
     )
     values = -values if channel.reversed else values
     clock = table.clock(key)
@@ -259,7 +264,7 @@ def read_run(reading: Reading, run: RunSection, parameters: dict[str, float]) ->
     for name, value in run.inputs.items():
         with at_key(reading.path, f"{where}.inputs.{name}"):
             inputs[name] = np.full(clock.size, parse_quantity(value, reading.units[name]))
-            check_readings(name, True, inputs[name][:1], f"got {value!r}, which", lambda _: "the program's own unit")
+            check_readings(name, True, inputs[name][:1], lambda _, value=value: f"got {value!r}")  # type: ignore[misc]
     skipping = frozenset(name for name in reading.output_names if reading.channels[name].missing == "skip")
     outputs = {
         name: (resample_with_gaps if name in skipping else resample_output)(
