@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from smajax.residual import noise_like
-from smajax.residual.noise_like import autocorrelation, bartlett_sum
+from smajax.residual.noise_like import autocorrelation, bartlett_sum, correlation_time, whiteness_p_value
 
 SERIES = np.random.default_rng(3).normal(size=(997, 3)).cumsum(axis=0)
 
@@ -40,3 +40,10 @@ def test_the_weighted_sum_is_what_its_formula_says() -> None:
         (1.0 - abs(i - j) / 5.0) * np.outer(some[i], some[j]) for i in range(30) for j in range(30) if abs(i - j) <= 4
     )
     np.testing.assert_allclose(bartlett_sum(some, 4), said, rtol=1e-12)
+
+
+def test_nothing_is_read_into_a_constant_or_a_single_sample() -> None:
+    constant, single = np.full(50, 0.1), np.array([3.0])
+    assert whiteness_p_value([constant]) == 1.0
+    assert whiteness_p_value([single]) == 1.0
+    assert correlation_time([constant]) == correlation_time([single]) == 1.0

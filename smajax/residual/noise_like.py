@@ -11,6 +11,7 @@ LAGS = 20
 MANY = (
     10**7
 )  # products from which on sums over lags are taken by Fourier transform: they grow as the square of the samples
+ROUNDING = 1e-14
 WHITE = 0.01  # a residual whose whiteness has a smaller p-value has structure
 
 
@@ -18,7 +19,8 @@ def autocorrelation(series: np.ndarray, lags: int) -> np.ndarray:
     """Autocorrelation at lags 0..`lags` of one run's residual (n,), mean removed."""
     centred = series - series.mean()
     power = float(centred @ centred)
-    if power == 0.0:
+    # What rounding leaves of a constant is no signal.
+    if power <= len(series) * (ROUNDING * float(np.abs(series).max(initial=0.0))) ** 2:
         return np.concatenate([[1.0], np.zeros(lags)])
     reach = min(lags, len(series) - 1)
     if reach * len(series) > MANY:
@@ -38,11 +40,13 @@ def whiteness_p_value(runs: Sequence[np.ndarray], lags: int = LAGS) -> float:
     statistic, freedom = 0.0, 0
     for run in runs:
         n = len(run)
+        if n < 2:
+            continue  # one sample has no neighbour
         reach = max(1, min(lags, n // 2))
         r = autocorrelation(run, reach)
         statistic += n * (n + 2) * float(np.sum(r[1:] ** 2 / (n - np.arange(1, reach + 1))))
         freedom += reach
-    return float(stats.chi2.sf(statistic, freedom))
+    return float(stats.chi2.sf(statistic, freedom)) if freedom else 1.0
 
 
 def correlation_time(runs: Sequence[np.ndarray]) -> float:
