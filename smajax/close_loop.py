@@ -27,7 +27,7 @@ from smajax.extended import base_model, extended
 from smajax.fit.batch import RunBatch, halved, pack, simulate_batch
 from smajax.fit.kept import Kept
 from smajax.fit.problem import Problem
-from smajax.fit.progress import Progress, quiet
+from smajax.fit.progress import Progress, quiet, say_checked
 from smajax.fit.sensitivity import Sensitivity, sensitivity
 from smajax.fit.uncertainty import Uncertainty, identifiability, uncertainty
 from smajax.load.coupon import AbstractCoupon
@@ -121,10 +121,10 @@ def close_loop(
         apart,
     )
     at_start = sensitivity(job.problem, start, job.unknowns)
-    check = [*experiment.warnings, *identifiability(at_start, job.unknowns, job.bounds)]
+    can_tell = identifiability(at_start, job.unknowns, job.bounds)
+    check = [*experiment.warnings, *can_tell]
     progress("checking what these runs can tell", 1.0)
-    for line in check:
-        progress(f"{'warn' if line in experiment.warnings else 'say'}: check: {line}", 1.0)
+    say_checked(progress, experiment.warnings, can_tell)
 
     first, final = search(setting, setting.base(start, seed))
     lacking: Lacking | None = None

@@ -23,7 +23,7 @@ from smajax.fit.noise import fit_with_noise
 from smajax.fit.posterior import library, posterior
 from smajax.fit.problem import Problem
 from smajax.fit.profile import ALIKE, profiles
-from smajax.fit.progress import Progress, quiet
+from smajax.fit.progress import Progress, quiet, say_checked
 from smajax.fit.robust import NORMAL, bent, robust_fit, robust_variance, unweighted_misfit
 from smajax.fit.sensitivity import Sensitivity, sensitivity
 from smajax.fit.starts import TRIED, from_many_starts
@@ -101,10 +101,10 @@ def identify(
     start = problem.start_values()
     # Of what the runs can tell: what is told at the start already. What moves together is told at the fit, by how much.
     at_start = sensitivity(everything, _in_full(everything, problem, start), names)
-    can_tell = identifiability(_of_fit_runs(at_start, experiment, problem), names, bounds)
-    check = [*experiment.warnings, *(line for line in can_tell if "move together" not in line)]
-    for line in check:
-        progress(f"{'warn' if line in experiment.warnings else 'say'}: check: {line}", 1.0)
+    every = identifiability(_of_fit_runs(at_start, experiment, problem), names, bounds)
+    can_tell = [line for line in every if "move together" not in line]
+    check = [*experiment.warnings, *can_tell]
+    say_checked(progress, experiment.warnings, can_tell)
     fits = from_many_starts(problem, names, bounds, seed, starts, progress, kept)
 
     def again(what: str) -> Callable[[Problem, np.ndarray], Fit]:

@@ -21,7 +21,8 @@ def plot(found: xr.Dataset, names: Sequence[str] = ()) -> Figure:
 
     found: of `simulate_dataset` or `simulate_loop_dataset`. names: by default what the drive is given, position (with the set
     point, dashed), temperature, martensite fraction and stress; of a coupon temperature, stress, strain and fraction. Raises
-    ValueError for a name that the data set has not, and for one that is no series over time, such as a whole batch; TypeError for what is no data set.
+    ValueError for a name that the data set has not, and for one that is no series over time, such as a whole batch;
+    TypeError for what is no data set.
     """
     import matplotlib.pyplot as plt
 

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import struct
 import sys
+import tracemalloc
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -249,6 +252,51 @@ def test_files_that_are_not_what_their_suffix_says(tmp_path: Path) -> None:
     (tmp_path / "new.mat").write_bytes(b"MATLAB 7.3 MAT-file, Platform: GLNXA64")
     with pytest.raises(MeasuredDataError, match=r"MATLAB 7\.3 file is damaged|smajax\[formats\]', or save it again"):
         read_table(tmp_path / "new.mat")
+
+
+def element(kind: int, content: bytes) -> bytes:
+    """One element of a MATLAB 5 file."""
+    return struct.pack("<II", kind, len(content)) + content + b"\0" * (-len(content) % 8)
+
+
+def matlab_array(kind: int, dimensions: Sequence[int], name: bytes, content: bytes) -> bytes:
+    flags, sizes = struct.pack("<II", kind, 0), struct.pack(f"<{len(dimensions)}i", *dimensions)
+    return element(14, element(6, flags) + element(5, sizes) + element(1, name) + content)
+
+
+def matlab_file(path: Path, *arrays: bytes) -> Path:
+    path.write_bytes(b"MATLAB 5.0 MAT-file".ljust(124) + b"\0\1IM" + b"".join(arrays))
+    return path
+
+
+READINGS = matlab_array(6, (3, 1), b"x", element(9, np.arange(3.0).tobytes()))
+
+
+def test_an_object_of_matlabs_own_is_left_unread_however_deep(tmp_path: Path) -> None:
+    """scipy's reader ends the program in one like this: it follows the cells by calling itself."""
+    layers = b""
+    for _ in range(20_000):
+        layers = matlab_array(1, (1, 1), b"", layers)
+    held = element(14, element(6, struct.pack("<II", 17, 0)) + element(1, b"table") + element(1, b"MCOS") + layers)
+    table = read_table(matlab_file(tmp_path / "run.mat", READINGS, held))
+    np.testing.assert_array_equal(table.columns["x"], np.arange(3.0))
+    assert "'table' is or holds an object of MATLAB's" in table.unusable["table"]
+    with pytest.raises(MeasuredDataError, match="more than 100 deep"):
+        read_table(matlab_file(tmp_path / "deep.mat", READINGS, layers))
+
+
+@pytest.mark.parametrize("dimensions", [(2**31 - 1, 1), (2**31 - 1, 2**31 - 1), (2**16,) * 4])
+def test_structs_without_fields_are_not_given_the_memory_that_they_announce(
+    tmp_path: Path, dimensions: tuple[int, ...]
+) -> None:
+    empty = matlab_array(2, dimensions, b"s", element(5, struct.pack("<i", 1)) + element(1, b""))
+    path = matlab_file(tmp_path / "run.mat", READINGS, empty)
+    tracemalloc.start()
+    with pytest.raises(MeasuredDataError, match=r"damaged.*0 bytes of names of fields"):
+        read_table(path)
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert most < 2**24
 
 
 def test_simulink_structures_carry_their_own_time(tmp_path: Path) -> None:

@@ -227,6 +227,13 @@ def _kept(path: Path, run: RunSection, start: float, end: float) -> tuple[float,
     return start, end
 
 
+def _constant(name: str, value: str | float, unit: str) -> float:
+    """An input that a run holds. Raises UnitError, and MeasuredDataError for what it cannot be."""
+    found = parse_quantity(value, unit)
+    check_readings(name, True, np.asarray([found]), lambda _: f"got {value!r}")
+    return found
+
+
 def read_run(reading: Reading, run: RunSection, parameters: dict[str, float]) -> ReadRun:
     """Reads one run. Its clock covers the time that all its signals have in common. Raises ExperimentError."""
     where = f"runs.{run.name}"
@@ -263,8 +270,7 @@ def read_run(reading: Reading, run: RunSection, parameters: dict[str, float]) ->
             )
     for name, value in run.inputs.items():
         with at_key(reading.path, f"{where}.inputs.{name}"):
-            inputs[name] = np.full(clock.size, parse_quantity(value, reading.units[name]))
-            check_readings(name, True, inputs[name][:1], lambda _, value=value: f"got {value!r}")  # type: ignore[misc]
+            inputs[name] = np.full(clock.size, _constant(name, value, reading.units[name]))
     skipping = frozenset(name for name in reading.output_names if reading.channels[name].missing == "skip")
     outputs = {
         name: (resample_with_gaps if name in skipping else resample_output)(

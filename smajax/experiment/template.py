@@ -16,6 +16,7 @@ from smajax.measured.read import read_table
 from smajax.measured.table import MeasuredDataError, Table
 from smajax.parameters import parameter_values, parameters
 from smajax.presets import build
+from smajax.system import System
 from smajax.units import convert
 from smajax.words import and_listed
 
@@ -92,34 +93,30 @@ def _clock(table: Table, columns: Sequence[Column]) -> np.ndarray | None:
     return None if time is None else convert(table.columns[time.name], time.unit, "s")
 
 
-def _known(model: _Model) -> dict[str, tuple[str, str]]:
+def _amount(value: float, unit: str, places: int) -> str:
+    return f"{value:.{places}g} {unit.replace('-', '')}".strip()
+
+
+def _known(model: _Model, system: System) -> dict[str, tuple[str, str]]:
     """What a ruler, a balance or a data sheet tells of the bench: name -> (the preset's value, what it is)."""
-    system = build(model.wire, model.load, model.drive)
     table, values = parameters(system), parameter_values(system)
     heated, given = model.drive != "none", {"load_mass"} if "mass" in model.inputs else set()
     sizes = ["wire_length", "wire_diameter", *["ambient_temperature"] * heated] if model.load != "coupon" else []
     names = [*sizes, *(name for name, one in table.items() if one.path[0] in ("load", "drive") and name not in given)]
-    return {
-        name: (
-            f"{values[name]:.4g} {table[name].unit.replace('(', '').replace(')', '').replace('-', '')}".strip(),
-            table[name].about,
-        )
-        for name in names
-    }
+    return {name: (_amount(values[name], table[name].unit, 4), table[name].about) for name in names}
 
 
-def _unknowns(model: _Model) -> list[str]:
+def _unknowns(model: _Model, system: System) -> list[str]:
     """The parameters that no sheet tells, with bounds around the preset's."""
-    system = build(model.wire, model.load, model.drive)
     table, values = parameters(system), parameter_values(system)
     heated = model.drive != "none"
     lines = []
     for name, (low, high) in FACTORS.items():
         if not heated and name != "recoverable_strain":
             continue
-        unit, value = table[name].unit.replace("-", ""), values[name]
+        value = values[name]
         box = (max(low * value, table[name].low), min(high * value, table[name].high), value)
-        shown = [f"{one:.3g} {unit}".strip() for one in box]
+        shown = [_amount(one, table[name].unit, 3) for one in box]
         lines.append(f'{name} = {{ low = "{shown[0]}", high = "{shown[1]}", start = "{shown[2]}" }}')
     for name, width in KELVINS.items():
         value = values[name]
@@ -217,7 +214,8 @@ def begun(files: Sequence[Path], target: Path, title: str = "") -> Guessed:
         "",
         "[model.parameters]  # what is known of your bench, each with its unit; the rest is the preset's",
     ]
-    known = _known(model)
+    preset = build(model.wire, model.load, model.drive)
+    known = _known(model, preset)
     lines += [f'# {name} = "{value}"  # {about}' for name, (value, about) in known.items()]
     if known:
         some = ", ".join(f"{name} {value}" for name, (value, _) in list(known.items())[:4])
@@ -226,7 +224,13 @@ def begun(files: Sequence[Path], target: Path, title: str = "") -> Guessed:
             "wrong one shows up as a wrong fitted value"
         )
     lines += ["", "[unknown]  # to be fitted: bounds around the preset's values, and where the search starts"]
-    lines += [*_unknowns(model), "", "[nuisance]", "offset = true  # the sensor's zero may move from run to run", ""]
+    lines += [
+        *_unknowns(model, preset),
+        "",
+        "[nuisance]",
+        "offset = true  # the sensor's zero may move from run to run",
+        "",
+    ]
     clocks = [clock for table in tables if (clock := _clock(table, columns)) is not None]
     if clocks and len(clocks) < len(tables):
         raise MeasuredDataError("some of the files have a time and others have none; give all of them one")

@@ -70,12 +70,11 @@ def profiles(
             lanes.append(problem.lane(others, bounds, start))
             points.append((name, value))
     solved = fit_in_box(problem, lanes, kept=kept, progress=progress, what="profiles") if lanes else []
-    found = []
+    found, (least, before) = [], _parts(problem, best)
     for name in asked:
         tried = [(value, *_parts(problem, one)) for (of, value), one in zip(points, solved, strict=True) if of == name]
-        tried = sorted([*tried, (float(best.values[index(name)]), *_parts(problem, best))])
+        tried = sorted([*tried, (float(best.values[index(name)]), least, before)])
         values, cost, known = np.asarray(tried).T
-        least, before = _parts(problem, best)
         # What is known before is known as it was said, whatever the residual's noise turns out to be.
         rise = (cost - least) / inflation + known - before
         middle = int(np.argmin(np.abs(values - best.values[index(name)])))

@@ -53,15 +53,18 @@ def robust_fit(problem: Problem, first: Fit, fit: Callable[[Problem, np.ndarray]
     return weighted, found
 
 
+def _most(misfit: np.ndarray) -> float:
+    """From where on a sample counts less."""
+    return max(BEND * NORMAL * float(np.median(np.abs(misfit))), 1e-300)
+
+
 def bent(misfit: np.ndarray) -> np.ndarray:
     """A residual with what is far off brought to where it counts no more: outliers hide a memory."""
-    most = BEND * NORMAL * float(np.median(np.abs(misfit)))
+    most = _most(misfit)
     return np.clip(misfit, -most, most)
 
 
 def robust_variance(misfit: np.ndarray) -> float:
     """Of an M-estimate by these residuals, over that of the design alone: mean psi^2 / (mean psi')^2 (Huber 1981)."""
-    spread = NORMAL * float(np.median(np.abs(misfit)))
-    far = misfit / max(BEND * spread, 1e-300)
-    bent = np.asarray(BEND * spread * np.clip(far, -1.0, 1.0))
-    return float(np.mean(np.square(bent)) / max(float(np.mean(np.abs(far) < 1.0)), 1e-3) ** 2)
+    inside = float(np.mean(np.abs(misfit) < _most(misfit)))
+    return float(np.mean(np.square(bent(misfit))) / max(inside, 1e-3) ** 2)

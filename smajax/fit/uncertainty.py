@@ -167,8 +167,7 @@ def uncertainty(
             remark[name] = "its variance comes out as no number"
     clear = [index for index, name in enumerate(loose) if not remark[name]]
     for index, name in enumerate(loose):
-        span = bounds[name][1] - bounds[name][0]
-        if not remark[name] and error[index] / scale[index] > span:
+        if not remark[name] and error[index] / scale[index] > room[index]:
             errors[name], remark[name] = None, "the runs leave all of its range open"
     for cluster in _clusters(covariance[np.ix_(clear, clear)]):
         members = [loose[clear[index]] for index in cluster]

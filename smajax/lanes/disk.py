@@ -37,9 +37,8 @@ from smajax.report.files import writing
 
 PACKAGE = "smajax"
 ROOT = Path(__file__).parents[1]
-BELOW = tuple(
-    Path(package.__file__).parent for package in (jax, eqx) if package.__file__
-)  # what classes here inherit from
+# What classes here inherit from.
+BELOW = tuple(Path(package.__file__).parent for package in (jax, eqx) if package.__file__)
 MOST = 2**30  # bytes in the folder: beyond, what was not used longest goes
 HEAD = b"smajax program 1\n"
 # What a process remembers of its own work: no program depends on it.
@@ -277,13 +276,13 @@ def _entry(value: Any, name: str, behind: set[str], within: tuple[FunctionType, 
     if isinstance(value, type):
         behind.add(value.__module__)
         told = f"{value.__module__}.{value.__qualname__}"
-        if _lies(value.__module__) is None:
+        if not _lies_here(value.__module__):
             raise Untold(told)
         return f"{told}:{_body(value)}" if value.__module__ == name else told
     if isinstance(value, FunctionType):
         behind.add(value.__module__)
         code = inspect.unwrap(value).__code__
-        installed = "site-packages" in Path(code.co_filename).parts and not _known(code.co_filename)
+        installed = _installed(code.co_filename) and not _known(code.co_filename)
         told = f"{value.__module__}.{value.__qualname__}" if installed else _function(value)
         if value in within:
             return told
@@ -308,20 +307,16 @@ def _entry(value: Any, name: str, behind: set[str], within: tuple[FunctionType, 
     raise Untold(f"{name}: {type(value)}")
 
 
-def _lies(module: str) -> str | None:
-    """Whose code a module is: ours or that of a package that is installed; None for what a program or a notebook defines."""
+def _lies_here(module: str) -> bool:
+    """Whether a module is ours or that of a package that is installed, and not what a program or a notebook defines."""
     if module.partition(".")[0] == PACKAGE or module in sys.builtin_module_names:
-        return module
+        return True
     file = getattr(sys.modules.get(module), "__file__", None)
-    if module == "__main__" or file is None:
-        return None
-    return module if "site-packages" in Path(file).parts or _known(file) else None
+    return module != "__main__" and file is not None and (_installed(file) or _known(file))
 
 
-def _body(value: FunctionType | type) -> str:
-    """What a function, or the methods of a class, consist of. Untold where they do not come from this package's files."""
-    if isinstance(value, FunctionType):
-        return _function(value)
+def _body(value: type) -> str:
+    """What the methods of a class consist of. Untold where they do not come from this package's files."""
     told = []
     for own, entry in sorted(vars(value).items()):
         found = _behind(entry)
@@ -341,24 +336,15 @@ def _layers(value: Any) -> list[FunctionType]:
             return [*found, value]
         rules = (getattr(value, way, None) for way in ("jvp", "fwd", "bwd"))
         found += [one for one in rules if isinstance(one, FunctionType)]
-        value = _inner(value)
+        inner = (getattr(value, name, None) for name in ("__wrapped__", "__func__", "fget", "method", "fun", "fn"))
+        value = next((one for one in inner if one is not None), None)
     return []
-
-
-def _inner(value: Any) -> Any:
-    found = (getattr(value, name, None) for name in ("__wrapped__", "__func__", "fget", "method", "fun", "fn"))
-    return next((one for one in found if one is not None), None)
 
 
 def _behind(entry: Any) -> FunctionType | None:
     """The function of a method, property or what wraps it."""
-    for _ in range(5):
-        if entry is None:
-            return None
-        if isinstance(entry, FunctionType):
-            return inspect.unwrap(entry)
-        entry = _inner(entry)
-    return None
+    layers = _layers(entry)
+    return inspect.unwrap(layers[-1]) if layers else None
 
 
 def _function(value: FunctionType) -> str:
@@ -368,13 +354,17 @@ def _function(value: FunctionType) -> str:
     return f"{value.__module__}.{value.__qualname__}:{code.co_filename}:{code.co_firstlineno}"
 
 
+def _installed(file: str) -> bool:
+    return "site-packages" in Path(file).parts
+
+
 @cache
 def _known(file: str) -> bool:
     """Whether a file is this package's, or of what stands in the key by its version."""
     path = Path(file)
     if path.is_relative_to(ROOT) or any(path.is_relative_to(one) for one in BELOW):
         return True
-    return path.is_relative_to(sysconfig.get_path("stdlib")) and "site-packages" not in path.parts
+    return path.is_relative_to(sysconfig.get_path("stdlib")) and not _installed(file)
 
 
 def _plain(value: Any) -> bool:

@@ -8,9 +8,8 @@ import numpy as np
 from scipy import fft, stats
 
 LAGS = 20
-MANY = (
-    10**7
-)  # products from which on sums over lags are taken by Fourier transform: they grow as the square of the samples
+# Products from which on sums over lags are taken by Fourier transform: they grow as the square of the samples.
+MANY = 10**7
 ROUNDING = 1e-14
 WHITE = 0.01  # a residual whose whiteness has a smaller p-value has structure
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 Found = Mapping[str, Mapping[str, Any]]
@@ -106,47 +106,45 @@ def _times(found: Found) -> list[str]:
     return rows
 
 
+def _section(title: str, head: str, rows: Sequence[str], words: str = "") -> list[str]:
+    """A table under a title, a word or two before it; nothing without rows."""
+    if not rows:
+        return []
+    under = "|" + "---|" * head.count(" | ") + "---|"
+    return [f"## {title}", "", *([words, ""] if words else []), f"| {head} |", under, *rows, ""]
+
+
 def _growth(found: Found) -> list[str]:
-    lines = []
-    if runs := [one for one in found.get("gradient_memory", {}).get("runs", []) if "steps" in one]:
-        lines += [
-            "## Memory of a gradient",
-            "",
-            "| steps | program of the run, MB | of its gradient, MB | gradient over run, time |",
-            "|---|---|---|---|",
-        ]
-        lines += [
-            f"| {one['steps']:,} | {one['cost_memory_MB']:.3g} | {one['gradient_memory_MB']:.3g} | {one['gradient_over_cost']:.2f} |"
-            for one in runs
-        ]
-        lines.append("")
-    if runs := [one for one in found.get("scale", {}).get("runs", []) if "members" in one]:
-        lines += [
-            "## Many members, streamed to a store",
-            "",
-            "| members | s, compiling included | ms each | peak memory, MB | of it imports | store, MB |",
-            "|---|---|---|---|---|---|",
-        ]
-        lines += [
-            f"| {one['members']:,} | {one['s']:.1f} | {one['ms_per_trajectory']:.3g} | {one['peak_memory_MB']:.0f} | {one['imports_MB']:.0f} | {one['store_MB']:.1f} |"
-            for one in runs
-        ]
-        lines.append("")
-    if runs := [one for one in found.get("loads", {}).get("runs", []) if "count" in one]:
-        lines += [
-            "## Loads",
-            "",
+    def runs(part: str, known: str) -> list[Mapping[str, Any]]:
+        return [one for one in found.get(part, {}).get("runs", []) if known in one]
+
+    return [
+        *_section(
+            "Memory of a gradient",
+            "steps | program of the run, MB | of its gradient, MB | gradient over run, time",
+            [
+                f"| {one['steps']:,} | {one['cost_memory_MB']:.3g} | {one['gradient_memory_MB']:.3g} | {one['gradient_over_cost']:.2f} |"
+                for one in runs("gradient_memory", "steps")
+            ],
+        ),
+        *_section(
+            "Many members, streamed to a store",
+            "members | s, compiling included | ms each | peak memory, MB | of it imports | store, MB",
+            [
+                f"| {one['members']:,} | {one['s']:.1f} | {one['ms_per_trajectory']:.3g} | {one['peak_memory_MB']:.0f} | {one['imports_MB']:.0f} | {one['store_MB']:.1f} |"
+                for one in runs("scale", "members")
+            ],
+        ),
+        *_section(
+            "Loads",
+            "what | N | s | peak memory, MB | of it grown by the work",
+            [
+                f"| {LOADS[one['what']]} | {one['count']:,} | {one['s']:.1f} | {one['peak_memory_MB']:.0f} | {one['grown_MB']:.0f} |"
+                for one in runs("loads", "count")
+            ],
             "`python -m studies.benchmarks.load WHAT --count N`, each in a process of its own.",
-            "",
-            "| what | N | s | peak memory, MB | of it grown by the work |",
-            "|---|---|---|---|---|",
-        ]
-        lines += [
-            f"| {LOADS[one['what']]} | {one['count']:,} | {one['s']:.1f} | {one['peak_memory_MB']:.0f} | {one['grown_MB']:.0f} |"
-            for one in runs
-        ]
-        lines.append("")
-    return lines
+        ),
+    ]
 
 
 def told(machine: Mapping[str, Any], found: Found) -> str:
