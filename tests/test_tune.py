@@ -46,6 +46,7 @@ SETTINGS = TuneSettings(
     tried=4,
     starts=2,
     rounds=4,
+    finish=3,
     seconds=SECONDS,
     unseen=2,
 )
@@ -174,6 +175,7 @@ def test_the_folder_is_whole(folder: Path) -> None:
     assert names == {
         "asked.json",
         "state.npz",
+        "finish.npz",
         "gains.json",
         "tune.html",
         "tune.json",

@@ -18,13 +18,13 @@ CANDIDATES = 12
 @pytest.fixture(scope="module")
 def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("study") / "fast.json"
-    run.compare(path, (run.FAST_PROBLEM,), CANDIDATES, again=False)
+    run.compare(path, (run.FAST_PROBLEM,), CANDIDATES, again=False, seeds_of=run.FAST_WAYS)
     return path
 
 
 def test_every_search_keeps_to_its_budget_and_never_worsens(results: Path) -> None:
     found = kept(results)["peers"]
-    assert len(found) == sum(len(seeds) for seeds in run.WAYS.values())
+    assert len(found) == sum(len(seeds) for seeds in run.FAST_WAYS.values())
     for one in found.values():
         loops, costs = np.asarray(one["course"]).T
         assert one["closed_loops"] <= CANDIDATES * len(run.FAST_PROBLEM.set_points) + len(loops)
@@ -47,7 +47,7 @@ def test_what_is_kept_is_not_run_again(results: Path, monkeypatch: pytest.Monkey
         raise AssertionError("run again")
 
     monkeypatch.setattr(run, "searched", never)
-    run.compare(results, (run.FAST_PROBLEM,), CANDIDATES, again=False)
+    run.compare(results, (run.FAST_PROBLEM,), CANDIDATES, again=False, seeds_of=run.FAST_WAYS)
 
 
 def test_the_kept_results_are_whole() -> None:

@@ -63,6 +63,10 @@ def tune(
         int | None, typer.Option(callback=within(1), help="points that gains are moved from; default 6")
     ] = None,
     rounds: Annotated[int | None, typer.Option(callback=within(1), help="steps, at most; default 30")] = None,
+    finish: Annotated[
+        int | None,
+        typer.Option(callback=within(0), help="generations of a search without slopes (CMA-ES) after that; default 60"),
+    ] = None,
     seconds: Annotated[float, typer.Option(callback=within(0.1, 86_400.0), help="length of each closed loop")] = 10.0,
     estimator: Annotated[
         str,
@@ -77,16 +81,18 @@ def tune(
     out: Annotated[Path, typer.Option(help="folder for gains.json, the page, the pictures and the numbers")] = Path(
         "tune"
     ),
-    fast: Annotated[bool, typer.Option("--fast", help="by default set points -20,20,60, 3 starts, 10 rounds")] = False,
+    fast: Annotated[
+        bool, typer.Option("--fast", help="by default set points -20,20,60, 3 starts, 10 rounds, 10 generations")
+    ] = False,
     overwrite: Overwrite = False,
     json_out: Json = False,
     open_page: OpenUnless = True,
 ) -> None:
-    """Tune the gains of a controller of the arm by gradient, on many set points and plants at once.
+    """Tune the gains of a controller of the arm, on many set points and plants at once: by gradient, then without slopes.
 
     Variations: inertia, damping, convection, ambient, payload, supply. The gains are checked on plants and set points that
     tuning never saw. `smajax sweep --gains tune/gains.json` reads them. Exit code 3 when a limit is not met. Ctrl-C loses
-    the round under way alone: the same command goes on.
+    the round or generation under way alone: the same command goes on.
 
     Example:  smajax tune sld --variation inertia=0.2,damping=0.2,convection=0.2 --limits settling_time=4,overshoot=2
     """
@@ -119,6 +125,7 @@ def tune(
         starts or (3 if fast else 6),
         rounds or (10 if fast else 30),
         by,
+        (10 if fast else 60) if finish is None else finish,
         seconds,
         estimator,
         noise,

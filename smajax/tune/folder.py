@@ -13,13 +13,15 @@ from smajax.made_with import made_with
 from smajax.report.files import json_text, replace
 from smajax.system import System
 from smajax.tune.descent import Descent, load
+from smajax.tune.evolve import Evolution
+from smajax.tune.evolve import load as load_evolution
 from smajax.tune.page import loops, page, record
 from smajax.tune.pictures import before_after, costs_over_loops
 from smajax.tune.settings import TuneSettings
 from smajax.tune.tune import Tuned, tune
 
-ASKED, STATE, GAINS = "asked.json", "state.npz", "gains.json"
-OURS = {ASKED, STATE, GAINS, "tune.html", "tune.json", "loops.csv", "before_after.png", "descent.png"}
+ASKED, STATE, FINISH, GAINS = "asked.json", "state.npz", "finish.npz", "gains.json"
+OURS = {ASKED, STATE, FINISH, GAINS, "tune.html", "tune.json", "loops.csv", "before_after.png", "descent.png"}
 
 
 def check_folder(out: Path, asked: dict[str, object]) -> None:
@@ -59,13 +61,13 @@ def tune_into(
     out.mkdir(parents=True, exist_ok=True)
     replace(out / ASKED, json_text(asked))
 
-    def keep(descent: Descent) -> None:
-        descent.save(out / STATE)
+    def keep(state: Descent | Evolution) -> None:
+        state.save(out / (STATE if isinstance(state, Descent) else FINISH))
 
-    after = load(out / STATE)
+    after, known = load(out / STATE), load_evolution(out / FINISH)
     if after is not None and not after.ended:
         progress(f"say: going on after round {after.round}" if after.round else "say: going on from the starts", 1.0)
-    found = tune(system, settings, after=after, keep=keep, progress=progress)
+    found = tune(system, settings, after=after, known=known, keep=keep, progress=progress)
     told = {"tuned": settings.record(), "command": command, **made_with()}
     write_gains(out / GAINS, found.after, found.units, told)
     pictures = {"before_after.png": before_after(found), "descent.png": costs_over_loops(found)}

@@ -123,9 +123,10 @@ def conclusions(found: Tuned) -> list[str]:
         told.append(f"At a bound of the box, beyond which better gains may lie: {', '.join(edge)}.")
     descent = found.descent
     told.append(
-        f"It took {descent.simulations:,} closed loops in {descent.round} rounds"
+        f"It took {found.simulations:,} closed loops in {counted(descent.round, 'round')} by slopes"
+        + (f" and {counted(found.evolution.generations, 'generation')} without" if found.evolution.generations else "")
         + (
-            f"; {descent.wild:,} of them had slopes of no use (a limit cycle multiplies every difference)"
+            f"; {descent.wild:,} loops had slopes of no use (a limit cycle multiplies every difference)"
             if descent.wild
             else ""
         )
@@ -255,21 +256,26 @@ def record(found: Tuned, command: str) -> dict[str, Any]:
             for name, one in found.checks.items()
         },
         "search": {
-            "closed_loops": descent.simulations,
+            "closed_loops": found.simulations,
             "rounds": descent.round,
             "slopes_of_no_use": descent.wild,
             "no_numbers": descent.left_out,
-            "best_cost_within_limits_by_round": [
-                float(one)
-                for one in np.minimum.accumulate(
-                    np.nanmin(np.where(descent.excesses <= 0.0, descent.costs, np.inf), axis=1)
-                )[: descent.round]
-            ],
+            "best_cost_within_limits_by_round": _best_so_far(
+                descent.costs[: descent.round], descent.excesses[: descent.round]
+            ),
             "closed_loops_by_round": descent.ran[: descent.round].tolist(),
+            "generations_without_slopes": found.evolution.generations,
+            "closed_loops_by_generation": found.evolution.ran.tolist(),
+            "best_cost_within_limits_by_generation": _best_so_far(found.evolution.costs, found.evolution.excesses),
         },
         "command": command,
         "made_with": made_with(),
     }
+
+
+def _best_so_far(costs: np.ndarray, excesses: np.ndarray) -> list[float]:
+    """Of candidates (steps, several) within the limits, after each step; infinite before there is one."""
+    return np.minimum.accumulate(np.nanmin(np.where(excesses <= 0.0, costs, np.inf), axis=1)).tolist()
 
 
 def _plain(found: Tuned, term: str, value: float) -> float | None:

@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter
 
 from smajax.report.pictures import AFTER, BEFORE, MEASURED, QUIET, as_png, new_figure, tidy
+from smajax.tune.objective import rank
 from smajax.tune.terms import TERMS
 from smajax.tune.tune import Tuned
 
@@ -99,26 +100,36 @@ def _over_set_points(axes: Axes, found: Tuned, name: str) -> None:
 
 
 def costs_over_loops(found: Tuned) -> bytes:
-    """What each round of each start cost, over the closed loops run so far; the best so far as a line."""
-    descent = found.descent
+    """What each round of each start and the best of each generation cost, over the closed loops run so far; the best as a line."""
+    descent, evolution = found.descent, found.evolution
     figure = new_figure(3.2)
     axes = figure.subplots()
-    ran = descent.ran[: descent.round]
     costs, excesses = descent.costs[: descent.round], descent.excesses[: descent.round]
-    loops = np.broadcast_to(ran[:, None], costs.shape)
-    within = excesses <= 0.0
+    loops = np.broadcast_to(descent.ran[: descent.round, None], costs.shape)
+    seen = [("s", loops, costs, excesses, "a start's round")]
+    if evolution.generations:
+        first = np.argmin(rank(evolution.costs, evolution.excesses), axis=1)[:, None]
+        cost, excess = (np.take_along_axis(one, first, axis=1) for one in (evolution.costs, evolution.excesses))
+        seen.append(("d", evolution.ran[:, None], cost, excess, "a generation's best"))
     limits = bool(found.settings.limits)
-    for mask, filled, label in (
-        (within, AFTER, "within the limits" if limits else "a start's round"),
-        (~within & np.isfinite(excesses), "white", "a limit exceeded"),
-    ):
-        if mask.any():
-            axes.plot(loops[mask], costs[mask], "o", color=AFTER, markerfacecolor=filled, markersize=4, label=label)
-    best = np.minimum.accumulate(np.nanmin(np.where(within, costs, np.inf), axis=1))
+    for marker, at, cost, excess, label in seen:
+        within = excess <= 0.0
+        for mask, filled, told in (
+            (within, AFTER, f"{label}, within the limits" if limits else label),
+            (~within & np.isfinite(excess), "white", f"{label}, a limit exceeded"),
+        ):
+            if mask.any():
+                axes.plot(at[mask], cost[mask], marker, color=AFTER, markerfacecolor=filled, markersize=4, label=told)
+    ran = np.concatenate([at.ravel() for _, at, *_ in seen])
+    within = np.concatenate([np.where(excess <= 0.0, cost, np.inf).ravel() for *_, cost, excess, _ in seen])
+    order = np.argsort(ran, kind="stable")
+    best = np.minimum.accumulate(within[order])
     if np.isfinite(best).any():
-        axes.step(ran[np.isfinite(best)], best[np.isfinite(best)], where="post", color=MEASURED, label="best so far")
+        known = np.isfinite(best)
+        axes.step(ran[order][known], best[known], where="post", color=MEASURED, label="best so far")
     axes.axhline(found.costs[0], color=BEFORE, linewidth=0.9, linestyle="--", label="the preset's gains")
-    finite = costs[np.isfinite(costs) & (costs > 0.0)]
+    every = np.concatenate([cost.ravel() for _, _, cost, *_ in seen])
+    finite = every[np.isfinite(every) & (every > 0.0)]
     if finite.size and finite.max() > 5.0 * finite.min():
         axes.set_yscale("log")
         for formatter in (axes.yaxis.set_major_formatter, axes.yaxis.set_minor_formatter):

@@ -31,6 +31,7 @@ class TuneSettings:
     starts: int = 6
     rounds: int = 30
     by: str = "trust-region"
+    finish: int = 60  # generations of the search without slopes that follows
     seconds: float = 10.0
     filtered: str = ""
     noise: float = 0.0  # degrees
@@ -65,6 +66,8 @@ class TuneSettings:
         box = CONTROLLERS[self.controller].box
         if self.start and set(self.start) != set(box):
             raise ValueError(f"gains to begin from are {', '.join(box)}, all of them; not {', '.join(self.start)}.")
+        if self.finish < 0:
+            raise ValueError(f"generations without slopes are none or more, not {self.finish}.")
         if self.unseen < 1:
             raise ValueError(f"the check needs at least one plant, not {self.unseen}.")
         _ = self.goal, self.effort  # they check themselves
@@ -105,6 +108,7 @@ class TuneSettings:
             "starts": self.starts,
             "rounds": self.rounds,
             "by": self.by,
+            "generations_without_slopes": self.finish,
             "seconds": self.seconds,
             "filter": self.filtered,
             "noise_deg": self.noise,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,8 +16,9 @@ from smajax.sweep_run import interface_of
 from smajax.system import System
 from smajax.tune.descent import Descent, begin, one_round
 from smajax.tune.evaluate import LOOPS, STEP, Rig, Seen
+from smajax.tune.evolve import Evolution, evolve
 from smajax.tune.members import Members, never_seen, tuned_on
-from smajax.tune.objective import rank
+from smajax.tune.objective import Goal, rank
 from smajax.tune.settings import TuneSettings
 
 LEAST_LOOPS = 8
@@ -54,12 +55,18 @@ class Tuned:
     costs: tuple[float, float]  # before and after, on what was tuned on
     excesses: Mapping[str, tuple[float, float]]  # by which a limit is exceeded, of each check
     descent: Descent
+    evolution: Evolution
     lines: Lines
 
     @property
     def within_limits(self) -> bool:
         """Every limit is met, in what was tuned on and in plants inside of the variation that were never seen."""
         return self.excesses["tuned on"][1] <= 0.0 and self.excesses["inside"][1] <= 0.0
+
+    @property
+    def simulations(self) -> int:
+        """Closed loops of the search."""
+        return int(self.evolution.ran.max(initial=self.descent.simulations))
 
 
 def rig_of(system: System, settings: TuneSettings) -> Rig:
@@ -82,10 +89,13 @@ def tune(
     settings: TuneSettings,
     *,
     after: Descent | None = None,
-    keep: Callable[[Descent], object] = lambda descent: None,
+    known: Evolution | None = None,
+    keep: Callable[[Descent | Evolution], object] = lambda state: None,
     progress: Progress = quiet,
 ) -> Tuned:
-    """Tune, from the preset's gains and the best of points of the box, or on from `after`; `keep` gets the starts and every round's end.
+    """Tune, from the preset's gains and the best of points of the box; `keep` gets the starts and every round's end.
+
+    after, known: where an interrupted tuning stood, by slopes and without; it goes on from there to the same end.
 
     Raises ValueError for settings that make no sense.
     """
@@ -107,11 +117,22 @@ def tune(
     progress(what, 1.0)
     progress("judging", 0.0)
     # Rounds judge at the step of tuning; of what they leave the best at a finer one is taken. The preset is among them.
-    ends = np.stack([rig.point(rig.gains(point)) for point in (rig.before, *now.best)])
-    seen = rig.judged(ends, members)
-    order = rank(goal.cost(seen.judged, members), goal.excess(seen.judged))
-    chosen = int(np.argmin(order))
-    best = rig.gains(ends[chosen])
+    best = _best_of(rig, goal, members, (rig.before, *now.best))
+    progress("judging", 1.0)
+    evolution = evolve(
+        rig,
+        goal,
+        members,
+        rig.point(best),
+        generations=settings.finish,
+        seed=settings.seed,
+        known=known,
+        keep=keep,
+        progress=progress,
+        what=f"{what}, without slopes",
+    )
+    progress("judging", 0.0)
+    best = _best_of(rig, goal, members, (rig.point(best), evolution.best))
     pair = np.stack([rig.before, rig.point(best)])
     checks = {
         "tuned on": members,
@@ -124,7 +145,7 @@ def tune(
     here = judged["tuned on"]
     cost = goal.cost(here.seen.judged, members)
     excesses = {name: goal.excess(one.seen.judged) for name, one in judged.items()}
-    known = parameters(rig.controller)
+    table = parameters(rig.controller)
     tuned = Gains(settings.controller, best)
     lines = _lines(rig, settings, tuned, checks["inside"])
     progress("judging", 1.0)
@@ -133,13 +154,21 @@ def tune(
         dict(zip(rig.names, np.asarray(get_parameters(rig.controller, rig.names)).tolist(), strict=True)),
         tuned,
         rig.box,
-        {name: known[name].unit for name in rig.names},
+        {name: table[name].unit for name in rig.names},
         judged,
         (float(cost[0]), float(cost[1])),
         {name: (float(one[0]), float(one[1])) for name, one in excesses.items()},
         now,
+        evolution,
         lines,
     )
+
+
+def _best_of(rig: Rig, goal: Goal, members: Members, points: Sequence[np.ndarray]) -> dict[str, float]:
+    """The gains of the best of points of the cube, as a file would hold them."""
+    ends = np.stack([rig.point(rig.gains(point)) for point in points])
+    judged = rig.judged(ends, members).judged
+    return rig.gains(ends[int(np.argmin(rank(goal.cost(judged, members), goal.excess(judged))))])
 
 
 def _lines(rig: Rig, settings: TuneSettings, tuned: Gains, inside: Members) -> Lines:

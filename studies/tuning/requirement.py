@@ -30,10 +30,12 @@ class Effort:
     """How much is tried, and how finely it is judged."""
 
     set_points: tuple[float, ...] = (-40.0, -20.0, 0.0, 20.0, 40.0, 60.0, 85.0)
-    judged_every: float = 5.0  # degrees
+    judged_every: float = 2.5  # degrees
+    added_at: float = 5.0  # degrees: set points that a later pass may add, multiples of it
     tried: int = 64
     starts: int = 8
     rounds: int = 30
+    finish: int = 60  # generations without slopes of the first pass, twice as many of the second, ...
     unseen: int = 32
     passes: int = 3
     seconds: float = 10.0
@@ -77,30 +79,35 @@ def requirement(system: System, controller: str, effort: Effort, progress: Progr
         tried=effort.tried,
         starts=effort.starts,
         rounds=effort.rounds,
+        finish=effort.finish,
         seconds=effort.seconds,
         unseen=effort.unseen,
     )
     goal, members = Goal(limits=LIMITS), judged_on(effort)
-    loops = rounds = wild = 0
+    loops = rounds = generations = wild = 0
     for number in range(effort.passes):
         found = tune(system, settings, progress=progress)
         rig = rig_of(system, settings)
         pair = np.stack([rig.before, rig.point(found.after.values)])
         seen = rig.judged(pair, members)
         excess = goal.excess(seen.judged)
-        loops, rounds = loops + found.descent.simulations, rounds + found.descent.round
+        loops, rounds = loops + found.simulations, rounds + found.descent.round
+        generations += found.evolution.generations
         wild += found.descent.wild
         over = (seen.judged[1][:, goal.limited] / goal.bounds - 1.0).max(axis=1)
         if excess[1] <= 0.0 or not np.isfinite(over).all() or excess[1] > HOPELESS:
             break
         # Once more from there, with the set points at which it fails by most.
-        worst = np.unique(np.degrees(members.targets[np.argsort(over)[-ADDED:]]).round(6))
+        angles = np.degrees(members.targets).round(6)
+        addable = np.flatnonzero((angles % effort.added_at == 0.0) & (over > 0.0))
+        worst = np.unique(angles[addable[np.argsort(over[addable])[-ADDED:]]])
         settings = dataclasses.replace(
             settings,
             set_points=tuple(sorted({*settings.set_points, *map(float, worst)})),
             start=found.after.values,
             starts=max(2, effort.starts // 2),
             tried=effort.tried // 2,
+            finish=effort.finish * (number + 2),
             seed=number + 1,
         )
     if keep:
@@ -118,5 +125,7 @@ def requirement(system: System, controller: str, effort: Effort, progress: Progr
         ),
         "closed_loops": loops,
         "rounds": rounds,
+        "generations_without_slopes": generations,
+        "set_points_tuned_deg": list(found.settings.set_points),
         "slopes_of_no_use": wild,
     }

@@ -7,6 +7,7 @@ Parts: `peers` and the controllers by name; default all (an hour on two cores). 
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 
 from smajax.control_presets import CONTROLLERS
@@ -21,9 +22,11 @@ from studies.tuning.requirement import Effort, requirement
 from studies.tuning.tables import readme
 
 CANDIDATES = 100  # closed loops of a search: so many candidates on all members
-WAYS = {"trust-region": (0, 1), "adam": (0,), "nelder-mead": (0, 1), "cma-es": (0, 1), "grid": (0,)}  # seeds
+SEEDS = tuple(range(5))
+WAYS = {"trust-region": SEEDS, "adam": SEEDS, "nelder-mead": SEEDS, "cma-es": SEEDS, "grid": (0,)}
 FAST_PROBLEM = Problem("vsc3", "worst", (0.0, 30.0), varied=False, seconds=3.0)
-FAST_EFFORT = Effort((0.0, 30.0), 30.0, 4, 2, 3, 2, 1, 3.0)
+FAST_WAYS = {way: (0,) for way in WAYS}
+FAST_EFFORT = Effort((0.0, 30.0), 30.0, 30.0, 4, 2, 3, 2, 2, 1, 3.0)
 
 
 def say(what: str, share: float) -> None:
@@ -32,11 +35,18 @@ def say(what: str, share: float) -> None:
         print(what.removeprefix("say: "), flush=True)
 
 
-def compare(path: Path, problems: tuple[Problem, ...], candidates: int, again: bool, progress: Progress = say) -> None:
+def compare(
+    path: Path,
+    problems: tuple[Problem, ...],
+    candidates: int,
+    again: bool,
+    seeds_of: Mapping[str, tuple[int, ...]] = WAYS,
+    progress: Progress = say,
+) -> None:
     """Every way on every problem, kept one by one."""
     for problem in problems:
         members = len(problem.set_points) * (9 if problem.varied else 1)
-        for way, seeds in WAYS.items():
+        for way, seeds in seeds_of.items():
             for seed in seeds:
                 name = f"{problem.name}; {way}; {seed}"
                 if name in kept(path).get("peers", {}) and not again:
@@ -66,7 +76,13 @@ def main(arguments: list[str]) -> None:
     prepare(cores=True)
     path = HERE / ("fast.json" if fast else "results.json")
     if not parts or "peers" in parts:
-        compare(path, (FAST_PROBLEM,) if fast else PROBLEMS, 12 if fast else CANDIDATES, bool(parts))
+        compare(
+            path,
+            (FAST_PROBLEM,) if fast else PROBLEMS,
+            12 if fast else CANDIDATES,
+            bool(parts),
+            FAST_WAYS if fast else WAYS,
+        )
     names = [part for part in parts if part in CONTROLLERS] or ([] if parts else list(CONTROLLERS))
     require(path, ["vsc3"] if fast and names else names, FAST_EFFORT if fast else Effort(), bool(parts))
     if not fast:
