@@ -25,6 +25,7 @@ from smajax.sweep_run import SweepSettings, run_sweep
 from smajax.tune import trust
 from smajax.tune.descent import Descent, Effort, begin, load, one_round
 from smajax.tune.evaluate import STEP, Rig
+from smajax.tune.evolve import Evolution
 from smajax.tune.folder import tune_into
 from smajax.tune.members import between, never_seen, tuned_on
 from smajax.tune.objective import Goal, rank, value_and_slope
@@ -241,22 +242,24 @@ def test_the_page_in_a_browser(folder: Path, browser: Any) -> None:
     assert faults(browser, folder / "tune.html") == []
 
 
-@pytest.mark.parametrize("finished", [0, 2])
+@pytest.mark.parametrize(
+    ("state", "count", "finished"), [(Descent, "round", 0), (Descent, "round", 2), (Evolution, "generations", 2)]
+)
 def test_a_tuning_goes_on_to_the_same_end(
-    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, finished: int
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, state: Any, count: str, finished: int
 ) -> None:
-    out, wrote = tmp_path / "again", Descent.save
+    out, wrote = tmp_path / "again", state.save
 
-    def interrupted(self: Descent, path: Path) -> None:
+    def interrupted(self: Any, path: Path) -> None:
         wrote(self, path)
-        if self.round == finished:
+        if getattr(self, count) == finished:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(Descent, "save", interrupted)
+    monkeypatch.setattr(state, "save", interrupted)
     with pytest.raises(KeyboardInterrupt):
         tune_into(arm(), SETTINGS, out)
     assert not (out / "gains.json").exists()
-    monkeypatch.setattr(Descent, "save", wrote)
+    monkeypatch.setattr(state, "save", wrote)
     tune_into(arm(), SETTINGS, out, COMMAND)
     one, other = (json.loads((place / "gains.json").read_text(encoding="utf-8")) for place in (folder, out))
     assert one == other
@@ -265,6 +268,9 @@ def test_a_tuning_goes_on_to_the_same_end(
     assert ends[1] is not None
     np.testing.assert_array_equal(ends[0].costs, ends[1].costs)
     assert ends[0].simulations == ends[1].simulations
+    one, other = (json.loads((place / "tune.json").read_text(encoding="utf-8")) for place in (folder, out))
+    assert one["search"] == other["search"]
+    assert one["search"]["generations_without_slopes"] == SETTINGS.finish
 
 
 def test_a_sweep_reads_the_gains(folder: Path, tmp_path: Path) -> None:
@@ -319,6 +325,7 @@ def test_a_wrong_gains_file_is_answered(text: str, told: str, tmp_path: Path) ->
         ({"weights": {"overshoot": 0.0}}, "one at least is more"),
         ({"limits": {"overshoot": -1.0}}, "more than 0"),
         ({"by": "adma"}, "did you mean 'adam'"),
+        ({"finish": -1}, "none or more"),
         ({"period": 0.015}, "whole number"),
         ({"filtered": "kalman"}, "printed"),
         ({"start": {"boundary": 1.0}}, "surface_slope"),
