@@ -31,6 +31,7 @@ settings = TuneSettings(
     tried=4 if fast else 32,
     starts=2 if fast else 6,
     rounds=4 if fast else 30,
+    finish=3 if fast else 60,
     seconds=3.0,
     unseen=2 if fast else 32,
 )
@@ -39,7 +40,8 @@ print(settings.goal_in_words())
 
 # %% [markdown]
 # Every loop gives the slopes of every term in every gain with it; a step is the least of the largest of all loops' straight lines, within a trust region.
-# Rounds are kept in the folder, so it can be interrupted.
+# Near the end another loop is the worst after every step, and slopes say little: a search without them (CMA-ES) follows, `finish` generations of it.
+# Rounds and generations are kept in the folder, so it can be interrupted.
 
 # %%
 out = Path(tempfile.mkdtemp()) / "tuned"

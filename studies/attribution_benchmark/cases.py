@@ -17,6 +17,7 @@ from studies.attribution_benchmark.strength import Found, Ruler
 
 STRENGTHS = (1.0, 3.0, 10.0)  # noises, after a refit
 NULLS = 30  # a rig
+ANEW = 100  # of a case's number: by so much cases that are drawn anew differ
 LARGEST_CHANGE = 0.25  # of a base parameter
 LARGEST_SHIFT, LARGEST_WIDTH = 5.0, 0.25  # K of a range; of its width
 LARGEST_SLOPE = 0.1  # of C_A, C_M
@@ -89,8 +90,8 @@ class Truth:
         return RIGS[self.rig_name]
 
 
-def cases() -> list[Case]:
-    """All cases, in a fixed order."""
+def cases(drawn: int = 0) -> list[Case]:
+    """All cases, in a fixed order. drawn: 1, 2, ... for the same ones with other wires, strengths and noise, which nobody has looked at."""
     found = [Case(rig, (), 0.0, i) for rig in RIGS for i in range(NULLS)]
     for name in EFFECTS:
         for rig in (rig for rig in RIGS if applies(name, rig)):
@@ -104,7 +105,7 @@ def cases() -> list[Case]:
                 continue
             found.append(Case(rig, pair, STRENGTHS[1], 0))
             found.append(Case(rig, pair, STRENGTHS[2], 1))
-    return found
+    return [replace(case, number=case.number + ANEW * drawn) for case in found]
 
 
 def true_wire(case: Case) -> Wire:

@@ -22,11 +22,11 @@ from studies.attribution_benchmark.tables import written
 from studies.attribution_benchmark.write import write
 
 
-def chosen(only: str, strengths: Sequence[float], nulls: int, part: tuple[int, int]) -> list[Case]:
+def chosen(only: str, strengths: Sequence[float], nulls: int, part: tuple[int, int], drawn: int = 0) -> list[Case]:
     """The cases asked for, in their order. `nulls`: of each rig at most."""
     seen: Counter[str] = Counter()
     found = []
-    for case in cases():
+    for case in cases(drawn):
         if only not in case.name or (case.kind != "null" and strengths and case.strength not in strengths):
             continue
         seen[f"{case.rig} {case.kind}"] += 1
@@ -65,12 +65,15 @@ def main() -> None:
     parser.add_argument("--strength", type=float, action="append", default=[], help="1, 3 or 10; may be given again")
     parser.add_argument("--nulls", type=int, default=30, help="of each rig")
     parser.add_argument("--part", default="1/1")
+    parser.add_argument(
+        "--drawn", type=int, default=0, help="1, 2, ...: the same cases with other wires, strengths and noise"
+    )
     asked = parser.parse_args()
     from smajax.runtime import prepare
 
     prepare()
     first, _, of = asked.part.partition("/")
-    todo = chosen(asked.only, asked.strength, asked.nulls, (int(first), int(of)))
+    todo = chosen(asked.only, asked.strength, asked.nulls, (int(first), int(of)), asked.drawn)
     judged = asked.out / "judged"
     judged.mkdir(parents=True, exist_ok=True)
     for number, case in enumerate(todo, 1):
