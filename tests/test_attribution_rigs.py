@@ -184,6 +184,16 @@ def test_enough_cases_of_each_kind() -> None:
     assert foreign >= {"heat", "electrical", "kinetics", "constitutive", "mechanics", "sensor"}
 
 
+def test_cases_drawn_anew_ask_the_same_of_other_wires() -> None:
+    before, anew = cases(), cases(1)
+    assert not {case.name for case in before} & {case.name for case in anew}
+    assert [(case.rig, case.effects, case.strength) for case in before] == [
+        (case.rig, case.effects, case.strength) for case in anew
+    ]
+    for one, other in list(zip(before, anew, strict=True))[::50]:
+        assert true_wire(one) != true_wire(other)
+
+
 def test_every_true_value_lies_inside_the_bounds_and_off_the_start() -> None:
     for case in cases()[:120:7]:
         wire, nominal = true_wire(case), RIGS[case.rig].wire
