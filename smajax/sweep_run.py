@@ -21,6 +21,7 @@ from smajax.gains_file import Gains
 from smajax.load.base import AbstractMovingLoad
 from smajax.measured_state import Sensor
 from smajax.merit import Merit
+from smajax.parameters import get_parameters
 from smajax.reference import clock
 from smajax.report.files import as_netcdf, replace, writing
 from smajax.sweep import MISMATCHES, Grid, Interface, closed_loops, lanes, positions, ratios
@@ -179,7 +180,8 @@ def run_sweep(
     replace(out / "sweep.json", as_json(targets, compared, grid, swept, settings.between, command))
     replace(out / "sweep.nc", as_netcdf(as_dataset(grid, swept, settings.between, command)))
     between, seconds = settings.between, settings.seconds
-    replace(out / "index.html", page(targets, compared, grid, swept, seconds, between, out, command))
+    air = float(get_parameters(system, [MISMATCHES["ambient"]])[0])
+    replace(out / "index.html", page(targets, compared, grid, swept, seconds, between, out, air, command))
     return comparison_rows(targets, compared)
 
 
