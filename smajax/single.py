@@ -24,11 +24,14 @@ from smajax.levels import clock_of, given
 from smajax.load.base import AbstractMovingLoad
 from smajax.load.coupon import AbstractCoupon
 from smajax.measured.names import instead
+from smajax.merit import Rest, merit_by_set_point, rests
 from smajax.parameters import parameter_values
 from smajax.reference import resting
 from smajax.simulate import DEFAULT_STEP
 from smajax.sweep_run import between_in_words, check_interface, interface_of
 from smajax.system import System
+
+MOST_RESTS = 50  # set points; more are a ramp or a sine of a file
 
 
 @dataclass(frozen=True)
@@ -74,6 +77,7 @@ class Ran:
     system: System
     merit: Mapping[str, float]
     notes: tuple[str, ...]
+    rests: tuple[Rest, ...] = ()  # figures of merit by set point, where there are several
 
 
 def channels(system: System) -> tuple[frozenset[str], frozenset[str]]:
@@ -159,8 +163,15 @@ def run_closed(asked: Asked, loop: AskedLoop) -> Ran:
         check_answers(ran)
     except ValueError as error:
         notes.append(str(error))
+    count = len(rests(position))
     judged = {name: float(value) for name, value in vars(merits).items()}
+    several: tuple[Rest, ...] = ()
     if np.ptp(position) > 0.0:
         judged = {}  # they look at one set point from the start of the run
-        notes.append("Figures of merit are those of a run to one set point; this one has several.")
-    return Ran(found, plant, judged, tuple(notes))
+        if count <= MOST_RESTS:
+            several = merit_by_set_point(ran, plant)
+        else:
+            notes.append(
+                f"Figures of merit are those of set points that rest, {MOST_RESTS} at most: this one has {count}."
+            )
+    return Ran(found, plant, judged, tuple(notes), several)
