@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -25,7 +26,7 @@ from smajax.load.base import AbstractMovingLoad
 from smajax.load.coupon import AbstractCoupon
 from smajax.measured.names import instead
 from smajax.merit import Rest, merit_by_set_point, rests
-from smajax.parameters import parameter_values
+from smajax.parameters import parameter_values, parameters
 from smajax.reference import resting
 from smajax.simulate import DEFAULT_STEP
 from smajax.sweep_run import between_in_words, check_interface, interface_of
@@ -70,6 +71,16 @@ class AskedLoop:
 
 
 @dataclass(frozen=True)
+class Mismatch:
+    """A parameter that the plant has otherwise than the controller believes, in the program's own unit."""
+
+    name: str
+    unit: str
+    believed: float | None  # None: its effect is no part of the model that the controller believes
+    true: float
+
+
+@dataclass(frozen=True)
 class Ran:
     """What came out: `found` over time, figures of merit of a closed loop (SI), what should be known of it."""
 
@@ -78,6 +89,7 @@ class Ran:
     merit: Mapping[str, float]
     notes: tuple[str, ...]
     rests: tuple[Rest, ...] = ()  # figures of merit by set point, where there are several
+    mismatches: tuple[Mismatch, ...] = ()
 
 
 def channels(system: System) -> tuple[frozenset[str], frozenset[str]]:
@@ -121,6 +133,16 @@ def run_open(asked: Asked) -> Ran:
     }
     found = simulate_dataset(system, series, asked.dt, asked.tolerance)
     return Ran(found, system, {}, tuple(_notes(found)))
+
+
+def mismatches(believed: System, plant: System) -> tuple[Mismatch, ...]:
+    """Every parameter in which they differ by more than a unit's rounding."""
+    before, units = parameter_values(believed), parameters(plant)
+    return tuple(
+        Mismatch(name, units[name].unit, before.get(name), value)
+        for name, value in parameter_values(plant).items()
+        if not math.isclose(before.get(name, math.nan), value, rel_tol=1e-12)
+    )
 
 
 def run_closed(asked: Asked, loop: AskedLoop) -> Ran:
@@ -174,4 +196,4 @@ def run_closed(asked: Asked, loop: AskedLoop) -> Ran:
             notes.append(
                 f"Figures of merit are those of set points that rest, {MOST_RESTS} at most: this one has {count}."
             )
-    return Ran(found, plant, judged, tuple(notes), several)
+    return Ran(found, plant, judged, tuple(notes), several, mismatches(believed, plant))

@@ -27,7 +27,8 @@ def test_the_report_of_a_closed_loop(browser: Any, tmp_path: Path) -> None:
 
 
 def test_the_page_of_a_run(browser: Any, tmp_path: Path) -> None:
-    ran = run_closed(Asked(dt=0.01), AskedLoop("pid", "30deg:6s"))
+    several = AskedLoop("pid", "30deg:3s,10deg:3s", mismatch={"convection_coefficient": "120"})
+    ran = run_closed(Asked(dt=0.01), several)
     assert faults(browser, write_run(ran, tmp_path, HOSTILE, f"smajax simulate --out {HOSTILE}", animated=True)) == []
 
 

@@ -98,6 +98,23 @@ def test_each_set_point_has_its_own_figures_of_merit(tmp_path: Path) -> None:
     assert page.count("<td class=n>never</td>") == 2
 
 
+def test_what_the_controller_believes_stands_beside_what_the_plant_has(tmp_path: Path) -> None:
+    words = ["simulate", "--controller", "pid", "--dt", "10ms", "--set-point", "10deg:1s"]
+    wrong = ["convection_coefficient=80", "latent_heat.enthalpy=20 J/g", "payload_mass=57.19 g"]  # the mass as believed
+    words += [word for one in wrong for word in ("--mismatch", one)]
+    told = run.invoke(app, [*words, "--out", str(tmp_path / "loop")])
+    assert told.exit_code == 0, told.output
+    assert " ".join(told.output.split()).count("convection_coefficient believed 150 -> true 80 W/(m^2 K)") == 1
+    record = json.loads((tmp_path / "loop" / "simulate.json").read_text(encoding="utf-8"))
+    assert record["mismatch"] == {
+        "convection_coefficient": {"believed": 150.0, "true": 80.0, "unit": "W/(m^2 K)"},
+        "latent_heat.enthalpy": {"believed": None, "true": 20_000.0, "unit": "J/kg"},
+    }
+    page = (tmp_path / "loop" / "simulate.html").read_text(encoding="utf-8")
+    assert "<td>convection_<wbr>coefficient</td><td class=n>150</td><td class=n>80</td>" in page
+    assert "not in its model" in page
+
+
 def test_a_set_point_that_moves_all_the_time_has_no_figures_of_merit(tmp_path: Path) -> None:
     rows = "\n".join(f"{k / 50},{0.2 * np.sin(k / 10)}" for k in range(101))
     (tmp_path / "sine.csv").write_text(f"time (s),angle (rad)\n{rows}\n")

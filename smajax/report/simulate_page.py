@@ -43,6 +43,9 @@ def record(ran: Ran, command: str, series: bool = True) -> dict[str, Any]:
         "command": command,
         "provenance": {name: value for name, value in found.attrs.items() if name != "parameters (SI)"},
         "parameters": parameter_values(ran.system),
+        "mismatch": {
+            one.name: {"believed": one.believed, "true": one.true, "unit": one.unit} for one in ran.mismatches
+        },
         "notes": list(ran.notes),
         "conclusions": conclusions(ran),
         "merit": _merit(ran.merit),
@@ -155,6 +158,22 @@ def rest_rows(ran: Ran) -> tuple[list[str], list[list[str]]]:
     return head, rows
 
 
+MISMATCH = ("parameter", "the controller believes", "the plant has", "unit")
+
+
+def mismatch_rows(ran: Ran) -> list[list[str]]:
+    """A row a parameter, as `MISMATCH`, in SI as the parameters are."""
+    return [
+        [
+            one.name,
+            "not in its model" if one.believed is None else digits(one.believed, 6),
+            digits(one.true, 6),
+            one.unit,
+        ]
+        for one in ran.mismatches
+    ]
+
+
 def conclusions(ran: Ran) -> list[str]:
     """What happened, in sentences: how hot, what transformed, what moved; whether a closed loop arrived."""
     found = ran.found
@@ -232,6 +251,8 @@ def page(ran: Ran, image: bytes, title: str, command: str, films: Sequence[bytes
         for name, value in parameter_values(ran.system).items()
     ]
     parts = [f"<h1>{html.escape(title)}</h1>", bullets([*ran.notes, *conclusions(ran)])]
+    if ran.mismatches:
+        parts.append(table(MISMATCH, mismatch_rows(ran), (1, 2)))
     if ran.merit:
         parts.append(table(["figure of merit", "value", "unit"], merit_rows(ran), (1,)))
     if ran.rests:
