@@ -135,7 +135,16 @@ def draw_lines(figure: Figure, time: np.ndarray, ratios: Sequence[float], swept:
         named(axes, "time (s)", "arm angle (°)", mismatch)
     # One key for all panels, where it covers no line.
     handles, labels = axes.get_legend_handles_labels()
-    figure.legend(handles, labels, title="plant / controller", loc="outside lower center", ncols=5, frameon=False)
+    figure.legend(
+        handles,
+        labels,
+        title="plant / controller",
+        loc="outside lower center",
+        ncols=len(labels),
+        columnspacing=1.0,
+        handlelength=1.2,
+        frameon=False,
+    )
 
 
 def draw_comparison(figure: Figure, targets: np.ndarray, merits: Mapping[str, Merit]) -> None:
@@ -185,18 +194,19 @@ def page(
     seconds: float,
     between: str,
     folder: Path,
+    upright: Mapping[str, bytes],
     air: float,
     command: str = "",
 ) -> str:
     """One page for a browser, with the pictures that lie in `folder` inside; the rows as CSV lie beside it.
 
-    air: its temperature as the controllers believe it, degC.
+    upright: those pictures for a telephone. air: its temperature as the controllers believe it, degC.
     """
     say = html.escape
     head = ["controller", "settles at", *(f"{label} ({unit})" for label, unit, _ in SHOWN.values())]
 
     def drawn(name: str, alt: str) -> str:
-        return str(picture((folder / name).read_bytes(), alt, "panels"))
+        return str(picture((folder / name).read_bytes(), alt, "panels", upright[name]))
 
     parts = [
         f"<h3>{say(one.name)}</h3><p>{counted(grid.size, 'closed loop')} of {seconds:g} s; {failures(one)}. "

@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from smajax.figures.drawing import BLUE, GREY, RED, named, panels
+from smajax.figures.drawing import BLUE, GREY, RED, UPRIGHT, named, panels
 from smajax.fit.progress import Progress, quiet
 from smajax.load.base import AbstractMovingLoad
 from smajax.merit import MERIT_UNITS, Rest
@@ -87,8 +87,8 @@ def drawn(found: xr.Dataset, form: str = "png", upright: bool = False) -> bytes:
     """
     inputs = _inputs(found)
     shown = [*inputs[:1], *PLAIN]
-    figure = Figure(figsize=(4.6, 14.0) if upright else (10.0, 8.2))
-    axes = panels(figure, 6, 1) if upright else panels(figure, 3, 2)
+    figure = Figure(figsize=(UPRIGHT if upright else 10.0, 8.2))
+    axes = panels(figure, 3, 2)
     time = found["time"].to_numpy()
 
     def values(name: str) -> tuple[Any, str]:
