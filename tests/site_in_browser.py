@@ -107,10 +107,10 @@ def unsearched(browser: Any, site: Path) -> list[str]:
     shown.on("pageerror", lambda error: wrong.append(f"search: {error}"))
     for page in ("index.html", "reference/names.html"):
         shown.goto((site.resolve() / page).as_uri())
-        shown.click("input.md-search__input")
-        shown.keyboard.type("martensite")
         found = shown.locator(".md-search-result__link")
         try:
+            shown.click("input.md-search__input", timeout=20_000)
+            shown.keyboard.type("martensite")
             found.first.wait_for(timeout=20_000)
         except Exception as error:
             wrong.append(f"{page}: from a disk the search finds nothing: {error}")
