@@ -25,7 +25,7 @@ audit: $(READY)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check pip-audit
 	$(BIN)/pip-audit --local --skip-editable
 
-# site/index.html; any warning ends it. To search it as well, a browser wants a server: python -m http.server -d site
+# site/index.html, which a browser reads and searches from the disk; any warning ends it.
 docs: $(READY)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[docs]'
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict

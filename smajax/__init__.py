@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from smajax.measured_state import Sensor as Sensor
     from smajax.merit import merit as merit
     from smajax.open_experiment import open_experiment as open_experiment
+    from smajax.parameters import check_bounds as check_bounds
     from smajax.parameters import get_parameters as get_parameters
     from smajax.parameters import parameter as parameter
     from smajax.parameters import parameter_values as parameter_values
@@ -77,6 +78,7 @@ NAMES = {
     "System": ("smajax.system", "System"),
     "WIRES": ("smajax.presets", "WIRES"),
     "build": ("smajax.presets", "build"),
+    "check_bounds": ("smajax.parameters", "check_bounds"),
     "close_loop": ("smajax.close_loop", "close_loop"),
     "compose": ("smajax.compose", "compose"),
     "extended": ("smajax.extended", "extended"),

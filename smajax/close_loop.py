@@ -21,6 +21,7 @@ from smajax.attribution.verdict import cannot_know, pooled, shown, summary, unex
 from smajax.catalogue import candidates
 from smajax.effects.library import LIBRARY
 from smajax.effects.neutral import check_neutral
+from smajax.experiment.catalogue import WIRE_SIZES
 from smajax.experiment.errors import ExperimentError
 from smajax.experiment.record import RUN_STARTS, Experiment, Run
 from smajax.extended import base_model, extended
@@ -178,6 +179,7 @@ def close_loop(
         refused,
         [one.name for one in after.parameters if one.name.startswith(added) and _asks_for_more(one)],
         [one for one in mistaken if one.weight > 0.5],
+        _sizes_not_given(job),
     )
     return Findings(
         experiment=experiment.name,
@@ -249,6 +251,17 @@ def _preset(job: _Job) -> dict[str, str]:
         name: f"{digits(display(entry.unit, name).of(float(value)))} {display(entry.unit, name).unit}".strip()
         for (name, entry), value in zip(table.items(), values, strict=True)
     }
+
+
+def _sizes_not_given(job: _Job) -> list[str]:
+    """Sizes of the wire and numbers of the load that are the presets' in every run, with their values."""
+    experiment, table = job.experiment, parameters(base_model(job.experiment))
+    own = set.intersection(*({*run.parameters} for run in experiment.runs))
+    return [
+        f"{name} {value}"
+        for name, value in _preset(job).items()
+        if (name in WIRE_SIZES or table[name].path[0] == "load") and name not in {*experiment.parameters, *own}
+    ]
 
 
 def _asks_for_more(one: ParameterFinding) -> bool:

@@ -144,6 +144,7 @@ def _run(
     initial: State | None,
 ) -> tuple[State, _Carry, Any, Reference]:
     """(first state, end, (states, commands, measured) of every period where they are `kept`, what was wanted)."""
+    check_bounds(system)
     check_bounds(controller)
     refuse_lag(system, "a closed loop")
     wanted = wanted if isinstance(wanted, Reference) else resting(wanted)

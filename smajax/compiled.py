@@ -20,6 +20,7 @@ from smajax.lanes.text import Unsupported
 from smajax.load.base import AbstractMovingLoad
 from smajax.measured_state import Sensor
 from smajax.merit import Merit, merit
+from smajax.parameters import check_bounds
 from smajax.recorded import acting_inputs
 from smajax.reference import Reference
 from smajax.simulate import DEFAULT_STEP, check_inputs, check_scalars, first_state, simulate, trajectory
@@ -76,6 +77,7 @@ def simulate_compiled(
         )
     check_inputs(system, inputs)
     check_scalars(system, dt, initial)
+    check_bounds(system)
     if tolerance is not None and (not tolerance > 0.0 or not isinstance(system.load, AbstractMovingLoad)):
         raise ValueError(f"`tolerance` is a positive number, for a load that moves; got {tolerance}. Take 1e-4.")
     series = {name: jnp.asarray(values, dtype=float) for name, values in inputs.items()}

@@ -146,7 +146,8 @@ def identify(
     spread = np.sqrt(np.diag(covariance)) if len(correlated) else np.ones(0)
     told = np.concatenate([at.columns(names), at.prior_columns(names)])
     seen = [name for k, name in enumerate(names) if told[:, k].any() and not held(values[name], *bounds[name], EDGE)]
-    weak = directions(at, seen, values, inflation) if seen else ()
+    degrees = [name for name in seen if unknowns[name].unit == "degC"]
+    weak = directions(at, seen, values, inflation, degrees) if seen else ()
     drawn = profiles(weighted, profiled, names, bounds, best, known.standard_error, inflation, progress, kept)
     drawn_from = None
     if draws and correlated:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Any, NamedTuple
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
+import numpy as np
 from jax import lax
 
 from smajax.closed_loop import AbstractWatch, ClosedLoop, watch_closed_loop
@@ -13,7 +16,7 @@ from smajax.controller.base import AbstractController
 from smajax.load.base import AbstractMovingLoad
 from smajax.reference import Reference
 from smajax.system import System, heating_power
-from smajax.types import Scalar, State
+from smajax.types import Scalar, Series, State, Trajectory
 from smajax.wire.resistance import resistance_per_metre
 
 BAND_DEGREES = 1.0  # an angle this near the set point counts as there
@@ -194,13 +197,48 @@ def judge_of(system: System, wanted: Reference, band: Scalar | float | None = No
 
 def merit(loop: ClosedLoop, system: System, band: Scalar | float | None = None) -> Merit:
     """Judge a run that was simulated; `system` is the plant that ran. Pure: `vmap` it with the loop."""
-    judge, run = judge_of(system, loop.wanted, band), loop.run
+    return _judged(judge_of(system, loop.wanted, band), loop.run, loop.voltage)
+
+
+def _judged(judge: Judge, run: Trajectory, voltage: Series) -> Merit:
     held = jnp.append(jnp.diff(run.time), 0.0)
-    samples = _Sample(run.time, run.position, run.temperature, run.martensite_fraction, loop.voltage, held)
+    samples = _Sample(run.time, run.position, run.temperature, run.martensite_fraction, voltage, held)
     seen, _ = lax.scan(
         lambda seen, now: (judge.judged(seen, now), None), judge.begun(run.position[0], run.time[0]), samples
     )
     return judge.result(seen)
+
+
+class Rest(NamedTuple):
+    """A set point from when it is asked to the next one, and what is made of it there."""
+
+    begin: float  # s
+    end: float  # s
+    set_point: float  # rad or m
+    merit: Merit  # times count from `begin`
+
+
+def rests(set_points: np.ndarray) -> list[tuple[int, int]]:
+    """(first sample, last one) of each set point; the last is the next one's first, where its command has done its work."""
+    ends = [0, *(np.flatnonzero(np.diff(set_points)) + 1).tolist(), len(set_points) - 1]
+    return [(first, last) for first, last in itertools.pairwise(ends) if first < last]
+
+
+def merit_by_set_point(loop: ClosedLoop, system: System, band: Scalar | float | None = None) -> tuple[Rest, ...]:
+    """`merit` of each set point by itself, as if the run began where it is asked and ended where the next is.
+
+    For runs that have been computed: how many there are is in the values.
+    """
+    held, judged = band_of(system) if band is None else jnp.asarray(band, dtype=float), eqx.filter_jit(_judged)
+    time, asked = np.asarray(loop.run.time), np.asarray(loop.wanted.position)
+    found = []
+    for first, last in rests(asked):
+        run = jax.tree.map(lambda series, part=slice(first, last + 1): series[part], loop.run)
+        voltage = jnp.asarray(loop.voltage)[first : last + 1].at[-1].set(loop.voltage[last - 1])
+        judge = Judge(system, jnp.asarray(asked[first]), held, last - first + 1)
+        one = jax.tree.map(np.asarray, judged(judge, run, voltage))
+        found.append(Rest(float(time[first]), float(time[last]), float(asked[first]), one))
+    return tuple(found)
 
 
 def judged_loop(

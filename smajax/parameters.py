@@ -102,7 +102,8 @@ def parameter_values(model: eqx.Module) -> dict[str, float]:
 def set_parameters(model: Module, values: Mapping[str, Any]) -> Module:
     """`model` with the named values put in; everything else is shared.
 
-    Raises ValueError when a name is not a parameter of the model.
+    Values may be traced, so their bounds are not looked at here: every run does so where it knows them, and `check_bounds`
+    says it before. Raises ValueError when a name is not a parameter of the model.
     """
     entries = _select(model, list(values))
     if not entries:

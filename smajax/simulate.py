@@ -11,7 +11,7 @@ from jax import lax
 
 from smajax.load.coupon import AbstractCoupon
 from smajax.measured.names import listed
-from smajax.parameters import parameters
+from smajax.parameters import check_bounds, parameters
 from smajax.recorded import acting_inputs
 from smajax.step import step
 from smajax.system import System, initial_state
@@ -94,10 +94,12 @@ def simulate(
     """Simulate over the samples of `inputs`, each of shape (n,), SI, `dt` seconds apart.
 
     The result holds the states at t_0 ... t_{n-1}; input i is held from t_i to t_{i+1} (a coupon's inputs are values
-    at t_i). `initial` defaults to rest with the first inputs. Raises ValueError for missing or ill-shaped inputs.
+    at t_i). `initial` defaults to rest with the first inputs. Raises ValueError for missing or ill-shaped inputs, and for a
+    parameter out of its bounds, unless its value is not known yet (`jit`, `vmap`, `grad`).
     """
     check_inputs(system, inputs)
     check_scalars(system, dt, initial)
+    check_bounds(system)
     series = acting_inputs(system, {name: jnp.asarray(values, dtype=float) for name, values in inputs.items()}, dt)
     state = first_state(system, series, initial)
     # Every number of the state then has a derivative where the model has one: a scan some of whose numbers gain theirs

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -24,11 +25,14 @@ from smajax.levels import clock_of, given
 from smajax.load.base import AbstractMovingLoad
 from smajax.load.coupon import AbstractCoupon
 from smajax.measured.names import instead
-from smajax.parameters import parameter_values
+from smajax.merit import Rest, merit_by_set_point, rests
+from smajax.parameters import parameter_values, parameters
 from smajax.reference import resting
 from smajax.simulate import DEFAULT_STEP
 from smajax.sweep_run import between_in_words, check_interface, interface_of
 from smajax.system import System
+
+MOST_RESTS = 50  # set points; more are a ramp or a sine of a file
 
 
 @dataclass(frozen=True)
@@ -67,6 +71,16 @@ class AskedLoop:
 
 
 @dataclass(frozen=True)
+class Mismatch:
+    """A parameter that the plant has otherwise than the controller believes, in the program's own unit."""
+
+    name: str
+    unit: str
+    believed: float | None  # None: its effect is no part of the model that the controller believes
+    true: float
+
+
+@dataclass(frozen=True)
 class Ran:
     """What came out: `found` over time, figures of merit of a closed loop (SI), what should be known of it."""
 
@@ -74,6 +88,8 @@ class Ran:
     system: System
     merit: Mapping[str, float]
     notes: tuple[str, ...]
+    rests: tuple[Rest, ...] = ()  # figures of merit by set point, where there are several
+    mismatches: tuple[Mismatch, ...] = ()
 
 
 def channels(system: System) -> tuple[frozenset[str], frozenset[str]]:
@@ -119,6 +135,16 @@ def run_open(asked: Asked) -> Ran:
     return Ran(found, system, {}, tuple(_notes(found)))
 
 
+def mismatches(believed: System, plant: System) -> tuple[Mismatch, ...]:
+    """Every parameter in which they differ by more than a unit's rounding."""
+    before, units = parameter_values(believed), parameters(plant)
+    return tuple(
+        Mismatch(name, units[name].unit, before.get(name), value)
+        for name, value in parameter_values(plant).items()
+        if not math.isclose(before.get(name, math.nan), value, rel_tol=1e-12)
+    )
+
+
 def run_closed(asked: Asked, loop: AskedLoop) -> Ran:
     """The closed loop. Raises as `run_open`, and GainsFileError."""
     believed, plant = asked.system(), asked.system(loop.mismatch)
@@ -159,8 +185,15 @@ def run_closed(asked: Asked, loop: AskedLoop) -> Ran:
         check_answers(ran)
     except ValueError as error:
         notes.append(str(error))
+    count = len(rests(position))
     judged = {name: float(value) for name, value in vars(merits).items()}
+    several: tuple[Rest, ...] = ()
     if np.ptp(position) > 0.0:
         judged = {}  # they look at one set point from the start of the run
-        notes.append("Figures of merit are those of a run to one set point; this one has several.")
-    return Ran(found, plant, judged, tuple(notes))
+        if count <= MOST_RESTS:
+            several = merit_by_set_point(ran, plant)
+        else:
+            notes.append(
+                f"Figures of merit are those of set points that rest, {MOST_RESTS} at most: this one has {count}."
+            )
+    return Ran(found, plant, judged, tuple(notes), several, mismatches(believed, plant))

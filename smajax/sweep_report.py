@@ -135,7 +135,16 @@ def draw_lines(figure: Figure, time: np.ndarray, ratios: Sequence[float], swept:
         named(axes, "time (s)", "arm angle (°)", mismatch)
     # One key for all panels, where it covers no line.
     handles, labels = axes.get_legend_handles_labels()
-    figure.legend(handles, labels, title="plant / controller", loc="outside lower center", ncols=5, frameon=False)
+    figure.legend(
+        handles,
+        labels,
+        title="plant / controller",
+        loc="outside lower center",
+        ncols=len(labels),
+        columnspacing=1.0,
+        handlelength=1.2,
+        frameon=False,
+    )
 
 
 def draw_comparison(figure: Figure, targets: np.ndarray, merits: Mapping[str, Merit]) -> None:
@@ -185,14 +194,19 @@ def page(
     seconds: float,
     between: str,
     folder: Path,
+    upright: Mapping[str, bytes],
+    air: float,
     command: str = "",
 ) -> str:
-    """One page for a browser, with the pictures that lie in `folder` inside; the rows as CSV lie beside it."""
+    """One page for a browser, with the pictures that lie in `folder` inside; the rows as CSV lie beside it.
+
+    upright: those pictures for a telephone. air: its temperature as the controllers believe it, degC.
+    """
     say = html.escape
     head = ["controller", "settles at", *(f"{label} ({unit})" for label, unit, _ in SHOWN.values())]
 
     def drawn(name: str, alt: str) -> str:
-        return str(picture((folder / name).read_bytes(), alt, "panels"))
+        return str(picture((folder / name).read_bytes(), alt, "panels", upright[name]))
 
     parts = [
         f"<h3>{say(one.name)}</h3><p>{counted(grid.size, 'closed loop')} of {seconds:g} s; {failures(one)}. "
@@ -209,7 +223,8 @@ def page(
     )
     mismatches = (
         f"<h2>Mismatch of {say(grid.first)} and {say(grid.second)}</h2><p>The plant's value over the one that the "
-        "controller believes, where it believes in one. Maps: median over the set points, at the gains that each controller begins with.</p>"
+        "controller believes, where it believes in one. Maps: median over the set points, at the gains that each controller begins with. "
+        f"{say(air_in_words(grid, air))}</p>"
     )
     compared = [
         table(head, comparison_rows(targets, merits)),
@@ -221,6 +236,13 @@ def page(
         "<p class=quiet>The same numbers: sweep.json, sweep.nc (every loop, with named axes and units), and a CSV file for each controller.</p>",
     ]
     return whole("Controllers compared", [top, *compared, mismatches, *parts, *foot])
+
+
+def air_in_words(grid: Grid, air: float) -> str:
+    """What the ratios of the air's temperature are in kelvins: degrees Celsius have no zero to be a share of."""
+    low, high = float(grid.ratios[0]), float(grid.ratios[-1])
+    off = " to ".join(f"{air * (ratio - 1.0):+.3g}" for ratio in (low, high))
+    return f"Ambient: {low:.3g} to {high:.3g} times the {air:g} °C believed is air that is {off} K off."
 
 
 def conclusions(targets: np.ndarray, merits: Mapping[str, Merit], grid: Grid, swept: Sequence[Swept]) -> list[str]:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+import io
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,12 +17,14 @@ from matplotlib.figure import Figure
 
 from smajax.batch.provenance import digest
 from smajax.control_presets import CONTROLLERS, FILTERS
+from smajax.figures.drawing import UPRIGHT
 from smajax.fit.kept import arrays
 from smajax.fit.progress import Progress
 from smajax.gains_file import Gains
 from smajax.load.base import AbstractMovingLoad
 from smajax.measured_state import Sensor
 from smajax.merit import Merit
+from smajax.parameters import get_parameters
 from smajax.reference import clock
 from smajax.report.files import as_netcdf, replace, writing
 from smajax.sweep import MISMATCHES, Grid, Interface, closed_loops, lanes, positions, ratios
@@ -163,23 +167,26 @@ def run_sweep(
     compared: dict[str, Merit] = {}
     swept: list[Swept] = []
     time = np.asarray(clock(settings.seconds, settings.dt))
+    upright: dict[str, bytes] = {}
+
+    def drawn(name: str, size: tuple[float, float], draw: Callable[[Figure], None]) -> None:
+        replace(out / name, _png(draw, size, 90))
+        upright[name] = _png(draw, (UPRIGHT, size[1]), 140)
+
     for name in settings.controllers:
         compared[name], one = _controller(system, name, settings, grid, out, progress)
         swept.append(one)
         write_rows(out / f"{name}.csv", grid, one)
-        maps, over_time = Figure(figsize=(10.0, 7.6)), Figure(figsize=(11.0, 6.2))
-        draw_maps(maps, grid, one)
-        _save(maps, out / f"{name}_maps.png")
-        draw_lines(over_time, time, LINES, one, float(np.radians(LINE_TARGET)))
-        _save(over_time, out / f"{name}_lines.png")
+        target = float(np.radians(LINE_TARGET))
+        drawn(f"{name}_maps.png", (10.0, 7.6), partial(draw_maps, grid=grid, swept=one))
+        drawn(f"{name}_lines.png", (11.0, 6.2), partial(draw_lines, time=time, ratios=LINES, swept=one, target=target))
         progress(f"say: {name}: {grid.size:,} closed loops; {failures(one)}. {over_mismatches(grid, one)}", 1.0)
-    comparison = Figure(figsize=(10.0, 11.0))
-    draw_comparison(comparison, targets, compared)
-    _save(comparison, out / "comparison.png")
+    drawn("comparison.png", (10.0, 11.0), partial(draw_comparison, targets=targets, merits=compared))
     replace(out / "sweep.json", as_json(targets, compared, grid, swept, settings.between, command))
     replace(out / "sweep.nc", as_netcdf(as_dataset(grid, swept, settings.between, command)))
     between, seconds = settings.between, settings.seconds
-    replace(out / "index.html", page(targets, compared, grid, swept, seconds, between, out, command))
+    air = float(get_parameters(system, [MISMATCHES["ambient"]])[0])
+    replace(out / "index.html", page(targets, compared, grid, swept, seconds, between, out, upright, air, command))
     return comparison_rows(targets, compared)
 
 
@@ -230,9 +237,11 @@ def _controller(
     return Merit(**{field: saved[f"alone_{field}"] for field in fields}), one
 
 
-def _save(figure: Figure, path: Path) -> None:
-    with writing(path) as file:
-        figure.savefig(file, dpi=90, facecolor="white", format="png")
+def _png(draw: Callable[[Figure], None], size: tuple[float, float], dpi: int) -> bytes:
+    figure, image = Figure(figsize=size), io.BytesIO()
+    draw(figure)
+    figure.savefig(image, dpi=dpi, facecolor="white", format="png")
+    return image.getvalue()
 
 
 def as_text(rows: Sequence[Sequence[str]]) -> str:

@@ -30,7 +30,7 @@ STAGES = (
         "A model",
         ("compose", "build", "under_law", "extended", "System", "WIRES", "LOADS", "DRIVES", "EFFECTS", "presets"),
     ),
-    ("Its parameters", ("parameter_values", "get_parameters", "set_parameters", "units")),
+    ("Its parameters", ("parameter_values", "get_parameters", "set_parameters", "check_bounds", "units")),
     ("One run", ("simulate_dataset", "plot", "simulate_compiled", "simulate")),
     ("Many runs", ("run_batch", "grid", "zipped", "sampled", "good", "measure")),
     (

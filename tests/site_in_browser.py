@@ -99,6 +99,28 @@ def faults(browser: Any, address: str, pages: Sequence[str], width: int) -> list
     return wrong
 
 
+def unsearched(browser: Any, site: Path) -> list[str]:
+    """What is wrong with a search for a word that many pages have, where the site is read from a disk."""
+    shown = browser.new_context(viewport={"width": 1400, "height": 900}).new_page()
+    wrong: list[str] = []
+    shown.on("console", lambda said: wrong.append(f"search: {said.text}") if said.type == "error" else None)
+    shown.on("pageerror", lambda error: wrong.append(f"search: {error}"))
+    for page in ("index.html", "reference/names.html"):
+        shown.goto((site.resolve() / page).as_uri())
+        found = shown.locator(".md-search-result__link")
+        try:
+            shown.click("input.md-search__input", timeout=20_000)
+            shown.keyboard.type("martensite")
+            found.first.wait_for(timeout=20_000)
+        except Exception as error:
+            wrong.append(f"{page}: from a disk the search finds nothing: {error}")
+            continue
+        target = unquote(urlparse(urldefrag(found.first.get_attribute("href")).url).path)
+        if not Path(target).is_file():
+            wrong.append(f"{page}: the search leads to {target}, which is not there")
+    return wrong
+
+
 def looked_at(site: Path) -> list[str]:
     """Every page but the sources of the repository, opened."""
     from playwright.sync_api import sync_playwright
@@ -116,6 +138,7 @@ def looked_at(site: Path) -> list[str]:
             browser = driver.chromium.launch(executable_path=found, args=FLAGS)
             address = f"http://127.0.0.1:{server.server_port}"
             wrong = [fault for width in WIDTHS for fault in faults(browser, address, pages, width)]
+            wrong += unsearched(browser, site)
             browser.close()
     finally:
         server.shutdown()

@@ -9,10 +9,11 @@ import pytest
 
 from smajax.batch.axes import grid, sampled, zipped
 from smajax.batch.run import run_batch
+from smajax.closed_loop import simulate_closed_loop
 from smajax.compiled import simulate_compiled
 from smajax.compose import compose
 from smajax.dataset import simulate_dataset
-from smajax.parameters import set_parameters
+from smajax.parameters import check_bounds, set_parameters
 from smajax.presets import build
 from smajax.simulate import simulate
 from smajax.system import initial_state
@@ -82,6 +83,29 @@ def test_values_that_cannot_be_are_named_before_a_run() -> None:
         set_parameters(SYSTEM, {"austenite_strat": 90.0})
     with pytest.raises(ValueError, match=r"`wire_diameter` = -1 m \(from"):
         simulate_dataset(set_parameters(SYSTEM, {"wire_diameter": -1.0}), VOLTAGE)
+
+
+@pytest.mark.parametrize("run", [simulate, simulate_compiled, simulate_dataset])
+def test_a_known_parameter_out_of_its_bounds_is_refused_and_a_traced_one_is_not(run) -> None:
+    beyond = set_parameters(SYSTEM, {"wire_diameter": -1.0})
+    with pytest.raises(ValueError, match=r"outside of the bounds: `wire_diameter` = -1 m \(from"):
+        run(beyond, VOLTAGE)
+    with pytest.raises(ValueError, match=r"`wire_diameter` = -1 m \(from"):
+        run_batch(beyond, {"voltage": 5.0}, grid(wire_length=[0.5]), seconds=0.1)
+    with pytest.raises(ValueError, match=r"`wire_diameter` = -1 m \(from"):
+        check_bounds(beyond)
+
+    def end(share: jax.Array) -> jax.Array:
+        return simulate(set_parameters(SYSTEM, {"start_fraction": share}), VOLTAGE).reading[-1]
+
+    assert jnp.isfinite(jax.vmap(jax.grad(end))(jnp.array([0.5, 1.5]))).all()
+
+
+def test_a_loop_around_a_plant_out_of_its_bounds_is_refused() -> None:
+    loop = compose("niti_table_3_1", "arm", "amplified_voltage", controller="pid")
+    beyond = set_parameters(loop.system, {"payload_mass": -1.0})
+    with pytest.raises(ValueError, match=r"`payload_mass` = -1 kg \(from"):
+        simulate_closed_loop(beyond, loop.controller, jnp.full(3, 0.5), 0.01)
 
 
 def test_a_parameter_beside_values_is_sent_there() -> None:

@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from smajax.figures.catalogue import CHAPTERS
-from smajax.figures.write import Drawn, as_page
+from smajax.figures.write import Drawn, as_page, draw, lying_in
+from smajax.fit.progress import quiet
 from smajax.report.plain_page import table, whole
 from smajax.report.simulate_page import write_run
 from smajax.report.write import write_report
@@ -27,8 +28,24 @@ def test_the_report_of_a_closed_loop(browser: Any, tmp_path: Path) -> None:
 
 
 def test_the_page_of_a_run(browser: Any, tmp_path: Path) -> None:
-    ran = run_closed(Asked(dt=0.01), AskedLoop("pid", "30deg:6s"))
+    several = AskedLoop("pid", "30deg:3s,10deg:3s", mismatch={"convection_coefficient": "120"})
+    ran = run_closed(Asked(dt=0.01), several)
     assert faults(browser, write_run(ran, tmp_path, HOSTILE, f"smajax simulate --out {HOSTILE}", animated=True)) == []
+
+
+def test_pictures_of_figures_fit_a_telephone(browser: Any, tmp_path: Path) -> None:
+    """Drawn here the panels stand below one another; a folder that an older version wrote has the wide picture alone."""
+    (row,) = [row for row in CHAPTERS["chapter3"] if row.name == "M8"]
+    page = tmp_path / "index.html"
+    page.write_text(as_page(draw([row], tmp_path, True, quiet), tmp_path), encoding="utf-8")
+    shown = browser.new_page(viewport={"width": 400, "height": 900})
+    wider = "() => [...document.querySelectorAll('.scroll:has(img)')].map(box => box.scrollWidth - box.clientWidth)"
+    shown.goto(page.as_uri())
+    assert shown.evaluate(wider) == [0]
+    (tmp_path / "M8.upright.png").unlink()
+    page.write_text(as_page(lying_in(tmp_path), tmp_path), encoding="utf-8")
+    shown.reload()
+    assert shown.evaluate(wider)[0] > 100
 
 
 def test_the_page_of_figures(browser: Any, tmp_path: Path) -> None:

@@ -72,6 +72,57 @@ def test_what_happened_is_told_in_words() -> None:
     assert "The loop never settles." in conclusions(run_closed(Asked(dt=0.01), AskedLoop("pid", "30deg:2s")))
 
 
+def test_each_set_point_has_its_own_figures_of_merit(tmp_path: Path) -> None:
+    """The first as the run to it alone has them; the energies are those of the whole run."""
+    words = ["simulate", "--controller", "pid", "--dt", "10ms", "--json", "--set-point"]
+    told = run.invoke(app, [*words, "40deg:3s,10deg:4s,-20deg:2s", "--out", str(tmp_path / "three")])
+    alone = run.invoke(app, [*words, "40deg:3s", "--out", str(tmp_path / "one")])
+    assert (told.exit_code, alone.exit_code) == (0, 0), told.output + alone.output
+    record = json.loads(told.stdout)
+    first, second, last = record["merit_by_set_point"]
+    assert (record["merit"], json.loads(alone.stdout)["merit_by_set_point"]) == ({}, [])
+    for name, figure in json.loads(alone.stdout)["merit"].items():
+        assert first["merit"][name]["value"] == pytest.approx(figure["value"], rel=1e-6, abs=1e-9), name
+    assert [second["begin_s"], second["end_s"], np.degrees(second["set_point_rad"])] == pytest.approx([3.0, 7.0, 10.0])
+    position, time = (np.asarray(record["series"][name]) for name in ("position", "time"))
+    there = (time > 2.995) & (time < 7.005)
+    beyond = np.max(np.radians(10.0) - position[there])  # it comes from above
+    assert beyond > np.radians(1.0)
+    assert second["merit"]["overshoot"]["value"] == pytest.approx(beyond, rel=1e-9)
+    steady = there & (time > 3.0 + 0.8 * 4.0 - 0.005)
+    error = np.mean(np.abs(position[steady] - np.radians(10.0)))
+    assert second["merit"]["steady_error"]["value"] == pytest.approx(error, rel=1e-6)
+    assert last["merit"]["settling_time"]["value"] is None
+    assert any("settles at 1 of 3 set points: 40 deg after" in one for one in record["conclusions"])
+    page = (tmp_path / "three" / "simulate.html").read_text(encoding="utf-8")
+    assert page.count("<td class=n>never</td>") == 2
+
+
+def test_what_the_controller_believes_stands_beside_what_the_plant_has(tmp_path: Path) -> None:
+    words = ["simulate", "--controller", "pid", "--dt", "10ms", "--set-point", "10deg:1s"]
+    wrong = ["convection_coefficient=80", "latent_heat.enthalpy=20 J/g", "payload_mass=57.19 g"]  # the mass as believed
+    words += [word for one in wrong for word in ("--mismatch", one)]
+    told = run.invoke(app, [*words, "--out", str(tmp_path / "loop")])
+    assert told.exit_code == 0, told.output
+    assert " ".join(told.output.split()).count("convection_coefficient believed 150 -> true 80 W/(m^2 K)") == 1
+    record = json.loads((tmp_path / "loop" / "simulate.json").read_text(encoding="utf-8"))
+    assert record["mismatch"] == {
+        "convection_coefficient": {"believed": 150.0, "true": 80.0, "unit": "W/(m^2 K)"},
+        "latent_heat.enthalpy": {"believed": None, "true": 20_000.0, "unit": "J/kg"},
+    }
+    page = (tmp_path / "loop" / "simulate.html").read_text(encoding="utf-8")
+    assert "<td>convection_<wbr>coefficient</td><td class=n>150</td><td class=n>80</td>" in page
+    assert "not in its model" in page
+
+
+def test_a_set_point_that_moves_all_the_time_has_no_figures_of_merit(tmp_path: Path) -> None:
+    rows = "\n".join(f"{k / 50},{0.2 * np.sin(k / 10)}" for k in range(101))
+    (tmp_path / "sine.csv").write_text(f"time (s),angle (rad)\n{rows}\n")
+    found = run_closed(Asked(dt=0.01), AskedLoop("pid", f"{tmp_path / 'sine.csv'}:angle (rad)"))
+    assert (found.merit, found.rests) == ({}, ())
+    assert any("50 at most: this one has 100." in note for note in found.notes)
+
+
 def test_what_was_written_is_an_input_again(folder: Path, tmp_path: Path) -> None:
     words = [
         "simulate",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import tomllib
 from importlib import resources
@@ -12,14 +13,15 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from smajax.attribution.verdict import pooled
+from smajax.attribution.verdict import pooled, summary
 from smajax.catalogue import CATALOGUE
-from smajax.close_loop import _preset, close_loop
+from smajax.close_loop import _preset, _sizes_not_given, close_loop
 from smajax.experiment.load import load_experiment
 from smajax.extended import base_model, extended
 from smajax.fit.batch import pack, simulate_batch
 from smajax.parameters import get_parameters, parameters, set_parameters
-from smajax.report.findings import Findings
+from smajax.report.findings import CoefficientFinding, Findings
+from tests.made_findings import made_effect, made_portrait, made_run
 
 STUDIES = Path(__file__).parents[1] / "studies"
 BENCH = STUDIES / "bias_spring_bench"
@@ -32,6 +34,33 @@ def test_a_parameter_that_the_log_gives_is_not_left_open() -> None:
     told = _preset(cast(Any, SimpleNamespace(experiment=experiment, unknowns=())))
     assert "load_mass" not in told
     assert {"wire_length", "damping"} <= set(told)
+
+
+def test_a_load_far_off_may_be_a_size_of_the_bench_that_was_never_given() -> None:
+    """The demo gives none of its sizes; a bench that gives them all, or a share that is small, has the one reading."""
+    with resources.as_file(resources.files("smajax") / "demo" / "latent") as folder:
+        experiment = load_experiment(folder / "experiment.toml", CATALOGUE)
+    bare = dataclasses.replace(experiment, parameters={})
+    sizes = _sizes_not_given(cast(Any, SimpleNamespace(experiment=bare, unknowns=("damping",))))
+    assert [one.split()[0] for one in sizes] == ["wire_length", "wire_diameter"]
+
+    def told(share: float, sizes: list[str]) -> str:
+        wrong = dataclasses.replace(
+            made_effect("wrong_load", "wrong load", "mechanics", 1e-4, added=True),
+            coefficients={"share": CoefficientFinding(share, 0.01, "-")},
+        )
+        runs = (made_run("a", "fit", 0), made_run("b", "fit", 1))
+        return " ".join(summary("explained", experiment, runs, [wrong], made_portrait(2e-5, True, ()), 9, sizes=sizes))
+
+    assert (
+        f"off by -79% may as well be a size of the bench that the experiment file never gives: {sizes[0]} and"
+        in told(-0.79, sizes)
+    )
+    assert "a size of the bench" not in told(-0.1, sizes)
+    assert "a size of the bench" not in told(-0.79, [])
+    given = dict.fromkeys(("wire_diameter", "wire_length"), 1e-3)
+    whole = dataclasses.replace(experiment, parameters=given)
+    assert _sizes_not_given(cast(Any, SimpleNamespace(experiment=whole, unknowns=("damping",)))) == []
 
 
 def _added(findings: Findings) -> set[str]:

@@ -10,6 +10,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from smajax.figures.catalogue import CHAPTERS, rows
+from smajax.figures.drawing import UPRIGHT
 from smajax.figures.row import Row
 from smajax.figures.write import Drawn, as_markdown, as_page
 
@@ -36,6 +37,10 @@ def test_the_claim_holds(row: Row) -> None:
     result.draw(figure)
     for axes in figure.axes:
         assert axes.get_ylabel(), f"{row.name}: an axis without a name"
+    upright = Figure(figsize=(UPRIGHT, 5.6))
+    result.draw(upright)
+    assert upright.get_layout_engine() is not None
+    assert {axes.get_subplotspec().get_gridspec().ncols for axes in upright.axes} == {1}, row.name  # type: ignore[union-attr]
 
 
 def test_chapter_three_is_whole() -> None:

@@ -20,7 +20,7 @@ from smajax.catalogue import CATALOGUE
 from smajax.design import candidate_runs
 from smajax.experiment.load import load_experiment
 from smajax.experiment.record import Experiment
-from smajax.fit.directions import directions, weak_ones
+from smajax.fit.directions import Direction, directions, weak_ones
 from smajax.fit.robust import huber_weights
 from smajax.fit.sensitivity import Sensitivity
 from smajax.identified import Identified
@@ -163,6 +163,22 @@ def test_what_moves_together_is_said() -> None:
     sentences = weak_ones(told)
     assert len(sentences) >= 1
     assert "a and b move together" in sentences[0]
+
+
+def test_a_temperature_moves_by_kelvins_wherever_its_zero_lies() -> None:
+    rng = np.random.default_rng(1)
+    columns = rng.standard_normal((400, 2))
+    columns[:, 1] = -0.05 * columns[:, 0] + 1e-2 * columns[:, 1]  # 1 of `a` does what 20 K do
+    at = Sensitivity(("a", "start"), np.zeros((1, 400)), columns[None], np.ones((1, 400)))
+    for value in (70.0, 0.5):  # degC
+        one = directions(at, ("a", "start"), {"a": 1.0, "start": value}, 1.0, ["start"])[0]
+        told = re.fullmatch(
+            r"a and start move together: a by (.*) % and start by (.*) K, all at once.*", one.sentence()
+        )
+        assert told is not None
+        assert float(told[2]) == pytest.approx(0.2 * float(told[1]), rel=0.06)  # two digits each
+    alone = Direction({"start": 1.0}, 0.1, frozenset({"start"}))
+    assert alone.sentence() == "start is known to 2 K only."
 
 
 def test_the_next_run_is_one_that_tells_more(experiment: Experiment, found: Identified) -> None:

@@ -57,8 +57,9 @@ def test_a_lane_is_the_single_loop_of_that_plant(folder: Path) -> None:
 
 def test_the_folder_is_whole(folder: Path) -> None:
     page = (folder / "index.html").read_text(encoding="utf-8")
-    assert page.count("data:image/png;base64,") == 3
+    assert page.count('src="data:image/png;base64,') == page.count('srcset="data:image/png;base64,') == 3
     assert 'href="vsc3.csv"' in page
+    assert "Ambient: 0.5 to 2 times the 20 °C believed is air that is -10 to +20 K off." in page
     for name in ("comparison.png", "vsc3_maps.png", "vsc3_lines.png", "vsc3.csv"):
         assert (folder / name).stat().st_size > 300
     record = json.loads((folder / "sweep.json").read_text(encoding="utf-8"))

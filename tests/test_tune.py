@@ -186,6 +186,7 @@ def test_the_folder_is_whole(folder: Path) -> None:
     }
     page = (folder / "tune.html").read_text(encoding="utf-8")
     assert "overshoot" in page
+    assert "another parameter wrong by 20 % (the air by 4 K)" in page
     assert page.count('src="data:image/png') == 2
     assert page.count('srcset="data:image/png') == 1  # the same for a telephone
     record = json.loads((folder / "tune.json").read_text(encoding="utf-8"))["checks"]
@@ -195,6 +196,11 @@ def test_the_folder_is_whole(folder: Path) -> None:
     for check, when in (("tuned on", "before"), ("beyond", "after")):
         errors = [float(one["steady_error [deg]"]) for one in loops if (one["check"], one["gains"]) == (check, when)]
         assert max(errors) == pytest.approx(record[check][when]["steady_error"]["worst"])
+
+
+def test_a_share_of_the_airs_temperature_is_told_in_kelvins() -> None:
+    told = TuneSettings("vsc3", (0.0,), {"damping": 0.2, "ambient": 0.2}).plants_in_words(20.0)
+    assert "damping ±20 %, ambient ±4 K at once" in told
 
 
 def test_what_the_gains_cost_is_said_with_both_numbers() -> None:

@@ -16,6 +16,8 @@ from smajax.words import and_listed
 WRONG_NOISE = 1.2
 # A held-out run is off where its error is so much larger than that of the fit runs; few samples may be so by chance.
 FURTHER, CHANCE = 1.3, 5.0
+LARGE_SHARE = 0.2  # of the load, wrong or shifting: from here on a size of the bench is as likely to be wrong
+NAMED_SIZES = 4  # of these in a sentence
 MENTIONED = 0.05  # weight from which on a rival is named
 
 
@@ -51,13 +53,15 @@ def summary(
     refused: tuple[Sequence[str], float, float] | None = None,
     at_bound: Sequence[str] = (),
     likelier: Sequence[Rival] = (),
+    sizes: Sequence[str] = (),
 ) -> tuple[str, ...]:
     """The verdict in sentences; `tried` is the number of candidate effects that were looked at.
 
     `aside`: those that were added and gave way to one unknown term. `foretold`: share of the motion in left-out runs that
     the model foretells, where that is so little that nothing is named. `refused`: effects that the held-out runs did not
     confirm, with the error there without and with them. `at_bound`: coefficients of what was added that end at a bound.
-    `likelier`: rivals that left-out runs prefer to what was added.
+    `likelier`: rivals that left-out runs prefer to what was added. `sizes`: those of the bench that the experiment never
+    gives, with the presets' values.
     """
     unit, name = experiment.output_unit, experiment.output_name
     added = [effect for effect in effects if effect.added]
@@ -111,7 +115,8 @@ def summary(
         f"Mind: runs left out speak for {title_of[one.rival]} rather than {title_of[one.effect]} (weight {one.weight:.2f})."
         for one in likelier
     ]
-    told += [effect.sentence for effect in added]
+    for effect in added:
+        told += [effect.sentence, *_or_a_size(effect, sizes)]
     told += _held_out_warnings(runs, experiment)
     if not several:
         told.append("There is one fit run only: effects were judged on the fit itself, no run could be left out.")
@@ -132,6 +137,18 @@ def summary(
             "smaller than it may hide. Declare it smaller, or as 'estimate', and run again."
         )
     return tuple(told)
+
+
+def _or_a_size(effect: EffectFinding, sizes: Sequence[str]) -> list[str]:
+    """The other reading of a load that is wrong by a large share, where sizes of the bench were never given."""
+    share = effect.coefficients.get("share")
+    if effect.name not in ("wrong_load", "load_shift") or share is None or abs(share.value) < LARGE_SHARE or not sizes:
+        return []
+    named = and_listed([*sizes[:NAMED_SIZES], *["others"] * (len(sizes) > NAMED_SIZES)])
+    return [
+        f"A load that is off by {share.value:+.0%} may as well be a size of the bench that the experiment file never gives: {named} are "
+        "the presets'. Give yours in [model.parameters] and run again."
+    ]
 
 
 def _partly(added: Sequence[EffectFinding], runs: Sequence[RunFinding], experiment: Experiment) -> str:

@@ -21,7 +21,7 @@ from smajax.load.coupon import AbstractCoupon
 from smajax.machine import available_memory
 from smajax.measure import SHOWN, AbstractMeasure
 from smajax.measured.names import listed
-from smajax.parameters import parameters
+from smajax.parameters import check_bounds, parameters
 from smajax.simulate import DEFAULT_STEP, check_scalars
 from smajax.system import System
 from smajax.types import Series
@@ -57,6 +57,7 @@ def recipe_of(
     known = known | {"ambient_temperature"}
     table = parameters(system)
     check_scalars(system, dt)
+    check_bounds(system)
     check_order(system)
     # A name that is both (ambient_temperature) is the parameter, unless it is an input already.
     channels = tuple(name for name in axes.names if name in known and name not in table)
@@ -152,7 +153,8 @@ def run_batch(
     On a processor the batch is compiled by `smajax.lanes`, five to twenty times as fast as by XLA; `engine="xla"` asks for the other
     (they agree to 1e-12 of a run), and where only XLA can do it, it does.
 
-    Raises ValueError for what does not fit together, and when `out` holds another batch.
+    A member whose values are out of their bounds is run as it is: `status` tells of those that go wrong.
+    Raises ValueError for what does not fit together, a parameter of `system` out of its bounds, and when `out` holds another batch.
     """
     recipe = recipe_of(
         system, inputs, axes, seconds=seconds, dt=dt, every=every, keep=keep, measures=measures, tolerance=tolerance

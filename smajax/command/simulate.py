@@ -124,7 +124,7 @@ def simulate(
     from smajax.gains_file import GainsFileError
     from smajax.progress import shown
     from smajax.report.files import json_text
-    from smajax.report.simulate_page import OWN, merit_rows, record, summary_rows, write_run
+    from smajax.report.simulate_page import OWN, merit_rows, mismatch_rows, record, rest_rows, summary_rows, write_run
     from smajax.single import Asked, AskedLoop, channels, run_closed, run_open
     from smajax.units import UnitError, parse_quantity
 
@@ -198,8 +198,13 @@ def simulate(
         typer.echo(title)
         for row in summary_rows(ran.found):
             typer.echo(f"  {row[0]:<28} {row[1]:>11} … {row[2]:<11} last {row[3]:<11} {row[4]}")
+        for row in mismatch_rows(ran):
+            typer.echo(f"  {row[0]:<28} believed {row[1]} -> true {row[2]} {row[3]}")
         for row in merit_rows(ran):
             typer.echo(f"  {row[0]:<28} {row[1]} {row[2]}")
+        head, rows = rest_rows(ran)
+        for row in rows:
+            typer.echo("  " + ", ".join(f"{name} {cell}" for name, cell in zip(head, row, strict=True)))
         typer.echo(f"Page: {page.resolve()}")
     if open_page:
         browse(page)

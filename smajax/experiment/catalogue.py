@@ -25,6 +25,9 @@ INPUT_UNITS: Mapping[str, str] = MappingProxyType(
 )
 
 
+WIRE_SIZES = ("wire_length", "wire_diameter")  # what a ruler tells of the wire; no preset's are those of another bench
+
+
 @dataclass(frozen=True)
 class ParameterInfo:
     """Unit of a parameter (the program's own: SI, degC, rad) and the widest values that make physical sense."""

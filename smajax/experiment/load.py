@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from smajax.experiment.catalogue import Catalogue, ModelDescription
+from smajax.experiment.catalogue import WIRE_SIZES, Catalogue, ModelDescription
 from smajax.experiment.errors import ExperimentError, at_key, check_name
 from smajax.experiment.folder import data_folder
 from smajax.experiment.magnitude import common_warnings, magnitude_warnings
@@ -180,8 +180,7 @@ def _output(path: Path, file: ExperimentFile, name: str, unit: str, runs: Sequen
 
 def _untold(file: ExperimentFile, free: Sequence[Unknown]) -> list[str]:
     """That no size of the bench is given: the preset's are another bench's."""
-    sizes = {"wire_length", "wire_diameter"}
-    if file.model.load == "coupon" or file.model.parameters or sizes & {one.name for one in free}:
+    if file.model.load == "coupon" or file.model.parameters or {*WIRE_SIZES} & {one.name for one in free}:
         return []
     return [
         f"[model.parameters] gives nothing of this bench: the length and diameter of the preset wire {file.model.wire!r} and the rest "

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from smajax.experiment.catalogue import WIRE_SIZES
 from smajax.experiment.grouping import RunFiles, paired
 from smajax.experiment.guess import DRIVES, GUESS, LIKELY, SURE, TIME, Column, columns_of, times_not_read
 from smajax.measured.read import read_table
@@ -101,7 +102,7 @@ def _known(model: _Model, system: System) -> dict[str, tuple[str, str]]:
     """What a ruler, a balance or a data sheet tells of the bench: name -> (the preset's value, what it is)."""
     table, values = parameters(system), parameter_values(system)
     heated, given = model.drive != "none", {"load_mass"} if "mass" in model.inputs else set()
-    sizes = ["wire_length", "wire_diameter", *["ambient_temperature"] * heated] if model.load != "coupon" else []
+    sizes = [*WIRE_SIZES, *["ambient_temperature"] * heated] if model.load != "coupon" else []
     names = [*sizes, *(name for name, one in table.items() if one.path[0] in ("load", "drive") and name not in given)]
     return {name: (_amount(values[name], table[name].unit, 4), table[name].about) for name in names}
 

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from smajax.control_presets import backstepping_two
 from smajax.figures.backstepping_runs import ON_ITS_PLANT, on_heating_curve, plant, runs, stacked
-from smajax.figures.drawing import BLUE, GREY, RED, keyed, named, styled
+from smajax.figures.drawing import BLUE, GREY, RED, is_upright, keyed, named, panels, styled
 from smajax.figures.row import Result, Row
 from smajax.parameters import set_parameters
 from smajax.types import Scalar
@@ -91,9 +91,13 @@ def work(fast: bool) -> Result:
     damping_rate = float(system.load.damping) / float(system.load.inertia({}))
 
     def draw(figure: Figure) -> None:
-        figure.set_layout_engine("constrained")
-        grid_of = figure.add_gridspec(2, len(tried))
-        (top,) = styled(figure.add_subplot(grid_of[0, :]))
+        if is_upright(figure):
+            top, *below = panels(figure, 1 + len(tried))
+        else:
+            figure.set_layout_engine("constrained")
+            grid_of = figure.add_gridspec(2, len(tried))
+            places = [grid_of[0, :], *(grid_of[1, k] for k in range(len(tried)))]
+            top, *below = styled(*(figure.add_subplot(place) for place in places))
         top.contourf(gains, epsilons, falls, levels=[0.5, 1.5], colors=[BLUE], alpha=0.25)
         top.contour(gains, epsilons, said, levels=[0.5], colors=[RED], linestyles="--")
         top.plot([], [], color=BLUE, linewidth=6, alpha=0.25, label="dV/dt < 0 (by derivatives)")
@@ -101,12 +105,11 @@ def work(fast: bool) -> Result:
         top.axvline(0.0, color=GREY, linewidth=0.8)
         keyed(top)
         named(top, "K (1/s)", "epsilon")
-        for k, gain in enumerate(tried):
-            (axes,) = styled(figure.add_subplot(grid_of[1, k]))
+        for k, (axes, gain) in enumerate(zip(below, tried, strict=True)):
             for ok, one in zip(there, grid, strict=True):
                 if one[0] == gain:
                     axes.plot(one[1], one[2], "o" if ok else "x", color=BLUE if ok else RED, markersize=4)
-            named(axes, "x_1 (°)", "x_2 (rad/s)" if k == 0 else " ", f"K = {gain:g} 1/s")
+            named(axes, "x_1 (°)", "x_2 (rad/s)" if k == 0 or is_upright(figure) else " ", f"K = {gain:g} 1/s")
 
     return Result(
         holds=bool(min(share[gain] for gain in inside) == 1.0 and share[0.0] < 0.5 and share[30.0] < 0.5),

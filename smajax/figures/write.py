@@ -11,6 +11,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from smajax.figures.catalogue import every_row
+from smajax.figures.drawing import UPRIGHT
 from smajax.figures.row import Row
 from smajax.fit.progress import Progress
 from smajax.made_with import made_with
@@ -20,7 +21,8 @@ from smajax.report.plain_page import table, whole
 from smajax.source_mark import source_mark
 
 SIZE = (9.0, 5.6)  # inches
-DPI = 90
+DPI, FINE = 90, 140  # of a desk and of a telephone, which has more of them
+UP = ".upright.png"  # the same panels one below the other, for a telephone
 MARK = ".made-by"  # which code and setting the folder's files come from
 
 
@@ -52,10 +54,11 @@ def _kept(row: Row, folder: Path) -> Drawn | None:
 
 def _made(row: Row, folder: Path, fast: bool) -> Drawn:
     result = row.work(fast)
-    figure = Figure(figsize=SIZE)
-    result.draw(figure)
-    with writing(folder / f"{row.name}.png") as file:
-        figure.savefig(file, dpi=DPI, facecolor="white", format="png", metadata={"Software": None})
+    for name, width, dpi in ((f"{row.name}.png", SIZE[0], DPI), (f"{row.name}{UP}", UPRIGHT, FINE)):
+        figure = Figure(figsize=(width, SIZE[1]))
+        result.draw(figure)
+        with writing(folder / name) as file:
+            figure.savefig(file, dpi=dpi, facecolor="white", format="png", metadata={"Software": None})
     record = {
         "id": row.name,
         "where": row.where,
@@ -78,12 +81,18 @@ def draw(rows: Sequence[Row], folder: Path, fast: bool, progress: Progress) -> l
     setting = f"{'fast' if fast else 'full'} {source_mark()}\n"
     if not mark.exists() or mark.read_text(encoding="utf-8") != setting:
         stale = [
-            name for row in every_row() for name in (f"{row.name}.json", f"{row.name}.png") if (folder / name).exists()
+            name
+            for row in every_row()
+            for name in (f"{row.name}.json", f"{row.name}.png", f"{row.name}{UP}")
+            if (folder / name).exists()
         ]
         for name in stale:
             (folder / name).unlink()
         if stale:
-            progress(f"say: {len(stale) // 2} figures of another version of smajax or another setting are gone.", 1.0)
+            progress(
+                f"say: {sum(name.endswith('.json') for name in stale)} figures of another version of smajax or another setting are gone.",
+                1.0,
+            )
         replace(mark, setting)
     drawn = []
     for index, row in enumerate(rows):
@@ -145,7 +154,7 @@ def as_page(drawn: Sequence[Drawn], folder: Path) -> str:
     parts = [
         f'<h2 id="{one.row.name}">{one.row.name}: {say(one.row.system)}</h2><p>{say(one.found)}.</p>'
         + (f"<p>Note: {say(one.caveat)}</p>" if one.caveat else "")
-        + str(picture((folder / f"{one.row.name}.png").read_bytes(), f"{one.row.name}: {one.found}", "panels"))
+        + _picture(one, folder)
         for one in drawn
     ]
     head = (
@@ -161,6 +170,13 @@ def as_page(drawn: Sequence[Drawn], folder: Path) -> str:
         "<p class=quiet>The same numbers: figures.csv, and a JSON file for each figure.</p>",
     ]
     return whole("Figures of the source", [head, *parts, *foot])
+
+
+def _picture(one: Drawn, folder: Path) -> str:
+    upright = folder / f"{one.row.name}{UP}"
+    wide = (folder / f"{one.row.name}.png").read_bytes()
+    alt = f"{one.row.name}: {one.found}"
+    return str(picture(wide, alt, "panels", upright.read_bytes() if upright.exists() else None))
 
 
 def as_csv(drawn: Sequence[Drawn], folder: Path) -> str:

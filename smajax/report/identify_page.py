@@ -17,10 +17,8 @@ from smajax.report.identify_record import record
 from smajax.report.identify_words import conclusions, estimate_rows, posterior_rows, prior_shown
 from smajax.report.plain_page import bullets, table, whole
 
-KNOWN = "Every combination of the parameters is known to 5 % or better."
-KNOWN_OF_THE_REST = (
-    "Of the parameters that are neither at a bound nor without effect, every combination is known to 5 %."
-)
+KNOWN = "Every combination of the parameters is known to 5 % (temperatures: to 1 K) or better."
+KNOWN_OF_THE_REST = "Of the parameters that are neither at a bound nor without effect, every combination is known to 5 % (temperatures: to 1 K)."
 
 
 def _run_rows(found: Identified) -> tuple[list[str], list[list[str]]]:

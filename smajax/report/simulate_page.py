@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import html
 import io
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +12,10 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from smajax.figures.drawing import BLUE, GREY, RED, named, panels
+from smajax.figures.drawing import BLUE, GREY, RED, UPRIGHT, named, panels
 from smajax.fit.progress import Progress, quiet
 from smajax.load.base import AbstractMovingLoad
-from smajax.merit import MERIT_UNITS
+from smajax.merit import MERIT_UNITS, Rest
 from smajax.parameters import parameter_values, parameters
 from smajax.report.animation import moving
 from smajax.report.display import axis_label, digits, display, label
@@ -43,9 +43,16 @@ def record(ran: Ran, command: str, series: bool = True) -> dict[str, Any]:
         "command": command,
         "provenance": {name: value for name, value in found.attrs.items() if name != "parameters (SI)"},
         "parameters": parameter_values(ran.system),
+        "mismatch": {
+            one.name: {"believed": one.believed, "true": one.true, "unit": one.unit} for one in ran.mismatches
+        },
         "notes": list(ran.notes),
         "conclusions": conclusions(ran),
-        "merit": {name: {"value": value, "unit": MERIT_UNITS[name]} for name, value in ran.merit.items()},
+        "merit": _merit(ran.merit),
+        "merit_by_set_point": [
+            {"begin_s": one.begin, "end_s": one.end, "set_point_rad": one.set_point, "merit": _merit(_figures(one))}
+            for one in ran.rests
+        ],
         "summary": {
             str(name): {
                 "unit": one.attrs["units"],
@@ -57,6 +64,14 @@ def record(ran: Ran, command: str, series: bool = True) -> dict[str, Any]:
         },
         "series": {str(name): found[name].to_numpy().tolist() for name in ("time", *found.data_vars)} if series else {},
     }
+
+
+def _merit(figures: Mapping[str, float]) -> dict[str, Any]:
+    return {name: {"value": value, "unit": MERIT_UNITS[name]} for name, value in figures.items()}
+
+
+def _figures(one: Rest) -> dict[str, float]:
+    return {name: float(value) for name, value in vars(one.merit).items()}
 
 
 def _inputs(found: xr.Dataset) -> list[str]:
@@ -72,8 +87,8 @@ def drawn(found: xr.Dataset, form: str = "png", upright: bool = False) -> bytes:
     """
     inputs = _inputs(found)
     shown = [*inputs[:1], *PLAIN]
-    figure = Figure(figsize=(4.6, 14.0) if upright else (10.0, 8.2))
-    axes = panels(figure, 6, 1) if upright else panels(figure, 3, 2)
+    figure = Figure(figsize=(UPRIGHT if upright else 10.0, 8.2))
+    axes = panels(figure, 3, 2)
     time = found["time"].to_numpy()
 
     def values(name: str) -> tuple[Any, str]:
@@ -113,11 +128,50 @@ def summary_rows(found: xr.Dataset) -> list[list[str]]:
 
 def merit_rows(ran: Ran) -> list[list[str]]:
     """A row a figure of merit."""
-    rows = []
-    for name, value in ran.merit.items():
-        unit = display(MERIT_UNITS[name], name)
-        rows.append([label(name), "never" if np.isinf(value) else digits(unit.of(value), 3), unit.unit])
-    return rows
+    return [
+        [label(name), _cell(name, value), display(MERIT_UNITS[name], name).unit] for name, value in ran.merit.items()
+    ]
+
+
+def _cell(name: str, value: float) -> str:
+    return "never" if np.isinf(value) else digits(display(MERIT_UNITS[name], name).of(value), 3)
+
+
+def rest_rows(ran: Ran) -> tuple[list[str], list[list[str]]]:
+    """(head, rows): a row a set point, from when it is asked to the next one."""
+    of = display("rad")
+    head = [
+        f"set point ({of.unit})",
+        "from (s)",
+        "to (s)",
+        *(axis_label(name, display(unit, name)) for name, unit in MERIT_UNITS.items()),
+    ]
+    rows = [
+        [
+            digits(of.of(one.set_point)),
+            digits(one.begin),
+            digits(one.end),
+            *(_cell(name, value) for name, value in _figures(one).items()),
+        ]
+        for one in ran.rests
+    ]
+    return head, rows
+
+
+MISMATCH = ("parameter", "the controller believes", "the plant has", "unit")
+
+
+def mismatch_rows(ran: Ran) -> list[list[str]]:
+    """A row a parameter, as `MISMATCH`, in SI as the parameters are."""
+    return [
+        [
+            one.name,
+            "not in its model" if one.believed is None else digits(one.believed, 6),
+            digits(one.true, 6),
+            one.unit,
+        ]
+        for one in ran.mismatches
+    ]
 
 
 def conclusions(ran: Ran) -> list[str]:
@@ -154,6 +208,16 @@ def conclusions(ran: Ran) -> list[str]:
         told.append(
             f"The loop settles after {digits(settles, 3)} s." if np.isfinite(settles) else "The loop never settles."
         )
+    if ran.rests:
+        of, after = display("rad"), [float(one.merit.settling_time) for one in ran.rests]
+        each = [
+            f"{digits(of.of(one.set_point))} {of.unit} "
+            + (f"after {digits(late, 3)} s" if np.isfinite(late) else "never")
+            for one, late in zip(ran.rests, after, strict=True)
+        ]
+        told.append(
+            f"The loop settles at {int(np.isfinite(after).sum())} of {len(each)} set points: {', '.join(each)}."
+        )
     return told
 
 
@@ -187,8 +251,14 @@ def page(ran: Ran, image: bytes, title: str, command: str, films: Sequence[bytes
         for name, value in parameter_values(ran.system).items()
     ]
     parts = [f"<h1>{html.escape(title)}</h1>", bullets([*ran.notes, *conclusions(ran)])]
+    if ran.mismatches:
+        parts.append(table(MISMATCH, mismatch_rows(ran), (1, 2)))
     if ran.merit:
         parts.append(table(["figure of merit", "value", "unit"], merit_rows(ran), (1,)))
+    if ran.rests:
+        head, rows = rest_rows(ran)
+        parts.append(table(head, rows, range(len(head))))
+        parts.append("<p class=quiet>Each from when it is asked to the next one; times count from there.</p>")
     film, upright = films or (None, None)
     parts += [
         str(picture(image, "the run over time", "panels", drawn(ran.found, upright=True))),

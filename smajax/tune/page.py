@@ -14,6 +14,7 @@ from smajax.report.files import csv_text, heading
 from smajax.report.html import picture
 from smajax.report.plain_page import bullets, table, whole
 from smajax.sweep import MISMATCHES
+from smajax.tune.members import BEYOND
 from smajax.tune.pictures import before_after
 from smajax.tune.terms import TERMS
 from smajax.tune.tune import Check, Tuned
@@ -28,6 +29,13 @@ CHECKS = {
     "inside": "never seen: plants within the variation, set points between those tuned",
     "beyond": "never seen: another parameter wrong by 20 %, set points tuned",
 }
+
+
+def checked_on(found: Tuned, name: str) -> str:
+    """The plants and set points of a check, in words; a share of the air's temperature in kelvins."""
+    if name != "beyond" or "ambient" in found.settings.variation:
+        return CHECKS[name]
+    return CHECKS[name].replace("20 %", f"20 % (the air by {BEYOND * abs(found.air):.3g} K)")
 
 
 def at_the_edge(found: Tuned) -> list[str]:
@@ -116,7 +124,7 @@ def conclusions(found: Tuned) -> list[str]:
         settled = np.isfinite(np.asarray(check.seen.merits.settling_time)).mean(axis=1)
         if settled.min() < 1.0:
             told.append(
-                f"Loops that settle, {CHECKS[name]}: {100 * settled[0]:.0f} % before, {100 * settled[1]:.0f} % after."
+                f"Loops that settle, {checked_on(found, name)}: {100 * settled[0]:.0f} % before, {100 * settled[1]:.0f} % after."
             )
     told += price(found)
     if edge := at_the_edge(found):
@@ -177,7 +185,7 @@ def page(found: Tuned, pictures: Mapping[str, bytes], command: str) -> str:
     parts = [
         f"<h1>Gains of {say(settings.controller)}, tuned</h1>",
         bullets(conclusions(found)),
-        f"<p>Tuned on {say(settings.plants_in_words())}. {say(settings.goal_in_words())}.</p>",
+        f"<p>Tuned on {say(settings.plants_in_words(found.air))}. {say(settings.goal_in_words())}.</p>",
         picture(
             pictures["before_after.png"],
             "angles and figures of merit before and after",
@@ -190,8 +198,9 @@ def page(found: Tuned, pictures: Mapping[str, bytes], command: str) -> str:
         table(["gain", "before", "after", "unit", "box", "remark"], gain_rows(found), (1, 2)),
     ]
     for name, check in found.checks.items():
+        what = checked_on(found, name)
         parts += [
-            f"<h2>{say(CHECKS[name].capitalize())}</h2><p class=quiet>"
+            f"<h2>{say(what[0].upper() + what[1:])}</h2><p class=quiet>"
             f"{counted(check.members.size, 'closed loop')} of {settings.seconds:g} s.</p>",
             table(head, _figures(found, check), range(1, len(head))),
         ]
@@ -238,7 +247,7 @@ def record(found: Tuned, command: str) -> dict[str, Any]:
         "limits_met": found.within_limits if found.settings.limits else None,
         "checks": {
             name: {
-                "what": CHECKS[name],
+                "what": checked_on(found, name),
                 "loops": one.members.size,
                 "limit_exceeded_by_share": {"before": found.excesses[name][0], "after": found.excesses[name][1]},
                 **{

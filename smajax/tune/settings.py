@@ -72,9 +72,12 @@ class TuneSettings:
             raise ValueError(f"the check needs at least one plant, not {self.unseen}.")
         _ = self.goal, self.effort  # they check themselves
 
-    def plants_in_words(self) -> str:
-        """On which plants gains are tuned."""
-        wrong = [f"{name} ±{100 * share:g} %" for name, share in self.variation.items()]
+    def plants_in_words(self, air: float) -> str:
+        """On which plants gains are tuned. `air`: degC as believed, of which a share is told in kelvins."""
+        sizes = {name: f"{100 * share:g} %" for name, share in self.variation.items()}
+        if "ambient" in sizes:
+            sizes["ambient"] = f"{self.variation['ambient'] * abs(air):.3g} K"
+        wrong = [f"{name} ±{size}" for name, size in sizes.items()]
         told = f"the plant as believed and with {', '.join(wrong)} at once" if wrong else "the plant as believed"
         return f"{told}; set points {', '.join(f'{angle:g}°' for angle in self.set_points)}"
 

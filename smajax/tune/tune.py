@@ -11,7 +11,7 @@ from smajax.control_presets import CONTROLLERS
 from smajax.fit.progress import Progress, quiet
 from smajax.gains_file import Gains
 from smajax.parameters import get_parameters, parameters
-from smajax.sweep import positions
+from smajax.sweep import MISMATCHES, positions
 from smajax.sweep_run import interface_of
 from smajax.system import System
 from smajax.tune.descent import Descent, begin, one_round
@@ -57,6 +57,7 @@ class Tuned:
     descent: Descent
     evolution: Evolution
     lines: Lines
+    air: float  # degC, as the controller believes it
 
     @property
     def within_limits(self) -> bool:
@@ -161,6 +162,7 @@ def tune(
         now,
         evolution,
         lines,
+        float(get_parameters(rig.system, [MISMATCHES["ambient"]])[0]),
     )
 
 
