@@ -18,7 +18,7 @@ BLUE, RED, GREEN, GREY, BLACK = "#1f6fb2", "#c8553d", "#3f8f5b", "#9aa0a8", "#1d
 UPRIGHT = 4.6  # inches: a figure as narrow as this is for a telephone
 PANEL, LEAST = 2.5, 3.4  # inches: height of a panel of an upright figure, and of a figure with one
 ACROSS, UP = 40, 28  # characters in a line of a label there
-CROWD = 6  # entries of a key beyond which it has two columns there
+FEW = 3  # entries of a key beyond which it has two columns there
 
 
 def panels(figure: Figure, rows: int, columns: int = 1, share: bool = False) -> list[Axes]:
@@ -63,6 +63,8 @@ def named(axes: Axes, horizontal: str, vertical: str, title: str = "") -> None:
 def keyed(axes: Axes, entries: Sequence[str] | None = None) -> None:
     """A legend without a frame."""
     count = len(entries) if entries else len(axes.get_legend_handles_labels()[1])
-    columns = 2 if _in_upright(axes) and count > CROWD else 1
+    columns = 2 if _in_upright(axes) and count > FEW else 1
     look: Any = {"frameon": False, "fontsize": 8, "ncols": columns}
+    if columns > 1 and not axes.get_title(loc="left"):
+        look |= {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0)}  # above the panel, which has no room inside
     axes.legend(entries, **look) if entries else axes.legend(**look)
