@@ -16,7 +16,7 @@ from smajax import explicit_arm as equations
 from smajax.figures.rigs import arm
 from smajax.parameters import set_parameters
 from smajax.simulate import simulate
-from studies.benchmarks import peers, problem
+from studies.benchmarks import numba_arm, numba_peer, peers, problem
 from studies.benchmarks.given import Given, load
 
 SOLVED = 4
@@ -57,6 +57,13 @@ def test_equations_for_peers_are_the_same_problem(exact: Given) -> None:
     off = exact.errors(np.degrees(states[2]), equations.fraction(np, p, tuple(states)))
     assert off[0] < 1e-3
     assert off[1] < 1e-5
+
+
+def test_numbas_program_is_as_accurate_as_asked(exact: Given) -> None:
+    off = numba_peer.errors(exact, numba_arm.build(np.float64, 1), np.float64, 1, DT)
+    assert exact.meets(off)
+    coarse = numba_peer.errors(exact, numba_arm.build(np.float64, 1), np.float64, 1, 5.0 * DT)
+    assert not exact.meets(coarse)
 
 
 def test_fewer_members_are_the_first_of_more() -> None:

@@ -2,7 +2,7 @@
 
 Parts are written one by one to FOLDER (default `studies/benchmarks/results/<processor>`), and the table of ratios is made
 of those that are there. Give parts by name to measure them again. diffrax is timed by the interpreter that
-`SMAJAX_DIFFRAX_PYTHON` names. Nothing else should run beside it; ratios are of one run on one machine.
+`SMAJAX_DIFFRAX_PYTHON` names, numba by that of `SMAJAX_NUMBA_PYTHON`. Nothing else should run beside it; ratios are of one run on one machine.
 """
 
 from __future__ import annotations
@@ -98,6 +98,7 @@ PARTS: dict[str, Callable[[Plan], Part]] = {
     ),
     "scipy": lambda plan: peers.scipy(plan.file(), plan.scipy_members),
     "diffrax": lambda plan: peers.diffrax(plan.file(), count=plan.diffrax_members),
+    "numba": lambda plan: peers.numba(plan.file(), DEFAULT_STEP, count=plan.members),
     "single": lambda plan: plan.own("single", plan.file()),
     "gradient": lambda plan: plan.own("gradient", "--steps", 2000, "--members", 64 if plan.fast else 512, "--forward"),
     "gradient_memory": lambda plan: {

@@ -62,6 +62,13 @@ def _ratios(found: Found) -> list[str]:
             0.7,
             _ratio(_each(found, "cpp", "float"), _each(found, "smajax_own_steps_float32")),
         ),
+        _row(
+            "throughput over numba, the same scheme and fixed steps, float64",
+            "",
+            _ratio(_each(found, "numba", "double"), fixed),
+            None,
+        ),
+        _row("throughput over numba, own steps, float64", "", _ratio(_each(found, "numba", "double"), own), None),
         _at_least("throughput over diffrax at its best", 5.0, _ratio(_each(found, "diffrax", "best"), own)),
         _at_least("throughput over scipy's LSODA", 200.0, _ratio(scipy, own)),
         _at_least("one trajectory: scipy's time over ours", 1.0, _ratio(scipy, single.get("ms"))),
@@ -83,7 +90,7 @@ def _times(found: Found) -> list[str]:
         "| | ms a trajectory | error of the angle, degrees | of the fraction | compiling, s | peak memory, MB |",
         "|---|---|---|---|---|---|",
     ]
-    named = {
+    parts = {
         "smajax, own steps, float64": found.get("smajax_own_steps", {}),
         "smajax, own steps, float32": found.get("smajax_own_steps_float32", {}),
         "smajax, fixed steps, float64": found.get("smajax", {}),
@@ -92,13 +99,17 @@ def _times(found: Found) -> list[str]:
         "scipy LSODA, one core": found.get("scipy", {}).get("best", found.get("scipy", {})),
         "C++, float64": found.get("cpp", {}).get("double", found.get("cpp", {})),
         "C++, float32": found.get("cpp", {}).get("float", found.get("cpp", {})),
+        "numba, float64": found.get("numba", {}).get("double", found.get("numba", {})),
+        "numba, float32": found.get("numba", {}).get("float", found.get("numba", {})),
     }
     keys = ("ms_per_trajectory", "angle_error", "fraction_error", "compile_s", "peak_memory_MB")
-    for name, one in named.items():
+    for name, one in parts.items():
         if one.get("ms_per_trajectory") is None:
             rows.append(f"| {name} | {one.get('reason', 'not measured')} | | | | |")
         else:
-            rows.append(f"| {name} | " + " | ".join(f"{one[key]:.3g}" if key in one else "" for key in keys) + " |")
+            # What is not accurate enough is shown for what it is.
+            named = name if one.get("accurate", True) else f"{name}, **not accurate enough**"
+            rows.append(f"| {named} | " + " | ".join(f"{one[key]:.3g}" if key in one else "" for key in keys) + " |")
     best = found.get("diffrax", {}).get("best")
     if best:
         way = "adaptive" if best["adaptive"] else "fixed steps"
