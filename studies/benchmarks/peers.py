@@ -11,6 +11,7 @@ from typing import Any
 
 ROOT = Path(__file__).parents[2]
 DIFFRAX_PYTHON = "SMAJAX_DIFFRAX_PYTHON"
+GRADSOLVE_PYTHON = "SMAJAX_GRADSOLVE_PYTHON"
 NUMBA_PYTHON = "SMAJAX_NUMBA_PYTHON"
 LONGEST = 3600.0  # s
 
@@ -60,3 +61,9 @@ def numba(file: Path, dt: float, python: str | None = None, count: int = 4096) -
     """numba with steps of `dt` s by the interpreter `python`, or the one that SMAJAX_NUMBA_PYTHON names."""
     options = (str(file.resolve()), "--dt", repr(dt), "--count", str(count))
     return _elsewhere("numba_peer", "numba", NUMBA_PYTHON, python, *options)
+
+
+def gradient(peer: str, file: Path, python: str | None = None) -> dict[str, Any]:
+    """The gradient of a problem of `tracking.py` by `diffrax` or `gradsolve`, each by the interpreter named for it."""
+    variable = {"diffrax": DIFFRAX_PYTHON, "gradsolve": GRADSOLVE_PYTHON}[peer]
+    return _elsewhere("gradient_peer", peer, variable, python, peer, str(file.resolve()))

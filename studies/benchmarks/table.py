@@ -125,6 +125,41 @@ def _section(title: str, head: str, rows: Sequence[str], words: str = "") -> lis
     return [f"## {title}", "", *([words, ""] if words else []), f"| {head} |", under, *rows, ""]
 
 
+def _gradients(found: Found) -> list[str]:
+    """Ours, and every way of the others, found or not."""
+    own = found.get("gradient_tracking", {})
+    rows, steps = [], []
+
+    def row(name: str, setting: str, one: Mapping[str, Any], members: int, way: str = "gradient") -> str:
+        if f"{way}_s" not in one:
+            return f"| {name} | | {one.get('reason', 'not measured')} | | | | | |"
+        cost, slopes = (1e3 * float(one[f"{key}_s"]) / members for key in ("cost", way))
+        numbers = (cost, slopes, one[f"{way}_over_cost"], one["gradient_error"], one[f"{way}_memory_MB"])
+        shown = " | ".join(f"{number:.3g}" for number in numbers)
+        return f"| {name} | {setting} | {shown} | {one[f'{way}_compile_s']:.1f} |"
+
+    if not any(name in found for name in ("gradient_tracking", "gradient_diffrax", "gradient_gradsolve")):
+        return []
+    for name, way in (("smajax, reverse", "gradient"), ("smajax, forward", "jacobian")):
+        rows.append(row(name, f"steps of {1e3 * own.get('setting', 0.0):g} ms", own, own.get("members", 1), way))
+    for peer in ("diffrax", "gradsolve"):
+        part = found.get(f"gradient_{peer}", {})
+        if "ways" not in part:
+            rows.append(row(peer, "", part, 1))
+        for one in part.get("ways", []):
+            rows.append(row(one["way"], f"{one.get('setting', 0.0):g}", one, part["members"]))
+            if "record_s" in one:
+                steps.append(f"{1e3 * one['record_s'] / part['members']:.2g} ms ({one['engine']})")
+    words = (
+        "The mean square distance from a ramp by all parameters of the arm (`studies/benchmarks/tracking.py`), all members in "
+        "one program; each at its loosest tolerance whose gradient is off by less than 3 % of its norm, by central differences of a tight solution."
+    )
+    if steps:
+        words += f" gradsolve's steps are found before, again when the parameters move: {', '.join(steps)} a run more."
+    head = "way | tolerance | ms a run | ms a gradient | gradient over its run | error | memory, MB | compiling, s"
+    return _section("A gradient by all parameters, beside others", head, rows, words)
+
+
 def _growth(found: Found) -> list[str]:
     def runs(part: str, known: str) -> list[Mapping[str, Any]]:
         return [one for one in found.get(part, {}).get("runs", []) if known in one]
@@ -176,6 +211,7 @@ def told(machine: Mapping[str, Any], found: Found) -> str:
         "",
         *_times(found),
         "",
+        *_gradients(found),
         *_growth(found),
     ]
     return "\n".join(lines)
