@@ -74,4 +74,11 @@ def test_fewer_members_are_the_first_of_more() -> None:
 def test_a_peer_that_cannot_run_says_why(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv(peers.DIFFRAX_PYTHON, raising=False)
     assert peers.DIFFRAX_PYTHON in peers.diffrax(tmp_path / "none.npz")["reason"]
+    monkeypatch.delenv(peers.NUMBA_PYTHON, raising=False)
+    assert peers.NUMBA_PYTHON in peers.numba(tmp_path / "none.npz", DT)["reason"]
+    monkeypatch.delenv(peers.GRADSOLVE_PYTHON, raising=False)
+    assert peers.GRADSOLVE_PYTHON in peers.gradient("gradsolve", tmp_path / "none.npz")["reason"]
+    # This interpreter has none of them: what the import says is the reason.
+    missing = peers.numba(tmp_path / "none.npz", DT, python=sys.executable)
+    assert "none.npz" in missing["reason"]
     assert "none.npz" in peers.run_peer("scipy_peer", sys.executable, str(tmp_path / "none.npz"))["reason"]

@@ -85,10 +85,17 @@ def _compared(
     return told
 
 
+def tracked_arm(given: tracking.Tracking) -> System:
+    """The arm of the peers' problem."""
+    return set_parameters(arm(), {"payload_mass": given.constants["payload_mass"]})
+
+
 def run_tracking(given: tracking.Tracking, forward: bool) -> dict[str, Any]:
     """The same on the members of the peers' problem, with the error of the gradient."""
-    system = set_parameters(arm(), {"payload_mass": given.constants["payload_mass"]})
-    cost, at = _cost_of(system, given.names, round(tracking.SECONDS / DEFAULT_STEP)), jnp.asarray(given.vector)
+    cost, at = (
+        _cost_of(tracked_arm(given), given.names, round(tracking.SECONDS / DEFAULT_STEP)),
+        jnp.asarray(given.vector),
+    )
     slopes = jax.jit(jax.vmap(jax.grad(cost), (None, 0)))(at, jnp.asarray(given.solved))
     told: dict[str, Any] = {"peer": "smajax", "members": len(given.voltage), "parameters": len(given.names)}
     told |= {"setting": DEFAULT_STEP, "gradient_error": given.error(np.asarray(slopes))}

@@ -75,6 +75,23 @@ def _ratios(found: Found) -> list[str]:
         _at_most("first call of a process, nothing kept, s", 3.0, single.get("first_call_s")),
         _at_most("reverse-mode gradient by all parameters over one run", 4.0, gradient.get("gradient_over_cost")),
     ]
+    tracked = found.get("gradient_tracking", {})
+    others = [
+        1e3 * float(one["gradient_s"]) / part["members"]
+        for part in (found.get("gradient_diffrax", {}), found.get("gradient_gradsolve", {}))
+        for one in part.get("ways", [])
+        if "gradient_s" in one
+    ]
+    if tracked or others:
+        each = 1e3 * float(tracked["gradient_s"]) / tracked["members"] if "gradient_s" in tracked else None
+        rows.append(
+            _row(
+                "one gradient by all parameters: the fastest other's time over ours",
+                "",
+                _ratio(min(others, default=None), each),
+                None,
+            )
+        )
     if "jacobian_over_cost" in gradient:
         most = 1.0 + float(gradient["parameters"])
         rows.append(
