@@ -99,7 +99,7 @@ def run_tracking(given: tracking.Tracking, forward: bool) -> dict[str, Any]:
     slopes = jax.jit(jax.vmap(jax.grad(cost), (None, 0)))(at, jnp.asarray(given.solved))
     told: dict[str, Any] = {"peer": "smajax", "members": len(given.voltage), "parameters": len(given.names)}
     told |= {"setting": DEFAULT_STEP, "gradient_error": given.error(np.asarray(slopes))}
-    return told | _compared(cost, at, jnp.asarray(given.voltage), REPEATS, forward)
+    return told | _compared(cost, at, jnp.asarray(given.voltage), tracking.REPEATS, forward)
 
 
 def main() -> None:

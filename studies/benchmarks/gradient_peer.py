@@ -33,7 +33,7 @@ FORWARD = "ForwardMode"
 ENGINES = ("tsit5_replay", "vern7_replay")
 FIRST_STEP = 1e-3  # s
 MOST_STEPS = 4096
-REPEATS = 3
+REPEATS = tracking.REPEATS
 
 
 def _first_line(error: Exception) -> str:

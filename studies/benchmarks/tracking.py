@@ -25,6 +25,7 @@ LIMIT = 3e-2  # of the norm of the slopes, each times its parameter: what the de
 UNKNOWN = "start_fraction"
 DIFFERENCE = 1e-4  # of a parameter, to either side
 RTOL = 1e-9
+REPEATS = 10  # of everything that is timed here: a tenth of a second each, and of two of them a ratio is taken
 
 State = tuple[Any, ...]  # of `smajax.explicit_arm`, and the cost so far
 
