@@ -16,7 +16,7 @@ from smajax import explicit_arm as equations
 from smajax.figures.rigs import arm
 from smajax.parameters import set_parameters
 from smajax.simulate import simulate
-from studies.benchmarks import peers, problem
+from studies.benchmarks import numba_arm, numba_peer, peers, problem
 from studies.benchmarks.given import Given, load
 
 SOLVED = 4
@@ -59,6 +59,13 @@ def test_equations_for_peers_are_the_same_problem(exact: Given) -> None:
     assert off[1] < 1e-5
 
 
+def test_numbas_program_is_as_accurate_as_asked(exact: Given) -> None:
+    off = numba_peer.errors(exact, numba_arm.build(np.float64, 1), np.float64, 1, DT)
+    assert exact.meets(off)
+    coarse = numba_peer.errors(exact, numba_arm.build(np.float64, 1), np.float64, 1, 5.0 * DT)
+    assert not exact.meets(coarse)
+
+
 def test_fewer_members_are_the_first_of_more() -> None:
     few, many = problem.members(5), problem.members(64)
     assert all(np.array_equal(few[name], many[name][:5]) for name in few)
@@ -67,4 +74,11 @@ def test_fewer_members_are_the_first_of_more() -> None:
 def test_a_peer_that_cannot_run_says_why(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv(peers.DIFFRAX_PYTHON, raising=False)
     assert peers.DIFFRAX_PYTHON in peers.diffrax(tmp_path / "none.npz")["reason"]
+    monkeypatch.delenv(peers.NUMBA_PYTHON, raising=False)
+    assert peers.NUMBA_PYTHON in peers.numba(tmp_path / "none.npz", DT)["reason"]
+    monkeypatch.delenv(peers.GRADSOLVE_PYTHON, raising=False)
+    assert peers.GRADSOLVE_PYTHON in peers.gradient("gradsolve", tmp_path / "none.npz")["reason"]
+    # This interpreter has none of them: what the import says is the reason.
+    missing = peers.numba(tmp_path / "none.npz", DT, python=sys.executable)
+    assert "none.npz" in missing["reason"]
     assert "none.npz" in peers.run_peer("scipy_peer", sys.executable, str(tmp_path / "none.npz"))["reason"]

@@ -1,4 +1,4 @@
-"""The hand-written C++ program solves what smajax solves: it is no bar for the speed of something else."""
+"""The programs written by hand, in C++ and for numba, solve what smajax solves: they are no bar for the speed of something else."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 from smajax.figures.rigs import arm
-from smajax.parameters import get_parameters, set_parameters
+from smajax.parameters import get_parameters, parameter_values, set_parameters
 from smajax.simulate import simulate
 from smajax.system import System
 from smajax.types import Scalar, Trajectory
-from studies.benchmarks import cpp
+from studies.benchmarks import cpp, numba_arm
 
 DT, STEPS = 0.005, 2000
 
@@ -75,6 +75,25 @@ def test_every_sample_agrees(program: Path, build: Callable[[], System]):
     np.testing.assert_allclose(theirs.final_temperature, ours.temperature[:, -1], atol=1e-5)
     np.testing.assert_allclose(theirs.largest_angle, ours.position.max(axis=1), atol=1e-5)
     np.testing.assert_allclose(theirs.smallest_fraction, ours.martensite_fraction.min(axis=1), atol=1e-5)
+
+
+@pytest.mark.parametrize("build", [arm, _swinging])
+def test_every_sample_of_numbas_program_agrees(build: Callable[[], System]):
+    members = _members(8)
+    ours = _simulated(build(), members)
+    # As ordinary Python, two members to a block; numba compiles the same functions.
+    simulate = numba_arm.build(np.float64, 2)
+    constants = parameter_values(build())
+    record, result = np.empty((STEPS + 1, len(members), 2)), np.empty((len(members), numba_arm.COLUMNS))
+    own = numba_arm.members_of(constants, DT, *members.T)
+    iterations = simulate(numba_arm.rig_of(constants, DT, np.float64), own, STEPS, 1, record, result)
+    assert 2.0 <= iterations / (STEPS * len(members)) < 3.0  # stages: two a step, of blocks of two
+    assert np.abs(record[..., 0].T - ours.position).max() < 1e-5
+    assert np.abs(record[..., 1].T - ours.martensite_fraction).max() < 1e-5
+    np.testing.assert_allclose(result[:, 0], record[-1, :, 0])
+    np.testing.assert_allclose(result[:, 1], ours.position.max(axis=1), atol=1e-5)
+    np.testing.assert_allclose(result[:, 2], ours.martensite_fraction.min(axis=1), atol=1e-5)
+    np.testing.assert_allclose(result[:, 3], ours.temperature[:, -1], atol=1e-5)
 
 
 def test_threads_and_precisions_agree(program: Path):

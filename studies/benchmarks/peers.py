@@ -11,6 +11,8 @@ from typing import Any
 
 ROOT = Path(__file__).parents[2]
 DIFFRAX_PYTHON = "SMAJAX_DIFFRAX_PYTHON"
+GRADSOLVE_PYTHON = "SMAJAX_GRADSOLVE_PYTHON"
+NUMBA_PYTHON = "SMAJAX_NUMBA_PYTHON"
 LONGEST = 3600.0  # s
 
 
@@ -39,10 +41,29 @@ def scipy(file: Path, count: int = 64) -> dict[str, Any]:
     return run_peer("scipy_peer", sys.executable, str(file.resolve()), "--count", str(count))
 
 
+def _elsewhere(name: str, package: str, variable: str, python: str | None, *options: str) -> dict[str, Any]:
+    """`run_peer` by the interpreter `python`, or the one that `variable` names: one that can import `package`."""
+    python = python or os.environ.get(variable)
+    if not python:
+        reason = f"not installed here: set {variable} to an interpreter that can import {package}"
+        return {"peer": package, "reason": reason}
+    return run_peer(name, python, *options)
+
+
 def diffrax(file: Path, python: str | None = None, cores: int | None = None, count: int = 4096) -> dict[str, Any]:
     """diffrax by the interpreter `python`, or the one that SMAJAX_DIFFRAX_PYTHON names: one that can import diffrax."""
-    python = python or os.environ.get(DIFFRAX_PYTHON)
-    if not python:
-        return {"peer": "diffrax", "reason": f"no interpreter: set {DIFFRAX_PYTHON} to one that can import diffrax"}
     several = () if cores is None else ("--cores", str(cores))
-    return run_peer("diffrax_peer", python, str(file.resolve()), "--count", str(count), *several)
+    options = (str(file.resolve()), "--count", str(count), *several)
+    return _elsewhere("diffrax_peer", "diffrax", DIFFRAX_PYTHON, python, *options)
+
+
+def numba(file: Path, dt: float, python: str | None = None, count: int = 4096) -> dict[str, Any]:
+    """numba with steps of `dt` s by the interpreter `python`, or the one that SMAJAX_NUMBA_PYTHON names."""
+    options = (str(file.resolve()), "--dt", repr(dt), "--count", str(count))
+    return _elsewhere("numba_peer", "numba", NUMBA_PYTHON, python, *options)
+
+
+def gradient(peer: str, file: Path, python: str | None = None) -> dict[str, Any]:
+    """The gradient of a problem of `tracking.py` by `diffrax` or `gradsolve`, each by the interpreter named for it."""
+    variable = {"diffrax": DIFFRAX_PYTHON, "gradsolve": GRADSOLVE_PYTHON}[peer]
+    return _elsewhere("gradient_peer", peer, variable, python, peer, str(file.resolve()))

@@ -2,7 +2,8 @@
 
 Parts are written one by one to FOLDER (default `studies/benchmarks/results/<processor>`), and the table of ratios is made
 of those that are there. Give parts by name to measure them again. diffrax is timed by the interpreter that
-`SMAJAX_DIFFRAX_PYTHON` names. Nothing else should run beside it; ratios are of one run on one machine.
+`SMAJAX_DIFFRAX_PYTHON` names, gradsolve and numba by those of `SMAJAX_GRADSOLVE_PYTHON` and `SMAJAX_NUMBA_PYTHON`. Nothing
+else should run beside it; ratios are of one run on one machine.
 """
 
 from __future__ import annotations
@@ -47,6 +48,7 @@ class Plan:
         self.members = 4096 if fast else 65536
         self.scipy_members = 16 if fast else 64
         self.diffrax_members = 2048 if fast else 8192
+        self.tracked = 64 if fast else 256
         self.steps = (1000, 4000) if fast else (1000, 10_000, 100_000, 1_000_000)
         self.counts = (10**3, 10**4) if fast else (10**4, 10**5, 10**6)
         self.loads = FEW_LOADS if fast else LOADS
@@ -57,6 +59,13 @@ class Plan:
 
         return given(8 if self.fast else SOLVED, self.members, RESULTS / "problems")[0]
 
+    def tracking(self) -> Path:
+        """The gradient's problem, likewise."""
+        from studies.benchmarks.problem import constants
+        from studies.benchmarks.tracking import tracking
+
+        return tracking(constants(), 4 if self.fast else 8, self.tracked, RESULTS / "problems")[0]
+
     def own(self, name: str, *options: object) -> Part:
         """One of our own parts in a fresh process."""
         return peers.run_peer(name, sys.executable, *map(str, options))
@@ -66,11 +75,11 @@ def _cpp(plan: Plan) -> Part:
     import os
 
     from smajax.figures.rigs import arm
-    from studies.benchmarks.problem import members
+    from studies.benchmarks.given import load
 
-    box = members(plan.members)
-    rows = np.stack([box["voltage"], box["payload_mass"]], axis=1)
-    steps = round(10.0 / DEFAULT_STEP)
+    given = load(plan.file())
+    rows = np.stack([given.voltage, given.payload_mass], axis=1)
+    steps, every = round(given.seconds / DEFAULT_STEP), round(float(given.times[1]) / DEFAULT_STEP)
     found: Part = {"peer": "cpp"}
     with TemporaryDirectory() as place:
         program = cpp.build(Path(place))
@@ -78,7 +87,22 @@ def _cpp(plan: Plan) -> Part:
             return {**found, "reason": cpp.MISSING}
         for precision in cpp.PRECISIONS:
             one = cpp.run(program, arm(), rows, DEFAULT_STEP, steps, os.cpu_count() or 1, precision, 3)
+            solved = cpp.run(
+                program,
+                arm(),
+                rows[: given.solved],
+                DEFAULT_STEP,
+                steps,
+                1,
+                precision,
+                every=every,
+                recorded=given.solved,
+            )
+            off = given.errors(np.degrees(solved.angle).T, solved.fraction.T)
             found[precision] = {
+                "angle_error": off[0],
+                "fraction_error": off[1],
+                "accurate": given.meets(off),
                 "ms_per_trajectory": 1e3 * one.seconds / plan.members,
                 "iterations_per_stage": one.iterations_per_stage,
             }
@@ -98,8 +122,12 @@ PARTS: dict[str, Callable[[Plan], Part]] = {
     ),
     "scipy": lambda plan: peers.scipy(plan.file(), plan.scipy_members),
     "diffrax": lambda plan: peers.diffrax(plan.file(), count=plan.diffrax_members),
+    "numba": lambda plan: peers.numba(plan.file(), DEFAULT_STEP, count=plan.members),
     "single": lambda plan: plan.own("single", plan.file()),
     "gradient": lambda plan: plan.own("gradient", "--steps", 2000, "--members", 64 if plan.fast else 512, "--forward"),
+    "gradient_tracking": lambda plan: plan.own("gradient", "--tracking", plan.tracking(), "--forward"),
+    "gradient_diffrax": lambda plan: peers.gradient("diffrax", plan.tracking()),
+    "gradient_gradsolve": lambda plan: peers.gradient("gradsolve", plan.tracking()),
     "gradient_memory": lambda plan: {
         "peer": "gradient_memory",
         "runs": [plan.own("gradient", "--steps", steps, "--members", 1) for steps in plan.steps],

@@ -62,12 +62,36 @@ def _ratios(found: Found) -> list[str]:
             0.7,
             _ratio(_each(found, "cpp", "float"), _each(found, "smajax_own_steps_float32")),
         ),
+        _row(
+            "throughput over numba, the same scheme and fixed steps, float64",
+            "",
+            _ratio(_each(found, "numba", "double"), fixed),
+            None,
+        ),
+        _row("throughput over numba, own steps, float64", "", _ratio(_each(found, "numba", "double"), own), None),
         _at_least("throughput over diffrax at its best", 5.0, _ratio(_each(found, "diffrax", "best"), own)),
         _at_least("throughput over scipy's LSODA", 200.0, _ratio(scipy, own)),
         _at_least("one trajectory: scipy's time over ours", 1.0, _ratio(scipy, single.get("ms"))),
         _at_most("first call of a process, nothing kept, s", 3.0, single.get("first_call_s")),
         _at_most("reverse-mode gradient by all parameters over one run", 4.0, gradient.get("gradient_over_cost")),
     ]
+    tracked = found.get("gradient_tracking", {})
+    others = [
+        1e3 * float(one["gradient_s"]) / part["members"]
+        for part in (found.get("gradient_diffrax", {}), found.get("gradient_gradsolve", {}))
+        for one in part.get("ways", [])
+        if "gradient_s" in one
+    ]
+    if tracked or others:
+        each = 1e3 * float(tracked["gradient_s"]) / tracked["members"] if "gradient_s" in tracked else None
+        rows.append(
+            _row(
+                "one gradient by all parameters: the fastest other's time over ours",
+                "",
+                _ratio(min(others, default=None), each),
+                None,
+            )
+        )
     if "jacobian_over_cost" in gradient:
         most = 1.0 + float(gradient["parameters"])
         rows.append(
@@ -83,7 +107,7 @@ def _times(found: Found) -> list[str]:
         "| | ms a trajectory | error of the angle, degrees | of the fraction | compiling, s | peak memory, MB |",
         "|---|---|---|---|---|---|",
     ]
-    named = {
+    parts = {
         "smajax, own steps, float64": found.get("smajax_own_steps", {}),
         "smajax, own steps, float32": found.get("smajax_own_steps_float32", {}),
         "smajax, fixed steps, float64": found.get("smajax", {}),
@@ -92,13 +116,17 @@ def _times(found: Found) -> list[str]:
         "scipy LSODA, one core": found.get("scipy", {}).get("best", found.get("scipy", {})),
         "C++, float64": found.get("cpp", {}).get("double", found.get("cpp", {})),
         "C++, float32": found.get("cpp", {}).get("float", found.get("cpp", {})),
+        "numba, float64": found.get("numba", {}).get("double", found.get("numba", {})),
+        "numba, float32": found.get("numba", {}).get("float", found.get("numba", {})),
     }
     keys = ("ms_per_trajectory", "angle_error", "fraction_error", "compile_s", "peak_memory_MB")
-    for name, one in named.items():
+    for name, one in parts.items():
         if one.get("ms_per_trajectory") is None:
             rows.append(f"| {name} | {one.get('reason', 'not measured')} | | | | |")
         else:
-            rows.append(f"| {name} | " + " | ".join(f"{one[key]:.3g}" if key in one else "" for key in keys) + " |")
+            # What is not accurate enough is shown for what it is.
+            named = name if one.get("accurate", True) else f"{name}, **not accurate enough**"
+            rows.append(f"| {named} | " + " | ".join(f"{one[key]:.3g}" if key in one else "" for key in keys) + " |")
     best = found.get("diffrax", {}).get("best")
     if best:
         way = "adaptive" if best["adaptive"] else "fixed steps"
@@ -112,6 +140,41 @@ def _section(title: str, head: str, rows: Sequence[str], words: str = "") -> lis
         return []
     under = "|" + "---|" * head.count(" | ") + "---|"
     return [f"## {title}", "", *([words, ""] if words else []), f"| {head} |", under, *rows, ""]
+
+
+def _gradients(found: Found) -> list[str]:
+    """Ours, and every way of the others, found or not."""
+    own = found.get("gradient_tracking", {})
+    rows, steps = [], []
+
+    def row(name: str, setting: str, one: Mapping[str, Any], members: int, way: str = "gradient") -> str:
+        if f"{way}_s" not in one:
+            return f"| {name} | | {one.get('reason', 'not measured')} | | | | | |"
+        cost, slopes = (1e3 * float(one[f"{key}_s"]) / members for key in ("cost", way))
+        numbers = (cost, slopes, one[f"{way}_over_cost"], one["gradient_error"], one[f"{way}_memory_MB"])
+        shown = " | ".join(f"{number:.3g}" for number in numbers)
+        return f"| {name} | {setting} | {shown} | {one[f'{way}_compile_s']:.1f} |"
+
+    if not any(name in found for name in ("gradient_tracking", "gradient_diffrax", "gradient_gradsolve")):
+        return []
+    for name, way in (("smajax, reverse", "gradient"), ("smajax, forward", "jacobian")):
+        rows.append(row(name, f"steps of {1e3 * own.get('setting', 0.0):g} ms", own, own.get("members", 1), way))
+    for peer in ("diffrax", "gradsolve"):
+        part = found.get(f"gradient_{peer}", {})
+        if "ways" not in part:
+            rows.append(row(peer, "", part, 1))
+        for one in part.get("ways", []):
+            rows.append(row(one["way"], f"{one.get('setting', 0.0):g}", one, part["members"]))
+            if "record_s" in one:
+                steps.append(f"{1e3 * one['record_s'] / part['members']:.2g} ms ({one['engine']})")
+    words = (
+        "The mean square distance from a ramp by all parameters of the arm (`studies/benchmarks/tracking.py`), all members in "
+        "one program; each at its loosest tolerance whose gradient is off by less than 3 % of its norm, by central differences of a tight solution."
+    )
+    if steps:
+        words += f" gradsolve's steps are found before, again when the parameters move: {', '.join(steps)} a run more."
+    head = "way | tolerance | ms a run | ms a gradient | gradient over its run | error | memory, MB | compiling, s"
+    return _section("A gradient by all parameters, beside others", head, rows, words)
 
 
 def _growth(found: Found) -> list[str]:
@@ -165,6 +228,7 @@ def told(machine: Mapping[str, Any], found: Found) -> str:
         "",
         *_times(found),
         "",
+        *_gradients(found),
         *_growth(found),
     ]
     return "\n".join(lines)
