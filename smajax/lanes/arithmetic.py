@@ -126,10 +126,10 @@ def _times(text: Text, left: Lane, right: Lane) -> Lane:
 
 
 def reciprocal(text: Text, one: Lane) -> Lane:
-    """1/x. The processor's divider is slow for vectors: where there is an estimate, that and Newton's steps, to an ulp."""
+    """1/x. Where the divider is slow for vectors, by an estimate and Newton's steps, to an ulp."""
     dtype = one.dtype
     parts = {"float64": ("pd", 8, 2), "float32": ("ps", 16, 1)}[dtype]
-    if not text.wide or one.constant or text.lanes % parts[1]:
+    if not text.estimates or one.constant or text.lanes % parts[1]:
         return _binary("fdiv", None)(text, dtype, text.constant(1, dtype), one)
     rough = _estimated(text, one, *parts[:2])
     found, unit = rough, text.constant(1, dtype)

@@ -11,11 +11,11 @@ import jax.numpy as jnp
 import numpy as np
 
 from smajax.lanes import disk
-from smajax.lanes.kernel import Kernel, compiled, has_wide_vectors, vector_bits
+from smajax.lanes.kernel import Kernel, compiled, divides_slowly, vector_bits
 from smajax.lanes.text import Unsupported
 from smajax.lanes.translate import translate
 
-VECTORS = 2  # of members under way at once: while one waits for a result the other goes on
+VECTORS = 4  # of members under way at once: while one waits for a result the others go on
 KEPT = 128  # compiled functions
 BITS = 60  # of the number by which members are put in order
 MOST_SORTED = 6  # numbers of a member that are looked at for that
@@ -156,7 +156,7 @@ def _compiled(function: Callable[[Any, Any], Any], arrays: Any, static: Any, nam
     program = jax.make_jaxpr(member)(*map(_plain, leaves), *(none for _ in names))
     dtypes = {str(aval.dtype) for aval in (*program.in_avals, *program.out_avals)}
     own = [False] * len(leaves) + [True] * len(names)
-    translated = translate(program, own, lanes_of(dtypes), has_wide_vectors())
+    translated = translate(program, own, lanes_of(dtypes), divides_slowly())
     try:
         code = compiled(translated)
     except RuntimeError as reason:  # LLVM's words for a text that makes no sense to it

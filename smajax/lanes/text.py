@@ -62,9 +62,9 @@ def literal(value: object, dtype: str) -> str:
 class Text:
     """The body of one function. Names are given in order, so the same program gives the same text."""
 
-    def __init__(self, lanes: int, wide: bool = False) -> None:
+    def __init__(self, lanes: int, estimates: bool = False) -> None:
         self.lanes = lanes
-        self.wide = wide  # the processor has AVX-512
+        self.estimates = estimates  # 1/x by AVX-512's estimate, not by division
         self.either: dict[str, tuple[str, float, float]] = {}  # (mask, yes, no) of what is one of two constants
         self.lines: list[str] = []
         self.globals: list[str] = []

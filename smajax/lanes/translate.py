@@ -456,12 +456,12 @@ class _Translation:
         ]
 
 
-def translate(program: Any, own: Sequence[bool], lanes: int, wide: bool = False) -> Translated:
+def translate(program: Any, own: Sequence[bool], lanes: int, estimates: bool = False) -> Translated:
     """`program` is `jax.make_jaxpr` of one member; `own[k]` says whether argument k differs from member to member.
 
-    Such an argument is a number. `wide`: for a processor with AVX-512. Raises Unsupported with what cannot be translated.
+    Such an argument is a number. `estimates`: 1/x by AVX-512's estimate. Raises Unsupported with what cannot be translated.
     """
-    text = Text(lanes, wide)
+    text = Text(lanes, estimates)
     put = _Translation(text)
     arguments = [_array(aval) for aval in program.in_avals]
     shared: list[Value | None] = []
