@@ -83,7 +83,7 @@ def simulate_compiled(
     series = {name: jnp.asarray(values, dtype=float) for name, values in inputs.items()}
     limit = None if tolerance is None else jnp.asarray(tolerance, dtype=float)
     asked = _Asked(system, series, jnp.asarray(dt, dtype=float), limit, initial)
-    found = evaluator(_run, asked, ("number",))(asked, {"number": np.zeros(1)}, threads=1)
+    found = evaluator(_run, asked, ("number",), alone=True)(asked, {"number": np.zeros(1)}, threads=1)
     return jax.tree.map(lambda leaf: leaf[0], found)
 
 
@@ -134,7 +134,7 @@ def judged_loop_compiled(
         system, controller, wanted, jnp.asarray(dt, dtype=float), estimator, sensor, key, every=every, delay=delay
     )
     try:
-        found = evaluator(_judged_run, asked, ("number",))(asked, {"number": np.zeros(1)}, threads=1)
+        found = evaluator(_judged_run, asked, ("number",), alone=True)(asked, {"number": np.zeros(1)}, threads=1)
     except Unsupported:
         return jax.tree.map(np.asarray, eqx.filter_jit(_judged_run)(asked, {}))
     return jax.tree.map(lambda leaf: leaf[0], found)

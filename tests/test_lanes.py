@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -19,17 +20,25 @@ from smajax.figures.rigs import arm
 from smajax.lanes.evaluate import evaluator
 from smajax.lanes.kernel import Kernel, compiled
 from smajax.lanes.text import Unsupported
-from smajax.lanes.translate import translate
+from smajax.lanes.translate import VECTORS, translate
 from smajax.measure import Largest, Last, Mean, MeanSquare
 
 Function = Callable[..., jax.Array]
+Numbers = tuple[Any, ...]
 ODD = [0.0, -0.0, 1.0, -1.0, 0.5, 2.5, -2.5, 1e-300, -1e300, 1e308, np.inf, -np.inf, np.nan, 3.0, 1e-9, 7.1]
 
 
-def by_lanes(function: Function, *own: np.ndarray, lanes: int = 8, wide: bool = False) -> np.ndarray:
+def by_lanes(
+    function: Function,
+    *own: np.ndarray,
+    lanes: int = 8,
+    wide: bool = False,
+    vectors: int = VECTORS,
+    mask: str = "i1",
+) -> np.ndarray:
     """`function` of every member by the translator."""
     program = jax.make_jaxpr(function)(*(jnp.zeros((), one.dtype) for one in own))
-    translated = translate(program, [True] * len(own), lanes, wide)
+    translated = translate(program, [True] * len(own), lanes, wide, vectors, mask)
     kernel = Kernel(compiled(translated), translated.lanes, translated.results, translated.scratch)
     return kernel([], [np.ascontiguousarray(one) for one in own], threads=1)[0]
 
@@ -79,7 +88,7 @@ def test_division_by_anything_is_right_to_two_roundings(wide, dtype):
         a, b = (np.ravel(one).astype(dtype) for one in np.meshgrid(ODD, [*ODD, 1 / 3, 1e5, 123.456]))
         wanted = a / b
         inverse = np.asarray(1.0, dtype) / b
-    found = by_lanes(lambda a, b: a / b, a, b, lanes=16, wide=wide)
+    found = by_lanes(lambda a, b: a / b, a, b, lanes=64 // a.itemsize, wide=wide)
     ordinary = np.isfinite(wanted) & np.isfinite(inverse) & (np.abs(inverse) > np.finfo(dtype).tiny)
     ordinary &= (np.abs(wanted) > np.finfo(dtype).tiny) | (a == 0.0)
     np.testing.assert_allclose(found[ordinary], wanted[ordinary], rtol=4 * np.finfo(dtype).eps)
@@ -150,6 +159,62 @@ def test_loops_and_tables_agree(function):
 def test_what_is_too_large_for_registers_and_no_plain_series_is_named():
     with pytest.raises(Unsupported, match=r"\(100,\)"):
         by_lanes(_nested, np.ones(8))
+
+
+def _busy(a: jax.Array) -> jax.Array:
+    """More than one phase holds, and truth values that go from the first to the last; whole numbers all the way."""
+    x, y, asked = a, 3.0 - a, []
+    for k in range(120):
+        asked.append(x > y)
+        x, y = jnp.where(x > y, x - 2.0 * y + k, y), jnp.where(x > 50.0, x - 50.0, x + y - k)
+    return x + y + sum(jnp.where(one, float(k), 0.5) for k, one in enumerate(asked))
+
+
+def _crosswise(a: jax.Array) -> jax.Array:
+    """Loops in a loop whose numbers change places from round to round, and one that is asked for after it was handed on."""
+
+    def inner(carry: Numbers, x: jax.Array) -> tuple[Numbers, jax.Array]:
+        p, q, r = carry
+        return (q, r + x, p), p - r
+
+    def outer(carry: Numbers, x: jax.Array) -> tuple[Numbers, None]:
+        p, q, kept = carry
+        (new_p, new_q, r), seen = lax.scan(inner, (p, q, a), jnp.arange(3.0) + x)
+        new_p, r, new_q = lax.fori_loop(0, 2, lambda _, now: (now[1], now[2], now[0] + p), (new_p, r, new_q))
+        return (new_q, new_p, kept + r + 2.0 * q + seen[1]), None
+
+    (p, q, kept), _ = lax.scan(outer, (a, 2.0 * a, 0.0 * a), jnp.arange(5.0))
+    return p + 10.0 * q + 100.0 * kept
+
+
+def _late(a: jax.Array) -> jax.Array:
+    """What a loop carries is asked for long after its next value is known."""
+
+    def body(carry: Numbers, x: jax.Array) -> tuple[Numbers, None]:
+        old, total = carry
+        return (2.0 * old - x, total + _busy(x + a) * old), None
+
+    return lax.scan(body, (a, 0.0 * a), jnp.arange(6.0))[0][1]
+
+
+def _uneven(a: jax.Array) -> jax.Array:
+    """Rounds within rounds, from none to many, by the member: what is done stays while others go on."""
+
+    def smaller(at: Numbers) -> Numbers:
+        left, total = at
+        _, steps = lax.while_loop(
+            lambda now: now[0] > 0.0, lambda now: (now[0] - 7.0, now[1] + 1.0), (left, total * 0.0)
+        )
+        return left - 3.0, total + steps + left
+
+    return lax.while_loop(lambda at: at[0] > 2.0, smaller, (a, 0.5 * a))[1]
+
+
+@pytest.mark.parametrize(("vectors", "mask"), [(1, "i1"), (3, "i1"), (8, "i1"), (8, "i64")])
+@pytest.mark.parametrize("function", [_busy, _crosswise, _late, _uneven], ids=lambda one: one.__name__)
+def test_phases_over_any_number_of_vectors_are_the_whole_program(function, vectors, mask):
+    a = np.arange(150.0) % 41.0 - 3.0
+    np.testing.assert_array_equal(by_lanes(function, a, vectors=vectors, mask=mask), by_xla(function, a))
 
 
 @settings(max_examples=25, deadline=None)

@@ -139,6 +139,7 @@ def test_a_key_is_of_kinds_and_settings_and_not_of_values(monkeypatch: pytest.Mo
     assert disk.key_of(build, warmer, ("a",)) == key
     others = [
         disk.key_of(build, ARM, ("b",)),
+        disk.key_of(build, ARM, ("a",), alone=True),
         disk.key_of(extended, ARM, ("a",)),
         disk.key_of(build, extended(ARM, ("latent_heat",)), ("a",)),
         disk.key_of(build, OTHER, ("a",)),

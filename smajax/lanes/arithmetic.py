@@ -46,17 +46,17 @@ def _extreme(larger: bool) -> Operation:
             if left.dtype == "bool":
                 return text.lane(f"{how} {kind} {left.name}, {right.name}", out)
             order = ("s" if _signed(left.dtype) else "u") + sign
-            first = text.assign(f"icmp {order} {kind} {left.name}, {right.name}")
+            first = text.assign(f"icmp {order} {kind} {left.name}, {right.name}", "bool")
             return _chosen(text, first, left, right)
         if right.constant:
             left, right = right, left
         if left.number is not None and math.isnan(left.number):
             return left
         # The second where one is no number: enough where the first is a constant.
-        found = _chosen(text, text.assign(f"fcmp o{sign} {kind} {left.name}, {right.name}"), left, right)
+        found = _chosen(text, text.assign(f"fcmp o{sign} {kind} {left.name}, {right.name}", "bool"), left, right)
         if left.constant:
             return found
-        return _chosen(text, text.assign(f"fcmp uno {kind} {left.name}, {left.name}"), left, found)
+        return _chosen(text, text.assign(f"fcmp uno {kind} {left.name}, {left.name}", "bool"), left, found)
 
     return put
 
@@ -102,11 +102,11 @@ def _absolute(text: Text, out: str, one: Lane, **_: Any) -> Lane:
 def _sign(text: Text, out: str, one: Lane, **_: Any) -> Lane:
     kind, zero = text.vector(out), text.constant(0, out)
     if not _signed(out):
-        some = text.assign(f"icmp ne {kind} {one.name}, {zero.name}")
+        some = text.assign(f"icmp ne {kind} {one.name}, {zero.name}", "bool")
         return _chosen(text, some, text.constant(1, out), zero)
     above, below = ("fcmp ogt", "fcmp olt") if _floating(out) else ("icmp sgt", "icmp slt")
-    positive = text.assign(f"{above} {kind} {one.name}, {zero.name}")
-    negative = text.assign(f"{below} {kind} {one.name}, {zero.name}")
+    positive = text.assign(f"{above} {kind} {one.name}, {zero.name}", "bool")
+    negative = text.assign(f"{below} {kind} {one.name}, {zero.name}", "bool")
     found = _chosen(text, positive, text.constant(1, out), one)
     return _chosen(text, negative, text.constant(-1, out), found)
 
@@ -126,41 +126,27 @@ def _times(text: Text, left: Lane, right: Lane) -> Lane:
 
 
 def reciprocal(text: Text, one: Lane) -> Lane:
-    """1/x. The processor's divider is slow for vectors: where there is an estimate, that and Newton's steps, to an ulp."""
+    """1/x. Where the divider is slow for vectors, by an estimate and Newton's steps, to an ulp."""
     dtype = one.dtype
     parts = {"float64": ("pd", 8, 2), "float32": ("ps", 16, 1)}[dtype]
-    if not text.wide or one.constant or text.lanes % parts[1]:
+    if not text.estimates or one.constant or text.lanes != parts[1]:
         return _binary("fdiv", None)(text, dtype, text.constant(1, dtype), one)
-    rough = _estimated(text, one, *parts[:2])
+    rough = _estimated(text, one, parts[0])
     found, unit = rough, text.constant(1, dtype)
     for _ in range(parts[2]):
         missed = _binary("fsub", None)(text, dtype, unit, _times(text, one, found))
         found = _binary("fadd", None)(text, dtype, found, _times(text, found, missed))
     name, mask = f"llvm.is.fpclass.v{text.lanes}{text.suffix(dtype)}", text.vector("bool")
     text.declare(name, mask, [text.vector(dtype), "i32"])
-    ordinary = text.assign(f"call {mask} @{name}({text.vector(dtype)} {rough.name}, i32 {NORMAL})")
+    ordinary = text.assign(f"call {mask} @{name}({text.vector(dtype)} {rough.name}, i32 {NORMAL})", "bool")
     return _chosen(text, ordinary, found, rough)  # of infinity the estimate is exact, and so it is of zero
 
 
-def _estimated(text: Text, one: Lane, kind: str, width: int) -> Lane:
-    """1/x to 14 bits, by so many lanes at a time."""
-    whole, part = text.vector(one.dtype), f"<{width} x {scalar_type(one.dtype)}>"
-    name = text.declare(f"llvm.x86.avx512.rcp14.{kind}.512", part, [part, part, f"i{width}"])
-    found = []
-    for first in range(0, text.lanes, width):
-        numbers = ", ".join(f"i32 {first + k}" for k in range(width))
-        mine = text.assign(f"shufflevector {whole} {one.name}, {whole} poison, <{width} x i32> <{numbers}>")
-        found.append(text.assign(f"call {part} @{name}({part} {mine}, {part} zeroinitializer, i{width} -1)"))
-    size = width
-    while len(found) > 1:
-        numbers = ", ".join(f"i32 {k}" for k in range(2 * size))
-        kind = f"<{size} x {scalar_type(one.dtype)}>"
-        found = [
-            text.assign(f"shufflevector {kind} {left}, {kind} {right}, <{2 * size} x i32> <{numbers}>")
-            for left, right in zip(found[::2], found[1::2], strict=True)
-        ]
-        size *= 2
-    return Lane(found[0], one.dtype)
+def _estimated(text: Text, one: Lane, kind: str) -> Lane:
+    """1/x to 14 bits."""
+    of, mask = text.vector(one.dtype), f"i{text.lanes}"
+    name = text.declare(f"llvm.x86.avx512.rcp14.{kind}.512", of, [of, of, mask])
+    return text.lane(f"call {of} @{name}({of} {one.name}, {of} zeroinitializer, {mask} -1)", one.dtype)
 
 
 def _whole_power(text: Text, out: str, one: Lane, *, y: int, **_: Any) -> Lane:
@@ -252,7 +238,7 @@ def select(text: Text, out: str, which: Lane, *cases: Lane, **_: Any) -> Lane:
     found = cases[0]
     for number, case in enumerate(cases[1:], start=1):
         is_it = text.assign(
-            f"icmp sge {text.vector(which.dtype)} {which.name}, {text.constant(number, which.dtype).name}"
+            f"icmp sge {text.vector(which.dtype)} {which.name}, {text.constant(number, which.dtype).name}", "bool"
         )
         found = _chosen(text, is_it, case, found)
     return found

@@ -69,11 +69,11 @@ def folder() -> Path | None:
     return Path(place) / "lanes"
 
 
-def key_of(function: Callable[..., Any], model: Any, names: tuple[str, ...]) -> str | None:
+def key_of(function: Callable[..., Any], model: Any, names: tuple[str, ...], alone: bool = False) -> str | None:
     """Of a program and of all that it is made from; None where it is not ours alone."""
     modules: set[str] = set()
     try:
-        said = [_said(function, modules), _said(model, modules), list(names), str(jnp.zeros(()).dtype)]
+        said = [_said(function, modules), _said(model, modules), list(names), alone, str(jnp.zeros(()).dtype)]
         said += [_constants(modules), _surroundings()]
     except (Untold, TypeError, OSError):  # a source that is gone
         return None

@@ -11,11 +11,10 @@ import jax.numpy as jnp
 import numpy as np
 
 from smajax.lanes import disk
-from smajax.lanes.kernel import Kernel, compiled, has_wide_vectors, vector_bits
+from smajax.lanes.kernel import Kernel, compiled, divides_slowly, has_wide_vectors, vector_bits
 from smajax.lanes.text import Unsupported
-from smajax.lanes.translate import translate
+from smajax.lanes.translate import VECTORS, translate
 
-VECTORS = 2  # of members under way at once: while one waits for a result the other goes on
 KEPT = 128  # compiled functions
 BITS = 60  # of the number by which members are put in order
 MOST_SORTED = 6  # numbers of a member that are looked at for that
@@ -85,7 +84,12 @@ def _like(leaf: Any, plain: Any) -> Any:
 def lanes_of(dtypes: set[str]) -> int:
     """Members side by side for a program of these kinds of numbers, of which the floating ones fill the vectors."""
     size = max((np.dtype(dtype).itemsize for dtype in dtypes if dtype.startswith("float")), default=8)
-    return VECTORS * vector_bits() // (8 * size)
+    return vector_bits() // (8 * size)
+
+
+def mask_of(dtypes: set[str]) -> str:
+    """LLVM's kind of a truth value in memory: what the processor compares to."""
+    return "i1" if has_wide_vectors() else f"i{vector_bits() // lanes_of(dtypes)}"
 
 
 def kind_of(function: Callable[[Any, Any], Any], model: Any, names: tuple[str, ...]) -> Hashable:
@@ -108,27 +112,29 @@ def recalled(kept: dict[Hashable, Made], key: Hashable, make: Callable[[], Made]
     return found
 
 
-def evaluator(function: Callable[[Any, Any], Any], model: Any, names: tuple[str, ...]) -> Evaluator:
-    """`function` compiled; `names` are those of the numbers that a member has of its own.
+def evaluator(
+    function: Callable[[Any, Any], Any], model: Any, names: tuple[str, ...], alone: bool = False
+) -> Evaluator:
+    """`function` compiled; `names` are those of the numbers that a member has of its own. `alone`: for one member at a time.
 
     Raises Unsupported, which says what of the function cannot be translated.
     """
 
     def made() -> Evaluator | str:
         arrays, static = eqx.partition(model, _is_array)
-        key = disk.key_of(function, model, names) if disk.folder() else None
+        key = disk.key_of(function, model, names, alone) if disk.folder() else None
         known = disk.load(key) if key else None
         if known is not None:
             return _evaluator(known, names)
         try:
-            program = _compiled(function, arrays, static, names)
+            program = _compiled(function, arrays, static, names, alone)
             if key:
                 disk.save(key, program)
             return _evaluator(program, names)
         except Unsupported as reason:
             return str(reason)
 
-    found = recalled(_kept, kind_of(function, model, names), made)
+    found = recalled(_kept, (kind_of(function, model, names), alone), made)
     if isinstance(found, str):
         raise Unsupported(found)
     return found
@@ -140,7 +146,9 @@ def _evaluator(program: disk.Stored, names: tuple[str, ...]) -> Evaluator:
     return Evaluator(kernel, program.tree, names, np.dtype(jnp.zeros(()).dtype), shared)
 
 
-def _compiled(function: Callable[[Any, Any], Any], arrays: Any, static: Any, names: tuple[str, ...]) -> disk.Stored:
+def _compiled(
+    function: Callable[[Any, Any], Any], arrays: Any, static: Any, names: tuple[str, ...], alone: bool
+) -> disk.Stored:
     leaves, tree = jax.tree.flatten(arrays)
     none = jnp.zeros(())
     shape: list[Any] = []
@@ -156,7 +164,8 @@ def _compiled(function: Callable[[Any, Any], Any], arrays: Any, static: Any, nam
     program = jax.make_jaxpr(member)(*map(_plain, leaves), *(none for _ in names))
     dtypes = {str(aval.dtype) for aval in (*program.in_avals, *program.out_avals)}
     own = [False] * len(leaves) + [True] * len(names)
-    translated = translate(program, own, lanes_of(dtypes), has_wide_vectors())
+    vectors = 1 if alone else VECTORS
+    translated = translate(program, own, lanes_of(dtypes), divides_slowly(), vectors, mask_of(dtypes))
     try:
         code = compiled(translated)
     except RuntimeError as reason:  # LLVM's words for a text that makes no sense to it

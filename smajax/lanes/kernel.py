@@ -51,6 +51,17 @@ def has_wide_vectors() -> bool:
     return all(bool(features.get(name)) for name in ("avx512f", "avx512dq", "avx512vl"))
 
 
+@cache
+def divides_slowly() -> bool:
+    """Whether an estimate of 1/x and Newton's steps are quicker than the processor's own division of its widest vectors.
+
+    AMD's divide in half the time of others, and beside all else that they do.
+    """
+    import llvmlite.binding as llvm
+
+    return has_wide_vectors() and not llvm.get_host_cpu_name().startswith("znver")
+
+
 def _aligned(count: int) -> np.ndarray:
     raw = np.empty(count + ALIGNED, np.uint8)
     start = -raw.ctypes.data % ALIGNED
@@ -97,14 +108,13 @@ class Kernel:
 
     def __call__(self, shared: Sequence[np.ndarray], own: Sequence[np.ndarray], threads: int) -> list[np.ndarray]:
         """`own` are arrays of shape (members,), `shared` of the shapes traced; results have shape (members, ...)."""
-        lanes = self._lanes
         members = len(own[0])
-        groups = -(-members // lanes)
-        room = groups * lanes
+        count = -(-members // self._lanes)
+        room = count * self._lanes
         filled = [np.concatenate([one, np.full(room - members, one[-1])]) for one in own]
         results = [np.empty((room, *one.shape), one.dtype) for one in self._results]
         tables = [self._pointers(arrays) for arrays in (shared, filled, results)]
-        edges = np.linspace(0, groups, min(threads, groups) + 1).astype(int)
+        edges = np.linspace(0, count, min(threads, count) + 1).astype(int)
 
         def part(first: int, last: int) -> None:
             scratch = _aligned(self._scratch)
@@ -114,7 +124,7 @@ class Kernel:
             with ThreadPoolExecutor(len(edges) - 1) as pool:
                 list(pool.map(part, edges[:-1].tolist(), edges[1:].tolist()))
         except RuntimeError:  # no room for another thread under a cap on memory: this one does it all
-            part(0, groups)
+            part(0, count)
         return [one[:members] for one in results]
 
     @staticmethod

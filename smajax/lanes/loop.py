@@ -1,46 +1,50 @@
-"""A loop whose carry are lanes."""
+"""A loop that carries lanes: cells, each read at the top of a round and written at its end."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from smajax.lanes.text import Lane, Text
+import numpy as np
+
+from smajax.lanes.text import Text
 from smajax.lanes.values import Held, held
 
 
 class Loop:
-    """Its first lines wait for what the last ones bring."""
+    """Begun at `start`; `sure`: it runs once at least."""
 
-    def __init__(self, text: Text, start: Sequence[Held], stem: str) -> None:
-        self.text, self.start, self.before = text, start, text.block
+    def __init__(self, text: Text, start: Sequence[Held], stem: str, sure: bool = True) -> None:
+        self.text, self.before = text, text.block
+        first = [one for array in start for one in array.ravel()]
+        self.shapes = [array.shape for array in start]
+        self.cells = [text.cell(one.dtype) for one in first]
+        text.write(self.cells, first)
         self.top = text.new_label(stem)
-        text.jump(self.top)
-        text.label(self.top)
-        self.count, self.next = text.fresh("i"), text.fresh("i")
-        self.carry = [held([Lane(text.fresh("c"), one.dtype) for one in array.ravel()], array.shape) for array in start]
-        self.at = len(text.lines)
-        text.lines += [""] * (1 + sum(array.size for array in start))
+        self.count = text.open(self.top, sure)
+        self.carry = self.carried()
+
+    def carried(self) -> list[Held]:
+        """What it carries, here and now: within a round that of its beginning, after the loop what is left."""
+        lanes = iter([self.text.present(cell) for cell in self.cells])
+        return [held([next(lanes) for _ in range(int(np.prod(shape)))], shape) for shape in self.shapes]
 
     def again(self, end: Sequence[Held]) -> None:
         """Back to the top with `end` as the carry."""
-        text = self.text
-        text.put(f"{self.next} = add i64 {self.count}, 1")
-        lines = [f"  {self.count} = phi i64 [ 0, %{self.before} ], [ {self.next}, %{text.block} ]"]
-        for start, here, new in zip(self.start, self.carry, end, strict=True):
-            for one, name, other in zip(start.ravel(), here.ravel(), new.ravel(), strict=True):
-                kind = text.vector(name.dtype)
-                lines.append(
-                    f"  {name.name} = phi {kind} [ {one.name}, %{self.before} ], [ {other.name}, %{text.block} ]"
-                )
-        text.lines[self.at : self.at + len(lines)] = lines
-        text.jump(self.top)
+        self._left(end)
+        self.text.jump(self.top)
+        self.text.close(self.count, self._following(), self.before)
 
     def end_after(self, rounds: int, end: Sequence[Held] = ()) -> None:
         """The end of a loop of so many rounds, `end` the carry of the next."""
         text = self.text
-        more, done = text.new_label("more"), text.new_label("done")
-        following = text.assign(f"add i64 {self.count}, 1")
-        text.branch(text.assign(f"icmp slt i64 {following}, {rounds}"), more, done)
-        text.label(more)
-        self.again(end)
+        self._left(end)
+        following, done = self._following(), text.new_label("done")
+        text.branch(text.assign(f"icmp slt i64 {following}, {rounds}"), self.top, done)
+        text.close(self.count, following, self.before)
         text.label(done)
+
+    def _left(self, end: Sequence[Held]) -> None:
+        self.text.write(self.cells, [one for array in end for one in array.ravel()])
+
+    def _following(self) -> str:
+        return self.text.assign(f"add i64 {self.count}, 1")

@@ -14,7 +14,7 @@ from smajax.lanes.values import SMALL, Filled, Held, Stored, Value, held, is_kno
 def _element(text: Text, value: Stored, index: str) -> Lane:
     """The number with the flat index (an i64) of an array in memory."""
     if value.own:
-        index = text.assign(f"mul i64 {index}, {text.lanes}")
+        index = text.assign(f"mul i64 {index}, {text.room}")
     address = text.address(value.address, index, value.dtype)
     return text.load_lanes(address, value.dtype) if value.own else text.load_everywhere(address, value.dtype)
 
@@ -54,7 +54,7 @@ def in_memory(text: Text, value: Value, shape: tuple[int, ...], dtype: str) -> S
     assert isinstance(value, Held)
     room = Stored(text.reserve(value.size, dtype), shape, dtype, own=True)
     for number, lane in enumerate(value.ravel()):
-        text.store_lanes(lane, text.address(room.address, str(number * text.lanes), dtype))
+        text.store_lanes(lane, text.address(room.address, str(number * text.room), dtype))
     return room
 
 
@@ -68,7 +68,7 @@ def row(text: Text, value: Value, index: str, shape: tuple[int, ...], dtype: str
     first = index if size == 1 else text.assign(f"mul i64 {index}, {size}")
     if shape == ():
         return held(_element(text, stored, first))
-    lanes = text.lanes if stored.own else 1
+    lanes = text.room if stored.own else 1
     start = text.assign(f"mul i64 {first}, {lanes}") if lanes > 1 else first
     part = Stored(text.address(stored.address, start, dtype), shape, dtype, stored.own)
     return in_registers(text, part) if size <= SMALL else part
@@ -77,12 +77,12 @@ def row(text: Text, value: Value, index: str, shape: tuple[int, ...], dtype: str
 def write(text: Text, room: Stored, index: str, value: Value) -> None:
     """`room[index] = value` in the members' own memory."""
     size = size_of(value)
-    first = text.assign(f"mul i64 {index}, {size * text.lanes}")
+    first = text.assign(f"mul i64 {index}, {size * text.room}")
     if isinstance(value, Filled) or (isinstance(value, Stored) and size > SMALL):
         copy(text, Stored(text.address(room.address, first, room.dtype), (size,), room.dtype, own=True), 0, value)
         return
     for number, lane in enumerate(in_registers(text, value).ravel()):
-        at = text.assign(f"add i64 {first}, {number * text.lanes}") if number else first
+        at = text.assign(f"add i64 {first}, {number * text.room}") if number else first
         text.store_lanes(lane, text.address(room.address, at, room.dtype))
 
 
@@ -91,7 +91,7 @@ def copy(text: Text, room: Stored, start: int, value: Value) -> None:
     size = size_of(value)
     if size <= SMALL:
         for number, lane in enumerate(in_registers(text, value).ravel()):
-            text.store_lanes(lane, text.address(room.address, str((start + number) * text.lanes), room.dtype))
+            text.store_lanes(lane, text.address(room.address, str((start + number) * text.room), room.dtype))
         return
     mapped(text, room, start, lambda lane: lane, [value])
 
@@ -109,6 +109,6 @@ def mapped(text: Text, room: Stored, start: int, operation: Callable[..., Lane],
 
     lane = operation(*(now(one) for one in sources))
     at = text.assign(f"add i64 {loop.count}, {start}")
-    at = text.assign(f"mul i64 {at}, {text.lanes}")
+    at = text.assign(f"mul i64 {at}, {text.room}")
     text.store_lanes(lane, text.address(room.address, at, room.dtype))
     loop.end_after(size)

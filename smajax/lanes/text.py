@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
+
+from smajax.lanes.phases import NAMES, Chosen, Edge, Item, Kept, Late, Names, Work, Write
 
 NAME = "members"  # of the translated function
 
@@ -59,14 +61,28 @@ def literal(value: object, dtype: str) -> str:
     return str(int(value))  # type: ignore[call-overload]
 
 
+@dataclass(slots=True)
+class _Level:
+    """A loop that is being written, or what lies outside of all."""
+
+    sure: bool  # it runs once at least: what does not depend on it may be done before it
+    items: list[Item] = field(default_factory=list)
+    known: dict[str, str] = field(default_factory=dict)  # values that have a name
+
+
 class Text:
     """The body of one function. Names are given in order, so the same program gives the same text."""
 
-    def __init__(self, lanes: int, wide: bool = False) -> None:
-        self.lanes = lanes
-        self.wide = wide  # the processor has AVX-512
+    def __init__(self, lanes: int, estimates: bool = False, vectors: int = 1, mask: str = "i1") -> None:
+        self.lanes = lanes  # members of a vector
+        self.vectors = vectors  # of a group, at most
+        self.room = lanes * vectors  # members of a group
+        self.mask = mask  # a truth value in memory
+        self.estimates = estimates  # 1/x by AVX-512's estimate, not by division
         self.either: dict[str, tuple[str, float, float]] = {}  # (mask, yes, no) of what is one of two constants
-        self.lines: list[str] = []
+        self.names = Names({}, {})
+        self.levels: list[_Level] = [_Level(sure=True)]
+        self.depth: dict[str, int] = {}  # how many loops lie about what has a name
         self.globals: list[str] = []
         self.declared: dict[str, str] = {}
         self.count = 0
@@ -81,16 +97,97 @@ class Text:
         return f"<{self.lanes} x {scalar_type(dtype)}>"
 
     def put(self, line: str) -> None:
-        self.lines.append("  " + line)
+        """What is the same for all vectors of a group, and does something."""
+        self.levels[-1].items.append("  " + line)
 
-    def assign(self, right: str, stem: str = "v") -> str:
-        """A new name for the value of `right`."""
-        name = self.fresh(stem)
-        self.put(f"{name} = {right}")
+    def assign(self, right: str, dtype: str | None = None) -> str:
+        """A name for the value of `right`, outside of all loops that it does not depend on; the one it has, if it has one.
+
+        `dtype`: the kind of number of a vector.
+        """
+        names = NAMES.findall(right)
+        sure = max(k for k, level in enumerate(self.levels) if k == 0 or not level.sure)
+        depth = max([sure, *(self.depth.get(one, 0) for one in names)])
+        level = self.levels[depth]
+        if right in level.known:
+            return level.known[right]
+        name = level.known[right] = self.fresh()
+        self.depth[name] = depth
+        if any(one in self.names.kept for one in names):
+            assert dtype is not None, f"of a kind that is not kept: {right}"
+            self._differs(name, dtype)
+            level.items.append(Work(name, [f"{name} = {right}"], self._reads(names)))
+        else:
+            level.items.append(f"  {name} = {right}")
         return name
 
+    def _differs(self, name: str, dtype: str) -> None:
+        kind = self.vector(dtype)
+        if dtype != "bool":
+            self.names.kept[name] = Kept(kind, self.lanes * self.bytes(dtype))
+        elif self.mask == "i1":
+            self.names.kept[name] = Kept(kind, -(-self.lanes // 8))
+        else:
+            whole = f"<{self.lanes} x {self.mask}>"
+            self.names.kept[name] = Kept(whole, self.lanes * int(self.mask[1:]) // 8, kind)
+
+    def _reads(self, names: Sequence[str]) -> tuple[str, ...]:
+        return tuple(dict.fromkeys(one for one in names if one in self.names.kept))
+
+    def work(self, lines: Sequence[str], dtype: str | None = None) -> str:
+        """Lines that stay together, of one vector; the name of the last one's value, where it has one: `{}` in it."""
+        name = None
+        own = list(lines)
+        if dtype is not None:
+            name = self.fresh()
+            self.depth[name] = len(self.levels) - 1
+            self._differs(name, dtype)
+            own[-1] = f"{name} = {own[-1]}"
+        inside = {one.split(" = ")[0].strip() for one in own}
+        names = [one for line in own for one in NAMES.findall(line) if one not in inside]
+        self.levels[-1].items.append(Work(name, own, self._reads(names)))
+        return name or ""
+
     def lane(self, right: str, dtype: str) -> Lane:
-        return Lane(self.assign(right), dtype)
+        return Lane(self.assign(right, dtype), dtype)
+
+    # Loops, and what they carry: a cell of memory for each number.
+
+    def open(self, label: str, sure: bool) -> str:
+        """Begin a loop at `label`; `sure`: it runs once at least. The name of its count."""
+        self.levels.append(_Level(sure))
+        self.label(label)
+        count = self.fresh("i")
+        self.depth[count] = len(self.levels) - 1
+        return count
+
+    def close(self, count: str, following: str, before: str, first: str = "0") -> None:
+        """The end of the last loop begun, with the value of its count in the next round, and the block before it."""
+        top, *rest = self.levels.pop().items
+        assert isinstance(top, str)
+        phi = f"  {count} = phi i64 [ {first}, %{before} ], [ {following}, %{self.block} ]"
+        self.levels[-1].items += [f"  br label %{top[:-1]}", Edge(begins=True), top, phi, *rest, Edge(begins=False)]
+
+    def cell(self, dtype: str) -> Lane:
+        """A number that will be written over."""
+        name = self.fresh("c")
+        self._differs(name, dtype)
+        self.names.cells[name] = name
+        return Lane(name, dtype)
+
+    def present(self, cell: Lane) -> Lane:
+        """What a cell holds here and now, to be read before it is written again."""
+        name = self.fresh("n")
+        self._differs(name, cell.dtype)
+        self.names.cells[name] = cell.name
+        self.depth[name] = len(self.levels) - 1
+        return Lane(name, cell.dtype)
+
+    def write(self, cells: Sequence[Lane], values: Sequence[Lane]) -> None:
+        """All at once: a value may be what another cell held."""
+        if cells:
+            pairs = [(cell.name, value.name) for cell, value in zip(cells, values, strict=True)]
+            self.levels[-1].items.append(Write(pairs))
 
     def constant(self, value: object, dtype: str) -> Lane:
         return Lane(f"splat ({scalar_type(dtype)} {literal(value, dtype)})", dtype, float(value))  # type: ignore[arg-type]
@@ -102,7 +199,7 @@ class Text:
         return self.lane(f"shufflevector {self.vector(dtype)} {one}, {self.vector(dtype)} poison, {ones}", dtype)
 
     def label(self, name: str) -> None:
-        self.lines.append(f"{name}:")
+        self.levels[-1].items.append(f"{name}:")
         self.block = name
 
     def new_label(self, stem: str) -> str:
@@ -132,10 +229,31 @@ class Text:
         given = ", ".join(f"{of} {one}" for one in arguments)
         return self.lane(f"call {flags if dtype.startswith('float') else ''}{of} @{full}({given})", dtype)
 
-    def any(self, mask: Lane) -> str:
-        """Whether any lane is true."""
-        bits = self.assign(f"bitcast {self.vector('bool')} {mask.name} to i{self.lanes}")
-        return self.assign(f"icmp ne i{self.lanes} {bits}, 0")
+    def any(self, mask: Lane) -> tuple[str, Chosen]:
+        """Whether any lane of any vector is true, and the vectors of which one is."""
+        kind, chosen = f"i{self.lanes}", Chosen(self.reserve(1, "int64"), self.reserve(1, "int64"))
+        self.put(f"store i64 0, ptr {chosen.count}")
+        bits, some, more, before, where, after = (self.fresh("b") for _ in range(6))
+        self.work(
+            [
+                f"{bits} = bitcast {self.vector('bool')} {mask.name} to {kind}",
+                f"{some} = icmp ne {kind} {bits}, 0",
+                f"{more} = zext i1 {some} to i64",
+                f"{before} = load i64, ptr {chosen.count}",
+                f"{where} = getelementptr inbounds i64, ptr {chosen.numbers}, i64 {before}",
+                f"store i64 %turn, ptr {where}",
+                f"{after} = add i64 {before}, {more}",
+                f"store i64 {after}, ptr {chosen.count}",
+            ]
+        )
+        found, going = self.fresh("b"), self.fresh("b")
+        items = self.levels[-1].items
+        items += [Late(f"  {found} = load i64, ptr {chosen.count}"), Late(f"  {going} = icmp ne i64 {found}, 0")]
+        return going, chosen
+
+    def only(self, chosen: Chosen) -> None:
+        """From here to the end of the loop, the vectors that were chosen alone."""
+        self.levels[-1].items.append(chosen)
 
     def address(self, base: str, index: str, dtype: str) -> str:
         """Where the number with the index (an i64) lies behind `base`. Truth values take a byte."""
@@ -143,17 +261,25 @@ class Text:
         return self.assign(f"getelementptr inbounds {kept}, ptr {base}, i64 {index}")
 
     def load_lanes(self, address: str, dtype: str) -> Lane:
-        align = f", align {self.bytes(dtype)}"
+        kept = "int8" if dtype == "bool" else dtype
+        where, raw = self.fresh("p"), self.fresh("r")
+        lines = [f"{where} = getelementptr inbounds {scalar_type(kept)}, ptr {address}, i64 %at"]
+        load = f"load {self.vector(kept)}, ptr {where}, align {self.bytes(dtype)}"
         if dtype == "bool":
-            raw = self.assign(f"load <{self.lanes} x i8>, ptr {address}{align}")
-            return self.lane(f"icmp ne <{self.lanes} x i8> {raw}, zeroinitializer", dtype)
-        return self.lane(f"load {self.vector(dtype)}, ptr {address}{align}", dtype)
+            lines += [f"{raw} = {load}", f"icmp ne {self.vector(kept)} {raw}, zeroinitializer"]
+        else:
+            lines.append(load)
+        return Lane(self.work(lines, dtype), dtype)
 
     def store_lanes(self, value: Lane, address: str) -> None:
-        name, kind = value.name, self.vector(value.dtype)
+        kept = "int8" if value.dtype == "bool" else value.dtype
+        where, name, lines = self.fresh("p"), value.name, []
         if value.dtype == "bool":
-            name, kind = self.assign(f"zext {kind} {name} to <{self.lanes} x i8>"), f"<{self.lanes} x i8>"
-        self.put(f"store {kind} {name}, ptr {address}, align {self.bytes(value.dtype)}")
+            name = self.fresh("r")
+            lines = [f"{name} = zext {self.vector('bool')} {value.name} to {self.vector(kept)}"]
+        lines.append(f"{where} = getelementptr inbounds {scalar_type(kept)}, ptr {address}, i64 %at")
+        lines.append(f"store {self.vector(kept)} {name}, ptr {where}, align {self.bytes(value.dtype)}")
+        self.work(lines)
 
     def load_everywhere(self, address: str, dtype: str) -> Lane:
         """The one number at an address, in every lane."""
@@ -169,7 +295,7 @@ class Text:
     def reserve(self, count: int, dtype: str) -> str:
         """Room for `count` numbers a lane in the thread's own memory."""
         here = self.scratch
-        self.scratch += -(-count * self.lanes * self.bytes(dtype) // 64) * 64
+        self.scratch += -(-count * self.room * self.bytes(dtype) // 64) * 64
         return self.assign(f"getelementptr inbounds i8, ptr %scratch, i64 {here}")
 
 

@@ -14,9 +14,11 @@ from jax.interpreters import partial_eval
 from smajax.lanes.arithmetic import ELEMENTWISE, exact_quotient, select
 from smajax.lanes.loop import Loop
 from smajax.lanes.memory import copy, in_memory, in_registers, mapped, row, write
+from smajax.lanes.phases import laid_out
 from smajax.lanes.text import NAME, Array, Lane, Text, Unsupported, scalar_type
 from smajax.lanes.values import SMALL, Filled, Held, Stored, Value, held, is_known, size_of
 
+VECTORS = 8  # of a group: while one waits for a result others go on
 CALLS = {  # primitives that stand for a program of their own, and where it is kept
     "jit": "jaxpr",
     "pjit": "jaxpr",
@@ -59,10 +61,10 @@ REDUCTIONS = {
 
 @dataclass(frozen=True)
 class Translated:
-    """The text of `void members(ptr shared, ptr own, ptr results, ptr scratch, i64 first, i64 last)`, over groups of members."""
+    """The text of `void members(ptr shared, ptr own, ptr results, ptr scratch, i64 first, i64 last)`, over vectors of members."""
 
     text: str
-    lanes: int
+    lanes: int  # members of a vector
     results: tuple[Array, ...]
     scratch: int  # bytes a thread needs
 
@@ -260,7 +262,7 @@ class _Translation:
             rest_whole = tuple(out.shape[1:]) == tuple(one.shape[1:])
             if not rest_whole or (params["strides"] or (1,))[0] != 1:
                 raise Unsupported("a part of a large array that is not a run of whole rows")
-            first = starts[0] * int(np.prod(one.shape[1:])) * (self.text.lanes if one.own else 1)
+            first = starts[0] * int(np.prod(one.shape[1:])) * (self.text.room if one.own else 1)
             part = Stored(self.text.address(one.address, str(first), one.dtype), out.shape, one.dtype, one.own)
             return in_registers(self.text, part) if part.size <= SMALL else part
         raise AssertionError("a small array is moved")
@@ -302,13 +304,17 @@ class _Translation:
         kind = scalar_type(dtype)
         if dtype == "bool":
             raise Unsupported("truth values looked up in a table")
-        offsets = low.name
+        offsets, of, lines = low.name, text.vector("int64"), []
+        base, places = text.fresh("p"), text.fresh("p")
         if stored.own:
-            # Lane k's own number lies at index * lanes + k.
+            # Member k's own number lies at index * room + k.
             own = ", ".join(f"i64 {k}" for k in range(text.lanes))
-            scaled = text.assign(f"mul {text.vector('int64')} {offsets}, {text.constant(text.lanes, 'int64').name}")
-            offsets = text.assign(f"add {text.vector('int64')} {scaled}, <{own}>")
-        places = text.assign(f"getelementptr {kind}, ptr {stored.address}, {text.vector('int64')} {offsets}")
+            scaled = text.lane(f"mul {of} {offsets}, {text.constant(text.room, 'int64').name}", "int64")
+            offsets = text.lane(f"add {of} {scaled.name}, <{own}>", "int64").name
+            lines.append(f"{base} = getelementptr {kind}, ptr {stored.address}, i64 %at")
+        else:
+            lines.append(f"{base} = getelementptr {kind}, ptr {stored.address}, i64 0")
+        lines.append(f"{places} = getelementptr {kind}, ptr {base}, {of} {offsets}")
         name = f"llvm.masked.gather.v{text.lanes}{text.suffix(dtype)}.v{text.lanes}p0"
         pointers = f"<{text.lanes} x ptr>"
         text.declare(name, text.vector(dtype), [pointers, text.vector("bool"), text.vector(dtype)])
@@ -316,7 +322,7 @@ class _Translation:
             f"{pointers} align {text.bytes(dtype)} {places}, {text.vector('bool')} splat (i1 true), "
             f"{text.vector(dtype)} poison"
         )
-        return text.lane(f"call {text.vector(dtype)} @{name}({arguments})", dtype)
+        return Lane(text.work([*lines, f"call {text.vector(dtype)} @{name}({arguments})"], dtype), dtype)
 
     def put_concatenate(self, params: Any, given: list[Value], out: Array, kinds: Any) -> Value:
         return self.joined(given, params["dimension"], out)
@@ -407,21 +413,22 @@ class _Translation:
         found = self.program(jaxpr, known, [*given[:fixed], *loop.carry, *now])
         for room, one in zip(rooms, found[carry:], strict=True):
             write(text, room, index, one)
-        end = [self.carried(one) for one in found[:carry]]
-        loop.end_after(length, end)
-        return [*end, *rooms]
+        loop.end_after(length, [self.carried(one) for one in found[:carry]])
+        return [*loop.carried(), *rooms]
 
     def repeat(self, params: dict[str, Any], given: list[Value]) -> list[Value]:
         text = self.text
         cond_fixed, body_fixed = params["cond_nconsts"], params["body_nconsts"]
         tests, bodies = given[:cond_fixed], given[cond_fixed : cond_fixed + body_fixed]
         start = [self.carried(one) for one in given[cond_fixed + body_fixed :]]
-        loop = Loop(text, start, "while")
+        loop = Loop(text, start, "while", sure=False)
         going = in_registers(text, self.closed(params["cond_jaxpr"], [*tests, *loop.carry])[0]).ravel()[0]
         inside, after = text.new_label("body"), text.new_label("end")
         # A lane that is done keeps what it has while others go on.
-        text.branch(text.any(going), inside, after)
+        some, chosen = text.any(going)
+        text.branch(some, inside, after)
         text.label(inside)
+        text.only(chosen)
         found = self.closed(params["body_jaxpr"], [*bodies, *loop.carry])
         new = [
             held(
@@ -435,7 +442,7 @@ class _Translation:
         ]
         loop.again(new)
         text.label(after)
-        return list(loop.carry)
+        return list(loop.carried())
 
     def choice(self, params: dict[str, Any], given: list[Value]) -> list[Value]:
         which, rest = given[0], given[1:]
@@ -456,12 +463,19 @@ class _Translation:
         ]
 
 
-def translate(program: Any, own: Sequence[bool], lanes: int, wide: bool = False) -> Translated:
+def translate(
+    program: Any,
+    own: Sequence[bool],
+    lanes: int,
+    estimates: bool = False,
+    vectors: int = VECTORS,
+    mask: str = "i1",
+) -> Translated:
     """`program` is `jax.make_jaxpr` of one member; `own[k]` says whether argument k differs from member to member.
 
-    Such an argument is a number. `wide`: for a processor with AVX-512. Raises Unsupported with what cannot be translated.
+    Such an argument is a number. `estimates`: 1/x by AVX-512's estimate. Raises Unsupported with what cannot be translated.
     """
-    text = Text(lanes, wide)
+    text = Text(lanes, estimates, vectors, mask)
     put = _Translation(text)
     arguments = [_array(aval) for aval in program.in_avals]
     shared: list[Value | None] = []
@@ -483,11 +497,10 @@ def translate(program: Any, own: Sequence[bool], lanes: int, wide: bool = False)
     for number in range(len(program.out_avals)):
         slot = text.assign(f"getelementptr inbounds ptr, ptr %results, i64 {number}")
         outputs.append(text.assign(f"load ptr, ptr {slot}"))
-    text.jump("groups")
-    text.label("groups")
-    place = len(text.lines)
-    text.put("")
-    first = text.assign(f"mul i64 %group, {lanes}")
+    group = text.open("groups", sure=True)
+    text.declare("llvm.smin.i64", "i64", ["i64", "i64"])
+    text.put(f"%vectors = call i64 @llvm.smin.i64(i64 {text.assign(f'sub i64 %last, {group}')}, i64 {vectors})")
+    first = text.assign(f"mul i64 {group}, {lanes}")
     given: list[Value] = []
     for pointer, argument, value in zip(pointers, arguments, shared, strict=True):
         if value is None:
@@ -499,9 +512,9 @@ def translate(program: Any, own: Sequence[bool], lanes: int, wide: bool = False)
     found = put.program(asked, _constants(program.consts), given)
     for pointer, result, answer in zip(outputs, results, found, strict=True):
         _leave(text, pointer, first, result, answer)
-    following = text.assign("add i64 %group, 1")
-    text.lines[place] = f"  %group = phi i64 [ %first, %entry ], [ {following}, %{text.block} ]"
+    following = text.assign(f"add i64 {group}, {vectors}")
     text.branch(text.assign(f"icmp slt i64 {following}, %last"), "groups", "finished")
+    text.close(group, following, "entry", "%first")
     text.label("finished")
     text.put("ret void")
     head = (
@@ -511,8 +524,9 @@ def translate(program: Any, own: Sequence[bool], lanes: int, wide: bool = False)
     # The processor takes what it has of 512 bits. Without the alignment what does not fit its registers would lie across
     # cache lines.
     attributes = 'attributes #0 = { nounwind alignstack=64 "prefer-vector-width"="512" "min-legal-vector-width"="512" }'
-    lines = [*text.globals, *sorted(text.declared.values()), head, *text.lines, "}", attributes]
-    return Translated("\n".join(lines) + "\n", lanes, results, text.scratch)
+    body, kept = laid_out(text.levels[0].items, text.names, lanes, vectors, text.scratch)
+    lines = [*text.globals, *sorted(text.declared.values()), head, *body, "}", attributes]
+    return Translated("\n".join(lines) + "\n", lanes, results, text.scratch + kept)
 
 
 def _leave(text: Text, pointer: str, first: str, result: Array, value: Value) -> None:
@@ -530,9 +544,17 @@ def _leave(text: Text, pointer: str, first: str, result: Array, value: Value) ->
     lane = in_registers(text, row(text, rows, loop.count, (), result.dtype)).ravel()[0]
     if result.dtype == "bool":
         lane = ELEMENTWISE["convert_element_type"](text, kept, lane)
-    kind = scalar_type(kept)
+    kind, where, at = scalar_type(kept), text.fresh("p"), text.fresh("p")
+    lines = [
+        f"{at} = mul i64 %at, {size}",
+        f"{where} = getelementptr inbounds {kind}, ptr {text.address(base, loop.count, kept)}, i64 {at}",
+    ]
     for k in range(text.lanes):
-        one = text.assign(f"extractelement {text.vector(kept)} {lane.name}, i64 {k}")
-        at = text.assign(f"add i64 {loop.count}, {k * size}")
-        text.put(f"store {kind} {one}, ptr {text.address(base, at, kept)}")
+        one, there = text.fresh("r"), text.fresh("p")
+        lines += [
+            f"{one} = extractelement {text.vector(kept)} {lane.name}, i64 {k}",
+            f"{there} = getelementptr inbounds {kind}, ptr {where}, i64 {k * size}",
+            f"store {kind} {one}, ptr {there}",
+        ]
+    text.work(lines)
     loop.end_after(size)

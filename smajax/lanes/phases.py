@@ -1,0 +1,387 @@
+"""A long run of instructions, cut into short loops over several vectors of members.
+
+Written out for one vector a step waits for its own results most of the time; written out for several at once it fits
+neither the registers nor the cache of instructions. So it is cut into phases that each go over all vectors of a group: a
+vector's turn in one is so short that the processor has several under way. What a phase leaves to later ones lies in the
+thread's own memory, in the nearest cache.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+LEAST, MOST = 24, 60  # works a phase
+LINE = 64  # bytes
+NAMES = re.compile(r"%[a-z]+\d+")
+OWN = re.compile(r"%[a-z]+\d+|%at\b|%turn\b")
+LABELS = re.compile(r", %(\w+) \]")
+
+
+@dataclass(slots=True)
+class Work:
+    """Instructions on one vector that stay together: `%turn` is its number within the group, `%at` that of its first member."""
+
+    name: str | None  # of what comes out
+    lines: list[str]
+    reads: tuple[str, ...]  # names of what goes in and differs from vector to vector
+
+
+@dataclass(slots=True)
+class Write:
+    """Cells and what they are to hold, all at once: a value may be what another of them held."""
+
+    pairs: list[tuple[str, str]]
+
+
+@dataclass(frozen=True, slots=True)
+class Late:
+    """A line that waits for the works before it."""
+
+    line: str
+
+
+@dataclass(frozen=True, slots=True)
+class Edge:
+    """Of a loop: where it begins, and where it has ended."""
+
+    begins: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Chosen:
+    """Vectors of a group, in memory: how many, and which. Works after it are of these alone, to the end of the loop."""
+
+    count: str
+    numbers: str
+
+
+Item = str | Work | Write | Late | Edge | Chosen
+
+
+@dataclass(frozen=True, slots=True)
+class Kept:
+    """How a vector lies in memory."""
+
+    kind: str  # LLVM's
+    size: int  # bytes
+    mask: str | None = None  # of truth values that are kept as whole numbers: their kind in a register
+
+
+@dataclass(frozen=True, slots=True)
+class Names:
+    """Those of what differs from vector to vector."""
+
+    kept: dict[str, Kept]
+    cells: dict[str, str]  # name -> the cell whose present value it is
+
+
+@dataclass(slots=True)
+class _Phase:
+    works: list[Work | Write]
+    chosen: Chosen | None
+    loads: list[str] = field(default_factory=list)
+    stores: list[tuple[str, str]] = field(default_factory=list)  # (where, what)
+
+
+@dataclass(slots=True)
+class _Block:
+    label: str
+    chosen: Chosen | None = None
+    lines: list[str] = field(default_factory=list)
+    works: list[Work | Write] = field(default_factory=list)
+    late: list[str] = field(default_factory=list)
+    end: str = ""
+    phases: list[_Phase] = field(default_factory=list)
+
+
+@dataclass(slots=True)
+class _Left:
+    """A cell's new value, and the phase that leaves it there."""
+
+    phase: int
+    cell: str
+    value: str
+
+
+def _needed(items: Sequence[Item], cells: Mapping[str, str]) -> list[Item]:
+    """Without works of which nothing comes."""
+    works = [one for one in items if isinstance(one, Work)]
+    makers = {one.name: one for one in works if one.name}
+    held: dict[str, list[str]] = {}
+    for item in items:
+        for cell, value in item.pairs if isinstance(item, Write) else ():
+            held.setdefault(cell, []).append(value)
+    wanted: set[str] = set()
+    asked = [name for one in works if not one.name for name in one.reads]
+    while asked:
+        name = asked.pop()
+        name = cells.get(name, name)
+        if name not in wanted:
+            wanted.add(name)
+            asked += makers[name].reads if name in makers else held.get(name, [])
+    lasting: list[Item] = []
+    for item in items:
+        if isinstance(item, Write):
+            lasting.append(Write([pair for pair in item.pairs if pair[0] in wanted]))
+        elif not isinstance(item, Work) or item.name is None or item.name in wanted:
+            lasting.append(item)
+    return lasting
+
+
+def _reads(work: Work | Write) -> Sequence[str]:
+    return work.reads if isinstance(work, Work) else [value for _, value in work.pairs]
+
+
+def _cut(works: Sequence[Work | Write], most: int) -> list[list[Work | Write]]:
+    """Into phases, where the fewest results go from one to the next."""
+    place = {work.name: k for k, work in enumerate(works) if isinstance(work, Work) and work.name}
+    last = {name: k for k, work in enumerate(works) for name in _reads(work) if name in place}
+    change = np.zeros(len(works) + 2, int)
+    for name, end in last.items():
+        change[place[name] + 1] += 1
+        change[end + 1] -= 1
+    crossing = np.cumsum(change)
+    found, start = [], 0
+    while len(works) - start > most:
+        window = crossing[start + LEAST : start + most + 1]
+        cut = start + LEAST + len(window) - 1 - int(np.argmin(window[::-1]))  # the last one of the best
+        found.append(list(works[start:cut]))
+        start = cut
+    return [*found, list(works[start:])] if start < len(works) else found
+
+
+def _blocks(items: Iterable[Item], most: int) -> tuple[list[_Block], list[tuple[int, int]]]:
+    """Blocks with their phases, and of every loop the first phase and the one after its last."""
+    blocks, loops, count = [_Block("entry")], [], 0
+    chosen: Chosen | None = None
+    outside: list[tuple[int, Chosen | None]] = []
+    for item in items:
+        here = blocks[-1]
+        if isinstance(item, Work | Write):
+            here.works.append(item)
+        elif isinstance(item, Late):
+            here.late.append(item.line)
+        elif isinstance(item, Chosen):
+            here.chosen = chosen = item
+        elif isinstance(item, Edge):
+            if item.begins:
+                outside.append((count, chosen))
+            else:
+                begin, chosen = outside.pop()
+                loops.append((begin, count))
+        elif item.endswith(":"):
+            blocks.append(_Block(item[:-1], chosen))
+        elif item.startswith(("  br ", "  ret ")):
+            here.end = item
+            here.phases = [_Phase(part, here.chosen) for part in _cut(here.works, most)]
+            count += len(here.phases)
+        else:
+            here.lines.append(item)
+    return blocks, loops
+
+
+def _joined(left: Sequence[_Left], reads: Mapping[str, list[int]], cells: Mapping[str, str]) -> dict[str, str]:
+    """Cells of inner loops -> those of the outer ones that they take over and hand back: one place does for both."""
+    of: dict[str, list[_Left]] = {}
+    for one in left:
+        of.setdefault(one.cell, []).append(one)
+    same: dict[str, str] = {}
+    for inner, (first, *_) in of.items():
+        outer = cells.get(first.value)
+        if outer is None or outer in same.values() or len(of[outer]) != 2:
+            continue
+        back = of[outer][1].phase
+        asked = [*reads.get(outer, []), *(one.phase for one in left if cells.get(one.value) == outer)]
+        meanwhile = any(first.phase < number <= back for number in asked)
+        if first.phase < back and not meanwhile:
+            same[inner] = outer
+    return same
+
+
+def _lay_early(
+    left: Sequence[_Left],
+    made: Mapping[str, int],
+    reads: Mapping[str, list[int]],
+    phases: Sequence[_Phase],
+    loops: Sequence[tuple[int, int]],
+    cells: Mapping[str, str],
+) -> None:
+    """Leave values in their cells as soon as they are there, where nobody asks for the one before any more."""
+    asked = {cell: list(numbers) for cell, numbers in reads.items()}
+    for one in left:
+        asked.setdefault(one.cell, []).append(one.phase)
+        if one.value in cells:
+            asked.setdefault(cells[one.value], []).append(one.phase)
+    for one in left:
+        early, late = made.get(one.value, one.phase), one.phase
+        beside = all((begin <= early < end) == (begin <= late < end) for begin, end in loops)
+        beside &= phases[early].chosen == phases[late].chosen
+        if beside and sum(early < at <= late for at in asked[one.cell]) == int(early < late):
+            one.phase = early
+
+
+def _places(spans: Mapping[str, tuple[int, int]], sizes: Mapping[str, int]) -> tuple[dict[str, int], int]:
+    """Offsets of what lives from one phase to another, and bytes altogether; what is over makes room for what comes."""
+    free: dict[int, list[int]] = {}
+    living: list[str] = []
+    found: dict[str, int] = {}
+    total = 0
+    for name in sorted(spans, key=lambda one: spans[one][0]):
+        for over in [one for one in living if spans[one][1] <= spans[name][0]]:
+            free.setdefault(sizes[over], []).append(found[over])
+            living.remove(over)
+        if free.get(sizes[name]):
+            found[name] = free[sizes[name]].pop()
+        else:
+            found[name], total = total, total + sizes[name]
+        living.append(name)
+    return found, total
+
+
+def _settled(
+    phases: Sequence[_Phase], loops: Sequence[tuple[int, int]], names: Names
+) -> tuple[Names, dict[str, tuple[int, int]]]:
+    """What each phase loads and stores, put down in it; the names with cells joined, and from when to when each lives."""
+    made: dict[str, int] = {}
+    left: list[_Left] = []
+    read: list[tuple[int, str]] = []
+    for number, phase in enumerate(phases):
+        for work in phase.works:
+            if isinstance(work, Write):
+                left += [_Left(number, *pair) for pair in work.pairs]
+                continue
+            read += [(number, name) for name in work.reads]
+            if work.name:
+                made[work.name] = number
+
+    def by_cell(cells: Mapping[str, str]) -> dict[str, list[int]]:
+        found: dict[str, list[int]] = {}
+        for number, name in read:
+            if name in cells:
+                found.setdefault(cells[name], []).append(number)
+        return found
+
+    same = _joined(left, by_cell(names.cells), names.cells)
+
+    def root(cell: str) -> str:
+        while cell in same:
+            cell = same[cell]
+        return cell
+
+    cells = {name: root(cell) for name, cell in names.cells.items()}
+    left = [_Left(one.phase, root(one.cell), one.value) for one in left]
+    left = [one for one in left if cells.get(one.value) != one.cell]
+    _lay_early(left, made, by_cell(cells), phases, loops, cells)
+
+    touched: dict[str, set[int]] = {}
+    for number, name in [*read, *((one.phase, one.value) for one in left if one.value in names.kept)]:
+        if name in cells or made[name] != number:
+            touched.setdefault(cells.get(name, name), set()).add(number)
+            if name not in phases[number].loads:
+                phases[number].loads.append(name)
+    for one in left:
+        touched.setdefault(one.cell, set()).add(one.phase)
+        phases[one.phase].stores.append((one.cell, one.value))
+    for name, numbers in touched.items():
+        if name in made:
+            numbers.add(made[name])
+            phases[made[name]].stores.append((name, name))
+    spans = {}
+    for name, numbers in touched.items():
+        first, last = min(numbers), max(numbers)
+        for begin, end in loops:
+            if not begin <= first < end and any(begin <= one < end for one in numbers):
+                last = max(last, end)  # the next round asks for it again
+        spans[name] = first, last
+    return Names(names.kept, cells), spans
+
+
+def laid_out(items: Sequence[Item], names: Names, lanes: int, vectors: int, start: int) -> tuple[list[str], int]:
+    """The lines of the function, and the bytes of a thread's own memory that it takes from `start` on.
+
+    Of a single vector nothing is cut: there is no other to go on with.
+    """
+    blocks, loops = _blocks(_needed(items, names.cells), MOST if vectors > 1 else len(items))
+    names, spans = _settled([phase for block in blocks for phase in block.phases], loops, names)
+    sizes = {name: -(-names.kept[name].size * vectors // LINE) * LINE for name in spans}
+    places, total = _places(spans, sizes)
+    places = {name: start + at for name, at in places.items()}
+
+    lines: list[str] = []
+    tails = {}  # of a block, where its last phase has ended
+    number = 0
+    for block in blocks:
+        lines += [f"{block.label}:"] if block.label != "entry" else []
+        lines += block.lines
+        tail = block.label
+        for phase in block.phases:
+            if phase.loads or phase.stores or any(isinstance(one, Work) for one in phase.works):
+                lines += _written(phase, number, tail, names, lanes, places)
+                tail = f"past{number}"
+            number += 1
+        tails[block.label] = tail
+        lines += [*block.late, block.end]
+
+    def renamed(line: str) -> str:
+        if " = phi " not in line or ".k = " in line:
+            return line
+        return LABELS.sub(lambda at: f", %{tails.get(at[1], at[1])} ]", line)
+
+    return [renamed(one) for one in lines], total
+
+
+def _written(phase: _Phase, number: int, before: str, names: Names, lanes: int, places: Mapping[str, int]) -> list[str]:
+    """A phase as a loop over the vectors of a group, or over those chosen."""
+    stem, chosen = f"%phase{number}", phase.chosen
+    count, turn, at, many = f"{stem}.k", f"{stem}.turn", f"{stem}.at", f"{stem}.many" if chosen else "%vectors"
+    here = {name: f"{name}.{number}" for name in phase.loads} | {"%at": at, "%turn": turn}
+    lines = [f"  {many} = load i64, ptr {chosen.count}"] if chosen else []
+    lines += [
+        f"  br label {stem}",
+        f"phase{number}:",
+        f"  {count} = phi i64 [ 0, %{before} ], [ {stem}.next, {stem} ]",
+    ]
+    if chosen:
+        lines.append(f"  {stem}.which = getelementptr inbounds i64, ptr {chosen.numbers}, i64 {count}")
+        lines.append(f"  {turn} = load i64, ptr {stem}.which")
+    else:
+        lines.append(f"  {turn} = add i64 {count}, 0")
+    lines.append(f"  {at} = mul i64 {turn}, {lanes}")
+
+    def own(text: str) -> str:
+        return OWN.sub(lambda one: here.get(one[0], one[0]), text)
+
+    def address(name: str, use: str) -> str:
+        base, where = f"{stem}.{use}.base", f"{stem}.{use}.address"
+        lines.append(f"  {base} = getelementptr inbounds i8, ptr %scratch, i64 {places[name]}")
+        lines.append(f"  {where} = getelementptr inbounds [{names.kept[name].size} x i8], ptr {base}, i64 {turn}")
+        size = names.kept[name].size
+        return f"ptr {where}, align {size & -size}"
+
+    for k, name in enumerate(phase.loads):
+        cell = names.cells.get(name, name)
+        kept, where = names.kept[cell], address(cell, f"load{k}")
+        if kept.mask is None:
+            lines.append(f"  {here[name]} = load {kept.kind}, {where}")
+        else:
+            lines.append(f"  {here[name]}.kept = load {kept.kind}, {where}")
+            lines.append(f"  {here[name]} = icmp slt {kept.kind} {here[name]}.kept, zeroinitializer")
+    for work in phase.works:
+        lines += ["  " + own(one) for one in work.lines] if isinstance(work, Work) else []
+    for k, (name, value) in enumerate(phase.stores):
+        kept, where, what = names.kept[name], address(name, f"store{k}"), own(value)
+        if kept.mask is not None:
+            lines.append(f"  {stem}.store{k} = sext {kept.mask} {what} to {kept.kind}")
+            what = f"{stem}.store{k}"
+        lines.append(f"  store {kept.kind} {what}, {where}")
+    return [
+        *lines,
+        f"  {stem}.next = add i64 {count}, 1",
+        f"  {stem}.more = icmp slt i64 {stem}.next, {many}",
+        f"  br i1 {stem}.more, label {stem}, label %past{number}",
+        f"past{number}:",
+    ]
