@@ -26,6 +26,9 @@ class Kinks:
     def __init__(self) -> None:
         self.simulations = 0
 
+    def held(self, points: np.ndarray) -> np.ndarray:
+        return points.round(6)
+
     def judged(self, points: np.ndarray, members: Members) -> Any:
         x, y = points.T
         self.simulations += len(points) * members.size
@@ -78,7 +81,6 @@ def test_what_was_seen_from_another_start_is_of_no_use() -> None:
 
 
 def test_a_search_at_rest_begins_anew_around_the_best(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "FIRST", 1e-3)
     begun: list[np.ndarray] = []
     search = module._search
 
@@ -88,8 +90,7 @@ def test_a_search_at_rest_begins_anew_around_the_best(monkeypatch: pytest.Monkey
 
     monkeypatch.setattr(module, "_search", watched)
     found, _ = searched(Goal(weights={"settling_time": 1.0}), 150)
-    assert len(begun) > 1
-    assert all(np.ptp(one) > 0.0 for one in begun)
+    assert len(begun) > 2
     np.testing.assert_allclose(begun[-1], [0.4, 0.6], atol=0.02)
     np.testing.assert_allclose(found.best, [0.4, 0.6], atol=0.01)
 

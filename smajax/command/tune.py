@@ -65,7 +65,10 @@ def tune(
     rounds: Annotated[int | None, typer.Option(callback=within(1), help="steps, at most; default 30")] = None,
     finish: Annotated[
         int | None,
-        typer.Option(callback=within(0), help="generations of a search without slopes (CMA-ES) after that; default 60"),
+        typer.Option(
+            callback=within(0),
+            help="generations of a search without slopes (CMA-ES) after that, 24 candidates each; default 60, 0 for none",
+        ),
     ] = None,
     seconds: Annotated[float, typer.Option(callback=within(0.1, 86_400.0), help="length of each closed loop")] = 10.0,
     estimator: Annotated[
@@ -77,7 +80,7 @@ def tune(
     ] = 0.0,
     period: Annotated[float, typer.Option(help="sample time of the controller, s, a multiple of 0.01")] = 0.01,
     delay: Annotated[int, typer.Option(callback=within(0), help="control periods until a command arrives")] = 0,
-    seed: Annotated[int, typer.Option(help="of starts, plants and noise")] = 0,
+    seed: Annotated[int, typer.Option(callback=within(0), help="of starts, plants and noise")] = 0,
     out: Annotated[Path, typer.Option(help="folder for gains.json, the page, the pictures and the numbers")] = Path(
         "tune"
     ),

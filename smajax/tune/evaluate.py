@@ -146,6 +146,10 @@ class Rig:
         values = np.asarray([gains[name] for name in self.names])
         return np.clip((np.log(values) - self._low) / self._width, 0.0, 1.0)
 
+    def held(self, points: np.ndarray) -> np.ndarray:
+        """Points (C, gains) as a file holds their gains."""
+        return np.stack([self.point(self.gains(one)) for one in points])
+
     def sloped(self, points: np.ndarray, members: Members, softness: float) -> Seen:
         """Terms with slopes of every point (C, gains); one that switches is smoothed by `softness`."""
         return self._seen(_sloped, points, members, STEP, softness, True)

@@ -22,8 +22,9 @@ from smajax.tune.evaluate import Rig
 from smajax.tune.members import Members
 from smajax.tune.objective import Goal, rank
 
-POPULATION = 24  # candidates of a generation; with fewer a search ends beside the least more often
-FIRST = 0.12  # sigma of a search as it begins, share of the box by logarithm
+POPULATION = 24  # candidates of a generation
+FIRST, AGAIN = 0.12, 0.04  # sigma of a search as it begins, and of one around its end: share of the box by logarithm
+REST = 1e-5  # a search whose candidates are as near to each other has come to rest
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,7 @@ class Evolution:
     """What was seen without slopes: generations (G) of candidates (P)."""
 
     start: np.ndarray  # (gains,), a point of the cube
-    points: np.ndarray  # (G, P, gains)
+    points: np.ndarray  # (G, P, gains), as they were asked for; judged as a file would hold them
     costs: np.ndarray  # (G, P)
     excesses: np.ndarray  # (G, P)
     ran: np.ndarray  # (G,) closed loops of the tuning up to the end of each
@@ -79,13 +80,15 @@ def load(path: Path) -> Evolution | None:
     whole = arrays(path)
     if whole is None or whole.keys() != {field.name for field in dataclasses.fields(Evolution)}:
         return None
-    return Evolution(**whole)
+    found = Evolution(**whole)
+    shapes = found.points.shape[:2], found.points.shape[:2], found.points.shape[:1]
+    return found if (found.costs.shape, found.excesses.shape, found.ran.shape) == shapes else None
 
 
 def _search(mean: np.ndarray, seed: int, number: int) -> CMA:
     return CMA(
         mean=np.array(mean),
-        sigma=FIRST,
+        sigma=AGAIN if number else FIRST,
         bounds=np.tile([0.0, 1.0], (len(mean), 1)),
         seed=int(np.random.default_rng([seed, number]).integers(2**31)),
         population_size=POPULATION,
@@ -108,23 +111,26 @@ def evolve(
     """Candidates around `start` (a point of the cube) for so many generations; `keep` gets each one's end.
 
     known: of an interrupted search; what it has seen of this one is not simulated again. A search that has come to rest
-    begins anew around the best of all.
+    begins anew around the best of all. The first candidate of each is where it begins.
     """
-    mine = (
-        known is not None and np.array_equal(known.start, start) and known.points.shape[1:] == (POPULATION, len(start))
-    )
-    seen = known if known is not None and mine else Evolution.none(start)
-    number, search = 0, _search(start, seed, 0)
+    seen = Evolution.none(start)
+    if known is not None and np.array_equal(known.start, start) and known.points.shape[1:] == seen.points.shape[1:]:
+        seen = known
+    number, search, begins, rest = 0, _search(start, seed, 0), start, False
     for k in range(generations):
         progress(what, k / generations)
-        if search.should_stop():
-            number += 1
-            search = _search(seen.upto(k).best, seed, number)
+        fresh = k == 0 or rest or search.should_stop()
+        if fresh and k:
+            number, begins = number + 1, seen.upto(k).best
+            search = _search(begins, seed, number)
         points = np.stack([search.ask() for _ in range(POPULATION)])
+        rest = float(np.ptp(points, axis=0).max()) < REST
+        if fresh:
+            points[0] = begins
         if k < seen.generations and np.array_equal(seen.points[k], points):
             rig.simulations = max(rig.simulations, int(seen.ran[k]))
         else:
-            judged = rig.judged(points, members).judged
+            judged = rig.judged(rig.held(points), members).judged
             seen = seen.upto(k).after(points, goal.cost(judged, members), goal.excess(judged), rig.simulations)
             keep(seen)
         values = rank(seen.costs[k], seen.excesses[k])

@@ -67,6 +67,8 @@ def tune_into(
     after, known = load(out / STATE), load_evolution(out / FINISH)
     if after is not None and not after.ended:
         progress(f"say: going on after round {after.round}" if after.round else "say: going on from the starts", 1.0)
+    elif after is not None and known is not None and known.generations < settings.finish:
+        progress(f"say: going on after generation {known.generations}", 1.0)
     found = tune(system, settings, after=after, known=known, keep=keep, progress=progress)
     told = {"tuned": settings.record(), "command": command, **made_with()}
     write_gains(out / GAINS, found.after, found.units, told)

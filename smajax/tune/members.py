@@ -14,6 +14,8 @@ from smajax.sweep import MISMATCHES, lanes
 
 CORNERS = 3  # mismatches of which every corner is taken
 DRAWN = 16  # plants drawn where there are more
+UNSEEN = 2**20  # of a seed: plants of the check are those of no tuning
+BESIDE = 5.0  # degrees
 BEYOND = 0.2  # how wrong each other parameter is in the check
 
 
@@ -82,18 +84,19 @@ def _drawn(variation: Mapping[str, float], count: int, seed: int) -> list[dict[s
 
 
 def between(targets: Sequence[float]) -> list[float]:
-    """The set points midway between those tuned; the only one itself."""
+    """The set points midway between those tuned; one beside the only one, towards the middle of the way."""
     ordered = sorted(targets)
-    return [0.5 * (low + high) for low, high in itertools.pairwise(ordered)] or list(ordered)
+    beside = [ordered[0] - BESIDE if ordered[0] > 0.0 else ordered[0] + BESIDE]
+    return [0.5 * (low + high) for low, high in itertools.pairwise(ordered)] or beside
 
 
 def never_seen(targets: Sequence[float], variation: Mapping[str, float], count: int, seed: int) -> dict[str, Members]:
-    """What tuning never saw, by name: `inside`, plants drawn within the variation at set points midway between; and `beyond`.
+    """What tuning never saw, by name: `inside`, set points that were not tuned, on plants drawn within the variation; and `beyond`.
 
     Beyond: at the set points tuned, each mismatch that was not varied wrong by 20 % alone.
     """
     others = [name for name in MISMATCHES if name not in variation]
-    inside = _drawn(variation, count, seed + 1) if variation else [{}]
+    inside = _drawn(variation, count, seed + UNSEEN) if variation else [{}]
     found = {"inside": _crossed(_plants(inside), between(targets))}
     if others:
         beyond = [{name: ratio} for name in others for ratio in (1.0 - BEYOND, 1.0 + BEYOND)]

@@ -100,8 +100,9 @@ class Goal:
 
 def rank(cost: np.ndarray, excess: np.ndarray) -> np.ndarray:
     """A number by which candidates are ordered: those within the limits by cost, the others after them by excess."""
-    finite = np.where(np.isfinite(cost), cost, 1e6)
-    return np.where(excess > 0.0, 1e9 * (1.0 + np.minimum(excess, 1e6)) + finite, cost)
+    finite = np.minimum(np.where(np.isfinite(cost), cost, np.inf), 1e8)
+    within = np.where(np.isfinite(cost), finite, np.inf)
+    return np.where(excess > 0.0, 1e9 * (1.0 + np.minimum(excess, 1e6)) + finite, within)
 
 
 def _smooth(

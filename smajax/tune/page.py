@@ -24,18 +24,16 @@ EDGE = 0.02  # of the box, by logarithm
 GROWN = 1.5  # times as much as before
 LEAST_PRICE = 0.1  # J, V/s, 1/s: what is less is nothing, however it grew
 UNITS = {"°": "deg", "°C": "degC"}  # as a file has them
-CHECKS = {
-    "tuned on": "tuned on",
-    "inside": "never seen: plants within the variation, set points between those tuned",
-    "beyond": "never seen: another parameter wrong by 20 %, set points tuned",
-}
 
 
 def checked_on(found: Tuned, name: str) -> str:
     """The plants and set points of a check, in words; a share of the air's temperature in kelvins."""
-    if name != "beyond" or "ambient" in found.settings.variation:
-        return CHECKS[name]
-    return CHECKS[name].replace("20 %", f"20 % (the air by {BEYOND * abs(found.air):.3g} K)")
+    if name == "tuned on":
+        return name
+    if name == "inside":
+        return f"never seen: {found.settings.unseen_in_words()}"
+    air = "" if "ambient" in found.settings.variation else f" (the air by {BEYOND * abs(found.air):.3g} K)"
+    return f"never seen: another parameter wrong by {BEYOND:.0%}{air}, set points tuned"
 
 
 def at_the_edge(found: Tuned) -> list[str]:
@@ -114,9 +112,9 @@ def conclusions(found: Tuned) -> list[str]:
         told.append(f"Not every limit is met: {'; '.join(missed)}." if missed else met(found, tuned, "tuned on"))
         missed = broken(found, inside)
         told.append(
-            f"In plants within the variation that were never seen: {'; '.join(missed)}."
+            f"Of what was never seen ({found.settings.unseen_in_words()}): {'; '.join(missed)}."
             if missed
-            else met(found, inside, "of plants and set points never seen, within the variation")
+            else met(found, inside, f"that were never seen ({found.settings.unseen_in_words()})")
         )
         if "beyond" in found.checks and (missed := broken(found, found.checks["beyond"])):
             told.append(f"With a parameter wrong that was not varied: {'; '.join(missed)}.")
@@ -131,7 +129,7 @@ def conclusions(found: Tuned) -> list[str]:
         told.append(f"At a bound of the box, beyond which better gains may lie: {', '.join(edge)}.")
     descent = found.descent
     told.append(
-        f"It took {found.simulations:,} closed loops in {counted(descent.round, 'round')} by slopes"
+        f"It took {counted(found.simulations, 'closed loop')} in {counted(descent.round, 'round')} by slopes"
         + (f" and {counted(found.evolution.generations, 'generation')} without" if found.evolution.generations else "")
         + (
             f"; {descent.wild:,} loops had slopes of no use (a limit cycle multiplies every difference)"

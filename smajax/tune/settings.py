@@ -12,7 +12,7 @@ from smajax.sweep_run import between_in_words, check_interface, check_set_points
 from smajax.system import System
 from smajax.tune.descent import Effort
 from smajax.tune.evaluate import STEP
-from smajax.tune.members import check_variation
+from smajax.tune.members import BESIDE, check_variation
 from smajax.tune.objective import REGULATION, Goal
 from smajax.tune.terms import TERMS
 
@@ -80,6 +80,11 @@ class TuneSettings:
         wrong = [f"{name} ±{size}" for name, size in sizes.items()]
         told = f"the plant as believed and with {', '.join(wrong)} at once" if wrong else "the plant as believed"
         return f"{told}; set points {', '.join(f'{angle:g}°' for angle in self.set_points)}"
+
+    def unseen_in_words(self) -> str:
+        """On what the gains are checked that tuning never saw."""
+        where = "set points between those tuned" if len(self.set_points) > 1 else f"a set point {BESIDE:g}° beside"
+        return f"plants within the variation, {where}" if self.variation else f"{where}, the plant as believed"
 
     def goal_in_words(self) -> str:
         """What is made small, and what is kept below a limit."""

@@ -56,6 +56,7 @@ class Tuned:
     excesses: Mapping[str, tuple[float, float]]  # by which a limit is exceeded, of each check
     descent: Descent
     evolution: Evolution
+    simulations: int  # closed loops of the search
     lines: Lines
     air: float  # degC, as the controller believes it
 
@@ -63,11 +64,6 @@ class Tuned:
     def within_limits(self) -> bool:
         """Every limit is met, in what was tuned on and in plants inside of the variation that were never seen."""
         return self.excesses["tuned on"][1] <= 0.0 and self.excesses["inside"][1] <= 0.0
-
-    @property
-    def simulations(self) -> int:
-        """Closed loops of the search."""
-        return int(self.evolution.ran.max(initial=self.descent.simulations))
 
 
 def rig_of(system: System, settings: TuneSettings) -> Rig:
@@ -117,8 +113,9 @@ def tune(
         keep(now)
     progress(what, 1.0)
     progress("judging", 0.0)
-    # Rounds judge at the step of tuning; of what they leave the best at a finer one is taken. The preset is among them.
-    best = _best_of(rig, goal, members, (rig.before, *now.best))
+    # Rounds judge at the step of tuning; of what they leave the best at a finer one is taken. The preset and what was begun from are among them.
+    begun = (rig.point(settings.start),) if settings.start else ()
+    best = _best_of(rig, goal, members, (rig.before, *begun, *now.best))
     progress("judging", 1.0)
     evolution = evolve(
         rig,
@@ -134,6 +131,7 @@ def tune(
     )
     progress("judging", 0.0)
     best = _best_of(rig, goal, members, (rig.point(best), evolution.best))
+    searched = rig.simulations
     pair = np.stack([rig.before, rig.point(best)])
     checks = {
         "tuned on": members,
@@ -161,6 +159,7 @@ def tune(
         {name: (float(one[0]), float(one[1])) for name, one in excesses.items()},
         now,
         evolution,
+        searched,
         lines,
         float(get_parameters(rig.system, [MISMATCHES["ambient"]])[0]),
     )

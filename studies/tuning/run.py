@@ -18,7 +18,7 @@ from smajax.runtime import prepare
 from studies.tuning.peers import PROBLEMS, Problem, searched
 from studies.tuning.picture import draw
 from studies.tuning.record import HERE, keep, kept
-from studies.tuning.requirement import Effort, requirement
+from studies.tuning.requirement import Plan, requirement
 from studies.tuning.tables import readme
 
 CANDIDATES = 100  # closed loops of a search: so many candidates on all members
@@ -26,7 +26,7 @@ SEEDS = tuple(range(5))
 WAYS = {"trust-region": SEEDS, "adam": SEEDS, "nelder-mead": SEEDS, "cma-es": SEEDS, "grid": (0,)}
 FAST_PROBLEM = Problem("vsc3", "worst", (0.0, 30.0), varied=False, seconds=3.0)
 FAST_WAYS = {way: (0,) for way in WAYS}
-FAST_EFFORT = Effort((0.0, 30.0), 30.0, 30.0, 4, 2, 3, 2, 2, 1, 3.0)
+FAST_PLAN = Plan((0.0, 30.0), 30.0, 4, 2, 3, 2, 4, 8, 1, 3.0)
 
 
 def say(what: str, share: float) -> None:
@@ -56,12 +56,12 @@ def compare(
                 progress(f"say: {name}: cost {found['course'][-1][1]:.4g} in {found['closed_loops']} loops", 1.0)
 
 
-def require(path: Path, names: list[str], effort: Effort, again: bool, progress: Progress = say) -> None:
+def require(path: Path, names: list[str], plan: Plan, again: bool, progress: Progress = say) -> None:
     """The requirement for every controller of `names`."""
     for name in names:
         if name in kept(path).get("requirement", {}) and not again:
             continue
-        found = requirement(arm(), name, effort, progress, keep=path.name == "results.json")
+        found = requirement(arm(), name, plan, progress, keep=path.name == "results.json")
         keep(path, "requirement", name, found)
         progress(f"say: {name}: {'met' if found['met'] else 'not met'}, {found['limit_exceeded_by_share']}", 1.0)
 
@@ -84,7 +84,7 @@ def main(arguments: list[str]) -> None:
             FAST_WAYS if fast else WAYS,
         )
     names = [part for part in parts if part in CONTROLLERS] or ([] if parts else list(CONTROLLERS))
-    require(path, ["vsc3"] if fast and names else names, FAST_EFFORT if fast else Effort(), bool(parts))
+    require(path, ["vsc3"] if fast and names else names, FAST_PLAN if fast else Plan(), bool(parts))
     if not fast:
         results, words = kept(path), (HERE / "words.md").read_text(encoding="utf-8")
         (HERE / "tuning.png").write_bytes(draw(results))
