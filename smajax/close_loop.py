@@ -323,6 +323,7 @@ def _effects(
             "score_p_value": seen.first_score.p_value if seen.first_score else float("nan"),
             "alone_rmse_fit": seen.alone_rmse,
             "leave_one_out_rmse": seen.alone_left_out_rmse,
+            "leave_one_out_rmse_of_the_base_model": seen.base_left_out_rmse,
             "leave_one_out_rmse_without": seen.without_left_out_rmse,
             "score_p_value_at_the_end": last[name].p_value if name in last else float("nan"),
             "score_gain_at_the_end": last[name].gain if name in last else float("nan"),

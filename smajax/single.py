@@ -29,7 +29,7 @@ from smajax.merit import Rest, merit_by_set_point, rests
 from smajax.parameters import parameter_values, parameters
 from smajax.reference import resting
 from smajax.simulate import DEFAULT_STEP
-from smajax.sweep_run import between_in_words, check_interface, interface_of
+from smajax.sweep_run import between_in_words, check_interface, check_set_points, interface_of
 from smajax.system import System
 
 MOST_RESTS = 50  # set points; more are a ramp or a sine of a file
@@ -145,6 +145,15 @@ def mismatches(believed: System, plant: System) -> tuple[Mismatch, ...]:
     )
 
 
+def _beyond(system: System, position: np.ndarray) -> list[str]:
+    """That a set point lies where the load cannot go."""
+    try:
+        check_set_points(system, np.degrees(np.unique([position.min(), position.max()])).tolist())
+    except ValueError as error:
+        return [f"Asked for what cannot be reached: {error}"]
+    return []
+
+
 def run_closed(asked: Asked, loop: AskedLoop) -> Ran:
     """The closed loop. Raises as `run_open`, and GainsFileError."""
     believed, plant = asked.system(), asked.system(loop.mismatch)
@@ -185,6 +194,7 @@ def run_closed(asked: Asked, loop: AskedLoop) -> Ran:
         check_answers(ran)
     except ValueError as error:
         notes.append(str(error))
+    notes += _beyond(believed, position)
     count = len(rests(position))
     judged = {name: float(value) for name, value in vars(merits).items()}
     several: tuple[Rest, ...] = ()

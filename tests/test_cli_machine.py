@@ -101,6 +101,22 @@ def test_a_template_lists_what_a_bench_should_tell(tmp_path: Path, heading: str,
         assert after[name] == pytest.approx(before[name], rel=1e-3)
 
 
+def test_the_other_load_can_be_asked_for_and_a_wrong_one_is_refused(tmp_path: Path) -> None:
+    rows = [f"{k / 10},{5.0 * (k % 20 > 9)},{3.0 + np.sin(k / 9)}" for k in range(200)]
+    log = tmp_path / "log.csv"
+    log.write_text("\n".join(["time [s],U [V],displacement [mm]", *rows]))
+    out = tmp_path / "e.toml"
+    told = run.invoke(app, ["new-experiment", str(log), "--load", "bias_spring", "--out", str(out)])
+    assert told.exit_code == 0, told.output
+    load_experiment(out, CATALOGUE)
+    assert tomllib.loads(out.read_text(encoding="utf-8"))["model"]["load"] == "bias_spring"
+    assert "# spring_stiffness = " in out.read_text(encoding="utf-8")
+    refused = run.invoke(app, ["new-experiment", str(log), "--load", "arm", "--out", str(tmp_path / "f.toml")])
+    assert refused.exit_code != 0
+    assert "dead_weight or bias_spring does" in refused.output + str(refused.exception)
+    assert not (tmp_path / "f.toml").exists()
+
+
 def _block(path: Path, name: str, every: float, values: np.ndarray) -> None:
     """A Simulink log of one signal, as a "Structure with time"."""
     time = every * np.arange(values.size)

@@ -98,6 +98,17 @@ def test_each_set_point_has_its_own_figures_of_merit(tmp_path: Path) -> None:
     assert page.count("<td class=n>never</td>") == 2
 
 
+def test_a_set_point_beyond_the_stops_is_told_and_several_stand_in_a_table(tmp_path: Path) -> None:
+    words = ["simulate", "--controller", "pid", "--dt", "10ms", "--out", str(tmp_path / "loop"), "--set-point"]
+    told = run.invoke(app, [*words, "20deg:1s,400deg:1s"])
+    assert told.exit_code == 0, told.output
+    assert "cannot be reached: set points are angles between the arm's stops, -45 to 95 degrees" in told.output
+    lines = told.output.splitlines()
+    at = next(k for k, line in enumerate(lines) if "set point (deg)" in line)
+    assert [lines[at + k].split()[:3] for k in (1, 2)] == [["20", "0", "1"], ["400", "1", "2"]]
+    assert len({len(line) for line in lines[at : at + 3]}) == 1
+
+
 def test_what_the_controller_believes_stands_beside_what_the_plant_has(tmp_path: Path) -> None:
     words = ["simulate", "--controller", "pid", "--dt", "10ms", "--set-point", "10deg:1s"]
     wrong = ["convection_coefficient=80", "latent_heat.enthalpy=20 J/g", "payload_mass=57.19 g"]  # the mass as believed

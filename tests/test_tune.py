@@ -11,15 +11,18 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from smajax.closed_loop import simulate_closed_loop
 from smajax.control_presets import CONTROLLERS
 from smajax.figures.rigs import arm
 from smajax.gain_search import regulation_cost
 from smajax.gains_file import GainsFileError, read_gains
-from smajax.merit import Merit
+from smajax.merit import Merit, merit_by_set_point
 from smajax.parameters import get_parameters, parameters
+from smajax.reference import resting
 from smajax.sweep import closed_loops, lanes
 from smajax.sweep_run import SweepSettings, run_sweep
 from smajax.tune import trust
@@ -28,6 +31,7 @@ from smajax.tune.evaluate import STEP, Rig
 from smajax.tune.evolve import Evolution
 from smajax.tune.folder import tune_into
 from smajax.tune.members import between, never_seen, tuned_on
+from smajax.tune.moves import walk
 from smajax.tune.objective import Goal, rank, value_and_slope
 from smajax.tune.page import met, price
 from smajax.tune.settings import TuneSettings
@@ -201,6 +205,34 @@ def test_the_folder_is_whole(folder: Path) -> None:
 def test_a_share_of_the_airs_temperature_is_told_in_kelvins() -> None:
     told = TuneSettings("vsc3", (0.0,), {"damping": 0.2, "ambient": 0.2}).plants_in_words(20.0)
     assert "damping ±20 %, ambient ±4 K at once" in told
+
+
+def test_moves_from_one_set_point_to_another_are_tried_and_told(folder: Path) -> None:
+    assert walk([0.0, -40.0, 85.0, 20.0]) == [-40.0, 85.0, 0.0, 20.0]
+    assert len(walk(list(range(50)))) == 12
+    record = json.loads((folder / "tune.json").read_text(encoding="utf-8"))
+    moves = record["moves"]
+    assert moves["set_points_deg"] == [0.0, 30.0]
+    assert [len(moves[when]["overshoot_deg"]) for when in ("before", "after")] == [1, 1]
+    # The same walk as `simulate` would run it.
+    rig = Rig(CONTROLLERS["vsc3"], arm(), seconds=SECONDS, loops=16)
+    gains = read_gains(folder / "gains.json", arm()).put(rig.system)
+    wanted = resting(jnp.asarray(np.radians(np.repeat([0.0, 30.0], [600, 601]))))
+    loop = simulate_closed_loop(rig.system, gains, wanted, 0.005, every=2)
+    (_, second) = merit_by_set_point(loop, rig.system)
+    assert moves["after"]["overshoot_deg"][0] == pytest.approx(np.degrees(float(second.merit.overshoot)), abs=1e-6)
+    told = " ".join(record["conclusions"])
+    assert "one step from the start, cold and at rest" in told
+    assert "In 1 move from one set point to another" in told
+    assert "Slopes ended at a cost of" in told
+
+
+def test_a_tuning_at_one_set_point_is_checked_at_another() -> None:
+    for angle, other in ((20.0, 15.0), (-40.0, -35.0), (85.0, 80.0)):
+        checks = never_seen([angle], {}, 4, 0)
+        assert np.degrees(checks["inside"].targets) == pytest.approx([other])
+        told = dataclasses.replace(SETTINGS, set_points=(angle,), variation={}).unseen_in_words()
+        assert told == "a set point 5° beside, the plant as believed"
 
 
 def test_what_the_gains_cost_is_said_with_both_numbers() -> None:

@@ -80,6 +80,7 @@ class Evidence:
     first_score: Score | None = None
     alone_rmse: float = float("nan")  # fit runs, effect added alone in the first round
     alone_left_out_rmse: float = float("nan")
+    base_left_out_rmse: float = float("nan")  # the base model, on the same
     without_left_out_rmse: float = float("nan")  # the final model with this effect taken out again
 
 

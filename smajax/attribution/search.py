@@ -95,7 +95,8 @@ def search(setting: Search, base: Fit) -> tuple[Model, Model]:
         if number == 1 and problem.batch.output.shape[0] > 1:
             for entry in judged:
                 if len(entry.effects) == 1:
-                    setting.evidence[entry.effects[0]].alone_left_out_rmse = entry.left_out_rmse
+                    evidence = setting.evidence[entry.effects[0]]
+                    evidence.alone_left_out_rmse, evidence.base_left_out_rmse = entry.left_out_rmse, model.left_out_rmse
         best, alike = simplest(setting, judged, model)
         enough, why = setting.better(best, model)
 

@@ -26,9 +26,9 @@ def told_of(terms: Sequence[UnknownTerm], shown: Callable[[float], str]) -> tupl
         equations = " or ".join(f"the {label(one)} equation" for one in (best.equation, *elsewhere))
         return (
             f"What is missing is not in the library, and runs left out do not tell whether it lives in {equations}: "
-            f"{_or_listed([best, *others])} do alike. Best is {best.title} ({brought}).",
+            f"of smooth unknown functions put into one equation in turn, {_or_listed([best, *others])} do alike. Best is the first ({brought}).",
         )
-    told = f"What is missing is not in the library; it lives in the {label(best.equation)} equation: {best.title}"
+    told = f"What is missing is not in the library; it lives in the {label(best.equation)} equation, as an unknown function put there shows: {best.title}"
     if others:
         told += f", or {_or_listed(others)}, which runs left out do not tell from it"
     told += f" ({brought})."

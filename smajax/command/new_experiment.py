@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from smajax.command import complete
 from smajax.command.base import UNMET, Json
 
 
@@ -18,6 +19,12 @@ def new_experiment(
     ],
     out: Annotated[Path, typer.Option(help="the file to write")] = Path("experiment.toml"),
     title: Annotated[str, typer.Option(help="one line; default: the file's name")] = "",
+    load: Annotated[
+        str,
+        typer.Option(
+            help="of a log with a position: dead_weight (default) or bias_spring", autocompletion=complete.loads
+        ),
+    ] = "",
     overwrite: Annotated[bool, typer.Option("--overwrite", help="write over a file that is there")] = False,
     json_out: Json = False,
 ) -> None:
@@ -40,7 +47,7 @@ def new_experiment(
     from smajax.experiment.template import begun
     from smajax.report.files import replace
 
-    guessed = begun(files, out, title)
+    guessed = begun(files, out, title, load)
     replace(out, guessed.text)
     try:
         warnings, why = list(load_experiment(out, CATALOGUE).warnings), ""

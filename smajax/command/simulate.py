@@ -32,6 +32,9 @@ def _texts(option: str, several: Sequence[str] | None) -> dict[str, str]:
     return found
 
 
+SHOWN = 7  # columns of a table of set points on a terminal
+
+
 def simulate(
     wire: Annotated[
         str, typer.Argument(help="a wire of `smajax presets`", autocompletion=complete.wires)
@@ -202,9 +205,13 @@ def simulate(
             typer.echo(f"  {row[0]:<28} believed {row[1]} -> true {row[2]} {row[3]}")
         for row in merit_rows(ran):
             typer.echo(f"  {row[0]:<28} {row[1]} {row[2]}")
-        head, rows = rest_rows(ran)
-        for row in rows:
-            typer.echo("  " + ", ".join(f"{name} {cell}" for name, cell in zip(head, row, strict=True)))
+        table = rest_rows(ran)
+        if table[1]:
+            # The first few; the page has all.
+            lines = [row[:SHOWN] for row in (table[0], *table[1])]
+            widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+            for line in lines:
+                typer.echo("  " + "  ".join(cell.rjust(width) for cell, width in zip(line, widths, strict=True)))
         typer.echo(f"Page: {page.resolve()}")
     if open_page:
         browse(page)

@@ -53,7 +53,10 @@ def tune(
     ] = None,
     limits: Annotated[
         list[str] | None,
-        typer.Option(help="of the same, met in every loop: settling_time=4,overshoot=2", autocompletion=complete.terms),
+        typer.Option(
+            help="of the same, met in every loop, in s, degrees, J, V/s, degC: settling_time=4,overshoot=2",
+            autocompletion=complete.terms,
+        ),
     ] = None,
     by: Annotated[str, typer.Option(help="trust-region or adam", autocompletion=complete.rules)] = "trust-region",
     start: Annotated[
@@ -93,7 +96,7 @@ def tune(
 ) -> None:
     """Tune the gains of a controller of the arm, on many set points and plants at once: by gradient, then without slopes.
 
-    Variations: inertia, damping, convection, ambient, payload, supply. The gains are checked on plants and set points that
+    Each loop is one step from the start, cold and at rest; moves between the set points are tried in the end and told. Variations: inertia, damping, convection, ambient, payload, supply. The gains are checked on plants and set points that
     tuning never saw. `smajax sweep --gains tune/gains.json` reads them. Exit code 3 when a limit is not met. Ctrl-C loses
     the round or generation under way alone: the same command goes on.
 

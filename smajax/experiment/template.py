@@ -22,6 +22,8 @@ from smajax.units import convert
 from smajax.words import and_listed
 
 MOST_SAMPLES = 2000  # of the longest run on the clock
+# Loads whose reading is a position, and the wire of a bench with one.
+POSITIONED = {"dead_weight": "flexinol_table_3_2", "bias_spring": "flexinol_ht_500um"}
 HELD_OUT_FROM = 3  # runs from which on the last one is held out
 COUPON, HEATED = ("temperature", "stress"), ("voltage", "current", "power", "duty")
 # Parameter -> how far its bounds lie from the preset's value: factors, or kelvins.
@@ -47,7 +49,22 @@ class _Model:
     why: str
 
 
-def _model(found: dict[str, Column]) -> _Model:
+def _model(found: dict[str, Column], load: str = "") -> _Model:
+    """The presets that the columns speak for; `load` in the place of the one guessed. Raises MeasuredDataError."""
+    guessed = _guessed(found)
+    if load in ("", guessed.load):
+        return guessed
+    if guessed.output != "position" or load not in POSITIONED:
+        raise MeasuredDataError(
+            f"the load {load!r} does not go with these columns, which have a reading of {guessed.output}: "
+            f"{' or '.join(POSITIONED) if guessed.output == 'position' else guessed.load} does"
+        )
+    return replace(
+        guessed, wire=POSITIONED[load], load=load, inputs=guessed.inputs[:1], why="the load that was asked for"
+    )
+
+
+def _guessed(found: dict[str, Column]) -> _Model:
     drive = next((name for name in DRIVES if name in found), "")
     if not drive and "temperature" in found and "strain" in found and "stress" in found:
         return _Model(
@@ -58,7 +75,7 @@ def _model(found: dict[str, Column]) -> _Model:
             "niti_table_3_1", "arm", drive or "voltage", (drive or "voltage",), "angle", "the output is an angle"
         )
     inputs = (drive or "voltage", *(["mass"] if "mass" in found else []))
-    why = "the output is a position; `bias_spring` is the other load that has one"
+    why = "the output is a position; `--load bias_spring` takes the other load that has one"
     return _Model("flexinol_table_3_2", "dead_weight", drive or "voltage", inputs, "position", why)
 
 
@@ -177,7 +194,7 @@ def _folder(files: Sequence[Path], target: Path) -> Path:
     return Path(os.path.relpath(common, target.resolve().parent))
 
 
-def begun(files: Sequence[Path], target: Path, title: str = "") -> Guessed:
+def begun(files: Sequence[Path], target: Path, title: str = "", load: str = "") -> Guessed:
     """The experiment file `target` for these logs. Raises MeasuredDataError for a file that cannot be read.
 
     A file is a run, with the columns of the first one; another file without one of them is refused by name. Where no file
@@ -187,7 +204,7 @@ def begun(files: Sequence[Path], target: Path, title: str = "") -> Guessed:
     logs = _logs(files, tables)
     columns = [one for one, _ in logs.columns]
     found = {one.quantity: one for one in columns if one.quantity}
-    model = _model(found)
+    model = _model(found, load)
     kind_of = {one.quantity: kind for one, kind in logs.columns if one.quantity}
     variable = {quantity: bool(logs.kinds[kind].clocks) for quantity, kind in kind_of.items()}
     told = [f"{one.name}: {one.quantity} in {one.unit} ({one.sure}: {one.why})" for one in columns if one.quantity]
@@ -283,6 +300,8 @@ def begun(files: Sequence[Path], target: Path, title: str = "") -> Guessed:
             *_channel(one.quantity, role, one, variable[one.quantity], True),
             "",
         ]
+    if len(logs.runs) >= HELD_OUT_FROM:
+        told.append(f"held out: the last run, {logs.runs[-1].name}; another one by its `role` in [[runs]]")
     lines += ["[data]", f"folder = {json.dumps(str(folder), ensure_ascii=False)}", ""]
     base = (target.resolve().parent / folder).resolve()
     used_here = [name for name in (*model.inputs, model.output) if name in found]

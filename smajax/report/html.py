@@ -37,7 +37,7 @@ EVIDENCE = {
 # Said of the effects that were added, but no column of the table of all candidates.
 ASIDE = {"leave_one_out_rmse_without", "score_gain_at_the_end"}
 # In the record only: the p-value says the same to a reader.
-RECORD_ONLY = {"score_statistic"}
+RECORD_ONLY = {"leave_one_out_rmse_of_the_base_model", "score_statistic"}
 # Shares of the residual's mean square.
 GAINS = {"score_gain", "score_gain_at_the_end"}
 

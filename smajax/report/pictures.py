@@ -190,8 +190,7 @@ def _literal(text: str) -> str:
 def candidates_ranked(findings: Findings) -> bytes | None:
     """The error on runs left out in turn, per candidate, best first; None when no candidate came that far.
 
-    Above them the base model's. The record has its error on the runs it was fitted to, which is the lower one: a bar
-    that is shorter than it is a gain all the more.
+    Above them the base model's, on the same runs.
     """
     scored = ranked(findings.effects)
     scored = [effect for effect in scored if np.isfinite(_left_out(effect))]
@@ -202,10 +201,11 @@ def candidates_ranked(findings: Findings) -> bytes | None:
     axes = figure.subplots()
     places = np.arange(len(scored) + 1)[::-1]
     colours = [BEFORE, *(AFTER if effect.added else QUIET for effect in scored)]
-    errors = [findings.portrait_before.rmse, *(_left_out(effect) for effect in scored)]
+    base = _left_out(scored[0], "leave_one_out_rmse_of_the_base_model")
+    errors = [base, *(_left_out(effect) for effect in scored)]
     axes.barh(places, [shown.of(error) for error in errors], 0.62, color=colours)
     names = [f"{label(effect.name)} alone" for effect in scored]
-    axes.set_yticks(places, ["base model\n(on runs it was fitted to)", *names])
+    axes.set_yticks(places, ["base model", *names])
     for tick, effect in zip(axes.get_yticklabels()[1:], scored, strict=True):
         tick.set_fontweight("bold" if effect.added else "normal")
     axes.axvline(shown.of(findings.noise_sigma), color=MEASURED, linestyle="--", linewidth=1.0, label="noise")
@@ -221,8 +221,8 @@ def candidates_ranked(findings: Findings) -> bytes | None:
     return as_png(figure)
 
 
-def _left_out(effect: EffectFinding) -> float:
-    return effect.evidence.get("leave_one_out_rmse", float("nan"))
+def _left_out(effect: EffectFinding, which: str = "leave_one_out_rmse") -> float:
+    return effect.evidence.get(which, float("nan"))
 
 
 def ranked(effects: Sequence[EffectFinding]) -> list[EffectFinding]:

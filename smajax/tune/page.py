@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import itertools
 from collections.abc import Mapping
 from typing import Any
 
@@ -15,10 +16,11 @@ from smajax.report.html import picture
 from smajax.report.plain_page import bullets, table, whole
 from smajax.sweep import MISMATCHES
 from smajax.tune.members import BEYOND
+from smajax.tune.moves import Moves
 from smajax.tune.pictures import before_after
 from smajax.tune.terms import TERMS
 from smajax.tune.tune import Check, Tuned
-from smajax.words import counted
+from smajax.words import and_listed, counted
 
 EDGE = 0.02  # of the box, by logarithm
 GROWN = 1.5  # times as much as before
@@ -33,7 +35,7 @@ def checked_on(found: Tuned, name: str) -> str:
     if name == "inside":
         return f"never seen: {found.settings.unseen_in_words()}"
     air = "" if "ambient" in found.settings.variation else f" (the air by {BEYOND * abs(found.air):.3g} K)"
-    return f"never seen: another parameter wrong by {BEYOND:.0%}{air}, set points tuned"
+    return f"never seen: another parameter wrong by {100 * BEYOND:g} %{air}, set points tuned"
 
 
 def at_the_edge(found: Tuned) -> list[str]:
@@ -98,6 +100,35 @@ def price(found: Tuned) -> list[str]:
     return [f"The tuned gains have their price, where they were tuned: {'; '.join(grown)}."] if grown else []
 
 
+def in_moves(found: Tuned) -> list[str]:
+    """How every loop begins, and what the gains do from one set point to another, which nothing was tuned on."""
+    cold = "Each of these loops is one step from the start, cold and at rest"
+    if found.moves is None:
+        return [f"{cold}: moves from one set point to another were not tried."]
+    moves = found.moves
+    ends = [f"{low:g}° to {high:g}°" for low, high in itertools.pairwise(moves.asked)]
+    overshoot, at = float(moves.overshoot[1].max()), ends[int(np.argmax(moves.overshoot[1]))]
+    never = int((~np.isfinite(moves.settling_time[1])).sum())
+    slowest = float(np.max(moves.settling_time[1], where=np.isfinite(moves.settling_time[1]), initial=0.0))
+    settled = f"{never} of {len(ends)} never settle" if never else f"all settle, in {digits(slowest, 3)} s at most"
+    limits = found.settings.limits
+    missed = [
+        word
+        for word, over in (
+            ("overshoot", overshoot > limits.get("overshoot", np.inf)),
+            ("settling time", (slowest if not never else np.inf) > limits.get("settling_time", np.inf)),
+            ("steady error", float(moves.steady_error[1].max()) > limits.get("steady_error", np.inf)),
+        )
+        if over
+    ]
+    broken_there = f": beyond the limit of {and_listed(missed)}" if missed else ""
+    return [
+        f"{cold}. In {counted(len(ends), 'move')} from one set point to another on the plant as believed, which nothing was "
+        f"tuned on, {settled}, and the largest overshoot is {digits(overshoot, 3)}° ({at}; {digits(float(moves.overshoot[0].max()), 3)}° "
+        f"with the preset's gains){broken_there}."
+    ]
+
+
 def conclusions(found: Tuned) -> list[str]:
     """What came out, in sentences that say no more than the numbers."""
     before, after = found.costs
@@ -124,10 +155,17 @@ def conclusions(found: Tuned) -> list[str]:
             told.append(
                 f"Loops that settle, {checked_on(found, name)}: {100 * settled[0]:.0f} % before, {100 * settled[1]:.0f} % after."
             )
+    told += in_moves(found)
     told += price(found)
     if edge := at_the_edge(found):
         told.append(f"At a bound of the box, beyond which better gains may lie: {', '.join(edge)}.")
-    descent = found.descent
+    descent, evolution = found.descent, found.evolution
+    if evolution.generations:
+        start, end = evolution.upto(1).costs[0, 0], float(found.costs[1])
+        told.append(
+            f"Slopes ended at a cost of {_ended(start, evolution.excesses[0, 0])}, the search without them at "
+            f"{_ended(end, found.excesses['tuned on'][1])}."
+        )
     told.append(
         f"It took {counted(found.simulations, 'closed loop')} in {counted(descent.round, 'round')} by slopes"
         + (f" and {counted(found.evolution.generations, 'generation')} without" if found.evolution.generations else "")
@@ -140,6 +178,10 @@ def conclusions(found: Tuned) -> list[str]:
         + "."
     )
     return told
+
+
+def _ended(cost: float, excess: float) -> str:
+    return digits(cost, 3) + (f" (a limit exceeded by {100.0 * excess:.2g} %)" if excess > 0.0 else "")
 
 
 def gain_rows(found: Tuned) -> list[list[str]]:
@@ -262,6 +304,7 @@ def record(found: Tuned, command: str) -> dict[str, Any]:
             }
             for name, one in found.checks.items()
         },
+        "moves": _moves(found.moves),
         "search": {
             "closed_loops": found.simulations,
             "rounds": descent.round,
@@ -277,6 +320,23 @@ def record(found: Tuned, command: str) -> dict[str, Any]:
         },
         "command": command,
         "made_with": made_with(),
+    }
+
+
+def _moves(moves: Moves | None) -> dict[str, Any] | None:
+    if moves is None:
+        return None
+    settled = np.where(np.isfinite(moves.settling_time), moves.settling_time, np.nan)
+    return {
+        "set_points_deg": moves.asked.tolist(),
+        **{
+            when: {
+                "overshoot_deg": moves.overshoot[k].tolist(),
+                "settling_time_s": settled[k].tolist(),
+                "steady_error_deg": moves.steady_error[k].tolist(),
+            }
+            for k, when in enumerate(("before", "after"))
+        },
     }
 
 

@@ -18,6 +18,7 @@ from smajax.tune.descent import Descent, begin, one_round
 from smajax.tune.evaluate import LOOPS, STEP, Rig, Seen
 from smajax.tune.evolve import Evolution, evolve
 from smajax.tune.members import Members, never_seen, tuned_on
+from smajax.tune.moves import Moves, moved
 from smajax.tune.objective import Goal, rank
 from smajax.tune.settings import TuneSettings
 
@@ -58,6 +59,7 @@ class Tuned:
     evolution: Evolution
     simulations: int  # closed loops of the search
     lines: Lines
+    moves: Moves | None
     air: float  # degC, as the controller believes it
 
     @property
@@ -147,6 +149,7 @@ def tune(
     table = parameters(rig.controller)
     tuned = Gains(settings.controller, best)
     lines = _lines(rig, settings, tuned, checks["inside"])
+    moves = moved(rig, (rig.controller, tuned.put(rig.system)), settings.set_points)
     progress("judging", 1.0)
     return Tuned(
         settings,
@@ -161,6 +164,7 @@ def tune(
         evolution,
         searched,
         lines,
+        moves,
         float(get_parameters(rig.system, [MISMATCHES["ambient"]])[0]),
     )
 

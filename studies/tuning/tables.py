@@ -98,25 +98,59 @@ def requirement_table(results: Mapping[str, Any]) -> str:
         if name not in results["requirement"]:
             continue
         one = results["requirement"][name]
-        after, alone = one["after"], one["after_on_the_plant_as_believed"]
-        cells = [name, "yes" if one["met"] else "no", f"{after['loops_that_meet_all']:,} of {after['loops']:,}"]
+        after, plant = one["after"], one["worst_plant"]
+        cells = [name, "yes" if one["met"] else "no"]
+        for part in ("after_at_the_corners", "after_on_plants_drawn", "after_on_the_plant_as_believed"):
+            cells.append(f"{one[part]['loops_that_meet_all']:,} of {one[part]['loops']:,}")
         for term in LIMITS:
             worst, at = after[term]["worst"], after[term]["at_deg"]
             cells.append(f"{'never' if worst is None else f'{worst:.3g}'} ({at:g}°)")
-        cells.append(f"{one['before']['loops_that_meet_all']:,}")
-        cells.append(f"{alone['loops_that_meet_all']} of {alone['loops']}")
+        ratios = ", ".join(f"{ratio:g}" for ratio in plant["ratios"].values())
+        cells.append(f"{plant['fails']} of {plant['of']} ({ratios})" if plant["fails"] else "none")
+        cells.append(f"{one['before']['loops_that_meet_all']:,} of {one['before']['loops']:,}")
+        cells.append(f"{one['closed_loops'] / 1e6:.2f}")
         rows.append(cells)
     head = [
         "controller",
         "met",
-        "loops that meet all three",
+        "corners, at set points not tuned",
+        "plants and set points drawn",
+        "plant as believed",
         "worst settling, s",
         "worst overshoot, °",
         "worst steady error, °",
+        "the corner that fails most (I, c, h_c)",
         "with the preset's gains",
-        "plant as believed",
+        "loops of the search, millions",
     ]
     return _table(head, rows)
+
+
+def finer_table(results: Mapping[str, Any]) -> str:
+    """A row a controller that comes near: its worst loops at a finer step."""
+    rows = []
+    for name in CONTROLLERS:
+        again = results["requirement"].get(name, {}).get("again_at_a_finer_step")
+        if again is None or again["failed_at_the_coarser_step"] == again["loops"]:
+            continue
+        rows.append(
+            [
+                name,
+                f"{again['failed_at_the_coarser_step']} of {again['loops']}",
+                f"{again['fail']}",
+                f"{100 * again['worst_exceeded_by_share']:+.3g} %",
+            ]
+        )
+    return _table(["controller", "of the worst loops fail at 5 ms", "at 1 ms", "the worst there, over its limit"], rows)
+
+
+def seconds(results: Mapping[str, Any]) -> str:
+    """What a search took, median over problems and seeds."""
+    of: dict[str, list[float]] = {}
+    for ways in by_problem(results).values():
+        for way, several in ways.items():
+            of.setdefault(way, []).extend(one["seconds"] for one in several)
+    return ", ".join(f"{way} {np.median(several):.3g} s" for way, several in of.items())
 
 
 def readme(results: Mapping[str, Any], words: str) -> str:
@@ -126,6 +160,8 @@ def readme(results: Mapping[str, Any], words: str) -> str:
         "VERDICT": verdict,
         "FIRST": first_below,
         "REQUIREMENT": requirement_table,
+        "FINER": finer_table,
+        "SECONDS": seconds,
     }
     for mark, made in parts.items():
         words = words.replace(f"<{mark}>", made(results))
