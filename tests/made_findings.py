@@ -105,6 +105,7 @@ def made_effect(name: str, title: str, equation: str, left_out: float, added: bo
             "score_statistic": 812.4 if added else 3.2,
             "score_p_value": 3.1e-88 if added else 0.21,
             "leave_one_out_rmse": left_out,
+            "leave_one_out_rmse_of_the_base_model": 0.9e-3,
             "leave_one_out_gain": 0.95 if added else NAN,
             "score_p_value_at_the_end": NAN if added else 2.0e-12,
         },
