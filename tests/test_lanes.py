@@ -210,8 +210,37 @@ def _uneven(a: jax.Array) -> jax.Array:
     return lax.while_loop(lambda at: at[0] > 2.0, smaller, (a, 0.5 * a))[1]
 
 
+def _begun_again(a: jax.Array) -> jax.Array:
+    """The innermost loop begins with what the outermost carries in every round of the one between."""
+
+    def between(p: jax.Array) -> Callable[[int, jax.Array], jax.Array]:
+        return lambda _, b: b + lax.fori_loop(0, 3, lambda _, c: 2.0 * c + b, p)
+
+    return lax.fori_loop(0, 2, lambda _, p: lax.fori_loop(0, 4, between(p), a), a)
+
+
+def _small(a: jax.Array) -> jax.Array:
+    """Truth values and whole numbers of one byte that live across phases beside each other."""
+
+    def moved(x: jax.Array, many: int) -> jax.Array:
+        for k in range(many):
+            x = jnp.where(x > 50.0, x - 50.0, x + k)
+        return x
+
+    asked = [a > 0.5 * k for k in range(4)]
+    x, small = moved(a, 80), []
+    for one in asked:
+        x = jnp.where(one, x + 1.0, x)
+        small.append(x.astype(jnp.int8))
+        x = moved(x, 3)
+    x = moved(x, 80)
+    return x + sum(one.astype(float) for one in small)
+
+
 @pytest.mark.parametrize(("vectors", "mask"), [(1, "i1"), (3, "i1"), (8, "i1"), (8, "i64")])
-@pytest.mark.parametrize("function", [_busy, _crosswise, _late, _uneven], ids=lambda one: one.__name__)
+@pytest.mark.parametrize(
+    "function", [_busy, _crosswise, _late, _uneven, _begun_again, _small], ids=lambda one: one.__name__
+)
 def test_phases_over_any_number_of_vectors_are_the_whole_program(function, vectors, mask):
     a = np.arange(150.0) % 41.0 - 3.0
     np.testing.assert_array_equal(by_lanes(function, a, vectors=vectors, mask=mask), by_xla(function, a))

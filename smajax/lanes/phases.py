@@ -184,8 +184,13 @@ def _blocks(items: Iterable[Item], most: int) -> tuple[list[_Block], list[tuple[
     return blocks, loops
 
 
-def _joined(left: Sequence[_Left], reads: Mapping[str, list[int]], cells: Mapping[str, str]) -> dict[str, str]:
-    """Cells of inner loops -> those of the outer ones that they take over and hand back: one place does for both."""
+def _joined(
+    left: Sequence[_Left], reads: Mapping[str, list[int]], loops: Sequence[tuple[int, int]], cells: Mapping[str, str]
+) -> dict[str, str]:
+    """Cells of inner loops -> those of the outer ones that they take over and hand back: one place does for both.
+
+    Not across a loop in between: its next round begins the inner one with the outer cell again.
+    """
     of: dict[str, list[_Left]] = {}
     for one in left:
         of.setdefault(one.cell, []).append(one)
@@ -197,7 +202,8 @@ def _joined(left: Sequence[_Left], reads: Mapping[str, list[int]], cells: Mappin
         back = of[outer][1].phase
         asked = [*reads.get(outer, []), *(one.phase for one in left if cells.get(one.value) == outer)]
         meanwhile = any(first.phase < number <= back for number in asked)
-        if first.phase < back and not meanwhile:
+        beside = all((begin <= first.phase < end) == (begin <= back < end) for begin, end in loops)
+        if first.phase < back and beside and not meanwhile:
             same[inner] = outer
     return same
 
@@ -224,8 +230,11 @@ def _lay_early(
             one.phase = early
 
 
-def _places(spans: Mapping[str, tuple[int, int]], sizes: Mapping[str, int]) -> tuple[dict[str, int], int]:
-    """Offsets of what lives from one phase to another, and bytes altogether; what is over makes room for what comes."""
+def _places(spans: Mapping[str, tuple[int, int]], sizes: Mapping[str, int], vectors: int) -> tuple[dict[str, int], int]:
+    """Offsets of what lives from one phase to another, and bytes altogether; what is over makes room for what comes.
+
+    sizes: bytes a vector. Only one of the same makes room: a vector's turn must not write where another's is still to be read.
+    """
     free: dict[int, list[int]] = {}
     living: list[str] = []
     found: dict[str, int] = {}
@@ -237,7 +246,7 @@ def _places(spans: Mapping[str, tuple[int, int]], sizes: Mapping[str, int]) -> t
         if free.get(sizes[name]):
             found[name] = free[sizes[name]].pop()
         else:
-            found[name], total = total, total + sizes[name]
+            found[name], total = total, total - (-sizes[name] * vectors // LINE) * LINE
         living.append(name)
     return found, total
 
@@ -265,7 +274,7 @@ def _settled(
                 found.setdefault(cells[name], []).append(number)
         return found
 
-    same = _joined(left, by_cell(names.cells), names.cells)
+    same = _joined(left, by_cell(names.cells), loops, names.cells)
 
     def root(cell: str) -> str:
         while cell in same:
@@ -307,8 +316,7 @@ def laid_out(items: Sequence[Item], names: Names, lanes: int, vectors: int, star
     """
     blocks, loops = _blocks(_needed(items, names.cells), MOST if vectors > 1 else len(items))
     names, spans = _settled([phase for block in blocks for phase in block.phases], loops, names)
-    sizes = {name: -(-names.kept[name].size * vectors // LINE) * LINE for name in spans}
-    places, total = _places(spans, sizes)
+    places, total = _places(spans, {name: names.kept[name].size for name in spans}, vectors)
     places = {name: start + at for name, at in places.items()}
 
     lines: list[str] = []
@@ -360,7 +368,7 @@ def _written(phase: _Phase, number: int, before: str, names: Names, lanes: int, 
         lines.append(f"  {base} = getelementptr inbounds i8, ptr %scratch, i64 {places[name]}")
         lines.append(f"  {where} = getelementptr inbounds [{names.kept[name].size} x i8], ptr {base}, i64 {turn}")
         size = names.kept[name].size
-        return f"ptr {where}, align {size & -size}"
+        return f"ptr {where}, align {min(size & -size, LINE)}"
 
     for k, name in enumerate(phase.loads):
         cell = names.cells.get(name, name)
