@@ -72,7 +72,7 @@ class TuneSettings:
             raise ValueError(f"the check needs at least one plant, not {self.unseen}.")
         _ = self.goal, self.effort  # they check themselves
 
-    def plants_in_words(self, air: float) -> str:
+    def plants_in_words(self, air: float = 20.0) -> str:
         """On which plants gains are tuned. `air`: degC as believed, of which a share is told in kelvins."""
         sizes = {name: f"{100 * share:g} %" for name, share in self.variation.items()}
         if "ambient" in sizes:
