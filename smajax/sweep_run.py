@@ -42,6 +42,7 @@ from smajax.sweep_report import (
     write_rows,
 )
 from smajax.system import System
+from smajax.words import aligned
 
 LINES = (0.5, 0.8, 1.0, 1.25, 2.0)  # mismatches drawn over time
 LINE_TARGET = 40.0  # deg
@@ -257,6 +258,4 @@ def as_text(rows: Sequence[Sequence[str]]) -> str:
         "switches/s",
         "peak °C",
     ]
-    table = [head, *rows]
-    widths = [max(len(row[column]) for row in table) for column in range(len(head))]
-    return "\n".join("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)) for row in table)
+    return "\n".join(aligned([head, *rows]))

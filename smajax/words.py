@@ -22,3 +22,10 @@ def and_listed(names: Sequence[str]) -> str:
         return names[0] if names else "nothing"
     between = "; " if any("," in name for name in names) else ", "
     return f"{between.join(names[:-1])} and {names[-1]}"
+
+
+def aligned(rows: Sequence[Sequence[str]], right: bool = False) -> list[str]:
+    """Lines of a table for a terminal, columns of one width."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    side = str.rjust if right else str.ljust
+    return ["  ".join(map(side, row, widths)) for row in rows]

@@ -20,6 +20,7 @@ from smajax.tune import evaluate
 from smajax.tune.evaluate import STEP, Rig
 from smajax.tune.members import tuned_on
 from tests.test_every_effect import RIGS, _rig
+from tests.test_lanes import same_batch
 
 pytestmark = pytest.mark.slow
 MEMBERS, SAMPLES, DT = 37, 120, 0.05  # members fill no vector and no group of vectors
@@ -43,25 +44,17 @@ def both(rig: str, effects: tuple[str, ...], tolerance: float | None) -> tuple[A
     )
 
 
-def same(ours: Any, theirs: Any, share: float) -> None:
-    assert set(ours) == set(theirs)
-    for name in KEEP:
-        scale = float(np.abs(theirs[name]).max())
-        np.testing.assert_allclose(ours[name], theirs[name], rtol=0.0, atol=share * scale, err_msg=name)
-    np.testing.assert_array_equal(ours["status"], theirs["status"])
-
-
 HERE = [name for name in sorted(LIBRARY) if any(LIBRARY[name].applies(system) for system, *_ in RIGS.values())]
 
 
 @pytest.mark.parametrize("effect", HERE)
-def test_every_effect_is_that_of_xla(effect: str) -> None:
-    same(*both(_rig(effect), (effect,), None), 1e-9)
+def test_a_batch_with_each_effect_is_that_of_xla(effect: str) -> None:
+    same_batch(*both(_rig(effect), (effect,), None), 1e-9)
 
 
 @pytest.mark.parametrize("rig", sorted(RIGS))
 def test_steps_of_their_own_are_those_of_xla(rig: str) -> None:
-    same(*both(rig, (), 1e-4), 1e-6)
+    same_batch(*both(rig, (), 1e-4), 1e-6)
 
 
 @pytest.mark.parametrize("controller", sorted(CONTROLLERS))

@@ -20,6 +20,8 @@ from smajax.command.base import (
     within,
 )
 
+SHOWN = 7  # columns of a table of set points on a terminal
+
 
 def _texts(option: str, several: Sequence[str] | None) -> dict[str, str]:
     """`NAME=TEXT`, given once or more."""
@@ -30,9 +32,6 @@ def _texts(option: str, several: Sequence[str] | None) -> dict[str, str]:
             raise typer.BadParameter(f"each name once, as in `name=text`, not `{part}`", param_hint=option)
         found[name.strip()] = text.strip()
     return found
-
-
-SHOWN = 7  # columns of a table of set points on a terminal
 
 
 def simulate(
@@ -130,6 +129,7 @@ def simulate(
     from smajax.report.simulate_page import OWN, merit_rows, mismatch_rows, record, rest_rows, summary_rows, write_run
     from smajax.single import Asked, AskedLoop, channels, run_closed, run_open
     from smajax.units import UnitError, parse_quantity
+    from smajax.words import aligned
 
     check_path(out)
     series, closed = _texts("--input", inputs), gains is not None or bool(controller)
@@ -205,13 +205,11 @@ def simulate(
             typer.echo(f"  {row[0]:<28} believed {row[1]} -> true {row[2]} {row[3]}")
         for row in merit_rows(ran):
             typer.echo(f"  {row[0]:<28} {row[1]} {row[2]}")
-        table = rest_rows(ran)
-        if table[1]:
+        head, rows = rest_rows(ran)
+        if rows:
             # The first few; the page has all.
-            lines = [row[:SHOWN] for row in (table[0], *table[1])]
-            widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
-            for line in lines:
-                typer.echo("  " + "  ".join(cell.rjust(width) for cell, width in zip(line, widths, strict=True)))
+            for line in aligned([row[:SHOWN] for row in (head, *rows)], right=True):
+                typer.echo(f"  {line}")
         typer.echo(f"Page: {page.resolve()}")
     if open_page:
         browse(page)

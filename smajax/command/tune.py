@@ -96,7 +96,8 @@ def tune(
 ) -> None:
     """Tune the gains of a controller of the arm, on many set points and plants at once: by gradient, then without slopes.
 
-    Each loop is one step from the start, cold and at rest; moves between the set points are tried in the end and told. Variations: inertia, damping, convection, ambient, payload, supply. The gains are checked on plants and set points that
+    Each loop is one step from the start, cold and at rest; moves between the set points are tried in the end and told.
+    Variations: inertia, damping, convection, ambient, payload, supply. The gains are checked on plants and set points that
     tuning never saw. `smajax sweep --gains tune/gains.json` reads them. Exit code 3 when a limit is not met. Ctrl-C loses
     the round or generation under way alone: the same command goes on.
 

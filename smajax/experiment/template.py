@@ -54,10 +54,11 @@ def _model(found: dict[str, Column], load: str = "") -> _Model:
     guessed = _guessed(found)
     if load in ("", guessed.load):
         return guessed
-    if guessed.output != "position" or load not in POSITIONED:
+    fitting = list(POSITIONED) if guessed.output == "position" else [guessed.load]
+    if load not in fitting:
         raise MeasuredDataError(
             f"the load {load!r} does not go with these columns, which have a reading of {guessed.output}: "
-            f"{' or '.join(POSITIONED) if guessed.output == 'position' else guessed.load} does"
+            f"{' or '.join(fitting)} does"
         )
     return replace(
         guessed, wire=POSITIONED[load], load=load, inputs=guessed.inputs[:1], why="the load that was asked for"
@@ -300,13 +301,14 @@ def begun(files: Sequence[Path], target: Path, title: str = "", load: str = "") 
             *_channel(one.quantity, role, one, variable[one.quantity], True),
             "",
         ]
-    if len(logs.runs) >= HELD_OUT_FROM:
-        told.append(f"held out: the last run, {logs.runs[-1].name}; another one by its `role` in [[runs]]")
+    held_out = logs.runs[-1] if len(logs.runs) >= HELD_OUT_FROM else None
+    if held_out is not None:
+        told.append(f"held out: the last run, {held_out.name}; another one by its `role` in [[runs]]")
     lines += ["[data]", f"folder = {json.dumps(str(folder), ensure_ascii=False)}", ""]
     base = (target.resolve().parent / folder).resolve()
     used_here = [name for name in (*model.inputs, model.output) if name in found]
-    for number, run in enumerate(logs.runs):
-        role = "held-out" if len(logs.runs) >= HELD_OUT_FROM and number == len(logs.runs) - 1 else "fit"
+    for run in logs.runs:
+        role = "held-out" if run is held_out else "fit"
         inside = [json.dumps(str(file.resolve().relative_to(base)), ensure_ascii=False) for file in run.files]
         by_channel = ", ".join(f"{name} = {inside[kind_of[name]]}" for name in used_here)
         lines += [

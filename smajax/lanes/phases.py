@@ -184,6 +184,11 @@ def _blocks(items: Iterable[Item], most: int) -> tuple[list[_Block], list[tuple[
     return blocks, loops
 
 
+def _beside(one: int, other: int, loops: Sequence[tuple[int, int]]) -> bool:
+    """Whether two phases lie in the same loops."""
+    return all((begin <= one < end) == (begin <= other < end) for begin, end in loops)
+
+
 def _joined(
     left: Sequence[_Left], reads: Mapping[str, list[int]], loops: Sequence[tuple[int, int]], cells: Mapping[str, str]
 ) -> dict[str, str]:
@@ -202,8 +207,7 @@ def _joined(
         back = of[outer][1].phase
         asked = [*reads.get(outer, []), *(one.phase for one in left if cells.get(one.value) == outer)]
         meanwhile = any(first.phase < number <= back for number in asked)
-        beside = all((begin <= first.phase < end) == (begin <= back < end) for begin, end in loops)
-        if first.phase < back and beside and not meanwhile:
+        if first.phase < back and _beside(first.phase, back, loops) and not meanwhile:
             same[inner] = outer
     return same
 
@@ -224,8 +228,7 @@ def _lay_early(
             asked.setdefault(cells[one.value], []).append(one.phase)
     for one in left:
         early, late = made.get(one.value, one.phase), one.phase
-        beside = all((begin <= early < end) == (begin <= late < end) for begin, end in loops)
-        beside &= phases[early].chosen == phases[late].chosen
+        beside = _beside(early, late, loops) and phases[early].chosen == phases[late].chosen
         if beside and sum(early < at <= late for at in asked[one.cell]) == int(early < late):
             one.phase = early
 

@@ -304,17 +304,17 @@ class _Translation:
         kind = scalar_type(dtype)
         if dtype == "bool":
             raise Unsupported("truth values looked up in a table")
-        offsets, of, lines = low.name, text.vector("int64"), []
+        offsets, of = low.name, text.vector("int64")
         base, places = text.fresh("p"), text.fresh("p")
         if stored.own:
             # Member k's own number lies at index * room + k.
             own = ", ".join(f"i64 {k}" for k in range(text.lanes))
             scaled = text.lane(f"mul {of} {offsets}, {text.constant(text.room, 'int64').name}", "int64")
             offsets = text.lane(f"add {of} {scaled.name}, <{own}>", "int64").name
-            lines.append(f"{base} = getelementptr {kind}, ptr {stored.address}, i64 %at")
-        else:
-            lines.append(f"{base} = getelementptr {kind}, ptr {stored.address}, i64 0")
-        lines.append(f"{places} = getelementptr {kind}, ptr {base}, {of} {offsets}")
+        lines = [
+            f"{base} = getelementptr {kind}, ptr {stored.address}, i64 {'%at' if stored.own else 0}",
+            f"{places} = getelementptr {kind}, ptr {base}, {of} {offsets}",
+        ]
         name = f"llvm.masked.gather.v{text.lanes}{text.suffix(dtype)}.v{text.lanes}p0"
         pointers = f"<{text.lanes} x ptr>"
         text.declare(name, text.vector(dtype), [pointers, text.vector("bool"), text.vector(dtype)])
@@ -473,7 +473,8 @@ def translate(
 ) -> Translated:
     """`program` is `jax.make_jaxpr` of one member; `own[k]` says whether argument k differs from member to member.
 
-    Such an argument is a number. `estimates`: 1/x by AVX-512's estimate. Raises Unsupported with what cannot be translated.
+    Such an argument is a number. `estimates`: 1/x by AVX-512's estimate. `vectors`: of a
+    group, at most. `mask`: LLVM's kind of a truth value in memory. Raises Unsupported with what cannot be translated.
     """
     text = Text(lanes, estimates, vectors, mask)
     put = _Translation(text)

@@ -67,8 +67,7 @@ def moved(rig: Rig, pair: Sequence[AbstractController], set_points: Sequence[flo
         )
         several.append(merit_by_set_point(ran, rig.system)[1:])
 
-    def of(name: str, scale: float = 1.0) -> np.ndarray:
-        return scale * np.asarray([[float(getattr(one.merit, name)) for one in rests] for rests in several])
+    def of(name: str) -> np.ndarray:
+        return np.asarray([[float(getattr(one.merit, name)) for one in rests] for rests in several])
 
-    degrees = 180.0 / np.pi
-    return Moves(np.asarray(asked), of("overshoot", degrees), of("settling_time"), of("steady_error", degrees))
+    return Moves(np.asarray(asked), np.degrees(of("overshoot")), of("settling_time"), np.degrees(of("steady_error")))

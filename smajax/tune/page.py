@@ -161,14 +161,14 @@ def conclusions(found: Tuned) -> list[str]:
         told.append(f"At a bound of the box, beyond which better gains may lie: {', '.join(edge)}.")
     descent, evolution = found.descent, found.evolution
     if evolution.generations:
-        start, end = evolution.upto(1).costs[0, 0], float(found.costs[1])
+        # It begins with where slopes have ended.
         told.append(
-            f"Slopes ended at a cost of {_ended(start, evolution.excesses[0, 0])}, the search without them at "
-            f"{_ended(end, found.excesses['tuned on'][1])}."
+            f"Slopes ended at a cost of {_ended(evolution.costs[0, 0], evolution.excesses[0, 0])}, the search without them at "
+            f"{_ended(found.costs[1], found.excesses['tuned on'][1])}."
         )
     told.append(
         f"It took {counted(found.simulations, 'closed loop')} in {counted(descent.round, 'round')} by slopes"
-        + (f" and {counted(found.evolution.generations, 'generation')} without" if found.evolution.generations else "")
+        + (f" and {counted(evolution.generations, 'generation')} without" if evolution.generations else "")
         + (
             f"; {descent.wild:,} loops had slopes of no use (a limit cycle multiplies every difference)"
             if descent.wild

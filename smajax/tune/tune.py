@@ -115,7 +115,8 @@ def tune(
         keep(now)
     progress(what, 1.0)
     progress("judging", 0.0)
-    # Rounds judge at the step of tuning; of what they leave the best at a finer one is taken. The preset and what was begun from are among them.
+    # Rounds judge at the step of tuning; of what they leave the best at a finer one is taken. The preset and what was begun
+    # from are among them.
     begun = (rig.point(settings.start),) if settings.start else ()
     best = _best_of(rig, goal, members, (rig.before, *begun, *now.best))
     progress("judging", 1.0)
@@ -171,7 +172,7 @@ def tune(
 
 def _best_of(rig: Rig, goal: Goal, members: Members, points: Sequence[np.ndarray]) -> dict[str, float]:
     """The gains of the best of points of the cube, as a file would hold them."""
-    ends = np.stack([rig.point(rig.gains(point)) for point in points])
+    ends = rig.held(np.stack(points))
     judged = rig.judged(ends, members).judged
     return rig.gains(ends[int(np.argmin(rank(goal.cost(judged, members), goal.excess(judged))))])
 

@@ -11,7 +11,6 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import time
 from collections.abc import Callable
 from functools import partial
 from importlib.metadata import version
@@ -22,6 +21,7 @@ import numpy as np
 
 from smajax import explicit_arm as equations
 from studies.benchmarks.given import Given, load
+from studies.benchmarks.timed import timed
 
 # Relative and absolute, from the loosest on.
 TOLERANCES = (1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6, 3e-7, 1e-7)
@@ -103,23 +103,20 @@ def _over_blocks(solve: Solve, block: int, cores: int) -> Any:
 
 def _timed(given: Given, found: dict[str, Any], block: int, cores: int, count: int, kept: bool) -> dict[str, Any]:
     """Milliseconds of wall clock a trajectory, best of some repeats; the compilation in seconds."""
-    import jax
-
     solve = _one(given, found["solver"], found["adaptive"], kept)
     whole = block * cores
     count = max(1, count // whole) * whole
     members = np.resize(given.voltage, count), np.resize(given.payload_mass, count)
     asked = (found["setting"], *members)
-    begin = time.perf_counter()
-    run = _over_blocks(solve, block, cores).lower(*asked).compile()
-    compiled = time.perf_counter() - begin
-    times = []
-    for _ in range(REPEATS):
-        begin = time.perf_counter()
-        jax.block_until_ready(run(*asked))
-        times.append(time.perf_counter() - begin)
-    each = 1e3 * min(times) / count
-    return {"block": block, "members": count, "cores": cores, "ms_per_trajectory": each, "compile_s": compiled}
+    measured = timed(_over_blocks(solve, block, cores), REPEATS, *asked)
+    each = 1e3 * measured.seconds / count
+    return {
+        "block": block,
+        "members": count,
+        "cores": cores,
+        "ms_per_trajectory": each,
+        "compile_s": measured.compile_s,
+    }
 
 
 def _tried(given: Given, solver: str, adaptive: bool, cores: int) -> dict[str, Any]:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -29,23 +28,10 @@ from smajax.runtime import prepare
 from smajax.simulate import DEFAULT_STEP
 from smajax.system import System
 from studies.benchmarks import tracking
+from studies.benchmarks.timed import timed
 
 REPEATS = 3
 LONGEST_REPEATED = 20000  # steps
-
-
-def _timed(name: str, function: Callable[..., Any], repeats: int, *given: Any) -> dict[str, float]:
-    begin = time.perf_counter()
-    made = jax.jit(function).lower(*given).compile()
-    compiled = time.perf_counter() - begin
-    times = []
-    for _ in range(repeats):
-        begin = time.perf_counter()
-        jax.block_until_ready(made(*given))
-        times.append(time.perf_counter() - begin)
-    room = made.memory_analysis()
-    used = room.temp_size_in_bytes / 1e6 if room else float("nan")
-    return {f"{name}_s": min(times), f"{name}_compile_s": compiled, f"{name}_memory_MB": used}
 
 
 def _cost_of(system: System, names: tuple[str, ...], steps: int) -> Callable[[jax.Array, jax.Array], jax.Array]:
@@ -76,11 +62,13 @@ def run(steps: int, members: int, forward: bool) -> dict[str, Any]:
 def _compared(
     cost: Callable[..., jax.Array], at: jax.Array, volts: jax.Array, repeats: int, forward: bool
 ) -> dict[str, float]:
-    told = _timed("cost", jax.vmap(cost, (None, 0)), repeats, at, volts)
-    told |= _timed("gradient", jax.vmap(jax.grad(cost), (None, 0)), repeats, at, volts)
+    def measured(name: str, function: Callable[..., jax.Array]) -> dict[str, float]:
+        return timed(jax.jit(jax.vmap(function, (None, 0))), repeats, at, volts).named(name)
+
+    told = measured("cost", cost) | measured("gradient", jax.grad(cost))
     told["gradient_over_cost"] = told["gradient_s"] / told["cost_s"]
     if forward:
-        told |= _timed("jacobian", jax.vmap(jax.jacfwd(cost), (None, 0)), repeats, at, volts)
+        told |= measured("jacobian", jax.jacfwd(cost))
         told["jacobian_over_cost"] = told["jacobian_s"] / told["cost_s"]
     return told
 

@@ -22,6 +22,7 @@ import numpy as np
 
 from smajax.runtime import prepare
 from studies.benchmarks import tracking
+from studies.benchmarks.timed import timed
 from studies.benchmarks.tracking import Tracking, load
 
 TOLERANCES = (1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6, 3e-7, 1e-7)
@@ -42,23 +43,6 @@ def _first_line(error: Exception) -> str:
 
 def _not_accurate(off: float) -> str:
     return f"not accurate at any tolerance to {TOLERANCES[-1]:g}: at best off by {off:.2g} of the gradient's norm"
-
-
-def _timed(name: str, function: Callable[..., Any], *given: Any) -> dict[str, float]:
-    """As in `gradient.py`."""
-    import jax
-
-    begin = time.perf_counter()
-    made = jax.jit(function).lower(*given).compile()
-    compiled = time.perf_counter() - begin
-    times = []
-    for _ in range(REPEATS):
-        begin = time.perf_counter()
-        jax.block_until_ready(made(*given))
-        times.append(time.perf_counter() - begin)
-    room = made.memory_analysis()
-    used = room.temp_size_in_bytes / 1e6 if room else float("nan")
-    return {f"{name}_s": min(times), f"{name}_compile_s": compiled, f"{name}_memory_MB": used}
 
 
 def _diffrax_cost(given: Tracking, solver: str, adjoint: str) -> Callable[[Any, Any, Any], Any]:
@@ -109,7 +93,8 @@ def _by_diffrax(given: Tracking, solver: str, adjoint: str) -> dict[str, Any]:
             return {**named, "reason": _not_accurate(min(off))}
         found: dict[str, Any] = {**named, "setting": tolerance, "gradient_error": off[-1]}
         at = given.vector, given.voltage, tolerance
-        found |= _timed("cost", cost, *at) | _timed("gradient", slopes, *at)
+        found |= timed(jax.jit(cost), REPEATS, *at).named("cost")
+        found |= timed(jax.jit(slopes), REPEATS, *at).named("gradient")
     except Exception as error:  # one that does not work is no reason to lose the others
         return {**named, "reason": _first_line(error)}
     return {**found, "gradient_over_cost": found["gradient_s"] / found["cost_s"]}
@@ -183,8 +168,8 @@ def _by_gradsolve(given: Tracking, engine: str) -> dict[str, Any]:
             begin = time.perf_counter()
             run, p = replayed(given.voltage, tolerance)
             recording.append(time.perf_counter() - begin)
-        found |= _timed("cost", run, p)
-        found |= _timed("gradient", slopes(run), p)
+        found |= timed(jax.jit(run), REPEATS, p).named("cost")
+        found |= timed(jax.jit(slopes(run)), REPEATS, p).named("gradient")
     except Exception as error:
         return {**named, "reason": _first_line(error)}
     return {**found, "record_s": min(recording), "gradient_over_cost": found["gradient_s"] / found["cost_s"]}
