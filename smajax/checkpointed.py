@@ -9,9 +9,24 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 from jax import lax
+from jax.ad_checkpoint import checkpoint_name
 
 # A segment may be this many times longer or shorter than the best one, to divide the steps evenly.
 UNEVEN = 2.0
+SOLVED = "solved"
+
+
+def solved(tree: Any) -> Any:
+    """`tree`, the outcome of an iteration that `recomputed` is not to do again."""
+    return jax.tree.map(lambda one: checkpoint_name(one, SOLVED), tree)
+
+
+def recomputed(body: Callable[..., Any]) -> Callable[..., Any]:
+    """`body`, of which a reverse-mode derivative keeps what it began with and what was `solved` in it, and nothing else.
+
+    To compute the rest again is quicker than to fetch it from where it would be kept.
+    """
+    return jax.checkpoint(body, prevent_cse=False, policy=jax.checkpoint_policies.save_only_these_names(SOLVED))
 
 
 def segment_of(length: int, weight: int = 1) -> int:

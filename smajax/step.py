@@ -26,6 +26,7 @@ import jax
 import jax.numpy as jnp
 from jax import lax
 
+from smajax.checkpointed import recomputed, solved
 from smajax.load.base import AbstractMovingLoad
 from smajax.load.coupon import Coupon, StrainCoupon
 from smajax.reading import followed, reading_of, time_constant
@@ -94,13 +95,10 @@ def _solved_jvp(primals, tangents):  # type: ignore[no-untyped-def]  # the signa
 
 
 def _differentiable(given: tuple[System, Stage, Inputs]) -> Solution:
-    """The same, and one linear correction: its derivatives, the second too, are then those of the equations' root.
-
-    Only where a derivative is asked for: what the solver leaves is of the size of its tolerance squared.
-    """
+    """The same, with the derivatives of the equations' root, to the size of the solver's tolerance squared."""
     system, stage, inputs = given
     wire, effects, old = system.wire, system.effects, stage.old.wire
-    found = solve(_held(system), _held(stage), _held(dict(inputs)))
+    found = solved(solve(_held(system), _held(stage), _held(dict(inputs))))
 
     def all_four(z: Unknowns) -> Unknowns:
         missed = equations(system, stage, inputs, z)
@@ -112,12 +110,9 @@ def _differentiable(given: tuple[System, Stage, Inputs]) -> Solution:
         columns = [g(Unknowns(*(one if k == at else zero for k in range(4)))) for at in range(4)]
         return Unknowns(*solved_linear(list(zip(*columns, strict=True)), list(asked))[0])
 
-    def corrected(f: Callable[[Unknowns], Unknowns], rough: Unknowns) -> Unknowns:
-        missed, along = jax.linearize(f, rough)
-        change = linear(along, missed)
-        return Unknowns(*(value - step for value, step in zip(rough, change, strict=True)))
-
-    return Solution(lax.custom_root(all_four, found.z, corrected, linear), found.branch, found.free)
+    # It is the root already.
+    z = lax.custom_root(all_four, found.z, lambda _, root: root, linear)
+    return Solution(z, found.branch, found.free)
 
 
 def _ended(system: System, stage: Stage, inputs: Inputs) -> tuple[WireState, Scalar, Scalar]:
@@ -180,7 +175,7 @@ def _moving_step(
     times = jnp.stack([state.time + share * dt for share in (*scheme.ends[1:], 1.0)])
     shares = [jnp.stack([share * dt for share in row]) for row in (scheme.moved, scheme.later_moved, scheme.compared)]
     none = [0.0 * one for one in start]  # with a derivative, as in `simulate`
-    end, _ = lax.scan(body, _Bases(first, list(start), none), (times, *shares))
+    end, _ = lax.scan(recomputed(body), _Bases(first, list(start), none), (times, *shares))
     old = end.stage.old
     heat, position, velocity = end.error
     return State(end.stage.time, old.wire, old.motion, old.reading, old.sensor), (heat, position, velocity)

@@ -11,9 +11,10 @@ from jax import lax
 
 from smajax.adaptive import advance
 from smajax.checkpointed import checkpointed_scan
+from smajax.experiment.catalogue import INPUT_UNITS
 from smajax.load.coupon import AbstractCoupon
 from smajax.measure import SHOWN, AbstractMeasure, value_of
-from smajax.parameters import set_parameters
+from smajax.parameters import get_parameters, parameters, set_parameters
 from smajax.recorded import acting_inputs
 from smajax.step import step
 from smajax.system import System, initial_state
@@ -23,6 +24,7 @@ from smajax.types import Scalar, Series, State
 GOOD, NOT_FINITE, RUNAWAY = 0, 1, 2
 HOTTEST = 3000.0  # C: no wire is hotter, it has molten long before
 COLDEST = -273.15  # C
+DIFFERENCES = {"degC": "K", "-": "1"}
 Values = dict[str, Scalar]
 
 
@@ -39,6 +41,7 @@ class Recipe(eqx.Module):
     steps: int = eqx.field(static=True)
     every: int = eqx.field(static=True)  # one state in so many is kept
     keep: tuple[str, ...] = eqx.field(static=True)  # of `measure.SHOWN`, over time
+    slopes: tuple[str, ...] = eqx.field(static=True, default=())  # parameters and varied inputs to differentiate by
 
     def units(self) -> dict[str, str]:
         """Of everything that a member gives."""
@@ -46,6 +49,11 @@ class Recipe(eqx.Module):
         per = {"velocity": f"{own}/s"}
         found = {name: SHOWN[name] or per.get(name, own) for name in self.keep}
         found |= {one.name: one.unit or own for one in self.measures}
+        table = parameters(self.system)
+        for one in self.measures:
+            for name in self.slopes:
+                below = table[name].unit if name in table else INPUT_UNITS[name]
+                found[slope_name(one.name, name)] = _per(one.unit or own, below)
         return found | {"status": "-", "first_bad_time": "s"}
 
 
@@ -56,11 +64,43 @@ def _wrong(state: State) -> tuple[Scalar, Scalar]:
     return ~jnp.isfinite(total), (wire.temperature > HOTTEST) | (wire.temperature < COLDEST)
 
 
+def slope_name(measure: str, name: str) -> str:
+    """Of the derivative of a measure by a parameter or an input, in a result."""
+    return f"{measure}_by_{name}"
+
+
+def _per(above: str, below: str) -> str:
+    """The unit of a slope: of differences, which in temperature are kelvins."""
+    above, below = (DIFFERENCES.get(one, one) for one in (above, below))
+    return above if below == "1" else f"{above}/{below if below.isalpha() else f'({below})'}"
+
+
 def member(recipe: Recipe, values: Values) -> dict[str, jax.Array]:
     """Simulate one member. Kept values are arrays (steps // every + 1,), everything else is a number.
 
-    Pure: `jit`, `vmap` and differentiate it as you like.
+    Pure: `jit`, `vmap` and differentiate it as you like. The slopes that the recipe asks for are found backwards through
+    the run, whatever their number, once for every measure.
     """
+    if not recipe.slopes:
+        return _run(recipe, values)
+    at = {
+        name: values[name] if name in values else get_parameters(recipe.system, [name])[0] for name in recipe.slopes
+    }
+    names = [one.name for one in recipe.measures]
+
+    def measured(at: Values) -> tuple[tuple[Scalar, ...], dict[str, jax.Array]]:
+        found = _run(recipe, values | at)
+        return tuple(found[name] for name in names), found
+
+    _, back, found = jax.vjp(measured, at, has_aux=True)
+    for number, name in enumerate(names):
+        weights = tuple(jnp.asarray(float(k == number)) for k in range(len(names)))
+        (slopes,) = back(weights)
+        found |= {slope_name(name, by): slope for by, slope in slopes.items()}
+    return found
+
+
+def _run(recipe: Recipe, values: Values) -> dict[str, jax.Array]:
     own = {name: value for name, value in values.items() if name not in recipe.channels}
     system = set_parameters(recipe.system, own)
     constants = recipe.constants | {name: values[name] for name in recipe.channels}

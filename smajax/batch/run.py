@@ -21,7 +21,7 @@ from smajax.load.coupon import AbstractCoupon
 from smajax.machine import available_memory
 from smajax.measure import SHOWN, AbstractMeasure
 from smajax.measured.names import listed
-from smajax.parameters import check_bounds, parameters
+from smajax.parameters import Parameter, check_bounds, parameters
 from smajax.simulate import DEFAULT_STEP, check_scalars
 from smajax.system import System
 from smajax.types import Series
@@ -48,6 +48,7 @@ def recipe_of(
     keep: Sequence[str] = KEPT,
     measures: Sequence[AbstractMeasure] = (),
     tolerance: float | None = None,
+    slopes: Sequence[str] = (),
 ) -> Recipe:
     """What `run_batch` runs. Raises ValueError naming what does not fit together."""
     if not axes.names:
@@ -104,6 +105,7 @@ def recipe_of(
             f"`tolerance` is a share of 1 C and of 1 % strain a step, for a load that moves; got {tolerance} and "
             f"{type(load).__name__}. Take 1e-4, or leave it out."
         )
+    _check_slopes(slopes, table, channels, names, tolerance)
     return Recipe(
         system=system,
         series=series,
@@ -115,7 +117,32 @@ def recipe_of(
         steps=steps,
         every=every,
         keep=tuple(keep),
+        slopes=tuple(slopes),
     )
+
+
+def _check_slopes(
+    slopes: Sequence[str],
+    table: Mapping[str, Parameter],
+    channels: Sequence[str],
+    measures: Sequence[str],
+    tolerance: float | None,
+) -> None:
+    wrong = [name for name in slopes if name not in table and name not in channels]
+    if wrong:
+        raise ValueError(
+            f"`slopes` names parameters ({listed(sorted(table))}) or inputs that `axes` vary ({listed(sorted(channels))}), "
+            f"not {listed(wrong)}. An input that is the same for all may be an axis of one value."
+        )
+    if len(set(slopes)) < len(slopes):
+        raise ValueError(f"`slopes` names something twice: {listed(slopes)}.")
+    if slopes and not measures:
+        raise ValueError("`slopes` are those of measures: give `measures`, as `smajax.measure.MeanSquare`.")
+    if slopes and tolerance is not None:
+        raise ValueError(
+            "slopes are found backwards through fixed steps, and a `tolerance` makes their number hang on the parameters: "
+            "leave `tolerance` out, or `slopes`."
+        )
 
 
 def run_batch(
@@ -129,6 +156,7 @@ def run_batch(
     keep: Sequence[str] = KEPT,
     measures: Sequence[AbstractMeasure] = (),
     tolerance: float | None = None,
+    slopes: Sequence[str] = (),
     budget: int = BUDGET,
     out: Path | str | None = None,
     devices: Sequence[jax.Device] | None = None,
@@ -144,7 +172,11 @@ def run_batch(
     With a `tolerance` a run takes as many steps between two samples, `dt` apart, as its error asks for: with 1e-4 (of 1 C and
     of 1 % strain, a step) and samples of 50 ms the worst members are more accurate than with fixed steps of 5 ms, typical
     ones less (to 1e-3 degrees), and it is several times as fast; an end stop met at speed is no better. Then measures see
-    the samples only, and there is no reverse-mode gradient.
+    the samples only, and there are no slopes.
+
+    `slopes` names parameters, and inputs of `axes`: the result then has the derivative of every measure by each of them, as
+    `mean_square_position_by_wire_diameter`. They are found backwards through the run (reverse mode): for all parameters
+    together they take less than four times as long as the run, and memory that grows as the square root of its steps.
 
     The result has the dimensions of `axes` and `time`, `status` (0 good, 1 a number that is none, 2 runaway heat) and
     `first_bad_time`. Results take a quarter of `budget` bytes at a time, or of half of the memory that is left. With `out` they are streamed to a Zarr group
@@ -157,7 +189,16 @@ def run_batch(
     Raises ValueError for what does not fit together, a parameter of `system` out of its bounds, and when `out` holds another batch.
     """
     recipe = recipe_of(
-        system, inputs, axes, seconds=seconds, dt=dt, every=every, keep=keep, measures=measures, tolerance=tolerance
+        system,
+        inputs,
+        axes,
+        seconds=seconds,
+        dt=dt,
+        every=every,
+        keep=keep,
+        measures=measures,
+        tolerance=tolerance,
+        slopes=slopes,
     )
     several = tuple(devices or jax.local_devices())
     size = chunk_size(member, recipe, axes, within_memory(budget), several)

@@ -252,6 +252,14 @@ def _same(text: Text, out: str, one: Lane, **_: Any) -> Lane:
     return one
 
 
+def _as_precise(text: Text, out: str, one: Lane, exponent_bits: int, mantissa_bits: int, **_: Any) -> Lane:
+    """What a derivative says of numbers that it computes again: no more digits than they had."""
+    whole = np.finfo(out)
+    if exponent_bits < whole.nexp or mantissa_bits < whole.nmant:
+        raise Unsupported(f"numbers of {exponent_bits} and {mantissa_bits} bits")
+    return one
+
+
 ELEMENTWISE: Mapping[str, Operation] = {
     "add": _binary("fadd", "add"),
     "add_any": _binary("fadd", "add"),
@@ -300,6 +308,7 @@ ELEMENTWISE: Mapping[str, Operation] = {
     "select_n": select,
     "clamp": _clamped,
     "convert_element_type": _converted,
+    "reduce_precision": _as_precise,
     "stop_gradient": _same,
     "copy": _same,
     "copy_p": _same,

@@ -30,6 +30,7 @@ CALLS = {  # primitives that stand for a program of their own, and where it is k
     "custom_vjp_call": "call_jaxpr",
     "custom_vjp_call_jaxpr": "fun_jaxpr",
 }
+SAME = ("optimization_barrier", "name")  # what says something to XLA, or to a derivative, and changes nothing
 # What only moves numbers about, and which of the arguments are the numbers; the others say where to. None: all are.
 MOVES: dict[str, tuple[int, ...] | None] = {
     "broadcast_in_dim": None,
@@ -137,7 +138,7 @@ class _Translation:
 
     def equation(self, equation: Any, given: list[Value], name: str) -> list[Value]:
         params = equation.params
-        if name == "optimization_barrier":
+        if name in SAME:
             return given
         if name in CALLS:
             return self.closed(params[CALLS[name]], given)
