@@ -83,9 +83,7 @@ def member(recipe: Recipe, values: Values) -> dict[str, jax.Array]:
     """
     if not recipe.slopes:
         return _run(recipe, values)
-    at = {
-        name: values[name] if name in values else get_parameters(recipe.system, [name])[0] for name in recipe.slopes
-    }
+    at = {name: values[name] if name in values else get_parameters(recipe.system, [name])[0] for name in recipe.slopes}
     names = [one.name for one in recipe.measures]
 
     def measured(at: Values) -> tuple[tuple[Scalar, ...], dict[str, jax.Array]]:

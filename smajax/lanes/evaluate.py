@@ -32,6 +32,11 @@ class Evaluator:
     ) -> None:
         self._kernel, self._tree, self._names, self._dtype, self._shared = kernel, tree, names, dtype, shared
 
+    @property
+    def scratch(self) -> int:
+        """Memory that a thread works in, bytes."""
+        return self._kernel.scratch
+
     def __call__(self, model: Any, own: dict[str, np.ndarray], threads: int) -> Any:
         """What the function gives, every leaf with one row a member; `own` are arrays of shape (members,)."""
         leaves = jax.tree.leaves(eqx.filter(model, _is_array))

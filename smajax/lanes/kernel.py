@@ -98,7 +98,7 @@ class Kernel:
     def __init__(self, code: bytes, lanes: int, results: Sequence[Array], scratch: int) -> None:
         import llvmlite.binding as llvm
 
-        self._lanes, self._results, self._scratch = lanes, tuple(results), scratch
+        self._lanes, self._results, self.scratch = lanes, tuple(results), scratch
         self._engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _machine())
         self._engine.add_object_file(llvm.ObjectFileRef.from_data(code))
         self._engine.finalize_object()
@@ -117,7 +117,7 @@ class Kernel:
         edges = np.linspace(0, count, min(threads, count) + 1).astype(int)
 
         def part(first: int, last: int) -> None:
-            scratch = _aligned(self._scratch)
+            scratch = _aligned(self.scratch)
             self._call(*tables, scratch.ctypes.data, first, last)
 
         try:

@@ -1,14 +1,16 @@
 """The gradient of a tracking cost by every parameter of the arm: `python -m studies.benchmarks.gradient --steps N`.
 
-Prints JSON: the time of the cost, of its reverse-mode gradient, of its forward-mode Jacobian, each as a program of its
-own for a batch of `--members`, and the memory that each needs. With `--tracking FILE` it is the problem of the peers of
-`gradient_peer.py` and its members, and how far the gradient is off is told too.
+Prints JSON: of a batch of `--members`, on one core, the time of the cost and of its reverse-mode gradient, as machine code
+(`run_batch` with `slopes`) and by XLA (`jax.grad` of a member), of the forward-mode Jacobian by XLA, and the memory that each
+needs. With `--tracking FILE` it is the problem of the peers of `gradient_peer.py` and its members, and how far the gradient
+is off is told too.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -19,11 +21,12 @@ import jax.numpy as jnp
 import numpy as np
 
 from smajax.batch.axes import grid
-from smajax.batch.member import member
+from smajax.batch.member import Recipe, member, slope_name
 from smajax.batch.run import recipe_of
 from smajax.figures.rigs import arm
+from smajax.lanes.evaluate import evaluator
 from smajax.measure import MeanSquare
-from smajax.parameters import get_parameters, parameters, set_parameters, set_vector
+from smajax.parameters import get_parameters, parameters, set_vector
 from smajax.runtime import prepare
 from smajax.simulate import DEFAULT_STEP
 from smajax.system import System
@@ -34,12 +37,18 @@ REPEATS = 3
 LONGEST_REPEATED = 20000  # steps
 
 
-def _cost_of(system: System, names: tuple[str, ...], steps: int) -> Callable[[jax.Array, jax.Array], jax.Array]:
-    """(values of `names`, volts) -> cost of tracking a ramp over so many of the default steps."""
+def _recipe(system: System, steps: int, slopes: tuple[str, ...] = ()) -> Recipe:
+    """The cost of tracking a ramp over so many of the default steps, and its slopes."""
     dt = DEFAULT_STEP
     wanted = jnp.linspace(float(system.load.start()), tracking.ENDS_AT, steps + 1)
     measures = (MeanSquare("position", wanted, tracking.SCALE),)
-    recipe = recipe_of(system, {}, grid(voltage=[8.0]), seconds=steps * dt, dt=dt, keep=(), measures=measures)
+    axes = grid(voltage=[8.0])
+    return recipe_of(system, {}, axes, seconds=steps * dt, dt=dt, keep=(), measures=measures, slopes=slopes)
+
+
+def cost_of(system: System, names: tuple[str, ...], steps: int) -> Callable[[jax.Array, jax.Array], jax.Array]:
+    """(values of `names`, volts) -> the cost, for XLA."""
+    recipe = _recipe(system, steps)
 
     def cost(vector: jax.Array, volts: jax.Array) -> jax.Array:
         changed = eqx.tree_at(lambda one: one.system, recipe, set_vector(system, names, vector))
@@ -48,22 +57,33 @@ def _cost_of(system: System, names: tuple[str, ...], steps: int) -> Callable[[ja
     return cost
 
 
-def run(steps: int, members: int, forward: bool) -> dict[str, Any]:
-    """Cost, gradient and, when asked for, Jacobian over `steps` of `members` arms of different voltages."""
-    system = arm()
-    names = tuple(parameters(system))
-    cost = _cost_of(system, names, steps)
-    at, volts = get_parameters(system, names), jnp.linspace(*tracking.VOLTAGES, members)
-    repeats = REPEATS if steps <= LONGEST_REPEATED else 1
-    told: dict[str, Any] = {"peer": "gradient", "steps": steps, "members": members, "parameters": len(names)}
-    return told | _compared(cost, at, volts, repeats, forward)
+def _by_machine_code(
+    system: System, names: tuple[str, ...], steps: int, volts: np.ndarray, repeats: int
+) -> dict[str, Any]:
+    """Time and memory of the cost, and of it with its slopes; `slopes` (members, names) too."""
+    told: dict[str, Any] = {}
+    for name, by in (("cost", ()), ("gradient", names)):
+        recipe = _recipe(system, steps, by)
+        begin = time.perf_counter()
+        found = evaluator(member, recipe, ("voltage",))
+        told[f"{name}_compile_s"] = time.perf_counter() - begin
+        times = []
+        for _ in range(repeats):
+            begin = time.perf_counter()
+            results = found(recipe, {"voltage": volts}, 1)
+            times.append(time.perf_counter() - begin)
+        told |= {f"{name}_s": min(times), f"{name}_memory_MB": found.scratch / 1e6}
+    told["slopes"] = np.stack([results[slope_name("mean_square_position", name)] for name in names], axis=1)
+    return told | {"gradient_over_cost": told["gradient_s"] / told["cost_s"]}
 
 
-def _compared(
-    cost: Callable[..., jax.Array], at: jax.Array, volts: jax.Array, repeats: int, forward: bool
+def _by_xla(
+    system: System, names: tuple[str, ...], steps: int, volts: np.ndarray, repeats: int, forward: bool
 ) -> dict[str, float]:
+    cost, at = cost_of(system, names, steps), get_parameters(system, names)
+
     def measured(name: str, function: Callable[..., jax.Array]) -> dict[str, float]:
-        return timed(jax.jit(jax.vmap(function, (None, 0))), repeats, at, volts).named(name)
+        return timed(jax.jit(jax.vmap(function, (None, 0))), repeats, at, jnp.asarray(volts)).named(name)
 
     told = measured("cost", cost) | measured("gradient", jax.grad(cost))
     told["gradient_over_cost"] = told["gradient_s"] / told["cost_s"]
@@ -73,21 +93,30 @@ def _compared(
     return told
 
 
+def run(steps: int, members: int, forward: bool) -> dict[str, Any]:
+    """Cost, gradient and, when asked for, Jacobian over `steps` of `members` arms of different voltages."""
+    system, volts = arm(), np.linspace(*tracking.VOLTAGES, members)
+    names = tuple(parameters(system))
+    repeats = REPEATS if steps <= LONGEST_REPEATED else 1
+    own = _by_machine_code(system, names, steps, volts, repeats)
+    del own["slopes"]
+    xla = _by_xla(system, names, steps, volts, repeats, forward)
+    return {"peer": "gradient", "steps": steps, "members": members, "parameters": len(names), **own, "xla": xla}
+
+
 def tracked_arm(given: tracking.Tracking) -> System:
     """The arm of the peers' problem."""
-    return set_parameters(arm(), {"payload_mass": given.constants["payload_mass"]})
+    return set_vector(arm(), given.names, jnp.asarray(given.vector))
 
 
 def run_tracking(given: tracking.Tracking, forward: bool) -> dict[str, Any]:
     """The same on the members of the peers' problem, with the error of the gradient."""
-    cost, at = (
-        _cost_of(tracked_arm(given), given.names, round(tracking.SECONDS / DEFAULT_STEP)),
-        jnp.asarray(given.vector),
-    )
-    slopes = jax.jit(jax.vmap(jax.grad(cost), (None, 0)))(at, jnp.asarray(given.solved))
+    system, steps = tracked_arm(given), round(tracking.SECONDS / DEFAULT_STEP)
+    own = _by_machine_code(system, given.names, steps, given.voltage, tracking.REPEATS)
+    slopes = own.pop("slopes")[np.searchsorted(given.voltage, given.solved)]
     told: dict[str, Any] = {"peer": "smajax", "members": len(given.voltage), "parameters": len(given.names)}
-    told |= {"setting": DEFAULT_STEP, "gradient_error": given.error(np.asarray(slopes))}
-    return told | _compared(cost, at, jnp.asarray(given.voltage), tracking.REPEATS, forward)
+    told |= {"setting": DEFAULT_STEP, "gradient_error": given.error(slopes), **own}
+    return told | {"xla": _by_xla(system, given.names, steps, given.voltage, tracking.REPEATS, forward)}
 
 
 def main() -> None:
@@ -97,6 +126,7 @@ def main() -> None:
     asked.add_argument("--forward", action="store_true", help="the forward-mode Jacobian too")
     asked.add_argument("--tracking", type=Path, metavar="FILE", help="the peers' problem (`tracking.py`)")
     options = asked.parse_args()
+    tracking.on_one_core()
     prepare(cores=True)
     jax.config.update("jax_enable_compilation_cache", False)
     if options.tracking:

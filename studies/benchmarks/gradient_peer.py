@@ -189,6 +189,7 @@ def main() -> None:
     asked.add_argument("peer", choices=PEERS)
     asked.add_argument("file", type=Path)
     options = asked.parse_args()
+    tracking.on_one_core()
     # XLA is asked for the same as by `gradient.py`: float64, the widest vectors, and no program from before.
     prepare(cores=True)
     import jax

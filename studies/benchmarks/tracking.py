@@ -8,6 +8,7 @@ to `ENDS_AT` and $s$ `SCALE`; smajax takes the mean over the ends of its steps. 
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -64,6 +65,12 @@ class Tracking:
         weights = np.where(np.array(self.names) == UNKNOWN, 0.0, self.vector)
         off = np.linalg.norm((slopes - self.slopes) * weights, axis=1) / np.linalg.norm(self.slopes * weights, axis=1)
         return float(off.max()) if np.isfinite(slopes).all() else float("inf")
+
+
+def on_one_core() -> None:
+    """Of this process and what it starts, where the system can say so: what is compared is the work, not how it is divided."""
+    if hasattr(os, "sched_setaffinity"):
+        os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
 
 
 def start(xp: Any, p: Mapping[str, Any]) -> State:
