@@ -16,6 +16,7 @@ from jax import lax
 from smajax.batch.axes import sampled, zipped
 from smajax.batch.engine import Engine, chunks
 from smajax.batch.run import run_batch
+from smajax.checkpointed import checkpointed_scan, recomputed, solved
 from smajax.figures.rigs import arm
 from smajax.lanes.evaluate import evaluator
 from smajax.lanes.kernel import Kernel, compiled
@@ -150,7 +151,30 @@ def _looked_up(a: jax.Array) -> jax.Array:
     return table[index] + lax.switch(jnp.clip(index, 0, 2), [lambda: a, lambda: 2.0 * a, lambda: -a])
 
 
-@pytest.mark.parametrize("function", [_newton, _long, _looked_up], ids=lambda one: one.__name__)
+def _backwards(a: jax.Array) -> jax.Array:
+    """A derivative through a long loop in segments, of a series that is too large for registers and was shifted before."""
+
+    def body(carry: tuple[jax.Array, jax.Array], x: jax.Array) -> tuple[tuple[jax.Array, jax.Array], jax.Array]:
+        kept = solved(jnp.sin(carry[0] * x))
+        one, other = jnp.stack([kept + carry[1], kept * a])
+        return (0.5 * one, jnp.cos(other)), kept * one
+
+    def cost(a: jax.Array) -> jax.Array:
+        series = a * jnp.arange(200.0) / 200.0
+        shifted = jnp.concatenate([jnp.full(3, a), series[:-3]])
+        (end, _), kept = checkpointed_scan(recomputed(body), (a, 0.1 * a), shifted - series, 200)
+        return end + (kept * series).sum()
+
+    return jax.grad(cost)(a)
+
+
+def _folded(a: jax.Array) -> jax.Array:
+    """Of more numbers than there are registers: their sum, the largest, and whether all of them are below another."""
+    kept = lax.scan(lambda c, x: (jnp.sin(c) + x, c * a), a, jnp.arange(200.0) / 100.0)[1]
+    return kept.sum() + 1e3 * kept.max() + 1e6 * (kept.reshape(20, 10) < 2.0 * a).all()
+
+
+@pytest.mark.parametrize("function", [_newton, _long, _looked_up, _backwards, _folded], ids=lambda one: one.__name__)
 def test_loops_and_tables_agree(function):
     a = np.array([0.3, 2.0, 1e-8, 1e8, 4.0, 9.0, 1.0, 5.5, -0.7 if function is not _newton else 0.7])
     np.testing.assert_allclose(by_lanes(function, a), by_xla(function, a), rtol=1e-13)
@@ -343,6 +367,10 @@ def test_traps(name):
 
 
 REFUSED: dict[str, Function] = {
+    "fewer digits than a number has": lambda a, b: lax.reduce_precision(a, 8, 7),
+    "rows put between the rows of a large array": lambda a, b: lax.pad(
+        lax.scan(lambda c, x: (c, c * x), a, jnp.arange(100.0))[1], b, [(0, 0, 1)]
+    ),
     "filled in beyond the end": lambda a, b: jnp.take(jnp.broadcast_to(a, (100,)), b.astype(int)),
     "filled in at a known place": lambda a, b: (
         jnp.stack([a, b]).at[jnp.array([0, 5])].get(mode="fill", fill_value=0).sum()

@@ -48,6 +48,7 @@ MOVES: dict[str, tuple[int, ...] | None] = {
     "squeeze": None,
     "stack": None,
     "transpose": None,
+    "unstack": None,
 }
 # What folds an array along some of its axes, and by which operation.
 REDUCTIONS = {
@@ -173,6 +174,8 @@ class _Translation:
             lane = _only_lane(given[0])
             if lane is not None and name not in ("dynamic_update_slice", "scatter", "split"):
                 return [_filled(lane, out.shape)]
+        if name == "split":
+            return self.parted(given[0], params, [_array(one.aval) for one in equation.outvars])
         method: Callable[..., Value] | None = getattr(self, f"put_{name}", None)
         if method is None:
             raise Unsupported(f"the operation `{name}`")
@@ -268,6 +271,19 @@ class _Translation:
             return in_registers(self.text, part) if part.size <= SMALL else part
         raise AssertionError("a small array is moved")
 
+    def parted(self, one: Value, params: Any, out: Sequence[Array]) -> list[Value]:
+        """A large array cut into runs of rows."""
+        if params["axis"] != 0:
+            raise Unsupported("a large array cut along another axis than the first")
+        if isinstance(one, Filled):
+            return [_filled(one.lane, part.shape) for part in out]
+        starts = np.cumsum([0, *params["sizes"]])[:-1]
+        rest = (0,) * (len(out[0].shape) - 1)
+        return [
+            self.put_slice({"start_indices": (int(start), *rest), "strides": None}, [one], part, ())
+            for start, part in zip(starts, out, strict=True)
+        ]
+
     def put_dynamic_slice(self, params: Any, given: list[Value], out: Array, kinds: Any) -> Value:
         one, starts = given[0], given[1:]
         shape = self.shape_of(one)
@@ -331,6 +347,15 @@ class _Translation:
     def put_stack(self, params: Any, given: list[Value], out: Array, kinds: Any) -> Value:
         return self.joined(given, params["axis"], out)
 
+    def put_pad(self, params: Any, given: list[Value], out: Array, kinds: Any) -> Value:
+        one, filling = given
+        (before, after, between), *others = params["padding_config"]
+        if between or before < 0 or after < 0 or any(any(rest) for rest in others):
+            raise Unsupported("a large array that is padded otherwise than with rows before and behind it")
+        lane = in_registers(self.text, filling).ravel()[0]
+        ends = [_filled(lane, (count, *out.shape[1:])) for count in (before, after)]
+        return self.joined([part for part in (ends[0], one, ends[1]) if size_of(part)], 0, out)
+
     def joined(self, given: list[Value], axis: int, out: Array) -> Value:
         """Large arrays one after the other."""
         if axis != 0:
@@ -344,7 +369,22 @@ class _Translation:
             start += size_of(one)
         return room
 
+    def folded(self, name: str, one: Value, dtype: str) -> Value:
+        """A large array, all of it, one number after the other."""
+
+        def at(index: str) -> Lane:
+            return in_registers(self.text, row(self.text, flat, index, (), dtype)).ravel()[0]
+
+        size = size_of(one)
+        flat = self.put_reshape({}, [one], Array((size,), dtype), ()) if isinstance(one, Stored) else one
+        loop = Loop(self.text, [held(at("0"))], "fold")
+        now = at(self.text.assign(f"add i64 {loop.count}, 1"))
+        loop.end_after(size - 1, [held(ELEMENTWISE[name](self.text, dtype, loop.carry[0].ravel()[0], now))])
+        return loop.carried()[0]
+
     def reduced(self, name: str, given: list[Value], axes: Sequence[int], out: Array) -> Value:
+        if size_of(given[0]) > SMALL and out.shape == () and not is_known(given[0]):
+            return self.folded(name, given[0], out.dtype)
         lanes = np.asarray(in_registers(self.text, given[0]))
         if lanes.size == 0:
             raise Unsupported("the sum of no numbers")
