@@ -38,6 +38,7 @@ class Stage(eqx.Module):
     position: Scalar  # x_b
     velocity: Scalar  # v_b
     enough: float = eqx.field(static=True)  # how far the last iteration may still move the solution (`stage_solver`)
+    once: bool = eqx.field(static=True)  # differentiated once at most (`step`)
 
 
 def friction_in_use(stage: Stage, position: Scalar) -> tuple[Scalar, Scalar]:

@@ -80,9 +80,9 @@ def test_page_tells_of_every_way(tmp_path: Path) -> None:
     table = [row for row in rows if row.startswith("|")]
     assert len({row.count("|") for row in table}) == 1
     assert "| gradsolve, tsit5_replay | 0.0001 | 1 | 4 | 4 | 0.01 | 5 | 2.0 |" in table
-    assert any(row.startswith("| smajax, `run_batch` with `slopes` | ") and " | 1 | 4 | 4 | " in row for row in table)
-    assert any(row.startswith("| smajax, `jax.grad` | ") and " | 1 | 6 | 4 | " in row for row in table)
-    assert any(row.startswith("| smajax, `jax.jacfwd` | ") and " | 10 | 10 | " in row for row in table)
+    assert any(row.startswith("| smajax, machine code | ") and " | 1 | 4 | 4 | " in row for row in table)
+    assert any(row.startswith("| smajax, XLA | ") and " | 1 | 6 | 4 | " in row for row in table)
+    assert any(row.startswith("| smajax, XLA, forward mode | ") and " | 10 | 10 | " in row for row in table)
     assert any("gradsolve, other" in row and "not accurate" in row for row in table)
     assert any("diffrax" in row and "not installed here" in row for row in table)
     assert "0.2 ms (tsit5_replay) a run more" in page

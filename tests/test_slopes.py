@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from smajax.batch.axes import Axes, grid, sampled, zipped
-from smajax.batch.member import Recipe, member, slope_name
+from smajax.batch.member import Recipe, _run, slope_name
 from smajax.batch.run import recipe_of, run_batch
 from smajax.effects.library import LIBRARY
 from smajax.extended import extended
@@ -36,7 +36,7 @@ def _along(asked: tuple[Recipe, dict[str, float]], own: dict[str, jax.Array]) ->
     at = {name: own[name] if name in own else get_parameters(recipe.system, [name])[0] for name in way}
 
     def measured(at: dict[str, jax.Array]) -> dict[str, jax.Array]:
-        found = member(recipe, own | at)
+        found = _run(recipe, own | at)
         return {one.name: found[one.name] for one in recipe.measures}
 
     return jax.jvp(measured, (at,), ({name: jnp.asarray(step) for name, step in way.items()},))[1]
@@ -59,7 +59,7 @@ def _same_as_forward(
     sizes = {name: size or 1e-2 * (table[name].high - table[name].low) for name, size in sizes.items()}
     rng = np.random.default_rng(1)
     way = {name: size * rng.uniform(0.5, 1.0) * rng.choice([-1.0, 1.0]) for name, size in sizes.items()}
-    recipe = recipe_of(system, inputs, axes, measures=measures, keep=(), **more)
+    recipe = recipe_of(system, inputs, axes, measures=measures, slopes=by, keep=(), **more)
     ahead = evaluator(_along, (recipe, way), tuple(members))((recipe, way), members, 1)
     for one in measures:
         parts = [found[slope_name(one.name, name)].to_numpy().ravel() * step for name, step in way.items()]

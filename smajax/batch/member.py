@@ -78,8 +78,8 @@ def _per(above: str, below: str) -> str:
 def member(recipe: Recipe, values: Values) -> dict[str, jax.Array]:
     """Simulate one member. Kept values are arrays (steps // every + 1,), everything else is a number.
 
-    Pure: `jit`, `vmap` and differentiate it as you like. The slopes that the recipe asks for are found backwards through
-    the run, whatever their number, once for every measure.
+    Pure: `jit`, `vmap` and differentiate it as you like, but for the slopes that the recipe asks for: they are found
+    backwards through the run, whatever their number, once for every measure, and have no derivative of their own.
     """
     if not recipe.slopes:
         return _run(recipe, values)
@@ -112,7 +112,7 @@ def _run(recipe: Recipe, values: Values) -> dict[str, jax.Array]:
         state, tried, memories, bad, status = carry
         inputs = {**constants, **now}
         if recipe.tolerance is None:
-            state = step(system, state, inputs, recipe.dt)
+            state = step(system, state, inputs, recipe.dt, once=bool(recipe.slopes))
         else:
             state, tried, _ = advance(system, state, inputs, recipe.dt, tried, recipe.tolerance)
         memories = [

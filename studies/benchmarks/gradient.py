@@ -1,8 +1,8 @@
 """The gradient of a tracking cost by every parameter of the arm: `python -m studies.benchmarks.gradient --steps N`.
 
 Prints JSON: of a batch of `--members`, on one core, the time of the cost and of its reverse-mode gradient, as machine code
-(`run_batch` with `slopes`) and by XLA (`jax.grad` of a member), of the forward-mode Jacobian by XLA, and the memory that each
-needs. With `--tracking FILE` it is the problem of the peers of `gradient_peer.py` and its members, and how far the gradient
+(`run_batch` with `slopes`) and by XLA (the same with `engine="xla"`), of the forward-mode Jacobian by XLA, and the memory that
+each needs. With `--tracking FILE` it is the problem of the peers of `gradient_peer.py` and its members, and how far the gradient
 is off is told too.
 """
 
@@ -80,15 +80,15 @@ def _by_machine_code(
 def _by_xla(
     system: System, names: tuple[str, ...], steps: int, volts: np.ndarray, repeats: int, forward: bool
 ) -> dict[str, float]:
-    cost, at = cost_of(system, names, steps), get_parameters(system, names)
-
-    def measured(name: str, function: Callable[..., jax.Array]) -> dict[str, float]:
-        return timed(jax.jit(jax.vmap(function, (None, 0))), repeats, at, jnp.asarray(volts)).named(name)
-
-    told = measured("cost", cost) | measured("gradient", jax.grad(cost))
+    told: dict[str, float] = {}
+    for name, by in (("cost", ()), ("gradient", names)):
+        recipe = _recipe(system, steps, by)
+        run = jax.jit(jax.vmap(lambda own, recipe=recipe: member(recipe, {"voltage": own})))
+        told |= timed(run, repeats, jnp.asarray(volts)).named(name)
     told["gradient_over_cost"] = told["gradient_s"] / told["cost_s"]
     if forward:
-        told |= measured("jacobian", jax.jacfwd(cost))
+        jacobian = jax.jit(jax.vmap(jax.jacfwd(cost_of(system, names, steps)), (None, 0)))
+        told |= timed(jacobian, repeats, get_parameters(system, names), jnp.asarray(volts)).named("jacobian")
         told["jacobian_over_cost"] = told["jacobian_s"] / told["cost_s"]
     return told
 

@@ -74,7 +74,7 @@ def _ratios(found: Found) -> list[str]:
         _at_least("one trajectory: scipy's time over ours", 1.0, _ratio(scipy, single.get("ms"))),
         _at_most("first call of a process, nothing kept, s", 3.0, single.get("first_call_s")),
         _at_most("reverse-mode gradient by all parameters over one run", 4.0, gradient.get("gradient_over_cost")),
-        _at_most("the same by `jax.grad`, XLA's", 4.0, gradient.get("xla", {}).get("gradient_over_cost")),
+        _at_most("the same by XLA", 4.0, gradient.get("xla", {}).get("gradient_over_cost")),
     ]
     tracked = found.get("gradient_tracking", {})
     others = [
@@ -157,9 +157,9 @@ def _gradients(found: Found) -> list[str]:
         return []
     by_xla = {**own, **own.get("xla", {})} if "xla" in own else {"reason": own.get("reason", "not measured")}
     for name, one, way in (
-        ("smajax, `run_batch` with `slopes`", own, "gradient"),
-        ("smajax, `jax.grad`", by_xla, "gradient"),
-        ("smajax, `jax.jacfwd`", by_xla, "jacobian"),
+        ("smajax, machine code", own, "gradient"),
+        ("smajax, XLA", by_xla, "gradient"),
+        ("smajax, XLA, forward mode", by_xla, "jacobian"),
     ):
         rows.append(row(name, f"steps of {1e3 * own.get('setting', 0.0):g} ms", one, own.get("members", 1), way))
     for peer in ("diffrax", "gradsolve"):
