@@ -124,7 +124,7 @@ def run_open(asked: Asked) -> Ran:
         raise ValueError(
             f"the model needs the input {name!r}: give {alone}--input {example}:10s (a file: {name}=log.csv:COLUMN)"
         )
-    several = {name: given(text, _unit(name), asked.time) for name, text in asked.inputs.items()}
+    several = {name: given(text, _unit(name), asked.time, bare=_unit(name)) for name, text in asked.inputs.items()}
     clock = clock_of(list(several.values()), asked.seconds, asked.dt)
     measured = system.load.inputs_required if isinstance(system.load, AbstractCoupon) else frozenset()
     series: Any = {
@@ -166,7 +166,7 @@ def run_closed(asked: Asked, loop: AskedLoop) -> Ran:
     believed, plant = preset.plant(believed), preset.plant(plant)
     check_interface(loop.estimator, loop.noise, loop.period, asked.dt)
     between = interface_of(believed, loop.estimator, loop.noise, loop.period, asked.dt, loop.delay)
-    wanted = given(loop.set_points, "rad", asked.time)
+    wanted = given(loop.set_points, "rad", asked.time, bare="deg")
     clock = clock_of([wanted], asked.seconds, asked.dt)
     periods = (clock.size - 1) // between.every
     if periods < 1:

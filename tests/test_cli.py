@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from smajax.cli import app, main
 from smajax.command import renamed
-from smajax.command.base import console
+from smajax.command.base import console, numbers, pairs
 from smajax.progress import VARIABLE, shown
+from smajax.tune.terms import TERMS
 
 DEMO = Path(__file__).parents[1] / "smajax" / "demo" / "latent"
 
@@ -187,6 +190,29 @@ def test_a_warning_is_said_wherever_stderr_leads(
         progress("fitting", 0.0)
         progress("warn: check: is it in mm?", 1.0)
     assert capsys.readouterr().err == "warning: check: is it in mm?\n"
+
+
+@pytest.mark.parametrize("command", ["simulate", "sweep", "tune", "identify", "close-loop", "figures", "bench"])
+def test_every_option_that_takes_a_quantity_says_its_unit(command: str) -> None:
+    """A plain number is asked for where it is a share of something alone."""
+    told = " ".join(CliRunner().invoke(app, [command, "--help"]).output.split())
+    assert re.findall(r"--([\w-]+) (?:<float>|FLOAT)", told) == ["tolerance"] * (command == "simulate")
+    timed = {"simulate": 3, "sweep": 2, "tune": 2}.get(command, 0)
+    assert len(re.findall(r"<s> (?:(?!--).)*in s where it says no unit", told.replace("--dt;", "dt;"))) == timed
+
+
+def test_lists_and_pairs_of_numbers_take_units() -> None:
+    np.testing.assert_allclose(
+        numbers("--set-points", "-20,0.5 rad 10deg, 85", "deg"), [-20.0, np.degrees(0.5), 10.0, 85.0]
+    )
+    assert numbers("--gain-shares", "50%,1") == (0.5, 1.0)
+    limits = pairs(
+        "--limits",
+        ["settling_time=4000 ms,overshoot=2", "energy=0.02kJ peak_temperature=363.15K"],
+        {name: term.unit for name, term in TERMS.items()},
+    )
+    assert limits == pytest.approx({"settling_time": 4.0, "overshoot": 2.0, "energy": 20.0, "peak_temperature": 90.0})
+    assert pairs("--variation", ["inertia=20%,", "damping = 0.1"]) == {"inertia": 0.2, "damping": 0.1}
 
 
 def test_a_list_may_be_cut_short(tmp_path: Path) -> None:

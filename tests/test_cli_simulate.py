@@ -176,7 +176,6 @@ def test_a_gains_file_closes_the_loop(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (["--step", "7:10"], "without a unit"),
         (["--step", "7V"], "how long the run is"),
         (["--step", "7V:1s,3V"], "LEVEL:TIME"),
         (["--step", "7V:1s", "--set", "convection_coeficient=80"], "did you mean 'convection_coefficient'"),
@@ -221,6 +220,39 @@ def test_levels_hold_until_the_next(tmp_path: Path) -> None:
     np.testing.assert_allclose(one.on(clock, 0.25, sampled=True), [6, 6, 6, 6, 0.2])  # levels: none
     with pytest.raises(UnitError, match="above zero"):
         levels("6V:0s", "V")
+
+
+def test_a_quantity_says_its_unit_or_has_that_of_its_option(tmp_path: Path) -> None:
+    """The same run in both ways, of every option that takes one."""
+
+    def asked(name: str, *words: str) -> tuple[dict[str, list[float]], str]:
+        told = run.invoke(app, ["simulate", *words, "--json", "--out", str(tmp_path / name)])
+        assert told.exit_code == 0, told.output
+        record = json.loads(told.stdout)
+        return record["series"], record["provenance"].get("between", "")
+
+    loop = ["--controller", "pid", "--set-point"]
+    said = ["10deg:500 ms,0.5rad:1s", "--dt", "10 ms", "--period", "20ms", "--noise", "0.05rad", "--seconds", "1.2 s"]
+    alone = [
+        "10:0.5,28.64788975654116:1",
+        "--dt",
+        "0.01",
+        "--period",
+        "0.02",
+        "--noise",
+        "2.8647889756541160",
+        "--seconds",
+        "1.2",
+    ]
+    first, second = asked("said", *loop, *said), asked("alone", *loop, *alone)
+    assert len(first[0]["time"]) == 121
+    assert "called every 20 ms" in first[1]
+    assert "with 2.86479° of noise" in first[1]
+    assert first[1] == second[1]
+    np.testing.assert_allclose(first[0]["position"], second[0]["position"], rtol=1e-6)
+    held = asked("held", "--input", "voltage=5:1,0V:500ms", "--input", "ambient_temperature=25", "--dt", "0.1")[0]
+    np.testing.assert_allclose(held["voltage"], [5.0] * 10 + [0.0] * 6, atol=1e-12)
+    assert set(held["ambient_temperature"]) == {25.0}
 
 
 def test_a_coupon_is_given_its_temperature_and_stress(tmp_path: Path) -> None:

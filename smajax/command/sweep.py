@@ -12,10 +12,12 @@ from smajax.command.base import (
     Json,
     OpenUnless,
     Overwrite,
+    alone,
     browse_from_terminal,
     command_line,
     console,
     numbers,
+    quantity,
     resumable,
     within,
 )
@@ -40,7 +42,7 @@ def sweep(
         typer.Option(callback=within(2), help="mismatches from 0.5 to 2 along each side of a map; default 15"),
     ] = None,
     set_points: Annotated[
-        str | None, typer.Option(help="degrees, with commas; default -40,-20,0,10,20,40,50,60,80")
+        str | None, typer.Option(help=f"with commas, {alone('deg')}; default -40,-20,0,10,20,40,50,60,80")
     ] = None,
     gains: Annotated[
         list[Path] | None,
@@ -49,15 +51,13 @@ def sweep(
     gain_shares: Annotated[
         str | None, typer.Option(help="shares of the controller's main gain; default 0.5,0.7,1,1.4,2")
     ] = None,
-    seconds: Annotated[float, typer.Option(callback=within(0.1, 86_400.0), help="length of each closed loop")] = 10.0,
+    seconds: Annotated[float, quantity("length of each closed loop", "s", 0.1, 86_400.0)] = 10.0,
     estimator: Annotated[
         str,
         typer.Option(help="`printed` or `model` filter; none: told the true state", autocompletion=complete.estimators),
     ] = "",
-    noise: Annotated[
-        float, typer.Option(callback=within(0, 360.0), help="noise of the angle's readings, degrees (1 sigma)")
-    ] = 0.0,
-    period: Annotated[float, typer.Option(help="sample time of the controller, s, a multiple of 0.01")] = 0.01,
+    noise: Annotated[float, quantity("noise of the angle's readings (1 sigma)", "deg", 0.0, 360.0)] = 0.0,
+    period: Annotated[float, quantity("sample time of the controller, a multiple of 10 ms", "s")] = 0.01,
     delay: Annotated[int, typer.Option(callback=within(0), help="control periods until a command arrives")] = 0,
     out: Annotated[
         Path,
@@ -102,7 +102,7 @@ def sweep(
         names,
         *pair,
         points or (3 if fast else 15),
-        numbers("--set-points", set_points if set_points is not None else "-20,20,60" if fast else SET_POINTS),
+        numbers("--set-points", set_points if set_points is not None else "-20,20,60" if fast else SET_POINTS, "deg"),
         numbers("--gain-shares", gain_shares if gain_shares is not None else "1" if fast else GAINS),
         seconds,
         filtered=estimator,

@@ -13,11 +13,13 @@ from smajax.command.base import (
     Json,
     OpenUnless,
     Overwrite,
+    alone,
     browse_from_terminal,
     command_line,
     console,
     numbers,
     pairs,
+    quantity,
     resumable,
     within,
 )
@@ -32,11 +34,13 @@ def tune(
             help="pid, vsc1, vsc2, vsc3, nvsc, sld, backstepping1 or backstepping2", autocompletion=complete.controllers
         ),
     ],
-    set_points: Annotated[str | None, typer.Option(help="degrees, with commas; default -40,-20,0,20,40,60,85")] = None,
+    set_points: Annotated[
+        str | None, typer.Option(help=f"with commas, {alone('deg')}; default -40,-20,0,20,40,60,85")
+    ] = None,
     variation: Annotated[
         list[str] | None,
         typer.Option(
-            help="how wrong the plant may be: inertia=0.2,convection=0.2; may be repeated",
+            help="how wrong the plant may be, as shares: inertia=0.2,convection=20%; may be repeated",
             autocompletion=complete.shares_of_mismatches,
         ),
     ] = None,
@@ -54,7 +58,7 @@ def tune(
     limits: Annotated[
         list[str] | None,
         typer.Option(
-            help="of the same, met in every loop, in s, degrees, J, V/s, degC: settling_time=4,overshoot=2",
+            help="of the same, met in every loop: settling_time=4,overshoot=2deg; in s, deg, J, V/s or degC where it says no unit",
             autocompletion=complete.terms,
         ),
     ] = None,
@@ -73,15 +77,13 @@ def tune(
             help="generations of a search without slopes (CMA-ES) after that, 24 candidates each; default 60, 0 for none",
         ),
     ] = None,
-    seconds: Annotated[float, typer.Option(callback=within(0.1, 86_400.0), help="length of each closed loop")] = 10.0,
+    seconds: Annotated[float, quantity("length of each closed loop", "s", 0.1, 86_400.0)] = 10.0,
     estimator: Annotated[
         str,
         typer.Option(help="`printed` or `model` filter; none: told the true state", autocompletion=complete.estimators),
     ] = "",
-    noise: Annotated[
-        float, typer.Option(callback=within(0, 360.0), help="noise of the angle's readings, degrees (1 sigma)")
-    ] = 0.0,
-    period: Annotated[float, typer.Option(help="sample time of the controller, s, a multiple of 0.01")] = 0.01,
+    noise: Annotated[float, quantity("noise of the angle's readings (1 sigma)", "deg", 0.0, 360.0)] = 0.0,
+    period: Annotated[float, quantity("sample time of the controller, a multiple of 10 ms", "s")] = 0.01,
     delay: Annotated[int, typer.Option(callback=within(0), help="control periods until a command arrives")] = 0,
     seed: Annotated[int, typer.Option(callback=within(0), help="of starts, plants and noise")] = 0,
     out: Annotated[Path, typer.Option(help="folder for gains.json, the page, the pictures and the numbers")] = Path(
@@ -114,6 +116,7 @@ def tune(
     from smajax.tune.objective import REGULATION
     from smajax.tune.page import conclusions, gain_rows, price
     from smajax.tune.settings import TuneSettings
+    from smajax.tune.terms import TERMS
 
     try:
         begun = read_gains(start, arm()) if start is not None else None
@@ -123,11 +126,11 @@ def tune(
         raise typer.BadParameter(str(error), param_hint="--start") from None
     settings = TuneSettings(
         controller,
-        numbers("--set-points", set_points if set_points is not None else "-20,20,60" if fast else TUNED_AT),
+        numbers("--set-points", set_points if set_points is not None else "-20,20,60" if fast else TUNED_AT, "deg"),
         pairs("--variation", variation),
         objective,
         pairs("--weights", weights) or dict(REGULATION),
-        pairs("--limits", limits),
+        pairs("--limits", limits, {name: term.unit for name, term in TERMS.items()}),
         8 if fast else 32,
         starts or (3 if fast else 6),
         rounds or (10 if fast else 30),
