@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import importlib.metadata
 import json
 from pathlib import Path
 
@@ -50,6 +51,7 @@ def test_the_run_is_that_of_the_model(folder: Path) -> None:
     assert float(rows[150]["position [m]"]) == pytest.approx(float(expected.position[150]), rel=1e-9)
     record = json.loads((folder / "simulate.json").read_text(encoding="utf-8"))
     assert record["parameters"]["convection_coefficient"] == 80.0
+    assert (record["provenance"]["dt"], record["series"]["time"]) == (0.01, [0.01 * k for k in range(301)])
     assert record["summary"]["temperature"]["greatest"] == pytest.approx(float(expected.temperature.max()))
     assert (folder / "simulate.png").stat().st_size > 10_000
     page = (folder / "simulate.html").read_text(encoding="utf-8")
@@ -83,7 +85,11 @@ def test_each_set_point_has_its_own_figures_of_merit(tmp_path: Path) -> None:
     assert (record["merit"], json.loads(alone.stdout)["merit_by_set_point"]) == ({}, [])
     for name, figure in json.loads(alone.stdout)["merit"].items():
         assert first["merit"][name]["value"] == pytest.approx(figure["value"], rel=1e-6, abs=1e-9), name
-    assert [second["begin_s"], second["end_s"], np.degrees(second["set_point_rad"])] == pytest.approx([3.0, 7.0, 10.0])
+    ends = [(one["begin_s"], one["end_s"]) for one in (first, second, last)]
+    assert ends == [(0.0, 3.0), (3.0, 7.0), (7.0, 9.0)]  # to the last digit
+    assert record["series"]["time"] == [0.01 * k for k in range(901)]
+    assert np.degrees(second["set_point_rad"]) == pytest.approx(10.0)
+    assert record["provenance"]["dt"] == 0.01
     position, time = (np.asarray(record["series"][name]) for name in ("position", "time"))
     there = (time > 2.995) & (time < 7.005)
     beyond = np.max(np.radians(10.0) - position[there])  # it comes from above
@@ -170,7 +176,10 @@ def test_a_gains_file_closes_the_loop(tmp_path: Path) -> None:
     assert record["merit"]["steady_error"]["value"] < np.radians(1.0)
     assert np.degrees(record["series"]["wanted"][-1]) == pytest.approx(30.0)
     assert record["series"]["position"][-1] == pytest.approx(np.radians(30.0), abs=np.radians(1.0))
-    assert "'proportional_gain': 13.0" in record["provenance"]["gains"]
+    assert record["provenance"]["gains"]["proportional_gain"] == 13.0
+    assert record["provenance"]["version of jax"] == importlib.metadata.version("jax")
+    with xr.open_dataset(tmp_path / "loop" / "simulate.nc", engine="scipy") as found:
+        assert json.loads(found.attrs["gains"]) == record["provenance"]["gains"]
 
 
 @pytest.mark.parametrize(
