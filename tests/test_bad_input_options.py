@@ -120,7 +120,7 @@ def test_gains_that_are_none(tmp_path: Path, name: str) -> None:
 LONG = {
     "sweep --controllers pdi": "no controller `pdi`; there are pid,",
     "sweep --controllers pid --over convection,damp": "damp",
-    "sweep --controllers pid --over convection": "two mismatches with a comma between them, not `convection`",
+    "sweep --controllers pid --over convection,damping,payload": "one mismatch, or two with a comma between them, not",
     "sweep --set-points a": "finite numbers with commas between them, not `a`",
     "sweep --set-points nan": "finite numbers with commas between them, not `nan`",
     "sweep --set-points 400": "set points are angles between the arm's stops, -45 to 95 degrees",

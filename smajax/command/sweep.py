@@ -35,7 +35,7 @@ def sweep(
         ),
     ] = None,
     over: Annotated[
-        str, typer.Option(help="the two mismatches of the maps", autocompletion=complete.mismatches)
+        str, typer.Option(help="the two mismatches of the maps, or one of curves", autocompletion=complete.mismatches)
     ] = "convection,damping",
     points: Annotated[
         int | None,
@@ -95,12 +95,13 @@ def sweep(
         raise typer.BadParameter(f"{error}{hint}", param_hint="--gains") from None
     asked = controllers or ",".join(dict.fromkeys(one.controller for one in tuned)) or "all"
     names = tuple(CONTROLLERS) if asked == "all" else tuple(part for part in asked.split(",") if part)
-    pair = tuple(over.split(","))
-    if len(pair) != 2:
-        raise typer.BadParameter(f"two mismatches with a comma between them, not `{over}`", param_hint="--over")
+    first, _, second = (part.strip() for part in over.strip(" ,").partition(","))
+    if not first or "," in second:
+        raise typer.BadParameter(f"one mismatch, or two with a comma between them, not `{over}`", param_hint="--over")
     settings = SweepSettings(
         names,
-        *pair,
+        first,
+        second,
         points or (3 if fast else 15),
         numbers("--set-points", set_points if set_points is not None else "-20,20,60" if fast else SET_POINTS, "deg"),
         numbers("--gain-shares", gain_shares if gain_shares is not None else "1" if fast else GAINS),
