@@ -51,7 +51,13 @@ def test_effects_and_presets_are_listed_for_machines(tmp_path: Path) -> None:
     assert effects["latent_heat"]["parameters"]["latent_heat.enthalpy"]["unit"] == "J/kg"
     presets = json.loads(_run("presets", "--json", cwd=tmp_path).stdout)
     assert {"arm", "dead_weight", "bias_spring"} <= set(presets["loads"])
+    assert presets["wire_sizes"].keys() == set(presets["wires"])
+    assert presets["wire_sizes"]["niti_table_3_1"] == {
+        "wire_diameter": {"value": 150e-6, "unit": "m"},
+        "wire_length": {"value": 0.9, "unit": "m"},
+    }
     told = _run("presets", cwd=tmp_path).stdout.splitlines()
+    assert "  niti_table_3_1: diameter 0.15 mm, length 900 mm" in told
     lines = [next(line for line in told if line.startswith(f"  {drive}: ")) for drive in presets["drives"]]
     assert len({line.split(": ", 1)[1] for line in lines}) == len(lines)
 
