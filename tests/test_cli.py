@@ -207,6 +207,21 @@ def test_every_option_that_takes_a_quantity_says_its_unit(command: str) -> None:
     assert len(re.findall(r"<s> (?:(?!--).)*in s where it says no unit", told.replace("--dt;", "dt;"))) == timed
 
 
+@pytest.mark.parametrize("command", ["close-loop", "identify", "demo", "figures", "tune", "sweep", "simulate"])
+def test_every_command_with_a_page_opens_it_on_the_same_word(command: str) -> None:
+    told = " ".join(CliRunner().invoke(app, [command, "--help"], terminal_width=200).output.split())
+    assert "--open / --no-open open the page in a browser when it is done [default: no-open]" in told
+
+
+def test_a_page_is_opened_where_it_is_asked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[str] = []
+    monkeypatch.setattr("webbrowser.open", opened.append)
+    words = ["simulate", "--step", "1V:100ms", "--out", str(tmp_path / "out")]
+    for more in ([], ["--no-open"], ["--open"]):
+        assert CliRunner().invoke(app, [*words, *more]).exit_code == 0
+        assert opened == [(tmp_path / "out" / "simulate.html").as_uri()] * (more == ["--open"])
+
+
 def test_lists_and_pairs_of_numbers_take_units() -> None:
     np.testing.assert_allclose(
         numbers("--set-points", "-20,0.5 rad 10deg, 85", "deg"), [-20.0, np.degrees(0.5), 10.0, 85.0]

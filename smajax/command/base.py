@@ -34,8 +34,7 @@ Overwrite = Annotated[
     bool, typer.Option("--overwrite", help="delete another result that smajax wrote into --out, and begin anew")
 ]
 Json = Annotated[bool, typer.Option("--json", help="print the record on stdout as JSON instead of words")]
-Open = Annotated[bool, typer.Option("--open/--no-open", help="open the page in a browser")]
-OpenUnless = Annotated[bool, typer.Option("--open/--no-open", help="open the page in a browser (from a terminal)")]
+Open = Annotated[bool, typer.Option("--open/--no-open", help="open the page in a browser when it is done")]
 
 
 def console() -> Console:
@@ -50,12 +49,6 @@ def browse(page: Path) -> None:
     import webbrowser
 
     webbrowser.open(page.resolve().as_uri())
-
-
-def browse_from_terminal(page: Path, wanted: bool) -> None:
-    """Open it where a person looks: not in a pipe, not in a build."""
-    if wanted and sys.stdout.isatty() and not os.environ.get("CI"):
-        browse(page)
 
 
 def command_line() -> str:

@@ -15,10 +15,8 @@ from smajax.command.base import (
     FITS,
     Json,
     Open,
-    OpenUnless,
     Overwrite,
     browse,
-    browse_from_terminal,
     console,
     resumable,
 )
@@ -95,7 +93,7 @@ def demo(
     only: Annotated[str | None, typer.Option(help=f"one of {', '.join(DEMOS)}", autocompletion=complete.demos)] = None,
     overwrite: Overwrite = False,
     json_out: Json = False,
-    open_page: OpenUnless = True,
+    open_page: Open = False,
 ) -> None:
     """The main job on two virtual benches shipped with the package: one lacks an effect, the other lacks nothing.
 
@@ -124,4 +122,6 @@ def demo(
         pages.append(page)
     if json_out:
         typer.echo(json.dumps(records))
-    browse_from_terminal(pages[0], open_page)
+    if open_page:
+        for page in pages:
+            browse(page)

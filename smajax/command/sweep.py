@@ -10,10 +10,10 @@ import typer
 from smajax.command import complete
 from smajax.command.base import (
     Json,
-    OpenUnless,
+    Open,
     Overwrite,
     alone,
-    browse_from_terminal,
+    browse,
     command_line,
     console,
     numbers,
@@ -70,7 +70,7 @@ def sweep(
     ] = False,
     overwrite: Overwrite = False,
     json_out: Json = False,
-    open_page: OpenUnless = True,
+    open_page: Open = False,
 ) -> None:
     """Run controllers of the arm on plants that are not what they believe, and compare them on every set point.
 
@@ -131,4 +131,5 @@ def sweep(
     else:
         typer.echo(as_text(rows))
         typer.echo(f"Page: {page.resolve()}")
-    browse_from_terminal(page, open_page)
+    if open_page:
+        browse(page)

@@ -11,10 +11,10 @@ from smajax.command import complete
 from smajax.command.base import (
     UNMET,
     Json,
-    OpenUnless,
+    Open,
     Overwrite,
     alone,
-    browse_from_terminal,
+    browse,
     command_line,
     console,
     numbers,
@@ -94,7 +94,7 @@ def tune(
     ] = False,
     overwrite: Overwrite = False,
     json_out: Json = False,
-    open_page: OpenUnless = True,
+    open_page: Open = False,
 ) -> None:
     """Tune the gains of a controller of the arm, on many set points and plants at once: by gradient, then without slopes.
 
@@ -173,6 +173,7 @@ def tune(
             typer.echo(f"  {row[0]:<24} {row[1]:>10} -> {row[2]:<10} {row[3]}" + (f"  ({row[5]})" if row[5] else ""))
         typer.echo(f"Gains: {(out / 'gains.json').resolve()}")
         typer.echo(f"Page: {page.resolve()}")
-    browse_from_terminal(page, open_page)
+    if open_page:
+        browse(page)
     if settings.limits and not found.within_limits:
         raise typer.Exit(UNMET)
