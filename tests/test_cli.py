@@ -188,6 +188,35 @@ def test_progress_is_silent_where_nobody_looks(
         assert bool(said) is bool(told)
 
 
+def test_how_to_see_progress_is_said_once_to_a_person_without_a_terminal(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.delenv(VARIABLE, raising=False)
+
+    def said(told_how: bool) -> str:
+        with shown(console(), told_how) as progress:
+            for share in (0.0, 1.0):
+                progress("fitting", share)
+        return capsys.readouterr().err
+
+    assert said(True).count("SMAJAX_PROGRESS=lines") == 1
+    assert said(False) == ""
+    monkeypatch.setenv(VARIABLE, "none")
+    assert said(True) == ""
+
+
+def test_long_work_says_how_to_see_progress_and_for_a_machine_does_not(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv(VARIABLE, raising=False)
+    words = ["figures", "M9", "--fast", "--out", str(tmp_path / "out")]
+    for more, times in (([], 1), (["--json"], 0)):
+        told = CliRunner().invoke(app, [*words, *more])
+        assert told.exit_code == 0
+        assert told.output.count("SMAJAX_PROGRESS=lines") == times
+    assert json.loads(told.output)["M9"]["holds"]
+
+
 def test_a_warning_is_said_wherever_stderr_leads(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -54,7 +54,7 @@ def figures(
     with (
         resumable(kept, out, "[MC]*.json"),
         claimed(out, "figures", setting, OWN, overwrite),
-        shown(console()) as progress,
+        shown(console(), told_how=not json_out) as progress,
     ):
         drawn = draw(list(dict.fromkeys(asked)), out, fast, progress)
         page = write_pages(out)

@@ -118,7 +118,7 @@ def sweep(
         with (
             resumable(kept, out, "finished/*.npz"),
             claimed(out, "sweep", record, own, overwrite, goes_on),
-            shown(console()) as progress,
+            shown(console(), told_how=not json_out) as progress,
         ):
             rows = run_sweep(arm(), settings, out, progress, command_line())
     except FolderTaken:

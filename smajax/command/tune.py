@@ -152,7 +152,7 @@ def tune(
         with (
             resumable(kept, out, STATE),
             claimed(out, "tune", asked, sorted(OURS), overwrite),
-            shown(console()) as progress,
+            shown(console(), told_how=not json_out) as progress,
         ):
             found = tune_into(arm(), settings, out, command_line(), progress)
     except FolderTaken:
