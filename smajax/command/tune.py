@@ -112,9 +112,9 @@ def tune(
     from smajax.figures.rigs import arm
     from smajax.gains_file import GainsFileError, read_gains
     from smajax.progress import shown
-    from smajax.tune.folder import OURS, STATE, tune_into
+    from smajax.tune.folder import OURS, STATE, ended, tune_into
     from smajax.tune.objective import REGULATION
-    from smajax.tune.page import conclusions, gain_rows, price
+    from smajax.tune.page import gain_rows, record
     from smajax.tune.settings import TuneSettings
     from smajax.tune.terms import TERMS
 
@@ -154,26 +154,27 @@ def tune(
             claimed(out, "tune", asked, sorted(OURS), overwrite),
             shown(console(), told_how=not json_out) as progress,
         ):
-            found = tune_into(arm(), settings, out, command_line(), progress)
+            told = ended(arm(), settings, out)
+            if told is None:
+                told = record(tune_into(arm(), settings, out, command_line(), progress), command_line())
     except FolderTaken:
         raise
     except ValueError as error:
         raise typer.BadParameter(str(error)) from None
     page = out / "tune.html"
-    dear = price(found)
-    for sentence in dear:
+    for sentence in told["price"]:
         typer.echo(sentence, err=True)
     if json_out:
         typer.echo((out / "tune.json").read_text(encoding="utf-8"), nl=False)
     else:
-        for sentence in conclusions(found):
-            if sentence not in dear:  # said already
+        for sentence in told["conclusions"]:
+            if sentence not in told["price"]:  # said already
                 typer.echo(sentence)
-        for row in gain_rows(found):
+        for row in gain_rows(told["gains"]):
             typer.echo(f"  {row[0]:<24} {row[1]:>10} -> {row[2]:<10} {row[3]}" + (f"  ({row[5]})" if row[5] else ""))
         typer.echo(f"Gains: {(out / 'gains.json').resolve()}")
         typer.echo(f"Page: {page.resolve()}")
     if open_page:
         browse(page)
-    if settings.limits and not found.within_limits:
+    if settings.limits and not told["limits_met"]:
         raise typer.Exit(UNMET)
