@@ -180,6 +180,7 @@ def close_loop(
         [one.name for one in after.parameters if one.name.startswith(added) and _asks_for_more(one)],
         [one for one in mistaken if one.weight > 0.5],
         _sizes_not_given(job),
+        [one for one in after.parameters if not one.name.startswith(added) and _asks_for_more(one)],
     )
     return Findings(
         experiment=experiment.name,
@@ -197,6 +198,7 @@ def close_loop(
             len(job.fit_runs),
             integration,
             _preset(job),
+            after.uncertainty.together,
         ),
         check=tuple(check),
         output_name=experiment.output_name,

@@ -13,7 +13,7 @@ from smajax.effects.library import LIBRARY
 from smajax.extended import extended
 from smajax.load.base import AbstractMovingLoad
 from smajax.loop import Loop
-from smajax.measured.names import instead
+from smajax.measured.names import instead, own_first
 from smajax.parameters import check_bounds, parameters, set_parameters
 from smajax.presets import build
 from smajax.system import System
@@ -31,7 +31,7 @@ def parameter_name(system: System, name: str) -> str:
     places = {".".join(map(str, entry.path)): own for own, entry in table.items()}
     if name in table or name in places:
         return name if name in table else places[name]
-    raise ValueError(f"no parameter {name!r}{instead(name, [*table], 'this model has')}")
+    raise ValueError(f"no parameter {name!r}{instead(name, own_first(table), 'this model has')}")
 
 
 def _value(system: System, name: str, value: str | float) -> float:

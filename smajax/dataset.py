@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 
 import jax
@@ -55,8 +56,12 @@ def labelled_run(
 
 
 def labelled_loop(system: System, loop: ClosedLoop, **settings: object) -> xr.Dataset:
-    """A closed loop as `labelled_run`, with the command `voltage` (V) and the position `wanted`."""
-    found = labelled_run(system, loop.run, {"voltage": loop.voltage}, **settings)
+    """A closed loop as `labelled_run`, with the command `voltage` (V) and the position `wanted`.
+
+    A mapping among the settings, such as `gains`, becomes JSON.
+    """
+    told = {name: json.dumps(dict(one)) if isinstance(one, Mapping) else one for name, one in settings.items()}
+    found = labelled_run(system, loop.run, {"voltage": loop.voltage}, **told)
     position = found["position"].attrs["units"]
     found["wanted"] = ("time", np.asarray(loop.wanted.position), {"units": position, "long_name": "set point"})
     return found

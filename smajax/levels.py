@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -43,15 +44,30 @@ class Given:
         return resample_input(self.time, self.values, clock, dt, squared=squared)
 
 
-def levels(text: str, unit: str) -> Given:
-    """`LEVEL:TIME,LEVEL:TIME,...` with units, such as `6V:5s,0V:10s`. UnitError for what it cannot be read as."""
+def _check_commas(parts: Sequence[str]) -> None:
+    """UnitError where a comma stands between two digits and leaves a part without a colon: `6,5V:2s`, `6V:2,5s`."""
+    for left, right in pairwise(parts):
+        if left[-1:].isdigit() and right[:1].isdigit() and not (":" in left and ":" in right):
+            raise UnitError(
+                f"got '{left},{right}', expected a decimal point, as in '{left}.{right}': a comma stands between levels, "
+                "such as '6.5V:5s,0V:10s'"
+            )
+
+
+def levels(text: str, unit: str, bare: str = "") -> Given:
+    """`LEVEL:TIME,LEVEL:TIME,...`, such as `6V:5s,0V:10s`. UnitError for what it cannot be read as.
+
+    bare: the unit of levels without one, times are then s; empty: each must say its own.
+    """
     values, lengths = [], []
-    for part in text.split(","):
+    parts = text.split(",")
+    _check_commas(parts)
+    for part in parts:
         level, colon, length = part.rpartition(":")
         if not colon:
             raise UnitError(f"got {part.strip()!r}, expected LEVEL:TIME, such as '6V:5s'")
-        values.append(parse_quantity(level, unit))
-        lengths.append(parse_quantity(length, "s"))
+        values.append(parse_quantity(level, unit, bare=bare))
+        lengths.append(parse_quantity(length, "s", bare="s" if bare else ""))
     if min(lengths) <= 0.0:
         raise UnitError(f"got {text!r}, expected times above zero")
     ends = np.cumsum(lengths)
@@ -86,16 +102,19 @@ def column(path: Path, key: str | int, unit: str, own: str, time: str = "") -> G
     return Given(seconds, convert(values, written or own, own), float(seconds[-1]), measured=True)
 
 
-def given(text: str, own: str, time: str = "") -> Given:
-    """An input from text: levels, a constant, or `FILE:COLUMN` and `FILE:COLUMN:UNIT`; `own` is the unit that it comes in."""
+def given(text: str, own: str, time: str = "", bare: str = "") -> Given:
+    """An input from text: levels, a constant, or `FILE:COLUMN` and `FILE:COLUMN:UNIT`; `own` is the unit that it comes in.
+
+    bare: see `levels`; a file's column without a unit is asked for one.
+    """
     head, colon, rest = text.partition(":")
     if colon and (Path(head).suffix.lower() in READERS or Path(head).is_file()):
         name, _, unit = rest.partition(":")
         key: str | int = int(name) if name.isdigit() else name
         return column(Path(head), key, unit, own, time)
     if colon or "," in text:
-        return levels(text, own)
-    return Given(np.zeros(1), np.asarray([parse_quantity(text, own)]), None)
+        return levels(text, own, bare)
+    return Given(np.zeros(1), np.asarray([parse_quantity(text, own, bare=bare)]), None)
 
 
 def clock_of(several: Sequence[Given], seconds: float | None, dt: float) -> Array:

@@ -15,15 +15,17 @@ from rich.text import Text
 from smajax.fit.progress import Progress as Report
 
 # Where stderr is no terminal nothing is said, so that a program that calls us has a clean one; with `lines` a log of a
-# build has a line for each stage.
+# build has a line for each stage. A person who waits there for minutes is told so, unless the variable is set.
 VARIABLE = "SMAJAX_PROGRESS"
+HOW = f"No terminal here, so progress is not drawn; {VARIABLE}=lines writes a line for each stage, and {VARIABLE}=none leaves this one out."
 
 
 @contextmanager
-def shown(console: Console) -> Iterator[Report]:
+def shown(console: Console, told_how: bool = False) -> Iterator[Report]:
     """Yields `report(what, share)`; share 1 closes the stage.
 
     What begins with "say: " is a sentence, not a stage; what begins with "warn: " is said wherever stderr goes.
+    told_how: where nothing is drawn, say once how to get progress; for long work whose result is words for a person.
     """
     if sys.stderr.isatty():
         with _bars(console) as report:
@@ -31,6 +33,8 @@ def shown(console: Console) -> Iterator[Report]:
     elif os.environ.get(VARIABLE) == "lines":
         yield _lines(console)
     else:
+        if told_how and VARIABLE not in os.environ:
+            console.print(HOW, markup=False, highlight=False, soft_wrap=True)
         yield _warnings(console)
 
 

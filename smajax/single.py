@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -124,7 +125,7 @@ def run_open(asked: Asked) -> Ran:
         raise ValueError(
             f"the model needs the input {name!r}: give {alone}--input {example}:10s (a file: {name}=log.csv:COLUMN)"
         )
-    several = {name: given(text, _unit(name), asked.time) for name, text in asked.inputs.items()}
+    several = {name: given(text, _unit(name), asked.time, bare=_unit(name)) for name, text in asked.inputs.items()}
     clock = clock_of(list(several.values()), asked.seconds, asked.dt)
     measured = system.load.inputs_required if isinstance(system.load, AbstractCoupon) else frozenset()
     series: Any = {
@@ -132,6 +133,7 @@ def run_open(asked: Asked) -> Ran:
         for name, one in several.items()
     }
     found = simulate_dataset(system, series, asked.dt, asked.tolerance)
+    found = found.assign_coords(time=found["time"].copy(data=clock))  # a sum of steps is off by its rounding
     return Ran(found, system, {}, tuple(_notes(found)))
 
 
@@ -166,7 +168,7 @@ def run_closed(asked: Asked, loop: AskedLoop) -> Ran:
     believed, plant = preset.plant(believed), preset.plant(plant)
     check_interface(loop.estimator, loop.noise, loop.period, asked.dt)
     between = interface_of(believed, loop.estimator, loop.noise, loop.period, asked.dt, loop.delay)
-    wanted = given(loop.set_points, "rad", asked.time)
+    wanted = given(loop.set_points, "rad", asked.time, bare="deg")
     clock = clock_of([wanted], asked.seconds, asked.dt)
     periods = (clock.size - 1) // between.every
     if periods < 1:
@@ -185,6 +187,8 @@ def run_closed(asked: Asked, loop: AskedLoop) -> Ran:
         key=None if between.sensor is None else jax.random.key(loop.seed),
         delay=between.delay,
     )
+    # As in `run_open`.
+    ran = eqx.tree_at(lambda one: one.run.time, ran, jnp.asarray(clock))
     told = between_in_words(loop.estimator, loop.noise, loop.period, loop.delay)
     found = labelled_loop(
         plant, ran, dt=asked.dt, controller=gains.controller, gains=parameter_values(gains.put(believed)), between=told

@@ -28,6 +28,7 @@ from smajax.parameters import get_parameters, set_vector
 from smajax.reference import Reference, clock, constant
 from smajax.system import System
 from smajax.types import Scalar, Series
+from smajax.words import and_listed
 
 # What may be wrong: its name on the command line -> the plant's parameter.
 MISMATCHES = {
@@ -59,26 +60,36 @@ def lanes(
 
 @dataclass(frozen=True)
 class Grid:
-    """The product of two mismatches (plant over belief), set points (rad) and shares of the main gain.
+    """The product of two mismatches (plant over belief) or one, set points (rad) and shares of the main gain.
 
     Raises ValueError for a mismatch there is not, or twice the same.
     """
 
     first: str
-    second: str
+    second: str  # "": there is one alone
     ratios: np.ndarray  # (A,), for both
     targets: np.ndarray  # (S,), rad
     gains: np.ndarray  # (G,), share of the preset's main gain
 
     def __post_init__(self) -> None:
-        if self.first == self.second or not {self.first, self.second} <= set(MISMATCHES):
+        if self.first == self.second or not set(self.mismatches) <= set(MISMATCHES):
             raise ValueError(
-                f"two different mismatches of {', '.join(sorted(MISMATCHES))}, not `{self.first}` and `{self.second}`."
+                f"one mismatch or two different ones of {', '.join(sorted(MISMATCHES))}, not "
+                f"{and_listed([f'`{name}`' for name in self.mismatches])}."
             )
 
     @property
+    def mismatches(self) -> tuple[str, ...]:
+        return (self.first, self.second) if self.second else (self.first,)
+
+    @property
     def shape(self) -> tuple[int, int, int, int]:
-        return len(self.ratios), len(self.ratios), len(self.targets), len(self.gains)
+        """(A, A, S, G); (A, 1, S, G) of one mismatch alone."""
+        return len(self.ratios), len(self._second), len(self.targets), len(self.gains)
+
+    @property
+    def _second(self) -> np.ndarray:
+        return self.ratios if self.second else np.ones(1)
 
     @property
     def size(self) -> int:
@@ -87,11 +98,11 @@ class Grid:
 
     def axes(self) -> tuple[np.ndarray, ...]:
         """Both ratios, set point and share of the gain of every closed loop, each of the grid's shape."""
-        return np.meshgrid(self.ratios, self.ratios, self.targets, self.gains, indexing="ij")
+        return np.meshgrid(self.ratios, self._second, self.targets, self.gains, indexing="ij")
 
     def lanes(self) -> np.ndarray:
-        first, second, target, gain = self.axes()
-        return lanes({self.first: first, self.second: second}, target, gain)
+        *shares, target, gain = self.axes()
+        return lanes(dict(zip(self.mismatches, shares, strict=False)), target, gain)
 
 
 class Interface(eqx.Module):

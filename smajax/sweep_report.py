@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FormatStrFormatter
 
@@ -23,7 +24,7 @@ from smajax.report.files import replace
 from smajax.report.html import picture
 from smajax.report.plain_page import bullets, table, whole
 from smajax.sweep import Grid
-from smajax.words import counted
+from smajax.words import and_listed, counted
 
 # Figure of merit -> (what it is called, unit shown, factor from SI).
 SHOWN = {
@@ -57,8 +58,10 @@ def _values(one: Merit, name: str) -> np.ndarray:
 
 def write_rows(path: Path, grid: Grid, swept: Swept) -> None:
     """Every closed loop in a row; angles in degrees, an empty cell where a time is infinite."""
-    lanes = np.stack([axis.ravel() for axis in grid.axes()], axis=1)
-    columns = [f"{grid.first}_ratio", f"{grid.second}_ratio", "set_point_deg", f"{swept.main_gain}_ratio"]
+    *shares, target, gain = (axis.ravel() for axis in grid.axes())
+    shares = shares[: len(grid.mismatches)]
+    lanes = np.stack([*shares, np.degrees(target), gain], axis=1)
+    columns = [*(f"{name}_ratio" for name in grid.mismatches), "set_point_deg", f"{swept.main_gain}_ratio"]
     units = {"°": "deg", "°C": "degC", "1/s": "per_s"}
     merits = [f"{name}_{units.get(SHOWN[name][1], SHOWN[name][1])}" for name in SHOWN]
     table = np.stack([_values(swept.merits, name).ravel() for name in SHOWN], axis=1)
@@ -66,7 +69,7 @@ def write_rows(path: Path, grid: Grid, swept: Swept) -> None:
     writer = csv.writer(text)
     writer.writerow([*columns, *merits, "failed_at_s"])
     for lane, row, failed in zip(lanes, table, swept.failed_at.ravel(), strict=True):
-        cells = [*lane[:2], np.degrees(lane[2]), lane[3], *row, failed]
+        cells = [*lane, *row, failed]
         writer.writerow([f"{cell:.6g}" if np.isfinite(cell) else "" for cell in cells])
     replace(path, text.getvalue())
 
@@ -82,28 +85,59 @@ def _edges(ratios: np.ndarray) -> np.ndarray:
 GREY = {"settling_time": ("settling_time", "never settles"), "overshoot": ("reach_time", "never arrives")}
 
 
+def _over_set_points(grid: Grid, swept: Swept, name: str) -> tuple[np.ndarray, str]:
+    """A figure of merit at the share of the gain nearest to 1, (A, A or 1, S), and what it is where half of the set points
+    are never reached or settled at: no number, in words; empty where there is no such place.
+    """
+    at = int(np.argmin(np.abs(grid.gains - 1.0)))
+    values = _values(swept.merits, name)[..., at]
+    if name not in GREY:
+        return values, ""
+    deciding, why = GREY[name]
+    never = ~np.isfinite(np.median(_values(swept.merits, deciding)[..., at], axis=2))
+    return np.where(never[..., None], np.nan, values), why if never.any() else ""
+
+
+def _ratio_axis(axis: Axis) -> None:
+    axis.set_major_locator(FixedLocator([0.5, 0.7, 1.0, 1.4, 2.0]))
+    axis.set_major_formatter(FormatStrFormatter("%g"))
+    axis.set_minor_locator(FixedLocator([]))
+
+
+def draw_over_one(figure: Figure, grid: Grid, swept: Swept) -> None:
+    """The same over one mismatch alone: the median over the set points as a line, all of them as a band, where all have one."""
+    for axes, name in zip(panels(figure, 2, 2), MAPPED, strict=True):
+        label, unit, _ = SHOWN[name]
+        values, never = _over_set_points(grid, swept, name)
+        lines = np.stack([one(values[:, 0], axis=1) for one in (np.min, np.median, np.max)])
+        lines[:, ~np.isfinite(lines[1])] = np.nan
+        least, middle, largest = np.where(np.isfinite(lines), lines, np.nan)
+        axes.plot(grid.ratios, middle, "o-", color=COLOURS[0], markersize=3, linewidth=1.3)
+        axes.fill_between(grid.ratios, least, largest, color=COLOURS[0], alpha=0.2, linewidth=0)
+        axes.set(xscale="log", xlim=_edges(grid.ratios)[[0, -1]])
+        axes.axvline(1.0, color="#9aa0a8", linewidth=1.0, linestyle="--")
+        _ratio_axis(axes.xaxis)
+        gaps = f"; no line: {never}" if never else ""
+        named(axes, f"{grid.first}, plant / controller", f"{label} ({unit}{gaps})")
+        if np.isnan(middle).all():  # a scale would have nothing to say
+            axes.set_yticks([])
+
+
 def draw_maps(figure: Figure, grid: Grid, swept: Swept) -> None:
     """Median over the set points, at the share of the gain nearest to 1, over the two mismatches.
 
     Dashed: the source's single lines. Grey: where more than half of the set points are never reached or settled at.
     """
-    at = int(np.argmin(np.abs(grid.gains - 1.0)))
     edges = _edges(grid.ratios)
     for axes, name in zip(panels(figure, 2, 2), MAPPED, strict=True):
         label, unit, _ = SHOWN[name]
-        values = np.median(_values(swept.merits, name)[..., at], axis=2)
-        never = ""
-        if name in GREY:
-            deciding, why = GREY[name]
-            values = np.where(np.isfinite(np.median(_values(swept.merits, deciding)[..., at], axis=2)), values, np.nan)
-            never = f"; grey: {why}" if np.isnan(values).any() else ""
+        several, why = _over_set_points(grid, swept, name)
+        values, never = np.median(several, axis=2), f"; grey: {why}" if why else ""
         axes.set_facecolor("#c9ccd1")
         mesh = axes.pcolormesh(edges, edges, np.ma.masked_invalid(values).T, cmap="viridis")
         axes.set(xscale="log", yscale="log")
         for axis in (axes.xaxis, axes.yaxis):
-            axis.set_major_locator(FixedLocator([0.5, 0.7, 1.0, 1.4, 2.0]))
-            axis.set_major_formatter(FormatStrFormatter("%g"))
-            axis.set_minor_locator(FixedLocator([]))
+            _ratio_axis(axis)
         axes.axhline(1.0, color="white", linewidth=1.0, linestyle="--")
         axes.axvline(1.0, color="white", linewidth=1.0, linestyle="--")
         named(axes, f"{grid.first}, plant / controller", f"{grid.second}, plant / controller", label)
@@ -121,7 +155,7 @@ def over_mismatches(grid: Grid, swept: Swept) -> str:
     settles = float(np.isfinite(_values(swept.merits, "settling_time")[..., at]).mean())
     beyond = float(np.nanmax(_values(swept.merits, "overshoot")[..., at]))
     return (
-        f"On all mismatches of {grid.first} and {grid.second} it settles in {100 * settles:.0f} % of the runs at "
+        f"On all mismatches of {and_listed(grid.mismatches)} it settles in {100 * settles:.0f} % of the runs at "
         f"{grid.gains[at]:g} times its main gain; overshoot up to {beyond:.3g}°."
     )
 
@@ -221,9 +255,14 @@ def page(
         f"{len(targets)} set points from {np.degrees(targets.min()):.0f}° to {np.degrees(targets.max()):.0f}°; "
         f"median / worst over the set points. Within 1° counts as there. {say(between)}</p>"
     )
+    drawn_as = (
+        "Maps: median over the set points"
+        if grid.second
+        else "Lines: median over the set points; bands: all of them, where all come to rest"
+    )
     mismatches = (
-        f"<h2>Mismatch of {say(grid.first)} and {say(grid.second)}</h2><p>The plant's value over the one that the "
-        "controller believes, where it believes in one. Maps: median over the set points, at the gains that each controller begins with. "
+        f"<h2>Mismatch of {say(and_listed(grid.mismatches))}</h2><p>The plant's value over the one that the "
+        f"controller believes, where it believes in one. {drawn_as}, at the gains that each controller begins with. "
         f"{say(air_in_words(grid, air))}</p>"
     )
     compared = [
@@ -296,7 +335,7 @@ def as_json(
             for name, one in merits.items()
         },
         "sweep": {
-            "mismatches": [grid.first, grid.second],
+            "mismatches": list(grid.mismatches),
             "ratios": plain(grid.ratios),
             "set_points_rad": plain(grid.targets),
             "gain_ratios": plain(grid.gains),

@@ -36,6 +36,7 @@ from smajax.sweep_report import (
     draw_comparison,
     draw_lines,
     draw_maps,
+    draw_over_one,
     failures,
     over_mismatches,
     page,
@@ -54,7 +55,7 @@ class SweepSettings:
 
     controllers: tuple[str, ...]
     first: str = "convection"
-    second: str = "damping"
+    second: str = "damping"  # "": over the first alone
     points: int = 15
     set_points: tuple[float, ...] = (-40.0, -20.0, 0.0, 10.0, 20.0, 40.0, 50.0, 60.0, 80.0)
     gains: tuple[float, ...] = (0.5, 0.7, 1.0, 1.4, 2.0)
@@ -179,7 +180,9 @@ def run_sweep(
         swept.append(one)
         write_rows(out / f"{name}.csv", grid, one)
         target = float(np.radians(LINE_TARGET))
-        drawn(f"{name}_maps.png", (10.0, 7.6), partial(draw_maps, grid=grid, swept=one))
+        drawn(
+            f"{name}_maps.png", (10.0, 7.6), partial(draw_maps if grid.second else draw_over_one, grid=grid, swept=one)
+        )
         drawn(f"{name}_lines.png", (11.0, 6.2), partial(draw_lines, time=time, ratios=LINES, swept=one, target=target))
         progress(f"say: {name}: {grid.size:,} closed loops; {failures(one)}. {over_mismatches(grid, one)}", 1.0)
     drawn("comparison.png", (10.0, 11.0), partial(draw_comparison, targets=targets, merits=compared))

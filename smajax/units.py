@@ -171,17 +171,23 @@ def convert(
     return np.asarray(_registry().Quantity(numbers, source).to(target).magnitude, dtype=np.float64)
 
 
-def parse_quantity(value: str | float, expected: str, difference: bool = False) -> float:
+def parse_quantity(value: str | float, expected: str, difference: bool = False, bare: str = "") -> float:
     """The number that a quantity such as `"24.2 J/g"` is in the unit `expected` (`"J/kg"`: 24200.0).
 
-    A bare number is accepted only where the expected unit is "1": anything else must say its unit.
+    A bare number is in the unit `bare`; without one it is accepted only where the expected unit is "1": anything else
+    must say its unit.
     `expected` "degC" reads "341 K" as the absolute 67.85; `expected` "K" is always a difference.
     Raises UnitError naming what was got, what was expected and what to do.
     """
     if isinstance(value, str):
         match = _NUMBER.match(value)
         if match is None:
-            raise UnitError(f"got {value!r}, expected a number and a unit like '1.5 {_plain(_unit(expected))}'")
+            like = (
+                "a number like '1.5'"
+                if expected in _DIMENSIONLESS
+                else f"a number and a unit like '1.5 {_plain(_unit(expected))}'"
+            )
+            raise UnitError(f"got {value!r}, expected {like}")
         number, unit = float(match.group(1)), match.group(2)
         if re.match(r",\d", unit):
             raise UnitError(f"got {value!r}, expected a decimal point; write {value.replace(',', '.', 1)!r}")
@@ -189,6 +195,8 @@ def parse_quantity(value: str | float, expected: str, difference: bool = False) 
         number, unit = float(value), ""
     if not math.isfinite(number):
         raise UnitError(f"got {value!r}, expected a finite number in {expected!r}")
+    if unit in _DIMENSIONLESS and bare:
+        unit = bare
     if unit in _DIMENSIONLESS and expected not in _DIMENSIONLESS:
         raise UnitError(f"got {value!r} without a unit, expected one like {expected!r}; write '{number:g} {expected}'")
     return float(convert(number, unit, expected, difference))

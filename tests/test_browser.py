@@ -6,8 +6,12 @@ Those of `identify`, `sweep` and `tune` are looked at where they are made: test_
 from __future__ import annotations
 
 import dataclasses
+import io
 from pathlib import Path
 from typing import Any
+
+import numpy as np
+from PIL import Image
 
 from smajax.figures.catalogue import CHAPTERS
 from smajax.figures.write import Drawn, as_page, draw, lying_in
@@ -53,6 +57,36 @@ def test_the_page_of_figures(browser: Any, tmp_path: Path) -> None:
     page = as_page(drawn, Path(__file__).parents[1] / "studies" / "chapter3")
     (tmp_path / "index.html").write_text(page, encoding="utf-8")
     assert faults(browser, tmp_path / "index.html") == []
+
+
+def test_a_table_that_moves_sideways_shows_it(browser: Any, tmp_path: Path) -> None:
+    """A grey edge on the side where there is more, of tables that are wider than a telephone; none at their ends."""
+    loop = AskedLoop("pid", "30deg:1s,10deg:1s")
+    shown = browser.new_page(viewport={"width": 400, "height": 900})
+    for page in (
+        write_run(run_closed(Asked(dt=0.01), loop), tmp_path, "A run", ""),
+        write_report(made_findings(), tmp_path),
+    ):
+        shown.goto(page.as_uri())
+        wide = [
+            box
+            for box in shown.query_selector_all(".scroll:has(table)")
+            if box.evaluate("box => box.scrollWidth - box.clientWidth") > 80
+        ]
+        assert wide
+        for box in wide:
+            for where, left, right in ((0, False, True), (40, True, True), (1e6, True, False)):
+                box.evaluate("(box, where) => { box.scrollLeft = where; }", where)
+                with Image.open(io.BytesIO(box.screenshot())) as image:
+                    columns = np.median(np.asarray(image.convert("L")), axis=0)  # between the lines
+                assert ((columns[1] < 200), (columns[-2] < 200)) == (left, right)
+                assert columns[columns.size // 2] == 255
+    narrow = tmp_path / "narrow.html"
+    narrow.write_text(whole("A page", [table(["a", "b"], [["1", "2"]])]), encoding="utf-8")
+    shown.goto(narrow.as_uri())
+    with Image.open(io.BytesIO(shown.query_selector(".scroll").screenshot())) as image:
+        columns = np.median(np.asarray(image.convert("L")), axis=0)  # between the lines
+    assert columns.min() == 255
 
 
 # What is wrong with a page -> what is said of it.

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from smajax.cli import app, main
 from smajax.command import renamed
-from smajax.command.base import console
+from smajax.command.base import console, numbers, pairs
 from smajax.progress import VARIABLE, shown
+from smajax.tune.terms import TERMS
 
 DEMO = Path(__file__).parents[1] / "smajax" / "demo" / "latent"
 
@@ -48,7 +51,13 @@ def test_effects_and_presets_are_listed_for_machines(tmp_path: Path) -> None:
     assert effects["latent_heat"]["parameters"]["latent_heat.enthalpy"]["unit"] == "J/kg"
     presets = json.loads(_run("presets", "--json", cwd=tmp_path).stdout)
     assert {"arm", "dead_weight", "bias_spring"} <= set(presets["loads"])
+    assert presets["wire_sizes"].keys() == set(presets["wires"])
+    assert presets["wire_sizes"]["niti_table_3_1"] == {
+        "wire_diameter": {"value": 150e-6, "unit": "m"},
+        "wire_length": {"value": 0.9, "unit": "m"},
+    }
     told = _run("presets", cwd=tmp_path).stdout.splitlines()
+    assert "  niti_table_3_1: diameter 0.15 mm, length 900 mm" in told
     lines = [next(line for line in told if line.startswith(f"  {drive}: ")) for drive in presets["drives"]]
     assert len({line.split(": ", 1)[1] for line in lines}) == len(lines)
 
@@ -179,6 +188,35 @@ def test_progress_is_silent_where_nobody_looks(
         assert bool(said) is bool(told)
 
 
+def test_how_to_see_progress_is_said_once_to_a_person_without_a_terminal(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.delenv(VARIABLE, raising=False)
+
+    def said(told_how: bool) -> str:
+        with shown(console(), told_how) as progress:
+            for share in (0.0, 1.0):
+                progress("fitting", share)
+        return capsys.readouterr().err
+
+    assert said(True).count("SMAJAX_PROGRESS=lines") == 1
+    assert said(False) == ""
+    monkeypatch.setenv(VARIABLE, "none")
+    assert said(True) == ""
+
+
+def test_long_work_says_how_to_see_progress_and_for_a_machine_does_not(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv(VARIABLE, raising=False)
+    words = ["figures", "M9", "--fast", "--out", str(tmp_path / "out")]
+    for more, times in (([], 1), (["--json"], 0)):
+        told = CliRunner().invoke(app, [*words, *more])
+        assert told.exit_code == 0
+        assert told.output.count("SMAJAX_PROGRESS=lines") == times
+    assert json.loads(told.output)["M9"]["holds"]
+
+
 def test_a_warning_is_said_wherever_stderr_leads(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -187,6 +225,44 @@ def test_a_warning_is_said_wherever_stderr_leads(
         progress("fitting", 0.0)
         progress("warn: check: is it in mm?", 1.0)
     assert capsys.readouterr().err == "warning: check: is it in mm?\n"
+
+
+@pytest.mark.parametrize("command", ["simulate", "sweep", "tune", "identify", "close-loop", "figures", "bench"])
+def test_every_option_that_takes_a_quantity_says_its_unit(command: str) -> None:
+    """A plain number is asked for where it is a share of something alone."""
+    told = " ".join(CliRunner().invoke(app, [command, "--help"]).output.split())
+    assert re.findall(r"--([\w-]+) (?:<float>|FLOAT)", told) == ["tolerance"] * (command == "simulate")
+    timed = {"simulate": 3, "sweep": 2, "tune": 2}.get(command, 0)
+    assert len(re.findall(r"<s> (?:(?!--).)*in s where it says no unit", told.replace("--dt;", "dt;"))) == timed
+
+
+@pytest.mark.parametrize("command", ["close-loop", "identify", "demo", "figures", "tune", "sweep", "simulate"])
+def test_every_command_with_a_page_opens_it_on_the_same_word(command: str) -> None:
+    told = " ".join(CliRunner().invoke(app, [command, "--help"], terminal_width=200).output.split())
+    assert "--open / --no-open open the page in a browser when it is done [default: no-open]" in told
+
+
+def test_a_page_is_opened_where_it_is_asked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[str] = []
+    monkeypatch.setattr("webbrowser.open", opened.append)
+    words = ["simulate", "--step", "1V:100ms", "--out", str(tmp_path / "out")]
+    for more in ([], ["--no-open"], ["--open"]):
+        assert CliRunner().invoke(app, [*words, *more]).exit_code == 0
+        assert opened == [(tmp_path / "out" / "simulate.html").as_uri()] * (more == ["--open"])
+
+
+def test_lists_and_pairs_of_numbers_take_units() -> None:
+    np.testing.assert_allclose(
+        numbers("--set-points", "-20,0.5 rad 10deg, 85", "deg"), [-20.0, np.degrees(0.5), 10.0, 85.0]
+    )
+    assert numbers("--gain-shares", "50%,1") == (0.5, 1.0)
+    limits = pairs(
+        "--limits",
+        ["settling_time=4000 ms,overshoot=2", "energy=0.02kJ peak_temperature=363.15K"],
+        {name: term.unit for name, term in TERMS.items()},
+    )
+    assert limits == pytest.approx({"settling_time": 4.0, "overshoot": 2.0, "energy": 20.0, "peak_temperature": 90.0})
+    assert pairs("--variation", ["inertia=20%,", "damping = 0.1"]) == {"inertia": 0.2, "damping": 0.1}
 
 
 def test_a_list_may_be_cut_short(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import importlib.metadata
 import json
 from pathlib import Path
 
@@ -50,6 +51,7 @@ def test_the_run_is_that_of_the_model(folder: Path) -> None:
     assert float(rows[150]["position [m]"]) == pytest.approx(float(expected.position[150]), rel=1e-9)
     record = json.loads((folder / "simulate.json").read_text(encoding="utf-8"))
     assert record["parameters"]["convection_coefficient"] == 80.0
+    assert (record["provenance"]["dt"], record["series"]["time"]) == (0.01, [0.01 * k for k in range(301)])
     assert record["summary"]["temperature"]["greatest"] == pytest.approx(float(expected.temperature.max()))
     assert (folder / "simulate.png").stat().st_size > 10_000
     page = (folder / "simulate.html").read_text(encoding="utf-8")
@@ -83,7 +85,11 @@ def test_each_set_point_has_its_own_figures_of_merit(tmp_path: Path) -> None:
     assert (record["merit"], json.loads(alone.stdout)["merit_by_set_point"]) == ({}, [])
     for name, figure in json.loads(alone.stdout)["merit"].items():
         assert first["merit"][name]["value"] == pytest.approx(figure["value"], rel=1e-6, abs=1e-9), name
-    assert [second["begin_s"], second["end_s"], np.degrees(second["set_point_rad"])] == pytest.approx([3.0, 7.0, 10.0])
+    ends = [(one["begin_s"], one["end_s"]) for one in (first, second, last)]
+    assert ends == [(0.0, 3.0), (3.0, 7.0), (7.0, 9.0)]  # to the last digit
+    assert record["series"]["time"] == [0.01 * k for k in range(901)]
+    assert np.degrees(second["set_point_rad"]) == pytest.approx(10.0)
+    assert record["provenance"]["dt"] == 0.01
     position, time = (np.asarray(record["series"][name]) for name in ("position", "time"))
     there = (time > 2.995) & (time < 7.005)
     beyond = np.max(np.radians(10.0) - position[there])  # it comes from above
@@ -170,13 +176,15 @@ def test_a_gains_file_closes_the_loop(tmp_path: Path) -> None:
     assert record["merit"]["steady_error"]["value"] < np.radians(1.0)
     assert np.degrees(record["series"]["wanted"][-1]) == pytest.approx(30.0)
     assert record["series"]["position"][-1] == pytest.approx(np.radians(30.0), abs=np.radians(1.0))
-    assert "'proportional_gain': 13.0" in record["provenance"]["gains"]
+    assert record["provenance"]["gains"]["proportional_gain"] == 13.0
+    assert record["provenance"]["version of jax"] == importlib.metadata.version("jax")
+    with xr.open_dataset(tmp_path / "loop" / "simulate.nc", engine="scipy") as found:
+        assert json.loads(found.attrs["gains"]) == record["provenance"]["gains"]
 
 
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (["--step", "7:10"], "without a unit"),
         (["--step", "7V"], "how long the run is"),
         (["--step", "7V:1s,3V"], "LEVEL:TIME"),
         (["--step", "7V:1s", "--set", "convection_coeficient=80"], "did you mean 'convection_coefficient'"),
@@ -221,6 +229,39 @@ def test_levels_hold_until_the_next(tmp_path: Path) -> None:
     np.testing.assert_allclose(one.on(clock, 0.25, sampled=True), [6, 6, 6, 6, 0.2])  # levels: none
     with pytest.raises(UnitError, match="above zero"):
         levels("6V:0s", "V")
+
+
+def test_a_quantity_says_its_unit_or_has_that_of_its_option(tmp_path: Path) -> None:
+    """The same run in both ways, of every option that takes one."""
+
+    def asked(name: str, *words: str) -> tuple[dict[str, list[float]], str]:
+        told = run.invoke(app, ["simulate", *words, "--json", "--out", str(tmp_path / name)])
+        assert told.exit_code == 0, told.output
+        record = json.loads(told.stdout)
+        return record["series"], record["provenance"].get("between", "")
+
+    loop = ["--controller", "pid", "--set-point"]
+    said = ["10deg:500 ms,0.5rad:1s", "--dt", "10 ms", "--period", "20ms", "--noise", "0.05rad", "--seconds", "1.2 s"]
+    alone = [
+        "10:0.5,28.64788975654116:1",
+        "--dt",
+        "0.01",
+        "--period",
+        "0.02",
+        "--noise",
+        "2.8647889756541160",
+        "--seconds",
+        "1.2",
+    ]
+    first, second = asked("said", *loop, *said), asked("alone", *loop, *alone)
+    assert len(first[0]["time"]) == 121
+    assert "called every 20 ms" in first[1]
+    assert "with 2.86479° of noise" in first[1]
+    assert first[1] == second[1]
+    np.testing.assert_allclose(first[0]["position"], second[0]["position"], rtol=1e-6)
+    held = asked("held", "--input", "voltage=5:1,0V:500ms", "--input", "ambient_temperature=25", "--dt", "0.1")[0]
+    np.testing.assert_allclose(held["voltage"], [5.0] * 10 + [0.0] * 6, atol=1e-12)
+    assert set(held["ambient_temperature"]) == {25.0}
 
 
 def test_a_coupon_is_given_its_temperature_and_stress(tmp_path: Path) -> None:

@@ -13,14 +13,16 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from smajax.attribution.verdict import pooled, summary
+from smajax.attribution.verdict import cannot_know, pooled, summary
 from smajax.catalogue import CATALOGUE
 from smajax.close_loop import _preset, _sizes_not_given, close_loop
 from smajax.experiment.load import load_experiment
 from smajax.extended import base_model, extended
 from smajax.fit.batch import pack, simulate_batch
 from smajax.parameters import get_parameters, parameters, set_parameters
-from smajax.report.findings import CoefficientFinding, Findings
+from smajax.report.findings import CoefficientFinding, Findings, ParameterFinding
+from smajax.report.write import write_report
+from tests import small_bench
 from tests.made_findings import made_effect, made_portrait, made_run
 
 STUDIES = Path(__file__).parents[1] / "studies"
@@ -61,6 +63,53 @@ def test_a_load_far_off_may_be_a_size_of_the_bench_that_was_never_given() -> Non
     given = dict.fromkeys(("wire_diameter", "wire_length"), 1e-3)
     whole = dataclasses.replace(experiment, parameters=given)
     assert _sizes_not_given(cast(Any, SimpleNamespace(experiment=whole, unknowns=("damping",)))) == []
+
+
+def test_a_parameter_that_ends_at_a_bound_is_said_at_the_top(tmp_path: Path) -> None:
+    """The stroke of the log asks for more strain than the box has; the noise hides the rest, so that no search follows."""
+    before, _, rest = small_bench.BENCH.partition("[unknown]")
+    known = """[model.parameters]
+convection_coefficient = "60 W/m^2/K"
+[unknown]
+recoverable_strain = { low = "1 %", high = "2 %", start = "1.5 %" }
+[effects]
+only = []
+"""
+    (tmp_path / "experiment.toml").write_text(
+        f"{before}{known}[sampling]{rest.partition('[sampling]')[2]}".replace("0.1 mm", "9 mm")
+    )
+    for k, name in enumerate("ab"):
+        small_bench.log(tmp_path / f"{name}.csv", seconds=10.0, seed=k)
+    findings = close_loop(load_experiment(tmp_path / "experiment.toml", CATALOGUE))
+    told = next(one for one in findings.summary if one.startswith("Mind: recoverable_strain"))
+    assert told.startswith("Mind: recoverable_strain ends at its upper bound of 2 %. The truth may lie beyond")
+    page = write_report(findings, tmp_path).read_text(encoding="utf-8")
+    assert page.index("Mind: recoverable_strain ends at") < page.index('<section id="runs"')
+
+
+def test_each_cluster_that_moves_together_has_one_line_with_advice() -> None:
+    with resources.as_file(resources.files("smajax") / "demo" / "latent") as folder:
+        experiment = load_experiment(folder / "experiment.toml", CATALOGUE)
+
+    def found(name: str, remark: str) -> ParameterFinding:
+        return ParameterFinding(name, "-", 0.5, 0.1, 0.0, 1.0, 0.5, remark)
+
+    several = (
+        found("specific_heat", "moves together with convection_coefficient"),
+        found("convection_coefficient", "moves together with specific_heat"),
+        found("damping", "known from its prior; the runs add next to nothing"),
+    )
+    pair = ("specific_heat", "convection_coefficient")
+    blend = found("density", "the runs see only a combination of it with load_mass")
+    told = cannot_know(experiment, (*several, blend), (), (), (), 3, 0.0, {}, [pair])
+    (advice,) = [one for one in told if "move together" in one or "moves together" in one]
+    assert advice.startswith(
+        "specific_heat and convection_coefficient move together in these runs: what one has too much"
+    )
+    assert "add a fit run that separates them" in advice
+    (advice,) = [one for one in told if one.startswith("Of density these runs see combinations alone.")]
+    assert "`smajax identify experiment.toml --design`" in advice
+    assert any(one.startswith("damping: known from its prior") for one in told)
 
 
 def _added(findings: Findings) -> set[str]:

@@ -217,6 +217,16 @@ def test_the_page_and_the_record_say_the_same(found: Identified, tmp_path: Path)
     np.testing.assert_allclose(table.column("stress [Pa]").reshape(3, -1)[:, 0], [90e6, 150e6, 120e6])
 
 
+def test_the_page_says_what_to_do_about_parameters_that_move_together(found: Identified) -> None:
+    weak = ("a and b move together: a by +3 % and b by -3 %, all at once, is one standard error.",)
+    advice = "measure one by itself and give it under <code>[model.parameters]</code>"
+    bare = dataclasses.replace(found, weak=weak, suggestions=())
+    assert f"{advice} in the place of" in page(bare)
+    assert "<code>--design</code> ranks such runs" in page(bare)
+    assert "such runs are ranked below" in page(dataclasses.replace(found, weak=weak))
+    assert advice not in page(dataclasses.replace(found, weak=("a is known to 9 % only.",)))
+
+
 def test_the_page_in_a_browser(found: Identified, browser: Any, tmp_path: Path) -> None:
     runs = (dataclasses.replace(found.runs[0], name=HOSTILE), *found.runs[1:])
     assert faults(browser, write_identified(dataclasses.replace(found, title=HOSTILE, runs=runs), tmp_path)) == []

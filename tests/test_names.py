@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
+from smajax.catalogue import CATALOGUE
+from smajax.compose import compose
+from smajax.experiment.errors import ExperimentError, check_name
 from smajax.measured.names import instead, listed, nearest
+from smajax.parameters import set_parameters
 
 EFFECTS = ("radiation", "coulomb_friction", "latent_heat", "rising_convection")
 
@@ -43,3 +49,21 @@ def test_the_sentence_with_and_without_a_suggestion() -> None:
 def test_every_name_is_listed() -> None:
     assert listed(map(str, range(40))).endswith("38, 39")
     assert listed(()) == "none"
+
+
+def test_parameters_of_the_model_are_listed_before_those_of_effects() -> None:
+    arm = ("niti_table_3_1", "arm", "amplified_voltage")
+    system = compose(*arm, effects=["latent_heat"])
+    there = CATALOGUE.describe(*arm, "").parameters
+    for asked in (
+        lambda: compose(*arm, effects=["latent_heat"], values={"zeta": 1.0}),
+        lambda: set_parameters(system, {"zeta": 1.0}),
+        lambda: check_name(Path("experiment.toml"), "unknown.zeta", "parameter", "zeta", there),
+    ):
+        with pytest.raises((ValueError, ExperimentError), match=r"[nN]o parameter") as told:
+            asked()
+        names = str(told.value).rpartition(": ")[2].rstrip(".").split(", ")
+        own = [name for name in names if "." not in name]
+        assert {"ambient_temperature", "start_fraction", "young_modulus_martensite"} <= set(own)
+        assert names == [*sorted(own), *sorted(set(names) - set(own))]
+        assert "latent_heat.enthalpy" in names

@@ -380,3 +380,15 @@ def test_unknown_terms_are_told_drawn_and_recorded(findings, page):
     assert record[0]["formulas"][0]["numbers"] == 2
     assert sum(record[0]["samples"]["counts"]) == 190
     assert findings_to_json(findings)["unknown"] == []
+
+
+def test_a_remark_that_parameters_move_together_leads_to_what_can_be_done(findings: Findings) -> None:
+    def section(remark: str) -> str:
+        first, *rest = findings.after
+        made = dataclasses.replace(findings, after=(dataclasses.replace(first, remark=remark), *rest))
+        page = findings_to_html(made)
+        return page[page.index('<section id="parameters"') : page.index('<section id="residual"')]
+
+    assert 'href="#cannot-know"' in section("moves together with specific_heat")
+    assert 'href="#cannot-know"' in section("the runs see only a combination of it with specific_heat")
+    assert 'href="#cannot-know"' not in section("at its lower bound")

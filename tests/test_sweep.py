@@ -83,6 +83,33 @@ def test_the_data_set_holds_every_row(folder: Path) -> None:
         assert [field.name for field in dataclasses.fields(Merit)] == list(MERIT_UNITS)
 
 
+def test_one_mismatch_alone_is_swept_as_a_curve(tmp_path: Path, folder: Path, browser: Any) -> None:
+    """Its loops are those of the map where the other mismatch is 1."""
+    alone = dataclasses.replace(SETTINGS, second="", points=3)
+    run_sweep(arm(), alone, tmp_path, lambda what, share: None, f"smajax sweep {HOSTILE}")
+    with (tmp_path / "vsc3.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [(row["payload_ratio"], row["set_point_deg"]) for row in rows] == [
+        (ratio, angle) for ratio in ("0.5", "1", "2") for angle in ("0", "30")
+    ]
+    assert not any("supply" in name for name in rows[0])
+    system = arm()
+    believed = np.asarray(get_parameters(system, ["payload_mass"]))[0]
+    plant = set_parameters(system, {"payload_mass": 2.0 * believed})
+    controller = CONTROLLERS["vsc3"].make(system)
+    loop = eqx.filter_jit(simulate_closed_loop)(plant, controller, constant(clock(3.0, 0.01), np.radians(30.0)), 0.01)
+    assert float(rows[-1]["energy_J"]) == pytest.approx(float(merit(loop, plant).energy), rel=1e-5)
+    with xr.open_dataset(tmp_path / "sweep.nc", engine="scipy") as found:
+        assert found["energy"].dims == ("controller", "payload_ratio", "set_point", "gain_ratio")
+        assert float(found["energy"][0, 2, 1, 0]) == pytest.approx(float(rows[-1]["energy_J"]), rel=1e-5)
+    record = json.loads((tmp_path / "sweep.json").read_text(encoding="utf-8"))
+    assert (record["sweep"]["mismatches"], record["sweep"]["loops"]) == (["payload"], 6)
+    page = (tmp_path / "index.html").read_text(encoding="utf-8")
+    assert "<h2>Mismatch of payload</h2>" in page
+    assert "On all mismatches of payload it settles" in page
+    assert faults(browser, tmp_path / "index.html") == []
+
+
 def test_the_page_in_a_browser(folder: Path, browser: Any) -> None:
     assert faults(browser, folder / "index.html") == []
 
@@ -109,7 +136,7 @@ def test_unknown_names_are_answered_with_those_there_are(tmp_path: Path) -> None
         run_sweep(arm(), SweepSettings(("vsc4",)), tmp_path, lambda what, share: None)
     with pytest.raises(ValueError, match="printed"):
         run_sweep(arm(), dataclasses.replace(SETTINGS, filtered="kalman"), tmp_path, lambda what, share: None)
-    for pair in (("payload", "wind"), ("payload", "payload")):
+    for pair in (("payload", "wind"), ("payload", "payload"), ("", ""), ("wind", "")):
         with pytest.raises(ValueError, match="convection"):
             Grid(*pair, ratios(3), np.zeros(1), np.ones(1))
     with pytest.raises(ValueError, match="convection"):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import dataclasses
 import json
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -14,8 +15,12 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
+from smajax.cli import app
 from smajax.closed_loop import simulate_closed_loop
+from smajax.command.base import UNMET
+from smajax.command.folder import MARK
 from smajax.control_presets import CONTROLLERS
 from smajax.figures.rigs import arm
 from smajax.gain_search import regulation_cost
@@ -23,13 +28,14 @@ from smajax.gains_file import GainsFileError, read_gains
 from smajax.merit import Merit, merit_by_set_point
 from smajax.parameters import get_parameters, parameters
 from smajax.reference import resting
+from smajax.report.display import digits
 from smajax.sweep import closed_loops, lanes
 from smajax.sweep_run import SweepSettings, run_sweep
 from smajax.tune import trust
 from smajax.tune.descent import Descent, Effort, begin, load, one_round
 from smajax.tune.evaluate import STEP, Rig
 from smajax.tune.evolve import Evolution
-from smajax.tune.folder import tune_into
+from smajax.tune.folder import OURS, ended, tune_into
 from smajax.tune.members import between, never_seen, tuned_on
 from smajax.tune.moves import walk
 from smajax.tune.objective import Goal, rank, value_and_slope
@@ -383,6 +389,54 @@ def test_a_folder_that_holds_something_else_is_refused(folder: Path, tmp_path: P
     assert [one.name for one in tmp_path.iterdir()] == ["thesis.tex"]
     with pytest.raises(ValueError, match=r"seconds: 3.0 there, 5.0 asked"):
         tune_into(arm(), dataclasses.replace(SETTINGS, seconds=5.0), folder)
+
+
+def test_a_tuning_that_is_finished_is_told_again_without_a_loop(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "again"
+    shutil.copytree(folder, out)
+    mark = {"command": "tune", "asked": {"tuning": "vsc3"}, "files": sorted(OURS)}
+    (out / MARK).write_text(json.dumps(mark))
+    before = {one.name: one.read_bytes() for one in out.iterdir()}
+    told = json.loads(before["tune.json"])
+
+    def never(*_: object, **__: object) -> None:
+        raise AssertionError("computed again")
+
+    monkeypatch.setattr("smajax.tune.settings.TuneSettings", lambda *_: SETTINGS)
+    monkeypatch.setattr("smajax.tune.folder.tune", never)
+    monkeypatch.setattr("smajax.runtime.prepare", lambda **_: None)  # JAX has begun already
+    again = CliRunner().invoke(app, ["tune", "vsc3", "--out", str(out)])
+    assert again.exit_code == (0 if told["limits_met"] else UNMET), again.output
+    for sentence in (*told["conclusions"], *told["price"]):
+        assert sentence in again.output
+    for name, gain in told["gains"].items():
+        row = next(line.split() for line in again.output.splitlines() if line.split()[:1] == [name])
+        assert row[1:4] == [digits(gain["before"]), "->", digits(gain["after"])]
+    assert {one.name: one.read_bytes() for one in out.iterdir() if one.name != MARK} == {
+        name: content for name, content in before.items() if name != MARK
+    }
+    assert ended(arm(), SETTINGS, out) == told
+
+
+@pytest.mark.parametrize("name", ["loops.csv", "tune.html", "gains.json", "tune.json"])
+def test_a_tuning_of_which_something_is_lost_or_edited_is_worked_out_again(
+    folder: Path, tmp_path: Path, name: str
+) -> None:
+    out = tmp_path / "again"
+    shutil.copytree(folder, out)
+    if name == "gains.json":
+        gains = json.loads((out / name).read_text())
+        gains["gains"]["boundary"]["value"] *= 1.01
+        (out / name).write_text(json.dumps(gains))
+    elif name == "tune.json":
+        (out / name).write_text('{"gains": [')
+    else:
+        (out / name).unlink()
+    assert ended(arm(), SETTINGS, out) is None
+    with pytest.raises(ValueError, match=r"seconds: 3.0 there, 5.0 asked"):
+        ended(arm(), dataclasses.replace(SETTINGS, seconds=5.0), out)
 
 
 def test_a_wrong_name_ends_the_command_with_2(tmp_path: Path) -> None:

@@ -114,6 +114,15 @@ def test_two_pairs_that_move_together_are_two_lines() -> None:
     }
 
 
+def test_clusters_that_move_together_are_told_apart() -> None:
+    covariance = np.kron(np.eye(2), np.asarray([[1.0, 0.999], [0.999, 1.0]]))
+    at = _estimates_with(covariance, 9)
+    bounds = dict.fromkeys(at.names, (-1e6, 1e6))
+    found = uncertainty(at, at.names, dict.fromkeys(at.names, 1.0), bounds)
+    assert found.together == (("a", "b"), ("c", "d"))
+    assert found.remark["a"] == "moves together with b"
+
+
 def test_six_that_move_together_are_one_line_and_short_remarks() -> None:
     lines, remark = _told_of(_estimates_with(0.01 * np.eye(6) + 0.99, 8))
     assert lines == [

@@ -54,6 +54,7 @@ def summary(
     at_bound: Sequence[str] = (),
     likelier: Sequence[Rival] = (),
     sizes: Sequence[str] = (),
+    held: Sequence[ParameterFinding] = (),
 ) -> tuple[str, ...]:
     """The verdict in sentences; `tried` is the number of candidate effects that were looked at.
 
@@ -61,7 +62,7 @@ def summary(
     the model foretells, where that is so little that nothing is named. `refused`: effects that the held-out runs did not
     confirm, with the error there without and with them. `at_bound`: coefficients of what was added that end at a bound.
     `likelier`: rivals that left-out runs prefer to what was added. `sizes`: those of the bench that the experiment never
-    gives, with the presets' values.
+    gives, with the presets' values. `held`: parameters of the base model that end at a bound.
     """
     unit, name = experiment.output_unit, experiment.output_name
     added = [effect for effect in effects if effect.added]
@@ -109,6 +110,13 @@ def summary(
         told.append(
             f"Mind: {and_listed(at_bound)} {'ends' if len(at_bound) == 1 else 'end'} at a bound. The runs ask for more of the "
             "effect than is likely: it may stand in for another."
+        )
+    if held:
+        ends = [f"{one.name} ends {one.remark} of {shown(one.value, one.unit, one.name).strip()}" for one in held]
+        its = "its bounds" if len(held) == 1 else "their bounds"
+        told.append(
+            f"Mind: {and_listed(ends)}. The truth may lie beyond, and what was fitted beside it makes up for that: widen "
+            f"{its} in the experiment file where physics allows it, or look at what is taken as known."
         )
     title_of = {effect.name: effect.title for effect in effects}
     told += [
@@ -207,6 +215,15 @@ def unexplained(
     return tuple(told)
 
 
+def separated(experiment: Experiment) -> str:
+    """What to do about parameters of which the runs see one combination."""
+    return (
+        "Measure one of them by itself and give it under [model.parameters] in the place of [unknown], or add a fit run that "
+        "separates them (another load, a slower or a hotter one): "
+        f"`smajax identify {experiment.path.name} --design` ranks such runs."
+    )
+
+
 def cannot_know(
     experiment: Experiment,
     parameters: Sequence[ParameterFinding],
@@ -216,11 +233,12 @@ def cannot_know(
     fit_runs: int,
     integration: float,
     preset: Mapping[str, str],
+    together: Sequence[Sequence[str]] = (),
 ) -> tuple[str, ...]:
     """What these runs cannot tell, whatever the fit says.
 
     `integration` (SI of the output): by how much halving the step changes the model's output. `preset`: parameters
-    of the base model that were not fitted, with value and unit.
+    of the base model that were not fitted, with value and unit. `together`: clusters of fitted ones that move together.
     """
     titles = {effect.name: effect.title for effect in effects}
 
@@ -246,6 +264,12 @@ def cannot_know(
         if one.weight > MENTIONED
     ]
     told += [
+        f"{and_listed(list(cluster))} move together in these runs: what one has too much another makes up for, so each is known "
+        f"less well than alone. {separated(experiment)}"
+        for cluster in together
+    ]
+    known = {name for cluster in together for name in cluster}
+    told += [
         f"{p.name}: {p.remark}"
         + (
             "; its value is not measured by these runs."
@@ -253,8 +277,14 @@ def cannot_know(
             else ": known less well than alone."
         )
         for p in parameters
-        if p.remark
+        if p.remark and p.name not in known
     ]
+    blended = [p.name for p in parameters if "combination" in p.remark]
+    if blended:
+        told.append(
+            f"Of {and_listed(blended)} these runs see combinations alone. {separated(experiment)} Where the equations have their "
+            "product alone (density and specific heat) no run separates them."
+        )
     if fit_runs == 2:
         told.append("With two fit runs the left-out test is weak: give at least three of different kinds.")
     elif fit_runs == 1:

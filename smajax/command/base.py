@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import math
 import os
+import re
 import shlex
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -33,8 +34,7 @@ Overwrite = Annotated[
     bool, typer.Option("--overwrite", help="delete another result that smajax wrote into --out, and begin anew")
 ]
 Json = Annotated[bool, typer.Option("--json", help="print the record on stdout as JSON instead of words")]
-Open = Annotated[bool, typer.Option("--open/--no-open", help="open the page in a browser")]
-OpenUnless = Annotated[bool, typer.Option("--open/--no-open", help="open the page in a browser (from a terminal)")]
+Open = Annotated[bool, typer.Option("--open/--no-open", help="open the page in a browser when it is done")]
 
 
 def console() -> Console:
@@ -49,12 +49,6 @@ def browse(page: Path) -> None:
     import webbrowser
 
     webbrowser.open(page.resolve().as_uri())
-
-
-def browse_from_terminal(page: Path, wanted: bool) -> None:
-    """Open it where a person looks: not in a pipe, not in a build."""
-    if wanted and sys.stdout.isatty() and not os.environ.get("CI"):
-        browse(page)
 
 
 def command_line() -> str:
@@ -113,15 +107,48 @@ def resumable(kept: str = "", out: Path | None = None, finished: str = "") -> It
         os._exit(INTERRUPTED)
 
 
-def numbers(option: str, text: str) -> tuple[float, ...]:
-    """`1,2 3` as finite numbers."""
-    try:
-        found = tuple(float(part) for part in text.replace(",", " ").split())
-        if not all(map(math.isfinite, found)):
-            raise ValueError
+def quantity(
+    about: str, unit: str, low: float = -math.inf, high: float = math.inf, above: float = -math.inf, like: str = ""
+) -> Any:
+    """An option that takes a number with its unit (`10ms`, `10 ms`), or a number alone, which is in `unit`.
+
+    It is from `low` to `high`, and more than `above`; like: an example for the message of one that is not.
+    """
+
+    def parsed(text: str | float) -> float:
+        from smajax.units import UnitError, parse_quantity
+
+        if not isinstance(text, str):  # the default
+            return text
+        try:
+            found = parse_quantity(text, unit, bare=unit)
+        except UnitError as error:
+            raise typer.BadParameter(str(error)) from None
+        if not (low <= found <= high and above < found):
+            least = f"more than {above:g}" if above > low else f"{low:g} or more"
+            asked = f"{least} {unit}" if high == math.inf else f"{low:g} to {high:g} {unit}"
+            raise typer.BadParameter(f"{asked}, not `{text}`" + f"; give one such as {like}" * bool(like))
         return found
-    except ValueError:
-        raise typer.BadParameter(f"finite numbers with commas between them, not `{text}`", param_hint=option) from None
+
+    return typer.Option(parser=parsed, metavar=f"<{unit}>", help=f"{about}; {alone(unit)}")
+
+
+def alone(unit: str) -> str:
+    """What the help of every option says that takes quantities."""
+    return f"in {unit} where it says no unit"
+
+
+def numbers(option: str, text: str, unit: str = "1") -> tuple[float, ...]:
+    """`1,2 3` or `1deg,2 deg` as finite numbers in `unit`, which those without one have."""
+    from smajax.units import UnitError, parse_quantity
+
+    parts = [part for part in re.split(r"[,\s]+(?=[-+.\d])", text.strip(", ")) if part]
+    try:
+        return tuple(parse_quantity(part, unit, bare=unit) for part in parts)
+    except UnitError as error:
+        raise typer.BadParameter(
+            f"finite numbers with commas between them, not `{text}`: {error}", param_hint=option
+        ) from None
 
 
 def within(low: float, high: float = math.inf) -> Callable[[float | None], float | None]:
@@ -136,21 +163,23 @@ def within(low: float, high: float = math.inf) -> Callable[[float | None], float
     return checked
 
 
-def pairs(option: str, several: Sequence[str] | None) -> dict[str, float]:
-    """`name=0.2,other=1`, given once or more, as numbers by name."""
+def pairs(option: str, several: Sequence[str] | None, units: Mapping[str, str] | None = None) -> dict[str, float]:
+    """`name=0.2,other=1`, given once or more, as numbers by name, in the units of those names ("1": shares, weights)."""
+    from smajax.units import UnitError, parse_quantity
+
     found: dict[str, float] = {}
-    for part in ",".join(several or ()).replace(" ", ",").split(","):
-        name, sign, value = part.partition("=")
-        if not part:
-            continue
+    told = ",".join(one.strip(", ") for one in several or ())
+    for part in re.split(r",\s*(?=[A-Za-z_])|\s+(?=[^,\s=]+=)", told) if told else ():
+        name, sign, value = (one.strip() for one in part.partition("="))
         try:
             if not sign or name in found:
-                raise ValueError
-            found[name] = float(value)
-            if not math.isfinite(found[name]):
-                raise ValueError
-        except ValueError:
+                raise UnitError("")
+            unit = (units or {}).get(name, "1")
+            found[name] = parse_quantity(value, unit, bare=unit)
+        except UnitError as error:
+            why = f": {error}" if str(error) else ""
             raise typer.BadParameter(
-                f"each name once with its number, as in `name=0.2,other=1`, not `{part}`", param_hint=option
+                f"each name once with its number, as in `name=0.2,other=1`, not `{part.strip()}`{why}",
+                param_hint=option,
             ) from None
     return found

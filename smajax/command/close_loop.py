@@ -15,10 +15,8 @@ from smajax.command.base import (
     FITS,
     Json,
     Open,
-    OpenUnless,
     Overwrite,
     browse,
-    browse_from_terminal,
     console,
     resumable,
 )
@@ -31,7 +29,7 @@ FINISHED_FITS = "Finished fits are kept: the same command goes on from there."
 OWN = ("report.html", "report.json", "parameters.csv", "runs.csv", FITS)
 
 
-def _loop(experiment: Path, out: Path, command: str, overwrite: bool) -> tuple[Findings, Path]:
+def _loop(experiment: Path, out: Path, command: str, overwrite: bool, told_how: bool) -> tuple[Findings, Path]:
     # Imported here so that `--help` does not wait for JAX; x64 is the caller's choice, and this is the caller.
     from smajax.runtime import prepare
 
@@ -49,7 +47,7 @@ def _loop(experiment: Path, out: Path, command: str, overwrite: bool) -> tuple[F
     with (
         resumable(FINISHED_FITS, out, FITS),
         claimed(out, "close-loop", asked_of(loaded), OWN, overwrite),
-        shown(console()) as progress,
+        shown(console(), told_how) as progress,
     ):
         findings = close_loop(loaded, memory=out / "fits", progress=progress, command=command)
         return findings, write_report(findings, out)
@@ -79,7 +77,7 @@ def close_loop_command(
     Example:  smajax close-loop experiment.toml --out report
     """
     command = f"smajax close-loop {shlex.quote(str(experiment))} --out {shlex.quote(str(out))}"
-    findings, page = _loop(experiment, out, command, overwrite)
+    findings, page = _loop(experiment, out, command, overwrite, not json_out)
     if json_out:
         from smajax.report.json_file import findings_to_json
 
@@ -95,7 +93,7 @@ def demo(
     only: Annotated[str | None, typer.Option(help=f"one of {', '.join(DEMOS)}", autocompletion=complete.demos)] = None,
     overwrite: Overwrite = False,
     json_out: Json = False,
-    open_page: OpenUnless = True,
+    open_page: Open = False,
 ) -> None:
     """The main job on two virtual benches shipped with the package: one lacks an effect, the other lacks nothing.
 
@@ -106,12 +104,15 @@ def demo(
     """
     if only is not None and only not in DEMOS:
         raise typer.BadParameter(f"there is no demo `{only}`; choose one of {', '.join(DEMOS)}.", param_hint="--only")
-    pages, records = [], {}
+    pages: list[Path] = []
+    records = {}
     for name in DEMOS if only is None else (only,):
         with resources.as_file(resources.files("smajax") / "demo" / name) as folder:
             if not json_out:
                 typer.echo(f"\n=== {name} ===")
-            findings, page = _loop(folder / "experiment.toml", out / name, f"smajax demo --only {name}", overwrite)
+            findings, page = _loop(
+                folder / "experiment.toml", out / name, f"smajax demo --only {name}", overwrite, not (json_out or pages)
+            )
             if json_out:
                 from smajax.report.json_file import findings_to_json
 
@@ -124,4 +125,6 @@ def demo(
         pages.append(page)
     if json_out:
         typer.echo(json.dumps(records))
-    browse_from_terminal(pages[0], open_page)
+    if open_page:
+        for page in pages:
+            browse(page)

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from smajax.command import complete
-from smajax.command.base import UNMET, Json, OpenUnless, Overwrite, browse_from_terminal, console, resumable
+from smajax.command.base import UNMET, Json, Open, Overwrite, browse, console, resumable
 
 OWN = (".made-by", "index.html", "README.md", "figures.csv", "[MC][0-9].*", "[MC][0-9][0-9].*")
 
@@ -28,7 +28,7 @@ def figures(
     fast: Annotated[bool, typer.Option("--fast", help="coarser steps, fewer samples, the same claims")] = False,
     overwrite: Overwrite = False,
     json_out: Json = False,
-    open_page: OpenUnless = True,
+    open_page: Open = False,
 ) -> None:
     """Draw the source's figures, each with the number that proves it, and print which claims hold.
 
@@ -54,7 +54,7 @@ def figures(
     with (
         resumable(kept, out, "[MC]*.json"),
         claimed(out, "figures", setting, OWN, overwrite),
-        shown(console()) as progress,
+        shown(console(), told_how=not json_out) as progress,
     ):
         drawn = draw(list(dict.fromkeys(asked)), out, fast, progress)
         page = write_pages(out)
@@ -65,6 +65,7 @@ def figures(
     else:
         typer.echo(as_text(drawn))
         typer.echo(f"Page: {page.resolve()}")
-    browse_from_terminal(page, open_page)
+    if open_page:
+        browse(page)
     if not all(one.holds for one in drawn):
         raise typer.Exit(UNMET)

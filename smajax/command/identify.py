@@ -81,7 +81,7 @@ def identify_command(
         with (
             resumable(kept, out, FITS),
             claimed(out, "identify", asked, OWN, overwrite, _goes_on),
-            shown(console()) as progress,
+            shown(console(), told_how=not json_out) as progress,
         ):
             if any((out / "fits").glob("*.npz")):
                 progress(f"say: Fits kept in {out / 'fits'} are gone on with where they are of the same work.", 1.0)

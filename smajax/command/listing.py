@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from typing import Any
 
 import typer
 
@@ -41,14 +42,23 @@ def effects(json_out: Json = False) -> None:
 
 
 def presets(json_out: Json = False) -> None:
-    """List the wires, loads and drives that an experiment file may name, and the controllers of the arm.
+    """List the wires with their sizes, the loads and drives that an experiment file may name, and the controllers of the arm.
 
     Example:  smajax presets
     """
+    from smajax.runtime import prepare
+
+    prepare()
     from smajax.control_presets import CONTROLLERS
+    from smajax.parameters import parameter_values, parameters
     from smajax.presets import DRIVES, LOADS, WIRES
     from smajax.wire.laws import LAWS
 
+    sizes: dict[str, dict[str, dict[str, Any]]] = {}
+    for name, make in WIRES.items():
+        wire = make()
+        units, values = parameters(wire), parameter_values(wire)
+        sizes[name] = {one: {"value": values[one], "unit": units[one].unit} for one in ("wire_diameter", "wire_length")}
     told = {
         "wires": list(WIRES),
         "loads": list(LOADS),
@@ -57,10 +67,14 @@ def presets(json_out: Json = False) -> None:
         "laws": list(LAWS),
     }
     if json_out:
-        typer.echo(json.dumps(told))
+        typer.echo(json.dumps({**told, "wire_sizes": sizes}))
         return
     for kind, names in told.items():
         typer.echo(f"{kind}: {', '.join(names)}")
+        if kind == "wires":
+            for name, size in sizes.items():
+                diameter, length = (size[one]["value"] for one in ("wire_diameter", "wire_length"))
+                typer.echo(f"  {name}: diameter {1e3 * diameter:.4g} mm, length {1e3 * length:.4g} mm")
         if kind == "drives":  # several are a voltage
             for name, drive in DRIVES.items():
                 typer.echo(f"  {name}: {(drive.__doc__ or '').splitlines()[0]}")

@@ -16,6 +16,7 @@ from smajax.command.base import (
     browse,
     command_line,
     console,
+    quantity,
     resumable,
     within,
 )
@@ -44,13 +45,17 @@ def simulate(
         typer.Argument(help="a drive of `smajax presets`; `none` for a coupon", autocompletion=complete.drives),
     ] = "amplified_voltage",
     step: Annotated[
-        str | None, typer.Option(help="levels of the drive's input, each with its time: 6V:5s,0V:10s")
+        str | None,
+        typer.Option(
+            help="levels of the drive's input, each with its time: 6V:5s,0V:10s; in V, A, W or a share, and s, where they say no unit"
+        ),
     ] = None,
     inputs: Annotated[
         list[str] | None,
         typer.Option(
             "--input",
-            help="NAME=levels, NAME=a constant (ambient_temperature=25degC), or a column of a file, NAME=log.csv:U:mV; repeat",
+            help="NAME=levels, NAME=a constant (ambient_temperature=25degC), or a column of a file, NAME=log.csv:U:mV; levels in SI or "
+            "degC where they say no unit; repeat",
         ),
     ] = None,
     time: Annotated[
@@ -61,7 +66,7 @@ def simulate(
         typer.Option(
             "--set",
             help="a parameter: wire.heat.convection_coefficient=80, convection_coefficient='80 W/m^2/K' or "
-            "latent_heat.enthalpy='20 J/g', which adds that effect; repeat",
+            "latent_heat.enthalpy='20 J/g', which adds that effect; in SI, degC or rad where it says no unit; repeat",
             autocompletion=complete.values,
         ),
     ] = None,
@@ -69,9 +74,9 @@ def simulate(
         str, typer.Option(help="kinetics: tanaka, liang, brinson or enhanced", autocompletion=complete.laws)
     ] = "",
     seconds: Annotated[
-        float | None, typer.Option(callback=within(0), help="length of the run; default: that of the inputs")
+        float | None, quantity("length of the run; default: that of the inputs", "s", above=0.0, like="10s")
     ] = None,
-    dt: Annotated[str, typer.Option(help="time between samples")] = "5ms",
+    dt: Annotated[float, quantity("time between samples", "s", above=0.0, like="5ms")] = 0.005,
     tolerance: Annotated[
         float | None, typer.Option(help="steps of its own between samples, to this error (1e-4 is good); moving loads")
     ] = None,
@@ -82,7 +87,10 @@ def simulate(
         str, typer.Option(help="a closed loop by this controller's preset gains", autocompletion=complete.controllers)
     ] = "",
     set_point: Annotated[
-        str | None, typer.Option(help="what the loop is to reach: 40deg:5s,10deg:5s, or a file")
+        str | None,
+        typer.Option(
+            help="what the loop is to reach: 40deg:5s,10deg:5s, in deg and s where they say no unit, or a file"
+        ),
     ] = None,
     mismatch: Annotated[
         list[str] | None,
@@ -95,10 +103,8 @@ def simulate(
         str,
         typer.Option(help="`printed` or `model` filter; none: told the true state", autocompletion=complete.estimators),
     ] = "",
-    noise: Annotated[
-        float, typer.Option(callback=within(0, 360.0), help="noise of the angle's readings, degrees (1 sigma)")
-    ] = 0.0,
-    period: Annotated[float, typer.Option(help="sample time of the controller, s, a multiple of --dt")] = 0.01,
+    noise: Annotated[float, quantity("noise of the angle's readings (1 sigma)", "deg", 0.0, 360.0)] = 0.0,
+    period: Annotated[float, quantity("sample time of the controller, a multiple of --dt", "s")] = 0.01,
     delay: Annotated[int, typer.Option(callback=within(0), help="control periods until a command arrives")] = 0,
     seed: Annotated[int, typer.Option(help="of the noise")] = 0,
     gif: Annotated[
@@ -128,7 +134,6 @@ def simulate(
     from smajax.report.files import json_text
     from smajax.report.simulate_page import OWN, merit_rows, mismatch_rows, record, rest_rows, summary_rows, write_run
     from smajax.single import Asked, AskedLoop, channels, run_closed, run_open
-    from smajax.units import UnitError, parse_quantity
     from smajax.words import aligned
 
     check_path(out)
@@ -147,11 +152,7 @@ def simulate(
     if not closed and mismatch:
         raise typer.BadParameter("--mismatch is for closed loops; use --set.")
     try:
-        asked = Asked(
-            wire, load, drive, law, _texts("--set", values), series, time, seconds, parse_quantity(dt, "s"), tolerance
-        )
-        if not asked.dt > 0.0:
-            raise UnitError(f"--dt: got {dt!r}, expected a time above zero")
+        asked = Asked(wire, load, drive, law, _texts("--set", values), series, time, seconds, dt, tolerance)
         if step is not None:
             required, _ = channels(asked.system())
             if len(required) != 1 or required & series.keys():

@@ -10,12 +10,14 @@ import typer
 from smajax.command import complete
 from smajax.command.base import (
     Json,
-    OpenUnless,
+    Open,
     Overwrite,
-    browse_from_terminal,
+    alone,
+    browse,
     command_line,
     console,
     numbers,
+    quantity,
     resumable,
     within,
 )
@@ -33,14 +35,14 @@ def sweep(
         ),
     ] = None,
     over: Annotated[
-        str, typer.Option(help="the two mismatches of the maps", autocompletion=complete.mismatches)
+        str, typer.Option(help="the two mismatches of the maps, or one of curves", autocompletion=complete.mismatches)
     ] = "convection,damping",
     points: Annotated[
         int | None,
         typer.Option(callback=within(2), help="mismatches from 0.5 to 2 along each side of a map; default 15"),
     ] = None,
     set_points: Annotated[
-        str | None, typer.Option(help="degrees, with commas; default -40,-20,0,10,20,40,50,60,80")
+        str | None, typer.Option(help=f"with commas, {alone('deg')}; default -40,-20,0,10,20,40,50,60,80")
     ] = None,
     gains: Annotated[
         list[Path] | None,
@@ -49,15 +51,13 @@ def sweep(
     gain_shares: Annotated[
         str | None, typer.Option(help="shares of the controller's main gain; default 0.5,0.7,1,1.4,2")
     ] = None,
-    seconds: Annotated[float, typer.Option(callback=within(0.1, 86_400.0), help="length of each closed loop")] = 10.0,
+    seconds: Annotated[float, quantity("length of each closed loop", "s", 0.1, 86_400.0)] = 10.0,
     estimator: Annotated[
         str,
         typer.Option(help="`printed` or `model` filter; none: told the true state", autocompletion=complete.estimators),
     ] = "",
-    noise: Annotated[
-        float, typer.Option(callback=within(0, 360.0), help="noise of the angle's readings, degrees (1 sigma)")
-    ] = 0.0,
-    period: Annotated[float, typer.Option(help="sample time of the controller, s, a multiple of 0.01")] = 0.01,
+    noise: Annotated[float, quantity("noise of the angle's readings (1 sigma)", "deg", 0.0, 360.0)] = 0.0,
+    period: Annotated[float, quantity("sample time of the controller, a multiple of 10 ms", "s")] = 0.01,
     delay: Annotated[int, typer.Option(callback=within(0), help="control periods until a command arrives")] = 0,
     out: Annotated[
         Path,
@@ -70,7 +70,7 @@ def sweep(
     ] = False,
     overwrite: Overwrite = False,
     json_out: Json = False,
-    open_page: OpenUnless = True,
+    open_page: Open = False,
 ) -> None:
     """Run controllers of the arm on plants that are not what they believe, and compare them on every set point.
 
@@ -95,14 +95,15 @@ def sweep(
         raise typer.BadParameter(f"{error}{hint}", param_hint="--gains") from None
     asked = controllers or ",".join(dict.fromkeys(one.controller for one in tuned)) or "all"
     names = tuple(CONTROLLERS) if asked == "all" else tuple(part for part in asked.split(",") if part)
-    pair = tuple(over.split(","))
-    if len(pair) != 2:
-        raise typer.BadParameter(f"two mismatches with a comma between them, not `{over}`", param_hint="--over")
+    first, _, second = (part.strip() for part in over.strip(" ,").partition(","))
+    if not first or "," in second:
+        raise typer.BadParameter(f"one mismatch, or two with a comma between them, not `{over}`", param_hint="--over")
     settings = SweepSettings(
         names,
-        *pair,
+        first,
+        second,
         points or (3 if fast else 15),
-        numbers("--set-points", set_points if set_points is not None else "-20,20,60" if fast else SET_POINTS),
+        numbers("--set-points", set_points if set_points is not None else "-20,20,60" if fast else SET_POINTS, "deg"),
         numbers("--gain-shares", gain_shares if gain_shares is not None else "1" if fast else GAINS),
         seconds,
         filtered=estimator,
@@ -117,7 +118,7 @@ def sweep(
         with (
             resumable(kept, out, "finished/*.npz"),
             claimed(out, "sweep", record, own, overwrite, goes_on),
-            shown(console()) as progress,
+            shown(console(), told_how=not json_out) as progress,
         ):
             rows = run_sweep(arm(), settings, out, progress, command_line())
     except FolderTaken:
@@ -130,4 +131,5 @@ def sweep(
     else:
         typer.echo(as_text(rows))
         typer.echo(f"Page: {page.resolve()}")
-    browse_from_terminal(page, open_page)
+    if open_page:
+        browse(page)

@@ -11,13 +11,15 @@ from smajax.command import complete
 from smajax.command.base import (
     UNMET,
     Json,
-    OpenUnless,
+    Open,
     Overwrite,
-    browse_from_terminal,
+    alone,
+    browse,
     command_line,
     console,
     numbers,
     pairs,
+    quantity,
     resumable,
     within,
 )
@@ -32,11 +34,13 @@ def tune(
             help="pid, vsc1, vsc2, vsc3, nvsc, sld, backstepping1 or backstepping2", autocompletion=complete.controllers
         ),
     ],
-    set_points: Annotated[str | None, typer.Option(help="degrees, with commas; default -40,-20,0,20,40,60,85")] = None,
+    set_points: Annotated[
+        str | None, typer.Option(help=f"with commas, {alone('deg')}; default -40,-20,0,20,40,60,85")
+    ] = None,
     variation: Annotated[
         list[str] | None,
         typer.Option(
-            help="how wrong the plant may be: inertia=0.2,convection=0.2; may be repeated",
+            help="how wrong the plant may be, as shares: inertia=0.2,convection=20%; may be repeated",
             autocompletion=complete.shares_of_mismatches,
         ),
     ] = None,
@@ -54,7 +58,7 @@ def tune(
     limits: Annotated[
         list[str] | None,
         typer.Option(
-            help="of the same, met in every loop, in s, degrees, J, V/s, degC: settling_time=4,overshoot=2",
+            help="of the same, met in every loop: settling_time=4,overshoot=2deg; in s, deg, J, V/s or degC where it says no unit",
             autocompletion=complete.terms,
         ),
     ] = None,
@@ -73,15 +77,13 @@ def tune(
             help="generations of a search without slopes (CMA-ES) after that, 24 candidates each; default 60, 0 for none",
         ),
     ] = None,
-    seconds: Annotated[float, typer.Option(callback=within(0.1, 86_400.0), help="length of each closed loop")] = 10.0,
+    seconds: Annotated[float, quantity("length of each closed loop", "s", 0.1, 86_400.0)] = 10.0,
     estimator: Annotated[
         str,
         typer.Option(help="`printed` or `model` filter; none: told the true state", autocompletion=complete.estimators),
     ] = "",
-    noise: Annotated[
-        float, typer.Option(callback=within(0, 360.0), help="noise of the angle's readings, degrees (1 sigma)")
-    ] = 0.0,
-    period: Annotated[float, typer.Option(help="sample time of the controller, s, a multiple of 0.01")] = 0.01,
+    noise: Annotated[float, quantity("noise of the angle's readings (1 sigma)", "deg", 0.0, 360.0)] = 0.0,
+    period: Annotated[float, quantity("sample time of the controller, a multiple of 10 ms", "s")] = 0.01,
     delay: Annotated[int, typer.Option(callback=within(0), help="control periods until a command arrives")] = 0,
     seed: Annotated[int, typer.Option(callback=within(0), help="of starts, plants and noise")] = 0,
     out: Annotated[Path, typer.Option(help="folder for gains.json, the page, the pictures and the numbers")] = Path(
@@ -92,7 +94,7 @@ def tune(
     ] = False,
     overwrite: Overwrite = False,
     json_out: Json = False,
-    open_page: OpenUnless = True,
+    open_page: Open = False,
 ) -> None:
     """Tune the gains of a controller of the arm, on many set points and plants at once: by gradient, then without slopes.
 
@@ -110,10 +112,11 @@ def tune(
     from smajax.figures.rigs import arm
     from smajax.gains_file import GainsFileError, read_gains
     from smajax.progress import shown
-    from smajax.tune.folder import OURS, STATE, tune_into
+    from smajax.tune.folder import OURS, STATE, ended, tune_into
     from smajax.tune.objective import REGULATION
-    from smajax.tune.page import conclusions, gain_rows, price
+    from smajax.tune.page import gain_rows, record
     from smajax.tune.settings import TuneSettings
+    from smajax.tune.terms import TERMS
 
     try:
         begun = read_gains(start, arm()) if start is not None else None
@@ -123,11 +126,11 @@ def tune(
         raise typer.BadParameter(str(error), param_hint="--start") from None
     settings = TuneSettings(
         controller,
-        numbers("--set-points", set_points if set_points is not None else "-20,20,60" if fast else TUNED_AT),
+        numbers("--set-points", set_points if set_points is not None else "-20,20,60" if fast else TUNED_AT, "deg"),
         pairs("--variation", variation),
         objective,
         pairs("--weights", weights) or dict(REGULATION),
-        pairs("--limits", limits),
+        pairs("--limits", limits, {name: term.unit for name, term in TERMS.items()}),
         8 if fast else 32,
         starts or (3 if fast else 6),
         rounds or (10 if fast else 30),
@@ -149,27 +152,29 @@ def tune(
         with (
             resumable(kept, out, STATE),
             claimed(out, "tune", asked, sorted(OURS), overwrite),
-            shown(console()) as progress,
+            shown(console(), told_how=not json_out) as progress,
         ):
-            found = tune_into(arm(), settings, out, command_line(), progress)
+            told = ended(arm(), settings, out)
+            if told is None:
+                told = record(tune_into(arm(), settings, out, command_line(), progress), command_line())
     except FolderTaken:
         raise
     except ValueError as error:
         raise typer.BadParameter(str(error)) from None
     page = out / "tune.html"
-    dear = price(found)
-    for sentence in dear:
+    for sentence in told["price"]:
         typer.echo(sentence, err=True)
     if json_out:
         typer.echo((out / "tune.json").read_text(encoding="utf-8"), nl=False)
     else:
-        for sentence in conclusions(found):
-            if sentence not in dear:  # said already
+        for sentence in told["conclusions"]:
+            if sentence not in told["price"]:  # said already
                 typer.echo(sentence)
-        for row in gain_rows(found):
+        for row in gain_rows(told["gains"]):
             typer.echo(f"  {row[0]:<24} {row[1]:>10} -> {row[2]:<10} {row[3]}" + (f"  ({row[5]})" if row[5] else ""))
         typer.echo(f"Gains: {(out / 'gains.json').resolve()}")
         typer.echo(f"Page: {page.resolve()}")
-    browse_from_terminal(page, open_page)
-    if settings.limits and not found.within_limits:
+    if open_page:
+        browse(page)
+    if settings.limits and not told["limits_met"]:
         raise typer.Exit(UNMET)

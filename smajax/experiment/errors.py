@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from smajax.measured.names import instead
+from smajax.measured.names import instead, own_first
 from smajax.measured.table import MeasuredDataError
 from smajax.units import UnitError
 
@@ -22,7 +22,7 @@ class ExperimentError(ValueError):
 
 def check_name(path: Path, key: str, kind: str, name: str, known: Iterable[str]) -> None:
     """Raises ExperimentError unless `name` is one of the known names of that kind."""
-    names = sorted(known)
+    names = own_first(known)
     if name not in names:
         raise ExperimentError(path, key, f"there is no {kind} {name!r}{instead(name, names, 'there are')}")
 

@@ -29,10 +29,11 @@ FEW = 50  # independent samples that tell a parameter
 
 @dataclass(frozen=True)
 class Uncertainty:
-    """Standard errors (SI; None: not told by the runs) and remarks, by parameter name."""
+    """Standard errors (SI; None: not told by the runs) and remarks, by parameter name; and clusters that move together."""
 
     standard_error: dict[str, float | None]
     remark: dict[str, str]
+    together: tuple[tuple[str, ...], ...] = ()
 
 
 def held(value: float, low: float, high: float, edge: float = AT_BOUND) -> str:
@@ -169,11 +170,13 @@ def uncertainty(
     for index, name in enumerate(loose):
         if not remark[name] and error[index] / scale[index] > room[index]:
             errors[name], remark[name] = None, "the runs leave all of its range open"
-    for cluster in _clusters(covariance[np.ix_(clear, clear)]):
-        members = [loose[clear[index]] for index in cluster]
+    clusters = [
+        tuple(loose[clear[index]] for index in cluster) for cluster in _clusters(covariance[np.ix_(clear, clear)])
+    ]
+    for members in clusters:
         for name in members:
             remark[name] = remark[name] or _together(name, members)
-    return Uncertainty(errors, remark)
+    return Uncertainty(errors, remark, tuple(clusters))
 
 
 def covariance_of(

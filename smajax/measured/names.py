@@ -57,6 +57,11 @@ def instead(name: str, known: Iterable[str], lead: str, suggested: Iterable[str]
     return f"{guess} {lead[:1].upper()}{lead[1:]}: {listed(names)}" if guess else f"; {lead}: {listed(names)}"
 
 
+def own_first(names: Iterable[str]) -> list[str]:
+    """By the alphabet, what belongs to an effect (`latent_heat.enthalpy`) after the model's own."""
+    return sorted(names, key=lambda name: ("." in name, name))
+
+
 def listed(names: Iterable[str]) -> str:
     """The names in one line, all of them: it may be the only list that its reader has."""
     return ", ".join(str(name) for name in names) or "none"

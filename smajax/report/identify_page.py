@@ -38,6 +38,17 @@ def _run_rows(found: Identified) -> tuple[list[str], list[list[str]]]:
     return ["run", "role", "samples", *(head(one) for one in found.outputs)], rows
 
 
+def _what_to_do(found: Identified) -> str:
+    """About parameters of which the runs see one combination; empty where there are none."""
+    if not any("move together" in one for one in found.weak):
+        return ""
+    where = "such runs are ranked below" if found.suggestions else "<code>--design</code> ranks such runs"
+    return (
+        "<p>Of what moves together measure one by itself and give it under <code>[model.parameters]</code> in the place of "
+        f"<code>[unknown]</code>, or add a run that separates them (another load, a slower or a hotter one): {where}.</p>"
+    )
+
+
 def page(found: Identified) -> str:
     """The whole page."""
     say = html.escape
@@ -54,6 +65,7 @@ def page(found: Identified) -> str:
         table(head, rows, (1,)),
         "<h2>What the runs tell apart</h2>",
         bullets(found.weak) or f"<p>{KNOWN if found.all_took_part else KNOWN_OF_THE_REST}</p>",
+        _what_to_do(found),
         picture(draw.correlations(found), "correlations of the estimates"),
     ]
     if found.profiles:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import io
+import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -41,7 +42,7 @@ def record(ran: Ran, command: str, series: bool = True) -> dict[str, Any]:
     found = ran.found
     return {
         "command": command,
-        "provenance": {name: value for name, value in found.attrs.items() if name != "parameters (SI)"},
+        "provenance": {name: _plain(name, told) for name, told in found.attrs.items() if name != "parameters (SI)"},
         "parameters": parameter_values(ran.system),
         "mismatch": {
             one.name: {"believed": one.believed, "true": one.true, "unit": one.unit} for one in ran.mismatches
@@ -64,6 +65,14 @@ def record(ran: Ran, command: str, series: bool = True) -> dict[str, Any]:
         },
         "series": {str(name): found[name].to_numpy().tolist() for name in ("time", *found.data_vars)} if series else {},
     }
+
+
+def _plain(name: str, told: str) -> Any:
+    """An attribute as it was before it became text: `dt` a number, `gains` numbers by name; a version stays text."""
+    try:
+        return told if name.startswith(("version of ", "git")) else json.loads(told)
+    except ValueError:
+        return told
 
 
 def _merit(figures: Mapping[str, float]) -> dict[str, Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 from smajax.batch.provenance import digest
 from smajax.control_presets import CONTROLLERS
@@ -20,8 +21,8 @@ from smajax.tune.pictures import before_after, costs_over_loops
 from smajax.tune.settings import TuneSettings
 from smajax.tune.tune import Tuned, tune
 
-ASKED, STATE, FINISH, GAINS = "asked.json", "state.npz", "finish.npz", "gains.json"
-OURS = {ASKED, STATE, FINISH, GAINS, "tune.html", "tune.json", "loops.csv", "before_after.png", "descent.png"}
+ASKED, STATE, FINISH, GAINS, TOLD = "asked.json", "state.npz", "finish.npz", "gains.json", "tune.json"
+OURS = {ASKED, STATE, FINISH, GAINS, TOLD, "tune.html", "loops.csv", "before_after.png", "descent.png"}
 
 
 def check_folder(out: Path, asked: dict[str, object]) -> None:
@@ -47,6 +48,31 @@ def check_folder(out: Path, asked: dict[str, object]) -> None:
         raise ValueError(f"--out {out} holds another tuning ({told}): give another folder, or delete that one.")
 
 
+def _asked(system: System, settings: TuneSettings) -> dict[str, Any]:
+    """What tells this tuning from another: settings, code and plant. ValueError for settings that make no sense."""
+    settings.check(system)
+    mark = digest(CONTROLLERS[settings.controller].plant(system))[:16]
+    return dict(json.loads(json.dumps({**settings.record(), "code": mark})))
+
+
+def ended(system: System, settings: TuneSettings, out: Path) -> dict[str, Any] | None:
+    """The record of this very tuning, where `out` holds it whole; None where something is to be done.
+
+    Raises ValueError as `tune_into` does.
+    """
+    check_folder(out, _asked(system, settings))
+    if not all((out / name).is_file() for name in OURS - {STATE, FINISH}):
+        return None
+    try:
+        told, gains = (json.loads((out / name).read_text(encoding="utf-8")) for name in (TOLD, GAINS))
+        same = {name: one["after"] for name, one in told["gains"].items()} == {
+            name: one["value"] for name, one in gains["gains"].items()
+        }
+    except (AttributeError, KeyError, TypeError, ValueError):
+        return None
+    return told if same else None
+
+
 def tune_into(
     system: System, settings: TuneSettings, out: Path, command: str = "", progress: Progress = quiet
 ) -> Tuned:
@@ -54,9 +80,7 @@ def tune_into(
 
     Raises ValueError for settings that make no sense, and for a folder that holds something else.
     """
-    settings.check(system)
-    mark = digest(CONTROLLERS[settings.controller].plant(system))[:16]
-    asked = json.loads(json.dumps({**settings.record(), "code": mark}))
+    asked = _asked(system, settings)
     check_folder(out, asked)
     out.mkdir(parents=True, exist_ok=True)
     replace(out / ASKED, json_text(asked))
@@ -75,7 +99,7 @@ def tune_into(
     pictures = {"before_after.png": before_after(found), "descent.png": costs_over_loops(found)}
     for name, png in pictures.items():
         replace(out / name, png)
-    replace(out / "tune.json", json_text(record(found, command)))
+    replace(out / TOLD, json_text(record(found, command)))
     replace(out / "loops.csv", loops(found))
     replace(out / "tune.html", page(found, pictures, command))
     return found

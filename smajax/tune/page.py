@@ -38,11 +38,24 @@ def checked_on(found: Tuned, name: str) -> str:
     return f"never seen: another parameter wrong by {100 * BEYOND:g} %{air}, set points tuned"
 
 
-def at_the_edge(found: Tuned) -> list[str]:
-    """Gains that ended at a bound of their box."""
+def gains_of(found: Tuned) -> dict[str, dict[str, Any]]:
+    """Of each gain its value before and after, unit, and box, as the record has them."""
+    return {
+        name: {
+            "before": found.before[name],
+            "after": found.after.values[name],
+            "unit": found.units[name],
+            "box": list(box),
+        }
+        for name, box in found.box.items()
+    }
+
+
+def at_the_edge(gains: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """Those of `gains_of` that ended at a bound of their box."""
     edge = []
-    for name, (low, high) in found.box.items():
-        value = found.after.values[name]
+    for name, one in gains.items():
+        value, (low, high) = one["after"], one["box"]
         if min(value / low, high / value) < (high / low) ** EDGE:
             edge.append(name)
     return edge
@@ -157,7 +170,7 @@ def conclusions(found: Tuned) -> list[str]:
             )
     told += in_moves(found)
     told += price(found)
-    if edge := at_the_edge(found):
+    if edge := at_the_edge(gains_of(found)):
         told.append(f"At a bound of the box, beyond which better gains may lie: {', '.join(edge)}.")
     descent, evolution = found.descent, found.evolution
     if evolution.generations:
@@ -184,19 +197,19 @@ def _ended(cost: float, excess: float) -> str:
     return digits(cost, 3) + (f" (a limit exceeded by {100.0 * excess:.2g} %)" if excess > 0.0 else "")
 
 
-def gain_rows(found: Tuned) -> list[list[str]]:
-    """Gain, before, after, unit, box, remark."""
-    edge = at_the_edge(found)
+def gain_rows(gains: Mapping[str, Mapping[str, Any]]) -> list[list[str]]:
+    """Of `gains_of`: gain, before, after, unit, box, remark."""
+    edge = at_the_edge(gains)
     return [
         [
             name,
-            digits(found.before[name]),
-            digits(found.after.values[name]),
-            found.units[name],
-            f"{digits(low)} … {digits(high)}",
+            digits(one["before"]),
+            digits(one["after"]),
+            one["unit"],
+            " … ".join(digits(bound) for bound in one["box"]),
             "at the bound" if name in edge else "",
         ]
-        for name, (low, high) in found.box.items()
+        for name, one in gains.items()
     ]
 
 
@@ -235,7 +248,7 @@ def page(found: Tuned, pictures: Mapping[str, bytes], command: str) -> str:
         "<p class=quiet>Above: thick, the plant as believed; thin, plants never seen. Below: from the least to the largest "
         "over the plants at each set point; squares were tuned on, circles never seen.</p>",
         "<h2>Gains</h2>",
-        table(["gain", "before", "after", "unit", "box", "remark"], gain_rows(found), (1, 2)),
+        table(["gain", "before", "after", "unit", "box", "remark"], gain_rows(gains_of(found)), (1, 2)),
     ]
     for name, check in found.checks.items():
         what = checked_on(found, name)
@@ -273,16 +286,9 @@ def record(found: Tuned, command: str) -> dict[str, Any]:
     return {
         "controller": found.settings.controller,
         "conclusions": conclusions(found),
+        "price": price(found),
         "asked": found.settings.record(),
-        "gains": {
-            name: {
-                "before": found.before[name],
-                "after": found.after.values[name],
-                "unit": found.units[name],
-                "box": list(found.box[name]),
-            }
-            for name in found.box
-        },
+        "gains": gains_of(found),
         "cost": {"before": found.costs[0], "after": found.costs[1]},
         "limits_met": found.within_limits if found.settings.limits else None,
         "checks": {
