@@ -5,10 +5,13 @@ VENV  := .venv
 BIN   := $(VENV)/bin
 READY := $(VENV)/.ready
 
+# The demo's pages are opened where a person looks, not in a build.
+OPEN = $$(test -t 2 && test -z "$$CI" && echo --open)
+
 .PHONY: demo test test-all coverage audit docs lint format package clean
 
 demo: $(READY)
-	SMAJAX_PROGRESS=lines $(BIN)/smajax demo --out demo-report
+	SMAJAX_PROGRESS=lines $(BIN)/smajax demo --out demo-report $(OPEN)
 
 test: lint
 	$(BIN)/python -m pytest -n 2 --dist worksteal
