@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, ClassVar
 
-from smajax.effects.base import AbstractEffect, Extent
+from smajax.effects.base import AbstractEffect
 from smajax.effects.pulley_friction import PulleyFriction
-from smajax.effects.stribeck_friction import SLOW, falling
+from smajax.effects.stribeck_friction import falling, from_several
 from smajax.parameters import parameter
 from smajax.types import Scalar
 
@@ -36,15 +37,15 @@ class PulleyStribeckFriction(AbstractEffect):
         "every change of direction and jumps when it starts."
     )
     switches: ClassVar[tuple[str, ...]] = ("share",)
-    starts: ClassVar[dict[str, float]] = {"share": 0.2, "sliding": 0.5, "speed": 5e-3}
+    starts: ClassVar[dict[str, float]] = {"share": 0.02, "sliding": 0.5, "speed": 5e-3}
 
     @classmethod
     def base(cls) -> PulleyStribeckFriction:
         return cls(share=0.0, sliding=0.5, speed=5e-3)
 
     @classmethod
-    def places(cls, extent: Extent) -> tuple[dict[str, float], ...]:
-        return ({"speed": SLOW},)
+    def begins(cls, told: Mapping[str, float]) -> tuple[dict[str, float], ...]:
+        return from_several(told, "share")
 
     @classmethod
     def applies(cls, system: System) -> bool:

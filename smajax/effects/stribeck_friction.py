@@ -2,20 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import ClassVar
 
 import jax.numpy as jnp
 
-from smajax.effects.base import AbstractEffect, Extent
+from smajax.effects.base import AbstractEffect
 from smajax.parameters import parameter
 from smajax.types import Scalar
 
-SLOW = 1e-3  # m/s: what a wire does while it is heated slowly
+# A load that sticks and jumps has a valley of the misfit for every row of jumps: refits begin from several of them.
+# Friction at rest over what the score test says, that in motion over that at rest, and v_s, m/s.
+BEGINS = ((2.0, 0.5, 1e-3), (2.0, 0.35, 2e-3), (3.0, 0.5, 2e-3), (3.0, 0.35, 1e-3))
 
 
 def falling(speed: Scalar, sliding: Scalar, scale: Scalar) -> Scalar:
     """Friction at a speed (m/s) over that at rest: 1, and `sliding` far above `scale` (m/s)."""
     return sliding + (1.0 - sliding) * jnp.exp(-((speed / scale) ** 2))
+
+
+def from_several(told: Mapping[str, float], size: str) -> tuple[dict[str, float], ...]:
+    """`AbstractEffect.begins` of an effect whose switch is `size`, with a curve of `sliding` and `speed`."""
+    return tuple(
+        {size: more * told[size], "sliding": sliding, "speed": speed}
+        for more, sliding, speed in BEGINS
+        if told.get(size, 0.0) > 0.0
+    )
 
 
 class StribeckFriction(AbstractEffect):
@@ -50,8 +62,8 @@ class StribeckFriction(AbstractEffect):
         return cls(limit=0.0, sliding=0.5, speed=5e-3)
 
     @classmethod
-    def places(cls, extent: Extent) -> tuple[dict[str, float], ...]:
-        return ({"speed": SLOW},)
+    def begins(cls, told: Mapping[str, float]) -> tuple[dict[str, float], ...]:
+        return from_several(told, "limit")
 
     def friction_limit(self, speed: Scalar) -> Scalar | float:
         return self.limit * falling(speed, self.sliding, self.speed)
