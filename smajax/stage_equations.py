@@ -82,7 +82,9 @@ def _free_position(system: System, stage: Stage, inputs: Inputs, z: Unknowns) ->
     assert isinstance(load, AbstractMovingLoad)
     velocity, acceleration = motion_rates(stage, z.position)
     inertia = load.inertia(inputs)
-    limit = friction_limit(system, velocity, inputs)
+    # At the speed before the step: with friction that falls with the speed a step of any length has one answer then,
+    # where at its own speed both sticking and sliding on may be one.
+    limit = friction_limit(system, stage.old.motion.velocity, inputs)
     friction = 0.0 if limit is None else limit * friction_in_use(stage, z.position)[0]
     pull = load.lever() * cross_section(system.wire) * z.stress
     resisting = load_resistance(system, stage.time, z.position, velocity, inputs) + friction

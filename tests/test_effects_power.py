@@ -156,6 +156,52 @@ def test_a_friction_that_grows_with_the_load_is_that_share_of_each_weight() -> N
         assert np.abs(shared - moved("coulomb_friction", 0.0, mass)).max() > 1e-5
 
 
+def test_stribeck_friction_falls_from_its_value_at_rest_to_that_in_motion() -> None:
+    """Whatever the wire pulls beyond weight, inertia and damping is the curve over the speed, against the motion."""
+    system, rest, sliding, speed = RIGS["dead_weight"][0], 0.2, 0.4, 1.5e-3
+    mass, damping = 0.075, 200.0
+    slow = set_parameters(system, {"load_mass": mass, "damping": damping})
+    voltage = {"voltage": jnp.asarray(np.concatenate([np.full(3000, 7.4), np.zeros(3000)]))}
+
+    def run(effect: str, **values: float) -> Any:
+        own = {f"{effect}.{name}": value for name, value in values.items()}
+        return simulate_compiled(extended(slow, (effect,), own), voltage, DT / 10.0)
+
+    found = run("stribeck_friction", limit=rest, sliding=sliding, speed=speed)
+    area = 0.25 * np.pi * float(system.wire.wire_diameter) ** 2
+    v = np.asarray(found.velocity)
+    inertia = mass * np.gradient(v, DT / 10.0)
+    rubs = area * np.asarray(found.stress) - mass * 9.81 - damping * v - inertia
+    # Once up and down: at either turn the bristle first bends to the other side.
+    x = np.asarray(found.position)
+    bent = np.where(v > 0.0, x - x[0], x.max() - x) > 1e-4
+    slides = (np.abs(v) > 2e-4) & bent
+    assert (slides & (v > 0.0)).sum() > 100
+    assert (slides & (v < 0.0)).sum() > 100
+    assert np.abs(v).max() > 2.0 * speed
+    curve = rest * (sliding + (1.0 - sliding) * np.exp(-((v / speed) ** 2)))
+    np.testing.assert_allclose(rubs[slides], (np.sign(v) * curve)[slides], atol=0.02 * rest)
+    alike = run("stribeck_friction", limit=rest, sliding=1.0, speed=speed).position
+    np.testing.assert_allclose(alike, run("coulomb_friction", limit=rest).position, rtol=0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("speed", [2e-4, 5e-4, 1e-3])
+def test_a_load_that_slides_goes_on_sliding_whatever_the_step(speed: float) -> None:
+    """Friction that falls with the speed: at a long step the same readings as at short ones, to a hundredth of the stroke."""
+    own = {"stribeck_friction.limit": 0.2, "stribeck_friction.sliding": 0.3, "stribeck_friction.speed": speed}
+    system = extended(RIGS["dead_weight"][0], ("stribeck_friction",), own)
+    voltage = np.concatenate([np.full(200, 7.4), np.zeros(200), np.full(200, 7.4)])
+    long, shorter, short = (
+        np.asarray(simulate_compiled(system, {"voltage": jnp.asarray(np.repeat(voltage, k))}, DT / k).position)[::k]
+        for k in (1, 4, 16)
+    )
+    stroke = np.ptp(short)
+    assert 0.01 < stroke < 0.025
+    assert np.abs(long - short).max() < 0.02 * stroke
+    assert np.sqrt(np.mean((long - short) ** 2)) < 3e-3 * stroke
+    assert np.sqrt(np.mean((shorter - short) ** 2)) < 3e-3 * stroke
+
+
 def test_a_loose_wire_leaves_the_arm_on_its_stop_until_it_has_taken_up_its_length() -> None:
     """The temperature at which it leaves is that of the strain s/l_0; from there on both run in parallel."""
     system, length = build("niti_table_3_1", "arm", "amplified_voltage"), 6e-3

@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import lfilter
 
 from smajax.attribution.screen import Score, screen
-from smajax.attribution.search import start_values
+from smajax.attribution.search import all_starts, start_values
 from smajax.effects.library import LIBRARY
 from smajax.fit.sensitivity import Sensitivity
 from smajax.residual.noise_like import correlation_time, whiteness_p_value
@@ -74,6 +74,25 @@ def test_a_refit_starts_on_the_side_that_the_score_points_to(score: float, expec
 def test_a_refit_never_starts_out_of_bounds() -> None:
     found = start_values(np.zeros(4), NAMES, Score(EFFECTS[:1], 0.5, 9.0, 0.0, {NAMES[1]: -6e-8}), BOUNDS)
     assert found[1] == LIBRARY["latent_heat"].starts["enthalpy"]
+
+
+@pytest.mark.parametrize(("score", "more"), [(0.05, 4), (0.0, 0)])
+def test_a_refit_of_a_friction_that_sticks_begins_from_several_sizes_and_speeds(score: float, more: int) -> None:
+    """Jumps make valleys; where the score test is silent on the size there is none to begin from."""
+    names = ("specific_heat", *(f"stribeck_friction.{name}" for name in ("limit", "sliding", "speed")))
+    bounds = dict(zip(names, [(100.0, 900.0), (0.0, 20.0), (0.0, 1.0), (1e-5, 1.0)], strict=True))
+    begun = np.asarray([450.0, 0.0, 0.5, 5e-3])
+    told = Score(("stribeck_friction",), 0.5, 9.0, 0.0, {names[1]: score})
+    first, *others = all_starts(begun, names, told, bounds)
+    np.testing.assert_array_equal(first, start_values(begun, names, told, bounds))
+    assert len(others) == more
+    assert len({tuple(one) for one in others}) == more
+    for one in others:
+        assert one[0] == 450.0
+        assert 1.9 * score < one[1] < 3.1 * score
+        assert one[3] < first[3]
+    latent = Score(("latent_heat",), 0.5, 9.0, 0.0, {NAMES[1]: 6e3})
+    assert len(all_starts(np.zeros(4), NAMES, latent, BOUNDS)) == 1
 
 
 def test_whiteness_and_memory_of_noise() -> None:

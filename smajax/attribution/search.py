@@ -44,6 +44,22 @@ def start_values(
     return values
 
 
+def all_starts(
+    model_values: np.ndarray, names: Sequence[str], score: Score, bounds: Mapping[str, tuple[float, float]]
+) -> list[np.ndarray]:
+    """`start_values`, and the same with an effect at each of the other places from which a refit of it begins."""
+    first = start_values(model_values, names, score, bounds)
+    found = [first]
+    for effect in score.effects:
+        told = {name.removeprefix(f"{effect}."): one for name, one in score.coefficients.items()}
+        for place in LIBRARY[effect].begins(told):
+            values = np.array(first)
+            for name, one in place.items():
+                values[names.index(f"{effect}.{name}")] = np.clip(one, *bounds[f"{effect}.{name}"])
+            found.append(values)
+    return found
+
+
 def search(setting: Search, base: Fit) -> tuple[Model, Model]:
     """(base model, final model). Fills `setting.evidence` and `setting.rounds` on the way."""
     problem, names = setting.problem, setting.problem.names
@@ -69,11 +85,16 @@ def search(setting: Search, base: Fit) -> tuple[Model, Model]:
         chosen = [*singles[:SINGLES], *pairs[:PAIRS]]
         begin = setting.inside(model)
         starts = [
-            Start((*model.effects, *score.effects), start_values(begin, names, score, setting.bounds))
+            Start((*model.effects, *score.effects), values)
             for score in chosen
+            for values in all_starts(begin, names, score, setting.bounds)
         ]
         solutions, _ = setting.fit(starts, f"round {number}: refitting candidates", hops=True)
-        fitted = [Fitted(begun.effects, solution) for begun, solution in zip(starts, solutions, strict=True)]
+        found: dict[tuple[str, ...], Fit] = {}
+        for begun, solution in zip(starts, solutions, strict=True):
+            if begun.effects not in found or solution.cost < found[begun.effects].cost:
+                found[begun.effects] = solution
+        fitted = [Fitted(effects, solution) for effects, solution in found.items()]
         if number == 1:
             samples = float(np.asarray(problem.batch.mask).sum())
             for one in fitted:

@@ -8,7 +8,7 @@ model. The default methods below change nothing; an effect overrides the one equ
 from __future__ import annotations
 
 import abc
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import equinox as eqx
@@ -61,6 +61,11 @@ class AbstractEffect(eqx.Module):
     @classmethod
     def places(cls, extent: Extent) -> tuple[dict[str, float], ...]:
         """Values of the coefficients that are no switches at which the score test looks too, beside `starts`."""
+        return ()
+
+    @classmethod
+    def begins(cls, told: Mapping[str, float]) -> tuple[dict[str, float], ...]:
+        """Coefficients from which a refit begins too, where the misfit has many valleys; `told`: the score test's switches."""
         return ()
 
     @classmethod

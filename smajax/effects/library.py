@@ -29,6 +29,7 @@ from smajax.effects.nonlinear_spring import NonlinearSpring
 from smajax.effects.phase_resistance import PhaseResistance
 from smajax.effects.phase_specific_heat import PhaseSpecificHeat
 from smajax.effects.pulley_friction import PulleyFriction
+from smajax.effects.pulley_stribeck_friction import PulleyStribeckFriction
 from smajax.effects.pulsed_voltage import PulsedVoltage
 from smajax.effects.pwm_smoothing import PwmSmoothing
 from smajax.effects.radiation import Radiation
@@ -102,6 +103,7 @@ _OWN: dict[str, type[AbstractEffect]] = {
         CoulombFriction,
         PulleyFriction,
         StribeckFriction,
+        PulleyStribeckFriction,
         ViscousFriction,
         SeriesCompliance,
         Slack,

@@ -24,6 +24,7 @@ CALLED: dict[str, tuple[str, ...]] = {
     "rate_dependence": ("lagging_transformation",),
     "transformation_drift": ("drifting_temperatures",),
     "coulomb_friction": ("coulomb_friction", "pulley_friction"),
+    "stribeck_friction": ("stribeck_friction", "pulley_stribeck_friction"),
     "slack": ("slack", "loose_start"),
     "dead_band": ("sensor_backlash",),
     "quantisation": ("sensor_resolution",),
