@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import abc
-from typing import Any
+from typing import Any, ClassVar
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -35,6 +35,8 @@ def value_of(state: State, name: str) -> Scalar:
 
 class AbstractMeasure(eqx.Module):
     """One number of a run. `update` is called once a step, with the state that the step ended in."""
+
+    smooth: ClassVar[bool] = True  # it moves with the parameters, and not by whole steps
 
     @property
     @abc.abstractmethod
@@ -163,6 +165,8 @@ class MeanSquare(AbstractMeasure):
 
 class TimeAbove(AbstractMeasure):
     """When the value first is above a threshold, s; infinite where it never is."""
+
+    smooth: ClassVar[bool] = False
 
     of: str = eqx.field(static=True)
     threshold: Scalar = eqx.field(converter=jnp.asarray)

@@ -12,7 +12,7 @@ L-stable two-stage SDIRK scheme (order 2, $\gamma = 1 - 1/\sqrt 2$) solves
 with g = gamma dt (`stage_solver` says how).
 
 Gradients: the iteration itself is not differentiated. `lax.custom_root` gives the solution the derivatives of the
-implicit function theorem, of any order, in forward and in reverse mode.
+implicit function theorem: of any order in forward mode, of the first two where reverse mode is among them.
 """
 
 from __future__ import annotations

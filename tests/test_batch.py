@@ -232,13 +232,14 @@ def test_members_that_go_wrong_are_told_and_disturb_nobody() -> None:
         (grid(volts=[6.0]), {}, "neither parameters"),
         (grid(payload_mass=[0.1]), {}, "needs the inputs"),
         (grid(voltage=[6.0]), {"keep": ("angle",)}, "martensite_fraction"),
+        (grid(ambient_temperature=[20.0]), {"inputs": {"voltage": 6.0, "ambient_temperature": 25.0}}, "of one"),
         (grid(voltage=[6.0]), {"measures": (Last("stress"), Last("stress"))}, "names of their own"),
         (grid(voltage=[6.0]), {"budget": 1000}, "every"),
     ],
 )
 def test_what_does_not_fit_together_is_told(axes: Axes, more: dict[str, object], told: str) -> None:
     with pytest.raises(ValueError, match=told):
-        run_batch(ARM, {}, axes, **{"seconds": SECONDS, "dt": DT, **more})  # type: ignore[arg-type]
+        run_batch(ARM, axes=axes, **{"inputs": {}, "seconds": SECONDS, "dt": DT, **more})  # type: ignore[arg-type]
 
 
 def test_wrong_values_are_told() -> None:

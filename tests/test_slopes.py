@@ -16,7 +16,7 @@ from smajax.batch.run import recipe_of, run_batch
 from smajax.effects.library import LIBRARY
 from smajax.extended import extended
 from smajax.lanes.evaluate import evaluator
-from smajax.measure import AbstractMeasure, Last, Mean, MeanSquare
+from smajax.measure import AbstractMeasure, Last, Mean, MeanSquare, TimeAbove
 from smajax.parameters import get_parameters, parameters, set_parameters
 from smajax.presets import build
 from smajax.system import System
@@ -95,12 +95,13 @@ def test_they_are_those_of_differences() -> None:
 
 
 def test_they_have_the_unit_of_the_measure_over_that_of_the_parameter() -> None:
-    measures = (Last("position"), Mean("temperature"), TRACKED)
-    recipe = recipe_of(
-        ARM, {}, grid(voltage=[6.0]), measures=measures, slopes=(*BY, "convection_coefficient"), **SPREAD
-    )
+    measures = (Last("position"), Last("velocity"), Mean("temperature"), TRACKED)
+    by = (*BY, "convection_coefficient", "start_fraction")
+    recipe = recipe_of(ARM, {}, grid(voltage=[6.0]), measures=measures, slopes=by, **SPREAD)
     units = recipe.units()
     assert units["last_position_by_voltage"] == "rad/V"
+    assert (units["last_velocity"], units["last_velocity_by_start_fraction"]) == ("rad/s", "rad/s")
+    assert units["mean_square_position_by_start_fraction"] == "-"
     assert units["mean_temperature_by_austenite_start"] == "K/K"
     assert units["mean_square_position_by_wire_diameter"] == "1/m"
     # One that a program can read.
@@ -127,11 +128,16 @@ def test_they_are_streamed_with_all_else_and_gone_on_with(tmp_path: Path) -> Non
         ({"slopes": ("damping", "damping")}, "twice"),
         ({"slopes": ("damping",), "measures": ()}, "give `measures`"),
         ({"slopes": ("damping",), "tolerance": 1e-4}, "leave `tolerance` out"),
+        (
+            {"slopes": ("damping",), "measures": (TimeAbove("position", 0.1),)},
+            "time_above_position moves by whole steps",
+        ),
+        ({"slopes": ("ambient_temperature",), "inputs": {"ambient_temperature": 25.0}}, "stands in for the parameter"),
     ],
 )
 def test_what_has_no_slopes_is_told(more: dict[str, Any], told: str) -> None:
     with pytest.raises(ValueError, match=told):
-        run_batch(ARM, {}, grid(voltage=[6.0]), **{"measures": (TRACKED,), **SPREAD, **more})
+        run_batch(ARM, axes=grid(voltage=[6.0]), **{"inputs": {}, "measures": (TRACKED,), **SPREAD, **more})
 
 
 def test_a_member_gone_wrong_spoils_no_other() -> None:

@@ -46,14 +46,15 @@ class Recipe(eqx.Module):
     def units(self) -> dict[str, str]:
         """Of everything that a member gives."""
         own = self.system.load.reading[1]
-        per = {"velocity": f"{own}/s"}
-        found = {name: SHOWN[name] or per.get(name, own) for name in self.keep}
-        found |= {one.name: one.unit or own for one in self.measures}
+        own_of = {name: unit or (f"{own}/s" if name == "velocity" else own) for name, unit in SHOWN.items()}
+        found = {name: own_of[name] for name in self.keep}
+        measured = {one.name: one.unit or own_of.get(getattr(one, "of", ""), own) for one in self.measures}
+        found |= measured
         table = parameters(self.system)
         for one in self.measures:
             for name in self.slopes:
                 below = table[name].unit if name in table else INPUT_UNITS[name]
-                found[slope_name(one.name, name)] = _per(one.unit or own, below)
+                found[slope_name(one.name, name)] = _per(measured[one.name], below)
         return found | {"status": "-", "first_bad_time": "s"}
 
 
@@ -72,7 +73,9 @@ def slope_name(measure: str, name: str) -> str:
 def _per(above: str, below: str) -> str:
     """The unit of a slope: of differences, which in temperature are kelvins."""
     above, below = (DIFFERENCES.get(one, one) for one in (above, below))
-    return above if below == "1" else f"{above}/{below if below.isalpha() else f'({below})'}"
+    if below == "1":
+        return "-" if above == "1" else above
+    return f"{above}/{below if below.isalpha() else f'({below})'}"
 
 
 def member(recipe: Recipe, values: Values) -> dict[str, jax.Array]:

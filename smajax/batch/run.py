@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -67,7 +67,7 @@ def recipe_of(
         raise ValueError(
             f"{listed(unknown)}: neither parameters ({listed(sorted(table))}) nor inputs ({listed(sorted(known))}) of the system."
         )
-    twice = sorted(set(channels) & set(inputs))
+    twice = sorted(set(axes.names) & set(inputs))
     if twice:
         raise ValueError(f"{listed(twice)}: varied by `axes` and given in `inputs` as well: leave them out of one.")
     given = set(inputs) | set(channels)
@@ -105,7 +105,7 @@ def recipe_of(
             f"`tolerance` is a share of 1 C and of 1 % strain a step, for a load that moves; got {tolerance} and "
             f"{type(load).__name__}. Take 1e-4, or leave it out."
         )
-    _check_slopes(slopes, table, channels, names, tolerance)
+    _check_slopes(slopes, table, channels, inputs, measures, tolerance)
     return Recipe(
         system=system,
         series=series,
@@ -125,7 +125,8 @@ def _check_slopes(
     slopes: Sequence[str],
     table: Mapping[str, Parameter],
     channels: Sequence[str],
-    measures: Sequence[str],
+    inputs: Collection[str],
+    measures: Sequence[AbstractMeasure],
     tolerance: float | None,
 ) -> None:
     wrong = [name for name in slopes if name not in table and name not in channels]
@@ -136,6 +137,14 @@ def _check_slopes(
         )
     if len(set(slopes)) < len(slopes):
         raise ValueError(f"`slopes` names something twice: {listed(slopes)}.")
+    hidden = sorted(set(slopes) & set(inputs))
+    if hidden:
+        raise ValueError(
+            f"an input stands in for the parameter {listed(hidden)}: leave it out of `inputs`, or of `slopes`."
+        )
+    jumping = [one.name for one in measures if not one.smooth]
+    if slopes and jumping:
+        raise ValueError(f"{listed(jumping)} moves by whole steps and has no slope: leave it out, or `slopes`.")
     if slopes and not measures:
         raise ValueError("`slopes` are those of measures: give `measures`, as `smajax.measure.MeanSquare`.")
     if slopes and tolerance is not None:
@@ -175,8 +184,9 @@ def run_batch(
     the samples only, and there are no slopes.
 
     `slopes` names parameters, and inputs of `axes`: the result then has the derivative of every measure by each of them, as
-    `mean_square_position_by_wire_diameter`. They are found backwards through the run (reverse mode): for all parameters
-    together they take less than four times as long as the run, and memory that grows as the square root of its steps.
+    `mean_square_position_by_wire_diameter`. They are found backwards through the run (reverse mode): those of one measure by all
+    parameters together in less than four times the time of the run, those of each further measure in two or three times more, in memory
+    that grows as the square root of its steps. Those of a member that went wrong mean nothing: `good` leaves them out.
 
     The result has the dimensions of `axes` and `time`, `status` (0 good, 1 a number that is none, 2 runaway heat) and
     `first_bad_time`. Results take a quarter of `budget` bytes at a time, or of half of the memory that is left. With `out` they are streamed to a Zarr group

@@ -55,7 +55,8 @@ def root(
 ) -> Scalar:
     """`bracketed` to rounding, and differentiable: `miss` rises, its root lies between the ends, `scale` is its size.
 
-    The iteration itself is not differentiated: `lax.custom_root` gives the root its derivatives, of any order.
+    The iteration itself is not differentiated: `lax.custom_root` gives the root its derivatives: of any order
+    in forward mode, of the first two where reverse mode is among them.
     """
     tolerance = ROUNDINGS * jnp.finfo(jnp.result_type(start)).eps * jnp.asarray(scale)
     held = lax.stop_gradient
