@@ -55,7 +55,7 @@ axes.boxplot([angles.sel(voltage=volts).dropna("sample").values for volts in vol
 axes.set(xlabel="voltage (V)", ylabel="angle after 20 s (degrees)")
 
 # %% [markdown]
-# With `out` the results are streamed to a store, a chunk at a time, and the same call goes on where it was stopped. It is opened like any xarray data.
+# With `out` the results are streamed to a store, a chunk at a time, and the same call goes on where it was stopped. `smajax.batch.run.opened` reads it again, with its coordinates.
 
 # %%
 store = Path(tempfile.mkdtemp()) / "stored"

@@ -5,7 +5,8 @@
     found = sma.simulate_dataset(sma.compose("niti_table_3_1", "arm", "amplified_voltage"), {"voltage": volts})
 
 The names below are imported when they are first asked for, so that a command which needs none of them starts at once.
-JAX's precision is the caller's choice: `jax.config.update("jax_enable_x64", True)` before the first array.
+JAX's precision is the caller's choice: `sma.prepare()` before the first array asks for float64, and keeps compiled programs
+from one process to the next; `jax.config.update("jax_enable_x64", True)` asks for float64 alone.
 """
 
 from __future__ import annotations
@@ -57,6 +58,7 @@ if TYPE_CHECKING:
     from smajax.presets import build as build
     from smajax.report.identify_page import write_identified as write_identified
     from smajax.report.write import write_report as write_report
+    from smajax.runtime import prepare as prepare
     from smajax.simulate import simulate as simulate
     from smajax.system import System as System
     from smajax.wire.laws import under_law as under_law
@@ -91,6 +93,7 @@ NAMES = {
     "parameter": ("smajax.parameters", "parameter"),
     "parameter_values": ("smajax.parameters", "parameter_values"),
     "plot": ("smajax.plot", "plot"),
+    "prepare": ("smajax.runtime", "prepare"),
     "run_batch": ("smajax.batch.run", "run_batch"),
     "sampled": ("smajax.batch.axes", "sampled"),
     "set_parameters": ("smajax.parameters", "set_parameters"),

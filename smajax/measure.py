@@ -48,6 +48,9 @@ class AbstractMeasure(eqx.Module):
     def unit(self) -> str:
         """SI; empty: that of the load's position."""
 
+    def check(self, steps: int) -> None:
+        """ValueError where it is no measure of a run of so many steps."""
+
     @abc.abstractmethod
     def start(self, state: State, inputs: Inputs) -> Any:
         """The memory before the first step."""
@@ -136,10 +139,14 @@ class Mean(AbstractMeasure):
 
 
 class MeanSquare(AbstractMeasure):
-    """The mean square of the distance from a series, in units of `scale`: a cost of tracking, or of a fit, to differentiate."""
+    """The mean square of the distance from a series, in units of `scale`: a cost of tracking, or of a fit, to differentiate.
+
+    of: what a state shows. wanted: its values, SI, from the start to the end of the last step, (steps + 1,), the same for all members of a
+    batch; or a number. The first is not compared: nothing has happened by then.
+    """
 
     of: str = eqx.field(static=True)
-    wanted: Series = eqx.field(converter=jnp.asarray)  # (steps + 1,), or a number
+    wanted: Series = eqx.field(converter=jnp.asarray)
     scale: Scalar = eqx.field(converter=jnp.asarray, default=1.0)
 
     @property
@@ -149,6 +156,13 @@ class MeanSquare(AbstractMeasure):
     @property
     def unit(self) -> str:
         return "-"
+
+    def check(self, steps: int) -> None:
+        if self.wanted.shape not in ((), (steps + 1,)):
+            raise ValueError(
+                f"`wanted` of {self.name} has the shape {self.wanted.shape}: a run of {steps} steps takes {steps + 1} values, from its "
+                "start to its end, or one number. Members with a series each are batches of their own."
+            )
 
     def start(self, state: State, inputs: Inputs) -> tuple[Scalar, Scalar]:
         return jnp.zeros_like(state.time, int), jnp.zeros_like(state.time)

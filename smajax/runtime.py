@@ -21,7 +21,7 @@ def kept_programs() -> Path:
 
 
 def prepare(cores: bool = False) -> None:
-    """Float64, and programs that compile fast and once. Before the first array: XLA reads its flags once.
+    """Float64, and compiled programs kept from one process to the next (`kept_programs`). Before the first array of JAX.
 
     `cores` is for large batches: every core is a device of its own, and programs are compiled to run fast instead.
     """

@@ -32,7 +32,7 @@ STAGES = (
     ),
     ("Its parameters", ("parameter_values", "get_parameters", "set_parameters", "check_bounds", "units")),
     ("One run", ("simulate_dataset", "plot", "simulate_compiled", "simulate")),
-    ("Many runs", ("run_batch", "grid", "zipped", "sampled", "good", "measure")),
+    ("Many runs", ("run_batch", "grid", "zipped", "sampled", "good", "told_of", "measure", "prepare")),
     (
         "A closed loop",
         (

@@ -235,11 +235,22 @@ def test_members_that_go_wrong_are_told_and_disturb_nobody() -> None:
         (grid(ambient_temperature=[20.0]), {"inputs": {"voltage": 6.0, "ambient_temperature": 25.0}}, "of one"),
         (grid(voltage=[6.0]), {"measures": (Last("stress"), Last("stress"))}, "names of their own"),
         (grid(voltage=[6.0]), {"budget": 1000}, "every"),
+        (grid(voltage=[6.0]), {"measures": (MeanSquare("position", jnp.zeros(100)),)}, "100 steps takes 101 values"),
+        (grid(voltage=[6.0]), {"measures": (MeanSquare("position", jnp.zeros((1, 101))),)}, "batches of their own"),
     ],
 )
 def test_what_does_not_fit_together_is_told(axes: Axes, more: dict[str, object], told: str) -> None:
     with pytest.raises(ValueError, match=told):
         run_batch(ARM, axes=axes, **{"inputs": {}, "seconds": SECONDS, "dt": DT, **more})  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("axes", [AXES, zipped(payload_mass=[0.05, 0.06], voltage=[6.0, 7.0])])
+def test_what_is_varied_has_its_unit_in_memory_and_on_disk(axes: Axes, tmp_path: Path) -> None:
+    here = _batch(axes, keep=(), measures=(Last("position"),))
+    _batch(axes, keep=(), measures=(Last("position"),), out=tmp_path / "batch")
+    for found in (here, opened(tmp_path / "batch")):
+        assert found["voltage"].attrs["units"] == "V"
+        assert found["payload_mass"].attrs["units"] == "kg"
 
 
 def test_wrong_values_are_told() -> None:

@@ -44,7 +44,7 @@ class Recipe(eqx.Module):
     slopes: tuple[str, ...] = eqx.field(static=True, default=())  # parameters and varied inputs to differentiate by
 
     def units(self) -> dict[str, str]:
-        """Of everything that a member gives."""
+        """Of everything that a member gives, and of what may be varied."""
         own = self.system.load.reading[1]
         own_of = {name: unit or (f"{own}/s" if name == "velocity" else own) for name, unit in SHOWN.items()}
         found = {name: own_of[name] for name in self.keep}
@@ -55,7 +55,8 @@ class Recipe(eqx.Module):
             for name in self.slopes:
                 below = table[name].unit if name in table else INPUT_UNITS[name]
                 found[slope_name(one.name, name)] = _per(measured[one.name], below)
-        return found | {"status": "-", "first_bad_time": "s"}
+        varied = {**INPUT_UNITS, **{name: one.unit for name, one in table.items()}}
+        return varied | found | {"status": "-", "first_bad_time": "s"}
 
 
 def _wrong(state: State) -> tuple[Scalar, Scalar]:

@@ -100,6 +100,8 @@ def recipe_of(
     names = [one.name for one in measures]
     if len(set(names)) < len(names):
         raise ValueError(f"measures must have names of their own, but there are {names}.")
+    for one in measures:
+        one.check(steps)
     if tolerance is not None and (not tolerance > 0.0 or isinstance(load, AbstractCoupon)):
         raise ValueError(
             f"`tolerance` is a share of 1 C and of 1 % strain a step, for a load that moves; got {tolerance} and "
@@ -149,7 +151,7 @@ def _check_slopes(
         raise ValueError("`slopes` are those of measures: give `measures`, as `smajax.measure.MeanSquare`.")
     if slopes and tolerance is not None:
         raise ValueError(
-            "slopes are found backwards through fixed steps, and a `tolerance` makes their number hang on the parameters: "
+            "slopes are found backwards through fixed steps, and a `tolerance` makes their number depend on the parameters: "
             "leave `tolerance` out, or `slopes`."
         )
 
@@ -190,7 +192,8 @@ def run_batch(
 
     The result has the dimensions of `axes` and `time`, `status` (0 good, 1 a number that is none, 2 runaway heat) and
     `first_bad_time`. Results take a quarter of `budget` bytes at a time, or of half of the memory that is left. With `out` they are streamed to a Zarr group
-    there, and the same call goes on where an earlier one was stopped; the data set returned then reads from disk.
+    there, and the same call goes on where an earlier one was stopped; the data set returned then reads from disk, as
+    `smajax.batch.run.opened(out)` does by itself.
 
     On a processor the batch is compiled by `smajax.lanes`, five to twenty times as fast as by XLA; `engine="xla"` asks for the other
     (they agree to 1e-12 of a run), and where only XLA can do it, it does.
@@ -278,13 +281,19 @@ def fill(
         progress("simulating", done / len(wanted))
 
 
+def _with_unit(units: Mapping[str, str], name: str) -> dict[str, str]:
+    return {"units": units[name]} if name in units else {}
+
+
 def labelled(
     values: Mapping[str, Any], axes: Axes, units: Mapping[str, str], time: np.ndarray, attributes: Mapping[str, Any]
 ) -> xr.Dataset:
     """Arrays of shape (members, ...) as a data set with the dimensions of `axes`, units and provenance."""
     dims = [one.name for one in axes.dimensions]
     coordinates: dict[str, Any] = {
-        name: (one.name, np.asarray(series)) for one in axes.dimensions for name, series in one.values.items()
+        name: (one.name, np.asarray(series), _with_unit(units, name))
+        for one in axes.dimensions
+        for name, series in one.values.items()
     }
     data = {}
     for name, array in values.items():
@@ -309,12 +318,15 @@ def opened(folder: Path | str) -> xr.Dataset:
     if len(axes.dimensions) == 1:
         one = axes.dimensions[0]
         found = lazy[list(store.names())].rename(member=one.name)
-        found = found.assign_coords({name: (one.name, series) for name, series in one.values.items()})
+        units = store.axis_units
+        found = found.assign_coords(
+            {name: (one.name, series, _with_unit(units, name)) for name, series in one.values.items()}
+        )
         if "time" in found.dims:
             found = found.assign_coords(time=("time", time, {"units": "s"}))
         found.attrs = attributes
         return found.set_coords(["status", "first_bad_time"])
-    units = {name: str(group[name].attrs["units"]) for name in store.names()}
+    units = store.axis_units | {name: str(group[name].attrs["units"]) for name in store.names()}
     return labelled({name: np.asarray(group[name][:]) for name in store.names()}, axes, units, time, attributes)  # type: ignore[index]
 
 

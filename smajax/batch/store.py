@@ -63,9 +63,10 @@ class Store:
         for one in axes.dimensions:
             for name, series in one.values.items():
                 points = np.asarray(series, dtype=float)
-                values.create_array(name, shape=points.shape, dtype=points.dtype, dimension_names=[one.name])[:] = (
-                    points
-                )
+                array = values.create_array(name, shape=points.shape, dtype=points.dtype, dimension_names=[one.name])
+                array[:] = points
+                if name in units:
+                    array.attrs["units"] = units[name]
         group.create_array(MARK, shape=(count,), chunks=(1,), dtype="uint8", fill_value=0, dimension_names=["chunk"])
         order = [[one.name, list(one.values)] for one in axes.dimensions]
         group.attrs.update({**attributes, CHUNK: chunk, AXES: json.dumps(order)})
@@ -84,6 +85,13 @@ class Store:
                 for name, keys in order
             )
         )
+
+    @property
+    def axis_units(self) -> dict[str, str]:
+        """Of what is varied, where it is known."""
+        arrays: Any = self.group[AXES]
+        told = {name: arrays[name].attrs.get("units") for one in self.axes.dimensions for name in one.values}
+        return {name: str(unit) for name, unit in told.items() if unit}
 
     @property
     def chunk(self) -> int:
