@@ -172,7 +172,8 @@ def _gradients(found: Found) -> list[str]:
                 steps.append(f"{1e3 * one['record_s'] / part['members']:.2g} ms ({one['engine']})")
     words = (
         "The mean square distance from a ramp by all parameters of the arm (`studies/benchmarks/tracking.py`), all members in "
-        "one program on one core; each at its loosest tolerance whose gradient is off by less than 3 % of its norm, by central differences of a tight solution."
+        "one program on one core; each at its loosest tolerance whose gradient is off by less than 3 % of its norm, by central differences of a tight solution. "
+        "Memory: of machine code what a thread works in, with 64 members side by side; of XLA what the program needs for all of them."
     )
     if steps:
         words += f" gradsolve's steps are found before, again when the parameters move: {', '.join(steps)} a run more."
@@ -193,7 +194,7 @@ def _growth(found: Found) -> list[str]:
             "steps | a run, MB | its gradient, MB | gradient over run, time | XLA: a run, MB | its gradient, MB | gradient over run, time",
             [
                 f"| {one['steps']:,} | {told_of(one)} | {told_of(one['xla'])} |"
-                for one in runs("gradient_memory", "steps")
+                for one in runs("gradient_memory", "xla")
             ],
             "Machine code: of a thread, which runs 64 members side by side. XLA: of one member.",
         ),
