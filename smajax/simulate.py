@@ -78,6 +78,7 @@ def first_state(system: System, series: Mapping[str, Series], initial: State | N
         return rest
     for part, theirs, ours in (
         ("wire", initial.wire.kept, rest.wire.kept),
+        ("load", initial.motion.friction, rest.motion.friction),
         ("sensor", initial.sensor, rest.sensor),
     ):
         if set(theirs) != set(ours):

@@ -8,15 +8,13 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from smajax.effects.base import having
+from smajax.friction import in_use, rubbing
 from smajax.load.base import AbstractMovingLoad
 from smajax.system import System, ambient_temperature, heating_power, load_resistance
 from smajax.types import Inputs, Scalar, State
 from smajax.wire.constitutive import stress_at
 from smajax.wire.heat import cross_section, heat_rate, stored_heat
 from smajax.wire.resistance import resistance_per_metre
-
-# Coulomb friction builds up over this much motion (a bristle bends before it slips), in units of position.
-PRESLIDING = 2e-5
 
 
 class Unknowns(NamedTuple):
@@ -41,27 +39,6 @@ class Stage(eqx.Module):
     once: bool = eqx.field(static=True)  # differentiated once at most (`step`)
 
 
-def friction_in_use(stage: Stage, position: Scalar) -> tuple[Scalar, Scalar]:
-    """(share of the Coulomb limit in use, the same before it is held within -1..1)."""
-    raw = stage.old.motion.friction + (position - stage.old.motion.position) / PRESLIDING
-    return jnp.clip(raw, -1.0, 1.0), raw
-
-
-def friction_limit(system: System, velocity: Scalar, inputs: Inputs) -> Scalar | None:
-    """Largest friction in the unit of the load's resistance; None where no effect has friction."""
-    load = system.load
-    assert isinstance(load, AbstractMovingLoad)
-    rubbing, bearing = having(system.effects, "friction_limit"), having(system.effects, "friction_share")
-    if not rubbing and not bearing:
-        return None
-    speed = load.lever() * velocity
-    limits = [effect.friction_limit(speed) for effect in rubbing]
-    if bearing:
-        at_rest = jnp.abs(load.resistance(load.start(), jnp.zeros_like(velocity), inputs))
-        limits += [effect.friction_share(speed) * at_rest for effect in bearing]
-    return jnp.sum(jnp.stack([jnp.asarray(one) for one in limits]))
-
-
 def _heating(system: System, stage: Stage, inputs: Inputs, temperature: Scalar, fraction: Scalar) -> Scalar:
     wire, effects = system.wire, system.effects
     ohms = resistance_per_metre(wire, effects, temperature, fraction)
@@ -82,10 +59,8 @@ def _free_position(system: System, stage: Stage, inputs: Inputs, z: Unknowns) ->
     assert isinstance(load, AbstractMovingLoad)
     velocity, acceleration = motion_rates(stage, z.position)
     inertia = load.inertia(inputs)
-    # At the speed before the step: with friction that falls with the speed a step of any length has one answer then,
-    # where at its own speed both sticking and sliding on may be one.
-    limit = friction_limit(system, stage.old.motion.velocity, inputs)
-    friction = 0.0 if limit is None else limit * friction_in_use(stage, z.position)[0]
+    before = stage.old.motion
+    friction = sum(one.limit * in_use(one, before, z.position) for one in rubbing(system, before, velocity, inputs))
     pull = load.lever() * cross_section(system.wire) * z.stress
     resisting = load_resistance(system, stage.time, z.position, velocity, inputs) + friction
     return z.position - (inertia * acceleration + resisting - pull) * stage.step**2 / inertia

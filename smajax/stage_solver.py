@@ -27,8 +27,9 @@ import jax.numpy as jnp
 from jax import lax
 from jaxtyping import Array, Bool
 
+from smajax.friction import bent, rubbing, unbent
 from smajax.load.base import AbstractMovingLoad
-from smajax.stage_equations import PRESLIDING, Stage, Unknowns, equations, friction_in_use, friction_limit
+from smajax.stage_equations import Stage, Unknowns, equations
 from smajax.system import System
 from smajax.types import Inputs, Scalar
 from smajax.wire.constitutive import young_modulus
@@ -147,8 +148,8 @@ def solve(system: System, stage: Stage, inputs: Inputs) -> Solution:
     law, effects, old = system.wire.kinetics, system.effects, stage.old.wire
     xi = old.martensite_fraction
     open_at_start = open_branches(law, effects, old)
-    slips = friction_limit(system, jnp.zeros_like(xi), inputs)
-    sticks = stage.old.motion.position - PRESLIDING * stage.old.motion.friction
+    before = stage.old.motion
+    slips = rubbing(system, before, before.velocity, inputs)
     tolerance = max(stage.enough, ROUNDINGS * float(jnp.finfo(xi.dtype).eps))
 
     def iterate(at: _Iterate, number: int | None) -> _Iterate:
@@ -193,11 +194,11 @@ def solve(system: System, stage: Stage, inputs: Inputs) -> Solution:
             late = (at.iterations > UNDAMPED) & (at.iterations % 2 == 0)
             step = [jnp.where(late, 0.5 * change, change) for change in step]
         new = Unknowns(*(value + change for value, change in zip(z, step, strict=True)))
-        if slips is not None:
+        for one in slips:
             # Friction passes through sticking on its way from one slip to the other.
-            before, after = friction_in_use(stage, z.position)[1], friction_in_use(stage, new.position)[1]
-            jumped = (slips > 0.0) & (jnp.abs(before) > 1.0) & (jnp.abs(after) > 1.0) & (before * after < 0.0)
-            new = new._replace(position=jnp.where(jumped, sticks, new.position))
+            here, there = bent(one, before, z.position), bent(one, before, new.position)
+            jumped = (one.limit > 0.0) & (jnp.abs(here) > 1.0) & (jnp.abs(there) > 1.0) & (here * there < 0.0)
+            new = new._replace(position=jnp.where(jumped, unbent(one, before), new.position))
             step[1] = new.position - z.position
         free = free + sum(entry * change for entry, change in zip(free_row, step, strict=True) if entry is not None)
         if number == 0:  # it solves the inner equation roughly only

@@ -27,10 +27,11 @@ import jax.numpy as jnp
 from jax import lax
 
 from smajax.checkpointed import recomputed, solved
+from smajax.friction import in_use, rubbing
 from smajax.load.base import AbstractMovingLoad
 from smajax.load.coupon import Coupon, StrainCoupon
 from smajax.reading import followed, reading_of, time_constant
-from smajax.stage_equations import Stage, Unknowns, equations, friction_in_use, motion_rates
+from smajax.stage_equations import Stage, Unknowns, equations, motion_rates
 from smajax.stage_solver import Solution, solve, solved_linear
 from smajax.system import System, supplied
 from smajax.types import Inputs, Motion, Scalar, State, WireState
@@ -155,7 +156,9 @@ def _stage(system: System, stage: Stage, inputs: Inputs) -> tuple[State, Scalar,
     heating = (
         stored_heat(system.wire, system.effects, wire.temperature, wire.martensite_fraction) - stage.heat
     ) / stage.step
-    friction, _ = friction_in_use(stage, position)
+    before = stage.old.motion
+    rubs = rubbing(system, before, motion_rates(stage, position)[0], inputs)
+    friction = {one.name: in_use(one, before, position) for one in rubs}
     new = State(stage.time, wire, Motion(position, velocity, friction), stage.old.reading, stage.old.sensor)
     return new, heating, velocity, acceleration
 
@@ -232,7 +235,7 @@ def _strain_coupon_step(system: System, state: State, inputs: Inputs, dt: Scalar
     own = strain_at(wire, effects, old, temperature, stress, fractions[0])
     new = remembered(law, effects, old, branch, temperature, stress, own, fractions)
     still = jnp.zeros_like(strain)
-    return State(state.time + dt, new, Motion(-strain, still, still), state.reading, state.sensor)
+    return State(state.time + dt, new, Motion(-strain, still), state.reading, state.sensor)
 
 
 def step(system: System, state: State, inputs: Inputs, dt: Scalar | float, once: bool = False) -> State:

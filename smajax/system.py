@@ -168,4 +168,6 @@ def initial_state(system: System, inputs: Inputs) -> State:
     zero = jnp.zeros_like(stress)
     wire = start(system.wire, system.effects, temperature, stress, strain, fraction)
     reading, sensor = first_reading(system.effects, reading, zero)
-    return State(zero, wire, Motion(position, zero, zero), reading, sensor)
+    rubbing = (*having(system.effects, "friction_limit"), *having(system.effects, "friction_share"))
+    friction = {effect.effect_name: zero for effect in rubbing}
+    return State(zero, wire, Motion(position, zero, friction), reading, sensor)

@@ -35,7 +35,8 @@ class Motion(eqx.Module):
 
     position: Scalar  # m (rad for an arm), positive when the wire contracts
     velocity: Scalar  # m/s (rad/s)
-    friction: Scalar  # -, -1..1: the part of the Coulomb limit in use, positive against +velocity
+    # Of each effect of friction: the part of its limit in use, -, -1..1, positive against +velocity.
+    friction: dict[str, Scalar] = eqx.field(default_factory=dict)
 
 
 class State(eqx.Module):

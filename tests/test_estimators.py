@@ -265,7 +265,7 @@ def test_a_step_down_a_cliff_stays_on_the_ground() -> None:
             "detwinned_fraction": jnp.asarray(0.9223526650511709),
         },
     )
-    motion = Motion(jnp.asarray(-0.6181031604727328), jnp.asarray(-6.989864112333557), jnp.asarray(-1.0))
+    motion = Motion(jnp.asarray(-0.6181031604727328), jnp.asarray(-6.989864112333557))
     state = dataclasses.replace(rest, wire=wire, motion=motion)
     after = jax.vmap(lambda span: advanced(ARM, state, jnp.zeros(()), span, 1))(jnp.linspace(0.0099, 0.0101, 101))
     assert float(after.wire.stress.max()) < 200e6

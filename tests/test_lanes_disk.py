@@ -151,7 +151,7 @@ def test_a_key_is_of_kinds_and_settings_and_not_of_values(monkeypatch: pytest.Mo
     assert len({key, *others}) == len(others) + 1
     # What a user puts in the place of a constant that the program was traced with makes another program.
     traced = disk.key_of(simulate_compiled, ARM, ("a",))
-    monkeypatch.setattr(smajax.stage_equations, "PRESLIDING", 3e-5)
+    monkeypatch.setattr(smajax.stage_solver, "CLOSE", 3e-6)
     assert disk.key_of(simulate_compiled, ARM, ("a",)) != traced
 
 

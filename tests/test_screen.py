@@ -79,9 +79,9 @@ def test_a_refit_never_starts_out_of_bounds() -> None:
 @pytest.mark.parametrize(("score", "more"), [(0.05, 4), (0.0, 0)])
 def test_a_refit_of_a_friction_that_sticks_begins_from_several_sizes_and_speeds(score: float, more: int) -> None:
     """Jumps make valleys; where the score test is silent on the size there is none to begin from."""
-    names = ("specific_heat", *(f"stribeck_friction.{name}" for name in ("limit", "sliding", "speed")))
-    bounds = dict(zip(names, [(100.0, 900.0), (0.0, 20.0), (0.0, 1.0), (1e-5, 1.0)], strict=True))
-    begun = np.asarray([450.0, 0.0, 0.5, 5e-3])
+    names = ("specific_heat", *(f"stribeck_friction.{name}" for name in ("limit", "sliding", "speed", "bend")))
+    bounds = dict(zip(names, [(100.0, 900.0), (0.0, 20.0), (0.0, 1.0), (1e-5, 1.0), (1e-6, 1e-3)], strict=True))
+    begun = np.asarray([450.0, 0.0, 0.5, 5e-3, 5e-5])
     told = Score(("stribeck_friction",), 0.5, 9.0, 0.0, {names[1]: score})
     first, *others = all_starts(begun, names, told, bounds)
     np.testing.assert_array_equal(first, start_values(begun, names, told, bounds))

@@ -23,6 +23,10 @@ if TYPE_CHECKING:
     from smajax.wire.wire import Wire
 
 
+# Asperities of a guide or a bearing bend by micrometres before they slip (Dahl 1968).
+PRESLIDING = 2e-5
+
+
 class Extent(NamedTuple):
     """How far the runs of an experiment go."""
 
@@ -168,13 +172,21 @@ class AbstractEffect(eqx.Module):
         """Strain beside eps_L xi_s and the elastic part, a function of state, -; `detwinned` is xi_s."""
         return 0.0
 
-    def friction_limit(self, speed: Scalar) -> Scalar | float:
-        """Largest friction of the load, N (N m for an arm), at a speed of the wire's moving end, m/s."""
+    def friction_limit(self) -> Scalar | float:
+        """Largest friction of the load at rest, N (N m for an arm)."""
         return 0.0
 
-    def friction_share(self, speed: Scalar) -> Scalar | float:
-        """Largest friction that grows with the load, over the load at rest at its start, -."""
+    def friction_share(self) -> Scalar | float:
+        """Largest friction at rest that grows with the load, over the load at rest at its start, -."""
         return 0.0
+
+    def friction_level(self, speed: Scalar) -> Scalar | float:
+        """Such a friction while it slips over that at rest, -, at a speed of the wire's moving end, m/s."""
+        return 1.0
+
+    def presliding(self) -> Scalar | float:
+        """Motion of the wire's moving end over which such a friction builds up, m."""
+        return PRESLIDING
 
     def loose_length(self) -> Scalar | float:
         """By how much the wire is longer than its way at the start of a run, m; of a load that rests on its end stop."""

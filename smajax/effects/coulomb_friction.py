@@ -31,5 +31,5 @@ class CoulombFriction(AbstractEffect):
     def base(cls) -> CoulombFriction:
         return cls(limit=0.0)
 
-    def friction_limit(self, speed: Scalar) -> Scalar | float:
+    def friction_limit(self) -> Scalar | float:
         return self.limit

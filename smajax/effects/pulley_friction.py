@@ -40,5 +40,5 @@ class PulleyFriction(AbstractEffect):
     def applies(cls, system: System) -> bool:
         return "mass" in system.load.inputs_required | system.load.inputs_optional
 
-    def friction_share(self, speed: Scalar) -> Scalar | float:
+    def friction_share(self) -> Scalar | float:
         return self.share

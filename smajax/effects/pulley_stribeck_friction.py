@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 from smajax.effects.base import AbstractEffect
 from smajax.effects.pulley_friction import PulleyFriction
-from smajax.effects.stribeck_friction import falling, from_several
+from smajax.effects.stribeck_friction import BEND, falling, from_several
 from smajax.parameters import parameter
 from smajax.types import Scalar
 
@@ -22,26 +22,27 @@ class PulleyStribeckFriction(AbstractEffect):
     """
 
     share: Scalar = parameter("-", 0.0, 1.0, "mu_s: friction at rest, to break away, over the load at rest")
-    sliding: Scalar = parameter("-", 0.0, 1.0, "r: friction in motion over that at rest")
+    sliding: Scalar = parameter("-", 0.01, 1.0, "r: friction in motion over that at rest")
     speed: Scalar = parameter("m/s", 1e-5, 1.0, "v_s: speed of the wire's moving end about which the friction falls")
+    bend: Scalar = parameter("m", 1e-6, 1e-3, "motion of the wire's end over which it builds up before the load slips")
 
     effect_name: ClassVar[str] = "pulley_stribeck_friction"
     title: ClassVar[str] = "Stribeck friction that grows with the load"
     equation: ClassVar[str] = "mechanics"
     formula: ClassVar[str] = (
         "inertia a + resistance + mu_s [r + (1 - r) exp(-(v/v_s)^2)] F_load sign(v) = lever A_w sigma "
-        "(Stribeck curve in its usual Gaussian form, presliding after Dahl 1968)"
+        "(Stribeck curve in its usual Gaussian form, presliding as in LuGre, Canudas de Wit 1995)"
     )
     sentence: ClassVar[str] = (
         "A pulley or a bearing rubs, the more the heavier the load, and more at rest than in motion: the load sticks at "
         "every change of direction and jumps when it starts."
     )
     switches: ClassVar[tuple[str, ...]] = ("share",)
-    starts: ClassVar[dict[str, float]] = {"share": 0.02, "sliding": 0.5, "speed": 5e-3}
+    starts: ClassVar[dict[str, float]] = {"share": 0.02, "sliding": 0.5, "speed": 5e-3, "bend": BEND}
 
     @classmethod
     def base(cls) -> PulleyStribeckFriction:
-        return cls(share=0.0, sliding=0.5, speed=5e-3)
+        return cls(share=0.0, sliding=0.5, speed=5e-3, bend=BEND)
 
     @classmethod
     def begins(cls, told: Mapping[str, float]) -> tuple[dict[str, float], ...]:
@@ -51,5 +52,11 @@ class PulleyStribeckFriction(AbstractEffect):
     def applies(cls, system: System) -> bool:
         return PulleyFriction.applies(system)
 
-    def friction_share(self, speed: Scalar) -> Scalar | float:
-        return self.share * falling(speed, self.sliding, self.speed)
+    def friction_share(self) -> Scalar | float:
+        return self.share
+
+    def friction_level(self, speed: Scalar) -> Scalar | float:
+        return falling(speed, self.sliding, self.speed)
+
+    def presliding(self) -> Scalar | float:
+        return self.bend

@@ -11,6 +11,7 @@ from smajax.effects.base import AbstractEffect
 from smajax.parameters import parameter
 from smajax.types import Scalar
 
+BEND = 5e-5  # m, where nothing is known of it
 # A load that sticks and jumps has a valley of the misfit for every row of jumps: refits begin from several of them.
 # Friction at rest over what the score test says, that in motion over that at rest, and v_s, m/s.
 BEGINS = ((2.0, 0.5, 1e-3), (2.0, 0.35, 2e-3), (3.0, 0.5, 2e-3), (3.0, 0.35, 1e-3))
@@ -24,7 +25,7 @@ def falling(speed: Scalar, sliding: Scalar, scale: Scalar) -> Scalar:
 def from_several(told: Mapping[str, float], size: str) -> tuple[dict[str, float], ...]:
     """`AbstractEffect.begins` of an effect whose switch is `size`, with a curve of `sliding` and `speed`."""
     return tuple(
-        {size: more * told[size], "sliding": sliding, "speed": speed}
+        {size: more * told[size], "sliding": sliding, "speed": speed, "bend": BEND}
         for more, sliding, speed in BEGINS
         if told.get(size, 0.0) > 0.0
     )
@@ -33,37 +34,44 @@ def from_several(told: Mapping[str, float], size: str) -> tuple[dict[str, float]
 class StribeckFriction(AbstractEffect):
     r"""$F_s\,[r + (1 - r)\,e^{-(v/v_s)^2}]\,\mathrm{sign}(v)$: $F_s$ at rest, $F_c = r F_s$ in motion (Stribeck curve, Gaussian form).
 
-    Built up over the same presliding displacement as `CoulombFriction`, which it is with r = 1, and where no run moves
-    faster than v_s. How wide the loop of a slow run is tells F_s, that of a fast one r; v_s takes runs of several speeds.
+    Built up over a presliding displacement, LuGre's bristle (Canudas de Wit et al. 1995). With r = 1, and where no run
+    moves faster than v_s, it is `CoulombFriction`. How wide the loop of a slow run is tells F_s, that of a fast one r; v_s takes runs of several speeds.
     """
 
     limit: Scalar = parameter("N", 0.0, 20.0, "F_s: friction at rest, to break away (N m on an arm)")
-    sliding: Scalar = parameter("-", 0.0, 1.0, "r = F_c/F_s: friction in motion over that at rest")
+    sliding: Scalar = parameter("-", 0.01, 1.0, "r = F_c/F_s: friction in motion over that at rest")
     speed: Scalar = parameter(
         "m/s", 1e-5, 1.0, "v_s: speed of the wire's moving end about which it falls from F_s to F_c"
     )
+    bend: Scalar = parameter("m", 1e-6, 1e-3, "motion of the wire's end over which it builds up before the load slips")
 
     effect_name: ClassVar[str] = "stribeck_friction"
     title: ClassVar[str] = "Stribeck friction"
     equation: ClassVar[str] = "mechanics"
     formula: ClassVar[str] = (
         "inertia a + resistance + [F_c + (F_s - F_c) exp(-(v/v_s)^2)] sign(v) = lever A_w sigma, F_c = r F_s "
-        "(eq. 3.8, 3.13; Stribeck curve in its usual Gaussian form, presliding after Dahl 1968)"
+        "(eq. 3.8, 3.13; Stribeck curve in its usual Gaussian form, presliding as in LuGre, Canudas de Wit 1995)"
     )
     sentence: ClassVar[str] = (
         "The guide rubs, and breaking away takes more force than keeping in motion: the load sticks at every change of "
         "direction, jumps when it starts, and may go on in jerks."
     )
     switches: ClassVar[tuple[str, ...]] = ("limit",)
-    starts: ClassVar[dict[str, float]] = {"limit": 0.1, "sliding": 0.5, "speed": 5e-3}
+    starts: ClassVar[dict[str, float]] = {"limit": 0.1, "sliding": 0.5, "speed": 5e-3, "bend": BEND}
 
     @classmethod
     def base(cls) -> StribeckFriction:
-        return cls(limit=0.0, sliding=0.5, speed=5e-3)
+        return cls(limit=0.0, sliding=0.5, speed=5e-3, bend=BEND)
 
     @classmethod
     def begins(cls, told: Mapping[str, float]) -> tuple[dict[str, float], ...]:
         return from_several(told, "limit")
 
-    def friction_limit(self, speed: Scalar) -> Scalar | float:
-        return self.limit * falling(speed, self.sliding, self.speed)
+    def friction_limit(self) -> Scalar | float:
+        return self.limit
+
+    def friction_level(self, speed: Scalar) -> Scalar | float:
+        return falling(speed, self.sliding, self.speed)
+
+    def presliding(self) -> Scalar | float:
+        return self.bend

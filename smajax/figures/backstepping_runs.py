@@ -55,7 +55,7 @@ def on_heating_curve(system: System, position: Scalar, velocity: Scalar) -> Stat
     temperature = temperature_for(system.wire.kinetics, fraction, stress, one > 0.0, one, zero, edge)
     strain = -load.contraction(system.wire) * (position - load.start())
     wire = start(system.wire, (), temperature, stress, strain, fraction)
-    return State(rest.time, wire, Motion(position, velocity, zero), position)
+    return State(rest.time, wire, Motion(position, velocity), position)
 
 
 def stacked(trees: Sequence[Tree]) -> Tree:
