@@ -21,7 +21,7 @@ from smajax.attribution.screen import Score, scaled, switches
 from smajax.effects.base import Extent
 from smajax.effects.every import EVERY
 from smajax.effects.library import LIBRARY
-from smajax.fit.box import Fit, fit_in_box
+from smajax.fit.box import MOST_STEPS, Fit, fit_in_box
 from smajax.fit.kept import Kept
 from smajax.fit.problem import Problem
 from smajax.fit.progress import Progress, quiet
@@ -161,16 +161,17 @@ class Search:
         enough: float = ENOUGH,
         hops: bool = False,
         carried: Sequence[str] = (),
+        most: int = MOST_STEPS,
     ) -> tuple[list[Fit], np.ndarray]:
         """Fit every start: (fits with full parameter vectors, misfit of all runs at each, (S, R, N)).
 
         `hops`: each from points near its end as well (`fit.starts.hopped`). `carried`: effects that the model holds besides,
-        as it did in the fits before, whose program then serves again.
+        as it did in the fits before, whose program then serves again. `most`: steps.
         """
         sets = sorted({start.effects for start in starts})
         if self.apart and len(sets) > 1:
             places = [[k for k, start in enumerate(starts) if start.effects == one] for one in sets]
-            parts = [self.fit([starts[k] for k in some], what, enough=enough, hops=hops) for some in places]
+            parts = [self.fit([starts[k] for k in some], what, enough=enough, hops=hops, most=most) for some in places]
             order = np.argsort(np.concatenate(places))
             together = [one for part, _ in parts for one in part]
             return [together[k] for k in order], np.concatenate([found for _, found in parts])[order]
@@ -179,7 +180,7 @@ class Search:
             problem.lane(self.free(start.effects), self.bounds, start.values[index], start.weights, start.tie)
             for start in starts
         ]
-        fits = fit_in_box(problem, lanes, enough=enough, kept=self.kept, progress=self.progress, what=what)
+        fits = fit_in_box(problem, lanes, most=most, enough=enough, kept=self.kept, progress=self.progress, what=what)
         if hops:
             fits = hopped(problem, lanes, fits, enough=enough, kept=self.kept, progress=self.progress, what=what)
         found = misfits(problem, [one.values for one in fits])

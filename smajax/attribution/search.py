@@ -12,6 +12,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from scipy.stats import qmc
 
 from smajax.attribution.judging import PENALTY, Evidence, Fitted, Model, Search, Start, base_value
 from smajax.attribution.places import Looked, looked_at
@@ -24,6 +25,8 @@ SIGNIFICANT = 1e-3  # of the score tests of one round, counted together
 SINGLES, PAIRS = 8, 2  # refitted in a round
 BEHIND = 2.0  # times the best one's sum of squares: from the second round on a candidate farther behind is not judged
 MOST_ROUNDS = 6
+PLACES = 32  # of the ranges of an effect that has valleys; a power of two, for Sobol's points
+FIRST, KEPT = 8, 4  # steps from each of them, before the worse ones are dropped, and that are carried to their end
 
 
 def start_values(
@@ -47,22 +50,54 @@ def start_values(
 def all_starts(
     model_values: np.ndarray, names: Sequence[str], score: Score, bounds: Mapping[str, tuple[float, float]]
 ) -> list[np.ndarray]:
-    """`start_values`, and the same with an effect at each of the other places from which a refit of it begins."""
+    """`start_values`, and the same with an effect at Sobol's points of the ranges from which a refit of it begins."""
     first = start_values(model_values, names, score, bounds)
     found = [first]
     for effect in score.effects:
         told = {name.removeprefix(f"{effect}."): one for name, one in score.coefficients.items()}
-        for place in LIBRARY[effect].begins(told):
+        ranges = LIBRARY[effect].begins(told)
+        if not ranges:
+            continue
+        low, high = np.log(np.asarray(list(ranges.values()))).T
+        for share in qmc.Sobol(len(ranges), seed=0).random(PLACES):
             values = np.array(first)
-            for name, one in place.items():
+            for name, one in zip(ranges, np.exp(low + share * (high - low)), strict=True):
                 values[names.index(f"{effect}.{name}")] = np.clip(one, *bounds[f"{effect}.{name}"])
             found.append(values)
     return found
 
 
+def begun(setting: Search, model: Model, score: Score, what: str, carried: Sequence[str]) -> tuple[list[Start], float]:
+    """Where a refit of a candidate begins, and the sum of squares that it has come to by then; infinite if not looked at.
+
+    Of many places those from which a few steps come farthest, from where these end.
+    """
+    effects = (*model.effects, *score.effects)
+    places = all_starts(setting.inside(model), setting.problem.names, score, setting.bounds)
+    starts = [Start(effects, values) for values in places]
+    if len(starts) <= KEPT:
+        return starts, math.inf
+    fits, _ = setting.fit(starts, what, most=FIRST, carried=() if setting.apart else carried)
+    best = sorted(fits, key=lambda one: one.cost)[:KEPT]
+    return [Start(effects, one.values) for one in best], best[0].cost
+
+
+def unforeseen(setting: Search, model: Model, singles: Sequence[Score], what: str) -> list[Start]:
+    """Starts of candidates with valleys that the score test, which knows no jumps, leaves behind those that are refitted.
+
+    Only where a few steps bring them farther than it promises the last of those.
+    """
+    found: list[Start] = []
+    for score in singles[SINGLES:]:
+        starts, cost = begun(setting, model, score, what, ())
+        if 1.0 - cost / model.cost > singles[SINGLES - 1].gain:
+            found += starts
+    return found
+
+
 def search(setting: Search, base: Fit) -> tuple[Model, Model]:
     """(base model, final model). Fills `setting.evidence` and `setting.rounds` on the way."""
-    problem, names = setting.problem, setting.problem.names
+    problem = setting.problem
     first = setting.judged([Fitted((), base)])[0]
     model = first
     for number in range(1, MOST_ROUNDS + 1):
@@ -83,17 +118,18 @@ def search(setting: Search, base: Fit) -> tuple[Model, Model]:
             setting.note(Round(number, (), "", why))
             break
         chosen = [*singles[:SINGLES], *pairs[:PAIRS]]
-        begin = setting.inside(model)
-        starts = [
-            Start((*model.effects, *score.effects), values)
-            for score in chosen
-            for values in all_starts(begin, names, score, setting.bounds)
-        ]
-        solutions, _ = setting.fit(starts, f"round {number}: refitting candidates", hops=True)
+        what = f"round {number}: refitting candidates"
+        carried = [*model.effects, *(effect for score in chosen for effect in score.effects)]
+        starts = [start for score in chosen for start in begun(setting, model, score, what, carried)[0]]
+        solutions, _ = setting.fit(starts, what, hops=True)
+        if number == 1 and not setting.is_noise(min(solutions, key=lambda one: one.cost).values):
+            late = unforeseen(setting, model, singles, what)
+            starts += late
+            solutions += setting.fit(late, what, hops=True)[0] if late else []
         found: dict[tuple[str, ...], Fit] = {}
-        for begun, solution in zip(starts, solutions, strict=True):
-            if begun.effects not in found or solution.cost < found[begun.effects].cost:
-                found[begun.effects] = solution
+        for start, solution in zip(starts, solutions, strict=True):
+            if start.effects not in found or solution.cost < found[start.effects].cost:
+                found[start.effects] = solution
         fitted = [Fitted(effects, solution) for effects, solution in found.items()]
         if number == 1:
             samples = float(np.asarray(problem.batch.mask).sum())
@@ -111,7 +147,7 @@ def search(setting: Search, base: Fit) -> tuple[Model, Model]:
         alone = next((entry for entry in weighed if len(entry.effects) == len(model.effects) + 1), taken[0])
         if alone not in taken:  # a pair is never added without its best single effect having had its chance
             taken = [*taken, alone]
-        carried = [effect for begun in starts for effect in begun.effects]
+        carried = [effect for start in starts for effect in start.effects]
         judged = setting.judged(taken, model, carried)
         if number == 1 and problem.batch.output.shape[0] > 1:
             for entry in judged:

@@ -23,8 +23,7 @@ if TYPE_CHECKING:
     from smajax.wire.wire import Wire
 
 
-# Asperities of a guide or a bearing bend by micrometres before they slip (Dahl 1968).
-PRESLIDING = 2e-5
+PRESLIDING = 5e-5  # m, where nothing is known of it: asperities bend by micrometres before they slip (Dahl 1968)
 
 
 class Extent(NamedTuple):
@@ -68,9 +67,12 @@ class AbstractEffect(eqx.Module):
         return ()
 
     @classmethod
-    def begins(cls, told: Mapping[str, float]) -> tuple[dict[str, float], ...]:
-        """Coefficients from which a refit begins too, where the misfit has many valleys; `told`: the score test's switches."""
-        return ()
+    def begins(cls, told: Mapping[str, float]) -> dict[str, tuple[float, float]]:
+        """Ranges of coefficients, positive, from all over which a refit begins where the misfit has many valleys.
+
+        `told`: the score test's switches.
+        """
+        return {}
 
     @classmethod
     def applies(cls, system: System) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from smajax.effects.base import AbstractEffect
+from smajax.effects.base import PRESLIDING, AbstractEffect
 from smajax.parameters import parameter
 from smajax.types import Scalar
 
@@ -13,6 +13,9 @@ class CoulombFriction(AbstractEffect):
     r"""$F_c\,\mathrm{sign}(\dot x)$ against the motion, built up over a small presliding displacement (Dahl 1968)."""
 
     limit: Scalar = parameter("N", 0.0, 20.0, "F_c: friction force while sliding (N m on an arm)")
+    bend: Scalar = parameter(
+        "m", 1e-6, 1e-3, "delta: motion of the wire's end over which it builds up before the load slips"
+    )
 
     effect_name: ClassVar[str] = "coulomb_friction"
     title: ClassVar[str] = "Coulomb friction"
@@ -25,11 +28,14 @@ class CoulombFriction(AbstractEffect):
         "change of direction."
     )
     switches: ClassVar[tuple[str, ...]] = ("limit",)
-    starts: ClassVar[dict[str, float]] = {"limit": 0.1}
+    starts: ClassVar[dict[str, float]] = {"limit": 0.1, "bend": PRESLIDING}
 
     @classmethod
     def base(cls) -> CoulombFriction:
-        return cls(limit=0.0)
+        return cls(limit=0.0, bend=PRESLIDING)
 
     def friction_limit(self) -> Scalar | float:
         return self.limit
+
+    def presliding(self) -> Scalar | float:
+        return self.bend

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, ClassVar
 
-from smajax.effects.base import AbstractEffect
+from smajax.effects.base import PRESLIDING, AbstractEffect
 from smajax.parameters import parameter
 from smajax.types import Scalar
 
@@ -19,6 +19,9 @@ class PulleyFriction(AbstractEffect):
     """
 
     share: Scalar = parameter("-", 0.0, 1.0, "mu: friction while sliding over the load at rest")
+    bend: Scalar = parameter(
+        "m", 1e-6, 1e-3, "delta: motion of the wire's end over which it builds up before the load slips"
+    )
 
     effect_name: ClassVar[str] = "pulley_friction"
     title: ClassVar[str] = "friction that grows with the load"
@@ -30,11 +33,11 @@ class PulleyFriction(AbstractEffect):
         "A pulley or a bearing rubs, and the more the heavier the load: the load sticks at every change of direction."
     )
     switches: ClassVar[tuple[str, ...]] = ("share",)
-    starts: ClassVar[dict[str, float]] = {"share": 0.02}
+    starts: ClassVar[dict[str, float]] = {"share": 0.02, "bend": PRESLIDING}
 
     @classmethod
     def base(cls) -> PulleyFriction:
-        return cls(share=0.0)
+        return cls(share=0.0, bend=PRESLIDING)
 
     @classmethod
     def applies(cls, system: System) -> bool:
@@ -42,3 +45,6 @@ class PulleyFriction(AbstractEffect):
 
     def friction_share(self) -> Scalar | float:
         return self.share
+
+    def presliding(self) -> Scalar | float:
+        return self.bend

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, ClassVar
 
-from smajax.effects.base import AbstractEffect
+from smajax.effects.base import PRESLIDING, AbstractEffect
 from smajax.effects.pulley_friction import PulleyFriction
-from smajax.effects.stribeck_friction import BEND, falling, from_several
+from smajax.effects.stribeck_friction import all_over, falling
 from smajax.parameters import parameter
 from smajax.types import Scalar
 
@@ -24,7 +24,9 @@ class PulleyStribeckFriction(AbstractEffect):
     share: Scalar = parameter("-", 0.0, 1.0, "mu_s: friction at rest, to break away, over the load at rest")
     sliding: Scalar = parameter("-", 0.01, 1.0, "r: friction in motion over that at rest")
     speed: Scalar = parameter("m/s", 1e-5, 1.0, "v_s: speed of the wire's moving end about which the friction falls")
-    bend: Scalar = parameter("m", 1e-6, 1e-3, "motion of the wire's end over which it builds up before the load slips")
+    bend: Scalar = parameter(
+        "m", 1e-6, 1e-3, "delta: motion of the wire's end over which it builds up before the load slips"
+    )
 
     effect_name: ClassVar[str] = "pulley_stribeck_friction"
     title: ClassVar[str] = "Stribeck friction that grows with the load"
@@ -38,15 +40,15 @@ class PulleyStribeckFriction(AbstractEffect):
         "every change of direction and jumps when it starts."
     )
     switches: ClassVar[tuple[str, ...]] = ("share",)
-    starts: ClassVar[dict[str, float]] = {"share": 0.02, "sliding": 0.5, "speed": 5e-3, "bend": BEND}
+    starts: ClassVar[dict[str, float]] = {"share": 0.02, "sliding": 0.5, "speed": 5e-3, "bend": PRESLIDING}
 
     @classmethod
     def base(cls) -> PulleyStribeckFriction:
-        return cls(share=0.0, sliding=0.5, speed=5e-3, bend=BEND)
+        return cls(share=0.0, sliding=0.5, speed=5e-3, bend=PRESLIDING)
 
     @classmethod
-    def begins(cls, told: Mapping[str, float]) -> tuple[dict[str, float], ...]:
-        return from_several(told, "share")
+    def begins(cls, told: Mapping[str, float]) -> dict[str, tuple[float, float]]:
+        return all_over(told, "share")
 
     @classmethod
     def applies(cls, system: System) -> bool:

@@ -7,14 +7,13 @@ from typing import ClassVar
 
 import jax.numpy as jnp
 
-from smajax.effects.base import AbstractEffect
+from smajax.effects.base import PRESLIDING, AbstractEffect
 from smajax.parameters import parameter
 from smajax.types import Scalar
 
-BEND = 5e-5  # m, where nothing is known of it
-# A load that sticks and jumps has a valley of the misfit for every row of jumps: refits begin from several of them.
-# Friction at rest over what the score test says, that in motion over that at rest, and v_s, m/s.
-BEGINS = ((2.0, 0.5, 1e-3), (2.0, 0.35, 2e-3), (3.0, 0.5, 2e-3), (3.0, 0.35, 1e-3))
+# A load that sticks and jumps has a valley of the misfit for every row of jumps, so refits begin all over these.
+# Friction at rest is larger than what the score test says, which knows no jumps: over that, r, v_s (m/s) and delta (m).
+MORE, SLIDING, SPEED, BENT = (1.5, 4.0), (0.2, 0.8), (1e-4, 1e-2), (1e-5, 2e-4)
 
 
 def falling(speed: Scalar, sliding: Scalar, scale: Scalar) -> Scalar:
@@ -22,13 +21,12 @@ def falling(speed: Scalar, sliding: Scalar, scale: Scalar) -> Scalar:
     return sliding + (1.0 - sliding) * jnp.exp(-((speed / scale) ** 2))
 
 
-def from_several(told: Mapping[str, float], size: str) -> tuple[dict[str, float], ...]:
-    """`AbstractEffect.begins` of an effect whose switch is `size`, with a curve of `sliding` and `speed`."""
-    return tuple(
-        {size: more * told[size], "sliding": sliding, "speed": speed, "bend": BEND}
-        for more, sliding, speed in BEGINS
-        if told.get(size, 0.0) > 0.0
-    )
+def all_over(told: Mapping[str, float], size: str) -> dict[str, tuple[float, float]]:
+    """`AbstractEffect.begins` of an effect whose switch is `size`, with a curve of `sliding` and `speed`, and `bend`."""
+    at = told.get(size, 0.0)
+    if at <= 0.0:
+        return {}
+    return {size: (MORE[0] * at, MORE[1] * at), "sliding": SLIDING, "speed": SPEED, "bend": BENT}
 
 
 class StribeckFriction(AbstractEffect):
@@ -43,7 +41,9 @@ class StribeckFriction(AbstractEffect):
     speed: Scalar = parameter(
         "m/s", 1e-5, 1.0, "v_s: speed of the wire's moving end about which it falls from F_s to F_c"
     )
-    bend: Scalar = parameter("m", 1e-6, 1e-3, "motion of the wire's end over which it builds up before the load slips")
+    bend: Scalar = parameter(
+        "m", 1e-6, 1e-3, "delta: motion of the wire's end over which it builds up before the load slips"
+    )
 
     effect_name: ClassVar[str] = "stribeck_friction"
     title: ClassVar[str] = "Stribeck friction"
@@ -57,15 +57,15 @@ class StribeckFriction(AbstractEffect):
         "direction, jumps when it starts, and may go on in jerks."
     )
     switches: ClassVar[tuple[str, ...]] = ("limit",)
-    starts: ClassVar[dict[str, float]] = {"limit": 0.1, "sliding": 0.5, "speed": 5e-3, "bend": BEND}
+    starts: ClassVar[dict[str, float]] = {"limit": 0.1, "sliding": 0.5, "speed": 5e-3, "bend": PRESLIDING}
 
     @classmethod
     def base(cls) -> StribeckFriction:
-        return cls(limit=0.0, sliding=0.5, speed=5e-3, bend=BEND)
+        return cls(limit=0.0, sliding=0.5, speed=5e-3, bend=PRESLIDING)
 
     @classmethod
-    def begins(cls, told: Mapping[str, float]) -> tuple[dict[str, float], ...]:
-        return from_several(told, "limit")
+    def begins(cls, told: Mapping[str, float]) -> dict[str, tuple[float, float]]:
+        return all_over(told, "limit")
 
     def friction_limit(self) -> Scalar | float:
         return self.limit
