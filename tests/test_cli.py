@@ -298,6 +298,29 @@ def test_what_may_be_wrong_has_the_same_words_in_every_command() -> None:
     assert len(found) == 1, found
 
 
+@pytest.mark.parametrize(
+    ("typed", "told"),
+    [
+        (
+            "simulate --load dead_weight",
+            "`load` is the second argument, without a name: smajax simulate niti_table_3_1 dead_weight",
+        ),
+        ("simulate --wire=mine --step 5V:1s", "`wire` is the first argument, without a name: smajax simulate mine"),
+        (
+            "simulate flexinol_table_3_2 --drive",
+            "third argument, without a name: smajax simulate flexinol_table_3_2 arm DRIVE",
+        ),
+        ("tune --controller pid", "`controller` is an argument, without a name: smajax tune pid"),
+        ("sweep --controller pid", "Possible options: --controllers"),
+    ],
+)
+def test_an_argument_that_is_given_as_an_option_is_told_where_it_stands(typed: str, told: str) -> None:
+    ended = CliRunner().invoke(app, typed.split())
+    assert ended.exit_code == 2
+    assert f"No such option: --{typed.partition('--')[2].split()[0].split('=')[0]}" in ended.output
+    assert told in ended.output
+
+
 def test_a_list_may_be_cut_short(tmp_path: Path) -> None:
     shell = f"{sys.executable} -m smajax effects | head -n 1; exit ${{PIPESTATUS[0]}}"
     told = subprocess.run(["bash", "-c", shell], cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False)
