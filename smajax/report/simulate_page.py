@@ -169,7 +169,7 @@ def rest_rows(ran: Ran) -> tuple[list[str], list[list[str]]]:
     return head, rows
 
 
-MISMATCH = ("parameter", "the controller believes", "the plant has", "unit", "plant / belief")
+MISMATCH = ("parameter", "the controller believes", "the plant has", "unit", "difference")
 
 
 def mismatch_rows(ran: Ran) -> list[list[str]]:
