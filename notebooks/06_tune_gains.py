@@ -4,7 +4,7 @@
 # The gains of a controller that switches with a layer (VSC3), moved so that the worst of all loops costs least: several set points at once, on the plant as
 # believed and with 20 % errors of its damping, with a limit on the overshoot. On the command line:
 #
-#     smajax tune vsc3 --set-points 0,30 --variation damping=0.2 --limits overshoot=0.1 --out tuned
+#     smajax tune vsc3 --set-points 0,30 --variation damping=20% --limits overshoot=0.1 --out tuned
 
 # %%
 import os

@@ -15,6 +15,7 @@ from smajax.command.identify import identify_command
 from smajax.command.listing import effects, presets
 from smajax.command.machine import bench, doctor
 from smajax.command.new_experiment import new_experiment
+from smajax.command.positional import Command
 from smajax.command.renamed import as_now
 from smajax.command.simulate import simulate
 from smajax.command.sweep import sweep
@@ -57,18 +58,18 @@ def _all(
     pass
 
 
-app.command("close-loop")(close_loop_command)
-app.command("identify")(identify_command)
-app.command()(effects)
-app.command()(presets)
-app.command()(demo)
-app.command()(figures)
-app.command()(tune)
-app.command()(sweep)
-app.command()(simulate)
-app.command()(doctor)
-app.command()(bench)
-app.command("new-experiment")(new_experiment)
+app.command("close-loop", cls=Command)(close_loop_command)
+app.command("identify", cls=Command)(identify_command)
+app.command(cls=Command)(effects)
+app.command(cls=Command)(presets)
+app.command(cls=Command)(demo)
+app.command(cls=Command)(figures)
+app.command(cls=Command)(tune)
+app.command(cls=Command)(sweep)
+app.command(cls=Command)(simulate)
+app.command(cls=Command)(doctor)
+app.command(cls=Command)(bench)
+app.command("new-experiment", cls=Command)(new_experiment)
 
 
 def _no_memory(error: Exception) -> bool:

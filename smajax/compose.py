@@ -9,12 +9,13 @@ from typing import overload
 from smajax.catalogue import check_together
 from smajax.control_presets import CONTROLLERS
 from smajax.controller.base import AbstractController
-from smajax.effects.library import LIBRARY
+from smajax.effects.library import LIBRARY, at_base
 from smajax.extended import extended
 from smajax.load.base import AbstractMovingLoad
 from smajax.loop import Loop
 from smajax.measured.names import instead, own_first
-from smajax.parameters import check_bounds, parameters, set_parameters
+from smajax.mismatch import MISMATCHES, ratio_of
+from smajax.parameters import check_bounds, parameter_values, parameters, set_parameters
 from smajax.presets import build
 from smajax.system import System
 from smajax.units import UnitError, parse_quantity
@@ -23,22 +24,31 @@ from smajax.wire.order import check_order
 
 
 def parameter_name(system: System, name: str) -> str:
-    """The parameter that `name` means: its own name, or its place in the model (`wire.heat.convection_coefficient`).
+    """The parameter that `name` means: its own name, its place in the model (`wire.heat.convection_coefficient`), or short.
 
-    Raises ValueError with the nearest name, and all there are.
+    Short names are those of `MISMATCHES`. Raises ValueError with the nearest name, and all there are.
     """
     table = parameters(system)
     places = {".".join(map(str, entry.path)): own for own, entry in table.items()}
-    if name in table or name in places:
-        return name if name in table else places[name]
-    raise ValueError(f"no parameter {name!r}{instead(name, own_first(table), 'this model has')}")
+    short = {short: own for short, own in MISMATCHES.items() if own in table}
+    meant = {**short, **places, **{own: own for own in table}}
+    if name in meant:
+        return meant[name]
+    told = f"{name!r} ({MISMATCHES[name]})" if name in MISMATCHES else f"{name!r}"
+    raise ValueError(f"no parameter {told}{instead(name, own_first(table), 'this model has', [*table, *short])}")
 
 
-def _value(system: System, name: str, value: str | float) -> float:
-    """The value in the program's own unit; text may carry a unit of its own, a plain number is SI, degC, rad."""
-    unit = parameters(system)[name].unit
+def _value(before: System, system: System, name: str, own: str, value: str | float) -> float:
+    """The value in the program's own unit; text may carry a unit of its own, a plain number is SI, degC, rad.
+
+    Text such as `+20%` is a change of the value that `before` has.
+    """
+    unit = parameters(system)[own].unit
     if not isinstance(value, str):
         return float(value)
+    ratio = ratio_of(name, value, plain=unit == "-" and name not in MISMATCHES)
+    if ratio is not None:
+        return ratio * _changed(before, own, f"{name}={value.strip()}", unit)
     try:
         return float(value)
     except ValueError:
@@ -47,6 +57,52 @@ def _value(system: System, name: str, value: str | float) -> float:
         return parse_quantity(value, "1" if unit == "-" else unit)
     except UnitError as error:
         raise UnitError(f"{name}: {error}") from None
+
+
+def _changed(before: System, own: str, told: str, unit: str) -> float:
+    """The value that a change is a share of. ValueError where there is none, or zero."""
+    value = parameter_values(before).get(own)
+    effect, _, coefficient = own.partition(".")
+    started = LIBRARY[effect].starts.get(coefficient) if effect in LIBRARY else None
+    like = "a value" + (f" in {unit}" if unit != "-" else "") + (f", such as '{started:g} {unit}'" if started else "")
+    like = like.replace(" -'", "'")  # of a number without unit
+    if value is None:
+        raise ValueError(f"{told} is a change of what is there, and the effect {effect} is not: give {like}.")
+    if value == 0.0:
+        raise ValueError(f"{told} is a change of what is there, which is 0, as any share of it: give {like}.")
+    return value
+
+
+def with_values(system: System, values: Mapping[str, str | float]) -> System:
+    """`system` with parameters put in, as `compose` takes them; what is a change (`+20%`) is one of `system`'s own value.
+
+    An effect of which a parameter is given is added. Raises as `compose` does.
+    """
+    known = {one.effect_name for one in system.effects}
+    named = {name.split(".")[0] for name in values} & LIBRARY.keys()
+    wider = _with_effects(system, sorted(named - known))
+    own: dict[str, str] = {}
+    for name in values:
+        meant = parameter_name(wider, name)
+        if meant in own:
+            raise ValueError(f"{name!r} and {own[meant]!r} are the same parameter: give it once.")
+        own[meant] = name
+    found = set_parameters(
+        wider, {meant: _value(system, wider, name, meant, values[name]) for meant, name in own.items()}
+    )
+    check_bounds(found)
+    check_order(found)
+    return found
+
+
+def _with_effects(system: System, names: Sequence[str]) -> System:
+    """`system` with more effects at base value, all in the library's order."""
+    if not names:
+        return system
+    there = [one.effect_name for one in system.effects]
+    own = dict(zip(there, system.effects, strict=True))
+    both = (own.get(one.effect_name, one) for one in at_base([*there, *names]))
+    return dataclasses.replace(system, effects=tuple(both))
 
 
 @overload
@@ -90,13 +146,14 @@ def compose(
 ) -> System | Loop:
     """Presets by name, under a kinetics law, with effects and parameters of one's own: a system, or a loop around it.
 
-    values: parameter -> a number (SI, temperatures in degC, angles in rad) or text with a unit (`"80 W/m^2/K"`); by its name
-    or its place in the model. An effect is part of the model when one of its parameters is given (`latent_heat.enthalpy`).
+    values: parameter -> a number (SI, temperatures in degC, angles in rad), text with a unit (`"80 W/m^2/K"`), or a change of
+    the preset's value (`"+20%"`, `"-50%"`); by its name, its place in the model, or a name of `MISMATCHES`. An effect is part
+    of the model when one of its parameters is given (`latent_heat.enthalpy`).
     controller: the name of one in `CONTROLLERS` with its preset gains, which knows this system, or one of one's own; what
     comes back is then a `Loop`, for `simulate_loop_dataset`.
-    Raises KeyError for a preset, law, effect or controller there is not, ValueError for a parameter there is not, a value out of its
-    bounds, transformation temperatures in the wrong order, or presets that do not go together, UnitError for a unit of
-    another kind, TypeError for a parameter that is not in `values`.
+    Raises KeyError for a preset, law, effect or controller there is not, ValueError for a parameter there is not, one given twice, a
+    change of nothing, a value out of its bounds, transformation temperatures in the wrong order, or presets that do not go
+    together, UnitError for a unit of another kind, TypeError for a parameter that is not in `values`.
     """
     if others:
         name, value = next(iter(others.items()))
@@ -105,13 +162,7 @@ def compose(
     check_together(system, load, drive)
     if law:
         system = dataclasses.replace(system, wire=under_law(system.wire, law))
-    given = dict(values or {})
-    named = {name.split(".")[0] for name in given} & LIBRARY.keys()
-    system = extended(system, [*dict.fromkeys([*effects, *sorted(named)])])
-    known = {parameter_name(system, name): value for name, value in given.items()}
-    system = set_parameters(system, {name: _value(system, name, value) for name, value in known.items()})
-    check_bounds(system)
-    check_order(system)
+    system = with_values(extended(system, [*dict.fromkeys(effects)]), values or {})
     return system if controller is None else _around(system, controller, load)
 
 

@@ -16,7 +16,7 @@ import xarray as xr
 
 from smajax.closed_loop import check_answers
 from smajax.compiled import judged_loop_compiled
-from smajax.compose import compose
+from smajax.compose import compose, with_values
 from smajax.control_presets import CONTROLLERS
 from smajax.dataset import labelled_loop, simulate_dataset
 from smajax.experiment.catalogue import INPUT_UNITS
@@ -51,9 +51,9 @@ class Asked:
     dt: float = DEFAULT_STEP
     tolerance: float | None = None
 
-    def system(self, more: Mapping[str, str] | None = None) -> System:
-        """The model, with `more` values on top."""
-        return compose(self.wire, self.load, self.drive, law=self.law, values={**self.values, **(more or {})})
+    def system(self) -> System:
+        """The model."""
+        return compose(self.wire, self.load, self.drive, law=self.law, values=self.values)
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,8 @@ class AskedLoop:
     controller: str
     set_points: str  # levels: `40deg:5s,10deg:5s`
     gains: Path | None = None
-    mismatch: Mapping[str, str] = field(default_factory=dict)  # values of the plant that the controller does not know
+    # Values of the plant that the controller does not know, or changes of what it believes: `+20%`.
+    mismatch: Mapping[str, str] = field(default_factory=dict)
     estimator: str = ""
     noise: float = 0.0  # degrees
     period: float = 0.01  # s
@@ -79,6 +80,11 @@ class Mismatch:
     unit: str
     believed: float | None  # None: its effect is no part of the model that the controller believes
     true: float
+
+    @property
+    def ratio(self) -> float | None:
+        """Plant over belief; None where nothing is believed, or zero."""
+        return self.true / self.believed if self.believed else None
 
 
 @dataclass(frozen=True)
@@ -158,14 +164,15 @@ def _beyond(system: System, position: np.ndarray) -> list[str]:
 
 def run_closed(asked: Asked, loop: AskedLoop) -> Ran:
     """The closed loop. Raises as `run_open`, and GainsFileError."""
-    believed, plant = asked.system(), asked.system(loop.mismatch)
+    believed = asked.system()
     if not isinstance(believed.load, AbstractMovingLoad) or believed.load.reading[1] != "rad":
         raise ValueError(f"controllers are those of the arm: give the load `arm`, not `{asked.load}`.")
     gains = Gains(loop.controller, {}) if loop.gains is None else read_gains(loop.gains, believed)
     if gains.controller not in CONTROLLERS:
         raise ValueError(f"no controller {gains.controller!r}{instead(gains.controller, CONTROLLERS, 'there are')}")
     preset = CONTROLLERS[gains.controller]
-    believed, plant = preset.plant(believed), preset.plant(plant)
+    believed = preset.plant(believed)
+    plant = with_values(believed, loop.mismatch)  # of what this controller believes
     check_interface(loop.estimator, loop.noise, loop.period, asked.dt)
     between = interface_of(believed, loop.estimator, loop.noise, loop.period, asked.dt, loop.delay)
     wanted = given(loop.set_points, "rad", asked.time, bare="deg")

@@ -24,21 +24,13 @@ from smajax.estimator.base import AbstractEstimator
 from smajax.fit.progress import Progress, quiet
 from smajax.measured_state import Sensor
 from smajax.merit import Merit, judged_loop
+from smajax.mismatch import MISMATCHES
 from smajax.parameters import get_parameters, set_vector
 from smajax.reference import Reference, clock, constant
 from smajax.system import System
 from smajax.types import Scalar, Series
 from smajax.words import and_listed
 
-# What may be wrong: its name on the command line -> the plant's parameter.
-MISMATCHES = {
-    "inertia": "inertia_ratio",
-    "damping": "damping",
-    "convection": "convection_coefficient",
-    "ambient": "ambient_temperature",
-    "payload": "payload_mass",
-    "supply": "amplifier_gain",
-}
 LEAST, MOST = 0.5, 2.0  # the mismatches looked at, plant over belief
 TARGET, GAIN, NUMBER = "set point", "share of the gain", "number"
 CHUNK = 1024  # loops between two marks of progress

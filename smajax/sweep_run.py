@@ -24,10 +24,11 @@ from smajax.gains_file import Gains
 from smajax.load.base import AbstractMovingLoad
 from smajax.measured_state import Sensor
 from smajax.merit import Merit
+from smajax.mismatch import MISMATCHES
 from smajax.parameters import get_parameters
 from smajax.reference import clock
 from smajax.report.files import as_netcdf, replace, writing
-from smajax.sweep import MISMATCHES, Grid, Interface, closed_loops, lanes, positions, ratios
+from smajax.sweep import Grid, Interface, closed_loops, lanes, positions, ratios
 from smajax.sweep_dataset import as_dataset
 from smajax.sweep_report import (
     Swept,

@@ -77,6 +77,35 @@ SIMULATE = {
         ["--controller", "pdi", "--set-point", "4deg:5s"],
         "no controller 'pdi'; did you mean 'pid'",
     ),
+    "a size that does not say which way": (
+        ["--controller", "pid", "--set-point", "4deg:5s", "--mismatch", "inertia=20%"],
+        "got inertia=20%, expected +20% or -20%, a change of what it is, or a value",
+    ),
+    "a size that goes both ways": (
+        ["--controller", "pid", "--set-point", "4deg:5s", "--mismatch", "damping=+-20%"],
+        "got damping=+-20%, expected +20% or -20%",
+    ),
+    "a change of an effect that is not believed": (
+        ["--controller", "pid", "--set-point", "4deg:5s", "--mismatch", "latent_heat.enthalpy=+20%"],
+        "is a change of what is there, and the effect latent_heat is not: give a value in J/kg, such as '",
+    ),
+    "a change of zero": (
+        ["--controller", "pid", "--set-point", "4deg:5s", "--set", "damping=0", "--mismatch", "damping=+20%"],
+        "damping=+20% is a change of what is there, which is 0, as any share of it: give a value in N m s/rad.",
+    ),
+    "a change below the bounds": ([*WIRE, "--step", "5V:1s", "--set", "damping=-150%"], "`damping` = -"),
+    "a decimal comma in a change": (
+        [*WIRE, "--step", "5V:1s", "--set", "damping=+2,5%"],
+        "damping: got '+2,5%', expected a decimal point; write '+2.5%'",
+    ),
+    "one parameter by two names": (
+        [*WIRE, "--step", "5V:1s", "--set", "convection=80,convection_coefficient=90"],
+        "'convection_coefficient' and 'convection' are the same parameter: give it once",
+    ),
+    "a short name of what the model has not": (
+        [*WIRE, "--step", "5V:1s", "--set", "payload=+20%"],
+        "no parameter 'payload' (payload_mass); this model has: ",
+    ),
     "gains that are not there": (["--gains", "no.json", "--set-point", "4deg:5s"], "gains file no.json cannot be read"),
 }
 
@@ -138,7 +167,10 @@ LONG = {
     "sweep --estimator kalman": "no filter `kalman`; there are",
     "tune pdi": "no controller `pdi`; did you mean 'pid'?",
     "tune pid --variation inertai=0.2": "no variation `inertai`; did you mean 'inertia'?",
-    "tune pid --variation inertia=nan": "each name once with its number",
+    "tune pid --variation inertia=nan": "inertia=nan: expected a share such as 20% or 0.2: got 'nan'",
+    "tune pid --variation inertia=+20%": "expected a variation, which goes both ways: inertia=20% is from -20% to +20%",
+    "tune pid --variation convection=20%,convection_coefficient=10%": "is `convection`, which is given already",
+    "sweep --over damping=20%": "names alone, as in `convection,damping`, not `damping=20%`",
     "tune pid --variation inertia=2": "a variation is a share between 0 and 1",
     "tune pid --limits overshot=2": "no term `overshot`; did you mean 'overshoot'?",
     "tune pid --limits overshoot=nan": "each name once with its number",

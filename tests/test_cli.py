@@ -16,7 +16,8 @@ from typer.testing import CliRunner
 
 from smajax.cli import app, main
 from smajax.command import renamed
-from smajax.command.base import console, numbers, pairs
+from smajax.command.base import console, numbers, pairs, texts, understood
+from smajax.mismatch import MISMATCHES, variation_of
 from smajax.progress import VARIABLE, shown
 from smajax.tune.terms import TERMS
 
@@ -260,9 +261,64 @@ def test_lists_and_pairs_of_numbers_take_units() -> None:
         "--limits",
         ["settling_time=4000 ms,overshoot=2", "energy=0.02kJ peak_temperature=363.15K"],
         {name: term.unit for name, term in TERMS.items()},
+        "overshoot=2deg",
     )
     assert limits == pytest.approx({"settling_time": 4.0, "overshoot": 2.0, "energy": 20.0, "peak_temperature": 90.0})
-    assert pairs("--variation", ["inertia=20%,", "damping = 0.1"]) == {"inertia": 0.2, "damping": 0.1}
+    told = texts("--variation", ["inertia=20%,", "damping = 0.35 payload=\N{PLUS-MINUS SIGN}5 %"])
+    told |= {"convection_coefficient": "+-50%", "supply": "35%"}
+    assert variation_of(told) == {"inertia": 0.2, "damping": 0.35, "supply": 0.35, "payload": 0.05, "convection": 0.5}
+
+
+@pytest.mark.parametrize(
+    ("typed", "unit", "told"),
+    [
+        ("6,5", "deg", "Set points: 6 and 5 deg."),
+        ("-20,20,60", "deg", "Set points: -20, 20 and 60 deg."),
+        ("1,5", "", "Set points: 1 and 5."),
+        ("6, 5", "deg", ""),
+        ("6.5 60deg", "deg", ""),
+    ],
+)
+def test_a_comma_that_may_be_meant_for_a_point_is_told(typed: str, unit: str, told: str) -> None:
+    assert understood("Set points", typed, numbers("--set-points", typed, unit or "1"), unit) == told
+
+
+MAY_BE_WRONG = "What may be wrong of a plant: " + ", ".join(
+    short if short == own else f"{short} ({own}{', in degC' if short == 'ambient' else ''})"
+    for short, own in MISMATCHES.items()
+)
+
+
+def test_what_may_be_wrong_has_the_same_words_in_every_command() -> None:
+    found = set()
+    for command in ("simulate", "sweep", "tune"):
+        page = " ".join(CliRunner().invoke(app, [command, "--help"]).output.split())
+        assert f"{MAY_BE_WRONG}. +20%" in page
+        found.add(re.split(r" Example:| Options:", page[page.index(MAY_BE_WRONG) :])[0])
+    assert len(found) == 1, found
+
+
+@pytest.mark.parametrize(
+    ("typed", "told"),
+    [
+        (
+            "simulate --load dead_weight",
+            "`load` is the second argument, without a name: smajax simulate niti_table_3_1 dead_weight",
+        ),
+        ("simulate --wire=mine --step 5V:1s", "`wire` is the first argument, without a name: smajax simulate mine"),
+        (
+            "simulate flexinol_table_3_2 --drive",
+            "third argument, without a name: smajax simulate flexinol_table_3_2 arm DRIVE",
+        ),
+        ("tune --controller pid", "`controller` is an argument, without a name: smajax tune pid"),
+        ("sweep --controller pid", "Possible options: --controllers"),
+    ],
+)
+def test_an_argument_that_is_given_as_an_option_is_told_where_it_stands(typed: str, told: str) -> None:
+    ended = CliRunner().invoke(app, typed.split())
+    assert ended.exit_code == 2
+    assert f"No such option: --{typed.partition('--')[2].split()[0].split('=')[0]}" in ended.output
+    assert told in ended.output
 
 
 def test_a_list_may_be_cut_short(tmp_path: Path) -> None:
@@ -285,6 +341,7 @@ def test_a_list_may_be_cut_short(tmp_path: Path) -> None:
         ),
         ("sweep --over convection,a", ["convection,ambient"]),
         ("tune sld --variation inertia=0.2,c", ["inertia=0.2,convection="]),
+        ("simulate --mismatch inertia=+20%,con", ["inertia=+20%,convection=", "inertia=+20%,convection_coefficient="]),
         ("tune sld --limits s", ["settling_time=", "steady_error="]),
         ("tune sld --objective w", ["worst"]),
         ("tune sld --by a", ["adam"]),

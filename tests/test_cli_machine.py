@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
+import sys
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
@@ -28,6 +31,7 @@ from smajax.parameters import parameter_values
 from smajax.presets import build
 
 run = CliRunner()
+PLAIN = {name: value for name, value in os.environ.items() if name != "JAX_ENABLE_X64"}
 DEMO = Path(__file__).parents[1] / "smajax" / "demo" / "latent"
 
 
@@ -43,6 +47,18 @@ def test_the_doctor_finds_what_is_missing() -> None:
     assert "optax is not installed" in told
     assert "jax_enable_x64" in told
     assert "JAX_COMPILATION_CACHE_DIR" in told
+
+
+def test_the_doctor_speaks_of_float64_in_the_commands_and_in_a_program() -> None:
+    """Without what it says to do, a program of one's own has float32; with it, float64."""
+    told = run.invoke(app, ["doctor"]).output
+    assert "float64: on in the commands; a program of your own switches it on itself" in told
+    assert "smajax.prepare()" in told
+    shown = "print(jax.numpy.zeros(1).dtype)"
+    for lines, expected in ((shown, "float32"), (f"smajax.prepare(); {shown}", "float64")):
+        words = [sys.executable, "-c", f"import jax, smajax; {lines}"]
+        ended = subprocess.run(words, capture_output=True, text=True, timeout=120, check=True, env=PLAIN)
+        assert ended.stdout.strip() == expected
 
 
 def test_only_compiled_programs_are_cleared(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -19,10 +19,12 @@ from smajax.command.folder import FolderTaken
 from smajax.compiled import simulate_compiled
 from smajax.compose import compose
 from smajax.levels import clock_of, given, levels
+from smajax.mismatch import MISMATCHES
 from smajax.parameters import parameter_values, set_parameters
 from smajax.presets import build
 from smajax.report.simulate_page import conclusions
 from smajax.single import Asked, AskedLoop, run_closed, run_open
+from smajax.sweep import mismatched
 from smajax.units import UnitError
 
 run = CliRunner()
@@ -118,18 +120,45 @@ def test_a_set_point_beyond_the_stops_is_told_and_several_stand_in_a_table(tmp_p
 def test_what_the_controller_believes_stands_beside_what_the_plant_has(tmp_path: Path) -> None:
     words = ["simulate", "--controller", "pid", "--dt", "10ms", "--set-point", "10deg:1s"]
     wrong = ["convection_coefficient=80", "latent_heat.enthalpy=20 J/g", "payload_mass=57.19 g"]  # the mass as believed
+    wrong.append("ambient=+10%")
     words += [word for one in wrong for word in ("--mismatch", one)]
     told = run.invoke(app, [*words, "--out", str(tmp_path / "loop")])
     assert told.exit_code == 0, told.output
-    assert " ".join(told.output.split()).count("convection_coefficient believed 150 -> true 80 W/(m^2 K)") == 1
+    said = " ".join(told.output.split())
+    assert said.count("convection_coefficient believed 150 -> true 80 W/(m^2 K), 0.5333 times (-46.67 %)") == 1
+    assert said.count("ambient_temperature believed 20 -> true 22 degC, +2 K") == 1
     record = json.loads((tmp_path / "loop" / "simulate.json").read_text(encoding="utf-8"))
     assert record["mismatch"] == {
-        "convection_coefficient": {"believed": 150.0, "true": 80.0, "unit": "W/(m^2 K)"},
-        "latent_heat.enthalpy": {"believed": None, "true": 20_000.0, "unit": "J/kg"},
+        "convection_coefficient": {"believed": 150.0, "true": 80.0, "unit": "W/(m^2 K)", "ratio": 80.0 / 150.0},
+        "ambient_temperature": {"believed": 20.0, "true": 22.0, "unit": "degC", "ratio": 1.1},
+        "latent_heat.enthalpy": {"believed": None, "true": 20_000.0, "unit": "J/kg", "ratio": None},
     }
     page = (tmp_path / "loop" / "simulate.html").read_text(encoding="utf-8")
     assert "<td>convection_<wbr>coefficient</td><td class=n>150</td><td class=n>80</td>" in page
     assert "not in its model" in page
+
+
+def test_a_change_is_one_of_what_the_controller_believes() -> None:
+    """Of the preset's value or the one put in its place, of an effect that is believed, of the law that a controller is for."""
+    changes = {"convection": "+20%", "latent_heat.enthalpy": "-50%", "ambient_temperature": "+10 %", "inertia": "1.5"}
+    asked = Asked(dt=0.01, values={"convection_coefficient": "80", "latent_heat.enthalpy": "20 J/g"})
+    found = run_closed(asked, AskedLoop("pid", "10deg:0.1s", mismatch=changes)).mismatches
+    assert {one.name: (one.believed, one.true, one.ratio) for one in found} == {
+        "convection_coefficient": pytest.approx((80.0, 96.0, 1.2)),
+        "latent_heat.enthalpy": pytest.approx((20_000.0, 10_000.0, 0.5)),
+        "ambient_temperature": pytest.approx((20.0, 22.0, 1.1)),  # in degC, as a sweep takes it
+        "inertia_ratio": pytest.approx((1.0, 1.5, 1.5)),
+    }
+    with pytest.raises(ValueError, match="which is 0"):  # the law of section 4.8 has no thermal term
+        run_closed(Asked(dt=0.01), AskedLoop("backstepping1", "10deg:0.1s", mismatch={"thermal_modulus": "+20%"}))
+
+
+def test_a_sweep_and_a_run_mean_the_same_plant_by_a_mismatch() -> None:
+    believed = build("niti_table_3_1", "arm", "amplified_voltage")
+    swept = mismatched(believed, dict.fromkeys(MISMATCHES, jnp.asarray(0.8)))
+    asked = compose("niti_table_3_1", "arm", "amplified_voltage", values=dict.fromkeys(MISMATCHES, "-20%"))
+    assert parameter_values(asked) == pytest.approx(parameter_values(swept), rel=1e-12)
+    assert parameter_values(asked)["damping"] == pytest.approx(0.8 * parameter_values(believed)["damping"])
 
 
 def test_a_set_point_that_moves_all_the_time_has_no_figures_of_merit(tmp_path: Path) -> None:

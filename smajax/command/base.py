@@ -138,6 +138,15 @@ def alone(unit: str) -> str:
     return f"in {unit} where it says no unit"
 
 
+def understood(what: str, text: str | None, values: Sequence[float], unit: str = "") -> str:
+    """How a list was read, where a comma may have been meant for a decimal point: `Set points: 6 and 5 deg.` of `6,5`; or ""."""
+    from smajax.words import and_listed
+
+    if text is None or not re.search(r"\d,\d", text):
+        return ""
+    return f"{what}: {and_listed([f'{one:g}' for one in values])} {unit}".rstrip() + "."
+
+
 def numbers(option: str, text: str, unit: str = "1") -> tuple[float, ...]:
     """`1,2 3` or `1deg,2 deg` as finite numbers in `unit`, which those without one have."""
     from smajax.units import UnitError, parse_quantity
@@ -163,23 +172,33 @@ def within(low: float, high: float = math.inf) -> Callable[[float | None], float
     return checked
 
 
-def pairs(option: str, several: Sequence[str] | None, units: Mapping[str, str] | None = None) -> dict[str, float]:
-    """`name=0.2,other=1`, given once or more, as numbers by name, in the units of those names ("1": shares, weights)."""
-    from smajax.units import UnitError, parse_quantity
-
-    found: dict[str, float] = {}
+def texts(option: str, several: Sequence[str] | None, example: str = "name=0.2,other=1") -> dict[str, str]:
+    """`name=0.2,other=1`, given once or more, as text by name; a comma within a value (`2,5`) stays there."""
+    found: dict[str, str] = {}
     told = ",".join(one.strip(", ") for one in several or ())
     for part in re.split(r",\s*(?=[A-Za-z_])|\s+(?=[^,\s=]+=)", told) if told else ():
         name, sign, value = (one.strip() for one in part.partition("="))
+        if not sign or not name or name in found:
+            raise _each_once(option, part, example)
+        found[name] = value
+    return found
+
+
+def _each_once(option: str, part: str, example: str, why: str = "") -> typer.BadParameter:
+    return typer.BadParameter(
+        f"each name once with its number, as in `{example}`, not `{part.strip()}`{why}", param_hint=option
+    )
+
+
+def pairs(option: str, several: Sequence[str] | None, units: Mapping[str, str], example: str) -> dict[str, float]:
+    """The same as numbers by name, in the units of those names ("1", where there is none: weights)."""
+    from smajax.units import UnitError, parse_quantity
+
+    found: dict[str, float] = {}
+    for name, value in texts(option, several, example).items():
+        unit = units.get(name, "1")
         try:
-            if not sign or name in found:
-                raise UnitError("")
-            unit = (units or {}).get(name, "1")
             found[name] = parse_quantity(value, unit, bare=unit)
         except UnitError as error:
-            why = f": {error}" if str(error) else ""
-            raise typer.BadParameter(
-                f"each name once with its number, as in `name=0.2,other=1`, not `{part.strip()}`{why}",
-                param_hint=option,
-            ) from None
+            raise _each_once(option, f"{name}={value}", example, f": {error}") from None
     return found

@@ -56,13 +56,13 @@ def several_controllers(incomplete: str) -> list[str]:
 
 
 def mismatches(incomplete: str) -> list[str]:
-    from smajax.sweep import MISMATCHES
+    from smajax.mismatch import MISMATCHES
 
     return _after_commas(MISMATCHES, incomplete)
 
 
 def shares_of_mismatches(incomplete: str) -> list[str]:
-    from smajax.sweep import MISMATCHES
+    from smajax.mismatch import MISMATCHES
 
     return _after_commas(MISMATCHES, incomplete, "=")
 
@@ -91,7 +91,8 @@ def _before(ctx: typer.Context) -> list[str]:
 
 
 def values(ctx: typer.Context, incomplete: str) -> list[str]:
-    """Parameters of the model that the words before name."""
+    """Parameters of the model that the words before name, short names first."""
+    from smajax.mismatch import MISMATCHES
     from smajax.parameters import parameters
     from smajax.presets import DRIVES, LOADS, WIRES
     from smajax.single import Asked
@@ -100,7 +101,9 @@ def values(ctx: typer.Context, incomplete: str) -> list[str]:
     # The last one named: what is typed comes behind the defaults.
     named = {kind: word for kind, there in kinds.items() for word in _before(ctx) if word in there}
     model = dataclasses.replace(Asked(), **named).system()  # type: ignore[arg-type]
-    return [f"{name}=" for name in _offered(parameters(model), incomplete)]
+    there = parameters(model)
+    short = [name for name, own in MISMATCHES.items() if own in there]
+    return _after_commas(dict.fromkeys([*short, *there]), incomplete, "=")
 
 
 def unknowns_declared(ctx: typer.Context, incomplete: str) -> list[str]:

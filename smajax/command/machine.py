@@ -62,7 +62,9 @@ def told(found: dict[str, object]) -> list[str]:
     return [
         f"smajax {one['smajax']['version']} in {one['smajax']['folder']}",
         f"python {here['python']}, {here['system']}, {here['processor']}, {here['cores']} cores",
-        f"devices: {', '.join(one['devices'])}; float64 {'on' if one['float64'] else 'off'}",
+        f"devices: {', '.join(one['devices'])}",
+        f"float64: {'on' if one['float64'] else 'off'} in the commands; a program of your own switches it on itself, before its "
+        "first array: smajax.prepare(), or jax.config.update('jax_enable_x64', True)",
         f"machine code for a batch: {'works' if lanes['works'] else 'does not work'}, vectors of {lanes['vector_bits']} bits"
         if lanes
         else "machine code for a batch: not tried, because of the plug-ins",

@@ -18,14 +18,16 @@ from smajax.command.base import (
     console,
     quantity,
     resumable,
+    texts,
     within,
 )
 
 SHOWN = 7  # columns of a table of set points on a terminal
+VALUES = "damping=+20%,wire_length='1 m'"
 
 
-def _texts(option: str, several: Sequence[str] | None) -> dict[str, str]:
-    """`NAME=TEXT`, given once or more."""
+def _inputs(option: str, several: Sequence[str] | None) -> dict[str, str]:
+    """`NAME=TEXT`, given once or more; a text may hold commas."""
     found: dict[str, str] = {}
     for part in several or ():
         name, sign, text = part.partition("=")
@@ -65,8 +67,9 @@ def simulate(
         list[str] | None,
         typer.Option(
             "--set",
-            help="a parameter: wire.heat.convection_coefficient=80, convection_coefficient='80 W/m^2/K' or "
-            "latent_heat.enthalpy='20 J/g', which adds that effect; in SI, degC or rad where it says no unit; repeat",
+            help="parameters: wire.heat.convection_coefficient=80, convection_coefficient='80 W/m^2/K' or "
+            "latent_heat.enthalpy='20 J/g', which adds that effect; in SI, degC or rad where it says no unit; payload=+20% is "
+            "that much more than the preset has; may be repeated",
             autocompletion=complete.values,
         ),
     ] = None,
@@ -95,7 +98,8 @@ def simulate(
     mismatch: Annotated[
         list[str] | None,
         typer.Option(
-            help="a parameter of the plant that the controller does not know of, as --set",
+            help="how the plant is wrong: damping=+20%,payload=-50% of what the controller believes, or any parameter's value as "
+            "--set; may be repeated",
             autocompletion=complete.values,
         ),
     ] = None,
@@ -121,9 +125,13 @@ def simulate(
 
     By default the model is the source's arm. Angles are given in deg; what is written is SI with degC and rad.
 
+    What may be wrong of a plant: inertia (inertia_ratio), damping, convection (convection_coefficient), ambient
+    (ambient_temperature, in degC), payload (payload_mass), supply (amplifier_gain). +20% is that much more than the
+    controller believes, -50% half of it, and 20% of a variation both ways.
+
     Example:  smajax simulate flexinol_table_3_2 dead_weight flexinol_voltage --step 5V:8s,0V:8s --set convection_coefficient=80
 
-    Example:  smajax simulate --gains tune/gains.json --set-point 40deg:5s,10deg:5s --out loop
+    Example:  smajax simulate --gains tune/gains.json --set-point 40deg:5s,10deg:5s --mismatch damping=+20% --out loop
     """
     from smajax.runtime import prepare
 
@@ -137,7 +145,7 @@ def simulate(
     from smajax.words import aligned
 
     check_path(out)
-    series, closed = _texts("--input", inputs), gains is not None or bool(controller)
+    series, closed = _inputs("--input", inputs), gains is not None or bool(controller)
     if gains is not None and controller:
         raise typer.BadParameter("--gains names its controller; leave --controller out.")
     if closed != (set_point is not None):
@@ -152,7 +160,7 @@ def simulate(
     if not closed and mismatch:
         raise typer.BadParameter("--mismatch is for closed loops; use --set.")
     try:
-        asked = Asked(wire, load, drive, law, _texts("--set", values), series, time, seconds, dt, tolerance)
+        asked = Asked(wire, load, drive, law, texts("--set", values, VALUES), series, time, seconds, dt, tolerance)
         if step is not None:
             required, _ = channels(asked.system())
             if len(required) != 1 or required & series.keys():
@@ -169,7 +177,7 @@ def simulate(
                     controller,
                     set_point or "",
                     gains,
-                    _texts("--mismatch", mismatch),
+                    texts("--mismatch", mismatch, VALUES),
                     estimator,
                     noise,
                     period,
@@ -203,7 +211,8 @@ def simulate(
         for row in summary_rows(ran.found):
             typer.echo(f"  {row[0]:<28} {row[1]:>11} … {row[2]:<11} last {row[3]:<11} {row[4]}")
         for row in mismatch_rows(ran):
-            typer.echo(f"  {row[0]:<28} believed {row[1]} -> true {row[2]} {row[3]}")
+            unit, ratio = f" {row[3]}" * (row[3] != "-"), f", {row[4]}" * bool(row[4])
+            typer.echo(f"  {row[0]:<28} believed {row[1]} -> true {row[2]}{unit}{ratio}")
         for row in merit_rows(ran):
             typer.echo(f"  {row[0]:<28} {row[1]} {row[2]}")
         head, rows = rest_rows(ran)

@@ -19,6 +19,7 @@ from smajax.command.base import (
     numbers,
     quantity,
     resumable,
+    understood,
     within,
 )
 
@@ -35,11 +36,18 @@ def sweep(
         ),
     ] = None,
     over: Annotated[
-        str, typer.Option(help="the two mismatches of the maps, or one of curves", autocompletion=complete.mismatches)
+        str,
+        typer.Option(
+            help="the two mismatches of the maps, or one of curves; names alone: each goes from -50% to +100%",
+            autocompletion=complete.mismatches,
+        ),
     ] = "convection,damping",
     points: Annotated[
         int | None,
-        typer.Option(callback=within(2), help="mismatches from 0.5 to 2 along each side of a map; default 15"),
+        typer.Option(
+            callback=within(2),
+            help="mismatches from 0.5 to 2 times (-50% to +100%) along each side of a map; default 15",
+        ),
     ] = None,
     set_points: Annotated[
         str | None, typer.Option(help=f"with commas, {alone('deg')}; default -40,-20,0,10,20,40,50,60,80")
@@ -74,7 +82,11 @@ def sweep(
 ) -> None:
     """Run controllers of the arm on plants that are not what they believe, and compare them on every set point.
 
-    Mismatches: inertia, damping, convection, ambient, payload, supply. Ctrl-C loses nothing: the same command goes on.
+    Ctrl-C loses nothing: the same command goes on.
+
+    What may be wrong of a plant: inertia (inertia_ratio), damping, convection (convection_coefficient), ambient
+    (ambient_temperature, in degC), payload (payload_mass), supply (amplifier_gain). +20% is that much more than the
+    controller believes, -50% half of it, and 20% of a variation both ways.
 
     Example:  smajax sweep --controllers pid,sld --over convection,ambient --out sweep
     """
@@ -85,6 +97,7 @@ def sweep(
     from smajax.control_presets import CONTROLLERS
     from smajax.figures.rigs import arm
     from smajax.gains_file import GainsFileError, read_gains
+    from smajax.mismatch import short_name
     from smajax.progress import shown
     from smajax.sweep_run import SweepSettings, as_text, files_of, goes_on, run_sweep
 
@@ -96,12 +109,17 @@ def sweep(
     asked = controllers or ",".join(dict.fromkeys(one.controller for one in tuned)) or "all"
     names = tuple(CONTROLLERS) if asked == "all" else tuple(part for part in asked.split(",") if part)
     first, _, second = (part.strip() for part in over.strip(" ,").partition(","))
+    if "=" in over:
+        raise typer.BadParameter(
+            f"names alone, as in `convection,damping`, not `{over}`: each goes from -50% to +100% in --points steps.",
+            param_hint="--over",
+        )
     if not first or "," in second:
         raise typer.BadParameter(f"one mismatch, or two with a comma between them, not `{over}`", param_hint="--over")
     settings = SweepSettings(
         names,
-        first,
-        second,
+        short_name(first),
+        short_name(second),
         points or (3 if fast else 15),
         numbers("--set-points", set_points if set_points is not None else "-20,20,60" if fast else SET_POINTS, "deg"),
         numbers("--gain-shares", gain_shares if gain_shares is not None else "1" if fast else GAINS),
@@ -112,6 +130,12 @@ def sweep(
         delay=delay,
         tuned=tuned,
     )
+    for told in (
+        understood("Set points", set_points, settings.set_points, "deg"),
+        understood("Shares of the main gain", gain_shares, settings.gains),
+    ):
+        if told and not json_out:
+            typer.echo(told, err=True)
     kept = "Finished controllers are kept: the same command goes on."
     record, own = settings.record(), files_of(names)
     try:

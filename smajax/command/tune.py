@@ -21,6 +21,8 @@ from smajax.command.base import (
     pairs,
     quantity,
     resumable,
+    texts,
+    understood,
     within,
 )
 
@@ -40,7 +42,8 @@ def tune(
     variation: Annotated[
         list[str] | None,
         typer.Option(
-            help="how wrong the plant may be, as shares: inertia=0.2,convection=20%; may be repeated",
+            help="how wrong the plant may be: damping=20%,payload=50% (or 0.2, 0.5) of what the controller believes, both ways; "
+            "may be repeated",
             autocompletion=complete.shares_of_mismatches,
         ),
     ] = None,
@@ -99,11 +102,14 @@ def tune(
     """Tune the gains of a controller of the arm, on many set points and plants at once: by gradient, then without slopes.
 
     Each loop is one step from the start, cold and at rest; moves between the set points are tried in the end and told.
-    Variations: inertia, damping, convection, ambient, payload, supply. The gains are checked on plants and set points that
-    tuning never saw. `smajax sweep --gains tune/gains.json` reads them. Exit code 3 when a limit is not met. Ctrl-C loses
-    the round or generation under way alone: the same command goes on.
+    The gains are checked on plants and set points that tuning never saw. `smajax sweep --gains tune/gains.json` reads them.
+    Exit code 3 when a limit is not met. Ctrl-C loses the round or generation under way alone: the same command goes on.
 
-    Example:  smajax tune sld --variation inertia=0.2,damping=0.2,convection=0.2 --limits settling_time=4,overshoot=2
+    What may be wrong of a plant: inertia (inertia_ratio), damping, convection (convection_coefficient), ambient
+    (ambient_temperature, in degC), payload (payload_mass), supply (amplifier_gain). +20% is that much more than the
+    controller believes, -50% half of it, and 20% of a variation both ways.
+
+    Example:  smajax tune sld --variation inertia=20%,damping=20%,convection=20% --limits settling_time=4,overshoot=2
     """
     from smajax.runtime import prepare
 
@@ -111,6 +117,7 @@ def tune(
     from smajax.command.folder import FolderTaken, claimed
     from smajax.figures.rigs import arm
     from smajax.gains_file import GainsFileError, read_gains
+    from smajax.mismatch import variation_of
     from smajax.progress import shown
     from smajax.tune.folder import OURS, STATE, ended, tune_into
     from smajax.tune.objective import REGULATION
@@ -124,13 +131,17 @@ def tune(
             raise GainsFileError(f"gains file {start} is of {begun.controller}, not of {controller}.")
     except GainsFileError as error:
         raise typer.BadParameter(str(error), param_hint="--start") from None
+    try:
+        varied = variation_of(texts("--variation", variation, "damping=20%,payload=50%"))
+    except ValueError as error:
+        raise typer.BadParameter(str(error), param_hint="--variation") from None
     settings = TuneSettings(
         controller,
         numbers("--set-points", set_points if set_points is not None else "-20,20,60" if fast else TUNED_AT, "deg"),
-        pairs("--variation", variation),
+        varied,
         objective,
-        pairs("--weights", weights) or dict(REGULATION),
-        pairs("--limits", limits, {name: term.unit for name, term in TERMS.items()}),
+        pairs("--weights", weights, {}, "settling_time=1,overshoot=1") or dict(REGULATION),
+        pairs("--limits", limits, {name: term.unit for name, term in TERMS.items()}, "settling_time=4,overshoot=2deg"),
         8 if fast else 32,
         starts or (3 if fast else 6),
         rounds or (10 if fast else 30),
@@ -145,6 +156,9 @@ def tune(
         4 if fast else 32,
         {} if begun is None else begun.values,
     )
+    understood_as = understood("Set points", set_points, settings.set_points, "deg")
+    if understood_as and not json_out:
+        typer.echo(understood_as, err=True)
     kept = "Finished rounds are kept: the same command goes on."
     asked = {"tuning": controller}  # what else was asked lies in a file of the tuning's own, which it checks
     try:

@@ -17,6 +17,7 @@ from smajax.figures.drawing import BLUE, GREY, RED, UPRIGHT, named, panels
 from smajax.fit.progress import Progress, quiet
 from smajax.load.base import AbstractMovingLoad
 from smajax.merit import MERIT_UNITS, Rest
+from smajax.mismatch import in_words
 from smajax.parameters import parameter_values, parameters
 from smajax.report.animation import moving
 from smajax.report.display import axis_label, digits, display, label
@@ -45,7 +46,8 @@ def record(ran: Ran, command: str, series: bool = True) -> dict[str, Any]:
         "provenance": {name: _plain(name, told) for name, told in found.attrs.items() if name != "parameters (SI)"},
         "parameters": parameter_values(ran.system),
         "mismatch": {
-            one.name: {"believed": one.believed, "true": one.true, "unit": one.unit} for one in ran.mismatches
+            one.name: {"believed": one.believed, "true": one.true, "unit": one.unit, "ratio": one.ratio}
+            for one in ran.mismatches
         },
         "notes": list(ran.notes),
         "conclusions": conclusions(ran),
@@ -167,7 +169,7 @@ def rest_rows(ran: Ran) -> tuple[list[str], list[list[str]]]:
     return head, rows
 
 
-MISMATCH = ("parameter", "the controller believes", "the plant has", "unit")
+MISMATCH = ("parameter", "the controller believes", "the plant has", "unit", "difference")
 
 
 def mismatch_rows(ran: Ran) -> list[list[str]]:
@@ -178,6 +180,7 @@ def mismatch_rows(ran: Ran) -> list[list[str]]:
             "not in its model" if one.believed is None else digits(one.believed, 6),
             digits(one.true, 6),
             one.unit,
+            in_words(one.believed, one.true, one.unit),
         ]
         for one in ran.mismatches
     ]

@@ -21,9 +21,10 @@ from smajax.closed_loop import watch_closed_loop
 from smajax.control_presets import Box, ControllerPreset
 from smajax.controller.base import AbstractController
 from smajax.merit import Merit, judge_of
+from smajax.mismatch import MISMATCHES
 from smajax.parameters import check_bounds, get_parameters, set_parameters, set_vector
 from smajax.reference import clock, constant
-from smajax.sweep import MISMATCHES, NUMBER, TARGET, Interface, mismatched
+from smajax.sweep import NUMBER, TARGET, Interface, mismatched
 from smajax.system import System
 from smajax.tune.members import Members
 from smajax.tune.terms import TERMS, Terms, as_judged, as_shown, watch_of

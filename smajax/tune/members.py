@@ -10,7 +10,8 @@ import numpy as np
 from scipy.stats import qmc
 
 from smajax.measured.names import instead
-from smajax.sweep import MISMATCHES, lanes
+from smajax.mismatch import MISMATCHES
+from smajax.sweep import lanes
 
 CORNERS = 3  # mismatches of which every corner is taken
 DRAWN = 16  # plants drawn where there are more
@@ -56,7 +57,8 @@ def check_variation(variation: Mapping[str, float]) -> None:
             raise ValueError(f"no variation `{name}`{instead(name, MISMATCHES, 'there are')}.")
         if not 0.0 < share < 1.0:
             raise ValueError(
-                f"a variation is a share between 0 and 1 (0.2: from 0.8 to 1.2 times), not {name}={share:g}."
+                f"a variation is a share between 0 and 1 (20% or 0.2: from -20% to +20% of what the controller believes), not "
+                f"{name}={share:g}."
             )
 
 

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from smajax.made_with import made_with
+from smajax.mismatch import MISMATCHES
 from smajax.report.display import digits
 from smajax.report.files import csv_text, heading
 from smajax.report.html import picture
 from smajax.report.plain_page import bullets, table, whole
-from smajax.sweep import MISMATCHES
 from smajax.tune.members import BEYOND
 from smajax.tune.moves import Moves
 from smajax.tune.pictures import before_after

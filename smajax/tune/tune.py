@@ -10,8 +10,9 @@ import numpy as np
 from smajax.control_presets import CONTROLLERS
 from smajax.fit.progress import Progress, quiet
 from smajax.gains_file import Gains
+from smajax.mismatch import MISMATCHES
 from smajax.parameters import get_parameters, parameters
-from smajax.sweep import MISMATCHES, positions
+from smajax.sweep import positions
 from smajax.sweep_run import interface_of
 from smajax.system import System
 from smajax.tune.descent import Descent, begin, one_round

@@ -16,7 +16,7 @@ from scipy.stats import qmc
 
 from smajax.fit.progress import Progress
 from smajax.gains_file import write_gains
-from smajax.sweep import MISMATCHES
+from smajax.mismatch import MISMATCHES
 from smajax.system import System
 from smajax.tune.evaluate import Rig
 from smajax.tune.members import Members, tuned_on
