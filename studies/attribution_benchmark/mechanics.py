@@ -22,11 +22,16 @@ class Mechanics:
         get = effects.get
         self.stroke = wire.recoverable_strain * wire.wire_length / load.ratio
         rest = load.resistance(load.start)
-        self.coulomb, self.stribeck = get("coulomb_friction", 0.0) * rest, get("stribeck_friction", 0.0) * rest
+        self.shares = get("coulomb_friction", 0.0), get("stribeck_friction", 0.0)
+        self.carry(load)
         self.stiffening = get("nonlinear_spring", 0.0) * rest / self.stroke**3
         self.cogging, self.detent = get("cogging", 0.0) * rest, get("detent", 0.0) * rest
         self.start = load.start
         self.rubs = bool(self.coulomb or self.stribeck)
+
+    def carry(self, load: Load) -> None:
+        """Another load from now on: friction is a share of what it pulls with at rest."""
+        self.coulomb, self.stribeck = (share * load.resistance(load.start) for share in self.shares)
 
     def resistance(self, q: float) -> float:
         """Force, or torque, beyond the load's own that depends on the position."""

@@ -182,6 +182,7 @@ def simulate(rig: Rig, wire: Wire, run: Run, effects: Effects) -> Vector:
         actuator.command = float(run.command[max(math.floor((t - delay) / clock.step + 1e-6), 0)])
         if masses is not None and rig.load is not None:
             actuator.load = rig.load(wrong * float(masses[math.floor(t / clock.step + 1e-6)]))
+            actuator.mechanics.carry(actuator.load)
 
     return march(actuator, [(end, begin) for end in ends], clock.times, RTOL, min(clock.step, 0.2) / 2)
 
