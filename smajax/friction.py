@@ -30,10 +30,10 @@ class Rubbing(NamedTuple):
 
 
 def rubbing(system: System, before: Motion, velocity: Scalar, inputs: Inputs) -> list[Rubbing]:
-    """All friction of a load on its way from `before` to a velocity, m/s (rad/s); empty where no effect has any.
+    """All friction of a load on its way from `before`; empty where no effect has any.
 
-    At the larger of the two speeds: with friction that falls with the speed a load that slides may at the end of a long
-    step as well stick, and which of both the equations say would hang on where the solution was looked for.
+    `velocity`: what a stage foretells of its end before it is solved, m/s (rad/s). At that or at the speed before, if that
+    is larger: friction that falls with the speed it is solved for has several answers, or none that Newton's method finds.
     """
     load = system.load
     assert isinstance(load, AbstractMovingLoad)

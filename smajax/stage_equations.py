@@ -60,7 +60,9 @@ def _free_position(system: System, stage: Stage, inputs: Inputs, z: Unknowns) ->
     velocity, acceleration = motion_rates(stage, z.position)
     inertia = load.inertia(inputs)
     before = stage.old.motion
-    friction = sum(one.limit * in_use(one, before, z.position) for one in rubbing(system, before, velocity, inputs))
+    friction = sum(
+        one.limit * in_use(one, before, z.position) for one in rubbing(system, before, stage.velocity, inputs)
+    )
     pull = load.lever() * cross_section(system.wire) * z.stress
     resisting = load_resistance(system, stage.time, z.position, velocity, inputs) + friction
     return z.position - (inertia * acceleration + resisting - pull) * stage.step**2 / inertia

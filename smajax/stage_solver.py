@@ -149,7 +149,7 @@ def solve(system: System, stage: Stage, inputs: Inputs) -> Solution:
     xi = old.martensite_fraction
     open_at_start = open_branches(law, effects, old)
     before = stage.old.motion
-    slips = rubbing(system, before, before.velocity, inputs)
+    slips = rubbing(system, before, stage.velocity, inputs)
     tolerance = max(stage.enough, ROUNDINGS * float(jnp.finfo(xi.dtype).eps))
 
     def iterate(at: _Iterate, number: int | None) -> _Iterate:

@@ -157,7 +157,7 @@ def _stage(system: System, stage: Stage, inputs: Inputs) -> tuple[State, Scalar,
         stored_heat(system.wire, system.effects, wire.temperature, wire.martensite_fraction) - stage.heat
     ) / stage.step
     before = stage.old.motion
-    rubs = rubbing(system, before, motion_rates(stage, position)[0], inputs)
+    rubs = rubbing(system, before, stage.velocity, inputs)
     friction = {one.name: in_use(one, before, position) for one in rubs}
     new = State(stage.time, wire, Motion(position, velocity, friction), stage.old.reading, stage.old.sensor)
     return new, heating, velocity, acceleration
