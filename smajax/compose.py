@@ -48,6 +48,12 @@ def _value(before: System, system: System, name: str, own: str, value: str | flo
         return float(value)
     ratio = ratio_of(name, value, plain=unit == "-" and name not in MISMATCHES)
     if ratio is not None:
+        if unit == "degC" and own not in MISMATCHES.values():
+            # A share of what 0 degC makes small or large; of the air it is what sweeps vary.
+            raise ValueError(
+                f"{name}={value.strip()} is a share of degrees Celsius, which says little: expected the temperature, such as "
+                f"'{parameter_values(before).get(own, 0.0):g} degC'."
+            )
         return ratio * _changed(before, own, f"{name}={value.strip()}", unit)
     try:
         return float(value)

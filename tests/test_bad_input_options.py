@@ -93,6 +93,10 @@ SIMULATE = {
         ["--controller", "pid", "--set-point", "4deg:5s", "--set", "damping=0", "--mismatch", "damping=+20%"],
         "damping=+20% is a change of what is there, which is 0, as any share of it: give a value in N m s/rad.",
     ),
+    "a share of a temperature": (
+        [*WIRE, "--step", "5V:1s", "--set", "austenite_start=+10%"],
+        "austenite_start=+10% is a share of degrees Celsius, which says little: expected the temperature, such as '",
+    ),
     "a change below the bounds": ([*WIRE, "--step", "5V:1s", "--set", "damping=-150%"], "`damping` = -"),
     "a decimal comma in a change": (
         [*WIRE, "--step", "5V:1s", "--set", "damping=+2,5%"],
