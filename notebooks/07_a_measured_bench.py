@@ -96,7 +96,7 @@ for panel, name in zip(axes, ("Step02", "Step03_PR"), strict=True):
 axes[0].legend()
 
 # %% [markdown]
-# The conclusion, no more than the numbers allow: expansion of each phase is missing from the base model; a transformation in two steps, with
-# long tails, helps, and may in part stand in for something that the library does not hold; and the run of another day is off by
-# five times the error of the fit runs, which no effect of the wire explains.
+# The conclusion, no more than the numbers allow: expansion of each phase is missing from the base model; a transformation in two steps with
+# long tails, a supply that tires and a draught help, and may in part stand in for something that the library does not hold (a draught that ends at
+# its bounds in every run is hardly one); and the run of another day is off by seven times the error of the fit runs, which no effect of the wire explains.
 print(*report["unexplained"], sep="\n")

@@ -78,7 +78,8 @@ def _normal_equations(
         value = np.concatenate([residual.ravel(), problem.priors.rows(points[k]), lane.tie * (place - lane.place)])
         known = problem.priors.slopes(points[k])[:, lane.slots] * (lane.high - lane.low)
         rows = np.concatenate([jacobian.reshape(len(lane.slots), residual.size), known.T, np.diag(lane.tie)], axis=1)
-        found.append((float(value @ value), rows @ value, rows @ rows.T))
+        with np.errstate(over="ignore", invalid="ignore"):  # a step to where a load jumps: it will not be taken
+            found.append((float(value @ value), rows @ value, rows @ rows.T))
     return found
 
 
@@ -98,7 +99,9 @@ def _step(walk: _Walk) -> np.ndarray:
         return free
     # Without a point between them a bound is no choice.
     wide = np.where(high > low, high, low + STILL)
-    return np.clip(lsq_linear(factor.T, -np.linalg.solve(factor, walk.slope), (low, wide), method="bvls").x, low, high)
+    with np.errstate(divide="ignore", invalid="ignore"):  # scipy's way along a bound may be of no length
+        held = lsq_linear(factor.T, -np.linalg.solve(factor, walk.slope), (low, wide), method="bvls").x
+    return np.clip(held, low, high) if np.isfinite(held).all() else np.zeros_like(walk.place)
 
 
 def _judged(
