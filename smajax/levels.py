@@ -65,9 +65,14 @@ def levels(text: str, unit: str, bare: str = "") -> Given:
     for part in parts:
         level, colon, length = part.rpartition(":")
         if not colon:
-            raise UnitError(f"got {part.strip()!r}, expected LEVEL:TIME, such as '6V:5s'")
-        values.append(parse_quantity(level, unit, bare=bare))
-        lengths.append(parse_quantity(length, "s", bare="s" if bare else ""))
+            within = "" if part.strip() else f" in {text!r}, nothing between two commas"
+            raise UnitError(f"got {part.strip()!r}{within}, expected LEVEL:TIME, such as '6V:5s'")
+        try:
+            values.append(parse_quantity(level, unit, bare=bare))
+            lengths.append(parse_quantity(length, "s", bare="s" if bare else ""))
+        except UnitError as error:
+            minutes = "; minutes are 'min'" if length.strip().endswith("m") else ""
+            raise UnitError(f"{part.strip()!r}: {error}{minutes}") from None
     if min(lengths) <= 0.0:
         raise UnitError(f"got {text!r}, expected times above zero")
     ends = np.cumsum(lengths)

@@ -32,6 +32,7 @@ from smajax.reference import resting
 from smajax.simulate import DEFAULT_STEP
 from smajax.sweep_run import between_in_words, check_interface, check_set_points, interface_of
 from smajax.system import System
+from smajax.words import and_listed
 
 MOST_RESTS = 50  # set points; more are a ramp or a sine of a file
 
@@ -125,11 +126,13 @@ def run_open(asked: Asked) -> Ran:
     for name in asked.inputs:
         if name not in required | optional:
             raise ValueError(f"no input {name!r}{instead(name, sorted(required | optional), 'this model takes')}")
-    for name in sorted(required - asked.inputs.keys()):
+    missing = sorted(required - asked.inputs.keys())
+    if missing:
         alone = "--step LEVEL:TIME,LEVEL:TIME or " if len(required) == 1 else ""
-        example = f"{name}=6{_unit(name)}" if name == "voltage" else f"{name}=LEVEL"
+        asks = [f"--input {name}={'6V' if name == 'voltage' else 'LEVEL'}:10s" for name in missing]
+        named = and_listed([repr(name) for name in missing])
         raise ValueError(
-            f"the model needs the input {name!r}: give {alone}--input {example}:10s (a file: {name}=log.csv:COLUMN)"
+            f"the model needs the input{'s' * (len(missing) > 1)} {named}: give {alone}{' '.join(asks)} (a file: {missing[0]}=log.csv:COLUMN)"
         )
     several = {name: given(text, _unit(name), asked.time, bare=_unit(name)) for name, text in asked.inputs.items()}
     clock = clock_of(list(several.values()), asked.seconds, asked.dt)

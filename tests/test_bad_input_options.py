@@ -19,6 +19,13 @@ SIMULATE = {
         "No load preset `weight`; did you mean 'dead_weight'? There are: arm",
     ),
     "no time": ([*WIRE, "--step", "5V"], "nothing says how long the run is: give levels with times (6V:5s,0V:10s)"),
+    "minutes as metres": ([*WIRE, "--step", "5V:8m"], "'5V:8m': got unit 'm'"),
+    "what minutes are": ([*WIRE, "--step", "5V:8m"], "minutes are 'min'"),
+    "a level left out": ([*WIRE, "--step", "8V:2s,,5V:1s"], "got '' in '8V:2s,,5V:1s', nothing between two commas"),
+    "a coupon without inputs": (
+        ["flexinol_isobaric", "coupon", "none"],
+        "the model needs the inputs 'stress' and 'temperature': give --input stress=LEVEL:10s --input temperature=LEVEL:10s",
+    ),
     "levels without times": ([*WIRE, "--step", "6V,0V"], "got '6V', expected LEVEL:TIME, such as '6V:5s'"),
     "no input": (
         [*WIRE, "--seconds", "3"],

@@ -214,7 +214,7 @@ def simulate(
             unit, ratio = f" {row[3]}" * (row[3] != "-"), f", {row[4]}" * bool(row[4])
             typer.echo(f"  {row[0]:<28} believed {row[1]} -> true {row[2]}{unit}{ratio}")
         for row in merit_rows(ran):
-            typer.echo(f"  {row[0]:<28} {row[1]} {row[2]}")
+            typer.echo(f"  {row[0]:<36} {row[1]} {row[2]}")
         head, rows = rest_rows(ran)
         if rows:
             # The first few; the page has all.

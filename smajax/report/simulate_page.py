@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from smajax.figures.drawing import BLUE, GREY, RED, UPRIGHT, named, panels
 from smajax.fit.progress import Progress, quiet
 from smajax.load.base import AbstractMovingLoad
-from smajax.merit import MERIT_UNITS, Rest
+from smajax.merit import MERIT_UNITS, STEADY, Rest
 from smajax.mismatch import in_words
 from smajax.parameters import parameter_values, parameters
 from smajax.report.animation import moving
@@ -138,9 +138,15 @@ def summary_rows(found: xr.Dataset) -> list[list[str]]:
 
 
 def merit_rows(ran: Ran) -> list[list[str]]:
-    """A row a figure of merit."""
+    """A row a figure of merit; of the steady ones over what they are means, for a short run may still be moving."""
+    steady = f" (last {STEADY:.0%} of the run)"
     return [
-        [label(name), _cell(name, value), display(MERIT_UNITS[name], name).unit] for name, value in ran.merit.items()
+        [
+            label(name) + steady * name.startswith("steady"),
+            _cell(name, value),
+            "" if np.isinf(value) else display(MERIT_UNITS[name], name).unit,
+        ]
+        for name, value in ran.merit.items()
     ]
 
 
