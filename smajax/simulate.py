@@ -90,18 +90,13 @@ def first_state(system: System, series: Mapping[str, Series], initial: State | N
 
 
 def simulate(
-    system: System,
-    inputs: Mapping[str, Series],
-    dt: Scalar | float = DEFAULT_STEP,
-    initial: State | None = None,
-    once: bool = False,
+    system: System, inputs: Mapping[str, Series], dt: Scalar | float = DEFAULT_STEP, initial: State | None = None
 ) -> Trajectory:
     """Simulate over the samples of `inputs`, each of shape (n,), SI, `dt` seconds apart.
 
     The result holds the states at t_0 ... t_{n-1}; input i is held from t_i to t_{i+1} (a coupon's inputs are values
     at t_i). `initial` defaults to rest with the first inputs. Raises ValueError for missing or ill-shaped inputs, and for a
-    parameter out of its bounds, unless its value is not known yet (`jit`, `vmap`, `grad`). `once`: it will be
-    differentiated once at most, which is quicker (`step`).
+    parameter out of its bounds, unless its value is not known yet (`jit`, `vmap`, `grad`).
     """
     check_inputs(system, inputs)
     check_scalars(system, dt, initial)
@@ -115,7 +110,7 @@ def simulate(
     held = {name: values[1:] if ahead else values[:-1] for name, values in series.items()}
 
     def body(state: State, now: dict[str, Scalar]) -> tuple[State, State]:
-        new = step(system, state, now, dt, once)
+        new = step(system, state, now, dt)
         return new, new
 
     _, states = lax.scan(body, state, held)

@@ -110,7 +110,7 @@ def shown_run(
 ) -> Float[Array, "output time"]:
     """What the sensors show of one run, with its own `values` of `names`."""
     here, initial = _started(system, names, values, inputs)
-    run = simulate(here, inputs, dt, initial, once=True)  # fits take first derivatives
+    run = simulate(here, inputs, dt, initial)
     return jnp.stack([shown_by(here, run, name) for name in outputs])
 
 
