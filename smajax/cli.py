@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import sys
+from collections.abc import Callable
 from typing import Annotated
 
 import typer
@@ -58,18 +59,22 @@ def _all(
     pass
 
 
-app.command("close-loop", cls=Command)(close_loop_command)
-app.command("identify", cls=Command)(identify_command)
-app.command(cls=Command)(effects)
-app.command(cls=Command)(presets)
-app.command(cls=Command)(demo)
-app.command(cls=Command)(figures)
-app.command(cls=Command)(tune)
-app.command(cls=Command)(sweep)
-app.command(cls=Command)(simulate)
-app.command(cls=Command)(doctor)
-app.command(cls=Command)(bench)
-app.command("new-experiment", cls=Command)(new_experiment)
+COMMANDS: dict[str, Callable[..., None]] = {
+    "close-loop": close_loop_command,
+    "identify": identify_command,
+    "effects": effects,
+    "presets": presets,
+    "demo": demo,
+    "figures": figures,
+    "tune": tune,
+    "sweep": sweep,
+    "simulate": simulate,
+    "doctor": doctor,
+    "bench": bench,
+    "new-experiment": new_experiment,
+}
+for _name, _function in COMMANDS.items():
+    app.command(_name, cls=Command)(_function)
 
 
 def _no_memory(error: Exception) -> bool:

@@ -9,13 +9,18 @@ from smajax.parameters import parameter
 from smajax.types import Scalar
 
 
+def presliding_parameter() -> Scalar:
+    """The field `bend` of every effect of friction: its presliding displacement."""
+    about = "delta: motion of the wire's end over which it builds up before the load slips"
+    field: Scalar = parameter("m", 1e-6, 1e-3, about)
+    return field
+
+
 class CoulombFriction(AbstractEffect):
     r"""$F_c\,\mathrm{sign}(\dot x)$ against the motion, built up over a small presliding displacement (Dahl 1968)."""
 
     limit: Scalar = parameter("N", 0.0, 20.0, "F_c: friction force while sliding (N m on an arm)")
-    bend: Scalar = parameter(
-        "m", 1e-6, 1e-3, "delta: motion of the wire's end over which it builds up before the load slips"
-    )
+    bend: Scalar = presliding_parameter()
 
     effect_name: ClassVar[str] = "coulomb_friction"
     title: ClassVar[str] = "Coulomb friction"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, ClassVar
 
 from smajax.effects.base import PRESLIDING, AbstractEffect
+from smajax.effects.coulomb_friction import presliding_parameter
 from smajax.parameters import parameter
 from smajax.types import Scalar
 
@@ -19,9 +20,7 @@ class PulleyFriction(AbstractEffect):
     """
 
     share: Scalar = parameter("-", 0.0, 1.0, "mu: friction while sliding over the load at rest")
-    bend: Scalar = parameter(
-        "m", 1e-6, 1e-3, "delta: motion of the wire's end over which it builds up before the load slips"
-    )
+    bend: Scalar = presliding_parameter()
 
     effect_name: ClassVar[str] = "pulley_friction"
     title: ClassVar[str] = "friction that grows with the load"

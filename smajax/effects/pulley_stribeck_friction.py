@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, ClassVar
 
 from smajax.effects.base import PRESLIDING, AbstractEffect
+from smajax.effects.coulomb_friction import presliding_parameter
 from smajax.effects.pulley_friction import PulleyFriction
 from smajax.effects.stribeck_friction import all_over, falling
 from smajax.parameters import parameter
@@ -24,9 +25,7 @@ class PulleyStribeckFriction(AbstractEffect):
     share: Scalar = parameter("-", 0.0, 1.0, "mu_s: friction at rest, to break away, over the load at rest")
     sliding: Scalar = parameter("-", 0.01, 1.0, "r: friction in motion over that at rest")
     speed: Scalar = parameter("m/s", 1e-5, 1.0, "v_s: speed of the wire's moving end about which the friction falls")
-    bend: Scalar = parameter(
-        "m", 1e-6, 1e-3, "delta: motion of the wire's end over which it builds up before the load slips"
-    )
+    bend: Scalar = presliding_parameter()
 
     effect_name: ClassVar[str] = "pulley_stribeck_friction"
     title: ClassVar[str] = "Stribeck friction that grows with the load"

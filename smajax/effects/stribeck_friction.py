@@ -8,6 +8,7 @@ from typing import ClassVar
 import jax.numpy as jnp
 
 from smajax.effects.base import PRESLIDING, AbstractEffect
+from smajax.effects.coulomb_friction import presliding_parameter
 from smajax.parameters import parameter
 from smajax.types import Scalar
 
@@ -41,9 +42,7 @@ class StribeckFriction(AbstractEffect):
     speed: Scalar = parameter(
         "m/s", 1e-5, 1.0, "v_s: speed of the wire's moving end about which it falls from F_s to F_c"
     )
-    bend: Scalar = parameter(
-        "m", 1e-6, 1e-3, "delta: motion of the wire's end over which it builds up before the load slips"
-    )
+    bend: Scalar = presliding_parameter()
 
     effect_name: ClassVar[str] = "stribeck_friction"
     title: ClassVar[str] = "Stribeck friction"
