@@ -80,6 +80,7 @@ def _job(experiment: Experiment) -> _Job:
     problem = problem_with((*declared, *names))
     full = problem.system
     bounds = {entry.name: (entry.low, entry.high) for entry in parameters(full).values()}
+    bounds |= {f"{name}.{own}": one for name in names for own, one in LIBRARY[name].spans(extent).items()}
     bounds |= {unknown.name: (unknown.low, unknown.high) for unknown in experiment.unknowns}
     return _Job(experiment, runs, problem, tuple(u.name for u in experiment.unknowns), bounds, names)
 

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from smajax.attribution.judging import NUDGE
+from smajax.effects.base import Extent
 from smajax.effects.library import LIBRARY
 from smajax.extended import extended
 from smajax.lanes.evaluate import evaluator
@@ -133,6 +134,20 @@ def test_an_experiment_file_can_say_its_coefficients(effect: str) -> None:
         low, high = entry.low, entry.high
         assert low <= LIBRARY[effect].starts[_short(name)] <= high
     assert {f"{effect}.{name}" for name in LIBRARY[effect].switches} <= set(table)
+
+
+@pytest.mark.parametrize("effect", sorted(name for name, one in LIBRARY.items() if one.spans(Extent(1.0, 1.0, 0.0))))
+def test_what_is_in_the_unit_of_the_reading_is_bounded_by_the_runs(effect: str) -> None:
+    """An arm turns by radians where a slider moves by millimetres: a bound in metres is none in radians."""
+    table = {_short(name): entry for name, entry in parameters(LIBRARY[effect].base()).items()}
+    arm, slider = LIBRARY[effect].spans(Extent(20.0, 2.0, 0.0)), LIBRARY[effect].spans(Extent(20.0, 2e-3, 0.0))
+    assert arm.keys() == slider.keys() <= table.keys()
+    for name, (low, high) in arm.items():
+        assert table[name].low <= low <= 0.0 < high <= table[name].high
+        assert np.array([low, high]) == pytest.approx(1e3 * np.array(slider[name]))
+    # Beyond a stroke a run, or a play of a whole stroke, a sensor shows nothing of the motion.
+    (most,) = (high for _, high in arm.values())
+    assert most == {"sensor_drift": 2.0 / 20.0, "sensor_offset": 2.0, "sensor_backlash": 1.0}[effect]
 
 
 def _short(name: str) -> str:

@@ -98,6 +98,18 @@ def test_a_refit_of_a_friction_that_sticks_begins_from_all_over_its_sizes_and_sp
     assert len(all_starts(np.zeros(4), NAMES, latent, BOUNDS)) == 1
 
 
+def test_a_refit_of_a_play_begins_beyond_what_its_score_says() -> None:
+    """The score is that of a play taken up at once; and in runs of a small stroke none begins out of their bounds."""
+    names, small = ("sensor_backlash.half_width",), {"sensor_backlash.half_width": (0.0, 5e-5)}
+    told = Score(("sensor_backlash",), 0.1, 9.0, 0.0, {names[0]: 0.01})
+    places = np.asarray(all_starts(np.zeros(1), names, told, {names[0]: (0.0, 1.0)}))[:, 0]
+    assert places[0] == LIBRARY["sensor_backlash"].starts["half_width"]
+    assert len(places) == PLACES + 1
+    assert 0.01 <= places[1:].min() < 0.012 < 0.12 < places.max() <= 0.16
+    silent = Score(("sensor_backlash",), 0.1, 9.0, 0.0, {names[0]: 0.0})
+    assert all_starts(np.zeros(1), names, silent, small) == [2.5e-5]
+
+
 def test_whiteness_and_memory_of_noise() -> None:
     rng = np.random.default_rng(5)
     white = [rng.normal(size=500) for _ in range(3)]

@@ -43,7 +43,9 @@ def start_values(
             size = score.place.get(full, start)
             asked = float(np.copysign(size, score.coefficients.get(full, 0.0) or size))
             low, high = bounds[full]
-            values[names.index(full)] = asked if full in switches(effect) and low < asked < high else size
+            if full in switches(effect):
+                size = asked if low < asked < high else min(size, 0.5 * high)  # these runs may be of a small stroke
+            values[names.index(full)] = size
     return values
 
 

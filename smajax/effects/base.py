@@ -67,6 +67,11 @@ class AbstractEffect(eqx.Module):
         return ()
 
     @classmethod
+    def spans(cls, extent: Extent) -> dict[str, tuple[float, float]]:
+        """Bounds of coefficients in the unit of the reading, by the runs: what is wide in metres is narrow in radians."""
+        return {}
+
+    @classmethod
     def begins(cls, told: Mapping[str, float]) -> dict[str, tuple[float, float]]:
         """Ranges of coefficients, positive, from all over which a refit begins where the misfit has many valleys.
 

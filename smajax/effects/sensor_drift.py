@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from smajax.effects.base import AbstractEffect
+from smajax.effects.base import AbstractEffect, Extent
 from smajax.parameters import parameter
 from smajax.types import Scalar
 
@@ -12,7 +12,7 @@ from smajax.types import Scalar
 class SensorDrift(AbstractEffect):
     r"""$y = x + a t$ from the start of each run."""
 
-    rate: Scalar = parameter("m/s", -1e-2, 1e-2, "a: drift of the reading (rad/s on an arm, 1/s for a strain)")
+    rate: Scalar = parameter("m/s", -10.0, 10.0, "a: drift of the reading (rad/s on an arm, 1/s for a strain)")
 
     effect_name: ClassVar[str] = "sensor_drift"
     title: ClassVar[str] = "sensor drift"
@@ -26,6 +26,11 @@ class SensorDrift(AbstractEffect):
     @classmethod
     def base(cls) -> SensorDrift:
         return cls(rate=0.0)
+
+    @classmethod
+    def spans(cls, extent: Extent) -> dict[str, tuple[float, float]]:
+        most = extent.stroke / extent.seconds
+        return {"rate": (-most, most)}
 
     def sensed(self, reading: Scalar, time: Scalar, last: Scalar) -> Scalar:
         return reading + self.rate * time

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from smajax.effects.base import AbstractEffect
+from smajax.effects.base import AbstractEffect, Extent
 from smajax.parameters import parameter
 from smajax.types import Scalar
 
@@ -12,7 +12,7 @@ from smajax.types import Scalar
 class SensorOffset(AbstractEffect):
     r"""$y = x + a$; nothing new where the experiment lets every run have its own zero."""
 
-    shift: Scalar = parameter("m", -0.1, 0.1, "a: zero of the sensor (rad on an arm, - for a strain)")
+    shift: Scalar = parameter("m", -10.0, 10.0, "a: zero of the sensor (rad on an arm, - for a strain)")
 
     effect_name: ClassVar[str] = "sensor_offset"
     title: ClassVar[str] = "sensor offset"
@@ -25,6 +25,10 @@ class SensorOffset(AbstractEffect):
     @classmethod
     def base(cls) -> SensorOffset:
         return cls(shift=0.0)
+
+    @classmethod
+    def spans(cls, extent: Extent) -> dict[str, tuple[float, float]]:
+        return {"shift": (-extent.stroke, extent.stroke)}
 
     def sensed(self, reading: Scalar, time: Scalar, last: Scalar) -> Scalar:
         return reading + self.shift

@@ -1,9 +1,9 @@
 """Close the loop on the cases, one after the other, and hold what it says against what is true.
 
-    python -m studies.attribution_benchmark.run --out OUT [--only TEXT] [--strength 10] [--each 3] [--part 1/4]
+    python -m studies.attribution_benchmark.run --out OUT [--only TEXT] [--strength 10] [--nulls 5] [--part 1/4]
 
-Resumable: a case that has been judged is not done again. `--each K` takes K cases of every effect and rig at most, and
-`--part i/n` every n-th case, for several machines. Cases of one rig follow each other: they share their programs.
+Resumable: a case that has been judged is not done again. `--nulls K` takes K nulls of every rig at most, and `--part i/n`
+every n-th case, for several machines. Cases of one rig follow each other: they share their programs.
 """
 
 from __future__ import annotations
