@@ -294,7 +294,7 @@ def test_gaps_and_repeated_samples_are_told(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("\n".join(lines[:100] + lines[150:]) + "\n")
     assert _warned(experiment, "'position' has a gap of 2.55 s at 4.9 s (usual interval 0.05 s); it is bridged")
     (tmp_path / "a.csv").write_text("\n".join([*lines[:50], lines[49], *lines[50:]]) + "\n")
-    assert _warned(experiment, "1 samples of 'position' at a time that another one has were taken out")
+    assert _warned(experiment, "1 sample of 'voltage' and 'position' at a time that another one has was taken out")
 
 
 def test_an_effect_that_the_load_cannot_show_is_told(tmp_path: Path) -> None:
