@@ -217,6 +217,18 @@ def test_the_page_and_the_record_say_the_same(found: Identified, tmp_path: Path)
     np.testing.assert_allclose(table.column("stress [Pa]").reshape(3, -1)[:, 0], [90e6, 150e6, 120e6])
 
 
+def test_the_page_has_a_column_of_profiles_where_one_was_drawn(found: Identified) -> None:
+    def first_table(one: Identified) -> list[list[str]]:
+        rows = re.search(r"<table.*?</table>", page(one), re.DOTALL)
+        assert rows is not None
+        return [re.findall(r"<t[hd][^>]*>(.*?)</t[hd]>", row) for row in rows[0].split("<tr>")[1:]]
+
+    drawn, bare = first_table(found), first_table(dataclasses.replace(found, profiles=()))
+    place = drawn[0].index("95 % (profile)")
+    assert any(row[place] for row in drawn[1:])
+    assert bare == [row[:place] + row[place + 1 :] for row in drawn]
+
+
 def test_the_page_says_what_to_do_about_parameters_that_move_together(found: Identified) -> None:
     weak = ("a and b move together: a by +3 % and b by -3 %, all at once, is one standard error.",)
     advice = "measure one by itself and give it under <code>[model.parameters]</code>"

@@ -53,7 +53,8 @@ def page(found: Identified) -> str:
     """The whole page."""
     say = html.escape
     run_head, runs = _run_rows(found)
-    head = ["parameter", "estimate ± standard error", "unit", "95 % (profile)", "bounds", "start", "remark"]
+    interval = ["95 % (profile)"] if found.profiles else []
+    head = ["parameter", "estimate ± standard error", "unit", *interval, "bounds", "start", "remark"]
     rows = estimate_rows(found)
     if any(one.prior for one in found.estimates):
         head.insert(-1, "known before")
