@@ -199,7 +199,7 @@ def test_the_page_and_the_record_say_the_same(found: Identified, tmp_path: Path)
     text = written.read_text(encoding="utf-8")
     assert text == page(found)
     assert "Coupon &lt;of&gt; test" in text
-    assert text.count('src="data:image/png') == 3 + 1 + 1 + 1  # runs, correlation, profiles, suggestions
+    assert text.count('src="data:image/png') == 3 + 1 + 1  # runs, profiles, suggestions
     assert not re.search(r">\s*nan\b", text.lower())
     assert "The residual is as large as the noise" in " ".join(conclusions(dataclasses.replace(found, ratio=1.004)))
     assert "The residual is 1.4 times the noise" in " ".join(conclusions(dataclasses.replace(found, ratio=1.4)))
@@ -242,6 +242,26 @@ def test_the_page_says_what_to_do_about_parameters_that_move_together(found: Ide
 def test_the_page_in_a_browser(found: Identified, browser: Any, tmp_path: Path) -> None:
     runs = (dataclasses.replace(found.runs[0], name=HOSTILE), *found.runs[1:])
     assert faults(browser, write_identified(dataclasses.replace(found, title=HOSTILE, runs=runs), tmp_path)) == []
+
+
+def test_correlations_of_many_parameters_are_text_that_a_telephone_moves_sideways(
+    found: Identified, browser: Any, tmp_path: Path
+) -> None:
+    names = tuple(f"parameter_{k}" for k in range(12))
+    correlation = np.asarray(np.corrcoef(np.random.default_rng(3).normal(size=(12, 20))))
+    many = dataclasses.replace(found, correlated=names, correlation=correlation)
+    shown = browser.new_page(viewport={"width": 400, "height": 900})
+    shown.goto(write_identified(many, tmp_path).as_uri())
+    box = next(one for one in shown.query_selector_all(".scroll") if "parameter_0" in one.inner_text())
+    rows = [[cell.inner_text() for cell in row.query_selector_all("td")] for row in box.query_selector_all("tbody tr")]
+    assert [row[0].split()[1] for row in rows] == list(names)
+    np.testing.assert_allclose(np.array([row[1:] for row in rows], float), correlation, atol=0.0051)
+    assert box.evaluate("box => box.scrollWidth > box.clientWidth && box.clientWidth <= 400")
+    assert all(
+        cell.evaluate("cell => parseFloat(getComputedStyle(cell).fontSize) >= 12")
+        for cell in box.query_selector_all("td")
+    )
+    assert "Correlations of the estimates" not in page(dataclasses.replace(many, correlated=names[:1]))
 
 
 def test_an_effect_is_part_of_the_model_when_a_parameter_of_it_is_named(tmp_path: Path) -> None:
