@@ -54,7 +54,10 @@ REFUSED = {
         ("[unknown]", PARAMETERS.format("wire_diameter = 2020-01-01")),
         "expected a table of name = 'number unit'",
     ),
-    "a unit of another kind": (("[unknown]", PARAMETERS.format('wire_diameter = "0.1 s"')), "got unit 's' ([time])"),
+    "a unit of another kind": (
+        ("[unknown]", PARAMETERS.format('wire_diameter = "0.1 s"')),
+        "got unit 's', expected one like 'm', to which",
+    ),
     "no unit": (
         ("[unknown]", PARAMETERS.format("wire_diameter = 0.1")),
         "got 0.1 without a unit, expected one like 'm'",

@@ -31,7 +31,7 @@ SIMULATE = {
         [*WIRE, "--seconds", "3"],
         "the model needs the input 'voltage': give --step LEVEL:TIME,LEVEL:TIME or --input voltage=6V:10s",
     ),
-    "a length for a voltage": ([*WIRE, "--step", "5mm:1s"], "got unit 'mm' ([length]), expected one like 'V'"),
+    "a length for a voltage": ([*WIRE, "--step", "5mm:1s"], "got unit 'mm', expected one like 'V', to which"),
     "no step": ([*WIRE, "--step", "5V:1s", "--dt", "0"], "'--dt': more than 0 s, not `0`; give one such as 5ms"),
     "a step back": (
         [*WIRE, "--step", "5V:1s", "--dt", "-5ms"],
