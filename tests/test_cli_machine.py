@@ -49,6 +49,20 @@ def test_the_doctor_finds_what_is_missing() -> None:
     assert "JAX_COMPILATION_CACHE_DIR" in told
 
 
+def test_the_doctor_asks_nobody_for_the_tools_of_developers(monkeypatch: pytest.MonkeyPatch) -> None:
+    lines = [
+        "jax>=0.7",
+        "h5py>=3.11; extra == 'dev'",
+        "h5py>=3.11; extra == 'formats'",
+        "jax[cuda12]>=0.7; extra == 'cuda12'",
+    ]
+    lines += ["mkdocs<2; extra == 'docs'", 'no-such-tool>=9.0; python_version > "3" and extra == "dev"']
+    monkeypatch.setattr("importlib.metadata.requires", lambda package: lines)
+    found = doctor.examined(lanes=False)
+    assert set(found["packages"]) == {"jax"}
+    assert set(found["packages of extras"]) == {"h5py"}
+
+
 def test_the_doctor_speaks_of_float64_in_the_commands_and_in_a_program() -> None:
     """Without what it says to do, a program of one's own has float32; with it, float64."""
     told = run.invoke(app, ["doctor"]).output
