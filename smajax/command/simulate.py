@@ -128,7 +128,7 @@ def simulate(
 
     What may be wrong of a plant: inertia (inertia_ratio), damping, convection (convection_coefficient), ambient
     (ambient_temperature, in degC), payload (payload_mass), supply (amplifier_gain). +20% is that much more than the
-    controller believes, -50% half of it, and 20% of a variation both ways.
+    controller believes (of 20 degC: 24 degC), -50% half of it, and 20% of a variation both ways.
 
     Example:  smajax simulate flexinol_table_3_2 dead_weight flexinol_voltage --step 5V:8s,0V:8s --set convection_coefficient=80
 
