@@ -117,7 +117,7 @@ def test_what_cannot_be_is_refused(tmp_path: Path, name: str, command: str) -> N
     change, words = REFUSED[name]
     experiment = bench(tmp_path / "bench", change)
     said = refused(command, experiment, "--out", tmp_path / "out")
-    assert said.startswith(f"error: {experiment}: "), said
+    assert said.startswith(f"Error: {experiment}: "), said
     assert words in said
     assert not (tmp_path / "out").exists()
 
