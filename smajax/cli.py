@@ -96,7 +96,7 @@ def main() -> None:
         if _no_memory(error):
             # Written plainly: what colours a message would have to be loaded, and there is no memory left for it.
             sys.stderr.write(
-                f"error: not enough memory ({error or 'none left'}); take a longer step or shorter runs, or allow more. "
+                f"Error: not enough memory ({error or 'none left'}); take a longer step or shorter runs, or allow more. "
                 "What was finished is kept.\n"
             )
             raise SystemExit(2) from None
@@ -114,5 +114,5 @@ def main() -> None:
             )
         elif not isinstance(error, (ExperimentError, FolderTaken, MeasuredDataError, OSError, PluginError, UnitError)):
             raise
-        console().print(f"error: {error}", style="red", markup=False, highlight=False, soft_wrap=True)
+        console().print(f"Error: {error}", style="red", markup=False, highlight=False, soft_wrap=True)
         raise SystemExit(2) from None

@@ -13,15 +13,17 @@ from smajax.plugins import PluginError, versions
 from smajax.runtime import TRIED, kept_programs
 
 PACKAGE = "smajax"
+WORK = ("dev", "docs")  # extras for work on smajax itself: no command uses them
 
 
 def _requirements() -> dict[str, bool]:
-    """Every package that smajax names -> whether it is of an extra."""
+    """Every package that a command uses -> whether it is of an extra."""
     found: dict[str, bool] = {}
     for line in metadata.requires(PACKAGE) or ():
         name = re.match(r"[\w.-]+", line)
-        if name is not None:
-            found[name.group()] = found.get(name.group(), True) and "extra ==" in line
+        extra = re.search(r"extra == ['\"]([\w.-]+)", line)
+        if name is not None and (extra is None or extra[1] not in WORK):
+            found[name.group()] = found.get(name.group(), True) and extra is not None
     return found
 
 

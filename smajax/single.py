@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -37,6 +38,23 @@ from smajax.words import and_listed
 MOST_RESTS = 50  # set points; more are a ramp or a sine of a file
 
 
+class AskedError(ValueError):
+    """A part of what was asked cannot be used. part: the field of `Asked` or `AskedLoop`; of an input `inputs.` and its name."""
+
+    def __init__(self, part: str, why: str) -> None:
+        super().__init__(why)
+        self.part = part
+
+
+@contextmanager
+def _part(name: str) -> Iterator[None]:
+    """What is wrong in here is wrong of this part."""
+    try:
+        yield
+    except ValueError as error:
+        raise AskedError(name, str(error)) from error
+
+
 @dataclass(frozen=True)
 class Asked:
     """A run: presets by name, values that differ, inputs as text (`levels.given`), and the step, s."""
@@ -53,8 +71,10 @@ class Asked:
     tolerance: float | None = None
 
     def system(self) -> System:
-        """The model."""
-        return compose(self.wire, self.load, self.drive, law=self.law, values=self.values)
+        """The model. Raises KeyError and ValueError as `compose`, AskedError of `values`."""
+        bare = compose(self.wire, self.load, self.drive, law=self.law)
+        with _part("values"):
+            return with_values(bare, self.values)
 
 
 @dataclass(frozen=True)
@@ -120,12 +140,14 @@ def _notes(found: xr.Dataset) -> list[str]:
 
 
 def run_open(asked: Asked) -> Ran:
-    """The run. Raises KeyError, ValueError, UnitError, MeasuredDataError for what cannot be used."""
+    """The run. Raises KeyError and ValueError for what cannot be used, AskedError where the part is known that it is in."""
     system = asked.system()
     required, optional = channels(system)
     for name in asked.inputs:
         if name not in required | optional:
-            raise ValueError(f"no input {name!r}{instead(name, sorted(required | optional), 'this model takes')}")
+            raise AskedError(
+                f"inputs.{name}", f"no input {name!r}{instead(name, sorted(required | optional), 'this model takes')}"
+            )
     missing = sorted(required - asked.inputs.keys())
     if missing:
         alone = "--step LEVEL:TIME,LEVEL:TIME or " if len(required) == 1 else ""
@@ -134,7 +156,10 @@ def run_open(asked: Asked) -> Ran:
         raise ValueError(
             f"the model needs the input{'s' * (len(missing) > 1)} {named}: give {alone}{' '.join(asks)} (a file: {missing[0]}=log.csv:COLUMN)"
         )
-    several = {name: given(text, _unit(name), asked.time, bare=_unit(name)) for name, text in asked.inputs.items()}
+    several = {}
+    for name, text in asked.inputs.items():
+        with _part(f"inputs.{name}"):
+            several[name] = given(text, _unit(name), asked.time, bare=_unit(name))
     clock = clock_of(list(several.values()), asked.seconds, asked.dt)
     measured = system.load.inputs_required if isinstance(system.load, AbstractCoupon) else frozenset()
     series: Any = {
@@ -175,10 +200,12 @@ def run_closed(asked: Asked, loop: AskedLoop) -> Ran:
         raise ValueError(f"no controller {gains.controller!r}{instead(gains.controller, CONTROLLERS, 'there are')}")
     preset = CONTROLLERS[gains.controller]
     believed = preset.plant(believed)
-    plant = with_values(believed, loop.mismatch)  # of what this controller believes
+    with _part("mismatch"):
+        plant = with_values(believed, loop.mismatch)  # of what this controller believes
     check_interface(loop.estimator, loop.noise, loop.period, asked.dt)
     between = interface_of(believed, loop.estimator, loop.noise, loop.period, asked.dt, loop.delay)
-    wanted = given(loop.set_points, "rad", asked.time, bare="deg")
+    with _part("set_points"):
+        wanted = given(loop.set_points, "rad", asked.time, bare="deg")
     clock = clock_of([wanted], asked.seconds, asked.dt)
     periods = (clock.size - 1) // between.every
     if periods < 1:

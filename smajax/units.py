@@ -138,8 +138,8 @@ def _factor(got: str, expected: str, difference: bool) -> tuple[Any, Any]:
     source, target = _unit(got, expected), _unit(expected)
     if source.dimensionality != target.dimensionality:
         raise UnitError(
-            f"got unit {got!r} ({source.dimensionality}), expected one like {expected!r} ({target.dimensionality})"
-            f"{_hint(got)}; change the unit or the quantity"
+            f"got unit {got!r}{_hint(got)}, expected one like {expected!r}, to which it cannot be converted; change the unit or "
+            "the quantity"
         )
     if _is_temperature(target):
         if difference or not _is_absolute(target):

@@ -54,7 +54,10 @@ REFUSED = {
         ("[unknown]", PARAMETERS.format("wire_diameter = 2020-01-01")),
         "expected a table of name = 'number unit'",
     ),
-    "a unit of another kind": (("[unknown]", PARAMETERS.format('wire_diameter = "0.1 s"')), "got unit 's' ([time])"),
+    "a unit of another kind": (
+        ("[unknown]", PARAMETERS.format('wire_diameter = "0.1 s"')),
+        "got unit 's', expected one like 'm', to which",
+    ),
     "no unit": (
         ("[unknown]", PARAMETERS.format("wire_diameter = 0.1")),
         "got 0.1 without a unit, expected one like 'm'",
@@ -114,7 +117,7 @@ def test_what_cannot_be_is_refused(tmp_path: Path, name: str, command: str) -> N
     change, words = REFUSED[name]
     experiment = bench(tmp_path / "bench", change)
     said = refused(command, experiment, "--out", tmp_path / "out")
-    assert said.startswith(f"error: {experiment}: "), said
+    assert said.startswith(f"Error: {experiment}: "), said
     assert words in said
     assert not (tmp_path / "out").exists()
 
@@ -294,7 +297,7 @@ def test_gaps_and_repeated_samples_are_told(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("\n".join(lines[:100] + lines[150:]) + "\n")
     assert _warned(experiment, "'position' has a gap of 2.55 s at 4.9 s (usual interval 0.05 s); it is bridged")
     (tmp_path / "a.csv").write_text("\n".join([*lines[:50], lines[49], *lines[50:]]) + "\n")
-    assert _warned(experiment, "1 samples of 'position' at a time that another one has were taken out")
+    assert _warned(experiment, "1 sample of 'voltage' and 'position' at a time that another one has was taken out")
 
 
 def test_an_effect_that_the_load_cannot_show_is_told(tmp_path: Path) -> None:

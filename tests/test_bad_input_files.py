@@ -43,7 +43,7 @@ def test_a_line_that_is_no_sample_is_named(tmp_path: Path, name: str) -> None:
     lines[number] = text
     (experiment.parent / "a.csv").write_text("\n".join(lines) + "\n")
     said = refused("close-loop", experiment, "--out", tmp_path / "out")
-    assert said.startswith(f"error: {experiment}: runs.A.file: {experiment.parent / 'a.csv'}: "), said
+    assert said.startswith(f"Error: {experiment}: runs.A.file: {experiment.parent / 'a.csv'}: "), said
     assert words in said
     assert not (tmp_path / "out").exists()
 

@@ -19,7 +19,7 @@ SIMULATE = {
         "No load preset `weight`; did you mean 'dead_weight'? There are: arm",
     ),
     "no time": ([*WIRE, "--step", "5V"], "nothing says how long the run is: give levels with times (6V:5s,0V:10s)"),
-    "minutes as metres": ([*WIRE, "--step", "5V:8m"], "'5V:8m': got unit 'm'"),
+    "minutes as metres": ([*WIRE, "--step", "5V:8m"], "Invalid value for --step: '5V:8m': got unit 'm'"),
     "what minutes are": ([*WIRE, "--step", "5V:8m"], "minutes are 'min'"),
     "a level left out": ([*WIRE, "--step", "8V:2s,,5V:1s"], "got '' in '8V:2s,,5V:1s', nothing between two commas"),
     "a coupon without inputs": (
@@ -31,7 +31,7 @@ SIMULATE = {
         [*WIRE, "--seconds", "3"],
         "the model needs the input 'voltage': give --step LEVEL:TIME,LEVEL:TIME or --input voltage=6V:10s",
     ),
-    "a length for a voltage": ([*WIRE, "--step", "5mm:1s"], "got unit 'mm' ([length]), expected one like 'V'"),
+    "a length for a voltage": ([*WIRE, "--step", "5mm:1s"], "got unit 'mm', expected one like 'V', to which"),
     "no step": ([*WIRE, "--step", "5V:1s", "--dt", "0"], "'--dt': more than 0 s, not `0`; give one such as 5ms"),
     "a step back": (
         [*WIRE, "--step", "5V:1s", "--dt", "-5ms"],
@@ -62,11 +62,11 @@ SIMULATE = {
     "too long": ([*WIRE, "--step", "5V:1e300s"], "are over 20,000,000 samples"),
     "a misspelt parameter": (
         [*WIRE, "--step", "5V:1s", "--set", "wire_lenght=4"],
-        "no parameter 'wire_lenght'; did you mean 'wire_length'",
+        "Invalid value for --set: no parameter 'wire_lenght'; did you mean 'wire_length'",
     ),
     "a negative diameter": (
         [*WIRE, "--step", "5V:1s", "--set", "wire_diameter=-1mm"],
-        "`wire_diameter` = -0.001 m (from 1e-05",
+        "Invalid value for --set: outside of the bounds: `wire_diameter` = -0.001 m (from 1e-05",
     ),
     "nan": ([*WIRE, "--step", "5V:1s", "--set", "wire_diameter=nan"], "`wire_diameter` = nan m (from"),
     "A_s above A_f": (
@@ -79,14 +79,29 @@ SIMULATE = {
         [*WIRE, "--input", "voltage={log}:U"],
         "does not say its unit; write it behind: a.csv:U:V",
     ),
-    "an input there is none of": ([*WIRE, "--input", "voltag=5V:1s"], "no input 'voltag'; did you mean 'voltage'?"),
+    "an input there is none of": (
+        [*WIRE, "--input", "voltag=5V:1s"],
+        "Invalid value for --input voltag: no input 'voltag'; did you mean 'voltage'?",
+    ),
+    "a second input in another unit": (
+        [*WIRE, "--step", "5V:1s", "--input", "mass=3K"],
+        "Invalid value for --input mass: got unit 'K', expected one like 'kg'",
+    ),
+    "a time column there is none of": (
+        [*WIRE, "--input", "voltage={log}:U:V", "--time", "s"],
+        "Invalid value for --input voltage or --time: ",
+    ),
+    "a set point in another unit": (
+        ["--controller", "pid", "--set-point", "4N:5s"],
+        "Invalid value for --set-point: '4N:5s': got unit 'N'",
+    ),
     "a controller there is none of": (
         ["--controller", "pdi", "--set-point", "4deg:5s"],
         "no controller 'pdi'; did you mean 'pid'",
     ),
     "a size that does not say which way": (
         ["--controller", "pid", "--set-point", "4deg:5s", "--mismatch", "inertia=20%"],
-        "got inertia=20%, expected +20% or -20%, a change of what it is, or a value",
+        "Invalid value for --mismatch: got inertia=20%, expected +20% or -20%, a change of what it is, or a value",
     ),
     "a size that goes both ways": (
         ["--controller", "pid", "--set-point", "4deg:5s", "--mismatch", "damping=+-20%"],

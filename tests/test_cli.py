@@ -17,7 +17,9 @@ from typer.testing import CliRunner
 from smajax.cli import app, main
 from smajax.command import renamed
 from smajax.command.base import console, numbers, pairs, texts, understood
+from smajax.compose import compose, with_values
 from smajax.mismatch import MISMATCHES, variation_of
+from smajax.parameters import parameter_values
 from smajax.progress import VARIABLE, shown
 from smajax.tune.terms import TERMS
 
@@ -296,6 +298,9 @@ def test_what_may_be_wrong_has_the_same_words_in_every_command() -> None:
         assert f"{MAY_BE_WRONG}. +20%" in page
         found.add(re.split(r" Example:| Options:", page[page.index(MAY_BE_WRONG) :])[0])
     assert len(found) == 1, found
+    assert "more than the controller believes (of 20 degC: 24 degC)" in found.pop()
+    believed = compose("niti_table_3_1", "arm", "amplified_voltage", values={"ambient_temperature": "20 degC"})
+    assert parameter_values(with_values(believed, {"ambient": "+20%"}))["ambient_temperature"] == pytest.approx(24.0)
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 import tomllib
@@ -47,6 +48,20 @@ def test_the_doctor_finds_what_is_missing() -> None:
     assert "optax is not installed" in told
     assert "jax_enable_x64" in told
     assert "JAX_COMPILATION_CACHE_DIR" in told
+
+
+def test_the_doctor_asks_nobody_for_the_tools_of_developers(monkeypatch: pytest.MonkeyPatch) -> None:
+    lines = [
+        "jax>=0.7",
+        "h5py>=3.11; extra == 'dev'",
+        "h5py>=3.11; extra == 'formats'",
+        "jax[cuda12]>=0.7; extra == 'cuda12'",
+    ]
+    lines += ["mkdocs<2; extra == 'docs'", 'no-such-tool>=9.0; python_version > "3" and extra == "dev"']
+    monkeypatch.setattr("importlib.metadata.requires", lambda package: lines)
+    found = doctor.examined(lanes=False)
+    assert set(found["packages"]) == {"jax"}
+    assert set(found["packages of extras"]) == {"h5py"}
 
 
 def test_the_doctor_speaks_of_float64_in_the_commands_and_in_a_program() -> None:
@@ -115,6 +130,14 @@ def test_a_template_lists_what_a_bench_should_tell(tmp_path: Path, heading: str,
     after = parameter_values(base_model(load_experiment(tmp_path / "e.toml", CATALOGUE)))
     for name in model["parameters"]:
         assert after[name] == pytest.approx(before[name], rel=1e-3)
+
+
+def test_a_template_sends_nobody_to_a_file_that_is_not_installed(tmp_path: Path) -> None:
+    log = _bench_log(tmp_path / "log.csv", "Zeit/ms;U/V;Weg/mm", lambda k: str(100 * k))
+    text = begun([log], tmp_path / "e.toml").text
+    (page,) = re.findall("the page '(.*)'", text)
+    assert f"- {page}: studies/parameters.md" in (Path(__file__).parents[1] / "mkdocs.yml").read_text(encoding="utf-8")
+    assert not re.search(r"[\w/]+\.(md|html)\b", text)
 
 
 def test_the_other_load_can_be_asked_for_and_a_wrong_one_is_refused(tmp_path: Path) -> None:

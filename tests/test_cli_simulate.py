@@ -22,7 +22,7 @@ from smajax.levels import clock_of, given, levels
 from smajax.mismatch import MISMATCHES
 from smajax.parameters import parameter_values, set_parameters
 from smajax.presets import build
-from smajax.report.simulate_page import conclusions
+from smajax.report.simulate_page import as_csv, conclusions, summary_rows, write_run
 from smajax.single import Asked, AskedLoop, run_closed, run_open
 from smajax.sweep import mismatched
 from smajax.units import UnitError
@@ -313,6 +313,40 @@ def test_a_coupon_is_given_its_temperature_and_stress(tmp_path: Path) -> None:
     assert record["series"]["stress"] == [100e6] * 21
     assert record["series"]["martensite_fraction"][-1] == pytest.approx(0.0, abs=1e-6)
     assert record["series"]["reading"][0] - record["series"]["reading"][-1] == pytest.approx(0.04, abs=5e-3)
+
+
+@pytest.mark.parametrize(
+    ("load", "values", "beside"),
+    [
+        ("coupon", {}, []),
+        ("strain_coupon", {}, []),
+        ("coupon", {"sensor_gain.error": "0.1"}, ["reading"]),  # what is read is not the strain
+    ],
+)
+def test_a_coupon_has_no_position_on_its_page_and_each_number_once(
+    load: str, values: dict[str, str], beside: list[str], tmp_path: Path
+) -> None:
+    inputs = {
+        "temperature": "30degC:1s,99degC:1s",
+        **({"stress": "100MPa"} if load == "coupon" else {"strain": "0.01"}),
+    }
+    ran = run_open(Asked("flexinol_isobaric", load, "none", values=values, dt=0.1, inputs=inputs))
+    rows = [row[0] for row in summary_rows(ran.found)]
+    assert sorted(rows) == sorted(
+        ["temperature", "stress", "strain", "martensite fraction", "detwinned fraction", "force", "resistance", *beside]
+    )
+    # No data is lost.
+    assert {"position [1]", "velocity [1/s]", "reading [" + ("1]" if load == "coupon" else "Pa]")} <= set(
+        as_csv(ran.found).splitlines()[0].split(",")
+    )
+    svg = write_run(ran, tmp_path, "A coupon", "").with_suffix(".svg").read_text(encoding="utf-8")
+    assert svg.count("<!-- strain (%) -->") == 2
+    assert "<!-- position" not in svg
+
+
+def test_a_moving_load_has_its_position_on_its_page() -> None:
+    found = run_open(Asked(dt=0.01, inputs={"voltage": "5V:1s"})).found
+    assert {"position", "velocity", "reading", "strain"} <= {row[0] for row in summary_rows(found)}
 
 
 def test_a_stop_and_a_slack_wire_are_told() -> None:

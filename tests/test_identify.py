@@ -199,7 +199,7 @@ def test_the_page_and_the_record_say_the_same(found: Identified, tmp_path: Path)
     text = written.read_text(encoding="utf-8")
     assert text == page(found)
     assert "Coupon &lt;of&gt; test" in text
-    assert text.count('src="data:image/png') == 3 + 1 + 1 + 1  # runs, correlation, profiles, suggestions
+    assert text.count('src="data:image/png') == 3 + 1 + 1  # runs, profiles, suggestions
     assert not re.search(r">\s*nan\b", text.lower())
     assert "The residual is as large as the noise" in " ".join(conclusions(dataclasses.replace(found, ratio=1.004)))
     assert "The residual is 1.4 times the noise" in " ".join(conclusions(dataclasses.replace(found, ratio=1.4)))
@@ -217,6 +217,18 @@ def test_the_page_and_the_record_say_the_same(found: Identified, tmp_path: Path)
     np.testing.assert_allclose(table.column("stress [Pa]").reshape(3, -1)[:, 0], [90e6, 150e6, 120e6])
 
 
+def test_the_page_has_a_column_of_profiles_where_one_was_drawn(found: Identified) -> None:
+    def first_table(one: Identified) -> list[list[str]]:
+        rows = re.search(r"<table.*?</table>", page(one), re.DOTALL)
+        assert rows is not None
+        return [re.findall(r"<t[hd][^>]*>(.*?)</t[hd]>", row) for row in rows[0].split("<tr>")[1:]]
+
+    drawn, bare = first_table(found), first_table(dataclasses.replace(found, profiles=()))
+    place = drawn[0].index("95 % (profile)")
+    assert any(row[place] for row in drawn[1:])
+    assert bare == [row[:place] + row[place + 1 :] for row in drawn]
+
+
 def test_the_page_says_what_to_do_about_parameters_that_move_together(found: Identified) -> None:
     weak = ("a and b move together: a by +3 % and b by -3 %, all at once, is one standard error.",)
     advice = "measure one by itself and give it under <code>[model.parameters]</code>"
@@ -230,6 +242,26 @@ def test_the_page_says_what_to_do_about_parameters_that_move_together(found: Ide
 def test_the_page_in_a_browser(found: Identified, browser: Any, tmp_path: Path) -> None:
     runs = (dataclasses.replace(found.runs[0], name=HOSTILE), *found.runs[1:])
     assert faults(browser, write_identified(dataclasses.replace(found, title=HOSTILE, runs=runs), tmp_path)) == []
+
+
+def test_correlations_of_many_parameters_are_text_that_a_telephone_moves_sideways(
+    found: Identified, browser: Any, tmp_path: Path
+) -> None:
+    names = tuple(f"parameter_{k}" for k in range(12))
+    correlation = np.asarray(np.corrcoef(np.random.default_rng(3).normal(size=(12, 20))))
+    many = dataclasses.replace(found, correlated=names, correlation=correlation)
+    shown = browser.new_page(viewport={"width": 400, "height": 900})
+    shown.goto(write_identified(many, tmp_path).as_uri())
+    box = next(one for one in shown.query_selector_all(".scroll") if "parameter_0" in one.inner_text())
+    rows = [[cell.inner_text() for cell in row.query_selector_all("td")] for row in box.query_selector_all("tbody tr")]
+    assert [row[0].split()[1] for row in rows] == list(names)
+    np.testing.assert_allclose(np.array([row[1:] for row in rows], float), correlation, atol=0.0051)
+    assert box.evaluate("box => box.scrollWidth > box.clientWidth && box.clientWidth <= 400")
+    assert all(
+        cell.evaluate("cell => parseFloat(getComputedStyle(cell).fontSize) >= 12")
+        for cell in box.query_selector_all("td")
+    )
+    assert "Correlations of the estimates" not in page(dataclasses.replace(many, correlated=names[:1]))
 
 
 def test_an_effect_is_part_of_the_model_when_a_parameter_of_it_is_named(tmp_path: Path) -> None:

@@ -23,6 +23,7 @@ from smajax.command.base import (
 )
 
 SHOWN = 7  # columns of a table of set points on a terminal
+OPTIONS = {"values": "--set", "mismatch": "--mismatch", "set_points": "--set-point"}  # part of a run -> its option
 VALUES = "damping=+20%,wire_length='1 m'"
 
 
@@ -127,7 +128,7 @@ def simulate(
 
     What may be wrong of a plant: inertia (inertia_ratio), damping, convection (convection_coefficient), ambient
     (ambient_temperature, in degC), payload (payload_mass), supply (amplifier_gain). +20% is that much more than the
-    controller believes, -50% half of it, and 20% of a variation both ways.
+    controller believes (of 20 degC: 24 degC), -50% half of it, and 20% of a variation both ways.
 
     Example:  smajax simulate flexinol_table_3_2 dead_weight flexinol_voltage --step 5V:8s,0V:8s --set convection_coefficient=80
 
@@ -141,7 +142,7 @@ def simulate(
     from smajax.progress import shown
     from smajax.report.files import json_text
     from smajax.report.simulate_page import OWN, merit_rows, mismatch_rows, record, rest_rows, summary_rows, write_run
-    from smajax.single import Asked, AskedLoop, channels, run_closed, run_open
+    from smajax.single import Asked, AskedError, AskedLoop, channels, run_closed, run_open
     from smajax.words import aligned
 
     check_path(out)
@@ -159,6 +160,7 @@ def simulate(
         raise typer.BadParameter("a coupon moves nothing that could be drawn.", param_hint="--gif")
     if not closed and mismatch:
         raise typer.BadParameter("--mismatch is for closed loops; use --set.")
+    options = {**OPTIONS, **{f"inputs.{name}": f"--input {name}" for name in series}}
     try:
         asked = Asked(wire, load, drive, law, texts("--set", values, VALUES), series, time, seconds, dt, tolerance)
         if step is not None:
@@ -168,7 +170,9 @@ def simulate(
                 raise ValueError(
                     f"--step is for a model with one required input; this one has {needs}: use --input NAME=..."
                 )
-            asked = Asked(**{**vars(asked), "inputs": {**series, next(iter(required)): step}})
+            stepped = next(iter(required))
+            asked = Asked(**{**vars(asked), "inputs": {**series, stepped: step}})
+            options[f"inputs.{stepped}"] = "--step"
         with resumable(), shown(console()) as progress:
             progress("simulating the run", 0.0)
             loop: AskedLoop | None = None
@@ -190,6 +194,10 @@ def simulate(
             progress("simulating the run", 1.0)
     except KeyError as error:
         raise typer.BadParameter(error.args[0]) from None
+    except AskedError as error:
+        # Of a file it may be the column of the times that cannot be read.
+        timed = bool(time) and error.part.startswith(("inputs.", "set_points"))
+        raise typer.BadParameter(str(error), param_hint=options[error.part] + " or --time" * timed) from None
     except (ValueError, GainsFileError) as error:
         raise typer.BadParameter(str(error)) from None
     command = command_line()

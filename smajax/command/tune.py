@@ -107,7 +107,7 @@ def tune(
 
     What may be wrong of a plant: inertia (inertia_ratio), damping, convection (convection_coefficient), ambient
     (ambient_temperature, in degC), payload (payload_mass), supply (amplifier_gain). +20% is that much more than the
-    controller believes, -50% half of it, and 20% of a variation both ways.
+    controller believes (of 20 degC: 24 degC), -50% half of it, and 20% of a variation both ways.
 
     Example:  smajax tune sld --variation inertia=20%,damping=20%,convection=20% --limits settling_time=4,overshoot=2
     """

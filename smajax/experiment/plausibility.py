@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from smajax.experiment.schema import RunSection
 from smajax.experiment.signals import ReadRun, Signal
 from smajax.measured.table import Array
-from smajax.words import counted
+from smajax.words import and_listed, counted
 
 FEW_SAMPLES = 20
 GAP_STEPS = 5.0
@@ -75,15 +75,22 @@ def _output_warnings(run: str, name: str, signal: Signal) -> list[str]:
     ]
 
 
+def _repeated_warnings(run: str, signals: Mapping[str, Signal]) -> list[str]:
+    """Samples that were taken out: one sentence for all signals that lost as many, as those of one log do."""
+    numbers = sorted({signal.repeated for signal in signals.values()} - {0}, reverse=True)
+    names = {number: [repr(name) for name, one in signals.items() if one.repeated == number] for number in numbers}
+    return [
+        f"run {run!r}: {counted(number, 'sample')} of {and_listed(names[number])} at a time that another one has "
+        f"{'was' if number == 1 else 'were'} taken out"
+        for number in numbers
+    ]
+
+
 def _time_warnings(run: str, name: str, signal: Signal) -> list[str]:
     intervals = np.diff(signal.time)
     usual = float(np.median(intervals))
     longest = int(np.argmax(intervals))
     found: list[str] = []
-    if signal.repeated:
-        found.append(
-            f"run {run!r}: {signal.repeated} samples of {name!r} at a time that another one has were taken out"
-        )
     uneven = float(np.mean(np.abs(intervals - usual) > UNEVEN * usual))
     if uneven > UNEVEN_SHARE:
         low, high = np.percentile(intervals, [5.0, 95.0])
@@ -113,9 +120,10 @@ def run_warnings(read: ReadRun, step: float) -> list[str]:
     found: list[str] = []
     if run.time.size < FEW_SAMPLES:
         found.append(f"run {run.name!r}: only {run.time.size} samples at a step of {step:g} s; is the step too long?")
-    for name, signal in read.signals.items():
-        if name not in read.skipping:
-            found += _time_warnings(run.name, name, signal)
+    clocked = {name: signal for name, signal in read.signals.items() if name not in read.skipping}
+    found += _repeated_warnings(run.name, clocked)
+    for name, signal in clocked.items():
+        found += _time_warnings(run.name, name, signal)
     duty = run.inputs.get("duty")
     if duty is not None and (duty.min() < 0.0 or duty.max() > 1.0):
         found.append(

@@ -223,7 +223,8 @@ def begun(files: Sequence[Path], target: Path, title: str = "", load: str = "") 
     folder = _folder(files, target)
     lines = [
         f'# Begun by `smajax new-experiment`. Lines that say "{GUESS}" or "{LIKELY}" want a look; "{SURE}" ones come from',
-        "# headings with units. What the model can be: `smajax presets`; what may be fitted: studies/parameters.md.",
+        "# headings with units. What the model can be: `smajax presets`; what may be fitted: the page 'Parameters of the presets'",
+        "# of the documentation, and the parameters of `smajax effects`.",
         f"title = {json.dumps(title or target.stem, ensure_ascii=False)}",
         "",
         f"[model]  # {GUESS}: {model.why}",

@@ -10,12 +10,12 @@ import numpy as np
 from smajax.identified import Identified, IdentifiedOutput
 from smajax.report import identify_pictures as draw
 from smajax.report.csv_files import PARAMETERS, RUNS, identified_parameters, identified_runs
-from smajax.report.display import digits, display, label
+from smajax.report.display import correlation, digits, display, label
 from smajax.report.files import json_text, replace
 from smajax.report.html import picture
 from smajax.report.identify_record import record
 from smajax.report.identify_words import conclusions, estimate_rows, posterior_rows, prior_shown
-from smajax.report.plain_page import bullets, table, whole
+from smajax.report.plain_page import breakable, bullets, table, whole
 
 KNOWN = "Every combination of the parameters is known to 5 % (temperatures: to 1 K) or better."
 KNOWN_OF_THE_REST = "Of the parameters that are neither at a bound nor without effect, every combination is known to 5 % (temperatures: to 1 K)."
@@ -49,11 +49,36 @@ def _what_to_do(found: Identified) -> str:
     )
 
 
+def _correlations(found: Identified) -> str:
+    """The correlation matrix of the estimates as text that keeps its size on a telephone; nothing for fewer than two."""
+    if len(found.correlated) < 2:
+        return ""
+    numbered = range(1, len(found.correlated) + 1)
+    columns = "".join(f"<th class=n>{number}</th>" for number in numbered)
+    rows = [
+        f"<tr><td>{number}&nbsp;{breakable(name)}</td>"
+        + "".join(f'<td class=n style="background:{_colour(value)}">{correlation(value)}</td>' for value in line)
+        + "</tr>"
+        for number, name, line in zip(numbered, found.correlated, found.correlation.tolist(), strict=True)
+    ]
+    return (
+        "<p class=quiet>Correlations of the estimates; a column is the parameter of its number.</p>"
+        f'<div class=scroll><table style="width:auto"><thead><tr><th></th>{columns}</tr></thead><tbody>{"".join(rows)}</tbody>'
+        "</table></div>"
+    )
+
+
+def _colour(value: float) -> str:
+    """Red of what rises together and blue of what does not, none stronger than what dark text is read on."""
+    return f"rgb({'178 24 43' if value > 0.0 else '33 102 172'} / {0.7 * abs(value):.2f})"
+
+
 def page(found: Identified) -> str:
     """The whole page."""
     say = html.escape
     run_head, runs = _run_rows(found)
-    head = ["parameter", "estimate ± standard error", "unit", "95 % (profile)", "bounds", "start", "remark"]
+    interval = ["95 % (profile)"] if found.profiles else []
+    head = ["parameter", "estimate ± standard error", "unit", *interval, "bounds", "start", "remark"]
     rows = estimate_rows(found)
     if any(one.prior for one in found.estimates):
         head.insert(-1, "known before")
@@ -66,7 +91,7 @@ def page(found: Identified) -> str:
         "<h2>What the runs tell apart</h2>",
         bullets(found.weak) or f"<p>{KNOWN if found.all_took_part else KNOWN_OF_THE_REST}</p>",
         _what_to_do(found),
-        picture(draw.correlations(found), "correlations of the estimates"),
+        _correlations(found),
     ]
     if found.profiles:
         parts += [

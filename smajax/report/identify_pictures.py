@@ -42,25 +42,6 @@ def run_with_band(found: Identified, run: IdentifiedRun, k: int = 0) -> bytes:
     return panels_done(figure, rows, 3)
 
 
-def correlations(found: Identified) -> bytes | None:
-    """The correlation matrix of the estimates; None for fewer than two."""
-    count = len(found.correlated)
-    if count < 2:
-        return None
-    figure = new_figure(1.6 + 0.42 * count, width=2.9 + 0.45 * count)
-    axes = figure.subplots()
-    axes.imshow(found.correlation, cmap="RdBu_r", vmin=-1.0, vmax=1.0)
-    for row in range(count):
-        for column in range(count):
-            value = float(found.correlation[row, column])
-            colour = "white" if abs(value) > 0.6 else "black"
-            axes.text(column, row, f"{value:.2f}", ha="center", va="center", fontsize=7, color=colour)
-    names = [label(name) for name in found.correlated]
-    axes.set_yticks(range(count), names, fontsize=8)
-    axes.set_xticks(range(count), names, fontsize=8, rotation=40, ha="right")
-    return as_png(figure)
-
-
 def _panels(count: int, height: float, upright: bool) -> tuple[Figure, np.ndarray]:
     """A figure with room for `count` panels of a height (inch), three a row, or two for a telephone."""
     columns = min(2 if upright else 3, count)

@@ -128,7 +128,7 @@ def _error(found: Identified, output: int) -> str:
 
 
 def estimate_rows(found: Identified) -> list[list[str]]:
-    """Parameter, estimate with standard error, unit, bounds, start, 95 % interval of the profile, remark."""
+    """Parameter, estimate with standard error, unit, 95 % interval of the profile if any was drawn, bounds, start, remark."""
     profiled = {one.name: one for one in found.profiles}
 
     def interval(one: Estimate) -> str:
@@ -152,7 +152,7 @@ def estimate_rows(found: Identified) -> list[list[str]]:
                 one.name,
                 with_error(unit.of(one.value), error),
                 unit.unit,
-                interval(one),
+                *([interval(one)] if profiled else []),
                 bounds,
                 digits(unit.of(one.start)),
                 one.remark,

@@ -28,7 +28,7 @@ from smajax.single import Ran
 
 AT_STOP = 1e-3  # of the way moved: nearer is at a stop
 STILL = 1e-3  # change of the martensite fraction that is none
-PLAIN = ("position", "temperature", "martensite_fraction", "stress")
+PLAIN = ("temperature", "martensite_fraction", "stress")
 
 
 def as_csv(found: xr.Dataset) -> str:
@@ -91,13 +91,19 @@ def _inputs(found: xr.Dataset) -> list[str]:
     return [name for name in names[: names.index("temperature")] if name != "wanted"]
 
 
+def _moves(found: xr.Dataset) -> bool:
+    """Whether the load has a position; a coupon's has no unit, and is zero as its velocity is."""
+    return bool(found["position"].attrs["units"] != "-")
+
+
 def drawn(found: xr.Dataset, form: str = "png", upright: bool = False) -> bytes:
     """Input, position, temperature, fraction and stress over time, and the hysteresis of the position; `form`: png or svg.
 
-    upright: one below the other, for a telephone.
+    Of a coupon the strain stands in the place of the position. upright: one below the other, for a telephone.
     """
     inputs = _inputs(found)
-    shown = [*inputs[:1], *PLAIN]
+    path = "position" if _moves(found) else "strain"
+    shown = [*inputs[:1], path, *PLAIN]
     figure = Figure(figsize=(UPRIGHT if upright else 10.0, 8.2))
     axes = panels(figure, 3, 2)
     time = found["time"].to_numpy()
@@ -114,7 +120,7 @@ def drawn(found: xr.Dataset, form: str = "png", upright: bool = False) -> bytes:
         named(one, "time (s)", said)
     last = axes[len(shown)]
     temperature, said = values("temperature")
-    position, other = values("position")
+    position, other = values(path)
     last.plot(temperature, position, color=BLUE, linewidth=1.1)
     named(last, said, other)
     for spare in axes[len(shown) + 1 :]:
@@ -124,10 +130,18 @@ def drawn(found: xr.Dataset, form: str = "png", upright: bool = False) -> bytes:
     return image.getvalue()
 
 
+def _of_no_coupon(found: xr.Dataset) -> set[str]:
+    """Variables that tell nothing of a coupon: where it is, and what its sensor reads where that is the strain or stress."""
+    if _moves(found):
+        return set()
+    again = any(np.array_equal(found["reading"], found[name]) for name in ("strain", "stress"))
+    return {"position", "velocity", *(["reading"] if again else [])}
+
+
 def summary_rows(found: xr.Dataset) -> list[list[str]]:
     """A row a variable: least, greatest, last, in the units that a reader sees."""
     rows = []
-    for name, one in found.data_vars.items():
+    for name, one in found.drop_vars(_of_no_coupon(found)).data_vars.items():
         unit, values = display(one.attrs["units"], str(name)), one.to_numpy()
         least, greatest, last = float(values.min()), float(values.max()), float(values[-1])
         # What rounding leaves of a zero is no number to show.
