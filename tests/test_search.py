@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from smajax.fit.batch import RunBatch, simulate_batch
 from smajax.fit.box import Fit
 from smajax.fit.kept import Kept
 from smajax.fit.problem import Problem
+from smajax.fit.shown import misfits
 from smajax.presets import build
 
 DT, SAMPLES, NOISE = 0.1, 200, 1e-4
@@ -46,6 +49,18 @@ def test_an_effect_that_one_run_alone_shows_is_not_told_without_it() -> None:
     judged = setting.judged([entry], present)[0]
     np.testing.assert_array_equal(judged.left_out[0], present.left_out[0])
     assert np.sqrt(np.mean(judged.left_out[1] ** 2)) < 1.2 * NOISE
+
+
+def test_a_fit_that_a_fold_has_passed_goes_on_from_there() -> None:
+    """The fit to all runs ended far off; without the run at rest it comes to the truth, which is better for both."""
+    setting = _setting()
+    off = _at(setting, 5e3)
+    (misfit,) = misfits(setting.problem, [off.values])
+    short = dataclasses.replace(off, cost=float((misfit**2).sum()) / NOISE**2)
+    (model,) = setting.judged([Fitted(("latent_heat",), short)])
+    assert short.cost > 4.0 * 2 * SAMPLES
+    assert model.cost < 1.2 * 2 * SAMPLES
+    assert model.values[setting.problem.names.index("latent_heat.enthalpy")] == pytest.approx(2e4, rel=0.02)
 
 
 def test_a_model_that_predicts_left_out_runs_worse_is_not_better() -> None:

@@ -242,7 +242,32 @@ class Search:
         the box: else a direction that the others hardly tell runs wherever the last iteration happened to take it, and
         with it the prediction. In such a direction the fold keeps what the run left out said: where the others do not
         tell the size of what is new (`told_without`), `present`'s error stands and the effect is credited with nothing.
+        A fold that follows all runs better than the fit to all has come to a better valley: that fit begins there again.
         """
+        parts = self.parts()
+        folded = self.folded(fitted, carried)
+        better = {
+            place: deeper.values
+            for place, (entry, (_, deeper)) in enumerate(zip(fitted, folded, strict=True))
+            if deeper.cost < (1.0 - PENALTY) * entry.solution.cost
+        }
+        if better:
+            starts = [Start(fitted[place].effects, values) for place, values in better.items()]
+            again, _ = self.fit(starts, "refitting where a fold did better", hops=True, carried=carried)
+            fitted, folded = list(fitted), list(folded)
+            for place, fit in zip(better, again, strict=True):
+                fitted[place] = Fitted(fitted[place].effects, fit)
+            for place, one in zip(better, self.folded([fitted[place] for place in better], carried), strict=True):
+                folded[place] = one
+        models = []
+        for entry, (own, _) in zip(fitted, folded, strict=True):
+            left_out = np.stack([own[fold, run] for run, fold in enumerate(parts.argmax(axis=0))])
+            model = Model(entry.effects, entry.solution.values, entry.solution.cost, left_out, self.rmse(left_out))
+            models.append(model if present is None else self.credited(entry, model, present))
+        return models
+
+    def folded(self, fitted: Sequence[Fitted], carried: Sequence[str] = ()) -> list[tuple[np.ndarray, Fit]]:
+        """Every fit refitted without each part of the runs: the misfit of all runs at each fold, and the one best for all."""
         parts = self.parts()
         # With one run nothing can be left out: the fit itself is all there is, and the report says so.
         folds = list(1.0 - parts) if len(parts) > 1 else [np.ones(1)]
@@ -252,14 +277,13 @@ class Search:
             for entry, level in zip(fitted, levels, strict=True)
             for weights in folds
         ]
-        _, found = self.fit(starts, "predicting runs left out", carried=carried)
-        models = []
-        for place, entry in enumerate(fitted):
-            own = found[place * len(folds) : (place + 1) * len(folds)]
-            left_out = np.stack([own[fold, run] for run, fold in enumerate(parts.argmax(axis=0))])
-            model = Model(entry.effects, entry.solution.values, entry.solution.cost, left_out, self.rmse(left_out))
-            models.append(model if present is None else self.credited(entry, model, present))
-        return models
+        fits, found = self.fit(starts, "predicting runs left out", carried=carried)
+        costs = np.nan_to_num((found**2).sum(axis=(1, 2)) / float(self.problem.noise_sigma) ** 2, nan=np.inf)
+        told = []
+        for first in range(0, len(starts), len(folds)):
+            best = first + int(np.argmin(costs[first : first + len(folds)]))
+            told.append((found[first : first + len(folds)], dataclasses.replace(fits[best], cost=float(costs[best]))))
+        return told
 
     def levels(self, fitted: Sequence[Fitted]) -> list[float]:
         """Variance that one effective sample of each fit's residual has, over the noise's: memory counts as noise."""

@@ -133,13 +133,6 @@ def search(setting: Search, base: Fit) -> tuple[Model, Model]:
             if start.effects not in found or solution.cost < found[start.effects].cost:
                 found[start.effects] = solution
         fitted = [Fitted(effects, solution) for effects, solution in found.items()]
-        if number == 1:
-            samples = float(np.asarray(problem.batch.mask).sum())
-            for one in fitted:
-                if len(one.effects) == 1:
-                    setting.evidence[one.effects[0]].alone_rmse = float(
-                        problem.noise_sigma * np.sqrt(one.solution.cost / samples)
-                    )
         weighed = sorted(
             fitted, key=lambda entry: entry.solution.cost * (1.0 + PENALTY * len(setting.free(entry.effects)))
         )
@@ -151,10 +144,12 @@ def search(setting: Search, base: Fit) -> tuple[Model, Model]:
             taken = [*taken, alone]
         carried = [effect for start in starts for effect in start.effects]
         judged = setting.judged(taken, model, carried)
-        if number == 1 and problem.batch.output.shape[0] > 1:
-            for entry in judged:
-                if len(entry.effects) == 1:
-                    evidence = setting.evidence[entry.effects[0]]
+        for entry in judged if number == 1 else ():
+            if len(entry.effects) == 1:
+                evidence = setting.evidence[entry.effects[0]]
+                samples = float(np.asarray(problem.batch.mask).sum())
+                evidence.alone_rmse = float(problem.noise_sigma * np.sqrt(entry.cost / samples))
+                if problem.batch.runs > 1:
                     evidence.alone_left_out_rmse, evidence.base_left_out_rmse = entry.left_out_rmse, model.left_out_rmse
         best, alike = simplest(setting, judged, model)
         enough, why = setting.better(best, model)
