@@ -28,6 +28,7 @@ from smajax.single import Ran
 
 AT_STOP = 1e-3  # of the way moved: nearer is at a stop
 STILL = 1e-3  # change of the martensite fraction that is none
+ROUNDING = 1e-9  # of the way moved: nearer to zero is what arithmetic leaves
 PLAIN = ("temperature", "martensite_fraction", "stress")
 
 
@@ -230,9 +231,16 @@ def conclusions(ran: Ran) -> list[str]:
             f"It transforms: the martensite fraction lies between {least:.2f} and {greatest:.2f}, at the end {last:.2f}."
         )
     name = ran.system.load.reading[0]
+    unit = display(found["reading"].attrs["units"], name)
+    stroke = float(np.ptp(reading))
+
+    def read(value: float) -> str:
+        shown = 0.0 if abs(value) < ROUNDING * stroke else unit.of(float(value))
+        return f"{digits(shown, 3)} {unit.unit}".strip()
+
     told.append(
-        f"The {label(name)} starts at {at('reading', reading[0])}, lies between {at('reading', reading.min())} and "
-        f"{at('reading', reading.max())}, and ends at {at('reading', reading[-1])}."
+        f"The {label(name)} starts at {read(reading[0])}, lies between {read(reading.min())} and "
+        f"{read(reading.max())}, and ends at {read(reading[-1])}."
     )
     told += _at_ends(ran)
     if ran.merit:
