@@ -182,6 +182,7 @@ def close_loop(
         [one for one in mistaken if one.weight > 0.5],
         _sizes_not_given(job),
         [one for one in after.parameters if not one.name.startswith(added) and _asks_for_more(one)],
+        integration,
     )
     return Findings(
         experiment=experiment.name,

@@ -38,6 +38,29 @@ def test_a_parameter_that_the_log_gives_is_not_left_open() -> None:
     assert {"wire_length", "damping"} <= set(told)
 
 
+def test_what_hangs_on_the_step_or_hides_in_the_noise_is_told_at_the_top() -> None:
+    with resources.as_file(resources.files("smajax") / "demo" / "latent") as folder:
+        experiment = load_experiment(folder / "experiment.toml", CATALOGUE)
+    runs = (made_run("a", "fit", 0), made_run("b", "fit", 1))
+    error = float(np.sqrt(np.mean([run.rmse_after**2 for run in runs])))
+    level = max(error, experiment.noise_sigma)
+    faint = made_effect("creep", "creep", "constitutive", 1e-9, added=False)
+
+    def told(answer: Any, p_value: float, integration: float, ratio: float = 1.0) -> str:
+        one = dataclasses.replace(
+            faint, evidence={**faint.evidence, "score_p_value_at_the_end": p_value, "score_gain_at_the_end": 0.03}
+        )
+        after = dataclasses.replace(made_portrait(2e-5, ratio == 1.0, ()), ratio=ratio)
+        return " ".join(summary(answer, experiment, runs, [one], after, 9, integration=integration))
+
+    assert "halving the step" in told("adequate", 0.5, 2.0 * level)
+    assert "halving the step" not in told("adequate", 0.5, 0.1 * level)
+    assert "creep leaves a trace in the score test (p = 1e-9 after 1 candidates)" in told("adequate", 1e-9, 0.0)
+    assert "leaves a trace" not in told("adequate", 0.5, 0.0) + told("not in the library", 1e-9, 0.0)
+    assert "has a memory, looks the same" in told("not in the library", 0.5, 0.0, 1.3)
+    assert "looks the same" not in told("not in the library", 0.5, 0.0, 3.0) + told("adequate", 0.5, 0.0)
+
+
 def test_a_load_far_off_may_be_a_size_of_the_bench_that_was_never_given() -> None:
     """The demo gives none of its sizes; a bench that gives them all, or a share that is small, has the one reading."""
     with resources.as_file(resources.files("smajax") / "demo" / "latent") as folder:

@@ -147,6 +147,17 @@ def test_an_estimated_noise_is_the_one_on_the_clock(bench: Path) -> None:
     assert got.noise_how.startswith("estimated from 1 fit run")
 
 
+@pytest.mark.parametrize("step", ["12.5 ms", "20 ms", "25 ms"])
+def test_an_estimated_noise_is_not_too_small_where_windows_share_samples(bench: Path, step: str) -> None:
+    write_run(bench / "a.csv", count=6000)
+    changed(bench, 'noise = "0.01 mm"', 'noise = "estimate"')
+    got = load(changed(bench, '"50 ms"', f'"{step}"'))
+    at_rest = next(run for run in got.runs if run.name == "A")
+    drift = 2e-6 * np.maximum(at_rest.time - 1.0, 0.0) * 1000.0
+    found = np.std((at_rest.output - drift)[at_rest.time > 2.0])
+    assert got.noise_sigma == pytest.approx(found, rel=0.06)
+
+
 def test_matlab_files_one_a_channel(bench: Path) -> None:
     for name, interval, values in (("Duty", 0.001, np.full(3001, 0.2)), ("Pos", 0.01, np.arange(300) * 1e-5)):
         record = {"time": interval * np.arange(values.size), "signals": {"values": values}, "blockName": "m"}

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from smajax.experiment.record import Experiment
-from smajax.report.display import display
+from smajax.report.display import digits, display
 from smajax.report.findings import EffectFinding, ParameterFinding, Portrait, Rival, Round, RunFinding, Verdict
 from smajax.residual.portrait import noise_like
 from smajax.words import and_listed
@@ -17,6 +17,9 @@ WRONG_NOISE = 1.2
 # A held-out run is off where its error is so much larger than that of the fit runs; few samples may be so by chance.
 FURTHER, CHANCE = 1.3, 5.0
 LARGE_SHARE = 0.2  # of the load, wrong or shifting: from here on a size of the bench is as likely to be wrong
+LITTLE = 2.0  # residual over noise up to which the noise itself may be what is wrong
+FAINT = 0.01  # chance, corrected for the candidates, from which on a trace below the noise is told
+HANGS = 0.5  # change at half the step over the error, from which on a model hangs on the step
 NAMED_SIZES = 4  # of these in a sentence
 MENTIONED = 0.05  # weight from which on a rival is named
 
@@ -55,21 +58,23 @@ def summary(
     likelier: Sequence[Rival] = (),
     sizes: Sequence[str] = (),
     held: Sequence[ParameterFinding] = (),
+    integration: float = 0.0,
 ) -> tuple[str, ...]:
     """The verdict in sentences; `tried` is the number of candidate effects that were looked at.
-
     `aside`: those that were added and gave way to one unknown term. `foretold`: share of the motion in left-out runs that
     the model foretells, where that is so little that nothing is named. `refused`: effects that the held-out runs did not
     confirm, with the error there without and with them. `at_bound`: coefficients of what was added that end at a bound.
     `likelier`: rivals that left-out runs prefer to what was added. `sizes`: those of the bench that the experiment never
-    gives, with the presets' values. `held`: parameters of the base model that end at a bound.
+    gives, with the presets' values. `held`: parameters of the base model that end at a bound. `integration` (SI of the output): by
+    how much halving the step changes what the final model gives.
     """
     unit, name = experiment.output_unit, experiment.output_name
     added = [effect for effect in effects if effect.added]
     several = sum(run.role == "fit" for run in runs) > 1
     judged_on = "on runs left out as well as on the fit" if several else "on the one fit run itself"
     opening = {
-        "adequate": "Nothing is missing that the fit runs can show: on them the base model leaves nothing but measurement noise.",
+        "adequate": "Nothing is missing whose trace is larger than the noise: what the base model leaves of the fit runs cannot be told "
+        "from measurement noise.",
         "explained": _explained(added, several, any(run.role == "held-out" for run in runs)),
         "partly explained": _partly(added, runs, experiment),
         "not in the library": f"Something is missing, and none of the {tried} candidate effects that were tried accounts "
@@ -90,6 +95,13 @@ def summary(
             "inputs and outputs belong together, and are the samples in order?"
         )
     told = [opening[answer]]
+    if answer not in ("adequate", "explained") and not after.white and after.ratio < LITTLE:
+        told.append(
+            f"What is left is no more than {after.ratio:.2f} times the noise: noise that is larger than said, or has a memory, looks the "
+            "same. Look at a stretch of the log in which nothing moves before you look for physics."
+        )
+    told += _faint(answer, effects)
+    told += _of_the_step(experiment, runs, integration)
     if refused is not None:
         told = [
             f"{and_listed([effect.title for effect in effects if effect.name in refused[0]])} would lower the error "
@@ -145,6 +157,36 @@ def summary(
             "smaller than it may hide. Declare it smaller, or as 'estimate', and run again."
         )
     return tuple(told)
+
+
+def _faint(answer: Verdict, effects: Sequence[EffectFinding]) -> list[str]:
+    """A trace below the noise that the score test sees all the same, for a verdict that nothing more is missing."""
+    left = [
+        one for one in effects if not one.added and np.isfinite(one.evidence.get("score_p_value_at_the_end", np.nan))
+    ]
+    if answer not in ("adequate", "explained") or not left:
+        return []
+    first = min(left, key=lambda one: one.evidence["score_p_value_at_the_end"])
+    chance = min(1.0, len(left) * first.evidence["score_p_value_at_the_end"])
+    if chance > FAINT:
+        return []
+    return [
+        f"Mind: {first.title} leaves a trace in the score test (p = {digits(chance, 2)} after {len(left)} candidates) that would take "
+        f"{first.evidence['score_gain_at_the_end']:.1%} of the residual's square: smaller than what is looked into, so it was not fitted."
+    ]
+
+
+def _of_the_step(experiment: Experiment, runs: Sequence[RunFinding], integration: float) -> list[str]:
+    """A model whose answer hangs on the step: where a load sticks and jumps, the step says when."""
+    error = max(pooled(runs, "fit", "after"), experiment.noise_sigma)
+    if not integration > HANGS * error:
+        return []
+    moved = shown(integration, experiment.output_unit, experiment.output_name)
+    return [
+        f"Mind: halving the step of {experiment.step:g} s changes what the model gives by {moved}, {integration / error:.1f} times its "
+        "error on the fit runs: what was fitted may be the integration's and not the wire's. Take a shorter step under [sampling] "
+        "and run again before you believe it."
+    ]
 
 
 def _or_a_size(effect: EffectFinding, sizes: Sequence[str]) -> list[str]:

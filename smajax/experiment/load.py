@@ -164,14 +164,17 @@ def _output(path: Path, file: ExperimentFile, name: str, unit: str, runs: Sequen
         return Output(name, unit, sensor * gain, how, True, offset), sensor
     for read in fit:
         _check_samples(path, key, name, file, read)
-    # On the clock, where the residual is; the increment is the sensor's, since averaging hides it.
+    # On the clock, where the residual is; the increment is the sensor's, since averaging hides it. Averages over windows that
+    # share samples resemble their neighbours, and their differences show less than there is: of noise without a memory
+    # the sensor's own rate tells what the average leaves.
     on_clock = [read.run.outputs[name] for read in fit]
     sigmas = [
         estimate_noise(values[np.isfinite(values)], read.quantum[name])
         for values, read in zip(on_clock, fit, strict=True)
     ]
     sensors = [estimate_noise(read.signals[name].measured, 0.0) for read in fit]
-    sigma = float(np.median(sigmas))
+    averaged = [sensor * read.noise_gain[name] for sensor, read in zip(sensors, fit, strict=True)]
+    sigma = max(float(np.median(sigmas)), float(np.median(averaged)))
     if sigma <= 0.0:
         raise ExperimentError(path, key, f"no noise can be seen in {name!r}; give it as text like '{example}'")
     how = f"estimated from {len(fit)} fit run{'s' if len(fit) > 1 else ''} (median)"
