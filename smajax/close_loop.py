@@ -316,7 +316,10 @@ def _effects(
         effect, seen = LIBRARY[name], setting.evidence.get(name, Evidence())
         coefficients = {
             full.split(".", 1)[1]: CoefficientFinding(
-                told[full].value, told[full].standard_error, told[full].unit, intervals.get(full)
+                told[full].value,
+                told[full].standard_error,
+                told[full].unit,
+                _spread(intervals.get(full), told[full].standard_error),
             )
             for full in setting.coefficients(name)
             if full in told
@@ -402,6 +405,14 @@ def _compare(job: _Job, first: Model, final: Model) -> tuple[tuple[RunFinding, .
         portrait(residuals["before"], states["before"], sigma),
         portrait(residuals["after"], states["after"], sigma),
     )
+
+
+def _spread(interval: tuple[float, float] | None, error: float | None) -> tuple[float, float] | None:
+    """What fits to runs drawn anew say, where it is wide enough to say something.
+
+    Where it is narrower than the standard error either way the tie to the fit holds the value there, and not the runs.
+    """
+    return None if interval is None or error is None or interval[1] - interval[0] < 2.0 * error else interval
 
 
 def _integration_error(job: _Job, final: Model) -> float:

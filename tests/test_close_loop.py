@@ -15,7 +15,7 @@ import pytest
 
 from smajax.attribution.verdict import cannot_know, pooled, summary
 from smajax.catalogue import CATALOGUE
-from smajax.close_loop import _preset, _sizes_not_given, close_loop
+from smajax.close_loop import _preset, _sizes_not_given, _spread, close_loop
 from smajax.experiment.load import load_experiment
 from smajax.extended import base_model, extended
 from smajax.fit.batch import pack, simulate_batch
@@ -59,6 +59,13 @@ def test_what_hangs_on_the_step_or_hides_in_the_noise_is_told_at_the_top() -> No
     assert "leaves a trace" not in told("adequate", 0.5, 0.0) + told("not in the library", 1e-9, 0.0)
     assert "has a memory, looks the same" in told("not in the library", 0.5, 0.0, 1.3)
     assert "looks the same" not in told("not in the library", 0.5, 0.0, 3.0) + told("adequate", 0.5, 0.0)
+
+
+def test_a_spread_over_runs_that_the_tie_holds_is_not_given() -> None:
+    assert _spread((1.0, 2.0), 0.4) == (1.0, 2.0)
+    assert _spread((1.0, 2.0), 0.6) is None
+    assert _spread((1.0, 2.0), None) is None
+    assert _spread(None, 0.1) is None
 
 
 def test_a_load_far_off_may_be_a_size_of_the_bench_that_was_never_given() -> None:
