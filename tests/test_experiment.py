@@ -133,6 +133,18 @@ def test_a_whole_experiment_in_si(bench: Path) -> None:
     assert load_experiment(bench, CATALOGUE).name == "bench"
 
 
+def test_a_unit_that_the_heading_contradicts_is_told(bench: Path) -> None:
+    for name in ("a.csv", "b.csv"):
+        (bench / name).write_text((bench / name).read_text().replace("time,duty,pos", "time [ms],duty [%],pos_m", 1))
+    changed(
+        changed(changed(bench, '"pos"', '"pos_m"'), '"time"', '"time [ms]"'), 'column = "duty"', 'column = "duty [%]"'
+    )
+    told = [text for text in load(bench).warnings if "heading" in text]
+    assert told == [
+        "channels.position.unit is 'mm', and the heading 'pos_m' says m: 1 m is 1000 mm. One of the two is wrong; the file's is taken"
+    ]
+
+
 def test_a_given_noise_shrinks_with_the_average_over_a_step(bench: Path) -> None:
     got = load(bench)
     at_rest = np.concatenate([run.output[1:20] for run in got.runs])

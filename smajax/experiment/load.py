@@ -11,6 +11,7 @@ import numpy as np
 from smajax.experiment.catalogue import WIRE_SIZES, Catalogue, ModelDescription
 from smajax.experiment.errors import ExperimentError, at_key, check_name
 from smajax.experiment.folder import data_folder
+from smajax.experiment.headings import heading_warnings
 from smajax.experiment.magnitude import common_warnings, magnitude_warnings
 from smajax.experiment.plausibility import (
     constant_warnings,
@@ -282,6 +283,7 @@ def load_experiment(path: str | Path, catalogue: Catalogue) -> Experiment:
     warnings = [text for read in runs for text in run_warnings(read, reading.step)]
     if file.time is None or file.time.kind != "sample":
         warnings += length_warnings(runs, "s" if file.time is None else file.time.unit)
+    warnings += heading_warnings(file.channels, file.time)
     warnings += constant_warnings(runs)
     for output, sensor_sigma in outputs:
         warnings += quantum_warning(fit, output.name, sensor_sigma, output.unit)
