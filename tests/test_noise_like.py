@@ -6,9 +6,18 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from smajax.residual import noise_like
-from smajax.residual.noise_like import autocorrelation, bartlett_sum, correlation_time, whiteness_p_value
+from smajax.residual.noise_like import (
+    WHITE,
+    autocorrelation,
+    bartlett_sum,
+    correlation_time,
+    first_order,
+    whiteness_p_value,
+)
+from smajax.residual.portrait import all_noise
 
 SERIES = np.random.default_rng(3).normal(size=(997, 3)).cumsum(axis=0)
 
@@ -47,3 +56,18 @@ def test_nothing_is_read_into_a_constant_or_a_single_sample() -> None:
     assert whiteness_p_value([constant]) == 1.0
     assert whiteness_p_value([single]) == 1.0
     assert correlation_time([constant]) == correlation_time([single]) == 1.0
+
+
+def test_the_noise_of_a_first_order_filter_is_told_from_a_trend() -> None:
+    """The AR(1) that made a noise is found, nothing is left beyond; a slow trace beside white noise is no such noise."""
+    random = np.random.default_rng(7)
+    made = [lfilter([0.3], [1.0, -0.8], random.normal(size=1200))[200:] for _ in range(3)]
+    found = first_order(made)
+    assert found.kept == pytest.approx(0.8, abs=0.03)
+    assert found.sigma == pytest.approx(0.3, rel=0.05)
+    assert found.p_value > WHITE
+    slow = [random.normal(size=1000) + np.sin(np.linspace(0.0, 9.0, 1000)) for _ in range(3)]
+    assert first_order(slow).p_value < 1e-6
+    assert all_noise(made, 0.3, noise_given=False)
+    assert not all_noise(made, 0.3)
+    assert not all_noise(slow, 1.0, noise_given=False)

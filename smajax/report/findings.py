@@ -81,6 +81,7 @@ class Portrait:
     by_phase: dict[str, dict[str, float]]  # "heating, transforming" -> {samples, share_of_squared_error, mean, rmse}
     correlation: dict[str, float]  # with time, input, temperature, martensite_fraction, stress, rate
     sentences: tuple[str, ...]
+    kept: float = 0.0  # of the sample before, where it is taken as a first-order noise larger than estimated; else 0
 
 
 @dataclass(frozen=True)
@@ -105,6 +106,18 @@ class Rival:
     left_out_rmse: float  # SI
     separating_run: str  # the run on which the two fitted models differ most; "" where none was looked for
     separation: float  # by how many times the noise, rms
+
+
+@dataclass(frozen=True)
+class LoneRun:
+    """A fit run that the others do not go with, by the model fitted to these alone; errors in SI."""
+
+    run: str
+    effects: tuple[str, ...]  # of that model; none: the base model
+    noise: bool  # whether what it leaves of the others is noise
+    others_with: float  # error on the others, fitted to all runs
+    others_without: float  # and to the others alone
+    foretold: float  # error on this run, by the fit to the others
 
 
 @dataclass(frozen=True)
@@ -167,4 +180,5 @@ class Findings:
     rounds: tuple[Round, ...]
     rivals: tuple[Rival, ...] = ()
     unknown: tuple[UnknownTerm, ...] = ()  # terms sought for what the library does not hold, best first
+    lone_runs: tuple[LoneRun, ...] = ()  # fit runs that the others do not go with
     provenance: dict[str, str] = field(default_factory=dict)  # versions, seed, data hashes, command, seconds

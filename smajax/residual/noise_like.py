@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from scipy import fft, stats
@@ -36,6 +37,12 @@ def whiteness_p_value(runs: Sequence[np.ndarray], lags: int = LAGS) -> float:
     Q = sum over runs of n (n + 2) sum_k r_k^2 / (n - k), chi-square with as many degrees of freedom
     as lags were taken over all runs.
     """
+    statistic, freedom = _ljung_box(runs, lags)
+    return float(stats.chi2.sf(statistic, freedom)) if freedom else 1.0
+
+
+def _ljung_box(runs: Sequence[np.ndarray], lags: int) -> tuple[float, int]:
+    """(Q, lags over all runs)."""
     statistic, freedom = 0.0, 0
     for run in runs:
         n = len(run)
@@ -45,7 +52,28 @@ def whiteness_p_value(runs: Sequence[np.ndarray], lags: int = LAGS) -> float:
         r = autocorrelation(run, reach)
         statistic += n * (n + 2) * float(np.sum(r[1:] ** 2 / (n - np.arange(1, reach + 1))))
         freedom += reach
-    return float(stats.chi2.sf(statistic, freedom)) if freedom else 1.0
+    return statistic, freedom
+
+
+class FirstOrder(NamedTuple):
+    """A series as the noise of a first-order filter, AR(1): r_k = kept r_(k-1) + e_k."""
+
+    kept: float  # share of the sample before
+    sigma: float  # of e, in the unit of the series
+    p_value: float  # chance of the autocorrelations of e in white noise: small where there is more than such a noise
+
+
+def first_order(runs: Sequence[np.ndarray], lags: int = LAGS) -> FirstOrder:
+    """The AR(1) nearest to all runs at once, each about its mean, by least squares; Ljung-Box on what it leaves."""
+    centred = [run - run.mean() for run in runs if len(run) > 1]
+    power = sum(float(run[:-1] @ run[:-1]) for run in centred)
+    if power == 0.0:
+        return FirstOrder(0.0, 0.0, 1.0)
+    kept = sum(float(run[1:] @ run[:-1]) for run in centred) / power
+    left = [run[1:] - kept * run[:-1] for run in centred]
+    statistic, freedom = _ljung_box(left, lags)
+    sigma = float(np.sqrt(np.mean(np.concatenate(left) ** 2)))
+    return FirstOrder(kept, sigma, float(stats.chi2.sf(statistic, freedom - 1)) if freedom > 1 else 1.0)
 
 
 def correlation_time(runs: Sequence[np.ndarray]) -> float:

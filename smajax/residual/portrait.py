@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from smajax.report.findings import Portrait
-from smajax.residual.noise_like import WHITE, correlation_time, whiteness_p_value
+from smajax.residual.noise_like import WHITE, correlation_time, first_order, whiteness_p_value
 from smajax.words import times_noise
 
 # A residual may miss the noise level by this share of its mean square and still be called noise: a noise sigma is
@@ -19,6 +19,11 @@ ERRORS, MOST_LEFT_OVER = 2.0, 0.1
 # A residual without memory of up to so many times the declared noise is noise that was declared too small. One that is
 # larger belongs to data that the model knows nothing of, such as shuffled ones.
 DECLARED_TOO_SMALL = 3.0
+# A noise that was estimated from neighbouring samples is its fast part alone. A residual that is the noise of a first-order
+# filter and nothing beyond is that noise with its slow part: what a model lacks has another memory, which a test on some
+# hundred samples sees at a trace of the noise's size. The filter may keep so much of the sample before, what it is fed is so
+# many times the estimate at most (1.6 times where it keeps nearly all), and so many independent samples have to be there.
+KEPT, FED, LEAST_INDEPENDENT = 0.95, 2.0, 50
 
 
 def phase_of(fraction: np.ndarray, temperature: np.ndarray, ambient: float) -> np.ndarray:
@@ -32,9 +37,12 @@ def phase_of(fraction: np.ndarray, temperature: np.ndarray, ambient: float) -> n
 
 
 def portrait(
-    residuals: Sequence[np.ndarray], states: Sequence[Mapping[str, np.ndarray]], noise_sigma: float
+    residuals: Sequence[np.ndarray],
+    states: Sequence[Mapping[str, np.ndarray]],
+    noise_sigma: float,
+    noise_given: bool = True,
 ) -> Portrait:
-    """Portrait of the fit runs' residuals (SI, one array of shape (n,) a run).
+    """Portrait of the fit runs' residuals (SI, one array of shape (n,) a run). `noise_given`: and not estimated.
 
     `states` gives, run by run, series of the model to hold the residual against; `temperature` and
     `martensite_fraction` are needed, others (inputs, stress, rates) are correlated as well.
@@ -63,6 +71,7 @@ def portrait(
         )
     ratio = rmse / noise_sigma
     white = p_value > WHITE
+    kept = 0.0 if noise_given else _kept(residuals, noise_sigma)
     return Portrait(
         rmse,
         noise_sigma,
@@ -72,13 +81,14 @@ def portrait(
         len(everything) / correlation_time(residuals),
         by_phase,
         correlation,
-        _sentences(ratio, white, by_phase, correlation),
+        _sentences(ratio, white, kept, by_phase, correlation),
+        kept,
     )
 
 
 def noise_like(found: Portrait) -> bool:
     """Nothing left to explain: no memory beyond chance, or no larger than the noise but for what its memory accounts for."""
-    return _is_noise(found.ratio, found.white, found.independent)
+    return found.kept > 0.0 or _is_noise(found.ratio, found.white, found.independent)
 
 
 def _is_noise(ratio: float, white: bool, independent: float) -> bool:
@@ -87,20 +97,35 @@ def _is_noise(ratio: float, white: bool, independent: float) -> bool:
     return excess <= min(max(LEFT_OVER, chance), MOST_LEFT_OVER) or (white and ratio < DECLARED_TOO_SMALL)
 
 
-def all_noise(residuals: Sequence[np.ndarray], noise_sigma: float) -> bool:
+def _kept(residuals: Sequence[np.ndarray], noise_sigma: float) -> float:
+    """Share of the sample before that a first-order filter keeps whose noise the residual is; 0 where it is none."""
+    found = first_order(residuals)
+    independent = sum(len(run) for run in residuals) / correlation_time(residuals)
+    enough = independent > LEAST_INDEPENDENT and found.p_value > WHITE
+    return found.kept if enough and 0.0 < found.kept < KEPT and found.sigma < FED * noise_sigma else 0.0
+
+
+def all_noise(residuals: Sequence[np.ndarray], noise_sigma: float, noise_given: bool = True) -> bool:
     """`noise_like` of residuals (SI, one array of shape (n,) a run) whose portrait nobody needs."""
     everything = np.concatenate(residuals)
     ratio = float(np.sqrt(np.mean(everything**2))) / noise_sigma
-    return _is_noise(ratio, whiteness_p_value(residuals) > WHITE, len(everything) / correlation_time(residuals))
+    independent = len(everything) / correlation_time(residuals)
+    plain = _is_noise(ratio, whiteness_p_value(residuals) > WHITE, independent)
+    return plain or (not noise_given and _kept(residuals, noise_sigma) > 0.0)
 
 
 def _sentences(
-    ratio: float, white: bool, by_phase: Mapping[str, Mapping[str, float]], correlation: Mapping[str, float]
+    ratio: float,
+    white: bool,
+    kept: float,
+    by_phase: Mapping[str, Mapping[str, float]],
+    correlation: Mapping[str, float],
 ) -> tuple[str, ...]:
-    told = [
-        f"The residual is {times_noise(ratio, 'the measurement noise')} and {'has no memory' if white else 'has a memory: one sample tells the next'}."
-    ]
-    if white:
+    memory = "has no memory" if white else "has a memory: one sample tells the next"
+    if kept > 0.0 and not white:
+        memory = f"has the memory of a first-order noise, which keeps {kept:.2f} of the sample before, and none beyond"
+    told = [f"The residual is {times_noise(ratio, 'the measurement noise')} and {memory}."]
+    if white or kept > 0.0:
         return tuple(told)
     worst = max(by_phase, key=lambda name: by_phase[name]["share_of_squared_error"])
     told.append(
