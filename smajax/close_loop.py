@@ -13,8 +13,9 @@ import numpy as np
 from smajax.attribution.bootstrap import bootstrapped
 from smajax.attribution.extent import extent_of
 from smajax.attribution.judging import FORETELLS, Evidence, Model, Search
+from smajax.attribution.lone_run import lone_runs
 from smajax.attribution.rivals import rivals
-from smajax.attribution.search import scores_at, search
+from smajax.attribution.search import fewer, scores_at, search
 from smajax.attribution.unknown import Lacking, in_place_of, unknown_terms
 from smajax.attribution.unknown_words import told_of
 from smajax.attribution.verdict import cannot_know, pooled, shown, summary, unexplained, verdict
@@ -40,6 +41,7 @@ from smajax.report.findings import (
     CoefficientFinding,
     EffectFinding,
     Findings,
+    LoneRun,
     ParameterFinding,
     Portrait,
     RunFinding,
@@ -49,6 +51,11 @@ from smajax.types import Trajectory
 
 SEED = 2004
 LOGGED = {"mass": "load_mass", "ambient_temperature": "ambient_temperature"}  # input channel -> what it replaces
+
+# Of an effect beside others: by so much the error on held-out runs may be larger with it than without it by chance.
+WORSE = 0.02
+_Compared = tuple[tuple[RunFinding, ...], Portrait, Portrait]
+_Refused = tuple[tuple[str, ...], float, float]  # effects, error on the held-out runs without and with them
 
 
 @dataclass(frozen=True)
@@ -120,6 +127,7 @@ def close_loop(
         kept,
         lambda value: shown(value, experiment.output_unit, experiment.output_name),
         progress,
+        experiment.outputs[0].noise_given,
         apart,
     )
     at_start = sensitivity(job.problem, start, job.unknowns)
@@ -141,14 +149,17 @@ def close_loop(
             setting.set_aside(final, why)
             final = first
 
-    # The held-out runs have had no part in anything before, and choose nothing here: they can only refuse.
-    compared = _compare(job, first, final)
-    without, with_it = (pooled(compared[0], "held-out", which) for which in ("before", "after"))
-    refused: tuple[tuple[str, ...], float, float] | None = None
-    if final.effects and with_it >= without:
-        setting.set_aside(final, f"error on the held-out runs {setting.shown(without)} -> {setting.shown(with_it)}")
-        refused, final = (final.effects, without, with_it), first
-        compared = _compare(job, first, final)
+    lone: tuple[LoneRun, ...] = ()
+    if not setting.is_noise(final.values):
+        names = [run.name for run in job.fit_runs]
+        lone = lone_runs(setting, first, names)
+        if final.effects and not any(one.noise for one in lone):
+            lone = lone_runs(setting, final, names) or lone
+        elif final.effects:
+            setting.set_aside(final, f"without {lone[0].run} what the base model leaves is noise")
+            final, lacking = first, None
+
+    final, compared, refused = _borne_out(job, setting, first, final)
 
     progress("standard errors and pictures", 0.0)
     before = _told(job, setting, first, start)
@@ -161,7 +172,8 @@ def close_loop(
     progress("standard errors and pictures", 1.0)
     answer = verdict(final.effects, portrait_after)
     if lacking is None:
-        lacking = unknown_terms(setting, final) if answer in ("partly explained", "not in the library") else Lacking()
+        more = answer in ("partly explained", "not in the library") and not any(one.noise for one in lone)
+        lacking = unknown_terms(setting, final) if more else Lacking()
     if lacking.terms and not setting.foretells(lacking.terms[0].left_out_after):
         lacking, aside = Lacking(), ()
     unknown = lacking.terms
@@ -183,6 +195,7 @@ def close_loop(
         _sizes_not_given(job),
         [one for one in after.parameters if not one.name.startswith(added) and _asks_for_more(one)],
         integration,
+        lone,
     )
     return Findings(
         experiment=experiment.name,
@@ -216,6 +229,7 @@ def close_loop(
         rounds=tuple(setting.rounds),
         rivals=mistaken,
         unknown=unknown,
+        lone_runs=lone,
         provenance=_provenance(experiment, kept, command, seed, clock.monotonic() - began),
     )
 
@@ -359,7 +373,7 @@ def _simulated(problem: Problem, values: np.ndarray, batch: RunBatch) -> Traject
     return simulate_batch(problem.system_at(jnp.asarray(values)), batch)
 
 
-def _compare(job: _Job, first: Model, final: Model) -> tuple[tuple[RunFinding, ...], Portrait, Portrait]:
+def _compare(job: _Job, first: Model, final: Model) -> _Compared:
     """Every run, held-out ones included, by both models; and the portraits of the fit runs' residuals."""
     experiment = job.experiment
     batch = pack(experiment.runs, experiment.step, parameter_values(job.problem.system))
@@ -399,11 +413,11 @@ def _compare(job: _Job, first: Model, final: Model) -> tuple[tuple[RunFinding, .
                 errors["after"],
             )
         )
-    sigma = experiment.noise_sigma
+    noise = experiment.noise_sigma, experiment.outputs[0].noise_given
     return (
         tuple(runs),
-        portrait(residuals["before"], states["before"], sigma),
-        portrait(residuals["after"], states["after"], sigma),
+        portrait(residuals["before"], states["before"], *noise),
+        portrait(residuals["after"], states["after"], *noise),
     )
 
 
@@ -425,6 +439,34 @@ def _integration_error(job: _Job, final: Model) -> float:
     change, mask = np.asarray(fine - coarse), np.asarray(batch.mask)
     centred = change - (job.experiment.offset * (change * mask).sum(1) / mask.sum(1))[:, None]
     return float(np.sqrt(((centred * mask) ** 2).sum(1) / mask.sum(1)).max())
+
+
+def _borne_out(job: _Job, setting: Search, first: Model, final: Model) -> tuple[Model, _Compared, _Refused | None]:
+    """What the held-out runs leave of `final`: (model, every run by it, what they refused).
+
+    They have had no part in anything before, and can only refuse: the effect that came last first, as long as with it their
+    error is larger than without it, or no smaller than the base model's. It may be larger by `WORSE` where others are left.
+    """
+
+    def held_out(compared: _Compared, which: str = "after") -> float:
+        return pooled(compared[0], "held-out", which)
+
+    compared = whole = _compare(job, first, final)
+    left = final
+    while left.effects:
+        rest = fewer(setting, left) if len(left.effects) > 1 else first
+        without = _compare(job, first, rest)
+        now = held_out(compared)
+        if not (now >= held_out(compared, "before") or now > (1.0 + WORSE) * held_out(without)):
+            break
+        left, compared = rest, without
+    gone = tuple(name for name in final.effects if name not in left.effects)
+    if not gone:
+        return left, compared, None
+    without_them, with_them = held_out(compared), held_out(whole)
+    told = f"error on the held-out runs {setting.shown(without_them)} without and {setting.shown(with_them)} with it"
+    setting.set_aside(final, told, gone)
+    return left, compared, (gone, without_them, with_them)
 
 
 def _series(run: Run, trajectory: Trajectory, index: int) -> dict[str, np.ndarray]:

@@ -13,23 +13,27 @@ from smajax.catalogue import CATALOGUE
 from smajax.close_loop import close_loop
 from smajax.experiment.load import load_experiment
 from smajax.experiment.record import Experiment
+from smajax.measured.noise import estimate_noise
 from studies.attribution_benchmark.cases import cases
 from studies.attribution_benchmark.rigs import show
 from studies.attribution_benchmark.write import write
 
 MEMORY = 0.8  # from one sample to the next
+LACKING = "coupon-thermal_expansion-10-02"
 
 
-def _coupon(folder: Path, seed: int, trend: float = 0.0) -> Experiment:
-    """A coupon by the independent generator that lacks nothing. `trend`: of the fit runs' readings over a run, in noises."""
-    true = write(next(case for case in cases() if case.name == "coupon-null-0-00"), folder)
-    experiment = load_experiment(folder / "coupon-null-0-00" / "experiment.toml", CATALOGUE)
+def _coupon(
+    folder: Path, seed: int, trend: float = 0.0, memory: float = MEMORY, name: str = "coupon-null-0-00"
+) -> Experiment:
+    """A coupon by the independent generator, with AR(1) noise. `trend`: of the fit runs' readings over a run, in noises."""
+    true = write(next(case for case in cases() if case.name == name), folder)
+    experiment = load_experiment(folder / name / "experiment.toml", CATALOGUE)
     random, sigma = np.random.default_rng(seed), experiment.noise_sigma
-    shown = {run.name: show(true.rig, true.wire, run, {}) for run in true.rig.runs(true.wire)}
+    shown = {run.name: show(true.rig, true.wire, run, true.effects) for run in true.rig.runs(true.wire)}
     runs = []
     for run in experiment.runs:
         drawn = random.normal(size=run.output.size + 200)
-        slow = sigma * np.sqrt(1.0 - MEMORY**2) * lfilter([1.0], [1.0, -MEMORY], drawn)[200:]
+        slow = sigma * np.sqrt(1.0 - memory**2) * lfilter([1.0], [1.0, -memory], drawn)[200:]
         if run.role == "fit":
             slow += trend * sigma * np.linspace(-0.5, 0.5, slow.size)
         else:
@@ -38,11 +42,38 @@ def _coupon(folder: Path, seed: int, trend: float = 0.0) -> Experiment:
     return dataclasses.replace(experiment, runs=tuple(runs))
 
 
+def _estimated(experiment: Experiment) -> Experiment:
+    """The same where nobody gave the noise: neighbouring samples, of which a noise with a memory shows too little."""
+    fit = [run.output for run in experiment.runs if run.role == "fit"]
+    sigma = float(np.median([estimate_noise(output, 0.0) for output in fit]))
+    (output,) = experiment.outputs
+    return dataclasses.replace(
+        experiment, outputs=(dataclasses.replace(output, noise_sigma=sigma, noise_given=False, noise_how="estimated"),)
+    )
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_a_noise_with_a_memory_gets_no_effect(seed: int, tmp_path: Path) -> None:
     findings = close_loop(_coupon(tmp_path, seed))
     assert not any(effect.added for effect in findings.effects)
     assert not any(term.named for term in findings.unknown)
+
+
+@pytest.mark.parametrize("memory", [0.6, 0.9])
+def test_a_noise_with_a_memory_that_nobody_gave_is_noise(memory: float, tmp_path: Path) -> None:
+    findings = close_loop(_estimated(_coupon(tmp_path, 0, memory=memory)))
+    assert findings.portrait_after.ratio > 1.5
+    assert findings.verdict == "adequate"
+    assert findings.portrait_after.kept == pytest.approx(memory, abs=0.05)
+    assert any("first-order filter" in line for line in findings.summary)
+
+
+@pytest.mark.slow  # a loop with one effect to find
+def test_what_is_missing_is_found_beside_a_noise_with_a_memory_that_nobody_gave(tmp_path: Path) -> None:
+    findings = close_loop(_estimated(_coupon(tmp_path, 0, memory=0.6, name=LACKING)))
+    assert [effect.name for effect in findings.effects if effect.added] == ["thermal_expansion"]
+    assert findings.verdict == "explained"
+    assert findings.portrait_before.kept == 0.0
 
 
 def test_what_the_held_out_runs_do_not_bear_out_is_not_named(tmp_path: Path) -> None:
@@ -54,3 +85,12 @@ def test_what_the_held_out_runs_do_not_bear_out_is_not_named(tmp_path: Path) -> 
     assert "not confirmed" in findings.summary[0]
     held_out = [run for run in findings.runs if run.role == "held-out"]
     assert all(run.rmse_after == run.rmse_before for run in held_out)
+
+
+def test_a_right_effect_outlives_its_wrong_companion(tmp_path: Path) -> None:
+    """The same drift beside an effect that is there: the held-out runs refuse the drift alone."""
+    findings = close_loop(_coupon(tmp_path, 0, trend=20.0, name=LACKING))
+    assert [effect.name for effect in findings.effects if effect.added] == ["thermal_expansion"]
+    assert "sensor drift would lower the error" in findings.summary[0].replace("Sensor", "sensor")
+    assert "not confirmed" in findings.summary[0]
+    assert findings.verdict == "partly explained"

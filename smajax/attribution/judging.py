@@ -95,9 +95,11 @@ class Search:
     kept: Kept
     shown: Callable[[float], str]  # an error in the unit that an engineer reads
     progress: Progress = quiet
+    noise_given: bool = True  # by the experiment file; else estimated
     apart: bool = False  # a program for each set of effects: pays where many experiments of one kind follow each other
     evidence: dict[str, Evidence] = field(default_factory=dict)
     rounds: list[Round] = field(default_factory=list)
+    path: list[Model] = field(default_factory=list)  # the models that were added to, the base model first
 
     def note(self, done: Round) -> None:
         """Keep a round and say what came of it."""
@@ -105,10 +107,10 @@ class Search:
         told = f"round {done.number}: {done.chosen or 'nothing added'}; {done.why}"
         self.progress(f"say: {told}", 1.0)
 
-    def set_aside(self, model: Model, why: str) -> None:
-        """Note a round in which all that was added goes."""
-        gone = " + ".join(model.effects)
-        tried = ((gone, model.left_out_rmse),)
+    def set_aside(self, model: Model, why: str, effects: Sequence[str] = ()) -> None:
+        """Note a round in which `effects` go, or all that was added."""
+        tried = ((" + ".join(model.effects), model.left_out_rmse),)
+        gone = " + ".join(effects or model.effects)
         self.note(Round(len(self.rounds) + 1, tried, f"without {gone}", f"set aside: {why}"))
 
     def free(self, effects: Sequence[str]) -> list[str]:
@@ -216,7 +218,11 @@ class Search:
     def is_noise(self, values: np.ndarray) -> bool:
         """Whether what a model leaves of the fit runs is measurement noise."""
         (misfit,) = misfits(self.problem, [values])
-        return all_noise(split_runs(misfit, np.asarray(self.problem.batch.mask)), float(self.problem.noise_sigma))
+        return self.all_noise(misfit, np.asarray(self.problem.batch.mask))
+
+    def all_noise(self, misfit: np.ndarray, mask: np.ndarray) -> bool:
+        """Whether a misfit (SI) is measurement noise, as far as `mask` goes, both (R, N)."""
+        return all_noise(split_runs(misfit, mask), float(self.problem.noise_sigma), self.noise_given)
 
     def rmse(self, misfit: np.ndarray) -> float:
         return float(np.sqrt((misfit**2).sum() / np.asarray(self.problem.batch.mask).sum()))

@@ -17,6 +17,7 @@ from scipy.stats import qmc
 from smajax.attribution.judging import PENALTY, Evidence, Fitted, Model, Search, Start, base_value
 from smajax.attribution.places import Looked, looked_at
 from smajax.attribution.screen import Score, screen, significant, switches
+from smajax.attribution.steady import kept_at_half_the_step
 from smajax.effects.library import LIBRARY
 from smajax.fit.box import Fit
 from smajax.report.findings import Round
@@ -25,6 +26,7 @@ SIGNIFICANT = 1e-3  # of the score tests of one round, counted together
 SINGLES, PAIRS = 8, 2  # refitted in a round
 BEHIND = 2.0  # times the best one's sum of squares: from the second round on a candidate farther behind is not judged
 MOST_ROUNDS = 6
+KEPT_AT_HALF_THE_STEP = 0.5  # share of its gain that an effect with which the load may jump has to keep
 PLACES = 32  # of the ranges of an effect that has valleys; a power of two, for Sobol's points
 FIRST, KEPT = 8, 4  # steps from each of them, before the worse ones are dropped, and that are carried to their end
 
@@ -151,17 +153,14 @@ def search(setting: Search, base: Fit) -> tuple[Model, Model]:
                 evidence.alone_rmse = float(problem.noise_sigma * np.sqrt(entry.cost / samples))
                 if problem.batch.runs > 1:
                     evidence.alone_left_out_rmse, evidence.base_left_out_rmse = entry.left_out_rmse, model.left_out_rmse
-        best, alike = simplest(setting, judged, model)
-        enough, why = setting.better(best, model)
+        best, alike, enough, why = taken_of(setting, judged, model)
 
-        def new(entry: Model, present: Model = model) -> str:
-            return " + ".join(name for name in entry.effects if name not in present.effects)
-
-        tried = tuple((new(entry), entry.left_out_rmse) for entry in judged)
-        ties = tuple(new(entry) for entry in alike) if enough else ()
-        setting.note(Round(number, tried, new(best) if enough else "", why, ties))
+        tried = tuple((added(entry, model), entry.left_out_rmse) for entry in judged)
+        ties = tuple(added(entry, model) for entry in alike) if enough else ()
+        setting.note(Round(number, tried, added(best, model) if enough else "", why, ties))
         if not enough:
             break
+        setting.path.append(model)
         model = best
     else:
         why = f"the search ends after {MOST_ROUNDS} rounds, whatever more there may be"
@@ -175,6 +174,26 @@ def refined(setting: Search, model: Model) -> Model:
     fits, _ = setting.fit(starts, "polishing the final model", enough=1e-8, hops=True)
     best = min(fits, key=lambda one: one.cost)
     return dataclasses.replace(model, values=best.values, cost=best.cost) if best.cost < model.cost else model
+
+
+def added(entry: Model, present: Model) -> str:
+    """The effects that `entry` has beside those of `present`."""
+    return " + ".join(name for name in entry.effects if name not in present.effects)
+
+
+def taken_of(setting: Search, judged: Sequence[Model], present: Model) -> tuple[Model, list[Model], bool, str]:
+    """(the model to go on with, those as good, whether it is enough, why): `simplest`, less what hangs on the step."""
+    left, hanging = list(judged), ""
+    while True:
+        best, alike = simplest(setting, left, present)
+        enough, why = setting.better(best, present)
+        kept = kept_at_half_the_step(setting, best, present) if enough else 1.0
+        if kept >= KEPT_AT_HALF_THE_STEP:
+            return best, alike, enough, hanging + why
+        hanging += f"{added(best, present)} keeps {max(kept, 0.0):.0%} of its gain at half the step and is not taken; "
+        left = [one for one in left if one is not best]
+        if not left:
+            return best, [], False, hanging.removesuffix("; ")
 
 
 def simplest(setting: Search, judged: Sequence[Model], present: Model) -> tuple[Model, list[Model]]:
@@ -205,6 +224,19 @@ def placed(score: Score, looked: Looked) -> Score:
     place = {name: one for effect in score.effects for name, one in looked.place.get(effect, {}).items()}
     looks = math.prod(looked.looks.get(effect, 1) for effect in score.effects)
     return dataclasses.replace(score, place=place, p_value=min(1.0, score.p_value * looks))
+
+
+def fewer(setting: Search, model: Model) -> Model:
+    """`model` without the effect that came last: as the search had it, or fitted anew."""
+    rest, names = model.effects[:-1], setting.problem.names
+    for one in setting.path:
+        if one.effects == rest:
+            return one
+    values = np.array(model.values)
+    for name in setting.coefficients(model.effects[-1]):
+        values[names.index(name)] = base_value(name)
+    (fit,), _ = setting.fit([Start(rest, values)], "taking the last effect out again", hops=True)
+    return setting.judged([Fitted(rest, fit)])[0]
 
 
 def pruned(setting: Search, model: Model) -> Model:

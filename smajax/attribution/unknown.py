@@ -64,7 +64,7 @@ def with_terms(setting: Search, final: Model) -> tuple[Terms, np.ndarray, Sought
     problem = Problem.build(whole, plain.batch, plain.noise_sigma, plain.offset, known=known)
     bounds = {**setting.bounds, **dict.fromkeys(own, (-1.0, 1.0))}
     unknowns = tuple(setting.free(final.effects))
-    search = Terms(problem, unknowns, bounds, names, setting.kept, setting.shown, setting.progress)
+    search = Terms(problem, unknowns, bounds, names, setting.kept, setting.shown, setting.progress, setting.noise_given)
     return search, problem.start_values(), found
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from smajax.experiment.record import Experiment
 from smajax.report.display import digits, display
-from smajax.report.findings import EffectFinding, ParameterFinding, Portrait, Rival, Round, RunFinding, Verdict
+from smajax.report.findings import EffectFinding, LoneRun, ParameterFinding, Portrait, Rival, Round, RunFinding, Verdict
 from smajax.residual.portrait import noise_like
 from smajax.words import and_listed
 
@@ -59,6 +59,7 @@ def summary(
     sizes: Sequence[str] = (),
     held: Sequence[ParameterFinding] = (),
     integration: float = 0.0,
+    lone: Sequence[LoneRun] = (),
 ) -> tuple[str, ...]:
     """The verdict in sentences; `tried` is the number of candidate effects that were looked at.
     `aside`: those that were added and gave way to one unknown term. `foretold`: share of the motion in left-out runs that
@@ -66,7 +67,7 @@ def summary(
     confirm, with the error there without and with them. `at_bound`: coefficients of what was added that end at a bound.
     `likelier`: rivals that left-out runs prefer to what was added. `sizes`: those of the bench that the experiment never
     gives, with the presets' values. `held`: parameters of the base model that end at a bound. `integration` (SI of the output): by
-    how much halving the step changes what the final model gives.
+    how much halving the step changes what the final model gives. `lone`: fit runs that the others do not go with.
     """
     unit, name = experiment.output_unit, experiment.output_name
     added = [effect for effect in effects if effect.added]
@@ -94,11 +95,25 @@ def summary(
             f"and with none of the {tried} candidate effects that were tried enough for it to mean anything: none is named. Do "
             "inputs and outputs belong together, and are the samples in order?"
         )
-    told = [opening[answer]]
+    if refused is not None and not added:
+        opening["not in the library"] = (
+            f"Something is missing: none of the {tried} candidate effects that were tried accounts for it in the fit runs and "
+            "is borne out by those that were held out."
+        )
+    alone = [one for one in lone if one.noise and not one.effects]
+    if alone and not added:
+        opening["not in the library"] = _in_one_run(alone, runs, experiment)
+    told = [opening[answer], *([] if alone and not added else _pulls(lone, runs, experiment))]
     if answer not in ("adequate", "explained") and not after.white and after.ratio < LITTLE:
         told.append(
             f"What is left is no more than {after.ratio:.2f} times the noise: noise that is larger than said, or has a memory, looks the "
             "same. Look at a stretch of the log in which nothing moves before you look for physics."
+        )
+    if after.kept > 0.0 and not after.white and after.ratio > WRONG_NOISE:
+        told.append(
+            f"Mind: what is left is {after.ratio:.2f} times the noise that was estimated from neighbouring samples, and is the noise of a "
+            f"first-order filter that keeps {after.kept:.2f} of the sample before, and nothing beyond. It is taken as the sensor's: the "
+            "slow part of such a noise does not show in neighbours. Give the noise as a number if you know it to be smaller."
         )
     told += _faint(answer, effects)
     told += _of_the_step(experiment, runs, integration)
@@ -157,6 +172,42 @@ def summary(
             "smaller than it may hide. Declare it smaller, or as 'estimate', and run again."
         )
     return tuple(told)
+
+
+def _in_one_run(lone: Sequence[LoneRun], runs: Sequence[RunFinding], experiment: Experiment) -> str:
+    """The opening where without one run the base model is complete."""
+    first = lone[0]
+    off = shown(first.foretold, experiment.output_unit, experiment.output_name)
+    return (
+        f"Something is missing or wrong, and in one run alone: without {' or without '.join(one.run for one in lone)} what the base "
+        f"model leaves of the other {_others(runs)} fit runs is noise, and by these {first.run} is foretold {off} off, "
+        f"{first.foretold / experiment.noise_sigma:.1f} times the noise. {_look_at(first)}"
+    )
+
+
+def _pulls(lone: Sequence[LoneRun], runs: Sequence[RunFinding], experiment: Experiment) -> list[str]:
+    """A run that the others do not go with, beside a verdict that is about more than it."""
+    if not lone:
+        return []
+    first, unit, name = lone[0], experiment.output_unit, experiment.output_name
+    model = "the extended model" if first.effects else "the base model"
+    left = ", which is noise" if first.noise else ""
+    return [
+        f"Mind: {first.run} pulls against the others. Fitted without it, the error of {model} on the other {_others(runs)} fit runs "
+        f"falls from {shown(first.others_with, unit, name)} to {shown(first.others_without, unit, name)}{left}. {_look_at(first)}"
+    ]
+
+
+def _others(runs: Sequence[RunFinding]) -> int:
+    return sum(run.role == "fit" for run in runs) - 1
+
+
+def _look_at(lone: LoneRun) -> str:
+    return (
+        f"{lone.run} may not belong to the others (another wire, another day, another run's readings, an input that was not as "
+        'logged), or it alone shows what the model lacks. Look at it first; give it role = "held-out" and run again to judge '
+        "the others without it."
+    )
 
 
 def _faint(answer: Verdict, effects: Sequence[EffectFinding]) -> list[str]:

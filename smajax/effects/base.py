@@ -47,6 +47,9 @@ class AbstractEffect(eqx.Module):
     switches: ClassVar[tuple[str, ...]]
     # Whether it is a matter of seconds: it means nothing where the samples of a log have no times.
     needs_time: ClassVar[bool] = False
+    # Whether the load may stick and jump with it: then what a fit gains by it may be the integration's
+    # (`attribution.steady`).
+    jumps: ClassVar[bool] = False
     # Where a refit begins, per coefficient: off the base value, because a coefficient that starts on its bound at
     # zero stays there.
     starts: ClassVar[dict[str, float]]

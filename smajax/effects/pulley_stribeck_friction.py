@@ -39,6 +39,7 @@ class PulleyStribeckFriction(AbstractEffect):
         "every change of direction and jumps when it starts."
     )
     switches: ClassVar[tuple[str, ...]] = ("share",)
+    jumps: ClassVar[bool] = True
     starts: ClassVar[dict[str, float]] = {"share": 0.02, "sliding": 0.5, "speed": 5e-3, "bend": PRESLIDING}
 
     @classmethod

@@ -56,6 +56,7 @@ class StribeckFriction(AbstractEffect):
         "direction, jumps when it starts, and may go on in jerks."
     )
     switches: ClassVar[tuple[str, ...]] = ("limit",)
+    jumps: ClassVar[bool] = True
     starts: ClassVar[dict[str, float]] = {"limit": 0.1, "sliding": 0.5, "speed": 5e-3, "bend": PRESLIDING}
 
     @classmethod

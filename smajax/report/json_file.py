@@ -146,6 +146,7 @@ def findings_to_json(findings: Findings) -> dict[str, Any]:
             for entry in findings.rounds
         ],
         "rivals": [dataclasses.asdict(rival) for rival in findings.rivals],
+        "lone_runs": [dataclasses.asdict(one) for one in findings.lone_runs],
         "unknown": [_unknown(term) for term in findings.unknown],
         "unexplained": findings.unexplained,
         "cannot_know": findings.cannot_know,
