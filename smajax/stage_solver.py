@@ -127,7 +127,8 @@ def _moves(system: System, change: Sequence[Scalar], tolerance: float) -> Bool[A
     """Whether any unknown changes by more than this share of 1 C, 1 % strain, 1e-4 E of the softer phase, xi in full."""
     load = system.load
     assert isinstance(load, AbstractMovingLoad)
-    softer = jnp.minimum(*(young_modulus(system.wire, jnp.full_like(change[0], phase)) for phase in (0.0, 1.0)))
+    phases = (jnp.full_like(change[0], phase) for phase in (0.0, 1.0))
+    softer = jnp.minimum(*(young_modulus(system.wire, phase, system.effects) for phase in phases))
     scales: list[Scalar | float] = [1.0, 0.01 / load.contraction(system.wire), 1e-4 * softer, 1.0]
     # What is no number does not move: it stays none, and must not keep the others.
     return reduce(operator.or_, [jnp.abs(one) > tolerance * scale for one, scale in zip(change, scales, strict=True)])

@@ -134,7 +134,9 @@ def _stretch(system: System, temperature: Scalar, stress: Scalar) -> Scalar:
     def series(at: Scalar) -> Scalar | float:
         return sum(effect.strain(system.wire, temperature, at, fraction, fraction) for effect in straining)
 
-    return stress / young_modulus(system.wire, fraction) + series(stress) - series(jnp.zeros_like(stress))
+    return (
+        stress / young_modulus(system.wire, fraction, system.effects) + series(stress) - series(jnp.zeros_like(stress))
+    )
 
 
 def initial_state(system: System, inputs: Inputs) -> State:

@@ -15,7 +15,7 @@ from smajax.effects.base import Extent
 from smajax.effects.library import LIBRARY
 from smajax.extended import extended
 from smajax.lanes.evaluate import evaluator
-from smajax.parameters import get_parameters, parameters, set_vector
+from smajax.parameters import get_parameters, parameters, set_parameters, set_vector
 from smajax.presets import build
 from smajax.simulate import simulate
 from smajax.system import System
@@ -28,6 +28,11 @@ RIGS: dict[str, tuple[System, str, float]] = {
     "dead_weight": (build("flexinol_table_3_2", "dead_weight", "voltage"), "voltage", 7.4),
     "bias_spring": (build("flexinol_ht_500um", "bias_spring", "duty"), "duty", 0.35),
     "arm": (build("niti_table_3_1", "arm", "amplified_voltage"), "voltage", 7.0),
+    "one modulus": (
+        set_parameters(build("flexinol_table_3_2", "dead_weight", "voltage"), {"young_modulus_austenite": 28e9}),
+        "voltage",
+        7.4,
+    ),
 }
 # Those of kinetics, constitutive law and sensor are together in one model a rig in `test_effects_material`.
 HERE = sorted(set(LIBRARY) - {name for *_, names in ELSEWHERE.values() for name in names})

@@ -182,6 +182,10 @@ class AbstractEffect(eqx.Module):
         """Strain beside eps_L xi_s and the elastic part, a function of state, -; `detwinned` is xi_s."""
         return 0.0
 
+    def modulus_change(self, wire: Wire, fraction: Scalar) -> Scalar | float:
+        """Added to Young's modulus of the base model, Pa; the sum must stay above zero."""
+        return 0.0
+
     def friction_limit(self) -> Scalar | float:
         """Largest friction of the load at rest, N (N m for an arm)."""
         return 0.0

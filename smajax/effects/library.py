@@ -26,6 +26,7 @@ from smajax.effects.load_shift import LoadShift
 from smajax.effects.loose_start import LooseStart
 from smajax.effects.minor_loops import MinorLoops
 from smajax.effects.nonlinear_spring import NonlinearSpring
+from smajax.effects.phase_modulus import PhaseModulus
 from smajax.effects.phase_resistance import PhaseResistance
 from smajax.effects.phase_specific_heat import PhaseSpecificHeat
 from smajax.effects.pulley_friction import PulleyFriction
@@ -95,6 +96,7 @@ _OWN: dict[str, type[AbstractEffect]] = {
         MinorLoops,
         LaggingTransformation,
         DriftingTemperatures,
+        PhaseModulus,
         ThermalExpansion,
         StressDependentStrain,
         TwoWayMemory,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import equinox as eqx
 import jax.numpy as jnp
 
-from smajax.effects.base import AbstractEffect
+from smajax.effects.base import AbstractEffect, having
 from smajax.parameters import parameter
 from smajax.types import Scalar, WireState
 from smajax.wire.kept import kept_after
@@ -49,7 +49,7 @@ class RateForm(AbstractForm):
         grown = transformation_strain(wire, middle) * (new.detwinned_fraction - old.detwinned_fraction)
         grown = grown + effect_strain(wire, effects, new) - effect_strain(wire, effects, old)
         thermal = law.thermal_modulus * (new.temperature - old.temperature)
-        return old.strain + grown, old.stress + thermal, young_modulus(wire, middle)
+        return old.strain + grown, old.stress + thermal, young_modulus(wire, middle, effects)
 
 
 class IntegratedForm(AbstractForm):
@@ -68,9 +68,9 @@ class IntegratedForm(AbstractForm):
             grown = transformation_strain(wire, at.martensite_fraction) * at.detwinned_fraction
             return grown + effect_strain(wire, effects, at)
 
-        elastic = (old.stress - thermal(old)) / young_modulus(wire, old.martensite_fraction)
+        elastic = (old.stress - thermal(old)) / young_modulus(wire, old.martensite_fraction, effects)
         strain = old.strain - elastic + own(new) - own(old)
-        return strain, thermal(new), young_modulus(wire, new.martensite_fraction)
+        return strain, thermal(new), young_modulus(wire, new.martensite_fraction, effects)
 
 
 class Constitutive(eqx.Module):
@@ -86,10 +86,11 @@ class Constitutive(eqx.Module):
     form: AbstractForm = RateForm()
 
 
-def young_modulus(wire: Wire, fraction: Scalar) -> Scalar:
-    r"""$E = E_A + \xi (E_M - E_A)$, Pa (Elahinia 2004, eq. 3.15), or what the law's stiffness says instead."""
+def young_modulus(wire: Wire, fraction: Scalar, effects: Sequence[AbstractEffect] = ()) -> Scalar:
+    r"""$E = E_A + \xi (E_M - E_A)$, Pa (Elahinia 2004, eq. 3.15), or what the law's stiffness says instead, and the effects' share."""
     law = wire.constitutive
-    return law.stiffness.young_modulus(law.young_modulus_austenite, law.young_modulus_martensite, fraction)
+    own = law.stiffness.young_modulus(law.young_modulus_austenite, law.young_modulus_martensite, fraction)
+    return own + sum(effect.modulus_change(wire, fraction) for effect in having(effects, "modulus_change"))
 
 
 def transformation_strain(wire: Wire, fraction: Scalar) -> Scalar:
@@ -148,7 +149,7 @@ def stress_at(
     # stress that asks for itself lies between zero and `asked(0)`.
     zero = jnp.zeros_like(stress)
     high = asked(zero)
-    return root(lambda guess: guess - asked(guess), high, zero, high, young_modulus(wire, xi))
+    return root(lambda guess: guess - asked(guess), high, zero, high, young_modulus(wire, xi, effects))
 
 
 def strain_at(
