@@ -74,6 +74,7 @@ def test_it_is_found_where_the_experiment_has_one_modulus(tmp_path: Path) -> Non
     (found,) = [effect for effect in findings.effects if effect.added]
     assert found.name == "phase_modulus"
     contrast = found.coefficients["contrast"]
+    assert contrast.standard_error is not None
     assert abs(contrast.value - CONTRAST) < 3.0 * contrast.standard_error
     assert contrast.standard_error < 0.1
     held_out = [run for run in findings.runs if run.role == "held-out"]
