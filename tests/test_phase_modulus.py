@@ -33,7 +33,7 @@ def _moduli(system: System, austenite: float) -> System:
 
 
 def _constitutive(system: System, **changed: object) -> System:
-    law = dataclasses.replace(system.wire.constitutive, **changed)  # type: ignore[arg-type]
+    law = dataclasses.replace(system.wire.constitutive, **changed)
     return dataclasses.replace(system, wire=dataclasses.replace(system.wire, constitutive=law))
 
 
