@@ -65,6 +65,7 @@ class _Job:
     experiment: Experiment
     fit_runs: tuple[Run, ...]
     problem: Problem
+    held_out: RunBatch | None
     unknowns: tuple[str, ...]
     bounds: dict[str, tuple[float, float]]
     candidates: tuple[str, ...]
@@ -89,7 +90,9 @@ def _job(experiment: Experiment) -> _Job:
     bounds = {entry.name: (entry.low, entry.high) for entry in parameters(full).values()}
     bounds |= {f"{name}.{own}": one for name in names for own, one in LIBRARY[name].spans(extent).items()}
     bounds |= {unknown.name: (unknown.low, unknown.high) for unknown in experiment.unknowns}
-    return _Job(experiment, runs, problem, tuple(u.name for u in experiment.unknowns), bounds, names)
+    others = tuple(run for run in experiment.runs if run.role != "fit")
+    held_out = pack(others, experiment.step, parameter_values(full)) if others else None
+    return _Job(experiment, runs, problem, held_out, tuple(u.name for u in experiment.unknowns), bounds, names)
 
 
 def close_loop(
@@ -128,6 +131,7 @@ def close_loop(
         lambda value: shown(value, experiment.output_unit, experiment.output_name),
         progress,
         experiment.outputs[0].noise_given,
+        job.held_out,
         apart,
     )
     at_start = sensitivity(job.problem, start, job.unknowns)

@@ -217,6 +217,25 @@ def test_effects_that_explain_less_than_one_unknown_function_give_way_to_it(shar
         assert found.model.left_out_rmse < 1.1 * NOISE
 
 
+@pytest.mark.parametrize("there", [True, False], ids=["there too", "another bench"])
+def test_held_out_runs_bear_out_a_term_or_refuse_it(there: bool) -> None:
+    """Of a bent scale: a held-out run that was read on it, and one that was not."""
+    setting, first = _setting(_BentScale.base())
+    batch = setting.problem.batch
+    plain = simulate_batch(setting.problem.system_at(jnp.asarray(first.values)), batch).reading
+    setting.held_out = dataclasses.replace(batch, output=batch.output if there else plain)
+    terms = unknown_terms(setting, first).terms
+    best = terms[0]
+    assert best.equation == "sensor"
+    assert best.named == there
+    assert best.held_out_before is not None
+    assert best.held_out_after is not None
+    assert (best.held_out_after < best.held_out_before) == there
+    told = told_of(terms, lambda value: f"{1e3 * value:.2g} mm")[0]
+    assert ("it lives in the sensor equation" in told and "on those held out" in told) == there
+    assert ("the held-out runs do not bear it out" in told) != there
+
+
 def test_where_nothing_is_missing_no_term_is_better_than_none() -> None:
     terms = unknown_terms(*_setting()).terms
     assert terms
@@ -270,7 +289,9 @@ def _told(named: bool, *alike: str) -> tuple[str, ...]:
         said = (of.symbol, of.state, of.state_unit, of.unit)
         arrays = (empty, empty, empty, empty, empty, empty)
         others = alike if first else ()
-        return UnknownTerm(name, of.title, of.equation, *said, named and first, others, "", 0.5, 2.0, 1.0, *arrays, ())
+        return UnknownTerm(
+            name, of.title, of.equation, *said, named and first, others, "", 0.5, 2.0, 1.0, None, None, *arrays, ()
+        )
 
     names = ("unknown_loss_of_temperature", "unknown_heat_of_fraction", "unknown_reading_of_time")
     return told_of([term(name, k == 0) for k, name in enumerate(names)], str)

@@ -21,6 +21,7 @@ from smajax.attribution.screen import Score, scaled, switches
 from smajax.effects.base import Extent
 from smajax.effects.every import EVERY
 from smajax.effects.library import LIBRARY
+from smajax.fit.batch import RunBatch
 from smajax.fit.box import MOST_STEPS, Fit, fit_in_box
 from smajax.fit.kept import Kept
 from smajax.fit.problem import Problem
@@ -96,6 +97,7 @@ class Search:
     shown: Callable[[float], str]  # an error in the unit that an engineer reads
     progress: Progress = quiet
     noise_given: bool = True  # by the experiment file; else estimated
+    held_out: RunBatch | None = None  # which choose nothing, and refuse an unknown term in the end
     apart: bool = False  # a program for each set of effects: pays where many experiments of one kind follow each other
     evidence: dict[str, Evidence] = field(default_factory=dict)
     rounds: list[Round] = field(default_factory=list)

@@ -2,7 +2,7 @@
 
 Each term (`smajax.unknown.terms`) is a smooth function of one state. All are screened by the score test at the final
 model of the search; the best of each equation are refitted together with the model's parameters and judged as effects
-are, on runs left out. What is learnt is a function: drawn over the states that the runs went through, and compared with
+are, on runs left out. The held-out runs can refuse the best. What is learnt is a function: drawn over the states that the runs went through, and compared with
 simple formulas.
 """
 
@@ -64,7 +64,17 @@ def with_terms(setting: Search, final: Model) -> tuple[Terms, np.ndarray, Sought
     problem = Problem.build(whole, plain.batch, plain.noise_sigma, plain.offset, known=known)
     bounds = {**setting.bounds, **dict.fromkeys(own, (-1.0, 1.0))}
     unknowns = tuple(setting.free(final.effects))
-    search = Terms(problem, unknowns, bounds, names, setting.kept, setting.shown, setting.progress, setting.noise_given)
+    search = Terms(
+        problem,
+        unknowns,
+        bounds,
+        names,
+        setting.kept,
+        setting.shown,
+        setting.progress,
+        setting.noise_given,
+        setting.held_out,
+    )
     return search, problem.start_values(), found
 
 
@@ -96,7 +106,7 @@ def unknown_terms(setting: Search, final: Model) -> Lacking:
     """An unknown term in each equation in turn, beside `final`.
 
     The first is `named` when it foretells left-out runs better than the final model does, by `Search.better` and `APART`
-    standard errors. Terms that do better than none, too, and that it is not as far ahead of, stand in `alike`.
+    standard errors, and the held-out runs better at all. Terms that do better than none, too, and that it is not as far ahead of, stand in `alike`.
     """
     search, values, found = with_terms(setting, final)
     if not search.candidates:
@@ -115,6 +125,12 @@ def unknown_terms(setting: Search, final: Model) -> Lacking:
     enough, why = search.better(best, present, APART)
     # One run fits too well to name anything: there is none to foretell.
     enough = enough and len(present.left_out) > 1
+    borne_out = _on_held_out(search, present, best) if enough and search.held_out is not None else None
+    if borne_out is not None and borne_out[1] >= borne_out[0]:
+        enough, why = (
+            False,
+            f"{why}; but on the held-out runs {search.shown(borne_out[0])} -> {search.shown(borne_out[1])}",
+        )
     rivals = [
         model
         for model in judged[1:]
@@ -126,8 +142,20 @@ def unknown_terms(setting: Search, final: Model) -> Lacking:
         ahead = model is best and enough
         alike = tuple(rival.effects[0] for rival in rivals) if ahead else ()
         said = why if model is best else ""
-        told.append(_learnt(search, found, model, present, gains[model.effects], ahead, alike, said))
+        learnt = _learnt(search, found, model, present, gains[model.effects], ahead, alike, said)
+        if model is best and borne_out is not None:
+            learnt = dataclasses.replace(learnt, held_out_before=borne_out[0], held_out_after=borne_out[1])
+        told.append(learnt)
     return Lacking(tuple(told), best if enough else None)
+
+
+def _on_held_out(search: Terms, *models: Model) -> list[float]:
+    """Rms error of each model on the held-out runs, SI."""
+    problem, batch = search.problem, search.held_out
+    assert batch is not None
+    there = Problem.build(problem.system, batch, problem.noise_sigma, problem.offset)
+    found = misfits(there, [model.values for model in models])
+    return [float(np.sqrt((misfit**2).sum() / np.asarray(batch.mask).sum())) for misfit in found]
 
 
 def in_place_of(setting: Search, first: Model, final: Model) -> Lacking | None:
@@ -221,6 +249,8 @@ def _learnt(
         score_gain=gain,
         left_out_before=present.left_out_rmse,
         left_out_after=model.left_out_rmse,
+        held_out_before=None,
+        held_out_after=None,
         at=low + width * grid,
         values=scale * basis @ at,
         error=error,

@@ -14,12 +14,19 @@ def told_of(terms: Sequence[UnknownTerm], shown: Callable[[float], str]) -> tupl
     if not terms:
         return ()
     best = terms[0]
+    if not best.named and best.held_out_before is not None:
+        return (
+            "Nor do these runs say in which equation it is missing: of the smooth unknown functions of one state that were put "
+            f"into each in turn {best.title} foretells runs left out best, and the held-out runs do not bear it out: {best.why}.",
+        )
     if not best.named:
         return (
             "Nor do these runs say in which equation it is missing: of the smooth unknown functions of one state that were "
             f"put into each in turn none is better beyond chance. The nearest is {best.title}: {best.why}.",
         )
     brought = f"error on runs left out {shown(best.left_out_before)} before, {shown(best.left_out_after)} with it"
+    if best.held_out_before is not None and best.held_out_after is not None:
+        brought += f"; on those held out {shown(best.held_out_before)} and {shown(best.held_out_after)}"
     others = [term for term in terms if term.name in best.alike]
     elsewhere = list(dict.fromkeys(term.equation for term in others if term.equation != best.equation))
     if elsewhere:

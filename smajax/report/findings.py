@@ -142,12 +142,14 @@ class UnknownTerm:
     state: str  # in words
     state_unit: str
     unit: str  # of the function
-    named: bool  # the one that foretells left-out runs best, better than the model without it beyond chance
+    named: bool  # the one that foretells left-out runs best, better than the model without it beyond chance, and held-out ones better
     alike: tuple[str, ...]  # terms that left-out runs cannot tell from the named one
     why: str
     score_gain: float
     left_out_before: float
     left_out_after: float
+    held_out_before: float | None  # on the held-out runs, where the term was asked for that
+    held_out_after: float | None
     at: np.ndarray  # states, (points,)
     values: np.ndarray  # the function there
     error: np.ndarray  # its standard error there

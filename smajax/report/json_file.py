@@ -97,6 +97,8 @@ def _unknown(term: UnknownTerm) -> dict[str, Any]:
         "score_gain": term.score_gain,
         "leave_one_out_rmse_without": term.left_out_before,
         "leave_one_out_rmse": term.left_out_after,
+        "held_out_rmse_without": term.held_out_before,
+        "held_out_rmse": term.held_out_after,
         "function": {
             "of": term.symbol,
             "state": term.state,
