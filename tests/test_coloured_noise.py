@@ -59,7 +59,7 @@ def test_a_noise_with_a_memory_gets_no_effect(seed: int, tmp_path: Path) -> None
     assert not any(term.named for term in findings.unknown)
 
 
-@pytest.mark.parametrize("memory", [0.6, 0.9])
+@pytest.mark.parametrize("memory", [pytest.param(0.6, marks=pytest.mark.slow), 0.9])
 def test_a_noise_with_a_memory_that_nobody_gave_is_noise(memory: float, tmp_path: Path) -> None:
     findings = close_loop(_estimated(_coupon(tmp_path, 0, memory=memory)))
     assert findings.portrait_after.ratio > 1.5
