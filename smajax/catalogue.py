@@ -12,7 +12,7 @@ from smajax.experiment.catalogue import Catalogue, ModelDescription, ParameterIn
 from smajax.extended import extended
 from smajax.load.coupon import AbstractCoupon
 from smajax.measured.names import listed
-from smajax.parameters import parameters, set_parameters
+from smajax.parameters import parameter_values, parameters, set_parameters
 from smajax.presets import DRIVES, LOADS, WIRES, build
 from smajax.sensors import sensors_of
 from smajax.system import System, heating_power
@@ -37,9 +37,11 @@ def describe(wire: str, load: str, drive: str, law: str = "") -> ModelDescriptio
     check_together(system, load, drive)
     # An effect is part of the base model when the experiment names a parameter of it.
     whole = extended(system, candidates(system, None, ()))
+    values = parameter_values(system)
     return ModelDescription(
         parameters={
-            entry.name: ParameterInfo(entry.unit, entry.low, entry.high) for entry in parameters(whole).values()
+            entry.name: ParameterInfo(entry.unit, entry.low, entry.high, values.get(entry.name))
+            for entry in parameters(whole).values()
         },
         inputs_required=system.load.inputs_required | system.drive.inputs_required,
         inputs_optional=system.load.inputs_optional | system.drive.inputs_optional | {"ambient_temperature"},

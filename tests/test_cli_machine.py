@@ -156,6 +156,50 @@ def test_the_other_load_can_be_asked_for_and_a_wrong_one_is_refused(tmp_path: Pa
     assert not (tmp_path / "f.toml").exists()
 
 
+def _angle_log(path: Path) -> Path:
+    rows = [f"{k / 10},{5.0 * (k % 20 > 9)},{30.0 + 20.0 * np.sin(k / 9)}" for k in range(200)]
+    path.write_text("\n".join(["time [s],U [V],angle [deg]", *rows]))
+    return path
+
+
+def test_the_boxes_are_those_of_the_wire_that_is_asked_for(tmp_path: Path) -> None:
+    log, out = str(_angle_log(tmp_path / "log.csv")), tmp_path / "e.toml"
+    chosen = ["--wire", "flexinol_table_3_2", "--drive", "amplified_voltage"]
+    told = run.invoke(app, ["new-experiment", log, *chosen, "--out", str(out)])
+    assert told.exit_code == 0, told.output
+    assert "as asked for: wire and drive; the rest is a guess" in told.output
+    loaded = load_experiment(out, CATALOGUE)
+    assert (loaded.wire, loaded.load, loaded.drive) == ("flexinol_table_3_2", "arm", "amplified_voltage")
+    boxes = {one.name: one for one in loaded.unknowns}
+    assert boxes["specific_heat"].start == 322.0
+    assert not any("box" in one for one in loaded.warnings)
+
+
+def test_boxes_that_stay_when_the_wire_is_changed_are_told(tmp_path: Path) -> None:
+    """With the value, the box and the command that writes others."""
+    text = begun([_angle_log(tmp_path / "log.csv")], tmp_path / "e.toml").text
+    (tmp_path / "e.toml").write_text(text.replace("niti_table_3_1", "flexinol_table_3_2"))
+    (told,) = [one for one in load_experiment(tmp_path / "e.toml", CATALOGUE).warnings if "box" in one]
+    assert "outside the box of specific_heat = 322 J/(kg K) (box: 418 to 2510)" in told
+    assert "`smajax new-experiment LOG --wire flexinol_table_3_2` writes its own" in told
+
+
+@pytest.mark.parametrize(
+    ("chosen", "words"),
+    [
+        (["--wire", "flexinol"], "there is no wire 'flexinol'; did you mean 'flexinol_"),
+        (["--drive", "amplified"], "there is no drive 'amplified'; did you mean 'amplified_voltage'?"),
+        (["--drive", "none"], "a coupon's temperature is prescribed"),
+    ],
+)
+def test_presets_that_cannot_be_asked_for_are_refused(tmp_path: Path, chosen: list[str], words: str) -> None:
+    log = str(_angle_log(tmp_path / "log.csv"))
+    refused = run.invoke(app, ["new-experiment", log, *chosen, "--out", str(tmp_path / "e.toml")])
+    assert refused.exit_code != 0
+    assert words in refused.output + str(refused.exception)
+    assert not (tmp_path / "e.toml").exists()
+
+
 def _block(path: Path, name: str, every: float, values: np.ndarray) -> None:
     """A Simulink log of one signal, as a "Structure with time"."""
     time = every * np.arange(values.size)

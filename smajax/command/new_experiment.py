@@ -25,6 +25,15 @@ def new_experiment(
             help="of a log with a position: dead_weight (default) or bias_spring", autocompletion=complete.loads
         ),
     ] = "",
+    wire: Annotated[
+        str, typer.Option(help="of `smajax presets`; the bounds are around its values", autocompletion=complete.wires)
+    ] = "",
+    drive: Annotated[
+        str,
+        typer.Option(
+            help="of `smajax presets`; takes the input channels that it needs", autocompletion=complete.drives
+        ),
+    ] = "",
     overwrite: Annotated[bool, typer.Option("--overwrite", help="write over a file that is there")] = False,
     json_out: Json = False,
 ) -> None:
@@ -47,7 +56,7 @@ def new_experiment(
     from smajax.experiment.template import begun
     from smajax.report.files import replace
 
-    guessed = begun(files, out, title, load)
+    guessed = begun(files, out, title, load, wire, drive)
     replace(out, guessed.text)
     try:
         warnings, why = list(load_experiment(out, CATALOGUE).warnings), ""

@@ -30,11 +30,15 @@ WIRE_SIZES = ("wire_length", "wire_diameter")  # what a ruler tells of the wire;
 
 @dataclass(frozen=True)
 class ParameterInfo:
-    """Unit of a parameter (the program's own: SI, degC, rad) and the widest values that make physical sense."""
+    """Unit of a parameter (the program's own: SI, degC, rad) and the widest values that make physical sense.
+
+    preset: what the presets have for it; None of an effect, whose base value says only that it is not there.
+    """
 
     unit: str
     low: float
     high: float
+    preset: float | None = None
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ from smajax.experiment.plausibility import (
 from smajax.experiment.record import Experiment, Output, Unknown
 from smajax.experiment.schema import ExperimentFile, read_schema
 from smajax.experiment.signals import Reading, ReadRun, read_run
-from smajax.experiment.unknowns import given_parameters, run_starts, unknowns
+from smajax.experiment.unknowns import given_parameters, preset_warnings, run_starts, unknowns
 from smajax.measured.names import instead
 from smajax.measured.noise import LEAST_SAMPLES, estimate_noise
 from smajax.measured.read import read_table
@@ -292,6 +292,7 @@ def load_experiment(path: str | Path, catalogue: Catalogue) -> Experiment:
     heats = sorted(model.heats & runs[0].run.inputs.keys())
     warnings += magnitude_warnings(runs, None if model.scale is None else model.scale(values), heats, reading.step)
     warnings += _useless(file, model) + _untold(file, free)
+    warnings += preset_warnings(file.model.wire, free, model.parameters)
     warnings += role_warnings(file.runs)
     return Experiment(
         name=path.resolve().parent.name if path.name == "experiment.toml" else path.stem,

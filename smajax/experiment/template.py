@@ -10,13 +10,16 @@ from pathlib import Path
 
 import numpy as np
 
+from smajax.catalogue import check_together
 from smajax.experiment.catalogue import WIRE_SIZES
 from smajax.experiment.grouping import RunFiles, paired
 from smajax.experiment.guess import DRIVES, GUESS, LIKELY, SURE, TIME, Column, columns_of, times_not_read
+from smajax.measured.names import instead
 from smajax.measured.read import read_table
 from smajax.measured.table import MeasuredDataError, Table
 from smajax.parameters import parameter_values, parameters
-from smajax.presets import build
+from smajax.presets import DRIVES as DRIVE_PRESETS
+from smajax.presets import WIRES, build
 from smajax.system import System
 from smajax.units import convert
 from smajax.words import and_listed
@@ -49,8 +52,35 @@ class _Model:
     why: str
 
 
-def _model(found: dict[str, Column], load: str = "") -> _Model:
-    """The presets that the columns speak for; `load` in the place of the one guessed. Raises MeasuredDataError."""
+def _model(found: dict[str, Column], load: str = "", wire: str = "", drive: str = "") -> _Model:
+    """The presets that the columns speak for; those that are named in the place of guessed ones. Raises MeasuredDataError."""
+    model = _loaded(found, load)
+    for kind, name, known in (("wire", wire, WIRES), ("drive", drive, DRIVE_PRESETS)):
+        if name and name not in known:
+            raise MeasuredDataError(f"there is no {kind} {name!r}{instead(name, known, 'there are')}")
+    if drive:
+        # What the drive takes stands first; a mass that varies is the load's.
+        needed = sorted(DRIVE_PRESETS[drive]().inputs_required)
+        others = [name for name in model.inputs if name not in DRIVES]
+        model = replace(model, drive=drive, inputs=(*needed, *others))
+    model = replace(model, wire=wire or model.wire, why=_how_sure(model.why, load, wire, drive))
+    try:
+        check_together(build(model.wire, model.load, model.drive), model.load, model.drive)
+    except ValueError as error:
+        raise MeasuredDataError(str(error)) from None
+    return model
+
+
+def _how_sure(why: str, load: str, wire: str, drive: str) -> str:
+    """`a guess: why`, but for the presets that were named."""
+    named = [kind for kind, name in (("load", load), ("wire", wire), ("drive", drive)) if name]
+    if not named:
+        return f"{GUESS}: {why}"
+    return f"as asked for: {and_listed(named)}" + (f"; the rest is {GUESS}" if len(named) < 3 else "")
+
+
+def _loaded(found: dict[str, Column], load: str) -> _Model:
+    """The presets that the columns speak for, with the load that is named, and the wire of a bench with it."""
     guessed = _guessed(found)
     if load in ("", guessed.load):
         return guessed
@@ -60,9 +90,7 @@ def _model(found: dict[str, Column], load: str = "") -> _Model:
             f"the load {load!r} does not go with these columns, which have a reading of {guessed.output}: "
             f"{' or '.join(fitting)} does"
         )
-    return replace(
-        guessed, wire=POSITIONED[load], load=load, inputs=guessed.inputs[:1], why="the load that was asked for"
-    )
+    return replace(guessed, wire=POSITIONED[load], load=load, inputs=guessed.inputs[:1])
 
 
 def _guessed(found: dict[str, Column]) -> _Model:
@@ -195,9 +223,12 @@ def _folder(files: Sequence[Path], target: Path) -> Path:
     return Path(os.path.relpath(common, target.resolve().parent))
 
 
-def begun(files: Sequence[Path], target: Path, title: str = "", load: str = "") -> Guessed:
+def begun(
+    files: Sequence[Path], target: Path, title: str = "", load: str = "", wire: str = "", drive: str = ""
+) -> Guessed:
     """The experiment file `target` for these logs. Raises MeasuredDataError for a file that cannot be read.
 
+    load, wire, drive: names of presets, in the place of those that the columns speak for.
     A file is a run, with the columns of the first one; another file without one of them is refused by name. Where no file
     has an input and an output, a run is one file of each kind, by their names.
     """
@@ -205,16 +236,14 @@ def begun(files: Sequence[Path], target: Path, title: str = "", load: str = "") 
     logs = _logs(files, tables)
     columns = [one for one, _ in logs.columns]
     found = {one.quantity: one for one in columns if one.quantity}
-    model = _model(found, load)
+    model = _model(found, load, wire, drive)
     kind_of = {one.quantity: kind for one, kind in logs.columns if one.quantity}
     variable = {quantity: bool(logs.kinds[kind].clocks) for quantity, kind in kind_of.items()}
     told = [f"{one.name}: {one.quantity} in {one.unit} ({one.sure}: {one.why})" for one in columns if one.quantity]
     told += [f"{one.name}: left out ({one.why})" for one in columns if not one.quantity]
     for table in logs.kinds:
         told += [f"{name}: left out ({why.split('; expected')[0]})" for name, why in table.unusable.items()]
-    told.append(
-        f"model: {model.wire}, {model.load}, {model.drive} ({GUESS}: {model.why}; `smajax presets` has the others)"
-    )
+    told.append(f"model: {model.wire}, {model.load}, {model.drive} ({model.why}; `smajax presets` has the others)")
     if len(logs.kinds) > 1:
         told.append(
             f"runs: {'; '.join(f'{run.name} of {and_listed([file.name for file in run.files])}' for run in logs.runs)} ({GUESS}: by their names)"
@@ -227,7 +256,7 @@ def begun(files: Sequence[Path], target: Path, title: str = "", load: str = "") 
         "# of the documentation, and the parameters of `smajax effects`.",
         f"title = {json.dumps(title or target.stem, ensure_ascii=False)}",
         "",
-        f"[model]  # {GUESS}: {model.why}",
+        f"[model]  # {model.why}",
         f'wire = "{model.wire}"',
         f'load = "{model.load}"',
         f'drive = "{model.drive}"',
@@ -243,7 +272,11 @@ def begun(files: Sequence[Path], target: Path, title: str = "", load: str = "") 
             f"the bench: the preset's {some}{' and others' if len(known) > 4 else ''} until [model.parameters] has yours; a "
             "wrong one shows up as a wrong fitted value"
         )
-    lines += ["", "[unknown]  # to be fitted: bounds around the preset's values, and where the search starts"]
+    lines += [
+        "",
+        f"[unknown]  # to be fitted: bounds around the values of {model.wire}, and where the search starts; for another wire",
+        "# begin again with `--wire NAME --overwrite`, or move them",
+    ]
     lines += [
         *_unknowns(model, preset),
         "",

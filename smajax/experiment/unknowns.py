@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from smajax.experiment.catalogue import ModelDescription, ParameterInfo
@@ -10,6 +10,7 @@ from smajax.experiment.errors import ExperimentError, at_key, check_name
 from smajax.experiment.record import RUN_STARTS, Prior, Unknown
 from smajax.experiment.schema import BoxSection, ExperimentFile, PriorSection, Quantity
 from smajax.units import parse_quantity
+from smajax.words import and_listed
 
 CELSIUS = ParameterInfo("degC", -273.15, 1500.0)  # of a wire as a run starts, which no parameter says
 
@@ -67,7 +68,10 @@ def _unknown(path: Path, key: str, name: str, section: BoxSection, info: Paramet
         )
     if not low <= start <= high:
         raise ExperimentError(
-            path, f"{key}.start", f"got {section.start!r}, expected between {section.low!r} and {section.high!r}"
+            path,
+            f"{key}.start",
+            f"got {section.start!r}, expected between {section.low!r} and {section.high!r}; move the start into the box, or the "
+            "box to it",
         )
     prior = None if section.prior is None else _prior(path, f"{key}.prior", section.prior, info, low)
     return Unknown(name, info.unit, low, high, start, per_run, prior)
@@ -81,6 +85,25 @@ def unknowns(path: Path, file: ExperimentFile, known: Mapping[str, ParameterInfo
         _unknown(path, f"unknown.{name}", name, section, known[name], section.per_run)
         for name, section in file.unknown.items()
     )
+
+
+def preset_warnings(wire: str, free: Sequence[Unknown], known: Mapping[str, ParameterInfo]) -> list[str]:
+    """Boxes that leave out what the presets have: those of another wire, mostly, that stayed when the wire was changed."""
+    outside = []
+    for one in free:
+        value = known[one.name].preset if one.name in known else None
+        slack = 1e-9 * (one.high - one.low)  # what a conversion of units leaves
+        if value is not None and not one.low - slack <= value <= one.high + slack:
+            outside.append(
+                f"{one.name} = {value:.4g} {one.unit} (box: {one.low:g} to {one.high:g})".replace(" - ", " ")
+            )
+    if not outside:
+        return []
+    return [
+        f"[unknown]: the preset's own value lies outside the box of {and_listed(outside)}. Were the boxes written for another wire "
+        f"than {wire!r}? `smajax new-experiment LOG --wire {wire}` writes its own; else move low and high, or leave them where you know "
+        "that your bench differs"
+    ]
 
 
 def run_starts(path: Path, file: ExperimentFile, model: ModelDescription) -> tuple[Unknown, ...]:
