@@ -156,6 +156,23 @@ def test_the_other_load_can_be_asked_for_and_a_wrong_one_is_refused(tmp_path: Pa
     assert not (tmp_path / "f.toml").exists()
 
 
+def test_a_log_of_commas_before_three_decimals_is_begun_with_its_mark(tmp_path: Path) -> None:
+    rows = [f"{k};{5 * (k % 20 > 9)};{k // 100 + 1},{k % 100:03}" for k in range(200)]
+    (tmp_path / "log.csv").write_text("\n".join(["time [s];U [V];displacement [mm]", *rows]))
+    asked = ["new-experiment", str(tmp_path / "log.csv"), "--out", str(tmp_path / "e.toml")]
+    untold = run.invoke(app, asked)
+    assert untold.exit_code == 3
+    assert "(`smajax new-experiment --decimal ,`)" in untold.output
+    assert '\n# decimal = ","  #' in (tmp_path / "e.toml").read_text()
+    told = run.invoke(app, [*asked, "--overwrite", "--decimal", ","])
+    assert told.exit_code == 0, told.output
+    assert tomllib.loads((tmp_path / "e.toml").read_text())["data"]["decimal"] == ","
+    assert load_experiment(tmp_path / "e.toml", CATALOGUE).runs[0].output[-1] == pytest.approx(2.099e-3)
+    wrong = run.invoke(app, [*asked, "--overwrite", "--decimal", ";"])
+    assert wrong.exit_code == 2
+    assert "`,` or `.`, not `;`" in wrong.output
+
+
 def _angle_log(path: Path) -> Path:
     rows = [f"{k / 10},{5.0 * (k % 20 > 9)},{30.0 + 20.0 * np.sin(k / 9)}" for k in range(200)]
     path.write_text("\n".join(["time [s],U [V],angle [deg]", *rows]))

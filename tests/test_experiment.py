@@ -380,6 +380,18 @@ def test_a_mistake_is_named_with_its_file_and_key(bench: Path, old: str, new: st
     assert "pydantic" not in str(caught.value)
 
 
+def test_commas_before_three_decimals_are_settled_by_a_key(bench: Path) -> None:
+    rows = "".join(f"{10 * k};20;{k // 1000},{k % 1000:03}\n" for k in range(1000, 1500))
+    for name in ("a.csv", "b.csv"):
+        (bench / name).write_text("time;duty;pos\n" + rows)
+    with pytest.raises(ExperimentError, match=r"set thousands apart: .*, or decimal = ',' under \[data\]"):
+        load(bench)
+    got = load(changed(bench, '[[runs]]\nname = "A"', '[data]\nfolder = "."\ndecimal = ","\n[[runs]]\nname = "A"'))
+    assert got.runs[0].output[-1] == pytest.approx(1.495e-3)
+    with pytest.raises(ExperimentError, match=r"data\.decimal: got ';', expected ',' or '\.'"):
+        load(changed(bench, 'decimal = ","', 'decimal = ";"'))
+
+
 def test_a_held_unknown_is_a_known_value(bench: Path) -> None:
     got = load(changed(bench, "[nuisance]", "fixed = true\n[nuisance]"))
     assert got.unknowns == ()

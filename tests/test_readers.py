@@ -424,6 +424,35 @@ def test_decimal_commas(tmp_path: Path, text: str) -> None:
     np.testing.assert_array_equal(table.column(2), [1.5, -25.0])
 
 
+@pytest.mark.parametrize(
+    "text", ["a x\n1,500 2,000\n2,250 3,125", 'a,x\n"1,500","2,000"\n"2,250","3,125"', "a;x\n1,500;2,000\n2,250;3,125"]
+)
+def test_decimal_commas_that_are_said_to_be_some(tmp_path: Path, text: str) -> None:
+    (tmp_path / "a.csv").write_text(text)
+    table = read_table(tmp_path / "a.csv", decimal=",")
+    np.testing.assert_array_equal(table.column("a"), [1.5, 2.25])
+    np.testing.assert_array_equal(table.column("x"), [2.0, 3.125])
+
+
+def test_one_column_of_decimal_commas(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("my x\n1,500\n2,250\n")
+    np.testing.assert_array_equal(read_table(tmp_path / "a.csv", decimal=",").column("my x"), [1.5, 2.25])
+
+
+@pytest.mark.parametrize(
+    ("text", "decimal", "words"),
+    [
+        ("a,x\n1,500\n2,250", ",", r"commas separate its cells \('a,x'\), and \[data\] decimal = ',' says"),
+        ("a;x\n1,500;1.5\n2,250;2.5", ",", r"line 2 has '1\.5', and \[data\] decimal = ','"),
+        ("a;x\n1,5;1\n2,25;2", ".", "line 2, column 'a': '1,5' is not a number"),
+    ],
+)
+def test_a_decimal_mark_that_the_file_contradicts(tmp_path: Path, text: str, decimal: str, words: str) -> None:
+    (tmp_path / "a.csv").write_text(text)
+    with pytest.raises(MeasuredDataError, match=words):
+        read_table(tmp_path / "a.csv", decimal=decimal).column("a")
+
+
 def test_commas_that_may_be_thousands_are_not_guessed(tmp_path: Path) -> None:
     table = read_table(written(tmp_path / "run.csv", "time;x\n0;1,500\n1;2,500\n"))
     with pytest.raises(MeasuredDataError, match="set thousands apart"):

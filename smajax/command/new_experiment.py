@@ -34,6 +34,9 @@ def new_experiment(
             help="of `smajax presets`; takes the input channels that it needs", autocompletion=complete.drives
         ),
     ] = "",
+    decimal: Annotated[
+        str, typer.Option(help="`,` or `.`: what stands before decimals, of logs that do not tell (`1,234`)")
+    ] = "",
     overwrite: Annotated[bool, typer.Option("--overwrite", help="write over a file that is there")] = False,
     json_out: Json = False,
 ) -> None:
@@ -47,6 +50,8 @@ def new_experiment(
         raise typer.BadParameter(f"{out} exists; give another name, or --overwrite.", param_hint="--out")
     if not out.parent.is_dir():
         raise typer.BadParameter(f"the folder {out.parent} does not exist.", param_hint="--out")
+    if decimal not in ("", ",", "."):
+        raise typer.BadParameter(f"`,` or `.`, not `{decimal}`.", param_hint="--decimal")
     from smajax.runtime import prepare
 
     prepare()
@@ -56,7 +61,7 @@ def new_experiment(
     from smajax.experiment.template import begun
     from smajax.report.files import replace
 
-    guessed = begun(files, out, title, load, wire, drive)
+    guessed = begun(files, out, title, load, wire, drive, decimal)
     replace(out, guessed.text)
     try:
         warnings, why = list(load_experiment(out, CATALOGUE).warnings), ""

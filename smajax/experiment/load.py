@@ -275,7 +275,7 @@ def load_experiment(path: str | Path, catalogue: Catalogue) -> Experiment:
         inputs_sampled=model.inputs_sampled,
         inputs_squared=model.inputs_squared,
         step=_step(path, file),
-        tables=lru_cache(maxsize=None)(partial(read_table, wanted=_columns(file))),
+        tables=lru_cache(maxsize=None)(partial(read_table, wanted=_columns(file), decimal=file.data.decimal)),
     )
     runs = [read_run(reading, run, overrides[run.name]) for run in file.runs]
     fit = [read for read in runs if read.run.role == "fit"]

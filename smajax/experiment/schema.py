@@ -138,6 +138,9 @@ class DataSection(Section):
     """Where the measured files are."""
 
     folder: str = Field(description="a folder, relative to this file; it may begin with ${SMAJAX_DATA}")
+    decimal: Literal[",", "."] | None = Field(
+        default=None, description="',' or '.': what stands before the decimals of a number in a text file"
+    )
 
 
 class RunSection(Section):

@@ -224,15 +224,22 @@ def _folder(files: Sequence[Path], target: Path) -> Path:
 
 
 def begun(
-    files: Sequence[Path], target: Path, title: str = "", load: str = "", wire: str = "", drive: str = ""
+    files: Sequence[Path],
+    target: Path,
+    title: str = "",
+    load: str = "",
+    wire: str = "",
+    drive: str = "",
+    decimal: str = "",
 ) -> Guessed:
     """The experiment file `target` for these logs. Raises MeasuredDataError for a file that cannot be read.
 
-    load, wire, drive: names of presets, in the place of those that the columns speak for.
+    load, wire, drive: names of presets, in the place of those that the columns speak for. decimal: "," or ".", where the files do not
+    tell which one it is.
     A file is a run, with the columns of the first one; another file without one of them is refused by name. Where no file
     has an input and an output, a run is one file of each kind, by their names.
     """
-    tables = [read_table(file) for file in files]
+    tables = [read_table(file, decimal=decimal or None) for file in files]
     logs = _logs(files, tables)
     columns = [one for one, _ in logs.columns]
     found = {one.quantity: one for one in columns if one.quantity}
@@ -338,7 +345,9 @@ def begun(
     held_out = logs.runs[-1] if len(logs.runs) >= HELD_OUT_FROM else None
     if held_out is not None:
         told.append(f"held out: the last run, {held_out.name}; another one by its `role` in [[runs]]")
-    lines += ["[data]", f"folder = {json.dumps(str(folder), ensure_ascii=False)}", ""]
+    lines += ["[data]", f"folder = {json.dumps(str(folder), ensure_ascii=False)}"]
+    mark = f'decimal = "{decimal or ","}"  # what stands before the decimals of a number'
+    lines += [mark if decimal else f"# {mark}, where no number shows it: 1,234 may be a thousand", ""]
     base = (target.resolve().parent / folder).resolve()
     used_here = [name for name in (*model.inputs, model.output) if name in found]
     for run in logs.runs:

@@ -71,8 +71,8 @@ def _blocks(path: Path) -> Iterator[list[tuple[int, str]]]:
         yield block
 
 
-def _separator(lines: Sequence[str]) -> str | None:
-    """The mark that separates the cells; None for whitespace.
+def _separator(path: Path, lines: Sequence[str], decimal: str | None) -> str | None:
+    """The mark that separates the cells; None for whitespace. Raises MeasuredDataError where it is said to be the decimal one.
 
     The bulk of the data lines decides: a header may hold commas in a whitespace-separated file, and one line that is
     cut short holds no mark at all. A header alone is asked when there is nothing else.
@@ -80,7 +80,15 @@ def _separator(lines: Sequence[str]) -> str | None:
     asked = lines[1:] or lines
     if 2 * sum(_blank_separated(line) for line in asked) > len(asked):
         return None
-    return next((mark for mark in SEPARATORS if 2 * sum(mark in line for line in asked) > len(asked)), None)
+    mark = next((mark for mark in SEPARATORS if 2 * sum(mark in line for line in asked) > len(asked)), None)
+    if decimal is None or mark != decimal or '"' in asked[0]:  # in quotes a cell may hold the mark
+        return mark
+    if "," in lines[0] and not DECIMAL_COMMA.fullmatch(lines[0].strip()):
+        raise MeasuredDataError(
+            f"{path}: commas separate its cells ({lines[0].strip()[:40]!r}), and [data] decimal = ',' says that they are decimal; take "
+            "that key out"
+        )
+    return ";"  # one column, whose heading may hold blanks
 
 
 def _blank_separated(line: str) -> bool:
@@ -98,6 +106,17 @@ def _has_decimal_commas(rows: list[tuple[int, list[str]]]) -> bool:
     commas = [cell for cell in cells if DECIMAL_COMMA.fullmatch(cell)]
     points = any("." in cell and _is_number(cell) for cell in cells)
     return bool(commas) and not points and not all(THOUSANDS.fullmatch(cell) for cell in commas)
+
+
+def _check_points(path: Path, rows: Sequence[tuple[int, list[str]]]) -> None:
+    """Raises MeasuredDataError for a number with a point in a file whose decimals stand behind commas: 1.234 may be a thousand."""
+    for number, row in rows:
+        for cell in row:
+            if "." in cell and _is_number(cell):
+                raise MeasuredDataError(
+                    f"{path}: line {number} has {cell!r}, and [data] decimal = ',' says that decimals stand behind a comma; take that "
+                    "key out, or write one mark in all cells"
+                )
 
 
 def _with_points(rows: list[tuple[int, list[str]]]) -> list[tuple[int, list[str]]]:
@@ -184,7 +203,12 @@ def _why_unusable(
         return None
     number, cell = wrong
     got = f"line {number}, column {name!r}: " + (f"{cell[:40]!r} is not a {what}" if cell else "the cell is empty")
-    hint = "; its comma may be decimal or set thousands apart: write a decimal point" if "," in cell else ""
+    hint = ""
+    if "," in cell:
+        hint = (
+            "; its comma may be decimal or set thousands apart: write a decimal point, or decimal = ',' under [data] "
+        )
+        hint += "(`smajax new-experiment --decimal ,`)"
     return f"{got}{hint}; expected a {what} in every line"
 
 
@@ -267,12 +291,13 @@ def _check_width(path: Path, rows: Sequence[tuple[int, list[str]]], width: int) 
             )
 
 
-def read_csv(path: Path, wanted: Collection[str | int] | None = None) -> Table:
+def read_csv(path: Path, wanted: Collection[str | int] | None = None, decimal: str | None = None) -> Table:
     """Reads a text table. The first line is a header when one of its cells is neither a number nor a clock time.
 
     Columns are named by the header, or "1", "2", ... without one. A line of units under the header gives them theirs. Clock
     times are read as seconds from the first one. A column with a cell that is not a number is
     an error only when it is asked for. wanted: the names and numbers (from 1) of the columns to keep; None: all.
+    decimal: "," or "."; None: as the first lines tell.
     The file goes by in blocks of lines, of which the first tells how it is written; what is kept is 8 bytes a number.
     Raises MeasuredDataError.
     """
@@ -280,10 +305,10 @@ def read_csv(path: Path, wanted: Collection[str | int] | None = None) -> Table:
     lines = next(blocks, [])
     if not lines:
         raise MeasuredDataError(f"{path}: holds no data line")
-    separator = _separator([line for _, line in lines])
-    rows = _rows(path, lines, separator)
-    commas = _has_decimal_commas(rows)
-    rows = _with_points(rows) if commas else rows
+    separator = _separator(path, [line for _, line in lines], decimal)
+    written = _rows(path, lines, separator)
+    commas = decimal == "," if decimal is not None else _has_decimal_commas(written)
+    rows = _with_points(written) if commas else written
     rows = _without_preamble(rows)
     header: list[str] | None = None
     if not all(_is_datum(cell) for cell in rows[0][1] if cell):
@@ -297,6 +322,8 @@ def read_csv(path: Path, wanted: Collection[str | int] | None = None) -> Table:
     stated = _units(names, rows[0][1]) if units else None
     if stated is not None:
         units, rows = False, rows[1:]
+    if decimal == ",":
+        _check_points(path, [row for row in written if row[0] >= rows[0][0]])
     first_line = rows[0][0]
     kept = [
         _Column(name, place, moment(rows[0][1][place]) is not None)
@@ -310,6 +337,8 @@ def read_csv(path: Path, wanted: Collection[str | int] | None = None) -> Table:
         whole = None if commas or any(column.clock for column in kept) else _numbers(lines, separator, width)
         if whole is None:
             rows = _rows(path, lines, separator)
+            if decimal == ",":
+                _check_points(path, rows)
             rows = _with_points(rows) if commas else rows
             _check_width(path, rows, width)
         for column in kept:

@@ -25,10 +25,11 @@ READERS: Mapping[str, Callable[[Path], Table]] = MappingProxyType(
 )
 
 
-def read_table(path: str | Path, wanted: Collection[str | int] | None = None) -> Table:
+def read_table(path: str | Path, wanted: Collection[str | int] | None = None, decimal: str | None = None) -> Table:
     """Reads one measured file with the reader for its suffix. Raises MeasuredDataError.
 
     wanted: the columns that will be asked for, by name or number from 1; of a text table no others are kept in memory.
+    decimal: what stands before the decimals of a text table, "," or "."; None: as its first lines tell.
     """
     path = Path(path)
     reader = READERS.get(path.suffix.lower())
@@ -45,6 +46,6 @@ def read_table(path: str | Path, wanted: Collection[str | int] | None = None) ->
     if path.stat().st_size == 0:
         raise MeasuredDataError(f"{path}: the file is empty")
     try:
-        return reader(path) if reader is not read_csv else read_csv(path, wanted)
+        return reader(path) if reader is not read_csv else read_csv(path, wanted, decimal)
     except PermissionError:
         raise MeasuredDataError(f"{path}: may not be read; give yourself the right to (chmod u+r)") from None
