@@ -13,7 +13,7 @@ from smajax.effects.library import LIBRARY, at_base
 from smajax.extended import extended
 from smajax.load.base import AbstractMovingLoad
 from smajax.loop import Loop
-from smajax.measured.names import instead, own_first
+from smajax.measured.names import instead, of_many
 from smajax.mismatch import MISMATCHES, ratio_of
 from smajax.parameters import check_bounds, parameter_values, parameters, set_parameters
 from smajax.presets import build
@@ -22,11 +22,13 @@ from smajax.units import UnitError, parse_quantity
 from smajax.wire.laws import under_law
 from smajax.wire.order import check_order
 
+PARAMETERS = "`smajax presets WIRE LOAD DRIVE` lists those of a model, `smajax effects` those of effects"
+
 
 def parameter_name(system: System, name: str) -> str:
     """The parameter that `name` means: its own name, its place in the model (`wire.heat.convection_coefficient`), or short.
 
-    Short names are those of `MISMATCHES`. Raises ValueError with the nearest name, and all there are.
+    Short names are those of `MISMATCHES`. Raises ValueError with the nearest names, and what lists all.
     """
     table = parameters(system)
     places = {".".join(map(str, entry.path)): own for own, entry in table.items()}
@@ -35,7 +37,7 @@ def parameter_name(system: System, name: str) -> str:
     if name in meant:
         return meant[name]
     told = f"{name!r} ({MISMATCHES[name]})" if name in MISMATCHES else f"{name!r}"
-    raise ValueError(f"no parameter {told}{instead(name, own_first(table), 'this model has', [*table, *short])}")
+    raise ValueError(f"no parameter {told}{of_many(name, [*table, *short], PARAMETERS)}")
 
 
 def _value(before: System, system: System, name: str, own: str, value: str | float) -> float:

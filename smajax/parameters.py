@@ -13,7 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
-from smajax.measured.names import instead, own_first
+from smajax.measured.names import of_many
 
 Module = TypeVar("Module", bound=eqx.Module)
 
@@ -84,7 +84,8 @@ def _select(model: eqx.Module, names: Sequence[str]) -> list[Parameter]:
     table = parameters(model)
     unknown = [name for name in names if name not in table]
     if unknown:
-        raise ValueError(f"No parameter `{unknown[0]}`{instead(unknown[0], own_first(table), 'this model has')}.")
+        told = of_many(unknown[0], table, "`smajax.parameter_values(model)` lists all of this model")
+        raise ValueError(f"No parameter `{unknown[0]}`{told}.")
     return [table[name] for name in names]
 
 

@@ -20,6 +20,7 @@ from smajax.command.base import console, numbers, pairs, texts, understood
 from smajax.compose import compose, with_values
 from smajax.mismatch import MISMATCHES, variation_of
 from smajax.parameters import parameter_values
+from smajax.presets import build
 from smajax.progress import VARIABLE, shown
 from smajax.tune.terms import TERMS
 
@@ -63,6 +64,19 @@ def test_effects_and_presets_are_listed_for_machines(tmp_path: Path) -> None:
     assert "  niti_table_3_1: diameter 0.15 mm, length 900 mm" in told
     lines = [next(line for line in told if line.startswith(f"  {drive}: ")) for drive in presets["drives"]]
     assert len({line.split(": ", 1)[1] for line in lines}) == len(lines)
+
+
+def test_the_parameters_of_named_presets_are_all_listed(tmp_path: Path) -> None:
+    """What the answer to a misspelt one sends to."""
+    model = ("niti_table_3_1", "arm", "amplified_voltage")
+    told = json.loads(_run("presets", *model, "--json", cwd=tmp_path).stdout)
+    listed = {name: one["value"] for part in told.values() for name, one in part.items()}
+    assert listed == pytest.approx(parameter_values(build(*model)))
+    lines = _run("presets", *model, cwd=tmp_path).stdout.splitlines()
+    assert any(line.split()[:3] == ["wire_length", "0.9", "m"] for line in lines)
+    wrong = _run("presets", "arms", cwd=tmp_path)
+    assert wrong.returncode == 2
+    assert "no preset `arms`; did you mean 'arm'?" in wrong.stderr
 
 
 def test_missing_experiment_file(tmp_path: Path) -> None:

@@ -8,8 +8,8 @@ import pytest
 
 from smajax.catalogue import CATALOGUE
 from smajax.compose import compose
-from smajax.experiment.errors import ExperimentError, check_name
-from smajax.measured.names import instead, listed, nearest
+from smajax.experiment.errors import ExperimentError, check_parameter
+from smajax.measured.names import instead, listed, nearest, of_many
 from smajax.parameters import set_parameters
 
 EFFECTS = ("radiation", "coulomb_friction", "latent_heat", "rising_convection")
@@ -51,19 +51,30 @@ def test_every_name_is_listed() -> None:
     assert listed(()) == "none"
 
 
-def test_parameters_of_the_model_are_listed_before_those_of_effects() -> None:
+def test_of_very_many_the_nearest_three_are_named_and_what_lists_all() -> None:
+    many = ("martensite_start", "martensite_finish", "austenite_start", "latent_heat.enthalpy", "wire_length")
+    assert of_many("wire_lenght", many, "`x` lists all") == "; did you mean 'wire_length'? `x` lists all"
+    told = of_many("martensite", many, "all: `x`")
+    assert told == "; did you mean 'martensite_start' or 'martensite_finish'? All: `x`"
+    assert of_many("_start", [f"a{k}_start" for k in range(9)], "x").count("'") == 2 * 3
+    assert of_many("zeta", many, "`x` lists all") == "; `x` lists all"
+    assert of_many("zeta", (), "`x` lists all") == "; `x` lists all"
+
+
+def test_a_misspelt_parameter_is_answered_with_its_neighbours_and_not_with_all_there_are() -> None:
     arm = ("niti_table_3_1", "arm", "amplified_voltage")
     system = compose(*arm, effects=["latent_heat"])
     there = CATALOGUE.describe(*arm, "").parameters
-    for asked in (
-        lambda: compose(*arm, effects=["latent_heat"], values={"zeta": 1.0}),
-        lambda: set_parameters(system, {"zeta": 1.0}),
-        lambda: check_name(Path("experiment.toml"), "unknown.zeta", "parameter", "zeta", there),
-    ):
-        with pytest.raises((ValueError, ExperimentError), match=r"[nN]o parameter") as told:
-            asked()
-        names = str(told.value).rpartition(": ")[2].rstrip(".").split(", ")
-        own = [name for name in names if "." not in name]
-        assert {"ambient_temperature", "start_fraction", "young_modulus_martensite"} <= set(own)
-        assert names == [*sorted(own), *sorted(set(names) - set(own))]
-        assert "latent_heat.enthalpy" in names
+    for name, near in (("austenite_strat", "did you mean 'austenite_start'? "), ("zeta", "")):
+        for asked, lists in (
+            (lambda name: compose(*arm, values={name: 1.0}), "`smajax presets WIRE LOAD DRIVE` lists"),
+            (lambda name: set_parameters(system, {name: 1.0}), "`smajax.parameter_values(model)` lists"),
+            (
+                lambda name: check_parameter(Path("e.toml"), f"unknown.{name}", name, there, " ".join(arm)),
+                "`smajax presets niti_table_3_1 arm amplified_voltage` lists",
+            ),
+        ):
+            with pytest.raises((ValueError, ExperimentError), match=r"[nN]o parameter") as told:
+                asked(name)
+            assert f"; {near}{lists}" in str(told.value)
+            assert "wire_diameter" not in str(told.value)

@@ -32,6 +32,10 @@ def drives(incomplete: str) -> list[str]:
     return _offered(DRIVES, incomplete)
 
 
+def presets(incomplete: str) -> list[str]:
+    return [*wires(incomplete), *loads(incomplete), *drives(incomplete)]
+
+
 def laws(incomplete: str) -> list[str]:
     from smajax.wire.laws import LAWS
 

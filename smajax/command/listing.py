@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import json
-from typing import Any
+from collections.abc import Callable, Collection, Sequence
+from typing import Annotated, Any
 
 import typer
 
+from smajax.command import complete
 from smajax.command.base import Json, until_nobody_reads
+from smajax.words import aligned
 
 
 def effects(json_out: Json = False) -> None:
@@ -41,14 +44,86 @@ def effects(json_out: Json = False) -> None:
                 typer.echo(f"    {full}: {entry['bounds'][0]:g} to {entry['bounds'][1]:g} {entry['unit']}")
 
 
-def presets(json_out: Json = False) -> None:
+def _parts(names: Sequence[str]) -> dict[str, dict[str, dict[str, Any]]]:
+    """Preset -> its parameters by name, each with value, unit, bounds and meaning. Raises typer.BadParameter.
+
+    Of a wire, a load and a drive together also those of the whole, as `model`.
+    """
+    from smajax.measured.names import instead
+    from smajax.presets import DRIVES, LOADS, WIRES, build, made_load
+
+    made: dict[str, Callable[[str], Any]] = {
+        **dict.fromkeys(WIRES, lambda name: WIRES[name]()),
+        **dict.fromkeys(LOADS, made_load),
+        **dict.fromkeys(DRIVES, lambda name: DRIVES[name]()),
+    }
+    for name in names:
+        if name not in made:
+            raise typer.BadParameter(f"no preset `{name}`{instead(name, made, 'there are')}", param_hint="NAMES")
+    found = {name: _told(made[name](name), ()) for name in names}
+    if [next((kind for kind in (WIRES, LOADS, DRIVES) if name in kind), None) for name in names] == [
+        WIRES,
+        LOADS,
+        DRIVES,
+    ]:
+        whole = build(*names)
+        found["model"] = _told(whole, {one for part in found.values() for one in part})
+    return found
+
+
+def _told(part: Any, without: Collection[str]) -> dict[str, dict[str, Any]]:
+    from smajax.parameters import get_parameters, parameters
+
+    return {
+        one.name: {
+            "value": float(get_parameters(part, [one.name])[0]),
+            "unit": one.unit,
+            "bounds": [one.low, one.high],
+            "meaning": one.about,
+        }
+        for one in parameters(part).values()
+        if one.name not in without
+    }
+
+
+def presets(
+    names: Annotated[
+        list[str] | None,
+        typer.Argument(help="a wire, a load, a drive: list their parameters", autocompletion=complete.presets),
+    ] = None,
+    json_out: Json = False,
+) -> None:
     """List the wires with their sizes, the loads and drives that an experiment file may name, and the controllers of the arm.
 
+    With names: every parameter of these, with its value, unit, bounds and meaning.
+
     Example:  smajax presets
+
+    Example:  smajax presets flexinol_table_3_2 dead_weight voltage
     """
     from smajax.runtime import prepare
 
     prepare()
+    if names:
+        parts = _parts(names)
+        if json_out:
+            typer.echo(json.dumps(parts))
+            return
+        with until_nobody_reads():
+            for name, entries in parts.items():
+                typer.echo(name if entries else f"{name}  (no parameters)")
+                rows = [
+                    [
+                        f"  {one}",
+                        f"{told['value']:.5g} {told['unit']}".removesuffix(" -"),
+                        f"{told['bounds'][0]:g} to {told['bounds'][1]:g}",
+                        told["meaning"],
+                    ]
+                    for one, told in entries.items()
+                ]
+                for line in aligned(rows) if rows else ():
+                    typer.echo(line.rstrip())
+        return
     from smajax.control_presets import CONTROLLERS
     from smajax.parameters import parameter_values, parameters
     from smajax.presets import DRIVES, LOADS, WIRES

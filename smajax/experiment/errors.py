@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from smajax.measured.names import instead, own_first
+from smajax.measured.names import instead, of_many, own_first
 from smajax.measured.table import MeasuredDataError
 from smajax.units import UnitError
 
@@ -25,6 +25,14 @@ def check_name(path: Path, key: str, kind: str, name: str, known: Iterable[str])
     names = own_first(known)
     if name not in names:
         raise ExperimentError(path, key, f"there is no {kind} {name!r}{instead(name, names, 'there are')}")
+
+
+def check_parameter(path: Path, key: str, name: str, known: Iterable[str], presets: str) -> None:
+    """Raises ExperimentError unless `name` is a parameter of the model of these presets, named as on a command line."""
+    names = list(known)
+    if name not in names:
+        lists = f"`smajax presets {presets}` lists those of the model, `smajax effects` those of effects"
+        raise ExperimentError(path, key, f"there is no parameter {name!r}{of_many(name, names, lists)}")
 
 
 @contextmanager

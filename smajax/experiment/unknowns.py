@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from smajax.experiment.catalogue import ModelDescription, ParameterInfo
-from smajax.experiment.errors import ExperimentError, at_key, check_name
+from smajax.experiment.errors import ExperimentError, at_key, check_parameter
 from smajax.experiment.record import RUN_STARTS, Prior, Unknown
 from smajax.experiment.schema import BoxSection, ExperimentFile, PriorSection, Quantity
 from smajax.units import parse_quantity
@@ -28,6 +28,10 @@ def _bounded(path: Path, key: str, value: Quantity, info: ParameterInfo) -> floa
     return number
 
 
+def _presets(file: ExperimentFile) -> str:
+    return f"{file.model.wire} {file.model.load} {file.model.drive}"
+
+
 def given_parameters(
     path: Path, key: str, values: Mapping[str, Quantity], file: ExperimentFile, known: Mapping[str, ParameterInfo]
 ) -> dict[str, float]:
@@ -35,7 +39,7 @@ def given_parameters(
     found: dict[str, float] = {}
     for name, value in values.items():
         where = f"{key}.{name}"
-        check_name(path, where, "parameter", name, known)
+        check_parameter(path, where, name, known, _presets(file))
         if name in file.unknown:
             raise ExperimentError(path, where, f"is given here and is an unknown too; remove this or [unknown.{name}]")
         found[name] = _bounded(path, where, value, known[name])
@@ -80,7 +84,7 @@ def _unknown(path: Path, key: str, name: str, section: BoxSection, info: Paramet
 def unknowns(path: Path, file: ExperimentFile, known: Mapping[str, ParameterInfo]) -> tuple[Unknown, ...]:
     """Every section [unknown.NAME], the fixed ones too."""
     for name in file.unknown:
-        check_name(path, f"unknown.{name}", "parameter", name, known)
+        check_parameter(path, f"unknown.{name}", name, known, _presets(file))
     return tuple(
         _unknown(path, f"unknown.{name}", name, section, known[name], section.per_run)
         for name, section in file.unknown.items()

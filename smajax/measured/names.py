@@ -1,4 +1,4 @@
-"""What to say about a name that is not known: the nearest one, and all there are."""
+"""What to say about a name that is not known: the nearest one, and all there are or how to list them."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from difflib import SequenceMatcher
 # Above the first, two spellings differ by a slip; below the second, they have letters in common and no more.
 SLIP = 0.85
 ALIKE = 0.65
+MOST = 3  # names that are suggested together
 # A shorter word is inside too many names by chance.
 SHORTEST_WORD = 3
 
@@ -55,6 +56,20 @@ def instead(name: str, known: Iterable[str], lead: str, suggested: Iterable[str]
     names = [str(one) for one in known]
     guess = nearest(name, names if suggested is None else suggested)
     return f"{guess} {lead[:1].upper()}{lead[1:]}: {listed(names)}" if guess else f"; {lead}: {listed(names)}"
+
+
+def of_many(name: str, known: Iterable[str], lists: str) -> str:
+    """`; did you mean 'x', 'y' or 'z'? LISTS` for a name of which there are too many to list; `; LISTS` when none is close.
+
+    Up to `MOST` names, all as near as the nearest in kind; the model's own before those of effects. lists: what lists all.
+    """
+    ranked = [(_likeness(name, one), one) for one in own_first(map(str, known))]
+    best = max((likeness[0] for likeness, _ in ranked), default=0)
+    near = sorted((one for one in ranked if 0 < one[0][0] == best), key=lambda one: one[0], reverse=True)
+    *others, last = [repr(one) for _, one in near[:MOST]] or [""]
+    if not last:
+        return f"; {lists}"
+    return f"; did you mean {', '.join(others)}{' or ' if others else ''}{last}? {lists[:1].upper()}{lists[1:]}"
 
 
 def own_first(names: Iterable[str]) -> list[str]:
