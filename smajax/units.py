@@ -171,11 +171,13 @@ def convert(
     return np.asarray(_registry().Quantity(numbers, source).to(target).magnitude, dtype=np.float64)
 
 
-def parse_quantity(value: str | float, expected: str, difference: bool = False, bare: str = "") -> float:
+def parse_quantity(
+    value: str | float, expected: str, difference: bool = False, bare: str = "", offered: str = ""
+) -> float:
     """The number that a quantity such as `"24.2 J/g"` is in the unit `expected` (`"J/kg"`: 24200.0).
 
     A bare number is in the unit `bare`; without one it is accepted only where the expected unit is "1": anything else
-    must say its unit.
+    must say its unit. offered: the unit that the message of one without puts behind it, in the place of `expected`.
     `expected` "degC" reads "341 K" as the absolute 67.85; `expected` "K" is always a difference.
     Raises UnitError naming what was got, what was expected and what to do.
     """
@@ -198,7 +200,8 @@ def parse_quantity(value: str | float, expected: str, difference: bool = False, 
     if unit in _DIMENSIONLESS and bare:
         unit = bare
     if unit in _DIMENSIONLESS and expected not in _DIMENSIONLESS:
-        raise UnitError(f"got {value!r} without a unit, expected one like {expected!r}; write '{number:g} {expected}'")
+        like = offered or expected
+        raise UnitError(f"got {value!r} without a unit, expected one like {like!r}; write '{number:g} {like}'")
     return float(convert(number, unit, expected, difference))
 
 

@@ -23,7 +23,7 @@ from smajax.experiment.plausibility import (
 )
 from smajax.experiment.record import Experiment, Output, Unknown
 from smajax.experiment.schema import ExperimentFile, read_schema
-from smajax.experiment.signals import Reading, ReadRun, read_run
+from smajax.experiment.signals import Reading, ReadRun, read_run, time_unit
 from smajax.experiment.unknowns import given_parameters, preset_warnings, run_starts, unknowns
 from smajax.measured.names import instead
 from smajax.measured.noise import LEAST_SAMPLES, estimate_noise
@@ -107,7 +107,7 @@ def _step(path: Path, file: ExperimentFile) -> float:
             return 1.0
         raise ExperimentError(path, "sampling", "is missing; expected a section [sampling] with step = '50 ms' or so")
     with at_key(path, "sampling.step"):
-        step = parse_quantity(file.sampling.step, "s")
+        step = parse_quantity(file.sampling.step, "s", offered=time_unit(file.time))
     if step <= 0.0:
         raise ExperimentError(path, "sampling.step", f"got {file.sampling.step!r}, expected a time above zero")
     if by_sample and step != 1.0:
@@ -146,7 +146,7 @@ def _output(path: Path, file: ExperimentFile, name: str, unit: str, runs: Sequen
     gain = float(np.median([read.noise_gain[name] for read in fit]))
     if given is not None and given != ESTIMATE:
         try:
-            sensor = parse_quantity(given, unit, difference=True)
+            sensor = parse_quantity(given, unit, difference=True, offered=channel.unit)
         except UnitError as error:
             raise ExperimentError(path, key, f"{error}; give a noise like '{example}', or '{ESTIMATE}'") from error
         if sensor <= 0.0:

@@ -211,14 +211,19 @@ def _digest(files: tuple[Path, ...]) -> str:
     return digest.hexdigest()
 
 
-def _kept(path: Path, run: RunSection, start: float, end: float) -> tuple[float, float]:
-    """The part of a log, `start` to `end` in s, that the run's own `start` and `end` leave."""
+def time_unit(time: TimeSection | None) -> str:
+    """What a file's times are in, and with them what a bare number in the experiment file is meant in."""
+    return "s" if time is None or time.kind == "sample" else time.unit
+
+
+def _kept(path: Path, run: RunSection, start: float, end: float, unit: str) -> tuple[float, float]:
+    """The part of a log, `start` to `end` in s, that the run's own `start` and `end` leave. unit: of a bare number, in a message."""
     where = f"runs.{run.name}"
     for key, given in (("start", run.start), ("end", run.end)):
         if given is None:
             continue
         with at_key(path, f"{where}.{key}"):
-            at = parse_quantity(given, "s")
+            at = parse_quantity(given, "s", offered=unit)
         if not start < at < end and at != (start if key == "start" else end):
             raise ExperimentError(
                 path, f"{where}.{key}", f"got {given!r}, expected a time of the log between {start:g} s and {end:g} s"
@@ -240,7 +245,7 @@ def read_run(reading: Reading, run: RunSection, parameters: dict[str, float]) ->
     signals, files = _read_signals(reading, run)
     start = max(signal.time[0] for signal in signals.values())
     end = min(signal.time[-1] for signal in signals.values())
-    start, end = _kept(reading.path, run, start, end)
+    start, end = _kept(reading.path, run, start, end, time_unit(reading.time))
     if end <= start:
         spans = ", ".join(f"{name} {s.time[0]:g}..{s.time[-1]:g} s" for name, s in signals.items())
         raise ExperimentError(
