@@ -344,9 +344,14 @@ def test_a_coupon_has_no_position_on_its_page_and_each_number_once(
     assert "<!-- position" not in svg
 
 
-def test_a_moving_load_has_its_position_on_its_page() -> None:
-    found = run_open(Asked(dt=0.01, inputs={"voltage": "5V:1s"})).found
-    assert {"position", "velocity", "reading", "strain"} <= {row[0] for row in summary_rows(found)}
+@pytest.mark.parametrize(("values", "beside"), [({}, set()), ({"sensor_gain.error": "0.1"}, {"reading"})])
+def test_a_moving_load_has_its_position_on_its_page_and_a_reading_that_differs(
+    values: dict[str, str], beside: set[str]
+) -> None:
+    found = run_open(Asked(dt=0.01, values=values, inputs={"voltage": "5V:1s"})).found
+    rows = {row[0] for row in summary_rows(found)}
+    assert {"position", "velocity", "strain"} <= rows
+    assert {"reading"} & rows == beside
 
 
 def test_a_stop_and_a_slack_wire_are_told() -> None:

@@ -131,18 +131,18 @@ def drawn(found: xr.Dataset, form: str = "png", upright: bool = False) -> bytes:
     return image.getvalue()
 
 
-def _of_no_coupon(found: xr.Dataset) -> set[str]:
-    """Variables that tell nothing of a coupon: where it is, and what its sensor reads where that is the strain or stress."""
-    if _moves(found):
-        return set()
-    again = any(np.array_equal(found["reading"], found[name]) for name in ("strain", "stress"))
-    return {"position", "velocity", *(["reading"] if again else [])}
+def _said_already(found: xr.Dataset) -> set[str]:
+    """Variables that tell nothing: where a coupon is, and what a sensor reads where that is what is there."""
+    moves = _moves(found)
+    true = ("position",) if moves else ("strain", "stress")
+    again = any(np.array_equal(found["reading"], found[name], equal_nan=True) for name in true)
+    return {*(() if moves else ("position", "velocity")), *(("reading",) if again else ())}
 
 
 def summary_rows(found: xr.Dataset) -> list[list[str]]:
-    """A row a variable: least, greatest, last, in the units that a reader sees."""
+    """A row a variable: least, greatest, last, in the units that a reader sees; the reading where it is not the true value."""
     rows = []
-    for name, one in found.drop_vars(_of_no_coupon(found)).data_vars.items():
+    for name, one in found.drop_vars(_said_already(found)).data_vars.items():
         unit, values = display(one.attrs["units"], str(name)), one.to_numpy()
         least, greatest, last = float(values.min()), float(values.max()), float(values[-1])
         # What rounding leaves of a zero is no number to show.
