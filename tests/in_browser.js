@@ -55,17 +55,26 @@ async hostile => {
     if (rows.some(row => row.cells.length !== head)) wrong.push(`rows of another length than their heading: ${named(table)}`);
   }
 
-  // A click on a heading sorts, another the other way round, and no row is lost.
+  // Every table with headings sorts: a click on one, by number where all cells begin with one; another the other way round. No row is lost.
+  for (const table of document.querySelectorAll("table:has(thead):not(.sortable)")) wrong.push(`a table that does not sort: ${named(table)}`);
   for (const table of document.querySelectorAll("table.sortable")) {
     const body = table.tBodies[0], all = () => [...body.rows].map(row => row.textContent);
     const before = all().sort().join("\n");
     [...table.tHead.rows[0].cells].forEach((heading, column) => {
-      for (const rising of [true, false]) {
+      if (!heading.textContent.trim() && column === 0) wrong.push(`the first heading is empty: ${named(table)}`);
+      for (const rising of [true, false, true]) {
         heading.click();
-        const cells = [...body.rows].map(row => row.cells[column]);
-        const number = cell => cell.dataset.v !== undefined ? Number(cell.dataset.v) : cell.classList.contains("n") ? parseFloat(cell.textContent.replace("−", "-")) : NaN;
+        const cells = [...body.rows].map(row => row.cells[column]).filter(cell => !["", "–"].includes(cell.textContent.trim()));
+        const number = cell => {
+          if (cell.dataset.v !== undefined) return Number(cell.dataset.v);
+          const text = cell.textContent.trim().replace("−", "-");
+          return text.startsWith("never") ? Infinity : parseFloat(cell.classList.contains("n") ? text.replace(/^\D*?(?=[-+.]?\d)/, "") : text);
+        };
         const numbers = cells.map(number).filter(value => !Number.isNaN(value));
-        const [values, order] = numbers.length ? [numbers, (a, b) => a - b] : [cells.map(cell => cell.textContent), (a, b) => a.localeCompare(b)];
+        const numeric = numbers.some(Number.isFinite) && (numbers.length === cells.length || cells.some(cell => cell.classList.contains("n") || cell.dataset.v !== undefined));
+        const [values, order] = numeric
+          ? [numbers, (a, b) => (a < b ? -1 : a > b ? 1 : 0)]
+          : [cells.map(cell => cell.textContent.trim()), (a, b) => a.localeCompare(b, undefined, { numeric: true })];
         const sorted = values.every((value, k) => !k || order(values[k - 1], value) * (rising ? 1 : -1) <= 0);
         if (!sorted) wrong.push(`a click on "${heading.textContent}" does not sort: ${values}`);
         if (heading.getAttribute("aria-sort") !== (rising ? "ascending" : "descending")) wrong.push(`"${heading.textContent}" does not say how it sorts`);

@@ -99,6 +99,7 @@ FAULTS = {
     "<img alt=away src='away.png'>": "asked for",
     "<table><tbody></tbody></table>": "a table without a row",
     "<table><tbody><tr><td>nan</td></tr></tbody></table>": "a cell says nan",
+    "<table><thead><tr><th>a</th></tr></thead><tbody><tr><td>1</td></tr></tbody></table>": "a table that does not sort",
     # Too late for what makes tables sort.
     "<script>addEventListener('load', () => document.body.insertAdjacentHTML('beforeend', '<table class=sortable><thead>"
     "<tr><th>a</th></tr></thead><tbody><tr><td>1</td></tr></tbody></table>'))</script>": "does not say how it sorts",
@@ -111,7 +112,9 @@ FAULTS = {
 
 
 def test_a_fault_is_seen(browser: Any, tmp_path: Path) -> None:
-    page, good = tmp_path / "page.html", table(["name", "value"], [["b", "2"], ["a", "10"]], (1,))
+    # The last two columns are numbers, as which they are not marked.
+    rows = [["b", "2", "9 ± 1", "never"], ["a", "10", "10 ± 1", "1e-5"], ["c", "", "–", "3 … 4"]]
+    page, good = tmp_path / "page.html", table(["name", "value", "both", "box"], rows, (1,))
 
     def told(*parts: str) -> list[str]:
         page.write_text(whole("A page", [good, *parts]), encoding="utf-8")

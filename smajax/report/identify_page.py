@@ -56,14 +56,15 @@ def _correlations(found: Identified) -> str:
     numbered = range(1, len(found.correlated) + 1)
     columns = "".join(f"<th class=n>{number}</th>" for number in numbered)
     rows = [
-        f"<tr><td>{number}&nbsp;{breakable(name)}</td>"
+        f'<tr><td data-v="{number}">{number}&nbsp;{breakable(name)}</td>'
         + "".join(f'<td class=n style="background:{_colour(value)}">{correlation(value)}</td>' for value in line)
         + "</tr>"
         for number, name, line in zip(numbered, found.correlated, found.correlation.tolist(), strict=True)
     ]
     return (
         "<p class=quiet>Correlations of the estimates; a column is the parameter of its number.</p>"
-        f'<div class=scroll><table style="width:auto"><thead><tr><th></th>{columns}</tr></thead><tbody>{"".join(rows)}</tbody>'
+        '<div class=scroll><table class=sortable style="width:auto"><thead><tr><th>parameter</th>'
+        f"{columns}</tr></thead><tbody>{''.join(rows)}</tbody>"
         "</table></div>"
     )
 
@@ -87,7 +88,7 @@ def page(found: Identified) -> str:
         f"<h1>{say(found.title or found.experiment)}: parameters</h1>",
         bullets(conclusions(found)),
         "<h2>Parameters</h2>",
-        table(head, rows, (1,)),
+        table(head, rows, [k for k, title in enumerate(head) if title not in ("parameter", "unit", "remark")]),
         "<h2>What the runs tell apart</h2>",
         bullets(found.weak) or f"<p>{KNOWN if found.all_took_part else KNOWN_OF_THE_REST}</p>",
         _what_to_do(found),
@@ -106,7 +107,7 @@ def page(found: Identified) -> str:
             f"{100.0 * found.posterior.accepted:.0f} % of the jumps were taken; the samples count by 1/"
             f"{digits(found.posterior.inflation, 2)}, as in the standard errors. Histograms: draws; grey: what the standard "
             "error stands for.</p>",
-            table(chains, posterior_rows(found), (1, 4, 5)),
+            table(chains, posterior_rows(found), (1, 3, 4, 5)),
             picture(
                 draw.posterior_histograms(found), "posterior", "panels", draw.posterior_histograms(found, upright=True)
             ),
@@ -124,7 +125,7 @@ def page(found: Identified) -> str:
         parts += [
             "<h2>What to measure next</h2><p class=quiet>Courses of the input within what was applied already, ranked by "
             "what one such run would tell (D-optimal, at the fit).</p>",
-            table(["", "run", "information, nats", "standard errors become"], rows, (2,)),
+            table(["rank", "run", "information, nats", "standard errors become"], rows, (0, 2)),
             picture(draw.suggested_inputs(found), "suggested inputs"),
         ]
     parts += ["<h2>Runs</h2>", table(run_head, runs, range(2, len(run_head)))]
