@@ -12,7 +12,7 @@ import numpy as np
 from smajax.measured.headers import time_column, unit_of
 from smajax.measured.read import READERS, read_table
 from smajax.measured.resample import resample_input, resample_output, uniform_clock
-from smajax.measured.table import Array, check_time
+from smajax.measured.table import Array, MeasuredDataError, Table, check_time
 from smajax.units import UnitError, convert, parse_quantity
 
 MOST_SAMPLES = 20_000_000
@@ -71,12 +71,29 @@ def levels(text: str, unit: str, bare: str = "") -> Given:
             values.append(parse_quantity(level, unit, bare=bare))
             lengths.append(parse_quantity(length, "s", bare="s" if bare else ""))
         except UnitError as error:
-            minutes = "; minutes are 'min'" if length.strip().endswith("m") else ""
-            raise UnitError(f"{part.strip()!r}: {error}{minutes}") from None
+            raise UnitError(f"{part.strip()!r}: {error}") from None
     if min(lengths) <= 0.0:
         raise UnitError(f"got {text!r}, expected times above zero")
     ends = np.cumsum(lengths)
     return Given(np.concatenate([[0.0], ends[:-1]]), np.asarray(values), float(ends[-1]))
+
+
+def reads_file(text: str) -> bool:
+    """Whether an input is a column of a file."""
+    head, colon, _ = text.partition(":")
+    return bool(colon) and (Path(head).suffix.lower() in READERS or Path(head).is_file())
+
+
+def _time(table: Table, time: str) -> tuple[Array, str, str]:
+    """(values, name, unit) of the column that `COLUMN` or `COLUMN:UNIT` names, or its heading. Raises MeasuredDataError."""
+    asked, _, unit = time.partition(":")
+    try:
+        key = int(asked) if asked.isdigit() and asked not in table.columns else asked
+        name = table.name_of(key) if asked else time_column(table)
+    except MeasuredDataError as error:
+        how = "a time column is named by --time, as COLUMN or COLUMN:UNIT; how long a run is says --seconds"
+        raise MeasuredDataError(f"{error}; {how}") from None
+    return table.column(name), name, unit or unit_of(table, name) or "s"
 
 
 def column(path: Path, key: str | int, unit: str, own: str, time: str = "") -> Given:
@@ -92,17 +109,15 @@ def column(path: Path, key: str | int, unit: str, own: str, time: str = "") -> G
         raise UnitError(
             f"{path}: column {table.name_of(key)!r} does not say its unit; write it behind: {path.name}:{key}:{own}"
         )
-    clock, clock_unit = table.clock(key), "s"
+    clock, clock_unit, where = table.clock(key), "s", f"the time of {key!r}"
     if clock is None:
-        name, _, clock_unit = time.partition(":")
-        at = (
-            table.name_of(int(name) if name.isdigit() and name not in table.columns else name)
-            if name
-            else time_column(table)
-        )
-        clock, clock_unit = table.column(at), clock_unit or unit_of(table, at) or "s"
-    check_time(clock, f"{path}: the time of {key!r}", clock_unit, table.place)
-    seconds = convert(clock, clock_unit, "s")
+        clock, name, clock_unit = _time(table, time)
+        where = f"the time column {name!r}"
+    check_time(clock, f"{path}: {where}", clock_unit, table.place)
+    try:
+        seconds = convert(clock, clock_unit, "s")
+    except UnitError as error:
+        raise UnitError(f"{path}: {where}: {error}") from None
     seconds = seconds - seconds[0]
     return Given(seconds, convert(values, written or own, own), float(seconds[-1]), measured=True)
 
@@ -113,7 +128,7 @@ def given(text: str, own: str, time: str = "", bare: str = "") -> Given:
     bare: see `levels`; a file's column without a unit is asked for one.
     """
     head, colon, rest = text.partition(":")
-    if colon and (Path(head).suffix.lower() in READERS or Path(head).is_file()):
+    if reads_file(text):
         name, _, unit = rest.partition(":")
         key: str | int = int(name) if name.isdigit() else name
         return column(Path(head), key, unit, own, time)
@@ -135,5 +150,8 @@ def clock_of(several: Sequence[Given], seconds: float | None, dt: float) -> Arra
             f"{end:g} s at {dt:g} s are over {MOST_SAMPLES:,} samples: take a longer --dt or a shorter run."
         )
     if end < dt:
-        raise ValueError(f"the run lasts {end:g} s, less than a step of {dt:g} s.")
+        raise ValueError(
+            f"the run lasts {end:g} s, less than a step of {dt:g} s: take a shorter --dt or a longer run, or "
+            "correct the unit of the times."
+        )
     return uniform_clock(0.0, end, dt)

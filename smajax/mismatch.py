@@ -68,7 +68,10 @@ def variation_of(told: Mapping[str, str]) -> dict[str, float]:
         try:
             found[short_name(name)] = float(both[1]) / 100.0 if both else parse_quantity(text, "1")
         except UnitError as error:
-            raise ValueError(f"{name}={text}: expected a share such as 20% or 0.2: {error}.") from None
+            comma = f" ({error})" if re.fullmatch(r"\s*\d*,\d+\s*%?\s*", text) else ""
+            raise ValueError(
+                f"got {name}={text}, expected a share such as {name}=20% or {name}=0.2, with a comma before the next name{comma}."
+            ) from None
     return found
 
 

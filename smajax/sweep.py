@@ -22,6 +22,7 @@ from smajax.closed_loop import simulate_closed_loop
 from smajax.controller.base import AbstractController
 from smajax.estimator.base import AbstractEstimator
 from smajax.fit.progress import Progress, quiet
+from smajax.measured.names import instead
 from smajax.measured_state import Sensor
 from smajax.merit import Merit, judged_loop
 from smajax.mismatch import MISMATCHES
@@ -29,7 +30,6 @@ from smajax.parameters import get_parameters, set_vector
 from smajax.reference import Reference, clock, constant
 from smajax.system import System
 from smajax.types import Scalar, Series
-from smajax.words import and_listed
 
 LEAST, MOST = 0.5, 2.0  # the mismatches looked at, plant over belief
 TARGET, GAIN, NUMBER = "set point", "share of the gain", "number"
@@ -50,6 +50,15 @@ def lanes(
     return np.stack([np.ravel(column) for column in np.broadcast_arrays(*columns, target, gain)], axis=1)
 
 
+def check_mismatches(first: str, second: str) -> None:
+    """ValueError for a mismatch there is not, or twice the same; `second` is "" where there is one alone."""
+    for name in (first, second) if second else (first,):
+        if name not in MISMATCHES:
+            raise ValueError(f"no mismatch `{name}`{instead(name, MISMATCHES, 'there are')}.")
+    if first == second:
+        raise ValueError(f"`{first}` twice, expected one mismatch or two different ones of {', '.join(MISMATCHES)}.")
+
+
 @dataclass(frozen=True)
 class Grid:
     """The product of two mismatches (plant over belief) or one, set points (rad) and shares of the main gain.
@@ -64,11 +73,7 @@ class Grid:
     gains: np.ndarray  # (G,), share of the preset's main gain
 
     def __post_init__(self) -> None:
-        if self.first == self.second or not set(self.mismatches) <= set(MISMATCHES):
-            raise ValueError(
-                f"one mismatch or two different ones of {', '.join(sorted(MISMATCHES))}, not "
-                f"{and_listed([f'`{name}`' for name in self.mismatches])}."
-            )
+        check_mismatches(self.first, self.second)
 
     @property
     def mismatches(self) -> tuple[str, ...]:

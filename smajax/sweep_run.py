@@ -22,6 +22,7 @@ from smajax.fit.kept import arrays
 from smajax.fit.progress import Progress
 from smajax.gains_file import Gains
 from smajax.load.base import AbstractMovingLoad
+from smajax.measured.names import instead
 from smajax.measured_state import Sensor
 from smajax.merit import Merit
 from smajax.mismatch import MISMATCHES
@@ -121,7 +122,7 @@ def check_interface(filtered: str, noise: float, period: float, dt: float) -> No
     if not 0.0 <= noise < math.inf:
         raise ValueError(f"a noise is a number of degrees, 0 or more; not {noise:g}.")
     if filtered and filtered not in FILTERS:
-        raise ValueError(f"no filter `{filtered}`; there are {', '.join(FILTERS)}.")
+        raise ValueError(f"no filter `{filtered}`{instead(filtered, FILTERS, 'there are')}.")
     steps = period / dt
     if not 0.5 <= steps < math.inf or abs(steps - round(steps)) > 1e-6:
         raise ValueError(f"a controller's period is a whole number of simulation steps of {dt:g} s, not {period:g} s.")
@@ -152,9 +153,11 @@ def run_sweep(
 
     Raises ValueError for a controller or mismatch there is not.
     """
-    unknown = [name for name in settings.controllers if name not in CONTROLLERS]
-    if unknown or not settings.controllers:
-        raise ValueError(f"no controller `{', '.join(unknown)}`; there are {', '.join(CONTROLLERS)}.")
+    for name in settings.controllers:
+        if name not in CONTROLLERS:
+            raise ValueError(f"no controller `{name}`{instead(name, CONTROLLERS, 'there are')}.")
+    if not settings.controllers:
+        raise ValueError(f"no controller is named, expected some of {', '.join(CONTROLLERS)}.")
     check_set_points(system, settings.set_points)
     if not settings.gains or min(settings.gains) <= 0.0:
         raise ValueError(f"gains are shares of the preset's, above 0, at least one; not {settings.gains}.")

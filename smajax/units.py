@@ -124,7 +124,9 @@ def _plain(unit: Any) -> str:
     return "1 (no unit)" if str(unit) == "dimensionless" else f"{unit:~C}".replace("**", "^")
 
 
-def _hint(got: str) -> str:
+def _hint(got: str, expected: str) -> str:
+    if got.strip() == "m" and expected == "s":
+        return " (minutes are 'min')"
     words = re.findall(r"[A-Za-z]+", got)
     if "C" in words:
         return " ('C' is the coulomb; write degC)"
@@ -138,7 +140,7 @@ def _factor(got: str, expected: str, difference: bool) -> tuple[Any, Any]:
     source, target = _unit(got, expected), _unit(expected)
     if source.dimensionality != target.dimensionality:
         raise UnitError(
-            f"got unit {got!r}{_hint(got)}, expected one like {expected!r}, to which it cannot be converted; change the unit or "
+            f"got unit {got!r}{_hint(got, expected)}, expected one like {expected!r}, to which it cannot be converted; change the unit or "
             "the quantity"
         )
     if _is_temperature(target):

@@ -38,6 +38,39 @@ SIMULATE = {
         "'--dt': more than 0 s, not `-5ms`; give one such as 5ms",
     ),
     "a step of a volt": ([*WIRE, "--step", "5V:1s", "--dt", "5V"], "'--dt': got unit 'V'"),
+    "minutes as metres in a length": (
+        [*WIRE, "--step", "5V:1s", "--seconds", "2m"],
+        "'--seconds': got unit 'm' (minutes are 'min')",
+    ),
+    "a time column without a file": (
+        [*WIRE, "--step", "5V:1s", "--time", "10s"],
+        "for --time: names the time column of a file, and nothing is read from one: leave `10s` out (how long a run is says "
+        "--seconds)",
+    ),
+    "a length in the place of a time column": (
+        [*WIRE, "--input", "voltage={log}:U:V", "--time", "10s"],
+        "no column '10s'; it has: t, U, x; a time column is named by --time, as COLUMN or COLUMN:UNIT; how long a run is says --seconds",
+    ),
+    "a time column before the first": (
+        [*WIRE, "--input", "voltage={log}:U:V", "--time", "0"],
+        "no column number 0; it has columns 1 to 3; a time column is named by --time",
+    ),
+    "a time column that goes back": (
+        [*WIRE, "--input", "voltage={log}:x:V", "--time", "U"],
+        "the time column 'U' does not increase",
+    ),
+    "a time in a unit there is not": (
+        [*WIRE, "--input", "voltage={log}:U:V", "--time", "t:foo"],
+        "the time column 't': unit 'foo' is not known; expected one like 's'",
+    ),
+    "a time in volts": (
+        [*WIRE, "--input", "voltage={log}:U:V", "--time", "t:V"],
+        "the time column 't': got unit 'V', expected one like 's'",
+    ),
+    "a run of less than a step": (
+        [*WIRE, "--input", "voltage={log}:U:V", "--time", "t:us"],
+        "take a shorter --dt or a longer run, or correct the unit of the times",
+    ),
     "no run": (
         [*WIRE, "--step", "5V:1s", "--seconds", "0s"],
         "'--seconds': more than 0 s, not `0s`; give one such as 10s",
@@ -173,8 +206,11 @@ def test_gains_that_are_none(tmp_path: Path, name: str) -> None:
 
 
 LONG = {
-    "sweep --controllers pdi": "no controller `pdi`; there are pid,",
-    "sweep --controllers pid --over convection,damp": "damp",
+    "sweep --controllers pdi": "no controller `pdi`; did you mean 'pid'? There are: pid,",
+    "sweep --controllers ,": "no controller is named, expected some of pid,",
+    "sweep --controllers pid --over convection,damp": "for --over: no mismatch `damp`; did you mean 'damping'? There are: in",
+    "sweep --controllers pid --over wire_length": "for --over: no mismatch `wire_length`; there are: inertia, damping",
+    "sweep --controllers pid --over damping,damping": "for --over: `damping` twice, expected one mismatch or two different",
     "sweep --controllers pid --over convection,damping,payload": "one mismatch, or two with a comma between them, not",
     "sweep --set-points a": "finite numbers with commas between them, not `a`",
     "sweep --set-points nan": "finite numbers with commas between them, not `nan`",
@@ -190,10 +226,14 @@ LONG = {
     "sweep --period nan": "'--period': got 'nan', expected a number and a unit like '1.5 s'",
     "sweep --period 15ms": "a whole number of simulation steps of 0.01 s, not 0.015 s",
     "sweep --set-points 10V": "not `10V`: got unit 'V'",
-    "sweep --estimator kalman": "no filter `kalman`; there are",
+    "sweep --estimator kalman": "no filter `kalman`; there are: printed, model",
     "tune pdi": "no controller `pdi`; did you mean 'pid'?",
-    "tune pid --variation inertai=0.2": "no variation `inertai`; did you mean 'inertia'?",
-    "tune pid --variation inertia=nan": "inertia=nan: expected a share such as 20% or 0.2: got 'nan'",
+    "tune pid --variation inertai=0.2": "for --variation: no variation `inertai`; did you mean 'inertia'?",
+    "tune pid --variation inertia=nan": "for --variation: got inertia=nan, expected a share such as inertia=20% or inertia=0.2",
+    "tune pid --variation inertia=2%damping=3%": "got inertia=2%damping=3%, expected a share such as inertia=20% or inertia=0.2, "
+    "with a comma before the next name.",
+    "tune pid --variation inertia=0,2": "the next name (got '0,2', expected a decimal point; write '0.2').",
+    "tune pid --variation inertia=20": "not inertia=20; 20 per cent is inertia=20%",
     "tune pid --variation inertia=+20%": "expected a variation, which goes both ways: inertia=20% is from -20% to +20%",
     "tune pid --variation convection=20%,convection_coefficient=10%": "is `convection`, which is given already",
     "sweep --over damping=20%": "names alone, as in `convection,damping`, not `damping=20%`",

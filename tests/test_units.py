@@ -56,7 +56,11 @@ def test_a_noise_in_kelvin_is_a_difference_where_a_temperature_is_expected() -> 
 @pytest.mark.parametrize(
     ("text", "expected", "words"),
     [
-        ("3 m", "s", "^got unit 'm', expected one like 's', to which it cannot be converted; change"),
+        (
+            "3 m",
+            "s",
+            r"^got unit 'm' \(minutes are 'min'\), expected one like 's', to which it cannot be converted; change",
+        ),
         ("7 MPa/C", "Pa/K", "'C' is the coulomb; write degC"),
         ("3 delta_degC", "degC", "got a temperature difference"),
         ("3 furlongz", "m", "unit 'furlongz' is not known; expected one like 'm'$"),

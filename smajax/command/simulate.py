@@ -139,6 +139,7 @@ def simulate(
     prepare()
     from smajax.command.folder import check_path, claimed
     from smajax.gains_file import GainsFileError
+    from smajax.levels import reads_file
     from smajax.progress import shown
     from smajax.report.files import json_text
     from smajax.report.simulate_page import OWN, merit_rows, mismatch_rows, record, rest_rows, summary_rows, write_run
@@ -155,6 +156,12 @@ def simulate(
     if closed and (series or step or tolerance is not None):
         raise typer.BadParameter(
             "in a closed loop the controller gives the voltage: leave --step, --input and --tolerance out."
+        )
+    texts_given = [*series.values(), *([set_point] if set_point is not None else [])]
+    if time and not any(map(reads_file, texts_given)):
+        raise typer.BadParameter(
+            f"names the time column of a file, and nothing is read from one: leave `{time}` out (how long a run is says --seconds).",
+            param_hint="--time",
         )
     if gif and load == "coupon":
         raise typer.BadParameter("a coupon moves nothing that could be drawn.", param_hint="--gif")

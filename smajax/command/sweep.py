@@ -99,6 +99,7 @@ def sweep(
     from smajax.gains_file import GainsFileError, read_gains
     from smajax.mismatch import short_name
     from smajax.progress import shown
+    from smajax.sweep import check_mismatches
     from smajax.sweep_run import SweepSettings, as_text, files_of, goes_on, run_sweep
 
     try:
@@ -107,7 +108,8 @@ def sweep(
         hint = " Shares of the main gain are `--gain-shares`." if any(not one.suffix for one in gains or ()) else ""
         raise typer.BadParameter(f"{error}{hint}", param_hint="--gains") from None
     asked = controllers or ",".join(dict.fromkeys(one.controller for one in tuned)) or "all"
-    names = tuple(CONTROLLERS) if asked == "all" else tuple(part for part in asked.split(",") if part)
+    named = [part.strip() for part in asked.split(",")]
+    names = tuple(CONTROLLERS) if named == ["all"] else tuple(dict.fromkeys(part for part in named if part))
     first, _, second = (part.strip() for part in over.strip(" ,").partition(","))
     if "=" in over:
         raise typer.BadParameter(
@@ -116,10 +118,15 @@ def sweep(
         )
     if not first or "," in second:
         raise typer.BadParameter(f"one mismatch, or two with a comma between them, not `{over}`", param_hint="--over")
+    first, second = short_name(first), short_name(second)
+    try:
+        check_mismatches(first, second)
+    except ValueError as error:
+        raise typer.BadParameter(str(error), param_hint="--over") from None
     settings = SweepSettings(
         names,
-        short_name(first),
-        short_name(second),
+        first,
+        second,
         points or (3 if fast else 15),
         numbers("--set-points", set_points if set_points is not None else "-20,20,60" if fast else SET_POINTS, "deg"),
         numbers("--gain-shares", gain_shares if gain_shares is not None else "1" if fast else GAINS),

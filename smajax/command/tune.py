@@ -120,6 +120,7 @@ def tune(
     from smajax.mismatch import variation_of
     from smajax.progress import shown
     from smajax.tune.folder import OURS, STATE, ended, tune_into
+    from smajax.tune.members import check_variation
     from smajax.tune.objective import REGULATION
     from smajax.tune.page import gain_rows, record
     from smajax.tune.settings import TuneSettings
@@ -133,6 +134,7 @@ def tune(
         raise typer.BadParameter(str(error), param_hint="--start") from None
     try:
         varied = variation_of(texts("--variation", variation, "damping=20%,payload=50%"))
+        check_variation(varied)
     except ValueError as error:
         raise typer.BadParameter(str(error), param_hint="--variation") from None
     settings = TuneSettings(

@@ -56,9 +56,10 @@ def check_variation(variation: Mapping[str, float]) -> None:
         if name not in MISMATCHES:
             raise ValueError(f"no variation `{name}`{instead(name, MISMATCHES, 'there are')}.")
         if not 0.0 < share < 1.0:
+            percent = f"; {share:g} per cent is {name}={share:g}%" if 1.0 < share < 100.0 else ""
             raise ValueError(
                 f"a variation is a share between 0 and 1 (20% or 0.2: from -20% to +20% of what the controller believes), not "
-                f"{name}={share:g}."
+                f"{name}={share:g}{percent}."
             )
 
 
