@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, ProgressColumn, Task, TaskID, TextColumn, TimeElapsedColumn
 from rich.text import Text
 
+from smajax.compiling import TOLD, compilations_told
 from smajax.fit.progress import Progress as Report
 
 # Where stderr is no terminal nothing is said, so that a program that calls us has a clean one; with `lines` a log of a
@@ -31,7 +32,8 @@ def shown(console: Console, told_how: bool = False) -> Iterator[Report]:
         with _bars(console) as report:
             yield report
     elif os.environ.get(VARIABLE) == "lines":
-        yield _lines(console)
+        with _lines(console) as report:
+            yield report
     else:
         if told_how and VARIABLE not in os.environ:
             console.print(HOW, markup=False, highlight=False, soft_wrap=True)
@@ -52,24 +54,41 @@ def _warnings(console: Console) -> Report:
     return warned
 
 
-def _lines(console: Console) -> Report:
-    began, last = clock.monotonic(), ""
+@contextmanager
+def _lines(console: Console) -> Iterator[Report]:
+    began, last, compiled = clock.monotonic(), "", "none"
+
+    def said(told: str) -> None:
+        console.print(f"[{clock.monotonic() - began:6.1f} s] {told}", markup=False, highlight=False, soft_wrap=True)
 
     def line(what: str, share: float) -> None:
         nonlocal last
         if _sentence(what) or (what != last and share < 1.0):
-            told = _sentence(what) or what
-            console.print(f"[{clock.monotonic() - began:6.1f} s] {told}", markup=False, highlight=False, soft_wrap=True)
+            said(_sentence(what) or what)
             last = what
 
-    return line
+    def compiles(now: bool) -> None:
+        nonlocal compiled
+        if now and compiled != last:  # once a stage
+            said(TOLD)
+            compiled = last
+
+    with compilations_told(compiles):
+        yield line
 
 
 class _Left(ProgressColumn):
-    """Time left at the pace of the whole stage: steps of a minute each have no pace within the last seconds."""
+    """Time left at the pace of the whole stage: steps of a minute each have no pace within the last seconds.
+
+    While a program is compiled, that it is.
+    """
+
+    compiling = False
 
     def render(self, task: Task) -> Text:
         """Counts down between two shares; nothing is promised before the first."""
+        if self.compiling and not task.finished:
+            return Text(TOLD)
         share, now, at = task.completed, task.elapsed or 0.0, float(task.fields["at"])
         if task.finished or not 0.0 < share < 1.0:
             return Text("")
@@ -79,8 +98,13 @@ class _Left(ProgressColumn):
 
 @contextmanager
 def _bars(console: Console) -> Iterator[Report]:
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), _Left())
-    with Progress(*columns, console=console) as bar:
+    left = _Left()
+
+    def compiles(now: bool) -> None:
+        left.compiling = now
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), left)
+    with Progress(*columns, console=console) as bar, compilations_told(compiles):
         open_tasks: dict[str, TaskID] = {}
 
         def move(what: str, share: float) -> None:

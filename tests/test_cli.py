@@ -8,20 +8,25 @@ import re
 import signal
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
+from rich.progress import Progress
 from typer.testing import CliRunner
 
 from smajax.cli import app, main
 from smajax.command import renamed
 from smajax.command.base import console, numbers, pairs, texts, understood
 from smajax.compose import compose, with_values
+from smajax.lanes.evaluate import evaluator
 from smajax.mismatch import MISMATCHES, variation_of
 from smajax.parameters import parameter_values
 from smajax.presets import build
-from smajax.progress import VARIABLE, shown
+from smajax.progress import VARIABLE, _Left, shown
 from smajax.tune.terms import TERMS
 
 DEMO = Path(__file__).parents[1] / "smajax" / "demo" / "latent"
@@ -232,6 +237,47 @@ def test_long_work_says_how_to_see_progress_and_for_a_machine_does_not(
         assert told.exit_code == 0
         assert told.output.count("SMAJAX_PROGRESS=lines") == times
     assert json.loads(told.output)["M9"]["holds"]
+
+
+class _AtOnce:
+    """A timer that waits for nothing."""
+
+    def __init__(self, seconds: float, function: Callable[[bool], None], args: tuple[bool]) -> None:
+        self.start = lambda: function(*args)
+
+    def cancel(self) -> None: ...
+
+
+def test_a_stage_that_waits_for_a_compilation_says_so(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv(VARIABLE, "lines")
+    monkeypatch.setattr("smajax.compiling.threading.Timer", _AtOnce)
+    monkeypatch.setattr("smajax.lanes.evaluate.disk.folder", lambda: None)
+    with shown(console()) as progress:
+        progress("fitting", 0.0)
+        for power in (2, 3):  # programs that no other test has
+            jax.jit(lambda x, power=power: jnp.sinc(x) ** power)(np.ones(7))
+        progress("fitting", 1.0)
+        progress("simulating", 0.0)
+        # A program of our own, which is not looked for on the disk.
+        evaluator(lambda model, own: {"a": jnp.sinc(own["a"]) ** 5}, None, ("a",))
+    jax.jit(lambda x: jnp.sinc(x) ** 4)(np.ones(7))  # nobody looks any more
+    said = [line.split("] ", 1)[1] for line in capsys.readouterr().err.splitlines()]
+    waits = "compiling, the first time only"
+    assert said == ["fitting", waits, "simulating", waits]
+
+
+def test_a_bar_says_that_a_program_is_compiled_and_until_when() -> None:
+    waits = _Left()
+    bar = Progress()
+    bar.add_task("fitting", total=1.0, at=0.0)
+    (task,) = bar.tasks
+    assert waits.render(task).plain == ""
+    waits.compiling = True
+    assert waits.render(task).plain == "compiling, the first time only"
+    bar.update(task.id, completed=1.0)
+    assert waits.render(task).plain == ""
 
 
 def test_a_warning_is_said_wherever_stderr_leads(

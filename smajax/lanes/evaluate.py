@@ -10,6 +10,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from smajax.compiling import compiling
 from smajax.lanes import disk
 from smajax.lanes.kernel import Kernel, compiled, divides_slowly, has_wide_vectors, vector_bits
 from smajax.lanes.text import Unsupported
@@ -132,7 +133,8 @@ def evaluator(
         if known is not None:
             return _evaluator(known, names)
         try:
-            program = _compiled(function, arrays, static, names, alone)
+            with compiling():
+                program = _compiled(function, arrays, static, names, alone)
             if key:
                 disk.save(key, program)
             return _evaluator(program, names)
