@@ -68,9 +68,24 @@ def test_the_first_example_of_the_readme_prints_what_it_says(tmp_path: Path) -> 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("only", ["under_law", "simulate_closed_loop", "run_batch"])
-def test_the_other_examples_of_the_readme_run(only: str, tmp_path: Path) -> None:
-    run(ROOT / "README.md", tmp_path, only)
+@pytest.mark.parametrize(
+    ("page", "only"),
+    [
+        ("README.md", "under_law"),
+        ("docs/reference/control.md", "simulate_closed_loop"),
+        ("docs/reference/batches.md", "run_batch"),
+    ],
+)
+def test_the_other_examples_of_the_readme_and_the_reference_run(page: str, only: str, tmp_path: Path) -> None:
+    run(ROOT / page, tmp_path, only)
+
+
+def test_the_readme_is_short_and_leads_to_what_it_leaves_out() -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert len(text.splitlines()) <= 225
+    for target, anchor in re.findall(r"\]\((docs/[^)#\s]+)#([^)\s]+)\)", text):
+        titles = re.findall(r"^#+ (.*)$", (ROOT / target).read_text(encoding="utf-8"), re.MULTILINE)
+        assert anchor in [title.lower().replace(".", "").replace(" ", "-") for title in titles], (target, anchor)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
