@@ -97,6 +97,6 @@ axes[0].legend()
 
 # %% [markdown]
 # The conclusion, no more than the numbers allow: expansion of each phase is missing from the base model; a transformation in two steps with
-# long tails, a supply that tires and a draught help, and may in part stand in for something that the library does not hold (a draught that ends at
-# its bounds in every run is hardly one); and the run of another day is off by seven times the error of the fit runs, which no effect of the wire explains.
+# long tails and a draught help, and may in part stand in for something that the library does not hold (a draught that ends at
+# a bound in every run is hardly one); and the run of another day is off by five times the error of the fit runs, which no effect of the wire explains.
 print(*report["unexplained"], sep="\n")
