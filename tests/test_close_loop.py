@@ -13,9 +13,11 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from smajax.attribution.assumed import assumed, sizes_not_given
+from smajax.attribution.found import spread
 from smajax.attribution.verdict import cannot_know, pooled, summary
 from smajax.catalogue import CATALOGUE
-from smajax.close_loop import _preset, _sizes_not_given, _spread, close_loop
+from smajax.close_loop import close_loop
 from smajax.experiment.load import load_experiment
 from smajax.extended import base_model, extended
 from smajax.fit.batch import pack, simulate_batch
@@ -33,7 +35,7 @@ def test_a_parameter_that_the_log_gives_is_not_left_open() -> None:
     """The demo's mass is logged, so the preset's is used nowhere; its length is the preset's."""
     with resources.as_file(resources.files("smajax") / "demo" / "latent") as folder:
         experiment = load_experiment(folder / "experiment.toml", CATALOGUE)
-    told = _preset(cast(Any, SimpleNamespace(experiment=experiment, unknowns=())))
+    told = assumed(cast(Any, SimpleNamespace(experiment=experiment, unknowns=())))
     assert "load_mass" not in told
     assert {"wire_length", "damping"} <= set(told)
 
@@ -62,10 +64,10 @@ def test_what_hangs_on_the_step_or_hides_in_the_noise_is_told_at_the_top() -> No
 
 
 def test_a_spread_over_runs_that_the_tie_holds_is_not_given() -> None:
-    assert _spread((1.0, 2.0), 0.4) == (1.0, 2.0)
-    assert _spread((1.0, 2.0), 0.6) is None
-    assert _spread((1.0, 2.0), None) is None
-    assert _spread(None, 0.1) is None
+    assert spread((1.0, 2.0), 0.4) == (1.0, 2.0)
+    assert spread((1.0, 2.0), 0.6) is None
+    assert spread((1.0, 2.0), None) is None
+    assert spread(None, 0.1) is None
 
 
 def test_a_load_far_off_may_be_a_size_of_the_bench_that_was_never_given() -> None:
@@ -73,7 +75,7 @@ def test_a_load_far_off_may_be_a_size_of_the_bench_that_was_never_given() -> Non
     with resources.as_file(resources.files("smajax") / "demo" / "latent") as folder:
         experiment = load_experiment(folder / "experiment.toml", CATALOGUE)
     bare = dataclasses.replace(experiment, parameters={})
-    sizes = _sizes_not_given(cast(Any, SimpleNamespace(experiment=bare, unknowns=("damping",))))
+    sizes = sizes_not_given(cast(Any, SimpleNamespace(experiment=bare, unknowns=("damping",))))
     assert [one.split()[0] for one in sizes] == ["wire_length", "wire_diameter"]
 
     def told(share: float, sizes: list[str]) -> str:
@@ -92,7 +94,7 @@ def test_a_load_far_off_may_be_a_size_of_the_bench_that_was_never_given() -> Non
     assert "a size of the bench" not in told(-0.79, [])
     given = dict.fromkeys(("wire_diameter", "wire_length"), 1e-3)
     whole = dataclasses.replace(experiment, parameters=given)
-    assert _sizes_not_given(cast(Any, SimpleNamespace(experiment=whole, unknowns=("damping",)))) == []
+    assert sizes_not_given(cast(Any, SimpleNamespace(experiment=whole, unknowns=("damping",)))) == []
 
 
 def test_a_parameter_that_ends_at_a_bound_is_said_at_the_top(tmp_path: Path) -> None:

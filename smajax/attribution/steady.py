@@ -6,13 +6,16 @@ row of jumps happens to fall where the log's does, and gains what no wire does: 
 
 from __future__ import annotations
 
+import jax.numpy as jnp
 import numpy as np
 
+from smajax.attribution.job import Job
 from smajax.attribution.judging import Model, Search
 from smajax.effects.library import LIBRARY
-from smajax.fit.batch import halved
+from smajax.fit.batch import halved, simulate_batch
 from smajax.fit.problem import Problem
 from smajax.fit.shown import shown_at
+from smajax.load.coupon import AbstractCoupon
 
 
 def kept_at_half_the_step(setting: Search, new: Model, old: Model) -> float:
@@ -27,3 +30,15 @@ def kept_at_half_the_step(setting: Search, new: Model, old: Model) -> float:
     misfit = problem.centred(problem.measured - shown_at(fine, [new.values[index]])[0][:, ::2])
     cost = float(np.sum((np.asarray(misfit) / np.asarray(problem.noise)) ** 2))
     return (old.cost - cost) / (old.cost - new.cost) if old.cost > new.cost else 1.0
+
+
+def integration_error(job: Job, final: Model) -> float:
+    """By how much the output (rms, worst fit run, SI, offset aside) changes when the step is halved."""
+    if isinstance(job.problem.system.load, AbstractCoupon):
+        return 0.0  # a closed form at each sample
+    batch, values = job.problem.batch, final.values
+    coarse = simulate_batch(job.problem.system_at(jnp.asarray(values)), batch).reading
+    fine = simulate_batch(job.problem.system_at(jnp.asarray(values)), halved(batch)).reading[:, ::2]
+    change, mask = np.asarray(fine - coarse), np.asarray(batch.mask)
+    centred = change - (job.experiment.offset * (change * mask).sum(1) / mask.sum(1))[:, None]
+    return float(np.sqrt(((centred * mask) ** 2).sum(1) / mask.sum(1)).max())

@@ -1,0 +1,111 @@
+"""The final model as a reader is told it: parameters with their errors, effects with their evidence."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from smajax.attribution.job import Job
+from smajax.attribution.judging import Evidence, Model, Search
+from smajax.attribution.search import scores_at
+from smajax.effects.library import LIBRARY
+from smajax.fit.sensitivity import Sensitivity, sensitivity
+from smajax.fit.uncertainty import Uncertainty, uncertainty
+from smajax.parameters import parameters
+from smajax.report.findings import CoefficientFinding, EffectFinding, ParameterFinding
+
+
+@dataclass(frozen=True)
+class ParametersFound:
+    parameters: tuple[ParameterFinding, ...]
+    uncertainty: Uncertainty
+
+
+def parameters_found(job: Job, setting: Search, model: Model, start: np.ndarray) -> ParametersFound:
+    """Every free parameter of `model` with its standard error and remark."""
+    names = setting.free(model.effects)
+    index = job.problem.names.index
+    at: Sensitivity = sensitivity(job.problem, model.values, names)
+    values = {name: float(model.values[index(name)]) for name in names}
+    known = uncertainty(at, names, values, job.bounds)
+    table = parameters(job.problem.system)
+    return ParametersFound(
+        tuple(
+            ParameterFinding(
+                name,
+                table[name].unit,
+                values[name],
+                known.standard_error[name],
+                *job.bounds[name],
+                float(start[index(name)]),
+                known.remark[name],
+            )
+            for name in names
+        ),
+        known,
+    )
+
+
+def effects_found(
+    job: Job, setting: Search, final: Model, after: ParametersFound, intervals: dict[str, tuple[float, float]]
+) -> tuple[EffectFinding, ...]:
+    """Every candidate with its evidence: added ones first, the strongest of them at the head, then by score."""
+    left = [name for name in job.candidates if name not in final.effects]
+    last = {score.effects[0]: score for score in scores_at(setting, final, left)[0]} if left else {}
+    told = {parameter.name: parameter for parameter in after.parameters}
+    findings = []
+    for name in job.candidates:
+        effect, seen = LIBRARY[name], setting.evidence.get(name, Evidence())
+        coefficients = {
+            full.split(".", 1)[1]: CoefficientFinding(
+                told[full].value,
+                told[full].standard_error,
+                told[full].unit,
+                spread(intervals.get(full), told[full].standard_error),
+            )
+            for full in setting.coefficients(name)
+            if full in told
+        }
+        evidence = {
+            "score_gain": seen.first_score.gain if seen.first_score else float("nan"),
+            "score_statistic": seen.first_score.statistic if seen.first_score else float("nan"),
+            "score_p_value": seen.first_score.p_value if seen.first_score else float("nan"),
+            "alone_rmse_fit": seen.alone_rmse,
+            "leave_one_out_rmse": seen.alone_left_out_rmse,
+            "leave_one_out_rmse_of_the_base_model": seen.base_left_out_rmse,
+            "leave_one_out_rmse_without": seen.without_left_out_rmse,
+            "score_p_value_at_the_end": last[name].p_value if name in last else float("nan"),
+            "score_gain_at_the_end": last[name].gain if name in last else float("nan"),
+        }
+        findings.append(
+            EffectFinding(
+                name,
+                effect.title,
+                effect.equation,
+                effect.formula,
+                effect.sentence,
+                name in final.effects,
+                coefficients,
+                evidence,
+            )
+        )
+
+    def strength(one: EffectFinding) -> tuple[bool, float, float]:
+        alone = one.evidence["alone_rmse_fit"] if one.added else np.nan
+        return not one.added, float(np.nan_to_num(alone, nan=np.inf)), -float(np.nan_to_num(one.evidence["score_gain"]))
+
+    return tuple(sorted(findings, key=strength))
+
+
+def spread(interval: tuple[float, float] | None, error: float | None) -> tuple[float, float] | None:
+    """What fits to runs drawn anew say, where it is wide enough to say something.
+
+    Where it is narrower than the standard error either way the tie to the fit holds the value there, and not the runs.
+    """
+    return None if interval is None or error is None or interval[1] - interval[0] < 2.0 * error else interval
+
+
+def asks_for_more(one: ParameterFinding) -> bool:
+    """Whether a parameter is at a bound that it might lie beyond: a share of all or of nothing is not."""
+    return one.remark.startswith("at its") and (one.unit, one.lower, one.upper) != ("-", 0.0, 1.0)

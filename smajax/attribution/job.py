@@ -1,0 +1,56 @@
+"""What every stage of one loop shares."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from smajax.attribution.extent import extent_of
+from smajax.catalogue import candidates
+from smajax.effects.library import LIBRARY
+from smajax.experiment.record import Experiment, Run
+from smajax.extended import base_model, extended
+from smajax.fit.batch import RunBatch, pack
+from smajax.fit.problem import Problem
+from smajax.parameters import parameter_values, parameters
+
+
+@dataclass(frozen=True)
+class Job:
+    """What every stage of one loop shares."""
+
+    experiment: Experiment
+    fit_runs: tuple[Run, ...]
+    problem: Problem
+    held_out: RunBatch | None
+    unknowns: tuple[str, ...]
+    bounds: dict[str, tuple[float, float]]
+    candidates: tuple[str, ...]
+
+
+def job_of(experiment: Experiment) -> Job:
+    """The fit runs packed, the base model with every candidate at its base value, and the box of each parameter.
+
+    A candidate that no fit run can show (a drift over cycles in a log of one, say) is left out here; a box that hangs on the
+    runs, such as the time of a change, is taken from them.
+    """
+    base = base_model(experiment)
+    declared = experiment.declared_effects
+    names = candidates(base, experiment.effects_only, (*experiment.effects_excluded, *declared), experiment.clocked)
+    known = {**experiment.parameters, **{unknown.name: unknown.start for unknown in experiment.unknowns}}
+    runs = tuple(run for run in experiment.runs if run.role == "fit")
+
+    def problem_with(effects: tuple[str, ...]) -> Problem:
+        model = extended(base, effects, {name: value for name, value in known.items() if "." in name})
+        batch = pack(runs, experiment.step, parameter_values(model))
+        return Problem.build(model, batch, experiment.noise_sigma, experiment.offset)
+
+    extent = extent_of(problem_with(declared))
+    names = tuple(name for name in names if LIBRARY[name].shows(extent))
+    problem = problem_with((*declared, *names))
+    full = problem.system
+    bounds = {entry.name: (entry.low, entry.high) for entry in parameters(full).values()}
+    bounds |= {f"{name}.{own}": one for name in names for own, one in LIBRARY[name].spans(extent).items()}
+    bounds |= {unknown.name: (unknown.low, unknown.high) for unknown in experiment.unknowns}
+    others = tuple(run for run in experiment.runs if run.role != "fit")
+    held_out = pack(others, experiment.step, parameter_values(full)) if others else None
+    return Job(experiment, runs, problem, held_out, tuple(u.name for u in experiment.unknowns), bounds, names)
