@@ -46,7 +46,8 @@ def close_loop(
     """Fit the base model, look at what it leaves, find what it lacks, and judge on runs the fit never saw.
 
     `memory` is a folder for finished fits: a loop that was interrupted goes on from there. `apart`: of `Search`. Held-out runs are simulated
-    when the search is over: they can refuse what it found, and choose nothing. The caller chooses precision; anything but float64 is refused with a ValueError, because the
+    when the search is over: they refuse what they do not bear out, and nothing is added
+    for them. The caller chooses precision; anything but float64 is refused with a ValueError, because the
     differences that decide here are far below float32's rounding over a run. Raises PluginError for an effect of another
     package that changes the model at its base value: every verdict would be wrong.
     """

@@ -1,4 +1,4 @@
-"""Runs that no fit saw: simulated when the search is over, they can refuse what it found, and choose nothing."""
+"""Runs that no fit saw: simulated when the search is over, no effect is added for them, and they refuse what they do not bear out."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Refused = tuple[tuple[str, ...], float, float]  # effects, error on the held-out
 def borne_out(job: Job, setting: Search, first: Model, final: Model) -> tuple[Model, Compared, Refused | None]:
     """What the held-out runs leave of `final`: (model, every run by it, what they refused).
 
-    They have had no part in anything before, and can only refuse: the effect that came last first, as long as with it their
+    No fit sees them and nothing is added for them. They refuse: the effect that came last first, as long as with it their
     error is larger than without it, or no smaller than the base model's. It may be larger by `WORSE` where others are left.
     """
 

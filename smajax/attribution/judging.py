@@ -97,7 +97,7 @@ class Search:
     shown: Callable[[float], str]  # an error in the unit that an engineer reads
     progress: Progress = quiet
     noise_given: bool = True  # by the experiment file; else estimated
-    held_out: RunBatch | None = None  # which choose nothing, and refuse an unknown term in the end
+    held_out: RunBatch | None = None  # which no fit sees, and which refuse an unknown term in the end
     apart: bool = False  # a program for each set of effects: pays where many experiments of one kind follow each other
     evidence: dict[str, Evidence] = field(default_factory=dict)
     rounds: list[Round] = field(default_factory=list)

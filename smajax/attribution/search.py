@@ -23,6 +23,9 @@ from smajax.fit.box import Fit
 from smajax.report.findings import Round
 
 SIGNIFICANT = 1e-3  # of the score tests of one round, counted together
+# What passes for noise is looked into all the same where one candidate alone would take more than this share of its square
+# beyond chance: a slow trace as large as the noise may look like a slow noise, and a test of size and memory sees it late.
+TOO_MUCH_FOR_NOISE = 0.2
 SINGLES, PAIRS = 8, 2  # refitted in a round
 BEHIND = 2.0  # times the best one's sum of squares: from the second round on a candidate farther behind is not judged
 MOST_ROUNDS = 6
@@ -105,12 +108,12 @@ def search(setting: Search, base: Fit) -> tuple[Model, Model]:
     first = setting.judged([Fitted((), base)])[0]
     model = first
     for number in range(1, MOST_ROUNDS + 1):
-        # The verdict will be that nothing more is missing: what could still be added would stand in for a run's chance.
-        if setting.is_noise(model.values):
-            setting.note(Round(number, (), "", "what is left of the fit runs is measurement noise"))
-            break
         left = [name for name in setting.candidates if name not in model.effects]
         singles, pairs = scores_at(setting, model, left)
+        # The verdict will be that nothing more is missing: what could still be added would stand in for a run's chance.
+        if setting.is_noise(model.values) and not taking(singles, TOO_MUCH_FOR_NOISE):
+            setting.note(Round(number, (), "", "what is left of the fit runs is measurement noise"))
+            break
         for score in singles:
             setting.evidence.setdefault(score.effects[0], Evidence(first_score=score))
         if not any(significant(scores, SIGNIFICANT, PENALTY) for scores in (singles, pairs)):
@@ -126,7 +129,7 @@ def search(setting: Search, base: Fit) -> tuple[Model, Model]:
         carried = [*model.effects, *(effect for score in chosen for effect in score.effects)]
         starts = [start for score in chosen for start in begun(setting, model, score, what, carried)[0]]
         solutions, _ = setting.fit(starts, what, hops=True)
-        if number == 1 and not setting.is_noise(min(solutions, key=lambda one: one.cost).values):
+        if not setting.is_noise(min(solutions, key=lambda one: one.cost).values):
             late = unforeseen(setting, model, singles, what)
             starts += late
             solutions += setting.fit(late, what, hops=True)[0] if late else []
@@ -166,6 +169,12 @@ def search(setting: Search, base: Fit) -> tuple[Model, Model]:
         why = f"the search ends after {MOST_ROUNDS} rounds, whatever more there may be"
         setting.note(Round(MOST_ROUNDS + 1, (), "", why))
     return first, refined(setting, pruned(setting, model))
+
+
+def taking(singles: Sequence[Score], share: float) -> list[str]:
+    """The single effects that would take more than that share of the residual's square, beyond chance."""
+    level = SIGNIFICANT / max(len(singles), 1)
+    return [score.effects[0] for score in singles if score.p_value < level and score.gain > share]
 
 
 def refined(setting: Search, model: Model) -> Model:

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from smajax.attribution.job import Job
-from smajax.attribution.judging import Model, Search
+from smajax.attribution.judging import Model, Search, Start, base_value
 from smajax.effects.library import LIBRARY
 from smajax.fit.batch import halved, simulate_batch
 from smajax.fit.problem import Problem
@@ -19,17 +19,28 @@ from smajax.load.coupon import AbstractCoupon
 
 
 def kept_at_half_the_step(setting: Search, new: Model, old: Model) -> float:
-    """Share of what `new` gains on `old` in the squared error of all fit runs that it keeps, unfitted, at half the step.
+    """Share of what lets the load jump gains in the squared error of all fit runs that it keeps, unfitted, at half the step.
 
+    The gain is of `new` on `old`, or on `old` with the partner that was added beside it: a partner's gain is not its own.
     1 where nothing that was added can jump.
     """
-    if not any(LIBRARY[effect].jumps for effect in new.effects if effect not in old.effects):
+    jumping = {effect for effect in new.effects if effect not in old.effects and LIBRARY[effect].jumps}
+    if not jumping:
         return 1.0
+    without = old.cost
+    partner = tuple(effect for effect in new.effects if effect not in jumping)
+    if partner != old.effects:
+        values = np.array(new.values)
+        for effect in jumping:
+            for name in setting.coefficients(effect):
+                values[setting.problem.names.index(name)] = base_value(name)
+        (fit,), _ = setting.fit([Start(partner, values)], "looking at half the step")
+        without = min(without, fit.cost)
     problem, index = setting.restricted(new.effects)
     fine = Problem.build(problem.system, halved(problem.batch), problem.noise_sigma, problem.offset)
     misfit = problem.centred(problem.measured - shown_at(fine, [new.values[index]])[0][:, ::2])
     cost = float(np.sum((np.asarray(misfit) / np.asarray(problem.noise)) ** 2))
-    return (old.cost - cost) / (old.cost - new.cost) if old.cost > new.cost else 1.0
+    return (without - cost) / (without - new.cost) if without > new.cost else 1.0
 
 
 def integration_error(job: Job, final: Model) -> float:

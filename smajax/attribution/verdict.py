@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from smajax.attribution.search import TOO_MUCH_FOR_NOISE
 from smajax.experiment.record import Experiment
 from smajax.report.display import digits, display
 from smajax.report.findings import EffectFinding, LoneRun, ParameterFinding, Portrait, Rival, Round, RunFinding, Verdict
@@ -76,7 +77,7 @@ def summary(
     opening = {
         "adequate": "Nothing is missing whose trace is larger than the noise: what the base model leaves of the fit runs cannot be told "
         "from measurement noise.",
-        "explained": _explained(added, several, any(run.role == "held-out" for run in runs)),
+        "explained": _explained(added, several, runs, experiment),
         "partly explained": _partly(added, runs, experiment),
         "not in the library": f"Something is missing, and none of the {tried} candidate effects that were tried accounts "
         f"for it: none lowers the error enough, {judged_on}."
@@ -130,7 +131,8 @@ def summary(
         if np.isfinite(before):
             told.append(
                 f"Error on the {words} runs: {shown(before, unit, name)}"
-                + (f" before, {shown(now, unit, name)} after." if added else ".")
+                + (f" before, {shown(now, unit, name)} after" if added else "")
+                + (" (no fit saw them, but they decided what is not named)." if role != "fit" and refused else ".")
             )
     told.append(f"Measurement noise: {shown(experiment.noise_sigma, unit, name)} ({experiment.noise_how}).")
     if at_bound:
@@ -223,7 +225,12 @@ def _faint(answer: Verdict, effects: Sequence[EffectFinding]) -> list[str]:
         return []
     return [
         f"Mind: {first.title} leaves a trace in the score test (p = {digits(chance, 2)} after {len(left)} candidates) that would take "
-        f"{first.evidence['score_gain_at_the_end']:.1%} of the residual's square: smaller than what is looked into, so it was not fitted."
+        f"{first.evidence['score_gain_at_the_end']:.1%} of the residual's square"
+        + (
+            ", but runs left out are not foretold better with it."
+            if first.evidence["score_gain_at_the_end"] > TOO_MUCH_FOR_NOISE
+            else ": smaller than what is looked into, so it was not fitted."
+        )
     ]
 
 
@@ -271,10 +278,16 @@ def _partly(added: Sequence[EffectFinding], runs: Sequence[RunFinding], experime
     )
 
 
-def _explained(added: Sequence[EffectFinding], several: bool, tested: bool) -> str:
-    """As sure as the runs allow: one fit run and none held out confirm nothing."""
-    if several or tested:
-        return f"The base model lacks: {_listed(added)}. With it, what is left on the fit runs is measurement noise."
+def _explained(
+    added: Sequence[EffectFinding], several: bool, runs: Sequence[RunFinding], experiment: Experiment
+) -> str:
+    """As sure as the runs allow: one fit run and none held out confirm nothing, and a held-out run that is off says the contrary."""
+    if several or any(run.role == "held-out" for run in runs):
+        off = _off(runs, experiment)
+        but = f", but not on {and_listed([run.name for run in off])}, held out: more may be missing" if off else ""
+        return (
+            f"The base model lacks: {_listed(added)}. With it, what is left on the fit runs is measurement noise{but}."
+        )
     return (
         f"The base model may lack: {_listed(added)}. With it, what is left on the one fit run is measurement noise. No run was "
         "left out or held out, so nothing confirms it."
@@ -283,11 +296,19 @@ def _explained(added: Sequence[EffectFinding], several: bool, tested: bool) -> s
 
 def _held_out_warnings(runs: Sequence[RunFinding], experiment: Experiment) -> list[str]:
     """One sentence for each held-out run that the final model predicts clearly worse than it fits."""
-    level = max(pooled(runs, "fit", "after"), experiment.noise_sigma)
     return [
         f"{run.name}, which was held out, is off by {shown(run.rmse_after, experiment.output_unit, experiment.output_name)}, "
         f"{run.rmse_after / pooled(runs, 'fit', 'after'):.1f} times the fit runs' error: the model misses what shows "
         "there and not in them, or something was different then (another day, another state of the wire)."
+        for run in _off(runs, experiment)
+    ]
+
+
+def _off(runs: Sequence[RunFinding], experiment: Experiment) -> list[RunFinding]:
+    """The held-out runs whose error is larger than the fit runs' beyond chance."""
+    level = max(pooled(runs, "fit", "after"), experiment.noise_sigma)
+    return [
+        run
         for run in runs
         if run.role == "held-out" and run.rmse_after > (FURTHER + CHANCE / np.sqrt(2.0 * len(run.time))) * level
     ]

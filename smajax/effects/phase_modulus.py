@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING, ClassVar
 import jax.numpy as jnp
 
 from smajax.effects.base import AbstractEffect
+from smajax.load.coupon import Coupon
 from smajax.parameters import parameter
 from smajax.types import Scalar
+from smajax.wire.constitutive import RateForm
 
 if TYPE_CHECKING:
     from smajax.system import System
@@ -20,6 +22,11 @@ class PhaseModulus(AbstractEffect):
 
     A candidate of wires whose base model has one modulus (`wire.stiffness.Constant`, as sec. 3.3 takes it, or $E_A = E_M$);
     where it has two, give `young_modulus_austenite` as an unknown instead.
+
+    In the source's rate form of eq. 3.2 the modulus multiplies rates alone: transforming under a constant stress $\sigma$ leaves no
+    elastic mismatch $\sigma(1/E_A - 1/E_M)$, and a cycle that heats under one stress and cools under another does not
+    close. The integrated form (`wire.constitutive.IntegratedForm`) has the first and not the second. So a coupon whose
+    stress is given has no such candidate in rate form; `stress_dependent_strain` shows what depends on stress there.
     """
 
     contrast: Scalar = parameter("-", -0.5, 5.0, "a: relative change of E from martensite to austenite")
@@ -40,6 +47,8 @@ class PhaseModulus(AbstractEffect):
 
     @classmethod
     def applies(cls, system: System) -> bool:
+        if isinstance(system.load, Coupon) and isinstance(system.wire.constitutive.form, RateForm):
+            return False
         hot, cold = (float(_own(system.wire, jnp.asarray(phase, float))) for phase in (0.0, 1.0))
         return abs(hot - cold) < 1e-6 * cold
 
