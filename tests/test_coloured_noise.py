@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +20,8 @@ from studies.attribution_benchmark.rigs import show
 from studies.attribution_benchmark.write import write
 
 MEMORY = 0.8  # from one sample to the next
-LACKING = "coupon-thermal_expansion-10-02"
+LACKING, WEAK = "coupon-thermal_expansion-10-02", "coupon-thermal_expansion-1-00"
+FEW = ("thermal_expansion", "creep", "sensor_drift")
 
 
 def _coupon(
@@ -74,6 +76,31 @@ def test_what_is_missing_is_found_beside_a_noise_with_a_memory_that_nobody_gave(
     assert [effect.name for effect in findings.effects if effect.added] == ["thermal_expansion"]
     assert findings.verdict == "explained"
     assert findings.portrait_before.kept == 0.0
+
+
+def _thinned(experiment: Experiment, by: int) -> Experiment:
+    """Every so manieth sample."""
+
+    def every(series: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+        return {name: values[::by] for name, values in series.items()}
+
+    runs = [
+        dataclasses.replace(run, time=run.time[::by], inputs=every(run.inputs), outputs=every(run.outputs))
+        for run in experiment.runs
+    ]
+    return dataclasses.replace(experiment, step=by * experiment.step, runs=tuple(runs))
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_an_effect_that_a_short_log_cannot_tell_from_a_slow_noise_is_looked_into(
+    seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = _coupon(tmp_path, seed, memory=0.5, name=WEAK)
+    short = dataclasses.replace(_estimated(_thinned(whole, 4)), effects_only=FEW)
+    findings = close_loop(short)
+    assert [effect.name for effect in findings.effects if effect.added] == ["thermal_expansion"]
+    monkeypatch.setattr("smajax.attribution.search.TOO_MUCH_FOR_NOISE", np.inf)
+    assert close_loop(short).verdict == "adequate"
 
 
 def test_what_the_held_out_runs_do_not_bear_out_is_not_named(tmp_path: Path) -> None:

@@ -57,6 +57,13 @@ def test_a_wire_of_two_moduli_has_no_such_candidate() -> None:
     assert "phase_modulus" in candidates(_moduli(RIG, MARTENSITE), None, ())
 
 
+def test_under_a_given_stress_the_rate_form_has_no_such_candidate() -> None:
+    """It leaves no elastic mismatch there; the integrated form does."""
+    coupon = _moduli(build("flexinol_isobaric", "coupon", "none"), MARTENSITE)
+    assert "phase_modulus" not in candidates(_constitutive(coupon, form=RateForm()), None, ())
+    assert "phase_modulus" in candidates(_constitutive(coupon, form=IntegratedForm()), None, ())
+
+
 @pytest.mark.slow  # a loop
 def test_it_is_found_where_the_experiment_has_one_modulus(tmp_path: Path) -> None:
     name = "bias_spring-null-0-00"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -14,6 +16,7 @@ from smajax.fit.batch import RunBatch, halved, simulate_batch
 from smajax.fit.kept import Kept
 from smajax.fit.problem import Problem
 from smajax.fit.shown import misfits
+from smajax.parameters import parameters
 from smajax.presets import build
 
 DT, SAMPLES, NOISE = 0.1, 300, 1e-5
@@ -35,7 +38,8 @@ def setting() -> Search:
     noise = NOISE * np.random.default_rng(1).normal(size=shown.shape)
     batch = RunBatch(inputs, shown + noise, blank.mask, blank.overrides, (), DT)
     problem = Problem.build(extended(base, HEAT + FRICTION, {}), batch, NOISE, False)
-    return Search(problem, ("convection_coefficient",), {}, HEAT + FRICTION, Kept(), "{:.3g} m".format)
+    bounds = {entry.name: (entry.low, entry.high) for entry in parameters(problem.system).values()}
+    return Search(problem, ("convection_coefficient",), bounds, HEAT + FRICTION, Kept(), "{:.3g} m".format)
 
 
 def _model(setting: Search, effects: tuple[str, ...], **values: float) -> Model:
@@ -61,6 +65,17 @@ def test_a_friction_that_is_there_keeps_its_gain(setting: Search) -> None:
 def test_what_cannot_jump_is_not_asked(setting: Search) -> None:
     base = _model(setting, ())
     assert kept_at_half_the_step(setting, _by_chance(setting, _model(setting, HEAT), 0.01), base) == 1.0
+
+
+def test_a_partner_that_gains_lends_nothing_to_a_friction_that_does_not(setting: Search) -> None:
+    """Of both together more than half would be left at half the step: all of it is the partner's."""
+    base = _model(setting, ())
+    both = _model(setting, FRICTION + HEAT, **{**TRUE, "limit": 0.0})
+    pair = _by_chance(setting, both, 0.05)
+    apart = dataclasses.replace(base, cost=4.0 * base.cost)
+    assert kept_at_half_the_step(setting, pair, apart) < 0.1
+    alone = _by_chance(setting, _model(setting, FRICTION, **{**TRUE, "limit": 0.0}), 0.05)
+    assert kept_at_half_the_step(setting, alone, apart) > 0.7
 
 
 def test_a_gain_that_hangs_on_the_step_is_not_taken_and_the_next_best_is(setting: Search) -> None:

@@ -40,7 +40,7 @@ def kept_at_half_the_step(setting: Search, new: Model, old: Model) -> float:
     fine = Problem.build(problem.system, halved(problem.batch), problem.noise_sigma, problem.offset)
     misfit = problem.centred(problem.measured - shown_at(fine, [new.values[index]])[0][:, ::2])
     cost = float(np.sum((np.asarray(misfit) / np.asarray(problem.noise)) ** 2))
-    return (without - cost) / (without - new.cost) if without > new.cost else 1.0
+    return (without - cost) / (without - new.cost) if without > new.cost else 0.0
 
 
 def integration_error(job: Job, final: Model) -> float:
