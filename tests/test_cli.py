@@ -71,6 +71,15 @@ def test_effects_and_presets_are_listed_for_machines(tmp_path: Path) -> None:
     assert len({line.split(": ", 1)[1] for line in lines}) == len(lines)
 
 
+def test_named_effects_and_those_of_an_equation_are_listed_alone(tmp_path: Path) -> None:
+    told = json.loads(_run("effects", "latent_heat", "electrical", "--json", cwd=tmp_path).stdout)
+    assert "latent_heat" in told
+    assert {one["equation"] for name, one in told.items() if name != "latent_heat"} == {"electrical"}
+    misspelt = _run("effects", "latent_heats", cwd=tmp_path)
+    assert misspelt.returncode == 2
+    assert "did you mean 'latent_heat'?" in misspelt.stderr
+
+
 def test_the_parameters_of_named_presets_are_all_listed(tmp_path: Path) -> None:
     """What the answer to a misspelt one sends to."""
     model = ("niti_table_3_1", "arm", "amplified_voltage")

@@ -36,6 +36,13 @@ def presets(incomplete: str) -> list[str]:
     return [*wires(incomplete), *loads(incomplete), *drives(incomplete)]
 
 
+def effects(incomplete: str) -> list[str]:
+    from smajax.effects.library import LIBRARY
+
+    equations = dict.fromkeys(effect.equation for effect in LIBRARY.values())
+    return _offered([*equations, *LIBRARY], incomplete)
+
+
 def laws(incomplete: str) -> list[str]:
     from smajax.wire.laws import LAWS
 

@@ -13,12 +13,23 @@ from smajax.command.base import Json, until_nobody_reads
 from smajax.words import aligned
 
 
-def effects(json_out: Json = False) -> None:
+def effects(
+    names: Annotated[
+        list[str] | None,
+        typer.Argument(help="effects, or equations whose effects to list", autocompletion=complete.effects),
+    ] = None,
+    json_out: Json = False,
+) -> None:
     """List the effects that `close-loop` may add: equation, formula, and what each means for a wire.
 
+    With names: these alone; the name of an equation (heat, kinetics, sensor, ...) stands for all of its effects.
+
     Example:  smajax effects --json
+
+    Example:  smajax effects latent_heat sensor
     """
     from smajax.effects.library import LIBRARY
+    from smajax.measured.names import instead
     from smajax.parameters import parameters
 
     told = {
@@ -33,7 +44,14 @@ def effects(json_out: Json = False) -> None:
             },
         }
         for name, effect in LIBRARY.items()
+        if not names or name in names or effect.equation in names
     }
+    known = {*LIBRARY, *(effect.equation for effect in LIBRARY.values())}
+    for name in names or ():
+        if name not in known:
+            raise typer.BadParameter(
+                f"no effect or equation `{name}`{instead(name, sorted(known), 'there are')}", param_hint="NAMES"
+            )
     if json_out:
         typer.echo(json.dumps(told))
         return
