@@ -149,7 +149,7 @@ def summary(
         )
     title_of = {effect.name: effect.title for effect in effects}
     told += [
-        f"Mind: runs left out speak for {title_of[one.rival]} rather than {title_of[one.effect]} (weight {one.weight:.2f})."
+        f"Mind: {'runs left out speak' if several else 'the one fit run speaks'} for {title_of[one.rival]} rather than {title_of[one.effect]} (weight {one.weight:.2f})."
         for one in likelier
     ]
     for effect in added:
@@ -269,10 +269,11 @@ def _partly(added: Sequence[EffectFinding], runs: Sequence[RunFinding], experime
     told = f"The base model lacks: {first.title}"
     if np.isfinite(alone) and others:
         told += f"; alone it takes the fit runs from {shown(pooled(runs, 'fit', 'before'), unit, name)} to {shown(alone, unit, name)}"
+    judged = "runs left out" if sum(run.role == "fit" for run in runs) > 1 else "the one fit run"
     if not others:
         return f"{told}. That explains part of the misfit: what is left is more than noise."
     return (
-        f"{told}. The error on runs left out is lowered further by {_listed(others)}. More than noise is still left: "
+        f"{told}. The error on {judged} is lowered further by {_listed(others)}. More than noise is still left: "
         "something that the library does not hold may be missing too, and "
         f"{'these' if len(others) > 1 else 'this'} may in part stand in for it."
     )
