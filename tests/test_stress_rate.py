@@ -30,6 +30,7 @@ def _found(answer: dict[str, Any]) -> None:
     assert after < 1.1 * noise
 
 
+@pytest.mark.slow  # the notebook of the same is run by `test_notebooks`, enhanced conditions included
 def test_the_stress_rate_is_found_among_what_resembles_it(tmp_path: Path) -> None:
     """Among the three candidates that leave the most similar traces, and one that everybody thinks of."""
     _found(_closed(tmp_path, "liang", '"enhanced_conditions", "minor_loops", "phase_resistance", "latent_heat"'))

@@ -95,8 +95,9 @@ def test_fraction_stays_in_range_with_several_effects_on(
     assert 0.0 <= float(run.martensite_fraction.min()) <= float(run.martensite_fraction.max()) <= 1.0
 
 
+@pytest.mark.slow  # one by one in `test_every_effect`
 def test_the_library_at_its_base_value_is_the_base_model() -> None:
-    """All of it together; one by one in `test_every_effect`."""
+    """All of it together."""
     for rig, (system, channel, top) in RIGS.items():
         inputs = _inputs(channel, top, [0.8, 0.2, 1.0, 0.0])
         plain, same = (simulate_compiled(one, inputs, DT) for one in (system, extended(system, tuple(LIBRARY))))
