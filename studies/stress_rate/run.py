@@ -80,9 +80,9 @@ def closed(out: Path, law: str) -> Findings:
 
 
 def told(findings: Findings) -> dict[str, Any]:
-    """What is asserted of it."""
-    share = next(effect for effect in findings.effects if effect.name == "enhanced_conditions")
-    found = share.coefficients.get("share")
+    """What is asserted of it; the enhanced conditions are no candidate where the model begins with them."""
+    share = next((effect for effect in findings.effects if effect.name == "enhanced_conditions"), None)
+    found = share.coefficients.get("share") if share else None
     return {
         "verdict": findings.verdict,
         "added": [effect.name for effect in findings.effects if effect.added],
