@@ -141,7 +141,8 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *NAMES, *MODULES, "__version__"})
+    own = (name for name in globals() if name.startswith("__"))
+    return sorted({*own, *NAMES, *MODULES, "__version__"})
 
 
 class _Package(ModuleType):

@@ -67,20 +67,6 @@ def labelled_loop(system: System, loop: ClosedLoop, **settings: object) -> xr.Da
     return found
 
 
-def _check_finite(inputs: Mapping[str, Series]) -> None:
-    for name, values in inputs.items():
-        series = np.asarray(values)
-        if series.dtype.kind not in "fiub":
-            raise ValueError(
-                f"the input `{name}` is {type(values).__name__}; expected numbers, a series of shape (n,)."
-            )
-        bad = np.flatnonzero(~np.isfinite(series))
-        if bad.size:
-            raise ValueError(
-                f"the input `{name}` is {series.ravel()[bad[0]]} at sample {bad[0] + 1}; give finite numbers."
-            )
-
-
 def simulate_dataset(
     system: System,
     inputs: Mapping[str, Series],
@@ -101,7 +87,6 @@ def simulate_dataset(
         )
     check_bounds(system)
     check_order(system)
-    _check_finite(inputs)
     try:
         run = simulate_compiled(system, inputs, dt, tolerance, initial)
     except Unsupported:

@@ -7,6 +7,7 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax import lax
 
 from smajax.load.coupon import AbstractCoupon
@@ -23,7 +24,7 @@ DEFAULT_STEP = 0.005  # s
 
 
 def check_inputs(system: System, inputs: Mapping[str, Series]) -> int:
-    """Number of samples; ValueError when a channel is missing, unknown, or of another length."""
+    """Number of samples; ValueError when a channel is missing, unknown, of another length, or not finite where it is known."""
     required = system.load.inputs_required | system.drive.inputs_required
     allowed = required | system.load.inputs_optional | system.drive.inputs_optional | {"ambient_temperature"}
     missing, unknown = sorted(required - set(inputs)), sorted(set(inputs) - allowed)
@@ -32,6 +33,8 @@ def check_inputs(system: System, inputs: Mapping[str, Series]) -> int:
             f"`inputs` must have the channels {listed(sorted(required))} and may have {listed(sorted(allowed - required))}, but "
             f"missing: {listed(missing)}; of no meaning to this load and drive: {listed(unknown)}."
         )
+    for name, series in inputs.items():
+        _check_finite(name, series)
     lengths = {name: jnp.shape(series) for name, series in inputs.items()}
     if not lengths:
         raise ValueError("`inputs` is empty: without one series there is no clock. Give e.g. `ambient_temperature`.")
@@ -41,6 +44,17 @@ def check_inputs(system: System, inputs: Mapping[str, Series]) -> int:
             "a batch, and `jnp.full(n, value)` for a constant."
         )
     return next(iter(lengths.values()))[0]
+
+
+def _check_finite(name: str, series: Series) -> None:
+    if isinstance(series, jax.core.Tracer):
+        return
+    known = np.asarray(series)
+    if known.dtype.kind not in "fiub":
+        raise ValueError(f"the input `{name}` is {type(series).__name__}; expected numbers, a series of shape (n,).")
+    bad = np.flatnonzero(~np.isfinite(known))
+    if bad.size:
+        raise ValueError(f"the input `{name}` is {known.ravel()[bad[0]]} at sample {bad[0] + 1}; give finite numbers.")
 
 
 def check_scalars(system: System, dt: Scalar | float, initial: State | None = None) -> None:
@@ -95,8 +109,8 @@ def simulate(
     """Simulate over the samples of `inputs`, each of shape (n,), SI, `dt` seconds apart.
 
     The result holds the states at t_0 ... t_{n-1}; input i is held from t_i to t_{i+1} (a coupon's inputs are values
-    at t_i). `initial` defaults to rest with the first inputs. Raises ValueError for missing or ill-shaped inputs, and for a
-    parameter out of its bounds, unless its value is not known yet (`jit`, `vmap`, `grad`).
+    at t_i). `initial` defaults to rest with the first inputs. Raises ValueError for missing or ill-shaped inputs, for one
+    that is not finite and a parameter out of its bounds, unless the value is not known yet (`jit`, `vmap`, `grad`).
     """
     check_inputs(system, inputs)
     check_scalars(system, dt, initial)

@@ -25,6 +25,7 @@ def test_every_name_is_there_and_known_to_a_checker() -> None:
         assert getattr(sma, name) is not None
         assert name in dir(sma)
         assert f" as {name}\n" in text or name in ("EFFECTS", "load_experiment"), name
+    assert not {"sys", "Any", "NAMES", "annotations"} & set(dir(sma))  # completion shows what a user needs
     assert "arm" in sma.presets.LOADS
     assert sma.EFFECTS["latent_heat"].__module__ == "smajax.effects.latent_heat"
     with pytest.raises(AttributeError, match="no attribute 'simulat'; it has"):

@@ -72,11 +72,15 @@ def test_inputs_of_a_wrong_shape_are_named(run) -> None:
             run(SYSTEM, VOLTAGE, dt=dt)
 
 
-def test_values_that_cannot_be_are_named_before_a_run() -> None:
+@pytest.mark.parametrize("run", [simulate, simulate_compiled, simulate_dataset])
+def test_inputs_that_are_no_finite_numbers_are_named(run) -> None:
     with pytest.raises(ValueError, match="the input `voltage` is nan at sample 3; give finite numbers"):
-        simulate_dataset(SYSTEM, {"voltage": jnp.array([1.0, 2.0, np.nan])})
+        run(SYSTEM, {"voltage": jnp.array([1.0, 2.0, np.nan])})
     with pytest.raises(ValueError, match="the input `voltage` is str; expected numbers"):
-        simulate_dataset(SYSTEM, {"voltage": "5 V"})  # type: ignore[dict-item]
+        run(SYSTEM, {"voltage": "5 V"})
+
+
+def test_values_that_cannot_be_are_named_before_a_run() -> None:
     with pytest.raises(ValueError, match="`martensite_finish` = 70 degC is not below `martensite_start`"):
         simulate_dataset(set_parameters(SYSTEM, {"martensite_finish": 70.0}), VOLTAGE)
     with pytest.raises(ValueError, match=r"No parameter `austenite_strat`; did you mean 'austenite_start'"):
