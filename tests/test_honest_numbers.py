@@ -186,23 +186,31 @@ def test_nothing_grows_without_power(rig: str, shares: list[float]) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(
-    strict=False, reason="not for all: a run that just meets a branch may meet it a step apart (docs/robustness.md)"
-)
-@settings(max_examples=25, deadline=None)
-@given(rig=st.sampled_from(sorted(RIGS)), levels=st.lists(st.floats(0.0, 1.0), min_size=4, max_size=4), shares=SHARES)
-def test_float32_follows_float64_from_any_parameters(rig: str, levels: list[float], shares: list[float]) -> None:
-    """In single precision: temperature to 5e-4 of its rise, and the fraction to 5e-3, of random systems."""
-    system, channel, top = RIGS[rig]
-    system, inputs = _spread(system, shares), {channel: top * jnp.repeat(jnp.asarray(levels), 100)}
-    double = RUN(system, inputs, 0.02)
+@pytest.mark.parametrize("rig", RIGS)
+def test_float32_follows_float64_nearly_from_any_parameters(rig: str) -> None:
+    """To rounding in nine of ten random systems; where a run just meets a branch it may meet it a step apart, in one of fifty at most."""
+    base, channel, top = RIGS[rig]
+    random = np.random.default_rng(7)
+    systems = [_spread(base, list(shares)) for shares in random.random((256, 7))]
+    system = jax.tree.map(lambda *leaves: jnp.stack(leaves) if eqx.is_array(leaves[0]) else leaves[0], *systems)
+    levels = jnp.asarray(random.random((256, 4)))
+
+    @eqx.filter_jit
+    @eqx.filter_vmap
+    def run(system: System, levels: jax.Array) -> tuple[jax.Array, jax.Array]:
+        found = simulate(system, {channel: top * jnp.repeat(levels, 100)}, 0.02)
+        return found.temperature, found.martensite_fraction
+
+    temperature, fraction = (np.asarray(series) for series in run(system, levels))
     with jax.enable_x64(False):
-        narrow = jax.tree.map(lambda leaf: leaf.astype(jnp.float32) if eqx.is_array(leaf) else leaf, (system, inputs))
-        single = RUN(*narrow, 0.02)
-    assert single.temperature.dtype == jnp.float32
-    rise = 1.0 + float(jnp.ptp(double.temperature))
-    assert np.abs(np.asarray(single.temperature) - np.asarray(double.temperature)).max() < 5e-4 * rise
-    assert np.abs(np.asarray(single.martensite_fraction) - np.asarray(double.martensite_fraction)).max() < 5e-3
+        narrow = jax.tree.map(lambda leaf: leaf.astype(jnp.float32) if eqx.is_array(leaf) else leaf, (system, levels))
+        single = run(*narrow)
+    assert single[0].dtype == single[1].dtype == jnp.float32
+    off = np.abs(np.asarray(single[0]) - temperature).max(axis=1) / (1.0 + np.ptp(temperature, axis=1))
+    fraction_off = np.abs(np.asarray(single[1]) - fraction).max(axis=1)
+    assert ((off < 5e-4) & (fraction_off < 5e-3)).mean() >= 0.98
+    assert np.quantile(off, 0.9) < 1e-5
+    assert np.quantile(fraction_off, 0.9) < 5e-5
 
 
 def test_the_same_seed_gives_the_same_bytes() -> None:
