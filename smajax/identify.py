@@ -30,6 +30,7 @@ from smajax.fit.starts import TRIED, from_many_starts
 from smajax.fit.uncertainty import covariance_of, held, identifiability, uncertainty
 from smajax.identified import Estimate, Identified, IdentifiedOutput, IdentifiedRun, IdentifiedSeries
 from smajax.made_with import made_with
+from smajax.measured.names import listed
 from smajax.residual.noise_like import LAGS, WHITE, correlation_time, split_runs, whiteness_p_value
 
 SEED = 2004
@@ -89,7 +90,7 @@ def identify(
     if profiled and robust:
         raise ValueError("a profile is that of least squares: ask for it without Huber's loss.")
     if odd:
-        raise ValueError(f"no profile of {odd}, which are not fitted; fitted are {', '.join(names)}.")
+        raise ValueError(f"no profile of {listed(odd)}: not fitted; fitted are {listed(names)}.")
     if draws:
         if robust:
             raise ValueError("a posterior is that of normal noise: ask for it without Huber's loss.")

@@ -125,7 +125,7 @@ def test_what_cannot_be_is_refused(tmp_path: Path, name: str, command: str) -> N
 def test_identify_says_when_nothing_is_unknown_and_what_cannot_be_profiled(tmp_path: Path) -> None:
     experiment = bench(tmp_path / "bench")
     said = refused("identify", experiment, "--out", tmp_path / "out", "--profile", "convecton_coefficient")
-    assert "no profile of ['convecton_coefficient'], which are not fitted; fitted are convection_coefficient" in said
+    assert "no profile of convecton_coefficient: not fitted; fitted are convection_coefficient" in said
     text = experiment.read_text()
     experiment.write_text(text[: text.index("[unknown]")] + text[text.index("[sampling]") :])
     assert "nothing is declared unknown; add a section [unknown.NAME]" in refused(

@@ -223,6 +223,31 @@ def _block(path: Path, name: str, every: float, values: np.ndarray) -> None:
     scipy.io.savemat(path, {name: {"time": time[:, None], "signals": {"values": values[:, None]}}})
 
 
+def test_logs_may_call_their_columns_otherwise(tmp_path: Path) -> None:
+    """Semicolons and decimal commas in one, milliseconds in another: each run says what is its own."""
+    time = np.arange(400) / 50.0
+    current, moved = 0.3 * (time % 4.0 > 1.0), 4.0 * np.sin(time) ** 2 + 0.3
+    noisy = moved + 0.01 * np.random.default_rng(1).standard_normal(400)
+    rows = [";".join(f"{v:.4f}".replace(".", ",") for v in row) for row in zip(time, current, noisy, strict=True)]
+    (tmp_path / "a.csv").write_text("Zeit [s];Strom [A];Weg [mm]\n" + "\n".join(rows))
+    rows = [f"{1e3 * t:.0f},{i:.4f},{x:.4f}" for t, i, x in zip(time, current, noisy, strict=True)]
+    (tmp_path / "b.csv").write_text("t_ms,I_A,disp_mm\n" + "\n".join(rows))
+    (tmp_path / "c.csv").write_text("t_ms,I_A,force_N\n" + "\n".join(rows))
+    logs = [str(tmp_path / name) for name in ("a.csv", "b.csv")]
+    told = run.invoke(app, ["new-experiment", *logs, "--out", str(tmp_path / "e.toml")])
+    assert told.exit_code == 0, told.output
+    assert "b.csv: t_ms: time in ms (sure: heading and unit)" in told.output
+    text = (tmp_path / "e.toml").read_text()
+    assert 'columns = { time = "t_ms", current = "I_A", position = "disp_mm" }' in text
+    assert 'units = { time = "ms" }' in text
+    first, second = load_experiment(tmp_path / "e.toml", CATALOGUE).runs
+    np.testing.assert_allclose(second.time, first.time, rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(second.inputs["current"], first.inputs["current"], rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(second.outputs["position"], first.outputs["position"], rtol=0.0, atol=1e-9)
+    lacks = run.invoke(app, ["new-experiment", *logs, str(tmp_path / "c.csv"), "--out", str(tmp_path / "f.toml")])
+    assert "c.csv: no column 'Weg [mm]'; it has: t_ms, I_A, force_N" in str(lacks.exception)
+
+
 def test_a_run_may_be_a_file_for_each_sensor(tmp_path: Path) -> None:
     """Pairs of .mat files at different rates, told apart by their names, also when they come in another order."""
     runs = ("Step01", "Step02_PR", "Ramp01")
@@ -333,9 +358,27 @@ def test_times_and_units_as_german_loggers_write_them(
 @pytest.mark.parametrize("end", ["\nEnde;5;1", "\n3;5;1"])
 def test_a_time_that_cannot_be_read_is_said_first(tmp_path: Path, end: str) -> None:
     log = _bench_log(tmp_path / "log.csv", "Zeit;U [V];x [mm]", lambda k: str(k / 10), end)
-    first = begun([log], tmp_path / "e.toml").told[0]
-    assert first.startswith("time: NOT READ, and samples are counted (a guess): ")
-    assert ("line 82, column 'Zeit': 'Ende' is not a number" if "Ende" in end else "'Zeit' goes back") in first
+    told = run.invoke(app, ["new-experiment", str(log), "--out", str(tmp_path / "e.toml")])
+    first, *_, last = told.output.splitlines()
+    why = (
+        "line 82, column 'Zeit': 'Ende' is not a number"
+        if "Ende" in end
+        else "does not increase at line 82 (7.9 s then 3 s)"
+    )
+    assert "time: NOT READ: " in first
+    assert why in first
+    assert told.exit_code == 3  # and it is not sent on with a clock of counted samples
+    assert "Next" not in last
+    assert "It does not load yet" in told.output
+    assert why in " ".join(told.output.splitlines()[1:])
+
+
+def test_a_unit_that_there_is_none_of_is_said_of_its_column(tmp_path: Path) -> None:
+    log = _bench_log(tmp_path / "log.csv", "t/s;U/V;disp [furlonx]", lambda k: str(k / 10))
+    told = begun([log], tmp_path / "e.toml").told
+    assert any(
+        "named like a position, and its unit 'furlonx' is none of that: expected one like 'm'" in line for line in told
+    )
 
 
 def test_every_column_that_is_left_out_is_listed_with_its_line(tmp_path: Path) -> None:

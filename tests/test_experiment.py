@@ -170,6 +170,57 @@ def test_an_estimated_noise_is_not_too_small_where_windows_share_samples(bench: 
     assert got.noise_sigma == pytest.approx(found, rel=0.06)
 
 
+OWN = """columns = { time = "t_s", position = 3, duty = "pwm" }
+units = { time = "s", duty = "1", position = "um" }
+"""
+
+
+def _other_names(bench: Path) -> None:
+    """The log of run B as another logger writes it."""
+    rows = np.loadtxt(bench / "b.csv", delimiter=",", skiprows=1) * [1e-3, 1e-2, 1e3]
+    np.savetxt(bench / "b.csv", rows, delimiter=",", header="t_s,pwm,weg", comments="")
+
+
+def test_a_run_may_have_columns_and_units_of_its_own(bench: Path) -> None:
+    before = load(bench)
+    _other_names(bench)
+    with pytest.raises(ExperimentError, match=r"runs.B.file: .*no column 'duty'; .*write columns = \{ duty = '...' \}"):
+        load(bench)
+    got = load(changed(bench, 'file = "b.csv"', f'file = "b.csv"\n{OWN}'))
+    for old, new in zip(before.runs, got.runs, strict=True):
+        np.testing.assert_allclose(new.time, old.time, rtol=0.0, atol=1e-12)
+        np.testing.assert_allclose(new.inputs["duty"], old.inputs["duty"], rtol=0.0, atol=1e-12)
+        np.testing.assert_allclose(new.output, old.output, rtol=0.0, atol=1e-15)
+    assert got.warnings == before.warnings
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("time = ", "tme = ", r"runs.B.columns.tme: there is no channel 'tme'; did you mean 'time'"),
+        ('duty = "1"', 'dut = "1"', r"runs.B.units.dut: there is no channel 'dut'; did you mean 'duty'"),
+        ('duty = "1"', 'duty = "mm"', r"runs.B.units.duty: got unit 'mm'"),
+        ('"t_s"', '"t"', r"runs.B.file: .*no column 't'; .*write columns = \{ time = '...' \}"),
+        ("position = 3", "position = 4", r"runs.B.file: .*no column number 4; it has columns 1 to 3"),
+        ("position = 3", "position = []", r"runs.B.columns.position: got \[\], expected a table of channel"),
+    ],
+)
+def test_a_mistake_in_a_runs_own_columns_is_named(bench: Path, old: str, new: str, words: str) -> None:
+    _other_names(bench)
+    own = OWN.replace(old, new, 1)
+    assert own != OWN
+    with pytest.raises(ExperimentError, match=words):
+        load(changed(bench, 'file = "b.csv"', f'file = "b.csv"\n{own}'))
+
+
+def test_a_unit_of_a_run_that_its_heading_contradicts_is_told(bench: Path) -> None:
+    _other_names(bench)
+    (bench / "b.csv").write_text((bench / "b.csv").read_text().replace("weg", "weg [um]"))
+    own = OWN.replace("position = 3", 'position = "weg [um]"').replace('"um"', '"nm"')
+    got = load(changed(bench, 'file = "b.csv"', f'file = "b.csv"\n{own}'))
+    assert any("runs.B.units.position is 'nm', and the heading 'weg [um]' says um" in text for text in got.warnings)
+
+
 def test_matlab_files_one_a_channel(bench: Path) -> None:
     for name, interval, values in (("Duty", 0.001, np.full(3001, 0.2)), ("Pos", 0.01, np.arange(300) * 1e-5)):
         record = {"time": interval * np.arange(values.size), "signals": {"values": values}, "blockName": "m"}

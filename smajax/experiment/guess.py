@@ -9,7 +9,7 @@ from types import MappingProxyType
 import numpy as np
 
 from smajax.measured.headers import is_time, unit_of, words
-from smajax.measured.table import Array, Table
+from smajax.measured.table import Array, MeasuredDataError, Table, check_time
 from smajax.units import UnitError, convert
 
 SURE, LIKELY, GUESS = "sure", "likely", "a guess"  # heading and unit; heading, unit by magnitude; neither
@@ -134,7 +134,14 @@ def _column(table: Table, key: str | int, name: str) -> Column:
         return Column(key, name, quantity, _unit_by_size(quantity, values), LIKELY, f"{where}; unit by magnitude")
     if unit and unit != "1" and (quantity := _by_unit(unit)):
         return Column(key, name, quantity, unit, LIKELY, "unit in the heading")
-    why = "named like a time, and goes back somewhere" if is_time(name) else "nothing tells"
+    named = _by_words(name, "") or _by_words(label, "")
+    if is_time(name):
+        why = "named like a time, and goes back somewhere"
+    elif unit and named:
+        own = QUANTITIES[named][1]
+        why = f"named like a {named}, and its unit {unit!r} is none of that: expected one like {own!r}"
+    else:
+        why = "nothing tells"
     return Column(key, name, "", unit, GUESS, why)
 
 
@@ -173,17 +180,26 @@ def _by_shape(columns: Sequence[Column], table: Table) -> list[Column]:
     return found
 
 
-def times_not_read(table: Table) -> list[str]:
+def time_unit_of(table: Table, name: str) -> str:
+    """Of a column that is no clock, as its heading has it."""
+    unit = _unit(table, name)
+    return unit if unit and name not in table.moments and _of_kind(unit, "s") else "s"
+
+
+def times_not_read(table: Table) -> dict[str, str]:
     """Columns that are named like a time, or hold clock times, and that are no clock: each with why, in words."""
-    wrong = []
+    wrong = {}
     for name in table.order or (*table.columns, *table.unusable):
         unit = _unit(table, name)
         if name in table.clocks or not (is_time(name) or name in table.moments) or (unit and not _of_kind(unit, "s")):
             continue
         if name in table.unusable:
-            wrong.append(table.unusable[name].split("; expected")[0])
+            wrong[name] = table.unusable[name].split("; expected")[0]
         elif not _is_clock(table, name, True) and not _column(table, name, name).quantity:
-            wrong.append(f"column {name!r} goes back somewhere, or stands still")
+            try:
+                check_time(table.columns[name], f"column {name!r}", unit or "s", table.place)
+            except MeasuredDataError as error:
+                wrong[name] = str(error).split("; sort")[0]
     return wrong
 
 

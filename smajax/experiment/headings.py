@@ -6,21 +6,29 @@ import math
 from collections.abc import Mapping
 
 from smajax.experiment.guess import MEANT
-from smajax.experiment.schema import ChannelSection, TimeSection
+from smajax.experiment.own_columns import TIME
+from smajax.experiment.schema import ChannelSection, RunSection, TimeSection
 from smajax.measured.headers import unit_in
 from smajax.units import UnitError, convert
 
 
-def heading_warnings(channels: Mapping[str, ChannelSection], time: TimeSection | None) -> list[str]:
+def heading_warnings(
+    channels: Mapping[str, ChannelSection], time: TimeSection | None, run: RunSection | None = None
+) -> list[str]:
     """One for each column whose heading has another unit of the same kind: one of the two is wrong by a factor.
 
-    A tail that is a unit of another kind (`T_s`, a temperature) is no unit.
+    A tail that is a unit of another kind (`T_s`, a temperature) is no unit. run: asked of what its log has otherwise alone.
     """
-    keys = [(f"channels.{name}.unit", channel.column, channel.unit) for name, channel in channels.items()]
+    places: dict[str, ChannelSection | TimeSection] = dict(channels)
     if time is not None:
-        keys.append(("time.unit", time.column, time.unit))
+        places[TIME] = time
+    if run is None:
+        where = {name: f"{name}.unit" if name == TIME else f"channels.{name}.unit" for name in places}
+    else:
+        where = {name: f"runs.{run.name}.units.{name}" for name in {**run.columns, **run.units}}
+    keys = [(key, places[name].column, places[name].unit) for name, key in where.items()]
     found = []
-    for where, heading, declared in keys:
+    for key, heading, declared in keys:
         said = unit_in(heading) if isinstance(heading, str) else ""
         if said in ("", "-", "1"):  # a plain number: of a log in per cent as often as not
             continue
@@ -31,7 +39,7 @@ def heading_warnings(channels: Mapping[str, ChannelSection], time: TimeSection |
             continue
         if not (math.isclose(one, 1.0, rel_tol=1e-9) and abs(zero) < 1e-9):
             found.append(
-                f"{where} is {declared!r}, and the heading {heading!r} says {said}: 1 {said} is {one:g} {declared}. One of the two "
+                f"{key} is {declared!r}, and the heading {heading!r} says {said}: 1 {said} is {one:g} {declared}. One of the two "
                 "is wrong; the file's is taken"
             )
     return found

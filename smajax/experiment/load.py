@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import lru_cache, partial
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from smajax.experiment.errors import ExperimentError, at_key, check_name
 from smajax.experiment.folder import data_folder
 from smajax.experiment.headings import heading_warnings
 from smajax.experiment.magnitude import common_warnings, magnitude_warnings
+from smajax.experiment.own_columns import own_columns
 from smajax.experiment.plausibility import (
     constant_warnings,
     copy_warnings,
@@ -236,7 +238,10 @@ def _check_order(
 def _columns(file: ExperimentFile) -> frozenset[str | int]:
     """Every column that the file names."""
     keys = [key for channel in file.channels.values() for key in (channel.column, channel.variable)]
-    keys.append(file.time.column if file.time is not None else None)
+    keys += [
+        file.time.column if file.time is not None else None,
+        *(key for run in file.runs for key in run.columns.values()),
+    ]
     return frozenset(key for key in keys if key is not None)
 
 
@@ -277,13 +282,17 @@ def load_experiment(path: str | Path, catalogue: Catalogue) -> Experiment:
         step=_step(path, file),
         tables=lru_cache(maxsize=None)(partial(read_table, wanted=_columns(file), decimal=file.data.decimal)),
     )
-    runs = [read_run(reading, run, overrides[run.name]) for run in file.runs]
+    runs = [
+        read_run(replace(reading, others=number > 0), run, overrides[run.name]) for number, run in enumerate(file.runs)
+    ]
     fit = [read for read in runs if read.run.role == "fit"]
     outputs = [_output(path, file, name, units[name], fit) for name in output_names]
     warnings = [text for read in runs for text in run_warnings(read, reading.step)]
     if file.time is None or file.time.kind != "sample":
         warnings += length_warnings(runs, "s" if file.time is None else file.time.unit)
     warnings += heading_warnings(file.channels, file.time)
+    for run in file.runs:
+        warnings += heading_warnings(*own_columns(path, run, file.channels, file.time), run)
     warnings += constant_warnings(runs)
     for output, sensor_sigma in outputs:
         warnings += quantum_warning(fit, output.name, sensor_sigma, output.unit)

@@ -150,6 +150,12 @@ class RunSection(Section):
     role: Literal["fit", "held-out"] = Field(description="'fit' or 'held-out'")
     file: str | None = Field(default=None, description="the name of one file with all channels")
     files: dict[str, str] | None = Field(default=None, description="a table of channel = 'file'")
+    columns: dict[str, str | int] = Field(
+        default={}, description="a table of channel (or time) = 'column', where this run's log calls it otherwise"
+    )
+    units: dict[str, str] = Field(
+        default={}, description="a table of channel (or time) = 'unit', where this run's log has another"
+    )
     start: Quantity | None = Field(
         default=None, description="a time in the log, 'number unit', before which it is left out"
     )

@@ -10,13 +10,14 @@ from pathlib import Path
 import numpy as np
 
 from smajax.experiment.errors import ExperimentError, at_key
+from smajax.experiment.own_columns import TIME, own_columns
 from smajax.experiment.readings import check_readings
 from smajax.experiment.record import Run
 from smajax.experiment.schema import ChannelSection, RunSection, TimeSection
 from smajax.measured.noise import detect_quantum
 from smajax.measured.repeated import once
 from smajax.measured.resample import resample_input, resample_output, resample_with_gaps, uniform_clock
-from smajax.measured.table import Array, MeasuredDataError, Table, check_time
+from smajax.measured.table import Array, MeasuredDataError, NoColumnError, Table, check_time
 from smajax.units import convert, parse_quantity
 
 MOST_SAMPLES = 2_000_000
@@ -59,6 +60,7 @@ class Reading:
     """What is common to the runs of one experiment file: where to look and what to turn it into.
 
     units: channel or input -> the program's own unit. inputs_sampled, inputs_squared: see ModelDescription. tables: reads a file, once however often it is asked for.
+    others: whether logs of other runs have these columns.
     """
 
     path: Path
@@ -71,6 +73,7 @@ class Reading:
     inputs_squared: frozenset[str]
     step: float
     tables: Callable[[Path], Table]
+    others: bool = False
 
 
 def _inside(reading: Reading, key: str, name: str) -> Path:
@@ -191,7 +194,14 @@ def _read_signals(reading: Reading, run: RunSection) -> tuple[dict[str, Signal],
         where, file = _channel_file(reading, run, name)
         with at_key(reading.path, where):
             table = reading.tables(file)
-            signals[name] = _signal(table, name, key, channel, reading.units[name], reading.time, _taken(reading, name))
+            try:
+                signals[name] = _signal(
+                    table, name, key, channel, reading.units[name], reading.time, _taken(reading, name)
+                )
+            except NoColumnError as error:
+                own = TIME if reading.time is not None and error.key == reading.time.column else name
+                hint = f"; where this log alone has another one, write columns = {{ {own} = '...' }} under its [[runs]]"
+                raise MeasuredDataError(f"{error}{hint if reading.others else ''}") from None
             if table.clock(key) is None and reading.time is not None and reading.time.column is not None:
                 moment = table.moments.get(table.name_of(reading.time.column))
                 first |= {} if moment is None else {name: moment}
@@ -242,6 +252,11 @@ def _constant(name: str, value: str | float, unit: str) -> float:
 def read_run(reading: Reading, run: RunSection, parameters: dict[str, float]) -> ReadRun:
     """Reads one run. Its clock covers the time that all its signals have in common. Raises ExperimentError."""
     where = f"runs.{run.name}"
+    channels, time = own_columns(reading.path, run, reading.channels, reading.time)
+    reading = replace(reading, channels=channels, time=time)
+    for name, unit in run.units.items():
+        with at_key(reading.path, f"{where}.units.{name}"):
+            convert(0.0, unit, "s" if name == TIME else reading.units[name])
     signals, files = _read_signals(reading, run)
     start = max(signal.time[0] for signal in signals.values())
     end = min(signal.time[-1] for signal in signals.values())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -13,10 +13,20 @@ import numpy as np
 from smajax.catalogue import check_together
 from smajax.experiment.catalogue import WIRE_SIZES
 from smajax.experiment.grouping import RunFiles, paired
-from smajax.experiment.guess import DRIVES, GUESS, LIKELY, SURE, TIME, Column, columns_of, times_not_read
+from smajax.experiment.guess import (
+    DRIVES,
+    GUESS,
+    LIKELY,
+    SURE,
+    TIME,
+    Column,
+    columns_of,
+    time_unit_of,
+    times_not_read,
+)
 from smajax.measured.names import instead
 from smajax.measured.read import read_table
-from smajax.measured.table import MeasuredDataError, Table
+from smajax.measured.table import MeasuredDataError, NoColumnError, Table
 from smajax.parameters import parameter_values, parameters
 from smajax.presets import DRIVES as DRIVE_PRESETS
 from smajax.presets import WIRES, build
@@ -126,6 +136,23 @@ def _channel(name: str, role: str, column: Column, variable: bool, off: bool) ->
     return [f"# {line}" if off else line for line in lines]
 
 
+def _own_lines(own: Mapping[str, Column], usual: Mapping[str, Column]) -> list[str]:
+    """What a run says of columns that its log calls otherwise."""
+    if not own:
+        return []
+    columns = ", ".join(f"{name} = {json.dumps(one.key, ensure_ascii=False)}" for name, one in own.items())
+    units = ", ".join(
+        f"{name} = {json.dumps(one.unit, ensure_ascii=False)}"
+        for name, one in own.items()
+        if one.unit != usual[name].unit
+    )
+    sure = max((one.sure for one in own.values()), key=[SURE, LIKELY, GUESS].index)
+    return [
+        f"columns = {{ {columns} }}  # {sure}: this log calls them otherwise",
+        *([f"units = {{ {units} }}"] if units else []),
+    ]
+
+
 def _round(step: float) -> float:
     """Up to 1, 2 or 5 times a power of ten."""
     power = 10.0 ** np.floor(np.log10(step))
@@ -180,6 +207,9 @@ class _Logs:
     columns: tuple[tuple[Column, int], ...]  # each quantity once
     kinds: tuple[Table, ...]  # a file of each kind
     runs: tuple[RunFiles, ...]
+    own: tuple[
+        Mapping[str, Column], ...
+    ] = ()  # of each file: quantity -> its column, where the first file's is not in it
 
 
 def _logs(files: Sequence[Path], tables: Sequence[Table]) -> _Logs:
@@ -188,12 +218,12 @@ def _logs(files: Sequence[Path], tables: Sequence[Table]) -> _Logs:
     quantities = [frozenset(one.quantity for one in columns) - {"", TIME} for columns in seen]
     kinds = list(dict.fromkeys(quantities))
     if len(kinds) == 1 or any(_is_whole(held) for held in quantities):
-        for table in tables[1:]:
-            for one in seen[0]:
-                if one.quantity:
-                    table.name_of(one.key)
         runs = tuple(RunFiles(file.stem, (file,)) for file in files)
-        return _Logs(tuple((one, 0) for one in seen[0]), (tables[0],), runs)
+        own = tuple(
+            _otherwise(table, seen[0], columns) if table is not tables[0] else {}
+            for table, columns in zip(tables, seen, strict=True)
+        )
+        return _Logs(tuple((one, 0) for one in seen[0]), (tables[0],), runs, own)
     members = [[k for k, held in enumerate(quantities) if held == kind] for kind in kinds]
     runs = paired([[files[k] for k in several] for several in members])
     columns: list[tuple[Column, int]] = []
@@ -210,6 +240,20 @@ def _logs(files: Sequence[Path], tables: Sequence[Table]) -> _Logs:
             if rival is None or one.quantity != TIME:
                 columns.append((one, kind))
     return _Logs(tuple(columns), tuple(tables[several[0]] for several in members), runs)
+
+
+def _otherwise(table: Table, usual: Sequence[Column], own: Sequence[Column]) -> dict[str, Column]:
+    """Quantity -> the column that this log has for it, where the usual one is not in it. Raises NoColumnError where it has none."""
+    found = {}
+    for one in usual:
+        try:
+            if one.quantity:
+                table.name_of(one.key)
+        except NoColumnError:
+            found[one.quantity] = next((other for other in own if other.quantity == one.quantity), None)
+            if found[one.quantity] is None:
+                raise
+    return {quantity: column for quantity, column in found.items() if column is not None}
 
 
 def _is_whole(quantities: Collection[str]) -> bool:
@@ -236,8 +280,8 @@ def begun(
 
     load, wire, drive: names of presets, in the place of those that the columns speak for. decimal: "," or ".", where the files do not
     tell which one it is.
-    A file is a run, with the columns of the first one; another file without one of them is refused by name. Where no file
-    has an input and an output, a run is one file of each kind, by their names.
+    A file is a run, with the columns of the first one; another file without one of them has its own for the same quantity, or
+    is refused by name. Where no file has an input and an output, a run is one file of each kind, by their names.
     """
     tables = [read_table(file, decimal=decimal or None) for file in files]
     logs = _logs(files, tables)
@@ -250,6 +294,8 @@ def begun(
     told += [f"{one.name}: left out ({one.why})" for one in columns if not one.quantity]
     for table in logs.kinds:
         told += [f"{name}: left out ({why.split('; expected')[0]})" for name, why in table.unusable.items()]
+    for file, own in zip(files, logs.own, strict=False):
+        told += [f"{file.name}: {one.name}: {name} in {one.unit} ({one.sure}: {one.why})" for name, one in own.items()]
     told.append(f"model: {model.wire}, {model.load}, {model.drive} ({model.why}; `smajax presets` has the others)")
     if len(logs.kinds) > 1:
         told.append(
@@ -291,17 +337,35 @@ def begun(
         "offset = true  # the sensor's zero may move from run to run",
         "",
     ]
-    clocks = [clock for table in tables if (clock := _clock(table, columns)) is not None]
+    own_of = dict(zip(files, logs.own, strict=True)) if logs.own else {}
+    clocks = [
+        clock
+        for file, table in zip(files, tables, strict=True)
+        if (clock := _clock(table, [*own_of.get(file, {}).values(), *columns])) is not None
+    ]
     if clocks and len(clocks) < len(tables):
         raise MeasuredDataError("some of the files have a time and others have none; give all of them one")
     if not clocks:
-        lines += ["[time]  # no column is a time: samples are counted", 'kind = "sample"', ""]
-        counted = f"samples are counted ({GUESS})"
-        wrong = [one for table in tables for one in times_not_read(table)]
+        wrong = [(table, *one) for table in tables for one in times_not_read(table).items()]
         if wrong:
-            told.insert(0, f"time: NOT READ, and {counted}: {wrong[0]}. Repair that and begin again")
+            table, name, why = wrong[0]
+            lines += [
+                f"[time]  # NOT READ: {why}",
+                f"column = {json.dumps(name, ensure_ascii=False)}",
+                f'unit = "{time_unit_of(table, name)}"',
+                "",
+                f"[sampling]  # {GUESS}",
+                'step = "50 ms"',
+                "",
+            ]
+            told.insert(
+                0,
+                f"time: NOT READ: {why}. Repair that and begin again; or write kind = 'sample' in the place of all under [time], "
+                "and leave [sampling] out, where samples are to be counted",
+            )
         else:
-            told.append(f"time: none found, {counted}")
+            lines += ["[time]  # no column is a time: samples are counted", 'kind = "sample"', ""]
+            told.append(f"time: none found, samples are counted ({GUESS})")
     else:
         if TIME in found:
             time = found[TIME]
@@ -359,6 +423,7 @@ def begun(
             f"name = {json.dumps(run.name, ensure_ascii=False)}",
             f'role = "{role}"' + ("  # never fitted: the error on it is the one to believe" if role != "fit" else ""),
             f"file = {inside[0]}" if len(inside) == 1 else f"files = {{ {by_channel} }}",
+            *_own_lines({name: one for name, one in own_of.get(run.files[0], {}).items() if name in used}, found),
             "",
         ]
     if len({run.name for run in logs.runs}) < len(logs.runs):

@@ -11,6 +11,7 @@ import numpy as np
 
 from smajax.measured.mat73_file import read_mat73
 from smajax.measured.mat_sound import sound_arrays
+from smajax.measured.names import listed
 from smajax.measured.table import Array, MeasuredDataError, Table
 
 _MAGIC = b"MATLAB "
@@ -97,7 +98,12 @@ def _add_structure(name: str, value: Any, found: Signals, deeper: bool = True) -
     signals = np.asarray(record["signals"])
     inner = signals.dtype.names or ()
     if "values" not in inner or signals.size == 0:
-        return f"variable {name!r}: its field 'signals' has fields {list(inner)}; expected 'values'"
+        held = (
+            f"has the fields {listed(list(inner))}"
+            if inner
+            else f"is no struct, but {signals.dtype} of {signals.shape}"
+        )
+        return f"variable {name!r}: its field 'signals' {held}; expected a struct with 'values'"
     time = _numbers(record["time"]) if "time" in fields else None
     for number, signal in enumerate(signals.ravel(), start=1):
         base = name if signals.size == 1 else f"{name}.{number}"

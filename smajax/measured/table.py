@@ -18,6 +18,14 @@ class MeasuredDataError(ValueError):
     """A measured file that is missing, is not what it says, or holds what cannot be used."""
 
 
+class NoColumnError(MeasuredDataError):
+    """A column that the file does not have. key: as it was asked for."""
+
+    def __init__(self, message: str, key: str | int) -> None:
+        super().__init__(message)
+        self.key = key
+
+
 def _counted(index: int) -> str:
     return f"sample {index + 1}"
 
@@ -60,11 +68,11 @@ class Table:
         if isinstance(key, int):
             if 1 <= key <= len(names):
                 return names[key - 1]
-            raise MeasuredDataError(f"{self.path}: no column number {key}; it has columns 1 to {len(names)}")
+            raise NoColumnError(f"{self.path}: no column number {key}; it has columns 1 to {len(names)}", key)
         if key in self.columns or key in self.unusable:
             return key
         free = [name for number, name in enumerate(names, start=1) if name not in taken and number not in taken]
-        raise MeasuredDataError(f"{self.path}: no column {key!r}{instead(key, names, 'it has', free)}")
+        raise NoColumnError(f"{self.path}: no column {key!r}{instead(key, names, 'it has', free)}", key)
 
     def column(self, key: str | int, taken: Collection[str | int] = (), gaps: bool = False) -> Array:
         """The values of one column, shape (n,), all finite or, with `gaps`, nan where a sample is missing.
