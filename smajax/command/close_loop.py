@@ -72,7 +72,8 @@ def close_loop_command(
 ) -> None:
     """Fit the base model, find what it lacks, add it, and report the error before and after.
 
-    Ctrl-C loses nothing: the same command with the same --out goes on from the fits that are finished.
+    A few minutes where little is missing, half an hour where several effects are. Ctrl-C loses nothing: the same command with
+    the same --out goes on from the fits that are finished.
 
     Example:  smajax close-loop experiment.toml --out report
     """
