@@ -19,7 +19,7 @@ from smajax.measured_state import MeasuredState, Sensor, truth
 from smajax.parameters import check_bounds, inside_bounds
 from smajax.recorded import refuse_lag
 from smajax.reference import Reference, resting
-from smajax.simulate import DEFAULT_STEP, trajectory
+from smajax.simulate import DEFAULT_STEP, check_finite, check_step, trajectory
 from smajax.step import step
 from smajax.system import System, initial_state
 from smajax.types import Scalar, Series, State, Trajectory
@@ -32,9 +32,7 @@ class ClosedLoop(eqx.Module):
     wanted: Reference
     voltage: Series  # the controller's command, as it reaches the amplifier
     measured: MeasuredState  # what the controller was told
-    failed_at: (
-        Scalar  # s; when the controller first answered with a number that is none, from where on it gets 0 V; inf
-    )
+    failed_at: Scalar  # s, when the controller first answered with no number, from where on it gets 0 V; else inf
 
 
 class AbstractWatch(eqx.Module):
@@ -90,13 +88,15 @@ def simulate_closed_loop(
 ) -> ClosedLoop:
     """Simulate over the samples of `wanted` (rad or m), `dt` seconds apart; the controller is called `every` samples.
 
+    `dt` is that of the clock by which `wanted` was made: a series carries no times, so another one stretches the run.
+
     Its command is held in between, as a digital controller holds it, and reaches the amplifier `delay` control periods
     later. Without an `estimator` it is told the true state, with the position as `sensor` (with noise drawn from `key`)
     reads it. `disturbance` are further inputs of the system, such as `load_torque` or `ambient_temperature`, each of
     shape (n,). A plain array for `wanted` means set points (`reference.resting`). `initial` defaults to rest.
 
-    Raises ValueError when a gain or parameter lies outside its bounds (where values are known: outside of `jit`),
-    when `wanted` has not a whole number of control periods and one sample more, and when noise has no `key`.
+    Raises ValueError when a gain, a parameter or the sensor's noise lies outside its bounds, when `dt` is none or a set point
+    not finite (where values are known: outside of `jit`), when `wanted` has not a whole number of control periods and one sample more, and when noise has no `key`.
     """
     first, end, (states, held, measured), wanted = _run(
         system, controller, wanted, dt, every, _Nobody(), True, estimator, sensor, key, delay, disturbance, initial
@@ -146,9 +146,16 @@ def _run(
     """(first state, end, (states, commands, measured) of every period where they are `kept`, what was wanted)."""
     check_bounds(system)
     check_bounds(controller)
+    check_step(dt)
     refuse_lag(system, "a closed loop")
     wanted = wanted if isinstance(wanted, Reference) else resting(wanted)
-    count = jnp.shape(wanted.position)[0]
+    shape = jnp.shape(wanted.position)
+    if len(shape) != 1:
+        raise ValueError(
+            f"`wanted` has the shape {shape}; expected a series, as `reference.constant(reference.clock(seconds, dt), 0.5)` gives it."
+        )
+    check_finite("the set point `wanted`", wanted.position)
+    (count,) = shape
     if every < 1 or (count - 1) % every:
         raise ValueError(
             f"`wanted` has {count} samples and the controller is called every {every}: give a multiple of {every} and "
@@ -158,6 +165,8 @@ def _run(
         raise ValueError(f"`delay` is a whole number of control periods, 0 or more, not {delay}.")
     if sensor is not None and key is None:
         raise ValueError("a sensor draws noise: give `key`, for instance `jax.random.key(0)`.")
+    if sensor is not None:
+        check_bounds(sensor)
     disturbance = {name: jnp.asarray(series, dtype=float) for name, series in (disturbance or {}).items()}
     for name, series in disturbance.items():
         if name not in system.load.inputs_optional | {"ambient_temperature"}:
@@ -165,6 +174,7 @@ def _run(
                 f"`{name}` is no disturbance of this system; there are "
                 f"{listed(sorted(system.load.inputs_optional | {'ambient_temperature'}))}."
             )
+        check_finite(f"the disturbance `{name}`", series)
         if series.shape != (count,):
             raise ValueError(f"disturbance `{name}` has the shape {series.shape}, `wanted` has {count} samples.")
 

@@ -23,7 +23,7 @@ from smajax.merit import Merit, merit
 from smajax.parameters import check_bounds
 from smajax.recorded import acting_inputs
 from smajax.reference import Reference
-from smajax.simulate import DEFAULT_STEP, check_inputs, check_scalars, first_state, simulate, trajectory
+from smajax.simulate import DEFAULT_STEP, check_inputs, check_kinds, check_scalars, first_state, simulate, trajectory
 from smajax.system import System
 from smajax.types import Scalar, Series, State, Trajectory
 
@@ -68,6 +68,7 @@ def simulate_compiled(
     and for a tolerance that is none; TypeError within `grad`, `jit` and `vmap`; Unsupported for an effect or a load of your
     own that cannot be translated.
     """
+    check_kinds(system, inputs)
     if any(
         isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves((system, dict(inputs), dt, tolerance, initial))
     ):
@@ -81,6 +82,8 @@ def simulate_compiled(
     if tolerance is not None and (not tolerance > 0.0 or not isinstance(system.load, AbstractMovingLoad)):
         raise ValueError(f"`tolerance` is a positive number, for a load that moves; got {tolerance}. Take 1e-4.")
     series = {name: jnp.asarray(values, dtype=float) for name, values in inputs.items()}
+    if len(next(iter(series.values()))) == 1:  # the start alone: there is nothing to compile
+        return jax.tree.map(np.asarray, simulate(system, series, dt, initial))
     limit = None if tolerance is None else jnp.asarray(tolerance, dtype=float)
     asked = _Asked(system, series, jnp.asarray(dt, dtype=float), limit, initial)
     found = evaluator(_run, asked, ("number",), alone=True)(asked, {"number": np.zeros(1)}, threads=1)

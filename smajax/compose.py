@@ -58,9 +58,15 @@ def _value(before: System, system: System, name: str, own: str, value: str | flo
             )
         return ratio * _changed(before, own, f"{name}={value.strip()}", unit)
     try:
-        return float(value)
+        plain = float(value)
     except ValueError:
         pass
+    else:
+        if value.strip().startswith("+"):
+            raise ValueError(
+                f"{name}={value.strip()} may be a change without its %, or a value: write '{value.strip()}%' or '{plain:g}'."
+            )
+        return plain
     try:
         return parse_quantity(value, "1" if unit == "-" else unit)
     except UnitError as error:
@@ -166,6 +172,15 @@ def compose(
     if others:
         name, value = next(iter(others.items()))
         raise TypeError(f"compose() has no argument {name!r}; a parameter goes into values={{{name!r}: {value!r}}}")
+    if (
+        isinstance(effects, str)
+        or not isinstance(effects, Sequence)
+        or not all(isinstance(one, str) for one in effects)
+    ):
+        raise TypeError(
+            f"effects={effects!r}; expected their names in a list, such as effects=['latent_heat']. One of your own goes into "
+            "`dataclasses.replace(system, effects=(YourEffect(...),))`."
+        )
     system = build(wire, load, drive)
     check_together(system, load, drive)
     if law:

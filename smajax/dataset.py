@@ -18,7 +18,7 @@ from smajax.load.base import AbstractMovingLoad
 from smajax.measure import SHOWN
 from smajax.parameters import check_bounds
 from smajax.sensors import SENSORS, shown_by
-from smajax.simulate import DEFAULT_STEP, simulate
+from smajax.simulate import DEFAULT_STEP, check_kinds, simulate
 from smajax.system import System
 from smajax.types import Series, State, Trajectory
 from smajax.wire.order import check_order
@@ -80,6 +80,7 @@ def simulate_dataset(
     a `tolerance`. For a call by itself: inside `jit`, `vmap` and `grad` take `simulate`. Raises ValueError as these do, and
     for a parameter out of its bounds.
     """
+    check_kinds(system, inputs)
     if any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves((system, dict(inputs), dt, initial))):
         raise TypeError(
             "simulate_dataset() gives labelled numbers, and no gradient, jit or vmap goes through it: use `sma.simulate`, which "

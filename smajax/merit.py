@@ -30,9 +30,7 @@ class Merit(eqx.Module):
 
     reach_time: Scalar  # s, first within the band or beyond the set point
     settling_time: Scalar  # s, in the band from there on, the whole last fifth of the run at least
-    overshoot: (
-        Scalar  # rad or m, largest distance beyond the set point, seen from the start (any, where it starts there)
-    )
+    overshoot: Scalar  # rad or m, largest distance beyond the set point, seen from the start (any, if it starts there)
     steady_error: Scalar  # rad or m, mean of the absolute error over the last fifth
     steady_offset: Scalar  # rad or m, mean of position - set point there
     energy: Scalar  # J into the wire

@@ -19,7 +19,9 @@ class Reference(eqx.Module):
 
 
 def clock(seconds: float, dt: float) -> Series:
-    """t_0 ... t_n, s."""
+    """t_0 ... t_n, s. Raises ValueError for a step that is none."""
+    if not 0.0 < dt < float("inf") or not 0.0 <= seconds < float("inf"):
+        raise ValueError(f"a clock takes seconds of 0 or more and a `dt` above zero, not {seconds:g} and {dt:g}.")
     return dt * jnp.arange(round(seconds / dt) + 1)
 
 

@@ -23,8 +23,21 @@ from smajax.types import Scalar, Series, State, Trajectory
 DEFAULT_STEP = 0.005  # s
 
 
+def check_kinds(system: Any, inputs: Any) -> None:
+    """TypeError where these are something else altogether."""
+    if not isinstance(system, System):
+        raise TypeError(
+            f"a run is of a `System`, as `compose` makes it, not of {type(system).__name__}; a `Loop` goes to `simulate_loop_dataset`."
+        )
+    if not isinstance(inputs, Mapping):
+        raise TypeError(
+            f"`inputs` is {type(inputs).__name__}; expected channel -> series, such as {{'voltage': series}}."
+        )
+
+
 def check_inputs(system: System, inputs: Mapping[str, Series]) -> int:
     """Number of samples; ValueError when a channel is missing, unknown, of another length, or not finite where it is known."""
+    check_kinds(system, inputs)
     required = system.load.inputs_required | system.drive.inputs_required
     allowed = required | system.load.inputs_optional | system.drive.inputs_optional | {"ambient_temperature"}
     missing, unknown = sorted(required - set(inputs)), sorted(set(inputs) - allowed)
@@ -34,7 +47,7 @@ def check_inputs(system: System, inputs: Mapping[str, Series]) -> int:
             f"missing: {listed(missing)}; of no meaning to this load and drive: {listed(unknown)}."
         )
     for name, series in inputs.items():
-        _check_finite(name, series)
+        check_finite(f"the input `{name}`", series)
     lengths = {name: jnp.shape(series) for name, series in inputs.items()}
     if not lengths:
         raise ValueError("`inputs` is empty: without one series there is no clock. Give e.g. `ambient_temperature`.")
@@ -46,19 +59,30 @@ def check_inputs(system: System, inputs: Mapping[str, Series]) -> int:
     return next(iter(lengths.values()))[0]
 
 
-def _check_finite(name: str, series: Series) -> None:
+def check_finite(what: str, series: Any) -> None:
+    """ValueError where a series that is known holds something else than finite numbers."""
     if isinstance(series, jax.core.Tracer):
         return
     known = np.asarray(series)
     if known.dtype.kind not in "fiub":
-        raise ValueError(f"the input `{name}` is {type(series).__name__}; expected numbers, a series of shape (n,).")
+        kind = f"of type {known.dtype}" if isinstance(series, np.ndarray) else type(series).__name__
+        raise ValueError(f"{what} is {kind}; expected numbers, a series of shape (n,).")
     bad = np.flatnonzero(~np.isfinite(known))
     if bad.size:
-        raise ValueError(f"the input `{name}` is {known.ravel()[bad[0]]} at sample {bad[0] + 1}; give finite numbers.")
+        raise ValueError(f"{what} is {known.ravel()[bad[0]]} at sample {bad[0] + 1}; give finite numbers.")
+
+
+def check_step(dt: Any) -> None:
+    """ValueError for a step that is none, where it is known."""
+    if isinstance(dt, str):
+        raise ValueError(f"`dt` is a number of seconds, not {dt!r}.")
+    if not isinstance(dt, jax.core.Tracer) and jnp.shape(dt) == () and not 0.0 < float(dt) < float("inf"):
+        raise ValueError(f"`dt` is the time between two samples, in seconds and above zero, not {float(dt):g}.")
 
 
 def check_scalars(system: System, dt: Scalar | float, initial: State | None = None) -> None:
     """ValueError that names the number which is a batch, with its shape; and a step that is none."""
+    check_step(dt)
     leaves = {f"`{name}`": leaf for name, leaf in _parameter_leaves(system).items()}
     leaves |= {
         f"`initial{jax.tree_util.keystr(path)}`": leaf for path, leaf in jax.tree_util.tree_leaves_with_path(initial)
@@ -71,8 +95,6 @@ def check_scalars(system: System, dt: Scalar | float, initial: State | None = No
             f"one run takes one number of each, and {told}. Map over the batch: `jax.vmap(run)(values)` with a `run` that puts "
             "one value in (`set_parameters`), or name what varies in `run_batch`."
         )
-    if not isinstance(dt, jax.core.Tracer) and not 0.0 < float(dt) < float("inf"):
-        raise ValueError(f"`dt` is the time between two samples, in seconds and above zero, not {float(dt):g}.")
 
 
 def _parameter_leaves(system: System) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from smajax.parameters import check_bounds, set_parameters
 from smajax.presets import build
 from smajax.simulate import simulate
 from smajax.system import initial_state
+from smajax.wire.laws import under_law
 
 SYSTEM = build("flexinol_table_3_2", "dead_weight", "flexinol_voltage")
 VOLTAGE = {"voltage": jnp.full(50, 5.0)}
@@ -124,3 +125,39 @@ def test_a_gradient_through_machine_code_is_sent_to_simulate() -> None:
     for change in (jax.grad, jax.jit, jax.vmap):
         with pytest.raises(TypeError, match=r"no gradient, jit or vmap goes through.*use `smajax.simulate.simulate`"):
             change(last)(jnp.full(2, 3.0) if change is jax.vmap else jnp.asarray(3.0))
+
+
+@pytest.mark.parametrize("run", [simulate, simulate_compiled, simulate_dataset])
+def test_what_is_no_system_and_no_inputs_is_said(run) -> None:
+    with pytest.raises(TypeError, match="`inputs` is ndarray; expected channel -> series"):
+        run(SYSTEM, np.ones(50))
+    with pytest.raises(TypeError, match="a run is of a `System`, as `compose` makes it, not of str"):
+        run("arm", VOLTAGE)
+    with pytest.raises(ValueError, match="`dt` is a number of seconds, not '5 ms'"):
+        run(SYSTEM, VOLTAGE, "5 ms")
+    with pytest.raises(ValueError, match="the input `voltage` is of type complex128; expected numbers"):
+        run(SYSTEM, {"voltage": np.ones(50) * 1j})
+
+
+def test_one_sample_is_the_start_in_machine_code_too() -> None:
+    inputs = {"voltage": jnp.ones(1)}
+    one, other = simulate(SYSTEM, inputs), simulate_compiled(SYSTEM, inputs)
+    assert one.time.shape == other.time.shape == (1,)
+    assert float(one.stress[0]) == float(other.stress[0])
+
+
+def test_things_in_the_wrong_place_are_sent_to_theirs() -> None:
+    with pytest.raises(TypeError, match="`axes` is dict; expected what `grid`, `zipped` or `sampled` gives"):
+        run_batch(SYSTEM, {"voltage": 5.0}, {"load_mass": [0.1]}, seconds=0.1)  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match="`measures` holds 'position'; expected measures"):
+        run_batch(SYSTEM, {"voltage": 5.0}, grid(load_mass=[0.1]), seconds=0.1, measures=("position",))  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="the values of `load_mass` must be numbers in SI, without units, not"):
+        grid(load_mass=["100 g"])
+    with pytest.raises(TypeError, match=r"a law is the wire's: give `system.wire`, not System"):
+        under_law(SYSTEM, "brinson")
+    names = ("flexinol_table_3_2", "dead_weight", "flexinol_voltage")
+    for effects in ("latent_heat", {"latent_heat": 1.0}, [3]):
+        with pytest.raises(TypeError, match="expected their names in a list, such as"):
+            compose(*names, effects=effects)  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match=r"convection_coefficient=\+20 may be a change without its %"):
+        compose(*names, values={"convection_coefficient": "+20"})

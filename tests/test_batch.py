@@ -212,14 +212,16 @@ def test_another_batch_in_the_folder_is_not_touched(tmp_path: Path) -> None:
 def test_members_that_go_wrong_are_told_and_disturb_nobody() -> None:
     """A negative loss heats without end; a negative mass of no size at all divides by zero."""
     axes = zipped(convection_coefficient=[70.0, -3000.0, 90.0])
-    found = run_batch(ARM, {"voltage": 7.0}, axes, seconds=SECONDS, dt=DT)
+    with pytest.warns(UserWarning, match="1 of 3 values of `convection_coefficient` are out of its bounds, 1 to 5000"):
+        found = run_batch(ARM, {"voltage": 7.0}, axes, seconds=SECONDS, dt=DT)
     assert found["status"].values.tolist() == [0, RUNAWAY, 0]
     assert 0.0 < float(found["first_bad_time"][1]) < SECONDS
     alone = run_batch(ARM, {"voltage": 7.0}, zipped(convection_coefficient=[70.0, 90.0]), seconds=SECONDS, dt=DT)
     np.testing.assert_array_equal(found["position"][[0, 2]], alone["position"])
     assert np.isnan(good(found)["position"][1]).all()
     assert "1 of 3 members (33.33%)" in told_of(found)
-    nothing = run_batch(ARM, {"voltage": 7.0}, zipped(wire_length=[1.0, 0.0]), seconds=SECONDS, dt=DT)
+    with pytest.warns(UserWarning, match="such as 0: such members are run all the same"):
+        nothing = run_batch(ARM, {"voltage": 7.0}, zipped(wire_length=[1.0, 0.0]), seconds=SECONDS, dt=DT)
     assert nothing["status"].values.tolist() == [0, NOT_FINITE]
 
 

@@ -216,7 +216,23 @@ def test_what_a_loop_refuses() -> None:
         simulate_closed_loop(ARM, Played(), jnp.ones(100), DT, 4)
     with pytest.raises(ValueError, match="delay"):
         simulate_closed_loop(ARM, Played(), jnp.ones(101), DT, delay=-1)
-    broken = simulate_closed_loop(ARM, Played(), jnp.where(jnp.arange(101) < 50, 1.0, jnp.nan), DT)
+    gone = jnp.where(jnp.arange(101) < 50, 1.0, jnp.nan)
+    with pytest.raises(ValueError, match="the set point `wanted` is nan at sample 51"):
+        simulate_closed_loop(ARM, Played(), gone, DT)
+    with pytest.raises(ValueError, match="the disturbance `load_torque` is nan at sample 51"):
+        simulate_closed_loop(ARM, Played(), jnp.ones(101), DT, disturbance={"load_torque": gone})
+    with pytest.raises(ValueError, match=r"`wanted` has the shape \(\); expected a series"):
+        simulate_closed_loop(ARM, Played(), jnp.asarray(0.5), DT)
+    for dt in (-0.01, 0.0, float("nan")):
+        with pytest.raises(ValueError, match="`dt` is the time between two samples"):
+            simulate_closed_loop(ARM, Played(), jnp.ones(101), dt)
+    for sigma in (-1.0, float("nan")):
+        with pytest.raises(ValueError, match="outside of the bounds: `noise_sigma`"):
+            simulate_closed_loop(ARM, Played(), jnp.ones(101), DT, sensor=Sensor(sigma), key=jax.random.key(0))
+    with pytest.raises(ValueError, match="a clock takes seconds of 0 or more and a `dt` above zero"):
+        clock(1.0, -0.01)
+    # Under `jit` a set point is not known: what its controller answers is told.
+    broken = eqx.filter_jit(simulate_closed_loop)(ARM, Played(), gone, DT)
     assert float(broken.failed_at) == pytest.approx(0.5)
     assert np.isfinite(broken.run.position).all()
     np.testing.assert_array_equal(broken.voltage[50:], 0.0)

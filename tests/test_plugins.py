@@ -54,6 +54,34 @@ class Gale(Breeze):
         return self.strength * (temperature - ambient) + 1.0
 
 
+class Misspelt(AbstractEffect):
+    effect_name: ClassVar[str] = "misspelt"
+    title: ClassVar[str] = "breeze"
+    equation: ClassVar[str] = "heat"
+    formula: ClassVar[str] = "P' = k (T - T_inf)"
+    sentence: ClassVar[str] = "Moving air takes more heat away."
+    switches: ClassVar[tuple[str, ...]] = ("strength",)
+    starts: ClassVar[dict[str, float]] = {"strength": 0.1}
+    strength: object = parameter("W/(m K)", 0.0, 10.0, "k", default=0.0)
+
+    @classmethod
+    def base(cls):
+        return cls()
+
+    def heat_los(self, wire, temperature, ambient):
+        return self.strength * (temperature - ambient)
+
+
+class Switched(Breeze):
+    effect_name: ClassVar[str] = "switched"
+    switches: ClassVar[tuple[str, ...]] = ("strenght",)
+
+
+class Started(Breeze):
+    effect_name: ClassVar[str] = "started"
+    starts: ClassVar[dict[str, float]] = {"x": 0.1}
+
+
 nothing = 3
 """
 LOOK = """
@@ -115,6 +143,9 @@ def test_an_effect_and_a_load_of_another_package(tmp_path: Path) -> None:
         ("draft = airflow:Breeze", "calls itself 'breeze'"),
         ("breeze = airflow:nothing", "expected a class of `smajax.AbstractEffect`"),
         ("breeze = airflow:missing", "cannot be loaded"),
+        ("misspelt = airflow:Misspelt", "changes no equation: it has none of the methods stored_heat"),
+        ("switched = airflow:Switched", "has switches that are none of its parameters: strenght; these are strength"),
+        ("started = airflow:Started", "has starts that are none of its parameters: x; these are strength"),
     ],
 )
 def test_what_cannot_be_used_is_refused_by_name(

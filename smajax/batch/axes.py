@@ -65,7 +65,10 @@ class Axes:
 
 
 def _series(name: str, values: object) -> np.ndarray:
-    series = np.asarray(values, dtype=float)
+    try:
+        series = np.asarray(values, dtype=float)
+    except (TypeError, ValueError):
+        raise ValueError(f"the values of `{name}` must be numbers in SI, without units, not {values!r}.") from None
     if series.ndim != 1 or series.size == 0:
         raise ValueError(f"the values of `{name}` must be a list of numbers, but their shape is {series.shape}.")
     if not np.isfinite(series).all():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -22,7 +23,7 @@ from smajax.machine import available_memory
 from smajax.measure import SHOWN, AbstractMeasure
 from smajax.measured.names import listed
 from smajax.parameters import Parameter, check_bounds, parameters
-from smajax.simulate import DEFAULT_STEP, check_scalars
+from smajax.simulate import DEFAULT_STEP, check_kinds, check_scalars
 from smajax.system import System
 from smajax.types import Series
 from smajax.wire.order import check_order
@@ -35,6 +36,22 @@ def within_memory(budget: int) -> int:
     """The budget, or half of what this program may still take where that is less: a cap makes chunks smaller."""
     free = available_memory()
     return budget if free is None else min(budget, free // 2)
+
+
+def _tell_beyond(axes: Axes, table: Mapping[str, Parameter]) -> None:
+    """Warns of values that no wire or load has: what comes of them may look like a result."""
+    for dimension in axes.dimensions:
+        for name, values in dimension.values.items():
+            if name not in table:
+                continue
+            low, high = table[name].low, table[name].high
+            beyond = values[~((values >= low) & (values <= high))]
+            if beyond.size:
+                warnings.warn(
+                    f"{beyond.size} of {values.size} values of `{name}` are out of its bounds, {low:g} to {high:g} {table[name].unit}, "
+                    f"such as {beyond[0]:g}: such members are run all the same, and what comes of them means nothing.",
+                    stacklevel=4,
+                )
 
 
 def recipe_of(
@@ -51,6 +68,14 @@ def recipe_of(
     slopes: Sequence[str] = (),
 ) -> Recipe:
     """What `run_batch` runs. Raises ValueError naming what does not fit together."""
+    check_kinds(system, inputs)
+    if not isinstance(axes, Axes):
+        raise TypeError(f"`axes` is {type(axes).__name__}; expected what `grid`, `zipped` or `sampled` gives.")
+    strange: list[object] = [measure for measure in measures if not isinstance(measure, AbstractMeasure)]
+    if strange:
+        raise TypeError(
+            f"`measures` holds {strange[0]!r}; expected measures, such as `sma.measure.Largest('position')`."
+        )
     if not axes.names:
         raise ValueError("`axes` varies nothing: for a single run use `simulate`, or give `grid(voltage=[6.0])`.")
     drive, load = system.drive, system.load
@@ -60,6 +85,7 @@ def recipe_of(
     check_scalars(system, dt)
     check_bounds(system)
     check_order(system)
+    _tell_beyond(axes, table)
     # A name that is both (ambient_temperature) is the parameter, unless it is an input already.
     channels = tuple(name for name in axes.names if name in known and name not in table)
     unknown = [name for name in axes.names if name not in table and name not in channels]
@@ -198,7 +224,8 @@ def run_batch(
     On a processor the batch is compiled by `smajax.lanes`, five to twenty times as fast as by XLA; `engine="xla"` asks for the other
     (they agree to 1e-12 of a run), and where only XLA can do it, it does.
 
-    A member whose values are out of their bounds is run as it is: `status` tells of those that go wrong.
+    A member whose values are out of their bounds is run as it is, with a warning: `status` tells of numbers that are none and of
+    runaway heat, not of what cannot be.
     Raises ValueError for what does not fit together, a parameter of `system` out of its bounds, and when `out` holds another batch.
     """
     recipe = recipe_of(

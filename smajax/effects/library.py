@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
+from types import FunctionType
 from typing import Any
 
 from smajax.effects.ambient_drift import AmbientDrift
@@ -134,6 +136,14 @@ def _wrong(name: str, effect: Any) -> str:
         return f"calls itself {effect.effect_name!r}: give the entry point and the effect the same name"
     if effect.equation not in EQUATIONS:
         return f"is in the equation {effect.equation!r}; expected one of {', '.join(EQUATIONS)}"
+    fields = [field.name for field in dataclasses.fields(effect)]
+    for which, named in (("switches", effect.switches), ("starts", tuple(effect.starts))):
+        strange = [one for one in named if one not in fields]
+        if strange:
+            return f"has {which} that are none of its parameters: {', '.join(strange)}; these are {', '.join(fields)}"
+    terms = [one for one, what in vars(AbstractEffect).items() if isinstance(what, FunctionType) and one[0] != "_"]
+    if all(getattr(effect, one) is getattr(AbstractEffect, one) for one in terms):
+        return f"changes no equation: it has none of the methods {', '.join(terms)}; is one misspelt?"
     return ""
 
 

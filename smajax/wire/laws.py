@@ -39,6 +39,10 @@ LAWS: dict[str, Law] = {
 
 def under_law(wire: Wire, name: str) -> Wire:
     """The same wire under the named law; everything it is made of stays. KeyError lists the laws there are."""
+    if not isinstance(wire, Wire):
+        raise TypeError(
+            f"a law is the wire's: give `system.wire`, not {type(wire).__name__}, or `compose(..., law={name!r})`."
+        )
     if name not in LAWS:
         raise KeyError(f"No kinetics law `{name}`{instead(name, sorted(LAWS), 'there are')}.")
     law = LAWS[name]

@@ -228,7 +228,8 @@ def told(machine: Mapping[str, Any], found: Found) -> str:
         f"{machine['compiler']}; {versions}.",
         "",
         "Rotary arm, 10 s, constant voltage; accurate to 0.05 degrees and 1e-3 of the fraction against a tight solution "
-        "(`studies/benchmarks/problem.py`). Every ratio is of one run of `python -m studies.benchmarks.run` on this machine.",
+        "(`studies/benchmarks/problem.py`). Every ratio is of `python -m studies.benchmarks.run` on this machine; "
+        "what was not run again keeps its number of an earlier run.",
         "",
         *_ratios(found),
         "",
