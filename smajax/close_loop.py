@@ -8,7 +8,7 @@ from pathlib import Path
 
 import jax.numpy as jnp
 
-from smajax.attribution.assumed import assumed, sizes_not_given
+from smajax.attribution.assumed import assumed, expansion_not_given, sizes_not_given
 from smajax.attribution.bootstrap import bootstrapped
 from smajax.attribution.found import asks_for_more, effects_found, parameters_found
 from smajax.attribution.held_out import borne_out
@@ -140,6 +140,7 @@ def close_loop(
         [one for one in after.parameters if not one.name.startswith(added) and asks_for_more(one)],
         integration,
         lone,
+        expansion_not_given(job),
     )
     return Findings(
         experiment=experiment.name,

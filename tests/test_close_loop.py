@@ -13,7 +13,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from smajax.attribution.assumed import assumed, sizes_not_given
+from smajax.attribution.assumed import assumed, expansion_not_given, sizes_not_given
 from smajax.attribution.found import spread
 from smajax.attribution.verdict import cannot_know, pooled, summary
 from smajax.catalogue import CATALOGUE
@@ -70,6 +70,36 @@ def test_a_spread_over_runs_that_the_tie_holds_is_not_given() -> None:
     assert spread((1.0, 2.0), 0.6) is None
     assert spread((1.0, 2.0), None) is None
     assert spread(None, 0.1) is None
+
+
+def test_an_expansion_that_takes_back_the_presets_says_so_and_nothing_of_the_wire() -> None:
+    """As found of two benches whose wires have none, with the preset's theta_T of 0.55 MPa/K left as it is."""
+    with resources.as_file(resources.files("smajax") / "demo" / "latent") as folder:
+        experiment = load_experiment(folder / "experiment.toml", CATALOGUE)
+
+    def preset(**own: float) -> tuple[float, float] | None:
+        changed = dataclasses.replace(experiment, parameters=own)
+        return expansion_not_given(cast(Any, SimpleNamespace(experiment=changed, unknowns=("damping",))))
+
+    assert preset() == pytest.approx((0.55e6 / 28e9, 0.55e6 / 75e9))
+    assert preset(thermal_modulus=0.4e6) is None
+
+    def told(martensite: float, austenite: float, expansion: tuple[float, float] | None) -> str:
+        found = {"martensite": martensite, "austenite": austenite}
+        effect = dataclasses.replace(
+            made_effect("thermal_expansion", "thermal expansion of each phase", "constitutive", 1e-4, added=True),
+            coefficients={phase: CoefficientFinding(value, 2e-7, "1/K") for phase, value in found.items()},
+        )
+        runs = (made_run("a", "fit", 0), made_run("b", "fit", 1))
+        given = summary("explained", experiment, runs, [effect], made_portrait(2e-5, True, ()), 9, expansion=expansion)
+        return " ".join(given)
+
+    assert "takes back the one that the base model has by its preset's thermal_modulus" in told(
+        1.88e-5, 7.4e-6, preset()
+    )
+    assert "takes back" not in told(-1.88e-5, 7.4e-6, preset())
+    assert "takes back" not in told(1.88e-5, 2.0e-5, preset())
+    assert "takes back" not in told(1.88e-5, 7.4e-6, None)
 
 
 def test_a_load_far_off_may_be_a_size_of_the_bench_that_was_never_given() -> None:

@@ -34,3 +34,17 @@ def sizes_not_given(job: Job) -> list[str]:
         for name, value in assumed(job).items()
         if (name in WIRE_SIZES or table[name].path[0] == "load") and name not in {*experiment.parameters, *own}
     ]
+
+
+def expansion_not_given(job: Job) -> tuple[float, float] | None:
+    """Thermal expansion (martensite, austenite, 1/K) that the base model has by its preset's theta_T alone, as a size: theta_T / E.
+
+    None where the experiment file gives theta_T, or fits it, or the model has none.
+    """
+    experiment, model = job.experiment, base_model(job.experiment)
+    names = ("thermal_modulus", "young_modulus_martensite", "young_modulus_austenite")
+    own = {*experiment.parameters, *job.unknowns, *(name for run in experiment.runs for name in run.parameters)}
+    if not set(names) <= parameters(model).keys() or names[0] in own:
+        return None
+    modulus, martensite, austenite = (float(value) for value in get_parameters(model, names))
+    return (modulus / martensite, modulus / austenite) if modulus else None

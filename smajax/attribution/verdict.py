@@ -22,6 +22,7 @@ LITTLE = 2.0  # residual over noise up to which the noise itself may be what is 
 FAINT = 0.01  # chance, corrected for the candidates, from which on a trace below the noise is told
 HANGS = 0.5  # change at half the step over the error, from which on a model hangs on the step
 NAMED_SIZES = 4  # of these in a sentence
+TAKES_BACK = 0.3  # share of the preset's expansion to within which one found is its negative
 MENTIONED = 0.05  # weight from which on a rival is named
 
 
@@ -61,6 +62,7 @@ def summary(
     held: Sequence[ParameterFinding] = (),
     integration: float = 0.0,
     lone: Sequence[LoneRun] = (),
+    expansion: tuple[float, float] | None = None,
 ) -> tuple[str, ...]:
     """The verdict in sentences; `tried` is the number of candidate effects that were looked at.
     `aside`: those that were added and gave way to one unknown term. `foretold`: share of the motion in left-out runs that
@@ -68,7 +70,8 @@ def summary(
     confirm, with the error there without and with them. `at_bound`: coefficients of what was added that end at a bound.
     `likelier`: rivals that left-out runs prefer to what was added. `sizes`: those of the bench that the experiment never
     gives, with the presets' values. `held`: parameters of the base model that end at a bound. `integration` (SI of the output): by
-    how much halving the step changes what the final model gives. `lone`: fit runs that the others do not go with.
+    how much halving the step changes what the final model gives. `lone`: fit runs that the others do not go with. `expansion`:
+    what the preset's theta_T alone gives, see `expansion_not_given`.
     """
     unit, name = experiment.output_unit, experiment.output_name
     added = [effect for effect in effects if effect.added]
@@ -153,7 +156,7 @@ def summary(
         for one in likelier
     ]
     for effect in added:
-        told += [effect.sentence, *_or_a_size(effect, sizes)]
+        told += [_of_the_preset(effect, expansion) or effect.sentence, *_or_a_size(effect, sizes)]
     told += _held_out_warnings(runs, experiment)
     if not several:
         told.append("There is one fit run only: effects were judged on the fit itself, no run could be left out.")
@@ -245,6 +248,22 @@ def _of_the_step(experiment: Experiment, runs: Sequence[RunFinding], integration
         "error on the fit runs: what was fitted may be the integration's and not the wire's. Take a shorter step under [sampling] "
         "and run again before you believe it."
     ]
+
+
+def _of_the_preset(effect: EffectFinding, expansion: tuple[float, float] | None) -> str:
+    """What an expansion says that takes back the one of the preset's theta_T: nothing of the wire, but of what was taken as known."""
+    found = [effect.coefficients.get(phase) for phase in ("martensite", "austenite")]
+    if effect.name != "thermal_expansion" or expansion is None:
+        return ""
+    for one, preset in zip(found, expansion, strict=True):
+        if one is None or abs(one.value - preset) > max(TAKES_BACK * abs(preset), 3.0 * (one.standard_error or 0.0)):
+            return ""
+    return (
+        f"The thermal expansion that was found ({found[0].value:.2g} and {found[1].value:.2g} 1/K) takes back the one that the base model has by its "  # type: ignore[union-attr]
+        f"preset's thermal_modulus ({-expansion[0]:.2g} and {-expansion[1]:.2g}): it says nothing of the wire, but that its thermal strain is not the preset's. "
+        "Give thermal_modulus in [model.parameters] ('0 MPa/K' where the wire shows none) and run again: in rate form it also leaves a strain "
+        "with every cycle, and other effects that are named here may make up for that."
+    )
 
 
 def _or_a_size(effect: EffectFinding, sizes: Sequence[str]) -> list[str]:
