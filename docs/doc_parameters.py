@@ -19,7 +19,8 @@ class Parameters(Extension):
             unit, low, high, about, *_ = (str(argument).strip("\"'") for argument in call.arguments)
             attr.docstring = Docstring(f"{about}; {unit}, from {low} to {high}", parent=attr)
             return
-        source = attr.lines_collection[attr.filepath][(attr.lineno or 1) - 1]
-        _, mark, comment = source.partition("  # ")
+        lines = attr.lines_collection[attr.filepath][(attr.lineno or 1) - 1 : attr.endlineno]
+        commented = next((line for line in lines if "  # " in line), "")  # a long one stands in brackets, lines below
+        _, mark, comment = commented.partition("  # ")
         if mark and not comment.startswith(("type:", "noqa")):
             attr.docstring = Docstring(comment.strip(), parent=attr)

@@ -21,8 +21,7 @@ from smajax import AbstractEffect, parameter
 from smajax.load.dead_weight import DeadWeight
 
 
-class Breeze(AbstractEffect):
-    effect_name: ClassVar[str] = "breeze"
+class Still(AbstractEffect):
     title: ClassVar[str] = "breeze"
     equation: ClassVar[str] = "heat"
     formula: ClassVar[str] = "P' = k (T - T_inf)"
@@ -34,6 +33,10 @@ class Breeze(AbstractEffect):
     @classmethod
     def base(cls):
         return cls()
+
+
+class Breeze(Still):
+    effect_name: ClassVar[str] = "breeze"
 
     def heat_loss(self, wire, temperature, ambient):
         return self.strength * (temperature - ambient)
@@ -54,19 +57,8 @@ class Gale(Breeze):
         return self.strength * (temperature - ambient) + 1.0
 
 
-class Misspelt(AbstractEffect):
+class Misspelt(Still):
     effect_name: ClassVar[str] = "misspelt"
-    title: ClassVar[str] = "breeze"
-    equation: ClassVar[str] = "heat"
-    formula: ClassVar[str] = "P' = k (T - T_inf)"
-    sentence: ClassVar[str] = "Moving air takes more heat away."
-    switches: ClassVar[tuple[str, ...]] = ("strength",)
-    starts: ClassVar[dict[str, float]] = {"strength": 0.1}
-    strength: object = parameter("W/(m K)", 0.0, 10.0, "k", default=0.0)
-
-    @classmethod
-    def base(cls):
-        return cls()
 
     def heat_los(self, wire, temperature, ambient):
         return self.strength * (temperature - ambient)

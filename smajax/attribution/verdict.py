@@ -81,7 +81,7 @@ def summary(
         "adequate": "Nothing is missing whose trace is larger than the noise: what the base model leaves of the fit runs cannot be told "
         "from measurement noise.",
         "explained": _explained(added, several, runs, experiment),
-        "partly explained": _partly(added, runs, experiment),
+        "partly explained": _partly(added, several, runs, experiment),
         "not in the library": f"Something is missing, and none of the {tried} candidate effects that were tried accounts "
         f"for it: none lowers the error enough, {judged_on}."
         if tried
@@ -252,14 +252,16 @@ def _of_the_step(experiment: Experiment, runs: Sequence[RunFinding], integration
 
 def _of_the_preset(effect: EffectFinding, expansion: tuple[float, float] | None) -> str:
     """What an expansion says that takes back the one of the preset's theta_T: nothing of the wire, but of what was taken as known."""
-    found = [effect.coefficients.get(phase) for phase in ("martensite", "austenite")]
     if effect.name != "thermal_expansion" or expansion is None:
         return ""
-    for one, preset in zip(found, expansion, strict=True):
-        if one is None or abs(one.value - preset) > max(TAKES_BACK * abs(preset), 3.0 * (one.standard_error or 0.0)):
-            return ""
+    found = [effect.coefficients[phase] for phase in ("martensite", "austenite")]
+    if any(
+        abs(one.value - preset) > max(TAKES_BACK * abs(preset), 3.0 * (one.standard_error or 0.0))
+        for one, preset in zip(found, expansion, strict=True)
+    ):
+        return ""
     return (
-        f"The thermal expansion that was found ({found[0].value:.2g} and {found[1].value:.2g} 1/K) takes back the one that the base model has by its "  # type: ignore[union-attr]
+        f"The thermal expansion that was found ({found[0].value:.2g} and {found[1].value:.2g} 1/K) takes back the one that the base model has by its "
         f"preset's thermal_modulus ({-expansion[0]:.2g} and {-expansion[1]:.2g}): it says nothing of the wire, but that its thermal strain is not the preset's. "
         "Give thermal_modulus in [model.parameters] ('0 MPa/K' where the wire shows none) and run again: in rate form it also leaves a strain "
         "with every cycle, and other effects that are named here may make up for that."
@@ -278,7 +280,7 @@ def _or_a_size(effect: EffectFinding, sizes: Sequence[str]) -> list[str]:
     ]
 
 
-def _partly(added: Sequence[EffectFinding], runs: Sequence[RunFinding], experiment: Experiment) -> str:
+def _partly(added: Sequence[EffectFinding], several: bool, runs: Sequence[RunFinding], experiment: Experiment) -> str:
     """The strongest effect by name with what it does alone; the others as what they may be, stand-ins."""
     if not added:
         return ""
@@ -288,7 +290,7 @@ def _partly(added: Sequence[EffectFinding], runs: Sequence[RunFinding], experime
     told = f"The base model lacks: {first.title}"
     if np.isfinite(alone) and others:
         told += f"; alone it takes the fit runs from {shown(pooled(runs, 'fit', 'before'), unit, name)} to {shown(alone, unit, name)}"
-    judged = "runs left out" if sum(run.role == "fit" for run in runs) > 1 else "the one fit run"
+    judged = "runs left out" if several else "the one fit run"
     if not others:
         return f"{told}. That explains part of the misfit: what is left is more than noise."
     return (

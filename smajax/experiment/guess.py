@@ -40,7 +40,10 @@ QUANTITIES: Mapping[str, tuple[frozenset[str], str]] = MappingProxyType(
 )
 # Units that people write and that mean something else to a unit library.
 MEANT = {"C": "degC", "°": "deg", "F": "degF", "": "", "-": "1", "%": "percent", "Ohm": "ohm", "Ω": "ohm"}
-DRIVES = ("voltage", "current", "power", "duty")
+DRIVES, COUPON = (
+    ("voltage", "current", "power", "duty"),
+    ("temperature", "stress"),
+)  # inputs of a heated wire, of a coupon
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from smajax.experiment.guess import MEANT
-from smajax.experiment.own_columns import TIME
+from smajax.experiment.guess import MEANT, TIME
 from smajax.experiment.schema import ChannelSection, RunSection, TimeSection
 from smajax.measured.headers import unit_in
 from smajax.units import UnitError, convert

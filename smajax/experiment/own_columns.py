@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from smajax.experiment.errors import check_name
+from smajax.experiment.guess import TIME
 from smajax.experiment.schema import ChannelSection, RunSection, TimeSection
 
-TIME = "time"
 Places = tuple[Mapping[str, ChannelSection], TimeSection | None]
 
 

@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from smajax.experiment.errors import ExperimentError, at_key
-from smajax.experiment.own_columns import TIME, own_columns
+from smajax.experiment.guess import TIME
+from smajax.experiment.own_columns import own_columns
 from smajax.experiment.readings import check_readings
 from smajax.experiment.record import Run
 from smajax.experiment.schema import ChannelSection, RunSection, TimeSection

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -12,21 +12,21 @@ import numpy as np
 
 from smajax.catalogue import check_together
 from smajax.experiment.catalogue import WIRE_SIZES
-from smajax.experiment.grouping import RunFiles, paired
 from smajax.experiment.guess import (
+    COUPON,
     DRIVES,
     GUESS,
     LIKELY,
     SURE,
     TIME,
     Column,
-    columns_of,
     time_unit_of,
     times_not_read,
 )
+from smajax.experiment.logs import logs_of
 from smajax.measured.names import instead
 from smajax.measured.read import read_table
-from smajax.measured.table import MeasuredDataError, NoColumnError, Table
+from smajax.measured.table import MeasuredDataError, Table
 from smajax.parameters import parameter_values, parameters
 from smajax.presets import DRIVES as DRIVE_PRESETS
 from smajax.presets import WIRES, build
@@ -38,7 +38,6 @@ MOST_SAMPLES = 2000  # of the longest run on the clock
 # Loads whose reading is a position, and the wire of a bench with one.
 POSITIONED = {"dead_weight": "flexinol_table_3_2", "bias_spring": "flexinol_ht_500um"}
 HELD_OUT_FROM = 3  # runs from which on the last one is held out
-COUPON, HEATED = ("temperature", "stress"), ("voltage", "current", "power", "duty")
 # Parameter -> how far its bounds lie from the preset's value: factors, or kelvins.
 FACTORS = {"convection_coefficient": (0.2, 4.0), "specific_heat": (0.5, 3.0), "recoverable_strain": (0.3, 2.0)}
 KELVINS = {"austenite_start": 25.0, "austenite_finish": 30.0, "martensite_start": 25.0, "martensite_finish": 30.0}
@@ -200,68 +199,6 @@ def _unknowns(model: _Model, system: System) -> list[str]:
     return lines
 
 
-@dataclass(frozen=True)
-class _Logs:
-    """What the files hold: columns of every kind of file, each with the kind that has it, and the runs."""
-
-    columns: tuple[tuple[Column, int], ...]  # each quantity once
-    kinds: tuple[Table, ...]  # a file of each kind
-    runs: tuple[RunFiles, ...]
-    own: tuple[
-        Mapping[str, Column], ...
-    ] = ()  # of each file: quantity -> its column, where the first file's is not in it
-
-
-def _logs(files: Sequence[Path], tables: Sequence[Table]) -> _Logs:
-    """One run a file where a file has an input and an output, else one file a sensor. Raises MeasuredDataError."""
-    seen = [columns_of(table) for table in tables]
-    quantities = [frozenset(one.quantity for one in columns) - {"", TIME} for columns in seen]
-    kinds = list(dict.fromkeys(quantities))
-    if len(kinds) == 1 or any(_is_whole(held) for held in quantities):
-        runs = tuple(RunFiles(file.stem, (file,)) for file in files)
-        own = tuple(
-            _otherwise(table, seen[0], columns) if table is not tables[0] else {}
-            for table, columns in zip(tables, seen, strict=True)
-        )
-        return _Logs(tuple((one, 0) for one in seen[0]), (tables[0],), runs, own)
-    members = [[k for k, held in enumerate(quantities) if held == kind] for kind in kinds]
-    runs = paired([[files[k] for k in several] for several in members])
-    columns: list[tuple[Column, int]] = []
-    for kind, several in enumerate(members):
-        for one in seen[several[0]]:
-            rival = next((other for other, _ in columns if one.quantity and other.quantity == one.quantity), None)
-            if rival is not None and one.quantity != TIME:
-                one = replace(one, quantity="", sure=GUESS, why=f"{rival.name!r} is taken for the {one.quantity}")
-            elif rival is not None and (rival.key, rival.unit) != (one.key, one.unit):
-                raise MeasuredDataError(
-                    f"{files[several[0]]}: its time is {one.name!r} in {one.unit}, that of {files[members[0][0]].name} is "
-                    f"{rival.name!r} in {rival.unit}; an experiment has one name for both: rename one"
-                )
-            if rival is None or one.quantity != TIME:
-                columns.append((one, kind))
-    return _Logs(tuple(columns), tuple(tables[several[0]] for several in members), runs)
-
-
-def _otherwise(table: Table, usual: Sequence[Column], own: Sequence[Column]) -> dict[str, Column]:
-    """Quantity -> the column that this log has for it, where the usual one is not in it. Raises NoColumnError where it has none."""
-    found = {}
-    for one in usual:
-        try:
-            if one.quantity:
-                table.name_of(one.key)
-        except NoColumnError:
-            found[one.quantity] = next((other for other in own if other.quantity == one.quantity), None)
-            if found[one.quantity] is None:
-                raise
-    return {quantity: column for quantity, column in found.items() if column is not None}
-
-
-def _is_whole(quantities: Collection[str]) -> bool:
-    """Whether these are an input and an output of some model."""
-    moves = {"position", "angle"} & set(quantities) and set(DRIVES) & set(quantities)
-    return bool(moves) or {*COUPON, "strain"} <= set(quantities)
-
-
 def _folder(files: Sequence[Path], target: Path) -> Path:
     common = Path(os.path.commonpath([file.resolve().parent for file in files]))
     return Path(os.path.relpath(common, target.resolve().parent))
@@ -284,7 +221,7 @@ def begun(
     is refused by name. Where no file has an input and an output, a run is one file of each kind, by their names.
     """
     tables = [read_table(file, decimal=decimal or None) for file in files]
-    logs = _logs(files, tables)
+    logs = logs_of(files, tables)
     columns = [one for one, _ in logs.columns]
     found = {one.quantity: one for one in columns if one.quantity}
     model = _model(found, load, wire, drive)
@@ -346,9 +283,9 @@ def begun(
     if clocks and len(clocks) < len(tables):
         raise MeasuredDataError("some of the files have a time and others have none; give all of them one")
     if not clocks:
-        wrong = [(table, *one) for table in tables for one in times_not_read(table).items()]
-        if wrong:
-            table, name, why = wrong[0]
+        wrong = next(((table, *one) for table in tables for one in times_not_read(table).items()), None)
+        if wrong is not None:
+            table, name, why = wrong
             lines += [
                 f"[time]  # NOT READ: {why}",
                 f"column = {json.dumps(name, ensure_ascii=False)}",
