@@ -1,10 +1,14 @@
-"""Checks that both reports of the demo exist and reach the verdict that their runs were made for."""
+"""Checks that both reports of the demo exist and reach the verdict that their runs were made for.
+
+With a second folder: and that their numbers are those of the demo that lies there, made by another Python or engine.
+"""
 
 from __future__ import annotations
 
 import json
 import sys
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +16,42 @@ DEMO = Path(__file__).parents[1] / "smajax" / "demo"
 
 # The runs of `latent` come from a wire with latent heat, which the base model lacks; those of `complete` lack nothing.
 EXPECTED: dict[str, tuple[str, list[str]]] = {"latent": ("explained", ["latent_heat"]), "complete": ("adequate", [])}
+
+
+SAME, NOTHING = 1e-6, 1e-11  # of a number; what is below the second is zero but for rounding
+OWN = ("provenance", "version", "seconds", "created")  # what may differ between two demos
+
+
+def _numbers(told: Any, place: str = "") -> Iterator[tuple[str, Any]]:
+    """Every entry of a report by its place in it."""
+    if isinstance(told, dict):
+        for key, value in told.items():
+            yield from () if key in OWN else _numbers(value, f"{place}/{key}")
+    elif isinstance(told, list):
+        for number, value in enumerate(told):
+            yield from _numbers(value, f"{place}/{number}")
+    else:
+        yield place, told
+
+
+def differences(folder: Path, other: Path) -> list[str]:
+    """Where two demos differ by more than rounding."""
+    found = []
+    for name in EXPECTED:
+        one, two = (
+            dict(_numbers(json.loads((at / name / "report.json").read_text("utf-8")))) for at in (folder, other)
+        )
+        if set(one) != set(two):
+            found.append(f"{name}: {sorted(set(one) ^ set(two))[:5]} are in one report alone")
+        for place in sorted(set(one) & set(two)):
+            a, b = one[place], two[place]
+            if isinstance(a, float) and isinstance(b, float):
+                scale = 1.0 if "/correlation/" in place else max(abs(a), abs(b))  # a correlation's own is one
+                if abs(a - b) > max(SAME * scale, NOTHING):
+                    found.append(f"{name}{place}: {a!r} here and {b!r} there")
+            elif a != b:
+                found.append(f"{name}{place}: {a!r} here and {b!r} there")
+    return found
 
 
 def problems(folder: Path) -> list[str]:
@@ -55,4 +95,7 @@ def _off(report: dict[str, Any], name: str) -> list[str]:
 
 if __name__ == "__main__":
     wrong = problems(Path(sys.argv[1]))
+    if len(sys.argv) > 2 and not wrong:
+        wrong = differences(Path(sys.argv[1]), Path(sys.argv[2]))
+        print("the same numbers as the other demo" if not wrong else f"{len(wrong)} numbers differ")
     sys.exit("\n".join(wrong) if wrong else 0)

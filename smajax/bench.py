@@ -15,8 +15,8 @@ import numpy as np
 
 from smajax import explicit_arm
 from smajax.batch.axes import sampled, zipped
-from smajax.batch.engine import available_cores
 from smajax.batch.run import run_batch
+from smajax.engine import available_cores
 from smajax.figures.rigs import arm
 from smajax.fit.progress import Progress, quiet
 from smajax.machine import machine

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import sys
+import warnings
 from collections.abc import Callable
 from typing import Annotated
 
@@ -28,7 +29,8 @@ Exit codes: 0 done; 1 a defect of smajax (a traceback says where); 2 input or op
 which the same command goes on from what is kept.
 
 A folder that holds another result is refused; --overwrite deletes that result, and nothing else that lies there. Progress
-is drawn in a terminal only; SMAJAX_PROGRESS=lines writes a line a stage to stderr elsewhere.
+is drawn in a terminal only; SMAJAX_PROGRESS=lines writes a line a stage to stderr elsewhere. SMAJAX_ENGINE=xla has XLA run
+every program in the place of smajax's own compiler.
 """
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)  # no room on the disk, in the quota, in a file
@@ -84,8 +86,14 @@ def _no_memory(error: Exception) -> bool:
     )
 
 
+def _warned(message: Warning | str, *_: object, **__: object) -> None:
+    """Of a warning what it says: the line of code that gave it means nothing to who typed a command."""
+    sys.stderr.write(f"warning: {message}\n")
+
+
 def main() -> None:
     """Entry point: errors that a user can mend are said in one paragraph with exit code 2, without a traceback."""
+    warnings.showwarning = _warned
     typed, told = as_now(sys.argv[1:])
     for sentence in told:
         sys.stderr.write(f"deprecated: {sentence}\n")
@@ -102,6 +110,7 @@ def main() -> None:
             raise SystemExit(2) from None
         # Imported when there is an error: `--help` does not wait for them.
         from smajax.command.folder import FolderTaken
+        from smajax.engine import EngineError
         from smajax.experiment.errors import ExperimentError
         from smajax.measured.table import MeasuredDataError
         from smajax.plugins import PluginError
@@ -112,7 +121,9 @@ def main() -> None:
                 f"{error.filename or 'the disk'}: {error.strerror}: free some space and give the same command again. What was "
                 "finished is kept."
             )
-        elif not isinstance(error, (ExperimentError, FolderTaken, MeasuredDataError, OSError, PluginError, UnitError)):
+        elif not isinstance(
+            error, (EngineError, ExperimentError, FolderTaken, MeasuredDataError, OSError, PluginError, UnitError)
+        ):
             raise
         console().print(f"Error: {error}", style="red", markup=False, highlight=False, soft_wrap=True)
         raise SystemExit(2) from None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import equinox as eqx
@@ -14,9 +14,8 @@ from jax import lax
 from smajax.adaptive import advance
 from smajax.closed_loop import ClosedLoop, simulate_closed_loop
 from smajax.controller.base import AbstractController
+from smajax.engine import Engine, program
 from smajax.estimator.base import AbstractEstimator
-from smajax.lanes.evaluate import evaluator
-from smajax.lanes.text import Unsupported
 from smajax.load.base import AbstractMovingLoad
 from smajax.measured_state import Sensor
 from smajax.merit import Merit, merit
@@ -59,14 +58,15 @@ def simulate_compiled(
     dt: float = DEFAULT_STEP,
     tolerance: float | None = None,
     initial: State | None = None,
+    engine: Engine = "auto",
 ) -> Trajectory:
     """What `simulate` gives, arrays of numpy, compiled in half of the time and run in a tenth of it.
 
     `inputs` have shape (n,), SI, `dt` seconds apart, and hold from sample to sample. With a `tolerance` (shares of 1 C
     and of 1 % strain a step; 1e-4 is good) a moving load takes as many steps between two samples as its error asks for.
     Compiled once for runs of one length and kind of model, whatever its values. Raises ValueError as `simulate` does,
-    and for a tolerance that is none; TypeError within `grad`, `jit` and `vmap`; Unsupported for an effect or a load of your
-    own that cannot be translated.
+    and for a tolerance that is none; TypeError within `grad`, `jit` and `vmap`. `engine`: "auto" is machine code, or XLA with a
+    warning (`EngineWarning`) where that cannot be had; "native" raises what stands in the way, "xla" does not try.
     """
     check_kinds(system, inputs)
     if any(
@@ -86,8 +86,13 @@ def simulate_compiled(
         return jax.tree.map(np.asarray, simulate(system, series, dt, initial))
     limit = None if tolerance is None else jnp.asarray(tolerance, dtype=float)
     asked = _Asked(system, series, jnp.asarray(dt, dtype=float), limit, initial)
-    found = evaluator(_run, asked, ("number",), alone=True)(asked, {"number": np.zeros(1)}, threads=1)
-    return jax.tree.map(lambda leaf: leaf[0], found)
+    return _alone(_run, asked, engine)
+
+
+def _alone(function: Callable[..., Any], asked: eqx.Module, engine: Engine) -> Any:
+    """What `function` gives of one run, arrays of numpy."""
+    run = program(function, asked, ("number",), alone=True, engine=engine)
+    return jax.tree.map(lambda leaf: leaf[0], run(asked, {"number": np.zeros(1)}, threads=1))
 
 
 class _AskedLoop(eqx.Module):
@@ -128,16 +133,14 @@ def judged_loop_compiled(
     sensor: Sensor | None = None,
     key: jax.Array | None = None,
     delay: int = 0,
+    engine: Engine = "auto",
 ) -> tuple[ClosedLoop, Merit]:
-    """`simulate_closed_loop` and `merit` of it, arrays of numpy; by XLA where a part cannot be translated.
+    """`simulate_closed_loop` and `merit` of it, arrays of numpy.
 
-    Arguments and errors as there, for `wanted` as a `Reference`.
+    Arguments and errors as there, for `wanted` as a `Reference`; `engine` as `simulate_compiled`'s.
     """
     asked = _AskedLoop(
         system, controller, wanted, jnp.asarray(dt, dtype=float), estimator, sensor, key, every=every, delay=delay
     )
-    try:
-        found = evaluator(_judged_run, asked, ("number",), alone=True)(asked, {"number": np.zeros(1)}, threads=1)
-    except Unsupported:
-        return jax.tree.map(np.asarray, eqx.filter_jit(_judged_run)(asked, {}))
-    return jax.tree.map(lambda leaf: leaf[0], found)
+    loop, found = _alone(_judged_run, asked, engine)
+    return loop, found

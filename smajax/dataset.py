@@ -12,13 +12,13 @@ import xarray as xr
 from smajax.batch.provenance import provenance
 from smajax.closed_loop import ClosedLoop
 from smajax.compiled import simulate_compiled
+from smajax.engine import Engine
 from smajax.experiment.catalogue import INPUT_UNITS
-from smajax.lanes.text import Unsupported
 from smajax.load.base import AbstractMovingLoad
 from smajax.measure import SHOWN
 from smajax.parameters import check_bounds
 from smajax.sensors import SENSORS, shown_by
-from smajax.simulate import DEFAULT_STEP, check_kinds, simulate
+from smajax.simulate import DEFAULT_STEP, check_kinds
 from smajax.system import System
 from smajax.types import Series, State, Trajectory
 from smajax.wire.order import check_order
@@ -73,11 +73,11 @@ def simulate_dataset(
     dt: float = DEFAULT_STEP,
     tolerance: float | None = None,
     initial: State | None = None,
+    engine: Engine = "auto",
 ) -> xr.Dataset:
     """`simulate` as an `xarray.Dataset`: `found["position"].plot()` has axes with units, `sma.plot(found)` draws them all.
 
-    Arguments as `simulate_compiled`'s, which does the work where it can; a model that it cannot translate is XLA's, without
-    a `tolerance`. For a call by itself: inside `jit`, `vmap` and `grad` take `simulate`. Raises ValueError as these do, and
+    Arguments as `simulate_compiled`'s, which does the work. For a call by itself: inside `jit`, `vmap` and `grad` take `simulate`. Raises ValueError as these do, and
     for a parameter out of its bounds.
     """
     check_kinds(system, inputs)
@@ -88,10 +88,5 @@ def simulate_dataset(
         )
     check_bounds(system)
     check_order(system)
-    try:
-        run = simulate_compiled(system, inputs, dt, tolerance, initial)
-    except Unsupported:
-        if tolerance is not None:
-            raise
-        run = simulate(system, inputs, dt, initial)
+    run = simulate_compiled(system, inputs, dt, tolerance, initial, engine)
     return labelled_run(system, run, inputs, dt=dt, tolerance="none" if tolerance is None else tolerance)

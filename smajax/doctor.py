@@ -13,6 +13,7 @@ from smajax.plugins import PluginError, versions
 from smajax.runtime import TRIED, kept_programs
 
 PACKAGE = "smajax"
+SAME = 1e-6  # C
 WORK = ("dev", "docs")  # extras for work on smajax itself: no command uses them
 
 
@@ -38,26 +39,34 @@ def _size(folder: Path) -> int:
     return sum(one.stat().st_size for one in folder.rglob("*") if one.is_file()) if folder.is_dir() else 0
 
 
-def _lanes() -> dict[str, Any]:
-    """Whether the processor's vectors are used, shown by a program that is compiled and run."""
+def _engine() -> dict[str, Any]:
+    """Which engine runs the programs and why not the other, shown by a run that is compiled and simulated by each."""
+    import jax.numpy as jnp
+    import numpy as np
+
+    from smajax.compiled import simulate_compiled
+    from smajax.engine import engine_of
+    from smajax.engine.facade import VARIABLE, reason
+    from smajax.presets import build
+
+    asked = engine_of()
+    found: dict[str, Any] = {"runs": "native", "why": "", "vector_bits": None}
+    if asked == "xla":
+        return {**found, "runs": "xla", "why": f"{VARIABLE} asks for it"}
+    system = build("flexinol_table_3_2", "dead_weight", "voltage")
+    command = {"voltage": jnp.full(21, 3.0)}
     try:
-        import jax.numpy as jnp
-        import numpy as np
+        from smajax.engine.kernel import vector_bits
 
-        from smajax.compiled import simulate_compiled
-        from smajax.lanes.kernel import vector_bits
-        from smajax.presets import build
-
-        system = build("flexinol_table_3_2", "dead_weight", "voltage")
-        run = simulate_compiled(system, {"voltage": jnp.full(21, 3.0)}, 0.01)
-        works = bool(np.isfinite(run.temperature).all() and run.temperature[-1] > run.temperature[0])
-        return {
-            "works": works,
-            "vector_bits": vector_bits(),
-            "why": "" if works else "a run gave numbers that make no sense",
-        }
+        found["vector_bits"] = vector_bits()
+        run = simulate_compiled(system, command, 0.01, engine="native")
+        by_xla = simulate_compiled(system, command, 0.01, engine="xla")
+        off = float(np.abs(run.temperature - by_xla.temperature).max())
+        if not off < SAME:
+            return {**found, "runs": "native", "faulty": True, "why": f"a run is {off:g} C off that of XLA"}
+        return found
     except Exception as error:
-        return {"works": False, "vector_bits": None, "why": repr(error)}
+        return {**found, "runs": "none" if asked == "native" else "xla", "faulty": True, "why": reason(error)}
 
 
 def _plugin_faults() -> list[str]:
@@ -85,8 +94,8 @@ def _plugin_faults() -> list[str]:
     return faults
 
 
-def examined(lanes: bool = True) -> dict[str, Any]:
-    """Versions, machine, devices, cache and memory. `lanes`: also compile and run a small model."""
+def examined(engine: bool = True) -> dict[str, Any]:
+    """Versions, machine, devices, cache and memory. `engine`: also compile and run a small model."""
     import jax
 
     cache = kept_programs()
@@ -99,7 +108,7 @@ def examined(lanes: bool = True) -> dict[str, Any]:
         "devices": [f"{one.platform}: {one.device_kind}" for one in jax.devices()],
         "float64": bool(jax.config.read("jax_enable_x64")),
         # Without the tables of parts there is no model to try.
-        "lanes": _lanes() if lanes and not faults else {},
+        "engine": _engine() if engine and not faults else {},
         "compiled programs": {
             "folder": str(cache),
             "bytes": _size(cache),
@@ -132,8 +141,14 @@ def remarks(found: dict[str, Any]) -> list[str]:
         )
     if not found["float64"]:
         told.append("JAX computes in float32 here: jax.config.update('jax_enable_x64', True) before the first array.")
-    if found["lanes"] and not found["lanes"]["works"]:
-        told.append(f"machine code does not work here ({found['lanes']['why']}); XLA is used, several times slower.")
+    if found["engine"].get("faulty"):
+        told.append(
+            {
+                "native": f"machine code gives wrong numbers here ({found['engine']['why']}): set SMAJAX_ENGINE=xla, and please report it.",
+                "xla": f"machine code does not work here ({found['engine']['why']}): XLA is used, several times slower.",
+                "none": f"machine code does not work here ({found['engine']['why']}), and SMAJAX_ENGINE=native asks for nothing else.",
+            }[found["engine"]["runs"]]
+        )
     if not found["compiled programs"]["writable"]:
         told.append("the folder of compiled programs cannot be written: set JAX_COMPILATION_CACHE_DIR to one that can.")
     memory = found["memory"]["available_bytes"]
@@ -146,7 +161,7 @@ def clear_cache() -> int:
     """Delete the compiled programs, and nothing else that may lie in their folder; the bytes that are free again."""
     folder = kept_programs()
     before = _size(folder)
-    for kind in ("*-cache", "*-atime", f"lanes/{'[0-9a-f]' * 64}"):
+    for kind in ("*-cache", "*-atime", f"lanes/{'[0-9a-f]' * 64}", f"native/{'[0-9a-f]' * 64}"):
         for one in folder.glob(kind):
             one.unlink(missing_ok=True)
     return before - _size(folder)

@@ -15,9 +15,9 @@ from typing import Any
 
 from smajax.control_presets import CONTROLLERS
 from smajax.controller.base import AbstractController
+from smajax.core.files import json_text, replace
 from smajax.measured.names import instead
 from smajax.parameters import check_bounds, parameters, set_parameters
-from smajax.report.files import json_text, replace
 from smajax.system import System
 
 FORMAT = "smajax gains 1"

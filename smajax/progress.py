@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, ProgressColumn, Task, TaskID, TextColumn, TimeElapsedColumn
 from rich.text import Text
 
-from smajax.compiling import TOLD, compilations_told
+from smajax.core.compiling import TOLD, compilations_told
 from smajax.fit.progress import Progress as Report
 
 # Where stderr is no terminal nothing is said, so that a program that calls us has a clean one; with `lines` a log of a

@@ -7,10 +7,11 @@ from importlib.metadata import version
 from pathlib import Path
 
 # XLA's newer way of compiling loops for a CPU takes two to four times as long for a fit, which runs as fast either way; a
-# batch of many members runs up to three times as fast by it, and a little faster in the widest vectors. A flag that a later version does not know ends the process: only versions that were tried.
+# batch of many members runs up to three times as fast by it, and a little faster in the widest vectors. A flag that a version does not know ends the process: each has the versions of jaxlib with which it was tried.
 FLAG = "--xla_cpu_use_fusion_emitters=false"
 WIDE = "--xla_cpu_prefer_vector_width=512"
-TRIED = ((0, 7), (0, 10))
+KNOWS = {FLAG: ((0, 7), (0, 10)), WIDE: ((0, 7), (0, 12))}
+TRIED = ((0, 7), (0, 12))  # versions of jaxlib that the tests ran with
 
 
 def kept_programs() -> Path:
@@ -31,10 +32,10 @@ def prepare(cores: bool = False) -> None:
     flags = os.environ.get("XLA_FLAGS", "")
     if cores:
         jax.config.update("jax_num_cpu_devices", os.cpu_count() or 1)
-        if WIDE.split("=")[0] not in flags and TRIED[0] <= (major, minor) <= TRIED[1]:
-            os.environ["XLA_FLAGS"] = f"{flags} {WIDE}".strip()
-    elif TRIED[0] <= (major, minor) <= TRIED[1] and FLAG.split("=")[0] not in flags:
-        os.environ["XLA_FLAGS"] = f"{flags} {FLAG}".strip()
+    flag = WIDE if cores else FLAG
+    first, last = KNOWS[flag]
+    if flag.split("=")[0] not in flags and first <= (major, minor) <= last:
+        os.environ["XLA_FLAGS"] = f"{flags} {flag}".strip()
     jax.config.update("jax_enable_x64", True)
     jax.config.update("jax_compilation_cache_dir", str(kept_programs()))
     # Small ones too: a command has dozens of them.

@@ -17,7 +17,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from smajax.batch.axes import zipped
-from smajax.batch.engine import Function, chunks
+from smajax.batch.chunks import Function, chunks
 from smajax.closed_loop import simulate_closed_loop
 from smajax.controller.base import AbstractController
 from smajax.estimator.base import AbstractEstimator

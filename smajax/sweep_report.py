@@ -17,10 +17,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FormatStrFormatter
 
 from smajax.control_presets import CONTROLLERS, with_printed_law
+from smajax.core.files import replace
 from smajax.figures.drawing import named, panels
 from smajax.made_with import made_with
 from smajax.merit import Merit
-from smajax.report.files import replace
 from smajax.report.html import picture
 from smajax.report.plain_page import bullets, table, whole
 from smajax.sweep import Grid

@@ -17,6 +17,7 @@ from matplotlib.figure import Figure
 
 from smajax.batch.provenance import digest
 from smajax.control_presets import CONTROLLERS, FILTERS
+from smajax.core.files import as_netcdf, replace, writing
 from smajax.figures.drawing import UPRIGHT
 from smajax.fit.kept import arrays
 from smajax.fit.progress import Progress
@@ -28,7 +29,6 @@ from smajax.merit import Merit
 from smajax.mismatch import MISMATCHES
 from smajax.parameters import get_parameters
 from smajax.reference import clock
-from smajax.report.files import as_netcdf, replace, writing
 from smajax.sweep import Grid, Interface, closed_loops, lanes, positions, ratios
 from smajax.sweep_dataset import as_dataset
 from smajax.sweep_report import (

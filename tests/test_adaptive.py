@@ -12,8 +12,8 @@ import pytest
 from smajax.adaptive import advance
 from smajax.batch.axes import zipped
 from smajax.batch.run import run_batch
+from smajax.engine import program
 from smajax.figures.rigs import arm
-from smajax.lanes.evaluate import evaluator
 from smajax.measure import Last
 from smajax.parameters import set_parameters
 from smajax.step import step, step_and_error
@@ -60,7 +60,7 @@ def test_fewer_steps_than_fixed_ones_of_the_same_accuracy():
         (_, _, taken), _ = jax.lax.scan(one, (start, jnp.asarray(0.05), jnp.zeros((), int)), None, 80)
         return {"taken": taken}
 
-    taken = evaluator(counted, LIGHT, ("voltage",))(LIGHT, {"voltage": VOLTAGE}, 1)["taken"]
+    taken = program(counted, LIGHT, ("voltage",), engine="native")(LIGHT, {"voltage": VOLTAGE}, 1)["taken"]
     assert 3 * taken.mean() < 2 * SECONDS / 0.005 / 3
 
 
@@ -89,7 +89,7 @@ def test_the_scheme_is_of_order_three_where_nothing_bends():
         return _walked(_order_three, initial_state(LIGHT, inputs), inputs, own["dt"], 0.2).wire.temperature
 
     steps = 0.2 / np.array([10.0, 20.0, 40.0, 2000.0])
-    *coarse, best = evaluator(run, None, ("dt",))(None, {"dt": steps}, 1)
+    *coarse, best = program(run, None, ("dt",), engine="native")(None, {"dt": steps}, 1)
     errors = np.abs(np.array(coarse) - best)
     assert errors[0] / errors[1] > 6.0
     assert errors[1] / errors[2] > 6.0
@@ -105,7 +105,7 @@ def test_the_estimate_is_of_the_size_of_the_error():
         best = _walked(_order_two, here, inputs, jnp.asarray(0.0001), 0.04)
         return one.motion.position - best.motion.position, error[1]
 
-    off, error = evaluator(run, None, ("at",))(None, {"at": np.linspace(1.0, 2.5, 16)}, 1)
+    off, error = program(run, None, ("at",), engine="native")(None, {"at": np.linspace(1.0, 2.5, 16)}, 1)
     assert (np.abs(off) < 1.5 * np.abs(error)).all()
     assert np.abs(error).max() > 0.0
 

@@ -83,7 +83,7 @@ def test_the_ranges_are_where_the_kinetics_has_them() -> None:
     law = ARM.wire.kinetics
     stress = np.asarray([0.0, 75e6, 200e6])
     found = ranges(law, stress)
-    for at, pulled in enumerate(stress):
+    for at, pulled in enumerate(jnp.asarray(stress)):
         assert heating_temperature(law, found["A_f'"][at], pulled) == pytest.approx(float(law.austenite_finish))
         assert found["M_s'"][at] == pytest.approx(float(law.martensite_start) + pulled / 10.3e6)
 

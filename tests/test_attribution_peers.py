@@ -240,7 +240,7 @@ def test_all_are_compared_on_cases_that_all_have_answered(tmp_path: Path) -> Non
     better = Answer("greedy", "c", ("creep",), ("constitutive",), False, 1.0, 1.5, 9.0)
     for folder in ("judged", "cases/truth"):
         (tmp_path / folder).mkdir(parents=True)
-    from smajax.report.files import json_text, replace
+    from smajax.core.files import json_text, replace
 
     for case in ("one", "two"):
         save(dataclasses.replace(loop, case=case), tmp_path / "judged" / f"{case}.json")

@@ -158,7 +158,7 @@ def _stop_after(count: int):
 
 @pytest.fixture
 def small_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("smajax.batch.engine.LEAST_BLOCK", 2)
+    monkeypatch.setattr("smajax.engine.xla.LEAST_BLOCK", 2)
     monkeypatch.setattr("smajax.batch.run.chunk_size", lambda *_: 4)
 
 
@@ -273,8 +273,8 @@ prepare()
 import jax
 jax.config.update("jax_num_cpu_devices", int(sys.argv[1]))
 import numpy as np
-from smajax.batch import engine
-engine.LEAST_BLOCK = 4
+from smajax.engine import xla
+xla.LEAST_BLOCK = 4
 from tests.test_batch import _batch, grid
 assert jax.local_device_count() == int(sys.argv[1])
 np.save(sys.argv[2], _batch(grid(voltage=np.linspace(5.0, 9.0, 13)))["position"].values)

@@ -22,7 +22,7 @@ from smajax.cli import app, main
 from smajax.command import renamed
 from smajax.command.base import console, numbers, pairs, texts, understood
 from smajax.compose import compose, with_values
-from smajax.lanes.evaluate import evaluator
+from smajax.engine import program
 from smajax.mismatch import MISMATCHES, variation_of
 from smajax.parameters import parameter_values
 from smajax.presets import build
@@ -261,8 +261,8 @@ def test_a_stage_that_waits_for_a_compilation_says_so(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv(VARIABLE, "lines")
-    monkeypatch.setattr("smajax.compiling.threading.Timer", _AtOnce)
-    monkeypatch.setattr("smajax.lanes.evaluate.disk.folder", lambda: None)
+    monkeypatch.setattr("smajax.core.compiling.threading.Timer", _AtOnce)
+    monkeypatch.setattr("smajax.engine.cache.folder", lambda: None)
     with shown(console()) as progress:
         progress("fitting", 0.0)
         for power in (2, 3):  # programs that no other test has
@@ -270,9 +270,9 @@ def test_a_stage_that_waits_for_a_compilation_says_so(
         progress("fitting", 1.0)
         progress("simulating", 0.0)
         # A program of our own, which is not looked for on the disk.
-        evaluator(lambda model, own: {"a": jnp.sinc(own["a"]) ** 5}, None, ("a",))
+        program(lambda model, own: {"a": jnp.sinc(own["a"]) ** 5}, None, ("a",), engine="native")
     jax.jit(lambda x: jnp.sinc(x) ** 4)(np.ones(7))  # nobody looks any more
-    said = [line.split("] ", 1)[1] for line in capsys.readouterr().err.splitlines()]
+    said = [line.split("] ", 1)[1] for line in capsys.readouterr().err.splitlines() if line.startswith("[")]
     waits = "compiling, the first time only"
     assert said == ["fitting", waits, "simulating", waits]
 

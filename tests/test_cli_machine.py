@@ -39,7 +39,8 @@ DEMO = Path(__file__).parents[1] / "smajax" / "demo" / "latent"
 def test_the_doctor_finds_what_is_missing() -> None:
     found = doctor.examined()
     assert found["float64"]
-    assert found["lanes"]["works"], found["lanes"]["why"]
+    assert found["engine"] == {"runs": "native", "why": "", "vector_bits": found["engine"]["vector_bits"]}
+    assert found["engine"]["vector_bits"] in (128, 256, 512)
     assert found["packages"]["jax"]
     assert found["memory"]["available_bytes"] is None or found["memory"]["available_bytes"] > 1 << 20
     ill = {**found, "float64": False, "packages": {**found["packages"], "optax": ""}}
@@ -59,7 +60,7 @@ def test_the_doctor_asks_nobody_for_the_tools_of_developers(monkeypatch: pytest.
     ]
     lines += ["mkdocs<2; extra == 'docs'", 'no-such-tool>=9.0; python_version > "3" and extra == "dev"']
     monkeypatch.setattr("importlib.metadata.requires", lambda package: lines)
-    found = doctor.examined(lanes=False)
+    found = doctor.examined(engine=False)
     assert set(found["packages"]) == {"jax"}
     assert set(found["packages of extras"]) == {"h5py"}
 
@@ -82,9 +83,11 @@ def test_only_compiled_programs_are_cleared(tmp_path: Path, monkeypatch: pytest.
     (tmp_path / "lanes").mkdir()
     (tmp_path / "lanes" / ("0a" * 32)).write_bytes(b"x" * 500)
     (tmp_path / "lanes" / "notes").write_text("mine")
+    (tmp_path / "native").mkdir()
+    (tmp_path / "native" / ("0b" * 32)).write_bytes(b"x" * 500)
     (tmp_path / "thesis.tex").write_text("mine")
-    assert doctor.clear_cache() == 1500
-    assert sorted(one.name for one in tmp_path.rglob("*")) == ["lanes", "notes", "thesis.tex"]
+    assert doctor.clear_cache() == 2000
+    assert sorted(one.name for one in tmp_path.rglob("*")) == ["lanes", "native", "notes", "thesis.tex"]
 
 
 def test_the_bench_compares_the_same_trajectories() -> None:

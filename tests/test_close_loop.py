@@ -240,7 +240,8 @@ def _change(time: np.ndarray, series: np.ndarray, start: float, end: float) -> f
     near = [int(np.argmin(np.abs(time - at))) for at in (start, end)]
     # Half a second on either side: the sensor's increment is 0.02 mm.
     width = max(1, round(0.25 / float(time[1] - time[0])))
-    return float(np.subtract(*[series[max(0, k - width) : k + width].mean() for k in reversed(near)]))
+    before, after = (float(series[max(0, k - width) : k + width].mean()) for k in near)
+    return after - before
 
 
 def _events_of_step02(time: np.ndarray, series: dict[str, np.ndarray]) -> None:

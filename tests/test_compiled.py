@@ -12,8 +12,8 @@ import pytest
 
 from smajax.compiled import simulate_compiled
 from smajax.effects.library import LIBRARY
+from smajax.engine import program
 from smajax.extended import extended
-from smajax.lanes.evaluate import evaluator
 from smajax.parameters import get_parameters, parameters, set_parameters, set_vector
 from smajax.presets import build
 from smajax.simulate import simulate
@@ -84,7 +84,7 @@ def test_derivatives_along_any_direction_are_the_differences():
 
         return jax.jvp(reading, (own["share"],), (jnp.ones_like(own["share"]),))
 
-    run = evaluator(along, system, ("share",))
+    run = program(along, system, ("share",), engine="native")
     step = 1e-6
     values, slopes = run(system, {"share": np.array([-step, 0.0, step])}, 1)
     difference = (values[2] - values[0]) / (2.0 * step)

@@ -16,8 +16,8 @@ import pytest
 from smajax.attribution.judging import NUDGE
 from smajax.compiled import simulate_compiled
 from smajax.effects.library import LIBRARY
+from smajax.engine import program
 from smajax.extended import extended
-from smajax.lanes.evaluate import evaluator
 from smajax.parameters import parameter_values, parameters, set_parameters
 from smajax.presets import build
 from smajax.simulate import simulate
@@ -150,7 +150,7 @@ def test_derivatives_are_the_differences_and_the_score_test_sees_every_switch(ri
     for key in base:
         members[f"{key} towards"] = np.repeat([size * (key == moved) for moved, _, size, _ in cases], 3)
     members["step"] = np.concatenate([[-step, 0.0, step] for *_, step in cases])
-    found = evaluator(readings, full, tuple(members))(full, members, 1)
+    found = program(readings, full, tuple(members), engine="native")(full, members, 1)
     # Means of parts of a run: no sample that lies at a kink hides the derivative.
     values, slopes = (np.stack([one[:, start:].mean(axis=1) for start in (0, 150, 260)], axis=1) for one in found)
     for number, (key, at, _, step) in enumerate(cases):

@@ -420,7 +420,10 @@ def test_a_delay_of_whole_and_of_half_steps_is_the_shifted_input() -> None:
 def test_a_coupons_temperature_is_late_and_its_stress_is_not() -> None:
     coupon = build("flexinol_isobaric", "coupon", "none")
     time = DT * np.arange(400)
-    inputs = {"temperature": 70.0 - 50.0 * np.cos(0.35 * time), "stress": 120e6 + 20e6 * np.sin(0.8 * time)}
+    inputs: dict[str, Any] = {
+        "temperature": 70.0 - 50.0 * np.cos(0.35 * time),
+        "stress": 120e6 + 20e6 * np.sin(0.8 * time),
+    }
     late = simulate_compiled(extended(coupon, ("input_delay",), {"input_delay.delay": 2.5 * DT}), inputs, DT)
     acted = np.interp(time - 2.5 * DT, time, inputs["temperature"])
     moved = simulate_compiled(coupon, inputs | {"temperature": acted}, DT)

@@ -13,8 +13,8 @@ import pytest
 from smajax.attribution.judging import NUDGE
 from smajax.effects.base import Extent
 from smajax.effects.library import LIBRARY
+from smajax.engine import program
 from smajax.extended import extended
-from smajax.lanes.evaluate import evaluator
 from smajax.parameters import get_parameters, parameters, set_parameters, set_vector
 from smajax.presets import build
 from smajax.simulate import simulate
@@ -64,7 +64,7 @@ def _shown(rig: str, effects: tuple[str, ...], names: list[str], points: Array, 
     asked = extended(system, effects), {channel: top * jnp.concatenate(shares)}
     own = {f"value {name}": points[:, k] for k, name in enumerate(names)}
     own |= {f"towards {name}": ways[:, k] for k, name in enumerate(names)}
-    return evaluator(_along, asked, tuple(own))(asked, own, 1)
+    return program(_along, asked, tuple(own), engine="native")(asked, own, 1)
 
 
 @cache

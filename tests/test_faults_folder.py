@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from smajax.command.folder import MARK, FolderTaken, claimed
+from smajax.core.files import replace, writing
 from smajax.fit.kept import Kept
-from smajax.report.files import replace, writing
 from tests.small_bench import bench, log, refused, smajax
 
 WIRE = ("flexinol_table_3_2", "dead_weight", "flexinol_voltage", "--step", "5V:1s")
@@ -55,7 +55,7 @@ def test_a_file_that_cannot_be_written_to_its_end_leaves_the_one_before(tmp_path
     """A cap on the size of files stands for any write that fails in the middle."""
     path = replace(tmp_path / "report.json", "before")
     code = (
-        "import sys\nfrom pathlib import Path\nfrom smajax.report.files import replace\n"
+        "import sys\nfrom pathlib import Path\nfrom smajax.core.files import replace\n"
         "replace(Path(sys.argv[1]), 'x' * 100_000)"
     )
     ended = _python(code, path, before="ulimit -f 8")  # blocks of 512 bytes
@@ -176,7 +176,7 @@ from smajax.runtime import prepare
 prepare()
 import jax
 from smajax.batch.axes import grid
-from smajax.batch.engine import chunks
+from smajax.batch.chunks import chunks
 from smajax.batch import run
 from smajax.presets import build
 system = build("flexinol_table_3_2", "dead_weight", "flexinol_voltage")

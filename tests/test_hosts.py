@@ -21,8 +21,9 @@ WORKER = """
 import sys
 from smajax.runtime import prepare
 prepare()
-from smajax.batch import engine, hosts
-engine.LEAST_BLOCK = 2
+from smajax.batch import hosts
+from smajax.engine import xla
+xla.LEAST_BLOCK = 2
 out, address, processes, process = sys.argv[1], sys.argv[2], int(sys.argv[3]), int(sys.argv[4])
 slow = len(sys.argv) > 5 and sys.argv[5] == str(process)
 at = hosts.join(address, processes, process) if processes > 1 else (0, 1)

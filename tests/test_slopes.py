@@ -14,15 +14,15 @@ from smajax.batch.axes import Axes, grid, sampled, zipped
 from smajax.batch.member import Recipe, _run, slope_name
 from smajax.batch.run import recipe_of, run_batch
 from smajax.effects.library import LIBRARY
+from smajax.engine import program
 from smajax.extended import extended
-from smajax.lanes.evaluate import evaluator
 from smajax.measure import AbstractMeasure, Last, Mean, MeanSquare, TimeAbove
 from smajax.parameters import get_parameters, parameters, set_parameters
 from smajax.presets import build
 from smajax.system import System
 from smajax.units import convert
+from tests.test_engine import same_batch
 from tests.test_every_effect import RIGS, _rig
-from tests.test_lanes import same_batch
 
 ARM = build("niti_table_3_1", "arm", "amplified_voltage")
 TRACKED = MeanSquare("position", jnp.linspace(-0.7, 0.2, 101), 0.1)
@@ -51,7 +51,7 @@ def _same_as_forward(
     **more: Any,
 ) -> None:
     """Along a way that moves every parameter by about its own size, or a little of its room where it is zero."""
-    found = run_batch(system, inputs, axes, measures=measures, slopes=by, engine="lanes", keep=(), **more)
+    found = run_batch(system, inputs, axes, measures=measures, slopes=by, engine="native", keep=(), **more)
     members, table = axes.members(0, axes.size), parameters(system)
     sizes = {
         name: abs(float(members[name][0] if name in members else get_parameters(system, [name])[0])) for name in by
@@ -60,7 +60,7 @@ def _same_as_forward(
     rng = np.random.default_rng(1)
     way = {name: size * rng.uniform(0.5, 1.0) * rng.choice([-1.0, 1.0]) for name, size in sizes.items()}
     recipe = recipe_of(system, inputs, axes, measures=measures, slopes=by, keep=(), **more)
-    ahead = evaluator(_along, (recipe, way), tuple(members))((recipe, way), members, 1)
+    ahead = program(_along, (recipe, way), tuple(members), engine="native")((recipe, way), members, 1)
     for one in measures:
         parts = [found[slope_name(one.name, name)].to_numpy().ravel() * step for name, step in way.items()]
         scale = np.abs(parts).sum(axis=0).max()
@@ -153,7 +153,9 @@ def test_a_member_gone_wrong_spoils_no_other() -> None:
 def test_they_are_those_of_xla() -> None:
     axes = sampled(13, voltage=(5.5, 8.5), payload_mass=(0.05, 0.09), seed=1)
     asked: dict[str, Any] = {"measures": (TRACKED, Mean("temperature")), "slopes": BY, **SPREAD}
-    same_batch(run_batch(ARM, {}, axes, engine="lanes", **asked), run_batch(ARM, {}, axes, engine="xla", **asked), 1e-9)
+    same_batch(
+        run_batch(ARM, {}, axes, engine="native", **asked), run_batch(ARM, {}, axes, engine="xla", **asked), 1e-9
+    )
 
 
 @pytest.mark.slow

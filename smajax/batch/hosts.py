@@ -15,7 +15,7 @@ import jax
 import xarray as xr
 
 from smajax.batch.axes import Axes
-from smajax.batch.engine import chunk_size
+from smajax.batch.chunks import chunk_size
 from smajax.batch.member import member
 from smajax.batch.run import BUDGET, created_or_opened, fill, opened, recipe_of
 from smajax.batch.store import Store

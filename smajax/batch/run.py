@@ -13,10 +13,11 @@ import numpy as np
 import xarray as xr
 
 from smajax.batch.axes import Axes
-from smajax.batch.engine import Engine, chunk_size, chunks, result_shapes
+from smajax.batch.chunks import chunk_size, chunks, result_shapes
 from smajax.batch.member import GOOD, Recipe, member
 from smajax.batch.provenance import digest, provenance
 from smajax.batch.store import DIGEST, Store
+from smajax.engine import Engine
 from smajax.fit.progress import Progress, quiet
 from smajax.load.coupon import AbstractCoupon
 from smajax.machine import available_memory
@@ -221,7 +222,7 @@ def run_batch(
     there, and the same call goes on where an earlier one was stopped; the data set returned then reads from disk, as
     `smajax.batch.run.opened(out)` does by itself.
 
-    On a processor the batch is compiled by `smajax.lanes`, five to twenty times as fast as by XLA; `engine="xla"` asks for the other
+    On a processor the batch is machine code (`smajax.engine`), five to twenty times as fast as by XLA; `engine="xla"` asks for the other
     (they agree to 1e-12 of a run), and where only XLA can do it, it does.
 
     A member whose values are out of their bounds is run as it is, with a warning: `status` tells of numbers that are none and of

@@ -24,7 +24,8 @@ class Store:
     """The folder of one batch."""
 
     def __init__(self, folder: Path, group: zarr.Group) -> None:
-        self.folder, self.group = folder, group
+        self.folder = folder
+        self.group: Any = group  # what it gives for a name has other types in other versions of zarr
 
     @classmethod
     def opened(cls, folder: Path) -> Store:
@@ -79,12 +80,7 @@ class Store:
     def axes(self) -> Axes:
         values = self.group[AXES]
         order = json.loads(str(self.group.attrs[AXES]))
-        return Axes(
-            tuple(
-                Dimension(name, {key: np.asarray(values[key][:]) for key in keys})  # type: ignore[index]
-                for name, keys in order
-            )
-        )
+        return Axes(tuple(Dimension(name, {key: np.asarray(values[key][:]) for key in keys}) for name, keys in order))
 
     @property
     def axis_units(self) -> dict[str, str]:
@@ -103,14 +99,14 @@ class Store:
 
     def missing(self) -> list[int]:
         """Chunks that are still to be computed."""
-        return np.flatnonzero(np.asarray(self.group[MARK][:]) == 0).tolist()  # type: ignore[index]
+        return np.flatnonzero(np.asarray(self.group[MARK][:]) == 0).tolist()
 
     def write(self, number: int, found: Mapping[str, np.ndarray]) -> None:
         """Chunk `number`, then its mark."""
         start = number * self.chunk
         for name, values in found.items():
-            self.group[name][start : start + len(values)] = values  # type: ignore[index]
-        self.group[MARK][number] = 1  # type: ignore[index]
+            self.group[name][start : start + len(values)] = values
+        self.group[MARK][number] = 1
 
     def names(self) -> Sequence[str]:
         return [name for name in self.group.array_keys() if name != MARK]

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from smajax.command.base import INSIDE
-from smajax.report.files import json_text, replace, sweep_up
+from smajax.core.files import json_text, replace, sweep_up
 
 MARK = ".smajax.json"
 # By the file that each command writes last another one refuses a folder without the mark, which may be the user's own.

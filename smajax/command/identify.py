@@ -56,13 +56,13 @@ def identify_command(
     prepare()
     from smajax.catalogue import CATALOGUE
     from smajax.command.folder import FolderTaken, check_path, claimed
+    from smajax.core.files import json_text
     from smajax.declared import free_by_name
     from smajax.experiment.asked import asked_of
     from smajax.experiment.errors import ExperimentError
     from smajax.experiment.load import load_experiment
     from smajax.identify import identify
     from smajax.progress import shown
-    from smajax.report.files import json_text
     from smajax.report.identify_page import write_identified
     from smajax.report.identify_record import record
     from smajax.report.identify_words import conclusions, estimate_rows, posterior_rows

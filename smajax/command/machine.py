@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -46,13 +46,13 @@ def doctor(
 
 def told(found: dict[str, object]) -> list[str]:
     """The same for a terminal."""
-    from typing import Any, cast
+    from typing import cast
 
     one = cast(dict[str, Any], found)
-    here, cache, lanes, memory = (
+    here, cache, engine, memory = (
         one["machine"],
         one["compiled programs"],
-        one["lanes"],
+        one["engine"],
         one["memory"]["available_bytes"],
     )
 
@@ -65,15 +65,22 @@ def told(found: dict[str, object]) -> list[str]:
         f"devices: {', '.join(one['devices'])}",
         f"float64: {'on' if one['float64'] else 'off'} in the commands; a program of your own switches it on itself, before its "
         "first array: smajax.prepare(), or jax.config.update('jax_enable_x64', True)",
-        f"machine code for a batch: {'works' if lanes['works'] else 'does not work'}, vectors of {lanes['vector_bits']} bits"
-        if lanes
-        else "machine code for a batch: not tried, because of the plug-ins",
+        _engine(engine),
         f"memory free: {'unknown' if memory is None else f'{memory / 1e9:.1f} GB'}",
         f"compiled programs: {cache['folder']}, {cache['bytes'] / 1e6:.1f} MB; to clear: {cache['clear']}",
         f"packages: {versions(one['packages'])}",
         f"of extras: {versions(one['packages of extras'])}",
         f"plug-ins: {', '.join(one['plug-ins']) or 'none'}",
     ]
+
+
+def _engine(found: dict[str, Any]) -> str:
+    """Which engine runs, and why not the other."""
+    if not found:
+        return "engine: not tried, because of the plug-ins"
+    if found["runs"] == "native":
+        return f"engine: machine code, vectors of {found['vector_bits']} bits; SMAJAX_ENGINE=xla asks for XLA"
+    return f"engine: {'XLA' if found['runs'] == 'xla' else 'none'}, because {found['why']}"
 
 
 def bench(
@@ -96,8 +103,8 @@ def bench(
     prepare(cores=True)
     from smajax.bench import bench as timed
     from smajax.bench import in_words
+    from smajax.core.files import json_text, replace
     from smajax.progress import shown
-    from smajax.report.files import json_text, replace
 
     with resumable(), shown(console()) as progress:
         found = timed(count, min(peers, count), progress)

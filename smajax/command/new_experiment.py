@@ -56,10 +56,10 @@ def new_experiment(
 
     prepare()
     from smajax.catalogue import CATALOGUE
+    from smajax.core.files import replace
     from smajax.experiment.errors import ExperimentError
     from smajax.experiment.load import load_experiment
     from smajax.experiment.template import begun
-    from smajax.report.files import replace
 
     guessed = begun(files, out, title, load, wire, drive, decimal)
     replace(out, guessed.text)

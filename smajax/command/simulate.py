@@ -138,10 +138,10 @@ def simulate(
 
     prepare()
     from smajax.command.folder import check_path, claimed
+    from smajax.core.files import json_text
     from smajax.gains_file import GainsFileError
     from smajax.levels import reads_file
     from smajax.progress import shown
-    from smajax.report.files import json_text
     from smajax.report.simulate_page import OWN, merit_rows, mismatch_rows, record, rest_rows, summary_rows, write_run
     from smajax.single import Asked, AskedError, AskedLoop, channels, run_closed, run_open
     from smajax.words import aligned

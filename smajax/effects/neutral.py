@@ -5,20 +5,17 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 
 from smajax.compiled import simulate_compiled
 from smajax.effects.base import AbstractEffect
 from smajax.effects.library import of_others
-from smajax.lanes.text import Unsupported
 from smajax.plugins import EFFECTS, PluginError, points_of, whose
 from smajax.presets import build
 from smajax.report.display import digits, display, label
-from smajax.simulate import simulate
 from smajax.system import System
-from smajax.types import Series, Trajectory
+from smajax.types import Series
 
 NOTHING = 1e-6  # of a variable's range in the run: what another order of sums may make of it
 SECONDS, DT = 12.0, 0.02
@@ -44,21 +41,13 @@ def _rigs() -> Iterator[tuple[System, dict[str, Series]]]:
     yield build("flexinol_isobaric", "strain_coupon", "none"), {**oven, "strain": 0.02 * cycle}
 
 
-def _run(system: System, inputs: dict[str, Series]) -> Trajectory:
-    """By machine code, or by XLA what that has no words for."""
-    try:
-        return simulate_compiled(system, inputs, DT)
-    except Unsupported:
-        return jax.jit(simulate)(system, inputs, DT)
-
-
 def shift(effect: type[AbstractEffect]) -> str:
     """What `effect` at its base value changes, in words; nothing if it changes nothing, or applies to none of our loads."""
     for system, inputs in _rigs():
         if not effect.applies(system) or ("temperature" in inputs and effect.equation in HEATED):
             continue
         with_it = dataclasses.replace(system, effects=(effect.base(),))
-        plain, changed = _run(system, inputs), _run(with_it, inputs)
+        plain, changed = simulate_compiled(system, inputs, DT), simulate_compiled(with_it, inputs, DT)
         name, unit = system.load.reading
         told = []
         for what, unit_of in (("reading", unit), ("temperature", "degC"), ("stress", "Pa")):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Collection, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -81,6 +82,8 @@ def _inside(reading: Reading, key: str, name: str) -> Path:
     """A measured file, which lies in the data folder, also once links are followed: what a file asks for is read from nowhere else."""
     try:
         file, folder = reading.folder / name, reading.folder.resolve()
+        with suppress(FileNotFoundError):
+            file.stat()  # since Python 3.13 it is not `resolve` that finds a link which leads to itself
         if not Path(name).is_absolute() and file.resolve().is_relative_to(folder):
             return file
     except (

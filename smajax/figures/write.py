@@ -10,12 +10,12 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
+from smajax.core.files import csv_text, replace, writing
 from smajax.figures.catalogue import every_row
 from smajax.figures.drawing import UPRIGHT
 from smajax.figures.row import Row
 from smajax.fit.progress import Progress
 from smajax.made_with import made_with
-from smajax.report.files import csv_text, replace, writing
 from smajax.report.html import picture
 from smajax.report.plain_page import table, whole
 from smajax.source_mark import source_mark

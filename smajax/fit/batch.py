@@ -14,7 +14,6 @@ from jaxtyping import Array, Float
 
 from smajax.compiled import simulate_compiled
 from smajax.experiment.record import RUN_STARTS, Run
-from smajax.lanes.text import Unsupported
 from smajax.parameters import set_parameters
 from smajax.sensors import shown_by
 from smajax.simulate import simulate
@@ -120,14 +119,8 @@ def simulate_batch(system: System, batch: RunBatch) -> Trajectory:
     for number in range(batch.runs):
         inputs = {name: series[number] for name, series in batch.inputs.items()}
         here, initial = _started(system, batch.override_names, batch.overrides[number], inputs)
-        try:
-            runs.append(simulate_compiled(here, inputs, batch.dt, initial=initial))
-        except Unsupported:
-            runs.append(_by_xla(here, inputs, batch.dt, initial))
+        runs.append(simulate_compiled(here, inputs, batch.dt, initial=initial))
     return jax.tree.map(lambda *leaves: np.stack(leaves), *runs)
-
-
-_by_xla = eqx.filter_jit(simulate)
 
 
 def shown_batch(

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from smajax.batch.provenance import digest
-from smajax.report.files import writing
+from smajax.core.files import writing
 
 SELDOM = 1.0  # s between two states of the same work
 

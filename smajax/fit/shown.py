@@ -1,24 +1,20 @@
 """What the sensors show of simulated runs, and how it moves with the parameters, at many points at once.
 
-By `smajax.lanes`: each pair of a point and a direction is one member, and takes the run with it in forward mode. XLA does
-what has no translation.
+Each pair of a point and a direction is one run of a compiled program, in forward mode.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-from smajax.batch.engine import available_cores
+from smajax.engine import program
 from smajax.fit.batch import shown_run
 from smajax.fit.problem import Problem
-from smajax.lanes.evaluate import evaluator
-from smajax.lanes.text import Unsupported
 from smajax.parameters import set_vector
 from smajax.system import System
 from smajax.types import Series
@@ -103,13 +99,10 @@ def shown_at(problem: Problem, points: Sequence[np.ndarray] | np.ndarray) -> np.
     if len(asked) <= FEW:
         nowhere = np.zeros((len(asked), 1, asked.shape[1]))
         return shown_and_slopes(problem, asked, nowhere)[0]
-    try:
-        found = []
-        for number, run in enumerate(_runs(problem)):
-            own = _columns("value", _of_run(problem, asked, number))
-            found.append(evaluator(_at, run, tuple(own))(run, own, available_cores()))
-    except Unsupported:
-        return np.stack([np.asarray(_shown_by_xla(problem, jnp.asarray(point))) for point in asked])
+    found = []
+    for number, run in enumerate(_runs(problem)):
+        own = _columns("value", _of_run(problem, asked, number))
+        found.append(program(_at, run, tuple(own))(run, own))
     return np.concatenate(found, axis=1)
 
 
@@ -135,29 +128,10 @@ def shown_and_slopes(problem: Problem, points: np.ndarray, towards: np.ndarray) 
         return shown_at(problem, points), np.zeros((members, 0, *problem.batch.output.shape))
     pairs = np.repeat(points, directions, axis=0), towards.reshape(members * directions, -1)
     values, slopes = [], []
-    try:
-        for number, run in enumerate(_runs(problem)):
-            at, along = (_of_run(problem, one, number) for one in pairs)
-            own = {**_columns("value", at), **_columns("towards", along)}
-            value, slope = evaluator(_along, run, tuple(own))(run, own, available_cores())
-            values.append(value[::directions])
-            slopes.append(slope.reshape(members, directions, *slope.shape[1:]))
-    except Unsupported:
-        every = [
-            _slopes_by_xla(problem, jnp.asarray(at), jnp.asarray(way)) for at, way in zip(points, towards, strict=True)
-        ]
-        return np.stack([np.asarray(one[0]) for one in every]), np.stack([np.asarray(one[1]) for one in every])
+    for number, run in enumerate(_runs(problem)):
+        at, along = (_of_run(problem, one, number) for one in pairs)
+        own = {**_columns("value", at), **_columns("towards", along)}
+        value, slope = program(_along, run, tuple(own))(run, own)
+        values.append(value[::directions])
+        slopes.append(slope.reshape(members, directions, *slope.shape[1:]))
     return np.concatenate(values, axis=1), np.concatenate(slopes, axis=2)
-
-
-@eqx.filter_jit
-def _shown_by_xla(problem: Problem, values: jax.Array) -> jax.Array:
-    return problem.shown(values)
-
-
-@eqx.filter_jit
-def _slopes_by_xla(problem: Problem, values: jax.Array, towards: jax.Array) -> Any:
-    def one(way: jax.Array) -> tuple[jax.Array, jax.Array]:
-        return jax.jvp(problem.shown, (values,), (way,))
-
-    return jax.vmap(one, out_axes=(None, 0))(towards)

@@ -16,10 +16,10 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from smajax.compiled import simulate_compiled
+from smajax.core.files import replace
 from smajax.fit.progress import Progress, quiet
 from smajax.load.arm import Arm
 from smajax.load.base import AbstractMovingLoad
-from smajax.report.files import replace
 from smajax.report.pictures import MEASURED, QUIET, tidy
 from smajax.simulate import DEFAULT_STEP
 from smajax.system import System

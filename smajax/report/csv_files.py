@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from smajax.core.files import csv_text, heading
 from smajax.experiment.catalogue import INPUT_UNITS
-from smajax.report.files import csv_text, heading
 from smajax.report.findings import Findings, ParameterFinding
 
 if TYPE_CHECKING:

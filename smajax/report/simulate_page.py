@@ -13,6 +13,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
+from smajax.core.files import as_netcdf, csv_text, heading, json_text, replace
 from smajax.figures.drawing import BLUE, GREY, RED, UPRIGHT, named, panels
 from smajax.fit.progress import Progress, quiet
 from smajax.load.base import AbstractMovingLoad
@@ -21,7 +22,6 @@ from smajax.mismatch import in_words
 from smajax.parameters import parameter_values, parameters
 from smajax.report.animation import moving
 from smajax.report.display import axis_label, digits, display, label
-from smajax.report.files import as_netcdf, csv_text, heading, json_text, replace
 from smajax.report.html import picture
 from smajax.report.plain_page import bullets, table, whole
 from smajax.single import Ran

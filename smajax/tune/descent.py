@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from scipy.stats import qmc
 
+from smajax.core.files import writing
 from smajax.fit.kept import arrays
 from smajax.measured.names import instead
-from smajax.report.files import writing
 from smajax.tune import adam, trust
 from smajax.tune.evaluate import Rig
 from smajax.tune.members import Members

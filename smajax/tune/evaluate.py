@@ -16,7 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from smajax.batch.axes import zipped
-from smajax.batch.engine import Function, chunks
+from smajax.batch.chunks import Function, chunks
 from smajax.closed_loop import watch_closed_loop
 from smajax.control_presets import Box, ControllerPreset
 from smajax.controller.base import AbstractController

@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 from cmaes import CMA
 
+from smajax.core.files import writing
 from smajax.fit.kept import arrays
 from smajax.fit.progress import Progress, quiet
-from smajax.report.files import writing
 from smajax.tune.evaluate import Rig
 from smajax.tune.members import Members
 from smajax.tune.objective import Goal, rank

@@ -8,10 +8,10 @@ from typing import Any
 
 from smajax.batch.provenance import digest
 from smajax.control_presets import CONTROLLERS
+from smajax.core.files import json_text, replace
 from smajax.fit.progress import Progress, quiet
 from smajax.gains_file import write_gains
 from smajax.made_with import made_with
-from smajax.report.files import json_text, replace
 from smajax.system import System
 from smajax.tune.descent import Descent, load
 from smajax.tune.evolve import Evolution

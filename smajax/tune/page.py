@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from smajax.core.files import csv_text, heading
 from smajax.made_with import made_with
 from smajax.mismatch import MISMATCHES
 from smajax.report.display import digits
-from smajax.report.files import csv_text, heading
 from smajax.report.html import picture
 from smajax.report.plain_page import bullets, table, whole
 from smajax.tune.members import BEYOND

@@ -127,7 +127,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=3, help="of each memory; four times as many that lack an effect")
     parser.add_argument("--every", type=int, default=1, help="sample to keep: a shorter log")
     given = parser.parse_args()
-    from smajax.report.files import replace
+    from smajax.core.files import replace
     from smajax.runtime import prepare
 
     prepare()

@@ -40,8 +40,8 @@ def closed(case: Case, out: Path) -> Judged:
     """One case written, closed and judged."""
     from smajax.catalogue import CATALOGUE
     from smajax.close_loop import close_loop
+    from smajax.core.files import replace
     from smajax.experiment.load import load_experiment
-    from smajax.report.files import replace
     from smajax.report.json_file import findings_to_json
 
     folder = out / "cases" / case.name

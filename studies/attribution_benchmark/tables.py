@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from scipy import stats
 
-from smajax.report.files import replace
+from smajax.core.files import replace
 from studies.attribution_benchmark.judge import EQUATIONS, NOTHING, OUTSIDE, Judged, called
 
 STRENGTHS = (1.0, 3.0, 10.0)

@@ -23,8 +23,8 @@ import numpy as np
 from smajax.batch.axes import grid
 from smajax.batch.member import Recipe, member, slope_name
 from smajax.batch.run import recipe_of
+from smajax.engine import program
 from smajax.figures.rigs import arm
-from smajax.lanes.evaluate import evaluator
 from smajax.measure import MeanSquare
 from smajax.parameters import get_parameters, parameters, set_vector
 from smajax.runtime import prepare
@@ -65,14 +65,15 @@ def _by_machine_code(
     for name, by in (("cost", ()), ("gradient", names)):
         recipe = _recipe(system, steps, by)
         begin = time.perf_counter()
-        found = evaluator(member, recipe, ("voltage",))
+        run = program(member, recipe, ("voltage",), engine="native")
         told[f"{name}_compile_s"] = time.perf_counter() - begin
+        assert run.native is not None  # or there would have been an error
         times = []
         for _ in range(repeats):
             begin = time.perf_counter()
-            results = found(recipe, {"voltage": volts}, 1)
+            results = run(recipe, {"voltage": volts}, 1)
             times.append(time.perf_counter() - begin)
-        told |= {f"{name}_s": min(times), f"{name}_memory_MB": found.scratch / 1e6}
+        told |= {f"{name}_s": min(times), f"{name}_memory_MB": run.native.scratch / 1e6}
     told["slopes"] = np.stack([results[slope_name("mean_square_position", name)] for name in names], axis=1)
     return told | {"gradient_over_cost": told["gradient_s"] / told["cost_s"]}
 

@@ -17,8 +17,8 @@ import jax
 import numpy as np
 
 from smajax.batch.axes import zipped
-from smajax.batch.engine import available_cores
 from smajax.batch.run import run_batch
+from smajax.engine import available_cores
 from smajax.figures.rigs import arm
 from smajax.machine import peak_memory
 from smajax.measure import Last

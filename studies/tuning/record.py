@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from smajax.report.files import json_text, replace
+from smajax.core.files import json_text, replace
 
 HERE = Path(__file__).parent
 

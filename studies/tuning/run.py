@@ -11,9 +11,9 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from smajax.control_presets import CONTROLLERS
+from smajax.core.files import replace
 from smajax.figures.rigs import arm
 from smajax.fit.progress import Progress
-from smajax.report.files import replace
 from smajax.runtime import prepare
 from studies.tuning.peers import PROBLEMS, Problem, searched
 from studies.tuning.picture import draw

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from smajax.report.files import json_text, replace
+from smajax.core.files import json_text, replace
 from studies.attribution_benchmark.judge import Judged, equations_of, kind_of, names_of
 
 

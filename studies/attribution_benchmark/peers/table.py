@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from smajax.report.files import replace
+from smajax.core.files import replace
 from studies.attribution_benchmark.judge import Judged, called
 from studies.attribution_benchmark.judge import load as load_judged
 from studies.attribution_benchmark.peers.answer import judged, load

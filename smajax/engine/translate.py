@@ -8,29 +8,29 @@ from typing import Any
 
 import jax
 import jax.extend as jex
+import jax.numpy as jnp
 import numpy as np
 from jax.interpreters import partial_eval
 
-from smajax.lanes.arithmetic import ELEMENTWISE, exact_quotient, select
-from smajax.lanes.loop import Loop
-from smajax.lanes.memory import copy, in_memory, in_registers, mapped, row, write
-from smajax.lanes.phases import laid_out
-from smajax.lanes.text import NAME, Array, Lane, Text, Unsupported, scalar_type
-from smajax.lanes.values import SMALL, Filled, Held, Stored, Value, held, is_known, size_of
+from smajax.engine.arithmetic import ELEMENTWISE, exact_quotient, select
+from smajax.engine.expansions import EXPANSIONS
+from smajax.engine.jax_versions import TABLE, expanded, kind_of, opened, parameters_of
+from smajax.engine.loop import Loop
+from smajax.engine.memory import copy, in_memory, in_registers, mapped, row, write
+from smajax.engine.phases import laid_out
+from smajax.engine.text import NAME, Array, Lane, Text, Unsupported, scalar_type
+from smajax.engine.values import SMALL, Filled, Held, Stored, Value, held, is_known, size_of
 
 VECTORS = 8  # of a group: while one waits for a result others go on
-CALLS = {  # primitives that stand for a program of their own, and where it is kept
-    "jit": "jaxpr",
-    "pjit": "jaxpr",
-    "closed_call": "call_jaxpr",
-    "core_call": "call_jaxpr",
-    "remat2": "jaxpr",
-    "checkpoint": "jaxpr",
-    "custom_jvp_call": "call_jaxpr",
-    "custom_vjp_call": "call_jaxpr",
-    "custom_vjp_call_jaxpr": "fun_jaxpr",
-}
-SAME = ("optimization_barrier", "name")  # what says something to XLA, or to a derivative, and changes nothing
+CALLS = {
+    name for name, own in TABLE.items() if "program" in own and name != "scan"
+}  # they stand for a program of their own
+SAME = (
+    "optimization_barrier",
+    "name",
+    "random_wrap",
+    "random_unwrap",
+)  # what says something to XLA, or to a derivative, and changes nothing
 # What only moves numbers about, and which of the arguments are the numbers; the others say where to. None: all are.
 MOVES: dict[str, tuple[int, ...] | None] = {
     "broadcast_in_dim": None,
@@ -72,7 +72,7 @@ class Translated:
 
 
 def _array(aval: Any) -> Array:
-    return Array(tuple(aval.shape), str(aval.dtype))
+    return Array(*kind_of(aval))
 
 
 def _only_lane(value: Value) -> Lane | None:
@@ -93,20 +93,22 @@ def _rounds(equation: Any) -> bool:
     """Whether it cuts its argument to a whole number: a quotient must not be a bit below one then."""
     name = equation.primitive.name
     if name in ("jit", "pjit"):
-        name = str(equation.params.get("name", ""))
-    to_whole = name == "convert_element_type" and "int" in str(equation.params["new_dtype"])
+        name = str(parameters_of(equation)["name"])
+    to_whole = name == "convert_element_type" and "int" in str(parameters_of(equation)["new_dtype"])
     return to_whole or name in ("floor", "ceil", "round", "trunc", "fix", "floor_divide")
+
+
+def _numbers(known: Any) -> np.ndarray:
+    """A known array; of random keys their words."""
+    keys = isinstance(known, jax.Array) and jnp.issubdtype(known.dtype, jax.dtypes.prng_key)
+    return np.asarray(jax.random.key_data(known) if keys else known)
 
 
 def _constants(consts: Sequence[Any]) -> list[Value]:
     try:
-        return [np.asarray(one) for one in consts]
+        return [_numbers(one) for one in consts]
     except TypeError:
         raise Unsupported("a constant that is no array of numbers") from None
-
-
-def _open(program: Any) -> tuple[Any, Sequence[Any]]:
-    return (program.jaxpr, program.consts) if hasattr(program, "consts") else (program, ())
 
 
 class _Translation:
@@ -128,48 +130,52 @@ class _Translation:
         for equation in jaxpr.eqns:
             given = [read(one) for one in equation.invars]
             whole = equation.primitive.name == "div" and id(equation.outvars[0]) in to_the_bit
-            found = self.equation(equation, given, "exact_div" if whole else equation.primitive.name)
+            try:
+                found = self.equation(equation, given, "exact_div" if whole else equation.primitive.name)
+            except Exception as error:
+                if not hasattr(error, "__notes__"):  # of the innermost alone
+                    error.add_note(f"while the operation `{equation.primitive.name}` was translated")
+                raise
             for variable, value in zip(equation.outvars, found, strict=True):
                 names[variable] = value
         return [read(one) for one in jaxpr.outvars]
 
     def closed(self, program: Any, given: Sequence[Value]) -> list[Value]:
-        jaxpr, consts = _open(program)
+        jaxpr, consts = opened(program)
         return self.program(jaxpr, _constants(consts), given)
 
     def equation(self, equation: Any, given: list[Value], name: str) -> list[Value]:
-        params = equation.params
+        params = parameters_of(equation)
         if name in SAME:
             return given
         if name in CALLS:
-            return self.closed(params[CALLS[name]], given)
+            return self.closed(params["program"], given)
         if name == "scan":
             return self.scan(params, given, [_array(one.aval) for one in equation.outvars])
         if name == "while":
             return self.repeat(params, given)
         if name == "cond":
             return self.choice(params, given)
+        if name in EXPANSIONS and not (name in ("threefry2x32", "erf_inv") and all(map(is_known, given))):
+            return self.closed(expanded(equation), given)
         if all(is_known(one) for one in given):
             with jax.ensure_compile_time_eval():
-                found = equation.primitive.bind(*given, **params)
-            return [np.asarray(one) for one in (found if equation.primitive.multiple_results else [found])]
+                found = equation.primitive.bind(*given, **equation.params)
+            return [_numbers(one) for one in (found if equation.primitive.multiple_results else [found])]
         out = _array(equation.outvars[0].aval)
         kinds = [str(one.aval.dtype) for one in equation.invars]
         if name == "exact_div" and not out.dtype.startswith("float"):
             name = "div"
         if name in ELEMENTWISE or name == "exact_div":
             return [self.elementwise(name, params, given, out)]
-        if name == "gather" and "FILL" in str(params["mode"]):
-            # Not a place there is: `moved` finds out where something would be put in.
-            params = {**params, "fill_value": -1}
-            if not self.at_known_places(name, given):
-                raise Unsupported("a gathering that puts something in the place of what is beyond the ends")
+        if name == "gather" and "FILL" in str(params["mode"]) and not self.at_known_places(name, given):
+            raise Unsupported("a gathering that puts something in the place of what is beyond the ends")
         if name in REDUCTIONS:
             return [self.reduced(REDUCTIONS[name], given, params["axes"], out)]
         small = all(size_of(one) <= SMALL for one in given)
         small &= all(int(np.prod(one.aval.shape)) <= SMALL for one in equation.outvars)
         if name in MOVES and small and self.at_known_places(name, given):
-            return self.moved(equation.primitive, params, given)
+            return self.moved(equation.primitive, equation.params, given)
         if name in MOVES and len(set(map(_only_lane, given[: 1 if MOVES[name] else None]))) == 1:
             lane = _only_lane(given[0])
             if lane is not None and name not in ("dynamic_update_slice", "scatter", "split"):
@@ -178,7 +184,10 @@ class _Translation:
             return self.parted(given[0], params, [_array(one.aval) for one in equation.outvars])
         method: Callable[..., Value] | None = getattr(self, f"put_{name}", None)
         if method is None:
-            raise Unsupported(f"the operation `{name}`")
+            program = expanded(equation)
+            if program is None:
+                raise Unsupported(f"the operation `{name}`")
+            return self.closed(program, given)
         return [method(params, given, out, kinds)]
 
     # Arithmetic, and the shapes of arrays.
@@ -192,7 +201,10 @@ class _Translation:
         operation = exact_quotient if name == "exact_div" else ELEMENTWISE[name]
 
         def put(*lanes: Lane) -> Lane:
-            if name not in ("select_n", "convert_element_type") and len({one.dtype for one in lanes}) > 1:
+            if (
+                name not in ("select_n", "convert_element_type", "bitcast_convert_type")
+                and len({one.dtype for one in lanes}) > 1
+            ):
                 raise Unsupported(f"`{name}` of different kinds of numbers")
             return operation(self.text, out.dtype, *lanes, **params)
 
@@ -228,6 +240,8 @@ class _Translation:
             own = in_registers(self.text, one)
             named.append(np.arange(len(lanes), len(lanes) + own.size, dtype="int32").reshape(own.shape))
             lanes += list(own.ravel())
+        if "FILL" in str(params.get("mode")):
+            params = {**params, "fill_value": -1}  # not a place there is: found out below where it would be put in
         with jax.ensure_compile_time_eval():
             found = primitive.bind(*named, **params)
         results = found if primitive.multiple_results else [found]
@@ -252,24 +266,52 @@ class _Translation:
         one, dims = given[0], params["broadcast_dimensions"]
         if size_of(one) == int(np.prod(out.shape)) and list(dims) == sorted(dims):
             return self.put_reshape(params, given, out, kinds)
-        lanes = in_registers(self.text, one)
-        if int(np.prod(out.shape)) > SMALL:
-            if lanes.size == 1:
-                return Filled(lanes.ravel()[0], out.shape)
-            raise Unsupported(f"an array spread to the shape {out.shape}")
+        if size_of(one) == 1:
+            return Filled(in_registers(self.text, one).ravel()[0], out.shape)
+        return self.spread(one, dims, out, kinds[0])
 
-        raise AssertionError("a small array is moved")
+    def spread(self, one: Value, dims: Sequence[int], out: Array, dtype: str) -> Value:
+        """A large array that repeats another along some of its axes: axis k of that is axis `dims[k]` of this."""
+        text, shape = self.text, self.shape_of(one)
+        source = in_memory(text, one, shape, dtype)
+        room = Stored(text.reserve(int(np.prod(out.shape)), dtype), out.shape, dtype, own=True)
+        loop = Loop(text, [], "spread")
+        at = "0"
+        for axis, size in enumerate(shape):
+            if size == 1:
+                continue
+            behind = int(np.prod(out.shape[dims[axis] + 1 :]))
+            place = text.assign(f"udiv i64 {loop.count}, {behind}")
+            place = text.assign(f"urem i64 {place}, {size}")
+            place = text.assign(f"mul i64 {place}, {int(np.prod(shape[axis + 1 :]))}")
+            at = text.assign(f"add i64 {at}, {place}")
+        write(text, room, loop.count, row(text, source, at, (), dtype))
+        loop.end_after(room.size)
+        return room
 
     def put_slice(self, params: Any, given: list[Value], out: Array, kinds: Any) -> Value:
-        one, starts = given[0], params["start_indices"]
+        one, starts = given[0], params["starts"]
         if isinstance(one, Stored):
             rest_whole = tuple(out.shape[1:]) == tuple(one.shape[1:])
-            if not rest_whole or (params["strides"] or (1,))[0] != 1:
-                raise Unsupported("a part of a large array that is not a run of whole rows")
+            if not rest_whole:
+                raise Unsupported("a part of a large array that is not whole rows")
+            if (params["strides"] or (1,))[0] != 1:
+                return self.every_few(one, starts[0], params["strides"][0], out)
             first = starts[0] * int(np.prod(one.shape[1:])) * (self.text.room if one.own else 1)
             part = Stored(self.text.address(one.address, str(first), one.dtype), out.shape, one.dtype, one.own)
             return in_registers(self.text, part) if part.size <= SMALL else part
         raise AssertionError("a small array is moved")
+
+    def every_few(self, one: Stored, start: int, stride: int, out: Array) -> Value:
+        """Rows of a large array, one in so many."""
+        text, size = self.text, int(np.prod(out.shape[1:]))
+        room = Stored(text.reserve(int(np.prod(out.shape)), out.dtype), out.shape, out.dtype, own=True)
+        loop = Loop(text, [], "few")
+        source = text.assign(f"add i64 {text.assign(f'mul i64 {loop.count}, {stride}')}, {start}")
+        taken = row(text, one, source, out.shape[1:], out.dtype)
+        write(text, room, loop.count, taken if size > 1 else held(in_registers(text, taken).ravel()[0]))
+        loop.end_after(out.shape[0])
+        return in_registers(text, room) if room.size <= SMALL else room
 
     def parted(self, one: Value, params: Any, out: Sequence[Array]) -> list[Value]:
         """A large array cut into runs of rows."""
@@ -280,7 +322,7 @@ class _Translation:
         starts = np.cumsum([0, *params["sizes"]])[:-1]
         rest = (0,) * (len(out[0].shape) - 1)
         return [
-            self.put_slice({"start_indices": (int(start), *rest), "strides": None}, [one], part, ())
+            self.put_slice({"starts": (int(start), *rest), "strides": None}, [one], part, ())
             for start, part in zip(starts, out, strict=True)
         ]
 
@@ -289,8 +331,7 @@ class _Translation:
         shape = self.shape_of(one)
         if all(is_known(start) for start in starts):
             begin = [min(max(_whole(s), 0), n - m) for s, n, m in zip(starts, shape, out.shape, strict=True)]
-            limits = [b + m for b, m in zip(begin, out.shape, strict=True)]
-            return self.put_slice({"start_indices": begin, "limit_indices": limits, "strides": None}, [one], out, kinds)
+            return self.put_slice({"starts": begin, "strides": None}, [one], out, kinds)
         if len(shape) != 1 or int(np.prod(out.shape)) != 1:
             raise Unsupported("a part of an array that begins where each member says")
         return held(self.looked_up(one, in_registers(self.text, starts[0]).ravel()[0], kinds[0]), out.shape)
@@ -342,14 +383,14 @@ class _Translation:
         return Lane(text.work([*lines, f"call {text.vector(dtype)} @{name}({arguments})"], dtype), dtype)
 
     def put_concatenate(self, params: Any, given: list[Value], out: Array, kinds: Any) -> Value:
-        return self.joined(given, params["dimension"], out)
+        return self.joined(given, params["axis"], out)
 
     def put_stack(self, params: Any, given: list[Value], out: Array, kinds: Any) -> Value:
         return self.joined(given, params["axis"], out)
 
     def put_pad(self, params: Any, given: list[Value], out: Array, kinds: Any) -> Value:
         one, filling = given
-        (before, after, between), *others = params["padding_config"]
+        (before, after, between), *others = params["padding"]
         if between or before < 0 or after < 0 or any(any(rest) for rest in others):
             raise Unsupported("a large array that is padded otherwise than with rows before and behind it")
         lane = in_registers(self.text, filling).ravel()[0]
@@ -431,9 +472,9 @@ class _Translation:
 
     def scan(self, params: dict[str, Any], given: list[Value], out: Sequence[Array]) -> list[Value]:
         text = self.text
-        fixed, carry = params["num_consts"], params["num_carry"]
-        length, backward = params["length"], params["reverse"]
-        jaxpr, consts = _open(params["jaxpr"])
+        fixed, carry = params["constants"], params["carry"]
+        length, backward = params["length"], params["backward"]
+        jaxpr, consts = opened(params["program"])
         known = _constants(consts)
         start = [self.carried(one) for one in given[fixed : fixed + carry]]
         series = given[fixed + carry :]
@@ -459,18 +500,18 @@ class _Translation:
 
     def repeat(self, params: dict[str, Any], given: list[Value]) -> list[Value]:
         text = self.text
-        cond_fixed, body_fixed = params["cond_nconsts"], params["body_nconsts"]
+        cond_fixed, body_fixed = params["test_constants"], params["body_constants"]
         tests, bodies = given[:cond_fixed], given[cond_fixed : cond_fixed + body_fixed]
         start = [self.carried(one) for one in given[cond_fixed + body_fixed :]]
         loop = Loop(text, start, "while", sure=False)
-        going = in_registers(text, self.closed(params["cond_jaxpr"], [*tests, *loop.carry])[0]).ravel()[0]
+        going = in_registers(text, self.closed(params["test"], [*tests, *loop.carry])[0]).ravel()[0]
         inside, after = text.new_label("body"), text.new_label("end")
         # A lane that is done keeps what it has while others go on.
         some, chosen = text.any(going)
         text.branch(some, inside, after)
         text.label(inside)
         text.only(chosen)
-        found = self.closed(params["body_jaxpr"], [*bodies, *loop.carry])
+        found = self.closed(params["body"], [*bodies, *loop.carry])
         new = [
             held(
                 [

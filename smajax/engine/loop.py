@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from smajax.lanes.text import Text
-from smajax.lanes.values import Held, held
+from smajax.engine.text import Text
+from smajax.engine.values import Held, held
 
 
 class Loop:

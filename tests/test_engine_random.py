@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from jax import lax
 
-from tests.test_lanes import by_lanes, by_xla
+from tests.test_engine import by_machine_code, by_xla
 
 MEMBERS = 77  # fill no vector and no group of vectors
 KINDS = ("float64", "int64", "int8", "bool")
@@ -155,7 +155,7 @@ def _agree(seed: int) -> None:
     a, b = rng.integers(0, 64, (2, MEMBERS)).astype(float)
     wanted = by_xla(_program(seed), a, b)
     for vectors, mask in ((8, "i1"), (3, "i64"), (1, "i1")):
-        found = by_lanes(_program(seed), a, b, vectors=vectors, mask=mask)
+        found = by_machine_code(_program(seed), a, b, vectors=vectors, mask=mask)
         np.testing.assert_array_equal(found, wanted, err_msg=f"seed {seed}, {vectors} vectors, masks of {mask}")
 
 

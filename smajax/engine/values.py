@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from smajax.lanes.text import Lane
+from smajax.engine.text import Lane
 
 SMALL = 64  # numbers an array may have to be held in registers, one name each
 

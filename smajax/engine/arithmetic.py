@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from smajax.lanes.text import Lane, Text, Unsupported, scalar_type
+from smajax.engine.text import Lane, Text, Unsupported, scalar_type
 
 Operation = Callable[..., Lane]
 
@@ -149,9 +149,9 @@ def _estimated(text: Text, one: Lane, kind: str) -> Lane:
     return text.lane(f"call {of} @{name}({of} {one.name}, {of} zeroinitializer, {mask} -1)", one.dtype)
 
 
-def _whole_power(text: Text, out: str, one: Lane, *, y: int, **_: Any) -> Lane:
+def _whole_power(text: Text, out: str, one: Lane, *, power: int, **_: Any) -> Lane:
     found: Lane | None = None
-    square, left = reciprocal(text, one) if y < 0 else one, abs(y)
+    square, left = reciprocal(text, one) if power < 0 else one, abs(power)
     while left:
         if left & 1:
             found = square if found is None else _times(text, found, square)
@@ -160,12 +160,67 @@ def _whole_power(text: Text, out: str, one: Lane, *, y: int, **_: Any) -> Lane:
     return found or text.constant(1, out)
 
 
+def _polynomial(text: Text, out: str, one: Lane, *coefficients: Lane, **_: Any) -> Lane:
+    """c_0 + c_1 x + ... (an operation since JAX 0.12)."""
+    found = coefficients[-1]
+    for coefficient in reversed(coefficients[:-1]):
+        found = _binary("fadd", "add")(text, out, _times(text, found, one), coefficient)
+    return found
+
+
 def _square(text: Text, out: str, one: Lane, **_: Any) -> Lane:
     return _times(text, one, one)
 
 
 def _inverse_root(text: Text, out: str, one: Lane, **_: Any) -> Lane:
     return reciprocal(text, text.call("llvm.sqrt", out, one.name))
+
+
+def _grown_less_one(text: Text, out: str, one: Lane, **_: Any) -> Lane:
+    """exp(x) - 1 = 2 sinh(x/2) exp(x/2): exact where x is small; -1 where the product would be nothing times infinity."""
+    half = _times(text, one, text.constant(0.5, out))
+    wave, grown = text.call("llvm.sinh", out, half.name), text.call("llvm.exp", out, half.name)
+    found = _times(text, _times(text, text.constant(2.0, out), wave), grown)
+    least = text.constant(-80.0, out)
+    low = text.assign(f"fcmp olt {text.vector(out)} {one.name}, {least.name}", "bool")
+    return _chosen(text, low, text.constant(-1.0, out), found)
+
+
+def _log_beside_one(text: Text, out: str, one: Lane, **_: Any) -> Lane:
+    """log(1 + x) = log(u) x/(u - 1) with the rounded u = 1 + x, whose own error cancels (Kahan)."""
+    kind, unit = text.vector(out), text.constant(1.0, out)
+    # Without the freedom to put another order of sums in its place.
+    u = text.lane(f"fadd {kind} {unit.name}, {one.name}", out)
+    above = text.lane(f"fsub {kind} {u.name}, {unit.name}", out)
+    logarithm = text.call("llvm.log", out, u.name, flags="")
+    found = text.lane(f"fmul {kind} {logarithm.name}, {exact_quotient(text, out, one, above).name}", out)
+    small = text.assign(f"fcmp oeq {kind} {above.name}, {text.constant(0.0, out).name}", "bool")
+    endless = text.assign(f"fcmp oeq {kind} {u.name}, {text.constant(np.inf, out).name}", "bool")
+    least = text.assign(f"fcmp oeq {kind} {u.name}, {text.constant(0.0, out).name}", "bool")
+    found = _chosen(text, least, text.constant(-np.inf, out), found)
+    return _chosen(text, small, one, _chosen(text, endless, u, found))
+
+
+def _shifted(how: str) -> Operation:
+    """JAX's shifts: by as many bits as there are, or more, nothing is left (of a signed shift to the right, the sign)."""
+
+    def put(text: Text, out: str, one: Lane, by: Lane, **_: Any) -> Lane:
+        kind, bits = text.vector(out), 8 * np.dtype(out).itemsize
+        most = text.constant(bits - 1, out)
+        inside = text.assign(f"icmp ule {kind} {by.name}, {most.name}", "bool")
+        near = _chosen(text, inside, by, most)
+        found = text.lane(f"{how} {kind} {one.name}, {near.name}", out)
+        return found if how == "ashr" else _chosen(text, inside, found, text.constant(0, out))
+
+    return put
+
+
+def _same_bits(text: Text, out: str, one: Lane, **_: Any) -> Lane:
+    if np.dtype(out).itemsize != np.dtype(one.dtype).itemsize:
+        raise Unsupported("bits of a number taken for those of one of another size")
+    if scalar_type(out) == scalar_type(one.dtype):
+        return Lane(one.name, out)
+    return text.lane(f"bitcast {text.vector(one.dtype)} {one.name} to {text.vector(out)}", out)
 
 
 def _sigmoid(text: Text, out: str, one: Lane, **_: Any) -> Lane:
@@ -279,7 +334,9 @@ ELEMENTWISE: Mapping[str, Operation] = {
     "rsqrt": _inverse_root,
     "exp": _function("exp"),
     "exp2": _function("exp2"),
+    "expm1": _grown_less_one,
     "log": _function("log"),
+    "log1p": _log_beside_one,
     "sin": _function("sin"),
     "cos": _function("cos"),
     "tan": _function("tan"),
@@ -293,6 +350,7 @@ ELEMENTWISE: Mapping[str, Operation] = {
     "atan2": _function("atan2"),
     "logistic": _sigmoid,
     "integer_pow": _whole_power,
+    "polynomial": _polynomial,
     "square": _square,
     "is_finite": _finite,
     "eq": _compare("oeq", "eq"),
@@ -305,6 +363,10 @@ ELEMENTWISE: Mapping[str, Operation] = {
     "or": _binary(None, "or"),
     "xor": _binary(None, "xor"),
     "not": _not,
+    "shift_left": _shifted("shl"),
+    "shift_right_logical": _shifted("lshr"),
+    "shift_right_arithmetic": _shifted("ashr"),
+    "bitcast_convert_type": _same_bits,
     "select_n": select,
     "clamp": _clamped,
     "convert_element_type": _converted,

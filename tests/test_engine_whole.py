@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from smajax.batch.axes import sampled
-from smajax.batch.engine import chunks
+from smajax.batch.chunks import chunks
 from smajax.batch.run import run_batch
 from smajax.control_presets import CONTROLLERS
 from smajax.effects.library import LIBRARY
@@ -19,8 +19,8 @@ from smajax.parameters import get_parameters, parameters, set_parameters
 from smajax.tune import evaluate
 from smajax.tune.evaluate import STEP, Rig
 from smajax.tune.members import tuned_on
+from tests.test_engine import same_batch
 from tests.test_every_effect import RIGS, _rig
-from tests.test_lanes import same_batch
 
 pytestmark = pytest.mark.slow
 MEMBERS, SAMPLES, DT = 37, 120, 0.05  # members fill no vector and no group of vectors
@@ -39,7 +39,7 @@ def both(rig: str, effects: tuple[str, ...], tolerance: float | None) -> tuple[A
     axes = sampled(MEMBERS, convection_coefficient=(0.7 * middle, 1.3 * middle), seed=3)
     inputs = {channel: jnp.asarray(command)}
     return (
-        run_batch(full, inputs, axes, dt=DT, keep=KEEP, tolerance=tolerance, engine="lanes"),
+        run_batch(full, inputs, axes, dt=DT, keep=KEEP, tolerance=tolerance, engine="native"),
         run_batch(full, inputs, axes, dt=DT, keep=KEEP, tolerance=tolerance, engine="xla"),
     )
 

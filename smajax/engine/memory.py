@@ -6,9 +6,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from smajax.lanes.loop import Loop
-from smajax.lanes.text import Lane, Text, Unsupported
-from smajax.lanes.values import SMALL, Filled, Held, Stored, Value, held, is_known, size_of
+from smajax.engine.loop import Loop
+from smajax.engine.text import Lane, Text, Unsupported
+from smajax.engine.values import SMALL, Filled, Held, Stored, Value, held, is_known, size_of
 
 
 def _element(text: Text, value: Stored, index: str) -> Lane:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from smajax.lanes.phases import NAMES, Chosen, Edge, Item, Kept, Late, Names, Work, Write
+from smajax.engine.phases import NAMES, Chosen, Edge, Item, Kept, Late, Names, Work, Write
 
 NAME = "members"  # of the translated function
 
@@ -27,8 +27,11 @@ TYPES = {
 }
 
 
-class Unsupported(Exception):
+class Unsupported(ValueError):
     """The program holds something that is not translated; says what."""
+
+    def __str__(self) -> str:
+        return f"machine code has no translation for {self.args[0]}"
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""Whether a program is compiled at this moment, by JAX or by `smajax.lanes`: a stage that stands still looks like one that hangs."""
+"""Whether a program is compiled at this moment, by JAX or by `smajax.engine`: a stage that stands still looks like one that hangs."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class _Watch:
     def __init__(self) -> None:
         self.say: Callable[[bool], None] | None = None
         self.timer: threading.Timer | None = None
-        self.own = False  # it is a program of `smajax.lanes`, in which JAX may ask for small ones of its own
+        self.own = False  # it is a program of `smajax.engine`, in which JAX may ask for small ones of its own
 
     def asked(self, event: str, **_: str | int) -> None:
         if event == ASKED:

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from smajax.lanes.text import NAME, Array
-from smajax.lanes.translate import Translated
+from smajax.engine.text import NAME, Array
+from smajax.engine.translate import Translated
 
 ALIGNED = 64  # bytes
 

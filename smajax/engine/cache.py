@@ -1,0 +1,90 @@
+"""Machine code on disk, under a key of the program's own text, so that another process need not compile it again.
+
+Where JAX keeps its compiled programs (`jax_compilation_cache_dir`, which our commands set), and only there. The key is of
+LLVM's text of the program, the versions of what wrote and compiles it, and the processor: an edited comment compiles
+nothing anew, and whatever changes a program changes its key. What is read is machine code and nothing else.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import platform
+from contextlib import suppress
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+import jax
+
+from smajax.core.files import writing
+from smajax.engine.kernel import processor
+
+LARGEST = 2**30  # bytes in the folder: beyond, what was not used longest goes
+HEAD = b"smajax program 2\n"
+PACKAGES = ("smajax", "jax", "jaxlib", "llvmlite", "numpy")
+
+
+@cache
+def versions() -> str:
+    """Of everything that writes or compiles a program."""
+
+    def one(name: str) -> str:
+        try:
+            return f"{name} {version(name)}"
+        except PackageNotFoundError:
+            return f"{name} (none)"
+
+    return ", ".join([f"Python {platform.python_version()}", *map(one, PACKAGES)])
+
+
+def folder() -> Path | None:
+    """Where programs are kept; None where JAX keeps none."""
+    values = jax.config.values
+    place = values["jax_compilation_cache_dir"]
+    if not place or "://" in place or not values["jax_enable_compilation_cache"]:  # a bucket somewhere is JAX's alone
+        return None
+    return Path(place) / "native"
+
+
+def key_of(text: str) -> str:
+    """Of a program by its text."""
+    packages = versions().split(", ", 1)[1]  # the interpreter has no part in it
+    return hashlib.sha256("\n".join([packages, processor(), text]).encode()).hexdigest()
+
+
+def load(key: str) -> bytes | None:
+    """The machine code under a key; None where there is nothing whole."""
+    place = folder()
+    if place is None:
+        return None
+    with suppress(OSError):
+        raw = (place / key).read_bytes()
+        digest, code = raw[len(HEAD) : len(HEAD) + 32], raw[len(HEAD) + 32 :]
+        if not raw.startswith(HEAD) or hashlib.sha256(key.encode() + code).digest() != digest:
+            return None
+        with suppress(OSError):  # a folder that others may read only
+            os.utime(place / key)
+        return code
+    return None
+
+
+def save(key: str, code: bytes) -> None:
+    """Keep machine code; where that cannot be done, it is compiled again the next time."""
+    place = folder()
+    if place is None:
+        return
+    with suppress(OSError):
+        place.mkdir(parents=True, exist_ok=True)
+        with writing(place / key) as file:
+            file.write(HEAD + hashlib.sha256(key.encode() + code).digest() + code)
+        _make_room(place)
+
+
+def _make_room(place: Path) -> None:
+    known = sorted(((one.stat().st_mtime, one.stat().st_size, one) for one in place.iterdir()), reverse=True)
+    total = 0
+    for _, size, path in known:
+        total += size
+        if total > LARGEST:
+            path.unlink(missing_ok=True)

@@ -1,0 +1,167 @@
+"""The one way to a compiled program: a function of one run -> the same of many, by machine code or by XLA.
+
+Under "auto" it is machine code on a processor, and XLA wherever that cannot be had, for whatever reason: one warning then
+says what was in the way. The caller knows nothing of it. The environment variable SMAJAX_ENGINE stands for "auto" where it is set.
+"""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Callable, Hashable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from typing import Any, Literal, TypeVar, cast, get_args
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from smajax.engine import xla
+from smajax.engine.cache import versions
+from smajax.engine.native import Function, NativeProgram, Traced, is_array
+from smajax.engine.text import Unsupported
+
+Engine = Literal["auto", "native", "xla"]
+VARIABLE = "SMAJAX_ENGINE"
+KEPT = 128  # programs that a process remembers
+Made = TypeVar("Made")
+
+
+class EngineWarning(UserWarning):
+    """A program runs by XLA, several times slower, because machine code could not be made of it; says why."""
+
+
+class EngineError(ValueError):
+    """An engine that there is not was asked for."""
+
+
+class Program:
+    """`function(model, own)` of one run, for many: `program(model, own)`."""
+
+    def __init__(self, function: Function, alone: bool, native: NativeProgram | None) -> None:
+        self._function, self._alone, self.native = function, alone, native
+
+    def __call__(self, model: Any, own: dict[str, np.ndarray], threads: int | None = None) -> Any:
+        """What the function gives, arrays of numpy, every leaf with one row a run; `own` are arrays of shape (runs,).
+
+        `threads` of machine code: by default as many as there are cores.
+        """
+        if self.native is None:
+            return xla.evaluated(self._function, model, own, self._alone)
+        return self.native(model, own, threads or available_cores())
+
+    def begin(
+        self,
+        model: Any,
+        own: dict[str, np.ndarray],
+        threads: int,
+        devices: tuple[jax.Device, ...],
+        block: int,
+        room: int,
+    ) -> Callable[[], Any]:
+        """The same beside the caller, who gets the results by calling what this gives.
+
+        `devices`, `block` and `room` (runs that one compilation has room for) are of XLA, `threads` of machine code.
+        """
+        if self.native is None:
+            return xla.begun(self._function, model, own, devices, block, room)
+        pool = ThreadPoolExecutor(1)
+        try:
+            coming = pool.submit(self.native, model, own, threads)
+        except RuntimeError:  # no room for another thread under a cap on memory: done when it is asked for
+            return partial(self.native, model, own, threads)
+        pool.shutdown(wait=False)
+        return coming.result
+
+
+def available_cores() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def engine_of(asked: str = "auto") -> Engine:
+    """The engine that is meant, with SMAJAX_ENGINE for "auto". Raises EngineError for one that there is not."""
+    named = asked
+    for engine, source in ((asked, "engine"), (os.environ.get(VARIABLE) or "auto", VARIABLE)):
+        if engine == "lanes" and source == "engine":
+            warnings.warn('`engine="lanes"` is "native" now; it goes in version 0.2', DeprecationWarning, stacklevel=3)
+            return "native"
+        if engine not in get_args(Engine):
+            raise EngineError(f"{source} is {engine!r}; expected one of {', '.join(get_args(Engine))}.")
+        named = engine if named == "auto" else named
+    return cast(Engine, named)
+
+
+def kind_of(function: Function, model: Any, names: tuple[str, ...]) -> Hashable:
+    """What a traced program depends on: not on the values of the model's arrays."""
+    arrays, static = eqx.partition(model, is_array)
+    leaves, tree = jax.tree.flatten(arrays)
+    settled, settled_tree = jax.tree.flatten(static)
+    kinds = tuple((leaf.shape, str(leaf.dtype), getattr(leaf, "weak_type", False)) for leaf in leaves)
+    # To Python 1, 1.0 and True are one key; to a traced program they are not.
+    told = tuple((type(one), repr(one)) if isinstance(one, bool | int | float | complex) else one for one in settled)
+    return function, tree, settled_tree, told, kinds, names, str(jnp.zeros(()).dtype)
+
+
+def recalled(kept: dict[Hashable, Made], key: Hashable, make: Callable[[], Made]) -> Made:
+    """What was made for a key before, or now; what was not asked for longest makes room."""
+    found = kept.pop(key) if key in kept else make()
+    while len(kept) >= KEPT:
+        kept.pop(next(iter(kept)), None)
+    kept[key] = found
+    return found
+
+
+_programs: dict[Hashable, Program] = {}
+
+
+def program(
+    function: Function,
+    model: Any,
+    names: tuple[str, ...],
+    *,
+    alone: bool = False,
+    engine: Engine = "auto",
+    devices: Sequence[jax.Device] = (),
+) -> Program:
+    """`function(model, own)` compiled for models of this kind; `names` are those of the numbers that a run has of its own.
+
+    `alone`: for one run at a time. `devices`: where XLA would run it; under "auto" anything but a processor is XLA's.
+    Raises, under "native" alone, what stands in the way of machine code: Unsupported for what has no translation,
+    ImportError without llvmlite, and whatever else goes wrong. What the function itself raises is always raised.
+    """
+    meant = engine_of(engine)
+    if meant == "auto" and devices and devices[0].platform != "cpu":
+        meant = "xla"
+    key = (kind_of(function, model, names), alone, meant)
+    return recalled(_programs, key, lambda: _made(function, model, names, alone, meant))
+
+
+def _made(function: Function, model: Any, names: tuple[str, ...], alone: bool, engine: Engine) -> Program:
+    if engine == "xla":
+        return Program(function, alone, None)
+    traced = Traced(function, model, names)  # what goes wrong in here goes wrong by XLA too
+    try:
+        return Program(function, alone, NativeProgram(traced, alone))
+    except Exception as error:
+        if engine == "native":
+            raise
+        warnings.warn(_told(error), EngineWarning, stacklevel=1)  # of one place, so that Python shows each reason once
+        return Program(function, alone, None)
+
+
+def reason(error: BaseException) -> str:
+    """Why there is no machine code, with the operation at which it failed."""
+    named = str(error) if isinstance(error, Unsupported) else f"{type(error).__name__}: {error}"
+    return ", ".join([named, *getattr(error, "__notes__", ())])
+
+
+def _told(error: BaseException) -> str:
+    if isinstance(error, ImportError):
+        return f"machine code needs llvmlite, which cannot be imported ({error}): XLA is used, several times slower."
+    return (
+        f"no machine code for a program, so XLA runs it, several times slower: {reason(error)} ({versions()}). Where the model "
+        "is smajax's own, please report this line with what `smajax doctor --json` says. SMAJAX_ENGINE=xla takes XLA at once."
+    )

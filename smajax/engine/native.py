@@ -1,0 +1,134 @@
+"""A function of one run as machine code: traced by JAX, translated and compiled once for each kind of arguments."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from smajax.core.compiling import compiling
+from smajax.engine import cache
+from smajax.engine.kernel import Kernel, compiled, divides_slowly, has_wide_vectors, vector_bits
+from smajax.engine.translate import VECTORS, Translated, translate
+
+BITS = 60  # of the number by which runs are put in order
+MOST_SORTED = 6  # numbers of a run that are looked at for that
+Function = Callable[[Any, Any], Any]
+
+
+class Traced:
+    """What JAX makes of `function(model, own)` for one run: the program, and how its results are put together."""
+
+    def __init__(self, function: Function, model: Any, names: tuple[str, ...]) -> None:
+        arrays, static = eqx.partition(model, is_array)
+        leaves, tree = jax.tree.flatten(arrays)
+        shape: list[Any] = []
+
+        def run(*flat: jax.Array) -> list[jax.Array]:
+            given = [_like(leaf, one) for leaf, one in zip(leaves, flat, strict=False)]
+            whole = eqx.combine(jax.tree.unflatten(tree, given), static)
+            found = function(whole, dict(zip(names, flat[len(leaves) :], strict=True)))
+            results, out = jax.tree.flatten(found)
+            shape[:] = [out]
+            return results
+
+        none = jnp.zeros(())
+        self.program = jax.make_jaxpr(run)(*map(_plain, leaves), *(none for _ in names))
+        self.names, self.shared, self.tree = names, len(leaves), shape[0]
+        self.number = np.dtype(none.dtype)
+
+
+class NativeProgram:
+    """`function(model, own)` of one run as a function of whole arrays, for models with arrays of the same shapes."""
+
+    def __init__(self, traced: Traced, alone: bool) -> None:
+        """`alone`: for one run at a time. Raises Unsupported for what has no translation, and whatever LLVM raises."""
+        program = traced.program
+        kinds = [str(aval.dtype) for aval in program.in_avals]
+        dtypes = {*kinds, *(str(aval.dtype) for aval in program.out_avals)}
+        own = [False] * traced.shared + [True] * len(traced.names)
+        vectors = 1 if alone else VECTORS
+        translated = translate(program, own, lanes_of(dtypes), divides_slowly(), vectors, mask_of(dtypes))
+        self._kernel = _kernel(translated)
+        self._tree, self._names, self._dtype = traced.tree, traced.names, traced.number
+        self._shared = [np.dtype(kind) for kind in kinds[: traced.shared]]
+
+    @property
+    def scratch(self) -> int:
+        """Memory that a thread works in, bytes."""
+        return self._kernel.scratch
+
+    def __call__(self, model: Any, own: dict[str, np.ndarray], threads: int) -> Any:
+        """What the function gives, every leaf with one row a run; `own` are arrays of shape (runs,)."""
+        leaves = jax.tree.leaves(eqx.filter(model, is_array))
+        shared = [
+            np.ascontiguousarray(_plain(leaf), dtype=dtype) for leaf, dtype in zip(leaves, self._shared, strict=True)
+        ]
+        order = alike([own[name] for name in self._names])
+        values = [np.ascontiguousarray(own[name][order], dtype=self._dtype) for name in self._names]
+        back = np.argsort(order)
+        return jax.tree.unflatten(self._tree, [one[back] for one in self._kernel(shared, values, threads)])
+
+
+def _kernel(translated: Translated) -> Kernel:
+    """Loaded from the disk, or compiled and kept there."""
+    key = cache.key_of(translated.text)
+    code = cache.load(key)
+    if code is None:
+        with compiling():
+            code = compiled(translated)
+        cache.save(key, code)
+    return Kernel(code, translated.lanes, translated.results, translated.scratch)
+
+
+def alike(series: Sequence[np.ndarray]) -> np.ndarray:
+    """An order of runs in which neighbours have nearly the same numbers, as indices.
+
+    Side by side they take the same ways through the program, and none waits for another. The bits of the ranks by each
+    number, interleaved (Morton's order).
+    """
+    count = len(series[0])
+    varied = [one for one in series if one.min() < one.max()][:MOST_SORTED]
+    if not varied:
+        return np.arange(count)
+    bits = min(BITS // len(varied), max(1, (count - 1).bit_length()))
+    code = np.zeros(count, np.int64)
+    for place, one in enumerate(varied):
+        _, rank = np.unique(one, return_inverse=True)
+        rank = rank * (1 << bits) // (int(rank.max()) + 1)
+        for bit in range(bits):
+            code |= ((rank >> bit) & 1) << (bit * len(varied) + place)
+    return np.argsort(code, kind="stable")
+
+
+def is_array(leaf: Any) -> bool:
+    """Whether a leaf of a model is given to the compiled program, and not part of it."""
+    return isinstance(leaf, jax.Array | np.ndarray)
+
+
+def _is_key(leaf: Any) -> bool:
+    return jnp.issubdtype(leaf.dtype, jax.dtypes.prng_key)
+
+
+def _plain(leaf: Any) -> Any:
+    """The numbers of a random key; anything else as it is."""
+    return jax.random.key_data(leaf) if _is_key(leaf) else leaf
+
+
+def _like(leaf: Any, plain: Any) -> Any:
+    return jax.random.wrap_key_data(plain) if _is_key(leaf) else plain
+
+
+def lanes_of(dtypes: set[str]) -> int:
+    """Runs side by side for a program of these kinds of numbers, of which the floating ones fill the vectors."""
+    size = max((np.dtype(dtype).itemsize for dtype in dtypes if dtype.startswith("float")), default=8)
+    return vector_bits() // (8 * size)
+
+
+def mask_of(dtypes: set[str]) -> str:
+    """LLVM's kind of a truth value in memory: what the processor compares to."""
+    return "i1" if has_wide_vectors() else f"i{vector_bits() // lanes_of(dtypes)}"
