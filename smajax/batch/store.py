@@ -91,7 +91,8 @@ class Store:
 
     @property
     def chunk(self) -> int:
-        return int(self.group.attrs[CHUNK])  # type: ignore[arg-type]
+        chunk: Any = self.group.attrs[CHUNK]  # whose type hangs on the version of zarr
+        return int(chunk)
 
     @property
     def digest(self) -> str:
