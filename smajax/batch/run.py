@@ -340,8 +340,8 @@ def opened(folder: Path | str) -> xr.Dataset:
     """The batch in a folder, finished or not; what is not there yet is NaN. Values are read when they are asked for."""
     store = Store.opened(Path(folder))
     group, axes = store.group, store.axes
-    attributes = dict(group.attrs)
-    time = np.arange(int(attributes["samples"])) * float(attributes["time step"])  # type: ignore[arg-type]
+    attributes: dict[str, Any] = dict(group.attrs)
+    time = np.arange(int(attributes["samples"])) * float(attributes["time step"])
     lazy = xr.open_zarr(Path(folder), consolidated=False, chunks=None, mask_and_scale=False)
     if len(axes.dimensions) == 1:
         one = axes.dimensions[0]
@@ -355,7 +355,7 @@ def opened(folder: Path | str) -> xr.Dataset:
         found.attrs = attributes
         return found.set_coords(["status", "first_bad_time"])
     units = store.axis_units | {name: str(group[name].attrs["units"]) for name in store.names()}
-    return labelled({name: np.asarray(group[name][:]) for name in store.names()}, axes, units, time, attributes)  # type: ignore[index]
+    return labelled({name: np.asarray(group[name][:]) for name in store.names()}, axes, units, time, attributes)
 
 
 def good(found: xr.Dataset) -> xr.Dataset:
