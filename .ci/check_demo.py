@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-DEMO = Path(__file__).parents[1] / "smajax" / "demo"
+DEMO = Path(__file__).parents[1] / "smajax" / "data" / "demo"
 
 # The runs of `latent` come from a wire with latent heat, which the base model lacks; those of `complete` lack nothing.
 EXPECTED: dict[str, tuple[str, list[str]]] = {"latent": ("explained", ["latent_heat"]), "complete": ("adequate", [])}

@@ -15,16 +15,16 @@ import jax
 
 jax.config.update("jax_enable_x64", True)
 
-from smajax.catalogue import CATALOGUE  # noqa: E402
-from smajax.close_loop import close_loop  # noqa: E402
-from smajax.experiment.load import load_experiment  # noqa: E402
+from smajax.attribution.close_loop import close_loop  # noqa: E402
+from smajax.data.experiment.load import load_experiment  # noqa: E402
+from smajax.data.model_catalogue import CATALOGUE  # noqa: E402
 from smajax.report.write import write_report  # noqa: E402
 
 # %% [markdown]
 # The experiment: what is known, what is to be found within which bounds, and which runs are held out.
 
 # %%
-with resources.as_file(resources.files("smajax") / "demo" / "latent") as folder:
+with resources.as_file(resources.files("smajax") / "data" / "demo" / "latent") as folder:
     experiment = load_experiment(folder / "experiment.toml", CATALOGUE)
 for unknown in experiment.unknowns:
     print(f"{unknown.name:25s} {unknown.low:10.4g} .. {unknown.high:10.4g} {unknown.unit}")

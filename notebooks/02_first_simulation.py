@@ -11,9 +11,9 @@ jax.config.update("jax_enable_x64", True)
 import matplotlib.pyplot as plt  # noqa: E402
 import numpy as np  # noqa: E402
 
-from smajax.compiled import simulate_compiled  # noqa: E402
-from smajax.parameters import parameters, set_parameters  # noqa: E402
-from smajax.presets import DRIVES, LOADS, WIRES, build  # noqa: E402
+from smajax.core.parameters import parameters, set_parameters  # noqa: E402
+from smajax.model.presets import DRIVES, LOADS, WIRES, build  # noqa: E402
+from smajax.simulation.compiled import simulate_compiled  # noqa: E402
 
 print("wires: ", ", ".join(WIRES))
 print("loads: ", ", ".join(LOADS))

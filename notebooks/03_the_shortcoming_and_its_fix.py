@@ -14,11 +14,11 @@ jax.config.update("jax_enable_x64", True)
 import matplotlib.pyplot as plt  # noqa: E402
 import numpy as np  # noqa: E402
 
-from smajax.closed_loop import simulate_closed_loop  # noqa: E402
-from smajax.control_presets import stress_sliding  # noqa: E402
-from smajax.presets import build  # noqa: E402
-from smajax.reference import clock, constant  # noqa: E402
-from smajax.wire.laws import under_law  # noqa: E402
+from smajax.control.closed_loop import simulate_closed_loop  # noqa: E402
+from smajax.control.presets import stress_sliding  # noqa: E402
+from smajax.control.reference import clock, constant  # noqa: E402
+from smajax.model.presets import build  # noqa: E402
+from smajax.model.wire.laws import under_law  # noqa: E402
 
 dt = 0.01
 wanted = constant(clock(20.0, dt), np.radians(85.0))

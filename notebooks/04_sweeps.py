@@ -15,10 +15,10 @@ jax.config.update("jax_enable_x64", True)
 import matplotlib.pyplot as plt  # noqa: E402
 import numpy as np  # noqa: E402
 
-from smajax.batch.axes import grid, sampled  # noqa: E402
-from smajax.batch.run import good, run_batch, told_of  # noqa: E402
-from smajax.measure import Largest, Last  # noqa: E402
-from smajax.presets import build  # noqa: E402
+from smajax.model.presets import build  # noqa: E402
+from smajax.simulation.batch.axes import grid, sampled  # noqa: E402
+from smajax.simulation.batch.run_batch import good, run_batch, told_of  # noqa: E402
+from smajax.simulation.measures import Largest, Last  # noqa: E402
 
 members = 64 if os.environ.get("SMAJAX_FAST") else 4096
 
@@ -55,7 +55,7 @@ axes.boxplot([angles.sel(voltage=volts).dropna("sample").values for volts in vol
 axes.set(xlabel="voltage (V)", ylabel="angle after 20 s (degrees)")
 
 # %% [markdown]
-# With `out` the results are streamed to a store, a chunk at a time, and the same call goes on where it was stopped. `smajax.batch.run.opened` reads it again, with its coordinates.
+# With `out` the results are streamed to a store, a chunk at a time, and the same call goes on where it was stopped. `smajax.simulation.batch.run_batch.opened` reads it again, with its coordinates.
 
 # %%
 store = Path(tempfile.mkdtemp()) / "stored"

@@ -14,9 +14,9 @@ jax.config.update("jax_enable_x64", True)
 
 import matplotlib.pyplot as plt  # noqa: E402
 
-from smajax.catalogue import CATALOGUE  # noqa: E402
-from smajax.experiment.load import load_experiment  # noqa: E402
-from smajax.identify import identify  # noqa: E402
+from smajax.data.experiment.load import load_experiment  # noqa: E402
+from smajax.data.model_catalogue import CATALOGUE  # noqa: E402
+from smajax.fit.identify import identify  # noqa: E402
 
 studies = next(one / "studies" for one in (Path.cwd(), *Path.cwd().parents) if (one / "studies").is_dir())
 experiment = load_experiment(studies / "flexinol_isobaric" / "identify.toml", CATALOGUE)

@@ -18,9 +18,9 @@ jax.config.update("jax_enable_x64", True)
 import matplotlib.pyplot as plt  # noqa: E402
 import numpy as np  # noqa: E402
 
-from smajax.figures.rigs import arm  # noqa: E402
-from smajax.tune.folder import tune_into  # noqa: E402
-from smajax.tune.settings import TuneSettings  # noqa: E402
+from smajax.control.tune.settings import TuneSettings  # noqa: E402
+from smajax.report.tune_folder import tune_into  # noqa: E402
+from studies.source.rigs import arm  # noqa: E402
 
 fast = bool(os.environ.get("SMAJAX_FAST"))
 settings = TuneSettings(

@@ -21,11 +21,11 @@ jax.config.update("jax_enable_x64", True)
 import matplotlib.pyplot as plt  # noqa: E402
 import numpy as np  # noqa: E402
 
-from smajax.catalogue import CATALOGUE  # noqa: E402
-from smajax.compiled import simulate_compiled  # noqa: E402
-from smajax.experiment.load import load_experiment  # noqa: E402
-from smajax.extended import base_model, extended  # noqa: E402
-from smajax.parameters import set_parameters  # noqa: E402
+from smajax.core.parameters import set_parameters  # noqa: E402
+from smajax.data.experiment.load import load_experiment  # noqa: E402
+from smajax.data.model_catalogue import CATALOGUE  # noqa: E402
+from smajax.model.extended import base_model, extended  # noqa: E402
+from smajax.simulation.compiled import simulate_compiled  # noqa: E402
 
 studies = next(one / "studies" for one in (Path.cwd(), *Path.cwd().parents) if (one / "studies").is_dir())
 bench = studies / "bias_spring_bench"
@@ -35,7 +35,7 @@ for run in experiment.runs:
 
 # %%
 if os.environ.get("SMAJAX_WHOLE"):
-    from smajax.close_loop import close_loop
+    from smajax.attribution.close_loop import close_loop
     from smajax.report.write import write_report
 
     write_report(close_loop(experiment, memory=Path("report/fits")), Path("report"))

@@ -14,14 +14,14 @@ import jax.numpy as jnp  # noqa: E402
 import matplotlib.pyplot as plt  # noqa: E402
 import numpy as np  # noqa: E402
 
-from smajax.compiled import simulate_compiled  # noqa: E402
-from smajax.effects.base import AbstractEffect  # noqa: E402
-from smajax.load.base import AbstractMovingLoad  # noqa: E402
-from smajax.parameters import get_parameters, parameter, parameters, set_parameters  # noqa: E402
-from smajax.presets import flexinol_table_3_2, flexinol_voltage  # noqa: E402
-from smajax.system import System  # noqa: E402
-from smajax.types import Scalar  # noqa: E402
-from smajax.wire.constitutive import IntegratedForm  # noqa: E402
+from smajax.core.parameters import get_parameters, parameter, parameters, set_parameters  # noqa: E402
+from smajax.model.effects.base import AbstractEffect  # noqa: E402
+from smajax.model.load.base import AbstractMovingLoad  # noqa: E402
+from smajax.model.presets import flexinol_table_3_2, flexinol_voltage  # noqa: E402
+from smajax.model.system import System  # noqa: E402
+from smajax.model.types import Scalar  # noqa: E402
+from smajax.model.wire.constitutive import IntegratedForm  # noqa: E402
+from smajax.simulation.compiled import simulate_compiled  # noqa: E402
 
 # %% [markdown]
 # The effect: a fan that comes on slowly, so that the air around the wire gets colder in time.
@@ -130,4 +130,4 @@ axes.set(xlabel="time (s)", ylabel="position (mm)")
 axes.legend()
 
 # %% [markdown]
-# To let `smajax close-loop` look for it in measured runs: a file in `smajax/effects/`, one line in `smajax/effects/library.py`.
+# To let `smajax close-loop` look for it in measured runs: a file in `smajax/model/effects/`, one line in `smajax/model/effects/library.py`.

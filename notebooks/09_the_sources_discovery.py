@@ -20,9 +20,9 @@ jax.config.update("jax_enable_x64", True)
 import matplotlib.pyplot as plt  # noqa: E402
 import numpy as np  # noqa: E402
 
-from smajax.catalogue import CATALOGUE  # noqa: E402
-from smajax.close_loop import close_loop  # noqa: E402
-from smajax.experiment.load import load_experiment  # noqa: E402
+from smajax.attribution.close_loop import close_loop  # noqa: E402
+from smajax.data.experiment.load import load_experiment  # noqa: E402
+from smajax.data.model_catalogue import CATALOGUE  # noqa: E402
 from studies.stress_rate.run import NET, write  # noqa: E402
 
 folder = Path(tempfile.mkdtemp())

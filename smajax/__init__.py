@@ -11,107 +11,112 @@ from one process to the next; `jax.config.update("jax_enable_x64", True)` asks f
 
 from __future__ import annotations
 
-import sys
 from importlib import import_module
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from smajax import control_presets as control_presets
-    from smajax import effects as effects
-    from smajax import measure as measure
-    from smajax import presets as presets
-    from smajax import reference as reference
-    from smajax import units as units
-    from smajax.batch.axes import grid as grid
-    from smajax.batch.axes import sampled as sampled
-    from smajax.batch.axes import zipped as zipped
-    from smajax.batch.run import good as good
-    from smajax.batch.run import run_batch as run_batch
-    from smajax.batch.run import told_of as told_of
-    from smajax.close_loop import close_loop as close_loop
-    from smajax.closed_loop import simulate_closed_loop as simulate_closed_loop
-    from smajax.compiled import simulate_compiled as simulate_compiled
-    from smajax.compose import compose as compose
-    from smajax.control_presets import CONTROLLERS as CONTROLLERS
-    from smajax.controller.base import AbstractController as AbstractController
-    from smajax.dataset import simulate_dataset as simulate_dataset
-    from smajax.effects.base import AbstractEffect as AbstractEffect
-    from smajax.effects.library import LIBRARY as LIBRARY
-    from smajax.extended import extended as extended
-    from smajax.identify import identify as identify
-    from smajax.load.base import AbstractMovingLoad as AbstractMovingLoad
-    from smajax.loop import Loop as Loop
-    from smajax.loop import simulate_loop_dataset as simulate_loop_dataset
-    from smajax.measured_state import Sensor as Sensor
-    from smajax.merit import merit as merit
-    from smajax.open_experiment import open_experiment as open_experiment
-    from smajax.parameters import check_bounds as check_bounds
-    from smajax.parameters import get_parameters as get_parameters
-    from smajax.parameters import parameter as parameter
-    from smajax.parameters import parameter_values as parameter_values
-    from smajax.parameters import set_parameters as set_parameters
-    from smajax.plot import plot as plot
-    from smajax.presets import DRIVES as DRIVES
-    from smajax.presets import LOADS as LOADS
-    from smajax.presets import WIRES as WIRES
-    from smajax.presets import build as build
+    from smajax.attribution.close_loop import close_loop as close_loop
+    from smajax.control import presets as _control_presets
+    from smajax.control import reference as reference
+    from smajax.control.closed_loop import simulate_closed_loop as simulate_closed_loop
+    from smajax.control.compose import compose as compose
+    from smajax.control.controllers.base import AbstractController as AbstractController
+    from smajax.control.figures_of_merit import merit as merit
+    from smajax.control.loop_dataset import Loop as Loop
+    from smajax.control.loop_dataset import simulate_loop_dataset as simulate_loop_dataset
+    from smajax.control.measured_state import Sensor as Sensor
+    from smajax.control.presets import CONTROLLERS as CONTROLLERS
+    from smajax.core import units as units
+    from smajax.core.parameters import check_bounds as check_bounds
+    from smajax.core.parameters import get_parameters as get_parameters
+    from smajax.core.parameters import parameter as parameter
+    from smajax.core.parameters import parameter_values as parameter_values
+    from smajax.core.parameters import set_parameters as set_parameters
+    from smajax.core.runtime import prepare as prepare
+    from smajax.data.open_experiment import open_experiment as open_experiment
+    from smajax.fit.identify import identify as identify
+    from smajax.model import effects as effects
+    from smajax.model import presets as presets
+    from smajax.model.effects.base import AbstractEffect as AbstractEffect
+    from smajax.model.effects.library import LIBRARY as LIBRARY
+    from smajax.model.extended import extended as extended
+    from smajax.model.load.base import AbstractMovingLoad as AbstractMovingLoad
+    from smajax.model.presets import DRIVES as DRIVES
+    from smajax.model.presets import LOADS as LOADS
+    from smajax.model.presets import WIRES as WIRES
+    from smajax.model.presets import build as build
+    from smajax.model.system import System as System
+    from smajax.model.wire.laws import under_law as under_law
     from smajax.report.identify_page import write_identified as write_identified
+    from smajax.report.plot import plot as plot
     from smajax.report.write import write_report as write_report
-    from smajax.runtime import prepare as prepare
-    from smajax.simulate import simulate as simulate
-    from smajax.system import System as System
-    from smajax.wire.laws import under_law as under_law
+    from smajax.simulation import measures as _measures
+    from smajax.simulation.batch.axes import grid as grid
+    from smajax.simulation.batch.axes import sampled as sampled
+    from smajax.simulation.batch.axes import zipped as zipped
+    from smajax.simulation.batch.run_batch import good as good
+    from smajax.simulation.batch.run_batch import run_batch as run_batch
+    from smajax.simulation.batch.run_batch import told_of as told_of
+    from smajax.simulation.compiled import simulate_compiled as simulate_compiled
+    from smajax.simulation.dataset import simulate_dataset as simulate_dataset
+    from smajax.simulation.simulate import simulate as simulate
 
-    EFFECTS, load_experiment = LIBRARY, open_experiment
+    EFFECTS, load_experiment, control_presets, measure = LIBRARY, open_experiment, _control_presets, _measures
     __version__: str
 
 # Name -> the module that has it, and its name there.
 NAMES = {
-    "AbstractController": ("smajax.controller.base", "AbstractController"),
-    "AbstractEffect": ("smajax.effects.base", "AbstractEffect"),
-    "AbstractMovingLoad": ("smajax.load.base", "AbstractMovingLoad"),
-    "CONTROLLERS": ("smajax.control_presets", "CONTROLLERS"),
-    "DRIVES": ("smajax.presets", "DRIVES"),
-    "EFFECTS": ("smajax.effects.library", "LIBRARY"),
-    "LOADS": ("smajax.presets", "LOADS"),
-    "Loop": ("smajax.loop", "Loop"),
-    "Sensor": ("smajax.measured_state", "Sensor"),
-    "System": ("smajax.system", "System"),
-    "WIRES": ("smajax.presets", "WIRES"),
-    "build": ("smajax.presets", "build"),
-    "check_bounds": ("smajax.parameters", "check_bounds"),
-    "close_loop": ("smajax.close_loop", "close_loop"),
-    "compose": ("smajax.compose", "compose"),
-    "extended": ("smajax.extended", "extended"),
-    "get_parameters": ("smajax.parameters", "get_parameters"),
-    "good": ("smajax.batch.run", "good"),
-    "grid": ("smajax.batch.axes", "grid"),
-    "identify": ("smajax.identify", "identify"),
-    "load_experiment": ("smajax.open_experiment", "open_experiment"),
-    "merit": ("smajax.merit", "merit"),
-    "parameter": ("smajax.parameters", "parameter"),
-    "parameter_values": ("smajax.parameters", "parameter_values"),
-    "plot": ("smajax.plot", "plot"),
-    "prepare": ("smajax.runtime", "prepare"),
-    "run_batch": ("smajax.batch.run", "run_batch"),
-    "sampled": ("smajax.batch.axes", "sampled"),
-    "set_parameters": ("smajax.parameters", "set_parameters"),
-    "simulate": ("smajax.simulate", "simulate"),
-    "simulate_closed_loop": ("smajax.closed_loop", "simulate_closed_loop"),
-    "simulate_compiled": ("smajax.compiled", "simulate_compiled"),
-    "simulate_dataset": ("smajax.dataset", "simulate_dataset"),
-    "simulate_loop_dataset": ("smajax.loop", "simulate_loop_dataset"),
-    "told_of": ("smajax.batch.run", "told_of"),
-    "under_law": ("smajax.wire.laws", "under_law"),
+    "AbstractController": ("smajax.control.controllers.base", "AbstractController"),
+    "AbstractEffect": ("smajax.model.effects.base", "AbstractEffect"),
+    "AbstractMovingLoad": ("smajax.model.load.base", "AbstractMovingLoad"),
+    "CONTROLLERS": ("smajax.control.presets", "CONTROLLERS"),
+    "DRIVES": ("smajax.model.presets", "DRIVES"),
+    "EFFECTS": ("smajax.model.effects.library", "LIBRARY"),
+    "LOADS": ("smajax.model.presets", "LOADS"),
+    "Loop": ("smajax.control.loop_dataset", "Loop"),
+    "Sensor": ("smajax.control.measured_state", "Sensor"),
+    "System": ("smajax.model.system", "System"),
+    "WIRES": ("smajax.model.presets", "WIRES"),
+    "build": ("smajax.model.presets", "build"),
+    "check_bounds": ("smajax.core.parameters", "check_bounds"),
+    "close_loop": ("smajax.attribution.close_loop", "close_loop"),
+    "compose": ("smajax.control.compose", "compose"),
+    "extended": ("smajax.model.extended", "extended"),
+    "get_parameters": ("smajax.core.parameters", "get_parameters"),
+    "good": ("smajax.simulation.batch.run_batch", "good"),
+    "grid": ("smajax.simulation.batch.axes", "grid"),
+    "identify": ("smajax.fit.identify", "identify"),
+    "load_experiment": ("smajax.data.open_experiment", "open_experiment"),
+    "merit": ("smajax.control.figures_of_merit", "merit"),
+    "parameter": ("smajax.core.parameters", "parameter"),
+    "parameter_values": ("smajax.core.parameters", "parameter_values"),
+    "plot": ("smajax.report.plot", "plot"),
+    "prepare": ("smajax.core.runtime", "prepare"),
+    "run_batch": ("smajax.simulation.batch.run_batch", "run_batch"),
+    "sampled": ("smajax.simulation.batch.axes", "sampled"),
+    "set_parameters": ("smajax.core.parameters", "set_parameters"),
+    "simulate": ("smajax.simulation.simulate", "simulate"),
+    "simulate_closed_loop": ("smajax.control.closed_loop", "simulate_closed_loop"),
+    "simulate_compiled": ("smajax.simulation.compiled", "simulate_compiled"),
+    "simulate_dataset": ("smajax.simulation.dataset", "simulate_dataset"),
+    "simulate_loop_dataset": ("smajax.control.loop_dataset", "simulate_loop_dataset"),
+    "told_of": ("smajax.simulation.batch.run_batch", "told_of"),
+    "under_law": ("smajax.model.wire.laws", "under_law"),
     "write_identified": ("smajax.report.identify_page", "write_identified"),
     "write_report": ("smajax.report.write", "write_report"),
-    "zipped": ("smajax.batch.axes", "zipped"),
+    "zipped": ("smajax.simulation.batch.axes", "zipped"),
 }
 # A public name that was renamed -> (the new one, the version that will not have the old one): it works and warns till then.
 RENAMED: dict[str, tuple[str, str]] = {}
 # Modules that are asked for by their own name.
-MODULES = ("control_presets", "effects", "measure", "presets", "reference", "units")
+MODULES = {
+    "control_presets": "smajax.control.presets",
+    "effects": "smajax.model.effects",
+    "measure": "smajax.simulation.measures",
+    "presets": "smajax.model.presets",
+    "reference": "smajax.control.reference",
+    "units": "smajax.core.units",
+}
 
 
 def _found(name: str) -> Any:
@@ -126,7 +131,7 @@ def __getattr__(name: str) -> Any:
 
         return version("smajax")
     if name in MODULES:
-        return import_module(f"smajax.{name}")
+        return import_module(MODULES[name])
     if name in RENAMED:
         import warnings
 
@@ -143,18 +148,3 @@ def __getattr__(name: str) -> Any:
 def __dir__() -> list[str]:
     own = (name for name in globals() if name.startswith("__"))
     return sorted({*own, *NAMES, *MODULES, "__version__"})
-
-
-class _Package(ModuleType):
-    """The package, in which a function goes before the module of its name.
-
-    Importing a module puts it into its package under its own name: without this `smajax.simulate` would be the function
-    or the module, as it happens what was imported before. `from smajax.simulate import ...` finds the module as ever.
-    """
-
-    def __setattr__(self, name: str, value: Any) -> None:
-        if not (isinstance(value, ModuleType) and name in NAMES):
-            super().__setattr__(name, value)
-
-
-sys.modules[__name__].__class__ = _Package

@@ -1,5 +1,5 @@
 """`python -m smajax` is `smajax`."""
 
-from smajax.cli import main
+from smajax.cli.main import main
 
 main()

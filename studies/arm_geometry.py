@@ -17,11 +17,11 @@ import jax.numpy as jnp
 import numpy as np
 from matplotlib.figure import Figure
 
-from smajax.figures.drawing import BLUE, GREY, keyed, named, panels
-from smajax.parameters import set_parameters
-from smajax.presets import build
-from smajax.runtime import prepare
-from smajax.simulate import simulate
+from smajax.core.parameters import set_parameters
+from smajax.core.runtime import prepare
+from smajax.model.presets import build
+from smajax.report.drawing import BLUE, GREY, keyed, named, panels
+from smajax.simulation.simulate import simulate
 
 PICTURE = Path(__file__).parent / "arm_geometry.png"
 VOLTS = (7.0, 7.2, 7.3, 8.0)

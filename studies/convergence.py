@@ -17,13 +17,13 @@ import jax.numpy as jnp
 import numpy as np
 from matplotlib.figure import Figure
 
-from smajax.closed_loop import simulate_closed_loop
-from smajax.control_presets import stress_sliding
-from smajax.figures.drawing import GREY, keyed, named, panels
-from smajax.presets import build
-from smajax.runtime import prepare
-from smajax.simulate import DEFAULT_STEP, simulate
-from smajax.system import initial_state
+from smajax.control.closed_loop import simulate_closed_loop
+from smajax.control.presets import stress_sliding
+from smajax.core.runtime import prepare
+from smajax.model.presets import build
+from smajax.model.system import initial_state
+from smajax.report.drawing import GREY, keyed, named, panels
+from smajax.simulation.simulate import DEFAULT_STEP, simulate
 from studies.reference.sliding import sliding_controller
 from studies.reference.wire_parameters import ArmParameters, DeadWeightParameters
 from studies.reference.wire_reference import simulate_arm, simulate_dead_weight

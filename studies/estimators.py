@@ -21,14 +21,14 @@ import jax.numpy as jnp
 import numpy as np
 from matplotlib.figure import Figure
 
-from smajax.control_presets import model_filter, printed_filter
-from smajax.estimator.printed_filter import PastCarried, PastDropped
-from smajax.estimator.run import estimate
-from smajax.estimator.unscented import Unscented
-from smajax.figures.drawing import BLUE, GREEN, GREY, RED, keyed, named, panels
-from smajax.figures.rigs import arm, recorded, simulated
-from smajax.parameters import get_parameters, set_parameters
-from smajax.system import System
+from smajax.control.estimators.printed_filter import PastCarried, PastDropped
+from smajax.control.estimators.run import estimate
+from smajax.control.estimators.unscented import Unscented
+from smajax.control.presets import model_filter, printed_filter
+from smajax.core.parameters import get_parameters, set_parameters
+from smajax.model.system import System
+from smajax.report.drawing import BLUE, GREEN, GREY, RED, keyed, named, panels
+from studies.source.rigs import arm, recorded, simulated
 
 PICTURE = Path(__file__).parent / "estimators.png"
 PERIOD, STEP, SECONDS, NOISE = 0.01, 0.005, 5.0, 1e-3

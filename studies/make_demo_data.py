@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from studies.reference.wire_reference import DeadWeightParameters, simulate_dead_weight
 
-FOLDER = Path(__file__).parents[1] / "smajax" / "demo"
+FOLDER = Path(__file__).parents[1] / "smajax" / "data" / "demo"
 STEP = 0.1  # s, sampling and amplifier update
 LENGTH = 60.0  # s
 NOISE = 1e-4  # m

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from smajax.control_presets import CONTROLLERS, model_filter, printed_filter
-from smajax.figures.rigs import arm
-from smajax.origins import ORIGINS
-from smajax.parameters import get_parameters, parameters
-from smajax.presets import DRIVES, LOADS, WIRES
-from smajax.report.display import digits
-from smajax.runtime import prepare
-from smajax.wire.laws import LAWS, detwinning
+from smajax.control.presets import CONTROLLERS, model_filter, printed_filter
+from smajax.core.display_units import digits
+from smajax.core.parameters import get_parameters, parameters
+from smajax.core.runtime import prepare
+from smajax.model.preset_sources import ORIGINS
+from smajax.model.presets import DRIVES, LOADS, WIRES
+from smajax.model.wire.laws import LAWS, detwinning
+from studies.source.rigs import arm
 
 BELIEVED = ("arm", "believed", "system")  # fields that hold a plant
 PAGE = Path(__file__).parent / "parameters.md"

@@ -8,12 +8,12 @@ from pathlib import Path
 
 from rich.console import Console
 
-from smajax.catalogue import CATALOGUE
-from smajax.close_loop import close_loop
-from smajax.experiment.load import load_experiment
-from smajax.progress import shown
+from smajax.attribution.close_loop import close_loop
+from smajax.cli.progress_display import shown
+from smajax.core.runtime import prepare
+from smajax.data.experiment.load import load_experiment
+from smajax.data.model_catalogue import CATALOGUE
 from smajax.report.pictures import run_over_time
-from smajax.runtime import prepare
 
 PICTURE = Path(__file__).parents[1] / "docs" / "loop.png"
 RUN = "mass_change"  # held out
@@ -21,7 +21,7 @@ RUN = "mass_change"  # held out
 
 def main() -> None:
     """Closes the loop on the demo's wire with a latent heat, and draws a run that no fit saw."""
-    with resources.as_file(resources.files("smajax") / "demo" / "latent") as folder:
+    with resources.as_file(resources.files("smajax") / "data" / "demo" / "latent") as folder:
         experiment = load_experiment(folder / "experiment.toml", CATALOGUE)
     with tempfile.TemporaryDirectory() as kept, shown(Console(stderr=True)) as progress:
         findings = close_loop(experiment, memory=Path(kept), progress=progress)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import smajax
-from smajax.effects.library import EQUATIONS, LIBRARY, of_others
+from smajax.model.effects.library import EQUATIONS, LIBRARY, of_others
 
 FOLDER = Path(__file__).parents[1] / "docs" / "reference"
 NAMES = "names.md"
@@ -130,7 +130,7 @@ def effects() -> str:
         effect.__module__ for equation in EQUATIONS for effect in own.values() if effect.equation == equation
     )
     lines += ["", "## Their classes"]
-    for module in ("smajax.effects.base", "smajax.effects.library", "smajax.extended", *modules):
+    for module in ("smajax.model.effects.base", "smajax.model.effects.library", "smajax.model.extended", *modules):
         lines += ["", f"::: {module}"]
     return "\n".join(lines) + "\n"
 

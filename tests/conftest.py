@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from smajax.runtime import prepare
-from tests.in_browser import FLAGS, NONE, chromium
+from smajax.core.runtime import prepare
+from tests.helpers.in_browser import FLAGS, NONE, chromium
 
 prepare()
 

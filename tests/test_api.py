@@ -27,7 +27,7 @@ def test_every_name_is_there_and_known_to_a_checker() -> None:
         assert f" as {name}\n" in text or name in ("EFFECTS", "load_experiment"), name
     assert not {"sys", "Any", "NAMES", "annotations"} & set(dir(sma))  # completion shows what a user needs
     assert "arm" in sma.presets.LOADS
-    assert sma.EFFECTS["latent_heat"].__module__ == "smajax.effects.latent_heat"
+    assert sma.EFFECTS["latent_heat"].__module__ == "smajax.model.effects.latent_heat"
     with pytest.raises(AttributeError, match="no attribute 'simulat'; it has"):
         sma.simulat  # noqa: B018
 
@@ -42,10 +42,14 @@ def test_a_renamed_name_works_and_warns(monkeypatch: pytest.MonkeyPatch) -> None
 
 
 @pytest.mark.parametrize(
-    "first", ["import smajax.simulate, smajax.identify;", "from smajax.close_loop import close_loop;"]
+    "first",
+    [
+        "import smajax.simulation.simulate, smajax.fit.identify;",
+        "from smajax.attribution.close_loop import close_loop;",
+    ],
 )
 def test_a_function_goes_before_the_module_of_its_name(first: str) -> None:
-    code = f"{first}import smajax as sma; from smajax import simulate; from smajax.simulate import DEFAULT_STEP;"
+    code = f"{first}import smajax as sma; from smajax import simulate; from smajax.simulation.simulate import DEFAULT_STEP;"
     code += "print(callable(sma.simulate), callable(simulate), callable(sma.identify), callable(sma.close_loop))"
     told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)
     assert told.stdout.split() == ["True"] * 4

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from smajax.attribution.job import Job
-from smajax.experiment.catalogue import WIRE_SIZES
-from smajax.extended import base_model
-from smajax.parameters import get_parameters, parameters
-from smajax.report.display import digits, display
+from smajax.core.display_units import digits, display
+from smajax.core.parameters import get_parameters, parameters
+from smajax.data.experiment.model_description import WIRE_SIZES
+from smajax.fit.base_model import base_model
 
 LOGGED = {"mass": "load_mass", "ambient_temperature": "ambient_temperature"}  # input channel -> what it replaces
 

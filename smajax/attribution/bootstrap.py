@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from smajax.attribution.judging import LOOSE, Fitted, Model, Search, Start
+from smajax.attribution.cross_validation import LOOSE, Fitted, Model, Search, Start
 
 DRAWS = 32
 INTERVAL = (2.5, 97.5)  # percentiles

@@ -17,8 +17,8 @@ from functools import partial
 
 import numpy as np
 
-from smajax.report.findings import Formula
-from smajax.unknown.spline import design
+from smajax.attribution.findings import Formula
+from smajax.attribution.unknown.spline import design
 
 OFFERED = 3
 # By how much a formula may differ from the function for nothing, in shares of its size: at most so where the model's

@@ -6,14 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from smajax.attribution.cross_validation import Evidence, Model, Search
+from smajax.attribution.findings import CoefficientFinding, EffectFinding, ParameterFinding
 from smajax.attribution.job import Job
-from smajax.attribution.judging import Evidence, Model, Search
 from smajax.attribution.search import scores_at
-from smajax.effects.library import LIBRARY
+from smajax.core.parameters import parameters
 from smajax.fit.sensitivity import Sensitivity, sensitivity
 from smajax.fit.uncertainty import Uncertainty, uncertainty
-from smajax.parameters import parameters
-from smajax.report.findings import CoefficientFinding, EffectFinding, ParameterFinding
+from smajax.model.effects.library import LIBRARY
 
 
 @dataclass(frozen=True)

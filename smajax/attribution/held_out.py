@@ -5,17 +5,17 @@ from __future__ import annotations
 import jax.numpy as jnp
 import numpy as np
 
+from smajax.attribution.cross_validation import Model, Search
+from smajax.attribution.findings import Portrait, RunFinding
 from smajax.attribution.job import Job
-from smajax.attribution.judging import Model, Search
+from smajax.attribution.residual_diagnostics import portrait
 from smajax.attribution.search import fewer
 from smajax.attribution.verdict import pooled
-from smajax.experiment.record import Run
-from smajax.fit.batch import RunBatch, pack, simulate_batch
+from smajax.core.parameters import parameter_values
+from smajax.data.experiment.record import Run
+from smajax.fit.packed_runs import RunBatch, pack, simulate_batch
 from smajax.fit.problem import Problem
-from smajax.parameters import parameter_values
-from smajax.report.findings import Portrait, RunFinding
-from smajax.residual.portrait import portrait
-from smajax.types import Trajectory
+from smajax.model.types import Trajectory
 
 # Of an effect beside others: by so much the error on held-out runs may be larger with it than without it by chance.
 WORSE = 0.02

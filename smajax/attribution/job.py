@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from smajax.attribution.extent import extent_of
-from smajax.catalogue import candidates
-from smajax.effects.library import LIBRARY
-from smajax.experiment.record import Experiment, Run
-from smajax.extended import base_model, extended
-from smajax.fit.batch import RunBatch, pack
+from smajax.attribution.run_extent import extent_of
+from smajax.core.parameters import parameter_values, parameters
+from smajax.data.experiment.record import Experiment, Run
+from smajax.data.model_catalogue import candidates
+from smajax.fit.base_model import base_model
+from smajax.fit.packed_runs import RunBatch, pack
 from smajax.fit.problem import Problem
-from smajax.parameters import parameter_values, parameters
+from smajax.model.effects.library import LIBRARY
+from smajax.model.extended import extended
 
 
 @dataclass(frozen=True)

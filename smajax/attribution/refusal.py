@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from smajax.experiment.errors import ExperimentError
-from smajax.experiment.record import RUN_STARTS, Experiment
-from smajax.presets import build
+from smajax.data.experiment.errors import ExperimentError
+from smajax.data.experiment.record import RUN_STARTS, Experiment
+from smajax.model.presets import build
 
 
 def refuse_what_only_identify_does(experiment: Experiment) -> None:

@@ -14,13 +14,13 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from scipy.stats import qmc
 
-from smajax.attribution.judging import PENALTY, Evidence, Fitted, Model, Search, Start, base_value
-from smajax.attribution.places import Looked, looked_at
-from smajax.attribution.screen import Score, screen, significant, switches
-from smajax.attribution.steady import kept_at_half_the_step
-from smajax.effects.library import LIBRARY
-from smajax.fit.box import Fit
-from smajax.report.findings import Round
+from smajax.attribution.cross_validation import PENALTY, Evidence, Fitted, Model, Search, Start, base_value
+from smajax.attribution.findings import Round
+from smajax.attribution.nuisance_grid import Looked, looked_at
+from smajax.attribution.score_test import Score, screen, significant, switches
+from smajax.attribution.step_size_check import kept_at_half_the_step
+from smajax.fit.levenberg_marquardt import Fit
+from smajax.model.effects.library import LIBRARY
 
 SIGNIFICANT = 1e-3  # of the score tests of one round, counted together
 # What passes for noise is looked into all the same where one candidate alone would take more than this share of its square

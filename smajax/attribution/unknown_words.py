@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from smajax.report.display import label
-from smajax.report.findings import UnknownTerm
+from smajax.attribution.findings import UnknownTerm
+from smajax.core.display_units import label
 from smajax.report.unknown_pictures import units
 
 

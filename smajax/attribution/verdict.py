@@ -6,12 +6,21 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from smajax.attribution.findings import (
+    EffectFinding,
+    LoneRun,
+    ParameterFinding,
+    Portrait,
+    Rival,
+    Round,
+    RunFinding,
+    Verdict,
+)
+from smajax.attribution.residual_diagnostics import noise_like
 from smajax.attribution.search import TOO_MUCH_FOR_NOISE
-from smajax.experiment.record import Experiment
-from smajax.report.display import digits, display
-from smajax.report.findings import EffectFinding, LoneRun, ParameterFinding, Portrait, Rival, Round, RunFinding, Verdict
-from smajax.residual.portrait import noise_like
-from smajax.words import and_listed
+from smajax.core.display_units import digits, display
+from smajax.core.wording import and_listed
+from smajax.data.experiment.record import Experiment
 
 # A residual this many times the declared noise, or the other way round, says that the noise was declared wrongly.
 WRONG_NOISE = 1.2

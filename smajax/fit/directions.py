@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from smajax.core.wording import and_listed
 from smajax.fit.sensitivity import Sensitivity
-from smajax.words import and_listed
 
 NAMED = 0.3  # a parameter with a smaller share of a direction's largest is not named
 WEAK = 0.05  # a direction whose standard error is more than this share of the values is worth a sentence

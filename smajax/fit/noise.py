@@ -9,10 +9,10 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
-from smajax.fit.box import Fit
+from smajax.fit.levenberg_marquardt import Fit
+from smajax.fit.predicted import misfits
 from smajax.fit.problem import Problem
 from smajax.fit.robust import NORMAL
-from smajax.fit.shown import misfits
 
 ROUNDS = 20
 SETTLED = 1e-3  # relative change of a sigma that changes no weight worth a step

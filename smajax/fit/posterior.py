@@ -14,9 +14,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from smajax.fit.kept import Kept
+from smajax.core.progress import Progress, quiet
+from smajax.core.result_cache import Kept
 from smajax.fit.problem import Problem
-from smajax.fit.progress import Progress, quiet
 
 CHAINS = 8
 WIDER = (

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from smajax.experiment.record import Prior
+from smajax.data.experiment.record import Prior
 
 ArrayOf = TypeVar("ArrayOf", bound=Any)
 LEAST = 1e-12  # of its mean: as near to zero as the logarithm of a value is taken

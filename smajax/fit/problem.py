@@ -11,11 +11,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from smajax.experiment.record import Prior
-from smajax.fit.batch import RunBatch, shown_batch
+from smajax.core.parameters import get_parameters, parameters, set_vector
+from smajax.data.experiment.record import Prior
+from smajax.fit.packed_runs import RunBatch, shown_batch
 from smajax.fit.priors import Priors
-from smajax.parameters import get_parameters, parameters, set_vector
-from smajax.system import System
+from smajax.model.system import System
 
 ArrayOf = TypeVar("ArrayOf", bound=Any)
 # How near to a bound the logit that ties a parameter to its start is taken, as a share of the box.

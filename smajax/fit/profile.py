@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from smajax.fit.box import Fit, fit_in_box
-from smajax.fit.kept import Kept
+from smajax.core.progress import Progress, quiet
+from smajax.core.result_cache import Kept
+from smajax.fit.levenberg_marquardt import Fit, fit_in_box
 from smajax.fit.problem import Problem
-from smajax.fit.progress import Progress, quiet
 
 ERRORS = (-2.8, -2.1, -1.4, -0.7, 0.7, 1.4, 2.1, 2.8)  # standard errors from the estimate
 SPARE = 0.1  # share of the box, for a parameter that has no standard error

@@ -8,9 +8,9 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
-from smajax.fit.box import Fit
+from smajax.fit.levenberg_marquardt import Fit
+from smajax.fit.predicted import misfits
 from smajax.fit.problem import Problem
-from smajax.fit.shown import misfits
 
 BEND = 1.345  # deviations from where on a sample counts less: 95 % as good as least squares where the noise is normal
 ROUNDS = 20

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from smajax.fit.predicted import shown_and_slopes
 from smajax.fit.problem import Problem
-from smajax.fit.shown import shown_and_slopes
 
 
 @dataclass(frozen=True)

@@ -8,11 +8,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from scipy.stats import qmc
 
-from smajax.fit.box import ENOUGH, Fit, fit_in_box
-from smajax.fit.kept import Kept
+from smajax.core.progress import Progress, quiet
+from smajax.core.result_cache import Kept
+from smajax.fit.levenberg_marquardt import ENOUGH, Fit, fit_in_box
+from smajax.fit.predicted import squares
 from smajax.fit.problem import Lane, Problem
-from smajax.fit.progress import Progress, quiet
-from smajax.fit.shown import squares
 
 MARGIN = 0.02  # share of the box that is kept from its bounds
 TRIED = 64

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse.csgraph import connected_components
 
+from smajax.core.whiteness import WHITE, bartlett_sum, correlation_time, split_runs, whiteness_p_value
+from smajax.core.wording import and_listed
 from smajax.fit.sensitivity import Sensitivity
-from smajax.residual.noise_like import WHITE, bartlett_sum, correlation_time, split_runs, whiteness_p_value
-from smajax.words import and_listed
 
 # A fitted value nearer to a bound than this share of the box counts as held by it.
 AT_BOUND = 2e-3

@@ -15,16 +15,16 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from PIL import Image
 
-from smajax.compiled import simulate_compiled
 from smajax.core.files import replace
-from smajax.fit.progress import Progress, quiet
-from smajax.load.arm import Arm
-from smajax.load.base import AbstractMovingLoad
+from smajax.core.progress import Progress, quiet
+from smajax.model.load.arm import Arm
+from smajax.model.load.base import AbstractMovingLoad
+from smajax.model.system import System
+from smajax.model.types import Series, Trajectory
+from smajax.model.wire.kinetics import Kinetics
 from smajax.report.pictures import MEASURED, QUIET, tidy
-from smajax.simulate import DEFAULT_STEP
-from smajax.system import System
-from smajax.types import Series, Trajectory
-from smajax.wire.kinetics import Kinetics
+from smajax.simulation.compiled import simulate_compiled
+from smajax.simulation.simulate import DEFAULT_STEP
 
 HOT, COLD = "#c8553d", "#1f6fb2"
 SIZE, UPRIGHT, DPI = (8.4, 3.9), (4.4, 7.6), 80  # inches

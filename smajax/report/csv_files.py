@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from smajax.attribution.findings import Findings, ParameterFinding
 from smajax.core.files import csv_text, heading
-from smajax.experiment.catalogue import INPUT_UNITS
-from smajax.report.findings import Findings, ParameterFinding
+from smajax.model.channels import INPUT_UNITS
 
 if TYPE_CHECKING:
-    from smajax.identified import Identified  # which is made with words of this package
+    from smajax.fit.identify_result import Identified  # which is made with words of this package
 
 RUNS, PARAMETERS = "runs.csv", "parameters.csv"
 

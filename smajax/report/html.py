@@ -12,9 +12,9 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
+from smajax.attribution.findings import Findings, ParameterFinding
+from smajax.core.display_units import chance, correlation, digits, display, label, p_value, share, with_error
 from smajax.report import pictures
-from smajax.report.display import chance, correlation, digits, display, label, p_value, share, with_error
-from smajax.report.findings import Findings, ParameterFinding
 from smajax.report.plain_page import breakable
 from smajax.report.unknown_pictures import function_learnt, units
 

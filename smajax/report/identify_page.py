@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
+from smajax.core.display_units import correlation, digits, display, label
 from smajax.core.files import json_text, replace
-from smajax.identified import Identified, IdentifiedOutput
+from smajax.fit.identify_result import Identified, IdentifiedOutput
 from smajax.report import identify_pictures as draw
 from smajax.report.csv_files import PARAMETERS, RUNS, identified_parameters, identified_runs
-from smajax.report.display import correlation, digits, display, label
 from smajax.report.html import picture
 from smajax.report.identify_record import record
 from smajax.report.identify_words import conclusions, estimate_rows, posterior_rows, prior_shown

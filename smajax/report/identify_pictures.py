@@ -8,8 +8,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from smajax.identified import Identified, IdentifiedRun
-from smajax.report.display import axis_label, channel, digits, display, label
+from smajax.core.display_units import axis_label, digits, display, label
+from smajax.fit.identify_result import Identified, IdentifiedRun
+from smajax.model.channels import channel
 from smajax.report.pictures import (
     AFTER,
     NOISE,

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from smajax.fit.identify_result import Identified
 from smajax.fit.posterior import Posterior
-from smajax.identified import Identified
 from smajax.report.identify_words import conclusions, rms_by_role
 
 

@@ -7,12 +7,12 @@ import sys
 
 import numpy as np
 
-from smajax.experiment.record import Prior
+from smajax.core.display_units import digits, display, label, p_value, with_error
+from smajax.core.whiteness import WHITE
+from smajax.core.wording import and_listed, times_noise
+from smajax.data.experiment.record import Prior
+from smajax.fit.identify_result import Estimate, Identified
 from smajax.fit.posterior import Posterior
-from smajax.identified import Estimate, Identified
-from smajax.report.display import digits, display, label, p_value, with_error
-from smajax.residual.noise_like import WHITE
-from smajax.words import and_listed, times_noise
 
 FAR = 2.0  # standard deviations of what was known before, from which on an estimate contradicts it
 OFF = 1.25  # ratio of residual to noise that is worth a sentence

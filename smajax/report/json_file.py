@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from smajax.report.findings import (
+from smajax.attribution.findings import (
     CoefficientFinding,
     EffectFinding,
     Findings,

@@ -14,8 +14,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from smajax.report.display import Display, axis_label, channel, display, label
-from smajax.report.findings import EffectFinding, Findings, Portrait, RunFinding
+from smajax.attribution.findings import EffectFinding, Findings, Portrait, RunFinding
+from smajax.core.display_units import Display, axis_label, display, label
+from smajax.model.channels import channel
 
 MEASURED, BEFORE, AFTER, NOISE, QUIET = "#1d1d1f", "#c8553d", "#1f6fb2", "#d9dce1", "#9aa0a8"
 THICK: dict[str, Any] = {"color": MEASURED, "linewidth": 2.2, "alpha": 0.55}  # the measured curve, under the models

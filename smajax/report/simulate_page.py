@@ -13,18 +13,18 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
+from smajax.control.figures_of_merit import MERIT_UNITS, STEADY, Rest
+from smajax.control.mismatch import in_words
+from smajax.control.single_run import Ran
+from smajax.core.display_units import axis_label, digits, display, label
 from smajax.core.files import as_netcdf, csv_text, heading, json_text, replace
-from smajax.figures.drawing import BLUE, GREY, RED, UPRIGHT, named, panels
-from smajax.fit.progress import Progress, quiet
-from smajax.load.base import AbstractMovingLoad
-from smajax.merit import MERIT_UNITS, STEADY, Rest
-from smajax.mismatch import in_words
-from smajax.parameters import parameter_values, parameters
+from smajax.core.parameters import parameter_values, parameters
+from smajax.core.progress import Progress, quiet
+from smajax.model.load.base import AbstractMovingLoad
 from smajax.report.animation import moving
-from smajax.report.display import axis_label, digits, display, label
+from smajax.report.drawing import BLUE, GREY, RED, UPRIGHT, named, panels
 from smajax.report.html import picture
 from smajax.report.plain_page import bullets, table, whole
-from smajax.single import Ran
 
 AT_STOP = 1e-3  # of the way moved: nearer is at a stop
 STILL = 1e-3  # change of the martensite fraction that is none

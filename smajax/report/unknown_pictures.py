@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from smajax.report.display import axis_label, display
-from smajax.report.findings import UnknownTerm
+from smajax.attribution.findings import UnknownTerm
+from smajax.core.display_units import axis_label, display
 from smajax.report.pictures import AFTER, NARROW, NOISE, QUIET, as_png, new_figure, tidy
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+from smajax.attribution.findings import Findings
 from smajax.core.files import replace
 from smajax.report.csv_files import PARAMETERS, RUNS, findings_parameters, findings_runs
-from smajax.report.findings import Findings
 from smajax.report.html import findings_to_html
 from smajax.report.json_file import findings_to_json
 

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 from scipy.signal import lfilter
 
-from smajax.experiment.record import Experiment
+from smajax.data.experiment.record import Experiment
 from studies.attribution_benchmark.cases import cases
 from studies.attribution_benchmark.rigs import show
 from studies.attribution_benchmark.write import write
@@ -35,8 +35,8 @@ WARM_UP = 300
 
 def filtered(folder: Path, name: str, seed: int, memory: float, every: int) -> Experiment:
     """A coupon, its white noise put through a first-order filter, as large as declared, and estimated."""
-    from smajax.catalogue import CATALOGUE
-    from smajax.experiment.load import load_experiment
+    from smajax.data.experiment.load import load_experiment
+    from smajax.data.model_catalogue import CATALOGUE
 
     case = next(case for case in cases() if case.name == name)
     true = write(case, folder)
@@ -55,7 +55,7 @@ def filtered(folder: Path, name: str, seed: int, memory: float, every: int) -> E
 
 def estimated(experiment: Experiment) -> Experiment:
     """The same where nobody gave the noise."""
-    from smajax.measured.noise import estimate_noise
+    from smajax.data.readers.noise import estimate_noise
 
     sigma = float(np.median([estimate_noise(run.output, 0.0) for run in experiment.runs if run.role == "fit"]))
     (output,) = experiment.outputs
@@ -65,7 +65,7 @@ def estimated(experiment: Experiment) -> Experiment:
 
 def closed(experiment: Experiment) -> dict[str, Any]:
     """What the loop says: verdict, effects, what is left over the estimate, what such a filter keeps."""
-    from smajax.close_loop import close_loop
+    from smajax.attribution.close_loop import close_loop
 
     found = close_loop(experiment, apart=True)
     portrait = found.portrait_after
@@ -128,7 +128,7 @@ def main() -> None:
     parser.add_argument("--every", type=int, default=1, help="sample to keep: a shorter log")
     given = parser.parse_args()
     from smajax.core.files import replace
-    from smajax.runtime import prepare
+    from smajax.core.runtime import prepare
 
     prepare()
     given.out.mkdir(parents=True, exist_ok=True)

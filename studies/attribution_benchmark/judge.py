@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from smajax.core.files import replace
-from smajax.effects.library import LIBRARY
+from smajax.model.effects.library import LIBRARY
 
 # What the library calls the generator's effects, where it calls them otherwise. Neither was written with the other in
 # view; some of the library's forms were widened after cases that it missed (README.md). The generator's smooth transformation, a share of the wire over a wider range, is the library's of two parts.

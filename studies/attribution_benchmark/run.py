@@ -38,10 +38,10 @@ def chosen(only: str, strengths: Sequence[float], nulls: int, part: tuple[int, i
 
 def closed(case: Case, out: Path) -> Judged:
     """One case written, closed and judged."""
-    from smajax.catalogue import CATALOGUE
-    from smajax.close_loop import close_loop
+    from smajax.attribution.close_loop import close_loop
     from smajax.core.files import replace
-    from smajax.experiment.load import load_experiment
+    from smajax.data.experiment.load import load_experiment
+    from smajax.data.model_catalogue import CATALOGUE
     from smajax.report.json_file import findings_to_json
 
     folder = out / "cases" / case.name
@@ -69,7 +69,7 @@ def main() -> None:
         "--drawn", type=int, default=0, help="1, 2, ...: the same cases with other wires, strengths and noise"
     )
     asked = parser.parse_args()
-    from smajax.runtime import prepare
+    from smajax.core.runtime import prepare
 
     prepare()
     first, _, of = asked.part.partition("/")

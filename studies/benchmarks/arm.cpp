@@ -1,4 +1,4 @@
-// The rotary arm by hand: the scheme of smajax/step.py and smajax/stage_solver.py for one system.
+// The rotary arm by hand: the scheme of smajax/simulation/step.py and smajax/simulation/stage_solver.py for one system.
 //
 // Wire under the `enhanced` law with the rate form (eq. 3.2), arm with end stops, amplified voltage held over the run.
 // SI, temperatures in C. A block of members goes through each phase of a stage together: short loops over the lanes that
@@ -50,7 +50,7 @@ constexpr int COLUMNS = 4;
 
 using Parameters = std::map<std::string, double>;
 
-// smajax/cosine.py; terms below the rounding of single precision are left out there.
+// smajax/model/wire/cosine.py; terms below the rounding of single precision are left out there.
 constexpr double C[8] = {-1.2337005501361697,     0.253669507901046,     -0.02086348076331063,
                          0.0009192602745006437,   -2.5202041041025108e-05, 4.710846321668482e-07,
                          -6.3832315751919636e-09, 6.357424822347121e-11};
@@ -434,7 +434,7 @@ template <bool LAST, class Real> int stage(Block<Real>& b, const Rig<Real>& r) {
     return iterations;
 }
 
-// At rest in equilibrium at ambient temperature (smajax/system.py).
+// At rest in equilibrium at ambient temperature (smajax/model/system.py).
 template <class Real> void start(Block<Real>& b, const Rig<Real>& r, int i, double voltage, double payload) {
     const double step = r.step, inertia = r.inertia_ratio * (payload + r.link_mass / 3.0) * r.arm_length * r.arm_length;
     const double by_inertia = step * step / inertia, put = std::min(std::abs(r.gain_per_metre * voltage), r.limit);

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from smajax.parameters import get_parameters, parameters
-from smajax.system import System
+from smajax.core.parameters import get_parameters, parameters
+from smajax.model.system import System
 
 SOURCE = Path(__file__).with_name("arm.cpp")
 MISSING = "there is no g++ here (clang under its name does not count: its OpenMP is a matter of luck)"
@@ -70,7 +70,7 @@ def run(
 ) -> Result:
     """Simulate `members`, rows of (voltage in V, payload mass in kg), over `steps` of `dt` s.
 
-    `system` is `smajax.figures.rigs.arm()` with any parameters; `precision` is "double" or "float". Of the first
+    `system` is `studies.source.rigs.arm()` with any parameters; `precision` is "double" or "float". Of the first
     `recorded` members every `every`-th sample comes back, the first one included.
     """
     if precision not in PRECISIONS:

@@ -20,18 +20,18 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from smajax.batch.axes import grid
-from smajax.batch.member import Recipe, member, slope_name
-from smajax.batch.run import recipe_of
+from smajax.core.parameters import get_parameters, parameters, set_vector
+from smajax.core.runtime import prepare
 from smajax.engine import program
-from smajax.figures.rigs import arm
-from smajax.measure import MeanSquare
-from smajax.parameters import get_parameters, parameters, set_vector
-from smajax.runtime import prepare
-from smajax.simulate import DEFAULT_STEP
-from smajax.system import System
+from smajax.model.system import System
+from smajax.simulation.batch.axes import grid
+from smajax.simulation.batch.run_batch import recipe_of
+from smajax.simulation.batch.single_run import Recipe, member, slope_name
+from smajax.simulation.measures import MeanSquare
+from smajax.simulation.simulate import DEFAULT_STEP
 from studies.benchmarks import tracking
 from studies.benchmarks.timed import timed
+from studies.source.rigs import arm
 
 REPEATS = 3
 LONGEST_REPEATED = 20000  # steps

@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from smajax.runtime import prepare
+from smajax.core.runtime import prepare
 from studies.benchmarks import tracking
 from studies.benchmarks.timed import timed
 from studies.benchmarks.tracking import Tracking, load

@@ -17,8 +17,8 @@ from pathlib import Path
 
 import numpy as np
 
-from smajax.machine import peak_memory
-from smajax.runtime import prepare
+from smajax.core.machine import peak_memory
+from smajax.core.runtime import prepare
 
 COLUMNS = 10  # of the text log
 BLOCK = 50_000  # lines written at once
@@ -65,7 +65,7 @@ Work = Callable[[], Told]
 
 
 def _text(megabytes: int, place: Path) -> Work:
-    from smajax.measured.read import read_table
+    from smajax.data.readers.read import read_table
 
     draw = np.random.default_rng(0).normal(size=(BLOCK, COLUMNS))
     names = [f"c{number}" for number in range(COLUMNS)]
@@ -103,10 +103,10 @@ def _written(place: Path, runs: int, samples: int) -> None:
     prepare()
     import jax.numpy as jnp
 
-    from smajax.compiled import simulate_compiled
-    from smajax.experiment.signals import MOST_SAMPLES
-    from smajax.parameters import set_parameters
-    from smajax.presets import build
+    from smajax.core.parameters import set_parameters
+    from smajax.data.experiment.signals import MOST_SAMPLES
+    from smajax.model.presets import build
+    from smajax.simulation.compiled import simulate_compiled
 
     coupon = set_parameters(build("flexinol_isobaric", "coupon", "none"), TRUTH)
     random = np.random.default_rng(1)
@@ -138,9 +138,9 @@ def _written(place: Path, runs: int, samples: int) -> None:
 
 
 def _samples(count: int, place: Path) -> Work:
-    from smajax.catalogue import CATALOGUE
-    from smajax.experiment.load import load_experiment
-    from smajax.identify import identify
+    from smajax.data.experiment.load import load_experiment
+    from smajax.data.model_catalogue import CATALOGUE
+    from smajax.fit.identify import identify
 
     file = _experiment(place, 1, count)
 
@@ -152,9 +152,9 @@ def _samples(count: int, place: Path) -> Work:
 
 
 def _runs(count: int, place: Path) -> Work:
-    from smajax.catalogue import CATALOGUE
-    from smajax.close_loop import close_loop
-    from smajax.experiment.load import load_experiment
+    from smajax.attribution.close_loop import close_loop
+    from smajax.data.experiment.load import load_experiment
+    from smajax.data.model_catalogue import CATALOGUE
 
     file = _experiment(place, count, RUN_SAMPLES)
     return lambda: {"runs": count, "verdict": close_loop(load_experiment(file, CATALOGUE)).verdict}
@@ -163,9 +163,9 @@ def _runs(count: int, place: Path) -> Work:
 def _day(hours: int, place: Path) -> Work:
     import jax.numpy as jnp
 
-    from smajax.batch.axes import grid
-    from smajax.batch.run import run_batch
-    from smajax.figures.rigs import arm
+    from smajax.simulation.batch.axes import grid
+    from smajax.simulation.batch.run_batch import run_batch
+    from studies.source.rigs import arm
 
     steps = round(3600.0 * hours / DAY_STEP)
     # A step of the supply every minute, as a series of the whole day.

@@ -12,13 +12,13 @@ from pathlib import Path
 import jax.numpy as jnp
 import numpy as np
 
-from smajax import explicit_arm as equations
-from smajax.batch.axes import Axes, sampled
-from smajax.figures.rigs import arm
-from smajax.parameters import parameter_values
+from smajax.cli import explicit_arm as equations
+from smajax.core.parameters import parameter_values
+from smajax.simulation.batch.axes import Axes, sampled
 from studies.benchmarks.given import Given, load, save
 from studies.reference.wire_parameters import ArmParameters
 from studies.reference.wire_reference import simulate_arm
+from studies.source.rigs import arm
 
 SECONDS = 10.0
 EVERY = 0.05  # s between compared samples
@@ -94,7 +94,7 @@ def _reference(p: dict[str, float], payload_mass: float) -> ArmParameters:
 
 
 def _solved(p: dict[str, float], voltage: float, payload_mass: float) -> tuple[np.ndarray, np.ndarray]:
-    """(angle in degrees, fraction) of one member; ValueError where it does what `smajax.explicit_arm` leaves out."""
+    """(angle in degrees, fraction) of one member; ValueError where it does what `smajax.cli.explicit_arm` leaves out."""
     times = np.arange(CLOSE * round(SECONDS / EVERY) + 1) * (EVERY / CLOSE)
     run = simulate_arm(_reference(p, payload_mass), [(SECONDS, voltage)], times, rtol=RTOL)
     angle, xi, stress = run["angle"], run["martensite_fraction"], run["stress"]

@@ -19,9 +19,9 @@ from typing import Any
 
 import numpy as np
 
-from smajax.machine import machine
-from smajax.runtime import prepare
-from smajax.simulate import DEFAULT_STEP
+from smajax.core.machine import machine
+from smajax.core.runtime import prepare
+from smajax.simulation.simulate import DEFAULT_STEP
 from studies.benchmarks import cpp, peers
 from studies.benchmarks.table import told
 
@@ -74,8 +74,8 @@ class Plan:
 def _cpp(plan: Plan) -> Part:
     import os
 
-    from smajax.figures.rigs import arm
     from studies.benchmarks.given import load
+    from studies.source.rigs import arm
 
     given = load(plan.file())
     rows = np.stack([given.voltage, given.payload_mass], axis=1)

@@ -8,13 +8,13 @@ import tempfile
 import time
 from pathlib import Path
 
-from smajax.batch.run import run_batch
-from smajax.figures.rigs import arm
-from smajax.machine import peak_memory
-from smajax.runtime import prepare
+from smajax.core.machine import peak_memory
+from smajax.core.runtime import prepare
+from smajax.simulation.batch.run_batch import run_batch
 from studies.benchmarks import problem
 from studies.benchmarks.single import TOLERANCE
 from studies.benchmarks.throughput import MEASURES
+from studies.source.rigs import arm
 
 
 def main() -> None:

@@ -14,13 +14,13 @@ from pathlib import Path
 import equinox as eqx
 import jax
 
-from smajax.compiled import simulate_compiled
-from smajax.figures.rigs import arm
-from smajax.runtime import prepare
-from smajax.simulate import DEFAULT_STEP, simulate
-from smajax.types import Trajectory
+from smajax.core.runtime import prepare
+from smajax.model.types import Trajectory
+from smajax.simulation.compiled import simulate_compiled
+from smajax.simulation.simulate import DEFAULT_STEP, simulate
 from studies.benchmarks import problem
 from studies.benchmarks.given import load
+from studies.source.rigs import arm
 
 REPEATS = 10
 TOLERANCE = 3e-4

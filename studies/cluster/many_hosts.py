@@ -18,13 +18,13 @@ def main() -> None:
     parser.add_argument("--process", type=int)
     asked = parser.parse_args()
 
-    from smajax.runtime import prepare
+    from smajax.core.runtime import prepare
 
     prepare(cores=True)
-    from smajax.batch.axes import sampled
-    from smajax.batch.hosts import join, run_batch_here
-    from smajax.measure import Largest, Last, Smallest
-    from smajax.presets import build
+    from smajax.model.presets import build
+    from smajax.simulation.batch.axes import sampled
+    from smajax.simulation.batch.hosts import join, run_batch_here
+    from smajax.simulation.measures import Largest, Last, Smallest
 
     alone = asked.coordinator is None and not {"SLURM_JOB_ID", "OMPI_COMM_WORLD_SIZE"} & set(os.environ)
     process, processes = (0, 1) if alone else join(asked.coordinator, asked.processes, asked.process)

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import jax.numpy as jnp
 import numpy as np
 
-from smajax.fit.batch import RunBatch
+from smajax.core.parameters import set_parameters
+from smajax.fit.packed_runs import RunBatch
 from smajax.fit.problem import Problem
-from smajax.parameters import set_parameters
-from smajax.presets import build
+from smajax.model.presets import build
 from studies.reference.wire_parameters import DeadWeightParameters
 from studies.reference.wire_reference import simulate_dead_weight
 

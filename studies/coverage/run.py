@@ -19,10 +19,10 @@ import jax.numpy as jnp
 import numpy as np
 from scipy.optimize import least_squares
 
-from smajax.fit.box import MOST_STEPS, Fit, fit_in_box
+from smajax.core.runtime import prepare
+from smajax.fit.levenberg_marquardt import MOST_STEPS, Fit, fit_in_box
 from smajax.fit.sensitivity import sensitivity
 from smajax.fit.uncertainty import uncertainty
-from smajax.runtime import prepare
 from studies.coverage.rig import BOUNDS, NOISE, Rig, rig
 
 HERE = Path(__file__).parent
@@ -163,7 +163,7 @@ def page(found: dict[str, Any]) -> str:
             "A bias beyond chance (martensite_start, specific_heat) is of the model, which is not linear over an error bar: with "
             "another seed it came out alike, and 93.3 % of all intervals held the truth, 90.5 % of martensite_start's. Profiles and "
             "Huber's loss are not in here, nor noise with a memory, of which few samples are independent: intervals by standard errors "
-            "were too short there (72 to 87 % held the truth at an AR(1) of 0.8, before they were widened; on a coupon of 2 x 241 samples they hold 87 to 97 % at an AR(1) of 0.8 and 0.95 since, where it was 37 to 77 %), see `tests/test_uncertainty.py`.",
+            "were too short there (72 to 87 % held the truth at an AR(1) of 0.8, before they were widened; on a coupon of 2 x 241 samples they hold 87 to 97 % at an AR(1) of 0.8 and 0.95 since, where it was 37 to 77 %), see `tests/fit/test_uncertainty.py`.",
             "",
             "Made by `python -m studies.coverage.run`.",
             "",

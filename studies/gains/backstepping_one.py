@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from smajax.control_presets import CONTROLLERS, backstepping_one
-from smajax.figures.backstepping_runs import plant
-from smajax.gain_search import regulation_cost
+from smajax.control.gain_search import regulation_cost
+from smajax.control.presets import CONTROLLERS, backstepping_one
 from studies.gains.record import main, searched
+from studies.source.backstepping_runs import plant
 
 BOX = CONTROLLERS["backstepping1"].box
 TARGETS = [-20.0, 0.0, 20.0, 40.0]  # degrees

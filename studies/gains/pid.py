@@ -9,11 +9,11 @@ from typing import Any
 
 import jax.numpy as jnp
 
-from smajax.control_presets import PID_BOX
-from smajax.controller.pid import Pid
-from smajax.gain_search import regulation_cost
-from smajax.merit import Merit
-from smajax.types import Scalar
+from smajax.control.controllers.pid import Pid
+from smajax.control.figures_of_merit import Merit
+from smajax.control.gain_search import regulation_cost
+from smajax.control.presets import PID_BOX
+from smajax.model.types import Scalar
 from studies.gains.record import Cost, main, or_never, searched
 
 # The source names no anti-windup.

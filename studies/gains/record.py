@@ -13,12 +13,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from smajax.controller.base import AbstractController
-from smajax.figures.rigs import arm
-from smajax.gain_search import merits_of, search_gains
-from smajax.merit import Merit
-from smajax.system import System
-from smajax.types import Scalar
+from smajax.control.controllers.base import AbstractController
+from smajax.control.figures_of_merit import Merit
+from smajax.control.gain_search import merits_of, search_gains
+from smajax.model.system import System
+from smajax.model.types import Scalar
+from studies.source.rigs import arm
 
 Cost = Callable[[Merit, float], Scalar]
 HERE = Path(__file__).parent

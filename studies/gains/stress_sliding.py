@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from smajax.control_presets import STRESS_BOX, quick_stress_sliding
-from smajax.figures.rigs import arm
-from smajax.gain_search import regulation_cost
+from smajax.control.gain_search import regulation_cost
+from smajax.control.presets import STRESS_BOX, quick_stress_sliding
 from studies.gains.record import main, searched
+from studies.source.rigs import arm
 
 TARGETS = [-40.0, -20.0, 0.0, 20.0, 40.0, 60.0]  # degrees
 

@@ -6,10 +6,10 @@ from typing import Any
 
 import jax.numpy as jnp
 
-from smajax.controller.vsc2 import Vsc2
-from smajax.controller.vsc3 import Vsc3
-from smajax.merit import Merit
-from smajax.types import Scalar
+from smajax.control.controllers.vsc2 import Vsc2
+from smajax.control.controllers.vsc3 import Vsc3
+from smajax.control.figures_of_merit import Merit
+from smajax.model.types import Scalar
 from studies.gains.record import Cost, main, or_never, searched
 
 FULL_OVERSHOOT = 38.5  # degrees from 50 to where the arm stands when its wire comes to A_f'

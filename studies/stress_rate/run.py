@@ -18,12 +18,12 @@ from typing import Any
 
 import numpy as np
 
-from smajax.catalogue import CATALOGUE
-from smajax.close_loop import close_loop
-from smajax.experiment.load import load_experiment
-from smajax.report.findings import Findings
+from smajax.attribution.close_loop import close_loop
+from smajax.attribution.findings import Findings
+from smajax.core.runtime import prepare
+from smajax.data.experiment.load import load_experiment
+from smajax.data.model_catalogue import CATALOGUE
 from smajax.report.write import write_report
-from smajax.runtime import prepare
 from studies.attribution_benchmark.rigs import DEAD_WEIGHT, show
 from studies.attribution_benchmark.runs import Clock, Marks, Run, command
 from studies.attribution_benchmark.write import experiment_text, table_text

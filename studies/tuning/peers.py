@@ -17,12 +17,12 @@ import numpy as np
 from cmaes import CMA
 from scipy.optimize import minimize
 
-from smajax.control_presets import CONTROLLERS
-from smajax.system import System
-from smajax.tune.descent import Effort, begin, one_round
-from smajax.tune.evaluate import LOOPS, STEP, Rig
-from smajax.tune.members import Members, tuned_on
-from smajax.tune.objective import Goal
+from smajax.control.presets import CONTROLLERS
+from smajax.control.tune.descent import Effort, begin, one_round
+from smajax.control.tune.evaluate import LOOPS, STEP, Rig
+from smajax.control.tune.members import Members, tuned_on
+from smajax.control.tune.objective import Goal
+from smajax.model.system import System
 
 VARIATION = {"inertia": 0.2, "damping": 0.2, "convection": 0.2}
 SET_POINTS = (-40.0, 20.0, 85.0)

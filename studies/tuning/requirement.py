@@ -14,16 +14,16 @@ from typing import Any
 import numpy as np
 from scipy.stats import qmc
 
-from smajax.fit.progress import Progress
-from smajax.gains_file import write_gains
-from smajax.mismatch import MISMATCHES
-from smajax.system import System
-from smajax.tune.evaluate import Rig
-from smajax.tune.members import Members, tuned_on
-from smajax.tune.objective import Goal
-from smajax.tune.settings import TuneSettings
-from smajax.tune.terms import TERMS
-from smajax.tune.tune import Tuned, rig_of, tune
+from smajax.control.gains_file import write_gains
+from smajax.control.mismatch import MISMATCHES
+from smajax.control.tune.evaluate import Rig
+from smajax.control.tune.members import Members, tuned_on
+from smajax.control.tune.objective import Goal
+from smajax.control.tune.settings import TuneSettings
+from smajax.control.tune.terms import TERMS
+from smajax.control.tune.tune import Tuned, rig_of, tune
+from smajax.core.progress import Progress
+from smajax.model.system import System
 from studies.tuning.record import HERE
 
 LIMITS = {"settling_time": 4.0, "overshoot": 2.0, "steady_error": 0.5}

@@ -10,11 +10,11 @@ import sys
 from collections.abc import Mapping
 from pathlib import Path
 
-from smajax.control_presets import CONTROLLERS
+from smajax.control.presets import CONTROLLERS
 from smajax.core.files import replace
-from smajax.figures.rigs import arm
-from smajax.fit.progress import Progress
-from smajax.runtime import prepare
+from smajax.core.progress import Progress
+from smajax.core.runtime import prepare
+from studies.source.rigs import arm
 from studies.tuning.peers import PROBLEMS, Problem, searched
 from studies.tuning.picture import draw
 from studies.tuning.record import HERE, keep, kept

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from smajax.control_presets import CONTROLLERS
+from smajax.control.presets import CONTROLLERS
 from studies.tuning.requirement import LIMITS
 
 FIFTH = 0.2

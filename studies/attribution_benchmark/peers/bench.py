@@ -8,18 +8,19 @@ from pathlib import Path
 
 import numpy as np
 
-from smajax.attribution.judging import Search
-from smajax.catalogue import CATALOGUE, candidates
-from smajax.close_loop import SEED
-from smajax.experiment.load import load_experiment
-from smajax.experiment.record import Experiment
-from smajax.extended import base_model, extended
-from smajax.fit.batch import pack
-from smajax.fit.box import Fit
-from smajax.fit.kept import Kept
+from smajax.attribution.close_loop import SEED
+from smajax.attribution.cross_validation import Search
+from smajax.core.parameters import parameter_values, parameters
+from smajax.core.result_cache import Kept
+from smajax.data.experiment.load import load_experiment
+from smajax.data.experiment.record import Experiment
+from smajax.data.model_catalogue import CATALOGUE, candidates
+from smajax.fit.base_model import base_model
+from smajax.fit.levenberg_marquardt import Fit
+from smajax.fit.packed_runs import pack
+from smajax.fit.predicted import misfits
 from smajax.fit.problem import Problem
-from smajax.fit.shown import misfits
-from smajax.parameters import parameter_values, parameters
+from smajax.model.extended import extended
 
 
 @dataclasses.dataclass(frozen=True)

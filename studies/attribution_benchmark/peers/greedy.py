@@ -13,10 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from smajax.attribution.judging import Model, Start
-from smajax.attribution.screen import switches
-from smajax.effects.library import LIBRARY
-from smajax.fit.box import Fit
+from smajax.attribution.cross_validation import Model, Start
+from smajax.attribution.score_test import switches
+from smajax.fit.levenberg_marquardt import Fit
+from smajax.model.effects.library import LIBRARY
 from studies.attribution_benchmark.peers.answer import Answer
 from studies.attribution_benchmark.peers.bench import Bench
 from studies.attribution_benchmark.peers.plain import fit_of

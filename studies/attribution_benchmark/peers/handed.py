@@ -10,8 +10,8 @@ from tempfile import TemporaryDirectory
 import jax.numpy as jnp
 import numpy as np
 
-from smajax.fit.batch import pack, simulate_batch
-from smajax.parameters import parameter_values
+from smajax.core.parameters import parameter_values
+from smajax.fit.packed_runs import pack, simulate_batch
 from studies.attribution_benchmark.peers.answer import Answer
 from studies.attribution_benchmark.peers.bench import Bench
 from studies.attribution_benchmark.peers.given import Given, Series, save

@@ -6,7 +6,7 @@ import time as clock
 
 import numpy as np
 
-from smajax.fit.box import Fit
+from smajax.fit.levenberg_marquardt import Fit
 from studies.attribution_benchmark.peers.answer import Answer
 from studies.attribution_benchmark.peers.bench import Bench
 

@@ -48,7 +48,7 @@ def main() -> None:
     parser.add_argument("--peer", choices=sorted(PEERS), action="append", default=[], help="may be given again")
     parser.add_argument("--only", default="", help="a part of the cases' names")
     given = parser.parse_args()
-    from smajax.runtime import prepare
+    from smajax.core.runtime import prepare
 
     prepare()
     cases = sorted(path.stem for path in (given.out / "judged").glob("*.json") if given.only in path.stem)

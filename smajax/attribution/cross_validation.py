@@ -1,0 +1,388 @@
+"""Models of one experiment with some effects of the library: fitted, and judged on runs left out.
+
+A model is judged by its error on each fit run in turn, fitted to the others; the held-out runs are not looked at. It is
+better than another when it predicts left-out runs better beyond a penalty per coefficient and beyond chance.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+
+from smajax.attribution.every_effect import EVERY
+from smajax.attribution.findings import Round
+from smajax.attribution.residual_diagnostics import all_noise
+from smajax.attribution.run_extent import extent_of
+from smajax.attribution.score_test import Score, scaled, switches
+from smajax.core.progress import Progress, quiet
+from smajax.core.result_cache import Kept
+from smajax.core.whiteness import correlation_time, split_runs
+from smajax.fit.levenberg_marquardt import MOST_STEPS, Fit, fit_in_box
+from smajax.fit.packed_runs import RunBatch
+from smajax.fit.predicted import misfits
+from smajax.fit.problem import Problem
+from smajax.fit.sensitivity import sensitivity
+from smajax.fit.starts import from_many_starts, hopped
+from smajax.fit.uncertainty import held
+from smajax.model.effects.base import Extent
+from smajax.model.effects.library import LIBRARY
+
+PENALTY = 0.01  # by how much of its mean square a coefficient must lower the error on left-out runs
+CHANCE = 0.5  # by how many standard errors of the paired difference, too: with three or four runs that error is wide
+CHANCE_ON_ONE = 2.0  # the same where there is one run and what is compared are fits to it
+NUDGE = 1e-3  # share of an effect's start at which its score is taken
+INSIDE = 0.03  # a refit starts at least this share of the box away from bounds to which a poorer model was driven
+TOLD = 1.0  # to what share of itself the other runs must tell an effect's size for a left-out run to count
+LOOSE = 1.0  # how far a fold's parameters may stray for nothing, in logits of the box
+FORETELLS = 0.5  # share of the motion in left-out runs that a model has to foretell for its effects to mean anything
+FOLDS = 12  # at most so many parts of the runs are left out in turn: one run each up to that many
+ENOUGH = 1e-5  # of its cost: where a refit ends
+
+
+@dataclass(frozen=True)
+class Start:
+    """Where one fit begins: the effects whose coefficients are free, all parameters, and how much each run counts."""
+
+    effects: tuple[str, ...]
+    values: np.ndarray  # (P,), in the order of the whole library's problem
+    weights: np.ndarray | None = None  # of the runs, (R,); None: all alike
+    tie: float = 0.0  # of `Problem.lane`
+
+
+@dataclass(frozen=True)
+class Model:
+    """A set of effects with fitted values, and how it does on runs left out."""
+
+    effects: tuple[str, ...]
+    values: np.ndarray  # (P,)
+    cost: float
+    left_out: np.ndarray  # misfit (SI) of each fit run by the model fitted to the others, (R, N)
+    left_out_rmse: float
+
+
+class Fitted(NamedTuple):
+    """A set of effects fitted to all runs."""
+
+    effects: tuple[str, ...]
+    solution: Fit
+
+
+@dataclass
+class Evidence:
+    """What was learnt of one effect over the whole search."""
+
+    first_score: Score | None = None
+    alone_rmse: float = float("nan")  # fit runs, effect added alone in the first round
+    alone_left_out_rmse: float = float("nan")
+    base_left_out_rmse: float = float("nan")  # the base model, on the same
+    without_left_out_rmse: float = float("nan")  # the final model with this effect taken out again
+
+
+@dataclass
+class Search:
+    """The search's settings and memory."""
+
+    problem: Problem
+    unknowns: tuple[str, ...]
+    bounds: Mapping[str, tuple[float, float]]
+    candidates: tuple[str, ...]
+    kept: Kept
+    shown: Callable[[float], str]  # an error in the unit that an engineer reads
+    progress: Progress = quiet
+    noise_given: bool = True  # by the experiment file; else estimated
+    held_out: RunBatch | None = None  # which no fit sees, and which refuse an unknown term in the end
+    apart: bool = False  # a program for each set of effects: pays where many experiments of one kind follow each other
+    evidence: dict[str, Evidence] = field(default_factory=dict)
+    rounds: list[Round] = field(default_factory=list)
+    path: list[Model] = field(default_factory=list)  # the models that were added to, the base model first
+
+    def note(self, done: Round) -> None:
+        """Keep a round and say what came of it."""
+        self.rounds.append(done)
+        told = f"round {done.number}: {done.chosen or 'nothing added'}; {done.why}"
+        self.progress(f"say: {told}", 1.0)
+
+    def set_aside(self, model: Model, why: str, effects: Sequence[str] = ()) -> None:
+        """Note a round in which `effects` go, or all that was added."""
+        tried = ((" + ".join(model.effects), model.left_out_rmse),)
+        gone = " + ".join(effects or model.effects)
+        self.note(Round(len(self.rounds) + 1, tried, f"without {gone}", f"set aside: {why}"))
+
+    def free(self, effects: Sequence[str]) -> list[str]:
+        """Every free parameter of a model with `effects`."""
+        return [*self.unknowns, *(name for effect in effects for name in self.coefficients(effect))]
+
+    def loose(self, effects: Sequence[str], values: np.ndarray) -> list[str]:
+        """Those of them that no bound holds at `values`."""
+        place = self.problem.names.index
+        return [name for name in self.free(effects) if not held(float(values[place(name)]), *self.bounds[name])]
+
+    @cached_property
+    def extent(self) -> Extent:
+        """How far the runs go; reading the levels of a log takes a while."""
+        return extent_of(self.problem)
+
+    @property
+    def every(self) -> list[str]:
+        """Unknowns and all coefficients of all candidates: one Jacobian serves every question."""
+        return self.free(self.candidates)
+
+    def coefficients(self, effect: str) -> list[str]:
+        return [name for name in self.problem.names if name.startswith(f"{effect}.")]
+
+    def inside(self, model: Model) -> np.ndarray:
+        """The values of `model`, with the free ones that lie at a bound moved off it."""
+        values = np.array(model.values)
+        for name in self.free(model.effects):
+            low, high = self.bounds[name]
+            room, place = INSIDE * (high - low), self.problem.names.index(name)
+            values[place] = np.clip(values[place], low + room, high - room)
+        return values
+
+    def restricted(self, effects: Sequence[str]) -> tuple[Problem, list[int]]:
+        """The same runs with a model that carries, of the candidates, only `effects`; where its parameters are in ours.
+
+        What is not in play costs nothing in a fit.
+        """
+        gone = set(self.candidates) - set(effects)
+        kept = tuple(effect for effect in self.problem.system.effects if effect.effect_name not in gone)
+        system = dataclasses.replace(self.problem.system, effects=kept)
+        problem = Problem.build(system, self.problem.batch, self.problem.noise_sigma, self.problem.offset)
+        return problem, [self.problem.names.index(name) for name in problem.names]
+
+    def fit(
+        self,
+        starts: Sequence[Start],
+        what: str,
+        *,
+        enough: float = ENOUGH,
+        hops: bool = False,
+        carried: Sequence[str] = (),
+        most: int = MOST_STEPS,
+    ) -> tuple[list[Fit], np.ndarray]:
+        """Fit every start: (fits with full parameter vectors, misfit of all runs at each, (S, R, N)).
+
+        `hops`: each from points near its end as well (`fit.starts.hopped`). `carried`: effects that the model holds besides,
+        as it did in the fits before, whose program then serves again. `most`: steps.
+        """
+        sets = sorted({start.effects for start in starts})
+        if self.apart and len(sets) > 1:
+            places = [[k for k, start in enumerate(starts) if start.effects == one] for one in sets]
+            parts = [self.fit([starts[k] for k in some], what, enough=enough, hops=hops, most=most) for some in places]
+            order = np.argsort(np.concatenate(places))
+            together = [one for part, _ in parts for one in part]
+            return [together[k] for k in order], np.concatenate([found for _, found in parts])[order]
+        problem, index = self.restricted([*carried, *(name for start in starts for name in start.effects)])
+        lanes = [
+            problem.lane(self.free(start.effects), self.bounds, start.values[index], start.weights, start.tie)
+            for start in starts
+        ]
+        fits = fit_in_box(problem, lanes, most=most, enough=enough, kept=self.kept, progress=self.progress, what=what)
+        if hops:
+            fits = hopped(problem, lanes, fits, enough=enough, kept=self.kept, progress=self.progress, what=what)
+        found = misfits(problem, [one.values for one in fits])
+        return [self.whole(one, start.values, index) for start, one in zip(starts, fits, strict=True)], found
+
+    def base(self, start: np.ndarray, seed: int) -> Fit:
+        """The base model fitted, from `start` and from many points of its box."""
+        problem, index = self.restricted(())
+        here = eqx.tree_at(lambda one: one.system, problem, problem.system_at(jnp.asarray(start[index])))
+        fits = from_many_starts(
+            here,
+            self.unknowns,
+            self.bounds,
+            seed,
+            progress=self.progress,
+            kept=self.kept,
+            enough=ENOUGH,
+            what="fitting the base model",
+        )
+        return self.whole(fits[0], start, index)
+
+    def whole(self, found: Fit, start: np.ndarray, index: Sequence[int]) -> Fit:
+        """A fit of a restricted problem with the parameters of the whole library's."""
+        values = np.array(start)
+        values[np.asarray(index)] = found.values
+        return dataclasses.replace(found, values=values)
+
+    @staticmethod
+    def known(model: Model) -> Fit:
+        """A fitted model as a fit that has ended."""
+        return Fit(model.values, model.cost, True, "", 0)
+
+    def is_noise(self, values: np.ndarray) -> bool:
+        """Whether what a model leaves of the fit runs is measurement noise."""
+        (misfit,) = misfits(self.problem, [values])
+        return self.all_noise(misfit, np.asarray(self.problem.batch.mask))
+
+    def all_noise(self, misfit: np.ndarray, mask: np.ndarray) -> bool:
+        """Whether a misfit (SI) is measurement noise, as far as `mask` goes, both (R, N)."""
+        return all_noise(split_runs(misfit, mask), float(self.problem.noise_sigma), self.noise_given)
+
+    def rmse(self, misfit: np.ndarray) -> float:
+        return float(np.sqrt((misfit**2).sum() / np.asarray(self.problem.batch.mask).sum()))
+
+    def foretold(self, left_out_rmse: float) -> float:
+        """Share of the mean square of the motion in the fit runs, each about its mean, that a left-out error leaves explained."""
+        mask = np.asarray(self.problem.batch.mask)
+        measured = np.asarray(self.problem.measured)
+        mean = (measured * mask).sum(axis=1, keepdims=True) / np.maximum(mask.sum(axis=1, keepdims=True), 1.0)
+        motion = self.rmse((measured - mean) * mask)
+        return 1.0 - (left_out_rmse / motion) ** 2 if motion > 0.0 else 1.0
+
+    def foretells(self, left_out_rmse: float) -> bool:
+        """Whether a model with that error has anything to do with these runs (`FORETELLS`)."""
+        return self.foretold(left_out_rmse) > FORETELLS
+
+    def judged(
+        self, fitted: Sequence[Fitted], present: Model | None = None, carried: Sequence[str] = ()
+    ) -> list[Model]:
+        """Leave each fit run out in turn, refit to the others, and predict the one left out (of many, `FOLDS` parts).
+
+        A fold starts at the fit to all runs and is tied to it, each parameter to within about `LOOSE` of its logit in
+        the box: else a direction that the others hardly tell runs wherever the last iteration happened to take it, and
+        with it the prediction. In such a direction the fold keeps what the run left out said: where the others do not
+        tell the size of what is new (`told_without`), `present`'s error stands and the effect is credited with nothing.
+        A fold that follows all runs better than the fit to all has come to a better valley: that fit begins there again.
+        """
+        parts = self.parts()
+        folded = self.folded(fitted, carried)
+        better = {
+            place: deeper.values
+            for place, (entry, (_, deeper)) in enumerate(zip(fitted, folded, strict=True))
+            if deeper.cost < (1.0 - PENALTY) * entry.solution.cost
+        }
+        if better:
+            starts = [Start(fitted[place].effects, values) for place, values in better.items()]
+            again, _ = self.fit(starts, "refitting where a fold did better", hops=True, carried=carried)
+            fitted, folded = list(fitted), list(folded)
+            for place, fit in zip(better, again, strict=True):
+                fitted[place] = Fitted(fitted[place].effects, fit)
+            for place, one in zip(better, self.folded([fitted[place] for place in better], carried), strict=True):
+                folded[place] = one
+        models = []
+        for entry, (own, _) in zip(fitted, folded, strict=True):
+            left_out = np.stack([own[fold, run] for run, fold in enumerate(parts.argmax(axis=0))])
+            model = Model(entry.effects, entry.solution.values, entry.solution.cost, left_out, self.rmse(left_out))
+            models.append(model if present is None else self.credited(entry, model, present))
+        return models
+
+    def folded(self, fitted: Sequence[Fitted], carried: Sequence[str] = ()) -> list[tuple[np.ndarray, Fit]]:
+        """Every fit refitted without each part of the runs: the misfit of all runs at each fold, and the one best for all."""
+        parts = self.parts()
+        # With one run nothing can be left out: the fit itself is all there is, and the report says so.
+        folds = list(1.0 - parts) if len(parts) > 1 else [np.ones(1)]
+        levels = self.levels(fitted)
+        starts = [
+            Start(entry.effects, entry.solution.values, weights, np.sqrt(level) / LOOSE)
+            for entry, level in zip(fitted, levels, strict=True)
+            for weights in folds
+        ]
+        fits, found = self.fit(starts, "predicting runs left out", carried=carried)
+        costs = np.nan_to_num((found**2).sum(axis=(1, 2)) / float(self.problem.noise_sigma) ** 2, nan=np.inf)
+        told = []
+        for first in range(0, len(starts), len(folds)):
+            best = first + int(np.argmin(costs[first : first + len(folds)]))
+            told.append((found[first : first + len(folds)], dataclasses.replace(fits[best], cost=float(costs[best]))))
+        return told
+
+    def levels(self, fitted: Sequence[Fitted]) -> list[float]:
+        """Variance that one effective sample of each fit's residual has, over the noise's: memory counts as noise."""
+        mask = np.asarray(self.problem.batch.mask)
+        found = misfits(self.problem, [entry.solution.values for entry in fitted]) / float(self.problem.noise_sigma)
+        return [float((one**2).sum() / mask.sum()) * correlation_time(split_runs(one, mask)) for one in found]
+
+    def credited(self, entry: Fitted, model: Model, present: Model) -> Model:
+        """`model` with `present`'s error on the runs that alone tell the size of what is new (`told_without`)."""
+        if len(model.left_out) == 1:
+            return model
+        told = self.told_without(entry, present)
+        left_out = np.where(told[:, None], model.left_out, present.left_out)
+        return dataclasses.replace(model, left_out=left_out, left_out_rmse=self.rmse(left_out))
+
+    def told_without(self, entry: Fitted, present: Model) -> np.ndarray:
+        """Run by run: do the other runs tell the size of what is new against `present`? Shape (R,).
+
+        They do when the trace of the new coefficients in them, less what the other free parameters absorb, stands out
+        of the residual so far that its size is known to within `TOLD` of itself. Two new effects are taken together:
+        how they share a trace is no matter here.
+        """
+        index, values = self.problem.names.index, entry.solution.values
+        new = [effect for effect in entry.effects if effect not in present.effects]
+        own = [name for effect in new for name in self.coefficients(effect)]
+        size = np.asarray([values[index(name)] - base_value(name) for name in own])
+        others = [name for name in self.loose(entry.effects, values) if name not in own]
+        at = sensitivity(self.problem, values, [*own, *others])
+        level = float(np.mean(at.residual() ** 2)) * correlation_time(split_runs(at.misfit, at.mask))
+        told = []
+        parts = self.parts()
+        for part in parts:
+            rest = dataclasses.replace(at, mask=at.mask * (1.0 - part)[:, None])
+            trace = rest.columns(own) @ size
+            basis = np.linalg.qr(scaled(rest.columns(others)))[0]
+            trace = trace - basis @ (basis.T @ trace)
+            told.append(float(trace @ trace) * TOLD**2 > level)
+        return np.asarray(told)[parts.argmax(axis=0)]
+
+    def parts(self) -> np.ndarray:
+        """Which runs are left out together, (parts, R) of zeros and ones: each alone, or every `FOLDS`-th of many."""
+        runs = self.problem.batch.runs
+        return np.eye(min(runs, FOLDS))[:, np.arange(runs) % FOLDS]
+
+    def better(self, new: Model, old: Model, chance: float | None = None) -> tuple[bool, str]:
+        """Does `new` predict left-out runs better, beyond its extra coefficients and beyond `chance` standard errors?"""
+        if chance is None:
+            chance = CHANCE if len(old.left_out) > 1 else CHANCE_ON_ONE
+        extra = len(self.free(new.effects)) - len(self.free(old.effects))
+        gain = 1.0 - (new.left_out_rmse / old.left_out_rmse) ** 2
+        z = paired(old.left_out, new.left_out, np.asarray(self.problem.batch.mask))
+        # The fit itself must gain as well: a left-out run of its own kind can favour a needless coefficient by luck.
+        fitted = 1.0 - new.cost / old.cost if old.cost > 0.0 else 0.0
+        enough = min(gain, fitted) > PENALTY * extra and z > chance
+        left_out = "left-out runs" if len(old.left_out) > 1 else "the one fit run itself"
+        told = (
+            f"error on {left_out} {self.shown(old.left_out_rmse)} -> {self.shown(new.left_out_rmse)} "
+            f"({gain:+.0%} of its mean square, {z:.1f} standard errors)"
+        )
+        return enough, told
+
+
+def base_value(coefficient: str) -> float:
+    """The value at which a coefficient such as `latent_heat.enthalpy` changes nothing."""
+    effect, name = coefficient.split(".", 1)
+    return float(getattr(EVERY[effect].base(), name))
+
+
+def paired(old: np.ndarray, new: np.ndarray, mask: np.ndarray) -> float:
+    """Mean drop of the squared error over its standard error, on blocks longer than the residual's memory.
+
+    All samples of a left-out run share the error of the one fit that foretells it, which blocks do not see. Over three or
+    four runs that cannot be told from an effect that shows in one of them alone: the held-out runs have to.
+    """
+    gains, block = [], int(np.ceil(2.0 * correlation_time(split_runs(old, mask))))
+    for before, after, valid in zip(old, new, mask, strict=True):
+        drop = (before**2 - after**2)[valid > 0]
+        width = min(block, max(1, len(drop) // 4))
+        gains += [float(piece.mean()) for piece in np.array_split(drop, max(1, len(drop) // width))]
+    spread = np.std(gains, ddof=1) / np.sqrt(len(gains)) if len(gains) > 1 else np.inf
+    return float(np.mean(gains) / spread) if spread > 0.0 else 0.0
+
+
+def nudged(setting: Search, values: np.ndarray, effects: Sequence[str]) -> np.ndarray:
+    """`values` with `effects` switched on by next to nothing.
+
+    A transformation with a tail follows its curve where one without rests, so at exactly zero the coefficient of a tail
+    has no derivative there.
+    """
+    found = np.array(values)
+    for effect in effects:
+        for name in switches(effect):
+            found[setting.problem.names.index(name)] += NUDGE * LIBRARY[effect].starts[name.removeprefix(f"{effect}.")]
+    return found

@@ -1,0 +1,124 @@
+"""Score test: which effects would lower the misfit, told from one Jacobian at the present fit, before any refit.
+
+Each coefficient is looked at where it is switched off. The columns of the fitted parameters are projected out first:
+what they can absorb is no evidence for an effect. What remains of the coefficient's column against what remains of the
+residual gives the gain that a small coefficient would bring, its sign, and a p-value under the hypothesis that nothing
+is missing: then the residual is noise, of as many independent samples as its memory leaves (`memory_of`), and the
+statistic is chi-square. Where something is missing every effect
+that is not orthogonal to it stands out, so the p-value says *whether* to search; *what* is found is judged on runs
+left out.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy import optimize, stats
+
+from smajax.attribution.every_effect import EVERY
+from smajax.core.whiteness import correlation_time, split_runs
+from smajax.fit.sensitivity import Sensitivity
+
+
+@dataclass(frozen=True)
+class Score:
+    """What the screening says of one effect or of two together."""
+
+    effects: tuple[str, ...]
+    gain: float  # share of the residual's square that the linear model would take away, 0..1
+    statistic: float  # gain in units of one independent sample's variance
+    p_value: float
+    coefficients: dict[str, float]  # linear estimate by parameter name, inside its bounds
+    place: dict[str, float] = field(
+        default_factory=dict
+    )  # values of the coefficients that are no switches, if not `starts`
+
+
+def switches(effect: str) -> tuple[str, ...]:
+    """Parameter names of the coefficients that switch `effect` on."""
+    return tuple(f"{effect}.{name}" for name in EVERY[effect].switches)
+
+
+def score_of(
+    names: tuple[str, ...],
+    at: Sensitivity,
+    basis: np.ndarray,
+    residual: np.ndarray,
+    bounds: Mapping[str, tuple[float, float]],
+    memory: float,
+) -> Score:
+    """Of one effect or two, in the residual and beside the directions of `without`; `memory`: of `memory_of`."""
+    coefficients = [name for effect in names for name in switches(effect)]
+    # misfit = measured - model: a coefficient lowers it along minus its derivative.
+    columns = -at.columns(coefficients)
+    columns = columns - basis @ (basis.T @ columns)
+    low = np.asarray([bounds[name][0] for name in coefficients])
+    high = np.asarray([bounds[name][1] for name in coefficients])
+    # In shares of the box the columns are of a like size; a column that the fitted parameters absorb is left out.
+    boxed = columns * (high - low)
+    seen = np.linalg.norm(boxed, axis=0) > 1e-9
+    found = np.zeros(len(coefficients))
+    if seen.any():
+        room = (high - low)[seen]
+        lower, upper = np.minimum(low[seen] / room, 0.0), np.maximum(high[seen] / room, 0.0)
+        solved = optimize.lsq_linear(boxed[:, seen], residual, bounds=(lower - 1e-12, upper + 1e-12))
+        found[seen] = solved.x * room
+    before = float(residual @ residual)
+    after = residual - columns @ found
+    gain = max(0.0, 1.0 - float(after @ after) / before) if before else 0.0
+    statistic = gain * len(residual) / memory
+    return Score(
+        names,
+        gain,
+        statistic,
+        float(stats.chi2.sf(statistic, max(1, int(seen.sum())))),
+        dict(zip(coefficients, found.tolist(), strict=True)),
+    )
+
+
+def screen(
+    at: Sensitivity, fitted: Sequence[str], candidates: Sequence[str], bounds: Mapping[str, tuple[float, float]]
+) -> tuple[list[Score], list[Score]]:
+    """(single effects, pairs), each ranked by gain. `fitted` are the loose parameters at the present fit."""
+    basis, residual = without(at, fitted)
+    memory = memory_of(at)
+    singles = [score_of((name,), at, basis, residual, bounds, memory) for name in candidates]
+    pairs = [score_of(two, at, basis, residual, bounds, memory) for two in itertools.combinations(candidates, 2)]
+    rank = lambda score: -score.gain  # noqa: E731
+    return sorted(singles, key=rank), sorted(pairs, key=rank)
+
+
+def without(at: Sensitivity, fitted: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
+    """(directions that the fitted parameters absorb, residual without them)."""
+    residual = at.residual()
+    basis = np.linalg.qr(scaled(at.columns(fitted)))[0] if fitted else np.zeros((len(residual), 0))
+    return basis, residual - basis @ (basis.T @ residual)
+
+
+def memory_of(at: Sensitivity) -> float:
+    """Samples per independent one, as far as noise accounts for them: with a memory it is matched by a slow trace far more easily.
+
+    What is larger than the noise is no noise, and its memory no reason for doubt.
+    """
+    noise = min(1.0, 1.0 / max(float(np.mean(at.residual() ** 2)), 1e-300))
+    return 1.0 + noise * (correlation_time(split_runs(at.misfit, at.mask)) - 1.0)
+
+
+def scaled(columns: np.ndarray) -> np.ndarray:
+    """The columns that are not all zero, each of length one."""
+    norm = np.linalg.norm(columns, axis=0)
+    return columns[:, norm > 0.0] / norm[norm > 0.0]
+
+
+def significant(scores: Sequence[Score], level: float, least_gain: float) -> bool:
+    """Does any score stand out among that many looks (Bonferroni), and promise more than `least_gain` a coefficient?
+
+    The second half keeps a search from starting for what it could not accept: many samples make the tiniest bias of
+    the integrator significant.
+    """
+    return any(
+        score.p_value * len(scores) < level and score.gain > least_gain * len(score.coefficients) for score in scores
+    )

@@ -1,0 +1,55 @@
+"""Does what an effect gains hang on the step of the integration?
+
+A load that sticks and jumps may jump a step earlier or later by rounding alone. A fit can choose the coefficients whose
+row of jumps happens to fall where the log's does, and gains what no wire does: at half the step the gain is gone.
+"""
+
+from __future__ import annotations
+
+import jax.numpy as jnp
+import numpy as np
+
+from smajax.attribution.cross_validation import Model, Search, Start, base_value
+from smajax.attribution.job import Job
+from smajax.fit.packed_runs import halved, simulate_batch
+from smajax.fit.predicted import shown_at
+from smajax.fit.problem import Problem
+from smajax.model.effects.library import LIBRARY
+from smajax.model.load.coupon import AbstractCoupon
+
+
+def kept_at_half_the_step(setting: Search, new: Model, old: Model) -> float:
+    """Share of what lets the load jump gains in the squared error of all fit runs that it keeps, unfitted, at half the step.
+
+    The gain is of `new` on `old`, or on `old` with the partner that was added beside it: a partner's gain is not its own.
+    1 where nothing that was added can jump.
+    """
+    jumping = {effect for effect in new.effects if effect not in old.effects and LIBRARY[effect].jumps}
+    if not jumping:
+        return 1.0
+    without = old.cost
+    partner = tuple(effect for effect in new.effects if effect not in jumping)
+    if partner != old.effects:
+        values = np.array(new.values)
+        for effect in jumping:
+            for name in setting.coefficients(effect):
+                values[setting.problem.names.index(name)] = base_value(name)
+        (fit,), _ = setting.fit([Start(partner, values)], "looking at half the step")
+        without = min(without, fit.cost)
+    problem, index = setting.restricted(new.effects)
+    fine = Problem.build(problem.system, halved(problem.batch), problem.noise_sigma, problem.offset)
+    misfit = problem.centred(problem.measured - shown_at(fine, [new.values[index]])[0][:, ::2])
+    cost = float(np.sum((np.asarray(misfit) / np.asarray(problem.noise)) ** 2))
+    return (without - cost) / (without - new.cost) if without > new.cost else 0.0
+
+
+def integration_error(job: Job, final: Model) -> float:
+    """By how much the output (rms, worst fit run, SI, offset aside) changes when the step is halved."""
+    if isinstance(job.problem.system.load, AbstractCoupon):
+        return 0.0  # a closed form at each sample
+    batch, values = job.problem.batch, final.values
+    coarse = simulate_batch(job.problem.system_at(jnp.asarray(values)), batch).reading
+    fine = simulate_batch(job.problem.system_at(jnp.asarray(values)), halved(batch)).reading[:, ::2]
+    change, mask = np.asarray(fine - coarse), np.asarray(batch.mask)
+    centred = change - (job.experiment.offset * (change * mask).sum(1) / mask.sum(1))[:, None]
+    return float(np.sqrt(((centred * mask) ** 2).sum(1) / mask.sum(1)).max())

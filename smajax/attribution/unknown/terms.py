@@ -1,0 +1,306 @@
+"""Unknown terms: a smooth function of one state put into one equation, for what no effect of the library accounts for.
+
+They are effects like any other, but no candidates: a function of seven coefficients says where something is missing and
+what it looks like, not what it is. With all coefficients zero each leaves the base model as it is.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+import equinox as eqx
+import jax.numpy as jnp
+
+from smajax.attribution.unknown.spline import spline
+from smajax.core.parameters import parameter
+from smajax.model.effects.base import AbstractEffect
+from smajax.model.types import Scalar
+
+if TYPE_CHECKING:
+    from smajax.model.load.base import AbstractMovingLoad
+    from smajax.model.wire.wire import Wire
+
+FORMULA = "f: seven cubic B-splines, each coefficient a share of the largest f that is sought"
+
+
+class AbstractUnknown(AbstractEffect):
+    r"""$f(x) = s \sum_j c_j B_j\big((x - x_0)/w\big)$ of one state x, cubic B-splines B_j, held outside of x_0..x_0 + w."""
+
+    c1: Scalar = parameter("-", -1.0, 1.0, "about f/s a quarter of the range below it", default=0.0)
+    c2: Scalar = parameter("-", -1.0, 1.0, "about f/s at the lower end", default=0.0)
+    c3: Scalar = parameter("-", -1.0, 1.0, "about f/s at a quarter of the range", default=0.0)
+    c4: Scalar = parameter("-", -1.0, 1.0, "about f/s at the middle", default=0.0)
+    c5: Scalar = parameter("-", -1.0, 1.0, "about f/s at three quarters", default=0.0)
+    c6: Scalar = parameter("-", -1.0, 1.0, "about f/s at the upper end", default=0.0)
+    c7: Scalar = parameter("-", -1.0, 1.0, "about f/s a quarter of the range above it", default=0.0)
+    low: Scalar = eqx.field(converter=jnp.asarray, default=0.0)  # x_0, in the state's unit
+    width: Scalar = eqx.field(converter=jnp.asarray, default=1.0)  # w
+    scale: Scalar = eqx.field(converter=jnp.asarray, default=1.0)  # s, in the function's unit
+
+    symbol: ClassVar[str]  # of the state
+    state: ClassVar[str]  # the state in words
+    state_unit: ClassVar[str]
+    unit: ClassVar[str]  # of the function
+    only_changes: ClassVar[bool] = False  # whether a constant f is none: drawn about its mean over the samples then
+    formula: ClassVar[str] = FORMULA
+    sentence: ClassVar[str] = "Something that the library does not hold."
+    switches: ClassVar[tuple[str, ...]] = ("c1", "c2", "c3", "c4", "c5", "c6", "c7")
+    starts: ClassVar[dict[str, float]] = dict.fromkeys(("c1", "c2", "c3", "c4", "c5", "c6", "c7"), 0.0)
+
+    @classmethod
+    def base(cls) -> AbstractUnknown:
+        return cls()
+
+    def value(self, x: Scalar) -> Scalar:
+        """f(x)."""
+        coefficients = (self.c1, self.c2, self.c3, self.c4, self.c5, self.c6, self.c7)
+        return self.scale * spline(coefficients, (x - self.low) / self.width)
+
+
+class LossOfTemperature(AbstractUnknown):
+    """A heat loss beside the convection's."""
+
+    effect_name: ClassVar[str] = "unknown_loss_of_temperature"
+    title: ClassVar[str] = "a heat loss depending on the temperature over the air's"
+    equation: ClassVar[str] = "heat"
+    symbol: ClassVar[str] = "T - T_inf"
+    state: ClassVar[str] = "temperature over ambient"
+    state_unit: ClassVar[str] = "K"
+    unit: ClassVar[str] = "W/m"
+
+    def heat_loss(self, wire: Wire, temperature: Scalar, ambient: Scalar) -> Scalar | float:
+        return self.value(temperature - ambient)
+
+
+class HeatOfFraction(AbstractUnknown):
+    """Heat stored in the phases."""
+
+    effect_name: ClassVar[str] = "unknown_heat_of_fraction"
+    title: ClassVar[str] = "a stored heat depending on the martensite fraction"
+    equation: ClassVar[str] = "heat"
+    symbol: ClassVar[str] = "xi"
+    state: ClassVar[str] = "martensite fraction"
+    state_unit: ClassVar[str] = "-"
+    unit: ClassVar[str] = "J/m"
+    only_changes: ClassVar[bool] = True
+
+    def stored_heat(self, wire: Wire, temperature: Scalar, fraction: Scalar) -> Scalar | float:
+        return self.value(fraction)
+
+
+class ResistanceOfTemperature(AbstractUnknown):
+    """A relative change of the resistance."""
+
+    effect_name: ClassVar[str] = "unknown_resistance_of_temperature"
+    title: ClassVar[str] = "a change of resistance depending on the temperature"
+    equation: ClassVar[str] = "electrical"
+    symbol: ClassVar[str] = "T"
+    state: ClassVar[str] = "temperature"
+    state_unit: ClassVar[str] = "degC"
+    unit: ClassVar[str] = "-"
+
+    def resistance_factor(self, temperature: Scalar, fraction: Scalar) -> Scalar | float:
+        return self.value(temperature)
+
+
+class ResistanceOfFraction(AbstractUnknown):
+    """The same by phase."""
+
+    effect_name: ClassVar[str] = "unknown_resistance_of_fraction"
+    title: ClassVar[str] = "a change of resistance depending on the martensite fraction"
+    equation: ClassVar[str] = "electrical"
+    symbol: ClassVar[str] = "xi"
+    state: ClassVar[str] = "martensite fraction"
+    state_unit: ClassVar[str] = "-"
+    unit: ClassVar[str] = "-"
+
+    def resistance_factor(self, temperature: Scalar, fraction: Scalar) -> Scalar | float:
+        return self.value(fraction)
+
+
+def _bent(share: Scalar, by: Scalar) -> Scalar:
+    # 0 and 1 stay where they are: a transformation ends where it ended.
+    return share + share * (1.0 - share) * by
+
+
+class HeatingCurve(AbstractUnknown):
+    """Another shape of the martensite-to-austenite curve: h -> h + h (1 - h) f(h)."""
+
+    effect_name: ClassVar[str] = "unknown_heating_curve"
+    title: ClassVar[str] = "another course of the transformation on heating"
+    equation: ClassVar[str] = "kinetics"
+    symbol: ClassVar[str] = "h"
+    state: ClassVar[str] = "share of martensite left on the heating curve"
+    state_unit: ClassVar[str] = "-"
+    unit: ClassVar[str] = "-"
+
+    def heating_shape(self, z: Scalar, remaining: Scalar) -> Scalar:
+        return _bent(remaining, self.value(remaining))
+
+
+class CoolingCurve(AbstractUnknown):
+    """The same of the austenite-to-martensite curve."""
+
+    effect_name: ClassVar[str] = "unknown_cooling_curve"
+    title: ClassVar[str] = "another course of the transformation on cooling"
+    equation: ClassVar[str] = "kinetics"
+    symbol: ClassVar[str] = "k"
+    state: ClassVar[str] = "share of austenite left on the cooling curve"
+    state_unit: ClassVar[str] = "-"
+    unit: ClassVar[str] = "-"
+
+    def cooling_shape(self, z: Scalar, remaining: Scalar) -> Scalar:
+        return _bent(remaining, self.value(remaining))
+
+
+class BothCurves(AbstractUnknown):
+    """The same of both curves, by what each has left: a material whose range is not traversed evenly either way."""
+
+    effect_name: ClassVar[str] = "unknown_both_curves"
+    title: ClassVar[str] = "another course of the transformation on either way"
+    equation: ClassVar[str] = "kinetics"
+    symbol: ClassVar[str] = "h"
+    state: ClassVar[str] = "share left on the heating or the cooling curve"
+    state_unit: ClassVar[str] = "-"
+    unit: ClassVar[str] = "-"
+
+    def heating_shape(self, z: Scalar, remaining: Scalar) -> Scalar:
+        return _bent(remaining, self.value(remaining))
+
+    def cooling_shape(self, z: Scalar, remaining: Scalar) -> Scalar:
+        return _bent(remaining, self.value(remaining))
+
+
+class StrainOfTemperature(AbstractUnknown):
+    """A strain beside eps_L xi_s and the elastic part."""
+
+    effect_name: ClassVar[str] = "unknown_strain_of_temperature"
+    title: ClassVar[str] = "a strain depending on the temperature"
+    equation: ClassVar[str] = "constitutive"
+    symbol: ClassVar[str] = "T"
+    state: ClassVar[str] = "temperature"
+    state_unit: ClassVar[str] = "degC"
+    unit: ClassVar[str] = "-"
+    only_changes: ClassVar[bool] = True
+
+    def strain(
+        self, wire: Wire, temperature: Scalar, stress: Scalar, fraction: Scalar, detwinned: Scalar
+    ) -> Scalar | float:
+        return self.value(temperature)
+
+
+class StrainOfStress(AbstractUnknown):
+    """The same of the stress."""
+
+    effect_name: ClassVar[str] = "unknown_strain_of_stress"
+    title: ClassVar[str] = "a strain depending on the stress"
+    equation: ClassVar[str] = "constitutive"
+    symbol: ClassVar[str] = "sigma"
+    state: ClassVar[str] = "stress"
+    state_unit: ClassVar[str] = "Pa"
+    unit: ClassVar[str] = "-"
+    only_changes: ClassVar[bool] = True
+
+    def strain(
+        self, wire: Wire, temperature: Scalar, stress: Scalar, fraction: Scalar, detwinned: Scalar
+    ) -> Scalar | float:
+        return self.value(stress)
+
+
+class StrainOfFraction(AbstractUnknown):
+    """The same of the martensite fraction."""
+
+    effect_name: ClassVar[str] = "unknown_strain_of_fraction"
+    title: ClassVar[str] = "a strain depending on the martensite fraction"
+    equation: ClassVar[str] = "constitutive"
+    symbol: ClassVar[str] = "xi"
+    state: ClassVar[str] = "martensite fraction"
+    state_unit: ClassVar[str] = "-"
+    unit: ClassVar[str] = "-"
+    only_changes: ClassVar[bool] = True
+
+    def strain(
+        self, wire: Wire, temperature: Scalar, stress: Scalar, fraction: Scalar, detwinned: Scalar
+    ) -> Scalar | float:
+        return self.value(fraction)
+
+
+class ForceOfDisplacement(AbstractUnknown):
+    """A force against contraction beside the load's."""
+
+    effect_name: ClassVar[str] = "unknown_force_of_displacement"
+    title: ClassVar[str] = "a force depending on the displacement"
+    equation: ClassVar[str] = "mechanics"
+    symbol: ClassVar[str] = "x"
+    state: ClassVar[str] = "displacement of the wire's end"
+    state_unit: ClassVar[str] = "m"
+    unit: ClassVar[str] = "N"
+
+    def resisting_force(self, load: AbstractMovingLoad, displacement: Scalar, speed: Scalar) -> Scalar | float:
+        return self.value(displacement)
+
+
+class ForceOfSpeed(AbstractUnknown):
+    """The same of the speed."""
+
+    effect_name: ClassVar[str] = "unknown_force_of_speed"
+    title: ClassVar[str] = "a force depending on the speed"
+    equation: ClassVar[str] = "mechanics"
+    symbol: ClassVar[str] = "v"
+    state: ClassVar[str] = "speed of the wire's end"
+    state_unit: ClassVar[str] = "m/s"
+    unit: ClassVar[str] = "N"
+
+    def resisting_force(self, load: AbstractMovingLoad, displacement: Scalar, speed: Scalar) -> Scalar | float:
+        return self.value(speed)
+
+
+class ReadingOfValue(AbstractUnknown):
+    """An error of the sensor's reading, in the sensor's unit."""
+
+    effect_name: ClassVar[str] = "unknown_reading_of_value"
+    title: ClassVar[str] = "an error of the sensor depending on what it shows"
+    equation: ClassVar[str] = "sensor"
+    symbol: ClassVar[str] = "y"
+    state: ClassVar[str] = "what an ideal sensor shows"
+    state_unit: ClassVar[str] = "reading"
+    unit: ClassVar[str] = "reading"
+
+    def sensed(self, reading: Scalar, time: Scalar, last: Scalar) -> Scalar:
+        return reading + self.value(reading)
+
+
+class ReadingOfTime(AbstractUnknown):
+    """The same of the time since the run's start."""
+
+    effect_name: ClassVar[str] = "unknown_reading_of_time"
+    title: ClassVar[str] = "an error of the sensor depending on the time in the run"
+    equation: ClassVar[str] = "sensor"
+    symbol: ClassVar[str] = "t"
+    state: ClassVar[str] = "time"
+    state_unit: ClassVar[str] = "s"
+    unit: ClassVar[str] = "reading"
+
+    def sensed(self, reading: Scalar, time: Scalar, last: Scalar) -> Scalar:
+        return reading + self.value(time)
+
+
+UNKNOWN: dict[str, type[AbstractUnknown]] = {
+    term.effect_name: term
+    for term in (
+        LossOfTemperature,
+        HeatOfFraction,
+        ResistanceOfTemperature,
+        ResistanceOfFraction,
+        HeatingCurve,
+        CoolingCurve,
+        BothCurves,
+        StrainOfTemperature,
+        StrainOfStress,
+        StrainOfFraction,
+        ForceOfDisplacement,
+        ForceOfSpeed,
+        ReadingOfValue,
+        ReadingOfTime,
+    )
+}

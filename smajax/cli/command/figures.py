@@ -1,0 +1,71 @@
+"""`smajax figures`: the source's figures with the numbers that prove them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from smajax.cli.command import complete
+from smajax.cli.command.base import UNMET, Json, Open, Overwrite, browse, console, resumable
+
+OWN = (".made-by", "index.html", "README.md", "figures.csv", "[MC][0-9].*", "[MC][0-9][0-9].*")
+
+
+def figures(
+    names: Annotated[
+        list[str] | None,
+        typer.Argument(
+            help="chapters (chapter3, chapter4) and single figures (M7 C12); default all",
+            autocompletion=complete.figures,
+        ),
+    ] = None,
+    out: Annotated[Path, typer.Option(help="folder for the pictures, the numbers (JSON) and the table")] = Path(
+        "figures"
+    ),
+    fast: Annotated[bool, typer.Option("--fast", help="coarser steps, fewer samples, the same claims")] = False,
+    overwrite: Overwrite = False,
+    json_out: Json = False,
+    open_page: Open = False,
+) -> None:
+    """Draw the source's figures, each with the number that proves it, and print which claims hold.
+
+    Exit code 3 when one that was asked for does not. Figures that lie in the folder already stay on its page. Ctrl-C loses
+    nothing: the same command goes on with the figures that are missing.
+
+    Example:  smajax figures M7 C12 --out figures
+    """
+    from smajax.core.runtime import prepare
+
+    prepare()
+    from smajax.cli.command.folder import claimed
+    from smajax.cli.progress_display import shown
+    from studies.source.catalogue import CHAPTERS, rows
+    from studies.source.write import as_text, draw, write_pages
+
+    try:
+        asked = [row for name in names or CHAPTERS for row in rows(name)]
+    except KeyError as error:
+        raise typer.BadParameter(error.args[0], param_hint="NAME") from None
+    setting = {"setting": "fast" if fast else "full"}
+    kept = "Finished figures are kept: the same command goes on."
+    with (
+        resumable(kept, out, "[MC]*.json"),
+        claimed(out, "figures", setting, OWN, overwrite),
+        shown(console(), told_how=not json_out) as progress,
+    ):
+        drawn = draw(list(dict.fromkeys(asked)), out, fast, progress)
+        page = write_pages(out)
+    if json_out:
+        typer.echo(
+            json.dumps({one.row.name: {"holds": one.holds, "found": one.found, "note": one.caveat} for one in drawn})
+        )
+    else:
+        typer.echo(as_text(drawn))
+        typer.echo(f"Page: {page.resolve()}")
+    if open_page:
+        browse(page)
+    if not all(one.holds for one in drawn):
+        raise typer.Exit(UNMET)

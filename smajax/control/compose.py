@@ -1,0 +1,204 @@
+"""A model from names: wire, load, drive, law, effects, values that differ from the presets', and a controller around it."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import overload
+
+from smajax.control.controllers.base import AbstractController
+from smajax.control.loop_dataset import Loop
+from smajax.control.mismatch import MISMATCHES, ratio_of
+from smajax.control.presets import CONTROLLERS
+from smajax.core.names import instead, of_many
+from smajax.core.parameters import check_bounds, parameter_values, parameters, set_parameters
+from smajax.core.units import UnitError, parse_quantity
+from smajax.data.model_catalogue import check_together
+from smajax.model.effects.library import LIBRARY, at_base
+from smajax.model.extended import extended
+from smajax.model.load.base import AbstractMovingLoad
+from smajax.model.presets import build
+from smajax.model.system import System
+from smajax.model.wire.laws import under_law
+from smajax.model.wire.order import check_order
+
+PARAMETERS = "`smajax presets WIRE LOAD DRIVE` lists those of a model, `smajax effects` those of effects"
+
+
+def parameter_name(system: System, name: str) -> str:
+    """The parameter that `name` means: its own name, its place in the model (`wire.heat.convection_coefficient`), or short.
+
+    Short names are those of `MISMATCHES`. Raises ValueError with the nearest names, and what lists all.
+    """
+    table = parameters(system)
+    places = {".".join(map(str, entry.path)): own for own, entry in table.items()}
+    short = {short: own for short, own in MISMATCHES.items() if own in table}
+    meant = {**short, **places, **{own: own for own in table}}
+    if name in meant:
+        return meant[name]
+    told = f"{name!r} ({MISMATCHES[name]})" if name in MISMATCHES else f"{name!r}"
+    raise ValueError(f"no parameter {told}{of_many(name, [*table, *short], PARAMETERS)}")
+
+
+def _value(before: System, system: System, name: str, own: str, value: str | float) -> float:
+    """The value in the program's own unit; text may carry a unit of its own, a plain number is SI, degC, rad.
+
+    Text such as `+20%` is a change of the value that `before` has.
+    """
+    unit = parameters(system)[own].unit
+    if not isinstance(value, str):
+        return float(value)
+    ratio = ratio_of(name, value, plain=unit == "-" and name not in MISMATCHES)
+    if ratio is not None:
+        if unit == "degC" and own not in MISMATCHES.values():
+            # A share of what 0 degC makes small or large; of the air it is what sweeps vary.
+            raise ValueError(
+                f"{name}={value.strip()} is a share of degrees Celsius, which says little: expected the temperature, such as "
+                f"'{parameter_values(before).get(own, 0.0):g} degC'."
+            )
+        return ratio * _changed(before, own, f"{name}={value.strip()}", unit)
+    try:
+        plain = float(value)
+    except ValueError:
+        pass
+    else:
+        if value.strip().startswith("+"):
+            raise ValueError(
+                f"{name}={value.strip()} may be a change without its %, or a value: write '{value.strip()}%' or '{plain:g}'."
+            )
+        return plain
+    try:
+        return parse_quantity(value, "1" if unit == "-" else unit)
+    except UnitError as error:
+        raise UnitError(f"{name}: {error}") from None
+
+
+def _changed(before: System, own: str, told: str, unit: str) -> float:
+    """The value that a change is a share of. ValueError where there is none, or zero."""
+    value = parameter_values(before).get(own)
+    effect, _, coefficient = own.partition(".")
+    started = LIBRARY[effect].starts.get(coefficient) if effect in LIBRARY else None
+    like = "a value" + (f" in {unit}" if unit != "-" else "") + (f", such as '{started:g} {unit}'" if started else "")
+    like = like.replace(" -'", "'")  # of a number without unit
+    if value is None:
+        raise ValueError(f"{told} is a change of what is there, and the effect {effect} is not: give {like}.")
+    if value == 0.0:
+        raise ValueError(f"{told} is a change of what is there, which is 0, as any share of it: give {like}.")
+    return value
+
+
+def with_values(system: System, values: Mapping[str, str | float]) -> System:
+    """`system` with parameters put in, as `compose` takes them; what is a change (`+20%`) is one of `system`'s own value.
+
+    An effect of which a parameter is given is added. Raises as `compose` does.
+    """
+    known = {one.effect_name for one in system.effects}
+    named = {name.split(".")[0] for name in values} & LIBRARY.keys()
+    wider = _with_effects(system, sorted(named - known))
+    own: dict[str, str] = {}
+    for name in values:
+        meant = parameter_name(wider, name)
+        if meant in own:
+            raise ValueError(f"{name!r} and {own[meant]!r} are the same parameter: give it once.")
+        own[meant] = name
+    found = set_parameters(
+        wider, {meant: _value(system, wider, name, meant, values[name]) for meant, name in own.items()}
+    )
+    check_bounds(found)
+    check_order(found)
+    return found
+
+
+def _with_effects(system: System, names: Sequence[str]) -> System:
+    """`system` with more effects at base value, all in the library's order."""
+    if not names:
+        return system
+    there = [one.effect_name for one in system.effects]
+    own = dict(zip(there, system.effects, strict=True))
+    both = (own.get(one.effect_name, one) for one in at_base([*there, *names]))
+    return dataclasses.replace(system, effects=tuple(both))
+
+
+@overload
+def compose(
+    wire: str,
+    load: str,
+    drive: str,
+    *,
+    law: str = "",
+    effects: Sequence[str] = (),
+    values: Mapping[str, str | float] | None = None,
+    controller: None = None,
+    **others: object,
+) -> System: ...
+
+
+@overload
+def compose(
+    wire: str,
+    load: str,
+    drive: str,
+    *,
+    law: str = "",
+    effects: Sequence[str] = (),
+    values: Mapping[str, str | float] | None = None,
+    controller: str | AbstractController,
+    **others: object,
+) -> Loop: ...
+
+
+def compose(
+    wire: str,
+    load: str,
+    drive: str,
+    *,
+    law: str = "",
+    effects: Sequence[str] = (),
+    values: Mapping[str, str | float] | None = None,
+    controller: str | AbstractController | None = None,
+    **others: object,
+) -> System | Loop:
+    """Presets by name, under a kinetics law, with effects and parameters of one's own: a system, or a loop around it.
+
+    values: parameter -> a number (SI, temperatures in degC, angles in rad), text with a unit (`"80 W/m^2/K"`), or a change of
+    the preset's value (`"+20%"`, `"-50%"`); by its name, its place in the model, or a name of `MISMATCHES`. An effect is part
+    of the model when one of its parameters is given (`latent_heat.enthalpy`).
+    controller: the name of one in `CONTROLLERS` with its preset gains, which knows this system, or one of one's own; what
+    comes back is then a `Loop`, for `simulate_loop_dataset`.
+    Raises KeyError for a preset, law, effect or controller there is not, ValueError for a parameter there is not, one given twice, a
+    change of nothing, a value out of its bounds, transformation temperatures in the wrong order, or presets that do not go
+    together, UnitError for a unit of another kind, TypeError for a parameter that is not in `values`.
+    """
+    if others:
+        name, value = next(iter(others.items()))
+        raise TypeError(f"compose() has no argument {name!r}; a parameter goes into values={{{name!r}: {value!r}}}")
+    if (
+        isinstance(effects, str)
+        or not isinstance(effects, Sequence)
+        or not all(isinstance(one, str) for one in effects)
+    ):
+        raise TypeError(
+            f"effects={effects!r}; expected their names in a list, such as effects=['latent_heat']. One of your own goes into "
+            "`dataclasses.replace(system, effects=(YourEffect(...),))`."
+        )
+    system = build(wire, load, drive)
+    check_together(system, load, drive)
+    if law:
+        system = dataclasses.replace(system, wire=under_law(system.wire, law))
+    system = with_values(extended(system, [*dict.fromkeys(effects)]), values or {})
+    return system if controller is None else _around(system, controller, load)
+
+
+def _around(system: System, controller: str | AbstractController, load: str) -> Loop:
+    """The loop; a preset is made for the system, and takes the plant that its section is written for."""
+    if isinstance(controller, AbstractController):
+        return Loop(system, controller)
+    if controller not in CONTROLLERS:
+        raise KeyError(f"no controller {controller!r}{instead(controller, CONTROLLERS, 'there are')}")
+    if not isinstance(system.load, AbstractMovingLoad) or system.load.reading[1] != "rad":
+        raise ValueError(
+            f"controllers by name have gains for the arm: give the load 'arm', not {load!r}, or a controller of your own."
+        )
+    preset = CONTROLLERS[controller]
+    plant = preset.plant(system)
+    return Loop(plant, preset.make(plant))

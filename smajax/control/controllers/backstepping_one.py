@@ -1,0 +1,130 @@
+r"""Backstepping, approach I (Elahinia 2004, sec. 4.8.1): Khalil's procedure through the stress, without a temperature.
+
+With $x_1 = \theta - \theta_d$ and $x_2 = \dot x_1$ (the source has $\theta_d = 0$):
+
+    Phi   = (I/alpha) (-x_1 + h/I + theta_d'' - K x_2)     stress that makes x_1'' + K x_1' + x_1 = 0   (eq. 4.57)
+    z_1   = sigma - Phi,      u_1 = -(alpha/I) x_2 - k_1 z_1                                         (eq. 4.58, 4.65)
+    x_4'  = (u_1 + dPhi/dt + (2 r/l_0) E x_2) / Gamma      rate of the fraction with which z_1' = u_1   (eq. 4.66)
+    x_5   = temperature at which the wire has its fraction under its stress                           (eq. 4.67)
+    U     = m c_p x_5' + h_c A_c (x_5 - T_inf)                                                       (eq. 4.68)
+
+Eq. 4.66 prints a part of the bracket outside of 1/Gamma; the derivatives of Phi and of eq. 4.67 are automatic.
+"""
+
+from __future__ import annotations
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from smajax.control.controllers.base import AbstractController
+from smajax.control.controllers.inverse_wire import (
+    moving_load,
+    power_for,
+    stress_slopes,
+    temperature_for,
+    torque_per_stress,
+    voltage_for,
+)
+from smajax.control.measured_state import MeasuredState
+from smajax.control.reference import Reference
+from smajax.core.parameters import parameter
+from smajax.model.system import System
+from smajax.model.types import Scalar
+
+
+class BacksteppingOneMemory(eqx.Module):
+    """For the rate of the stress, and the branch in force."""
+
+    stress: Scalar  # Pa, at the last call
+    heating: Scalar  # 1 while martensite is to become austenite, else 0
+
+
+class Asked(eqx.Module):
+    """What a call works out on its way to the voltage."""
+
+    stress: Scalar  # Pa, Phi
+    stress_error: Scalar  # Pa, z_1
+    fraction_rate: Scalar  # 1/s, x_4'
+    heating: Scalar  # 1 or 0: the curve used
+    temperature: Scalar  # C, x_5
+    temperature_rate: Scalar  # C/s, x_5'
+    power: Scalar  # W/m, U, before it is bounded
+
+
+class BacksteppingOne(AbstractController):
+    """Needs angle, rate, stress, its rate (a difference of two calls), the fraction, and the amplitudes xi_M and xi_A.
+
+    The curve changes with the sign of the wanted fraction's rate: there the voltage jumps and has no derivative.
+    """
+
+    believed: System
+    damping_gain: Scalar = parameter("1/s", 0.0, 1e4, "K: weight of the rate in the stress wanted (eq. 4.57)")
+    stress_gain: Scalar = parameter("1/s", 0.0, 1e4, "k_1: how fast the stress error dies out (eq. 4.65)")
+    largest_voltage: Scalar = parameter("V", 0.0, 1e4, "largest command; the smallest is zero")
+    edge: Scalar = parameter(
+        "-", 1e-12, 0.5, "distance from the ends of arccos from where on its slope is held", default=1e-6
+    )
+    rest_torque_share: Scalar = parameter(
+        "-", 0.0, 1.0, "share of h_0 taken off h: 1 as in eq. 4.70, which moves the equilibrium", default=0.0
+    )
+    measured_rate_share: Scalar = parameter(
+        "-", 0.0, 1.0, "1: the stress's rate as measured (sec. 4.8.2); 0: the rate that is wanted", default=1.0
+    )
+
+    def start(self, measured: MeasuredState, wanted: Reference) -> BacksteppingOneMemory:
+        return BacksteppingOneMemory(measured.stress, jnp.ones_like(measured.stress))
+
+    def stress_wanted(self, position: Scalar, velocity: Scalar, wanted: Reference) -> Scalar:
+        """Phi of eq. 4.57, Pa; never negative: a wire cannot push."""
+        load, inertia = moving_load(self.believed), self._inertia()
+        off, off_rate = position - wanted.position, velocity - wanted.velocity
+        torque = load.resistance(position, velocity, {}) - self.rest_torque_share * load.resistance(
+            wanted.position, jnp.zeros_like(velocity), {}
+        )
+        torque = torque + inertia * (wanted.acceleration - off - self.damping_gain * off_rate)
+        stress = torque / torque_per_stress(self.believed)
+        return jnp.where(stress < 0.0, 0.0, stress)  # so that nan stays nan
+
+    def asked(self, memory: BacksteppingOneMemory, measured: MeasuredState, wanted: Reference, period: Scalar) -> Asked:
+        """From the state to the power."""
+        believed, law = self.believed, self.believed.wire.kinetics
+        push = torque_per_stress(believed) / self._inertia()
+        resisting = moving_load(believed).resistance(measured.position, measured.velocity, {}) / self._inertia()
+        acceleration = push * measured.stress - resisting
+        moving = Reference(wanted.velocity, wanted.acceleration, jnp.zeros_like(wanted.acceleration))
+        stress, stress_wanted_rate = jax.jvp(
+            self.stress_wanted,
+            (measured.position, measured.velocity, wanted),
+            (measured.velocity, acceleration, moving),
+        )
+        error = measured.stress - stress
+        # In pascals and radians the first term is next to nothing; it is there for the Lyapunov function of eq. 4.64.
+        pull = -push * (measured.velocity - wanted.velocity) - self.stress_gain * error
+        stress_rate = pull + stress_wanted_rate
+        per_fraction, per_radian = stress_slopes(believed, measured.position, measured.martensite_fraction)
+        fraction_rate = (stress_rate - per_radian * measured.velocity) / per_fraction
+        heating = (fraction_rate < 0.0) | ((fraction_rate == 0.0) & (memory.heating > 0.5))
+        seen = (measured.stress - memory.stress) / period
+        share = self.measured_rate_share
+        temperature, rate = jax.jvp(
+            lambda fraction, stress: temperature_for(
+                law, fraction, stress, heating, measured.xi_M, measured.xi_A, self.edge
+            ),
+            (measured.martensite_fraction, measured.stress),
+            (fraction_rate, share * seen + (1.0 - share) * stress_rate),
+        )
+        power = power_for(believed, temperature, rate)
+        return Asked(stress, error, fraction_rate, 1.0 * heating, temperature, rate, power)
+
+    def step(
+        self, memory: BacksteppingOneMemory, measured: MeasuredState, wanted: Reference, period: Scalar
+    ) -> tuple[BacksteppingOneMemory, Scalar]:
+        asked = self.asked(memory, measured, wanted, period)
+        voltage = voltage_for(
+            self.believed, asked.power, asked.temperature, measured.martensite_fraction, self.largest_voltage
+        )
+        return BacksteppingOneMemory(measured.stress, asked.heating), voltage
+
+    def _inertia(self) -> Scalar:
+        return moving_load(self.believed).inertia({})

@@ -1,0 +1,143 @@
+r"""Backstepping, approach II (Elahinia 2004, sec. 4.8.2): angle -> stress -> fraction -> temperature -> voltage.
+
+With $x_1 = \theta - \theta_d$ and $x_2 = \dot x_1$ (the source has $\theta_d = 0$):
+
+    x_3 = (I/alpha) (-x_1 + h/I + theta_d'' - K x_2)     stress that makes x_1'' + K x_1' + x_1 = 0      (eq. 4.70)
+    x_4 = fraction with that stress at this angle                                                      (eq. 4.72)
+    z   = T - Phi_1(x_3, x_4)                            temperature less the one with that fraction     (eq. 4.73-4.75)
+    U   = m c_p (v + dPhi_1/dt) + h_c A_c (T - T_inf),   so that z' = v = -K_1 z                         (eq. 4.77-4.80)
+
+dPhi_1/dt is the automatic derivative along the motion, in the place of the misprinted eq. 4.76 to 4.80.
+"""
+
+from __future__ import annotations
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+
+from smajax.control.controllers.base import AbstractController
+from smajax.control.controllers.inverse_wire import (
+    fraction_for,
+    moving_load,
+    power_for,
+    temperature_for,
+    torque_per_stress,
+    voltage_for,
+)
+from smajax.control.measured_state import MeasuredState
+from smajax.control.reference import Reference
+from smajax.core.parameters import parameter
+from smajax.model.system import System
+from smajax.model.types import Scalar
+
+
+class BacksteppingTwoMemory(eqx.Module):
+    """The branch in force."""
+
+    heating: Scalar  # 1 while martensite is to become austenite, else 0
+
+
+class Asked(eqx.Module):
+    """What a call works out on its way to the voltage."""
+
+    stress: Scalar  # Pa, x_3
+    fraction: Scalar  # -, x_4
+    fraction_rate: Scalar  # 1/s
+    heating: Scalar  # 1 or 0: the curve used
+    temperature: Scalar  # C, Phi_1
+    temperature_rate: Scalar  # C/s
+    temperature_error: Scalar  # C, z
+    power: Scalar  # W/m, U, before it is bounded
+
+
+class BacksteppingTwo(AbstractController):
+    """Needs angle, rate, temperature and the amplitudes xi_M and xi_A; `believed` is the plant as the controller knows it.
+
+    The curve changes with the sign of the wanted fraction's rate: there the voltage jumps and has no derivative.
+    """
+
+    believed: System
+    damping_gain: Scalar = parameter("1/s", 0.0, 1e4, "K: weight of the rate in the stress wanted (eq. 4.70)")
+    temperature_gain: Scalar = parameter("1/s", 0.0, 1e4, "K_1: how fast the temperature's error dies out")
+    largest_voltage: Scalar = parameter("V", 0.0, 1e4, "largest command; the smallest is zero")
+    edge: Scalar = parameter(
+        "-", 1e-12, 0.5, "distance from the ends of arccos from where on its slope is held", default=1e-6
+    )
+    rest_torque_share: Scalar = parameter(
+        "-", 0.0, 1.0, "share of h_0 taken off h: 1 as eq. 4.70 prints, which moves the equilibrium", default=0.0
+    )
+    stress_share: Scalar = parameter(
+        "-", 0.0, 1.0, "share of the stress error in the acceleration: 0 as eq. 4.76, 1 exact, with x_3", default=0.0
+    )
+    epsilon: Scalar = parameter("-", -1.0, 1.0, "of eq. 4.81 and 4.87", default=0.0)
+    cross_share: Scalar = parameter(
+        "-",
+        -1.0,
+        1.0,
+        "of C (alpha/I)(epsilon x_1 + x_2) in v: 1 as eq. 4.87 prints, -1 the sign it needs",
+        default=0.0,
+    )
+
+    def start(self, measured: MeasuredState, wanted: Reference) -> BacksteppingTwoMemory:
+        return BacksteppingTwoMemory(jnp.ones_like(measured.position))
+
+    def stress_wanted(self, position: Scalar, velocity: Scalar, wanted: Reference) -> Scalar:
+        """x_3 of eq. 4.70, Pa; never negative: a wire cannot push."""
+        load, inertia = moving_load(self.believed), self._inertia()
+        torque = load.resistance(position, velocity, {}) - self.rest_torque_share * load.resistance(
+            wanted.position, jnp.zeros_like(velocity), {}
+        )
+        torque = torque + inertia * self._acceleration(position, velocity, wanted)
+        stress = torque / torque_per_stress(self.believed)
+        return jnp.where(stress < 0.0, 0.0, stress)  # so that nan stays nan
+
+    def asked(self, memory: BacksteppingTwoMemory, measured: MeasuredState, wanted: Reference) -> Asked:
+        """From the state to the power."""
+        believed, law = self.believed, self.believed.wire.kinetics
+
+        def stress_and_fraction(position: Scalar, velocity: Scalar, wanted: Reference) -> tuple[Scalar, Scalar]:
+            stress = self.stress_wanted(position, velocity, wanted)
+            return stress, fraction_for(believed, position, stress)
+
+        here = measured.position, measured.velocity, wanted
+        moving = Reference(wanted.velocity, wanted.acceleration, jnp.zeros_like(wanted.acceleration))
+        wish = self._acceleration(*here)
+        (stress, fraction), (stress_rate, fraction_rate) = jax.jvp(
+            stress_and_fraction, here, (measured.velocity, wish, moving)
+        )
+        # The curve follows the wish: an arm that the wire does not move yet shows no acceleration to go by.
+        heating = (fraction_rate < 0.0) | ((fraction_rate == 0.0) & (memory.heating > 0.5))
+        push = torque_per_stress(believed) / self._inertia()
+        missed = self.stress_share * push * (measured.stress - stress)
+        still = jax.tree.map(jnp.zeros_like, moving)
+        _, (stress_miss, fraction_miss) = jax.jvp(stress_and_fraction, here, (jnp.zeros_like(missed), missed, still))
+        stress_rate, fraction_rate = stress_rate + stress_miss, fraction_rate + fraction_miss
+        temperature, rate = jax.jvp(
+            lambda fraction, stress: temperature_for(
+                law, fraction, stress, heating, measured.xi_M, measured.xi_A, self.edge
+            ),
+            (fraction, stress),
+            (fraction_rate, stress_rate),
+        )
+        error = measured.temperature - temperature
+        slope = jnp.where(heating, law.stress_slope_austenite, law.stress_slope_martensite)
+        off, off_rate = measured.position - wanted.position, measured.velocity - wanted.velocity
+        cross = self.cross_share * slope * push * (self.epsilon * off + off_rate)
+        power = power_for(believed, measured.temperature, cross - self.temperature_gain * error + rate)
+        return Asked(stress, fraction, fraction_rate, 1.0 * heating, temperature, rate, error, power)
+
+    def step(
+        self, memory: BacksteppingTwoMemory, measured: MeasuredState, wanted: Reference, period: Scalar
+    ) -> tuple[BacksteppingTwoMemory, Scalar]:
+        asked = self.asked(memory, measured, wanted)
+        voltage = voltage_for(self.believed, asked.power, measured.temperature, asked.fraction, self.largest_voltage)
+        return BacksteppingTwoMemory(asked.heating), voltage
+
+    def _inertia(self) -> Scalar:
+        return moving_load(self.believed).inertia({})
+
+    def _acceleration(self, position: Scalar, velocity: Scalar, wanted: Reference) -> Scalar:
+        """theta'' that the stress wanted gives: theta_d'' - x_1 - K x_2."""
+        off, off_rate = position - wanted.position, velocity - wanted.velocity
+        return wanted.acceleration - off - self.damping_gain * off_rate

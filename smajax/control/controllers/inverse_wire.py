@@ -1,0 +1,122 @@
+"""The wire read backwards: angle and stress -> martensite fraction -> temperature, and power -> voltage (sec. 4.8).
+
+Of the `System` that a controller believes in: eq. 4.51 to 4.53, 4.72 to 4.74 and 4.69. Its effects, its thermal modulus
+and other forms of its stiffness are passed over, as the section passes them over.
+"""
+
+from __future__ import annotations
+
+import jax.numpy as jnp
+from jaxtyping import Array, Bool
+
+from smajax.core.limited import limited
+from smajax.model.load.base import AbstractMovingLoad
+from smajax.model.system import System
+from smajax.model.types import Scalar
+from smajax.model.wire.heat import cross_section, heat_rate, mass_per_metre
+from smajax.model.wire.kinetics import Kinetics
+from smajax.model.wire.resistance import resistance_per_metre
+
+# An amplitude of less than this is none: what is left of a branch is then taken as all of it.
+NONE_LEFT = 1e-9
+SMALLEST_VOLTAGE = 1e-3  # V: below it the voltage falls in proportion to the power, so that its slope stays finite
+SMALLEST_ROOT = 1e-12  # of a discriminant, in units of (E_A eps_L)^2
+
+
+def moving_load(believed: System) -> AbstractMovingLoad:
+    """Its load, which the section needs to move."""
+    assert isinstance(believed.load, AbstractMovingLoad)
+    return believed.load
+
+
+def torque_per_stress(believed: System) -> Scalar:
+    """alpha = 2 r A_w, N m/Pa (below eq. 4.50)."""
+    return moving_load(believed).lever() * cross_section(believed.wire)
+
+
+def strain_at_angle(believed: System, position: Scalar) -> Scalar:
+    r"""$\varepsilon = -2 r (\theta - \theta_0)/l_0 + \varepsilon_L + \sigma_0/E_M$, - (eq. 4.53).
+
+    From the unloaded austenite. The source leaves out the last term, and with it the stress of the wire at rest.
+    """
+    load, law = moving_load(believed), believed.wire.constitutive
+    start = load.start()
+    at_rest = load.resistance(start, jnp.zeros_like(start), {}) / torque_per_stress(believed)
+    elastic = jnp.where(at_rest > 0.0, at_rest, 0.0) / law.young_modulus_martensite
+    return law.recoverable_strain + elastic - load.contraction(believed.wire) * (position - start)
+
+
+def stress_slopes(believed: System, position: Scalar, fraction: Scalar) -> tuple[Scalar, Scalar]:
+    r"""(Gamma, $-2 r E(\xi)/l_0$): stress per fraction and per radian, Pa and Pa/rad (eq. 4.61)."""
+    law = believed.wire.constitutive
+    softer = law.young_modulus_martensite - law.young_modulus_austenite
+    modulus = law.young_modulus_austenite + fraction * softer
+    elastic = strain_at_angle(believed, position) - law.recoverable_strain * fraction
+    per_fraction = softer * elastic - modulus * law.recoverable_strain
+    return per_fraction, -moving_load(believed).contraction(believed.wire) * modulus
+
+
+def fraction_for(believed: System, position: Scalar, stress: Scalar) -> Scalar:
+    r"""Root of $[E_A + \xi (E_M - E_A)](\varepsilon - \varepsilon_L \xi) = \sigma$ in [0, 1] (eq. 4.72), -.
+
+    At the end that lies nearer where no fraction gives that stress.
+    """
+    law = believed.wire.constitutive
+    strain = strain_at_angle(believed, position)
+    softer = law.young_modulus_martensite - law.young_modulus_austenite
+    scale = law.young_modulus_austenite * law.recoverable_strain
+    # 0 = square xi^2 - line xi + constant; the smaller root, in the form that needs no square term.
+    line = scale - softer * strain
+    constant = law.young_modulus_austenite * strain - stress
+    square = -law.recoverable_strain * softer
+    discriminant = line**2 - 4.0 * square * constant
+    smallest = SMALLEST_ROOT * scale**2
+    real = jnp.where(discriminant > smallest, discriminant, smallest)
+    return limited(2.0 * constant / (line + jnp.sqrt(real)), 0.0, 1.0)
+
+
+def bounded_arccos(value: Scalar, edge: Scalar) -> Scalar:
+    r"""arccos with the slope held at that of $\pm(1 - \mathrm{edge})$ beyond it, $1/\sqrt{2\,\mathrm{edge}}$ about; flat beyond +-1."""
+    inside = limited(value, edge - 1.0, 1.0 - edge)
+    return jnp.arccos(inside) - (limited(value, -1.0, 1.0) - inside) / jnp.sqrt(1.0 - inside**2)
+
+
+def temperature_for(
+    law: Kinetics,
+    fraction: Scalar,
+    stress: Scalar,
+    heating: Bool[Array, ""],
+    xi_M: Scalar,
+    xi_A: Scalar,
+    edge: Scalar,
+) -> Scalar:
+    """Temperature at which the wire has that fraction, on the heating curve (eq. 4.73) or the cooling curve (4.74), C."""
+    left = jnp.where(xi_M > NONE_LEFT, fraction / jnp.where(xi_M > NONE_LEFT, xi_M, 1.0), 0.0)
+    room = 1.0 - xi_A
+    formed = jnp.where(room > NONE_LEFT, (1.0 - fraction) / jnp.where(room > NONE_LEFT, room, 1.0), 1.0)
+    hot = (law.austenite_finish - law.austenite_start) / jnp.pi * bounded_arccos(2.0 * left - 1.0, edge)
+    cold = (law.martensite_start - law.martensite_finish) / jnp.pi * bounded_arccos(1.0 - 2.0 * formed, edge)
+    return jnp.where(
+        heating,
+        law.austenite_start + hot + stress / law.stress_slope_austenite,
+        law.martensite_finish + cold + stress / law.stress_slope_martensite,
+    )
+
+
+def power_for(believed: System, temperature: Scalar, rate: Scalar) -> Scalar:
+    r"""$U = m c_p \dot T + h_c A_c (T - T_\infty)$, W/m (eq. 4.68, 4.80)."""
+    wire = believed.wire
+    nothing = jnp.zeros_like(temperature)
+    loss = -heat_rate(wire, (), temperature, wire.heat.ambient_temperature, nothing, nothing)
+    return mass_per_metre(wire) * wire.heat.specific_heat * rate + loss
+
+
+def voltage_for(believed: System, power: Scalar, temperature: Scalar, fraction: Scalar, largest: Scalar) -> Scalar:
+    """V = sqrt(U R) (eq. 4.69) through the amplifier; nothing for a negative power (sec. 4.8.3), `largest` at most."""
+    wire, drive = believed.wire, believed.drive
+    ohms = resistance_per_metre(wire, (), temperature, fraction)
+    at_one_volt = drive.power(ohms, wire.wire_length, drive.from_voltage(jnp.ones_like(power)))
+    squared = power / at_one_volt
+    large = squared > SMALLEST_VOLTAGE**2
+    root = jnp.sqrt(jnp.where(large, squared, 1.0))
+    return limited(jnp.where(large, root, squared / SMALLEST_VOLTAGE), 0.0, largest)

@@ -1,0 +1,23 @@
+"""The contract of an estimator: from readings of the position and the command held, to what a controller is told."""
+
+from __future__ import annotations
+
+import abc
+from typing import Any
+
+import equinox as eqx
+
+from smajax.control.measured_state import MeasuredState
+from smajax.model.types import Scalar
+
+
+class AbstractEstimator(eqx.Module):
+    """Sampled with the controller."""
+
+    @abc.abstractmethod
+    def start(self, reading: Scalar) -> tuple[Any, MeasuredState]:
+        """(memory, first estimate) from the first reading and what the estimator believes of the state at rest."""
+
+    @abc.abstractmethod
+    def step(self, memory: Any, reading: Scalar, voltage: Scalar, period: Scalar) -> tuple[Any, MeasuredState]:
+        """(memory, estimate) at `reading`, after `voltage` was held for `period` seconds."""

@@ -1,0 +1,68 @@
+"""The simulator's state as a filter sees it: four numbers that it corrects, and the rest kept consistent with them."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float
+
+from smajax.core.limited import limited
+from smajax.model.load.base import AbstractMovingLoad
+from smajax.model.system import System
+from smajax.model.types import Motion, Scalar, State
+from smajax.model.wire.constitutive import strain_at, stress_at
+from smajax.model.wire.history import kept_after, over
+from smajax.model.wire.two_populations import corrected, moved
+from smajax.simulation.input_delay import refuse_lag
+from smajax.simulation.step import step
+
+# Position (rad, m), velocity, temperature (C), martensite fraction.
+Corrected = Float[Array, "4"]
+
+
+def vector_of(state: State) -> Corrected:
+    """What a filter corrects."""
+    wire, motion = state.wire, state.motion
+    return jnp.stack([motion.position, motion.velocity, wire.temperature, wire.martensite_fraction])
+
+
+def with_vector(system: System, state: State, vector: Corrected) -> State:
+    """`state` with the four numbers put in, held between the end stops and in [0, 1].
+
+    Strain follows from the position and stress from the constitutive law, which counts from `state`. The curves of the
+    kinetics stay: on a branch the fraction belongs to the temperature, which is how a reading of the position tells it.
+    """
+    load, wire, effects, old = system.load, system.wire, system.effects, over(state.wire, 0.0)
+    assert isinstance(load, AbstractMovingLoad)
+    position = limited(vector[0], *load.limits())
+    velocity, temperature, fraction = vector[1], vector[2], limited(vector[3], 0.0, 1.0)
+    strain = -load.contraction(wire) * (position - load.start())
+    stress = stress_at(wire, effects, old, strain, temperature, old.stress, fraction)
+    new = dataclasses.replace(
+        old,
+        kept=kept_after(effects, old, temperature, stress, fraction),
+        temperature=temperature,
+        stress=stress,
+        strain=strain_at(wire, effects, old, temperature, stress, fraction),
+        martensite_fraction=fraction,
+        detwinned_fraction=wire.kinetics.variants.detwinned(old, stress, fraction),
+    )
+    new = moved(effects, old, new)
+    return State(state.time, new, Motion(position, velocity, state.motion.friction), state.reading, state.sensor)
+
+
+def with_correction(system: System, state: State, vector: Corrected, transforming: Bool[Array, ""]) -> State:
+    """`with_vector`, and the curves laid so that the corrected fraction does not jump in the next step."""
+    new = with_vector(system, state, vector)
+    wire = corrected(system.wire.kinetics, system.effects, state.wire, new.wire, transforming)
+    return dataclasses.replace(new, wire=wire)
+
+
+def advanced(system: System, state: State, voltage: Scalar, period: Scalar, substeps: int) -> State:
+    """The simulator's own steps through one period with `voltage` held."""
+    refuse_lag(system, "a filter")
+    inputs = system.drive.from_voltage(voltage)
+    for _ in range(substeps):
+        state = step(system, state, inputs, period / substeps)
+    return state

@@ -1,0 +1,91 @@
+"""Kalman filter over the simulator's own step: position, velocity, temperature and martensite fraction corrected.
+
+The transition is `smajax.simulation.step.step`, its derivative what automatic differentiation makes of it (or none, with the
+unscented prediction). So whatever the believed system has - a law, an effect, an end stop - is in the filter.
+"""
+
+from __future__ import annotations
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Bool
+
+from smajax.control.estimators.base import AbstractEstimator
+from smajax.control.estimators.believed_state import advanced, vector_of, with_correction, with_vector
+from smajax.control.estimators.kalman import (
+    AbstractPrediction,
+    Belief,
+    Innovation,
+    Linearised,
+    Matrix,
+    Vector,
+    corrected,
+)
+from smajax.control.measured_state import MeasuredState, truth
+from smajax.core.parameters import parameter
+from smajax.model.system import System, initial_state
+from smajax.model.types import Scalar, State
+from smajax.model.wire.branch_amplitude import beyond
+
+
+class ModelFilterMemory(eqx.Module):
+    """The believed state after the last reading, how far it may be off, and what that reading was off by."""
+
+    state: State
+    covariance: Matrix  # of position, velocity, temperature, martensite fraction
+    innovation: Innovation  # at the start, against the load at rest
+
+
+class ModelFilter(AbstractEstimator):
+    """`system` is the plant that the filter believes in; its load moves and its drive takes a voltage.
+
+    Noise enters the four numbers as random walks, whose variance grows with the time: it stands for what the believed
+    system has wrong. `substeps` are the simulator's steps in one period.
+    """
+
+    system: System
+    reading_noise: Scalar = parameter("rad or m", 1e-9, 1.0, "standard deviation of a reading")
+    position_walk: Scalar = parameter("rad/s^0.5 or m/s^0.5", 0.0, 1e2, "random walk of the position")
+    velocity_walk: Scalar = parameter("rad/s^1.5 or m/s^1.5", 0.0, 1e4, "random walk of the velocity")
+    temperature_walk: Scalar = parameter("K/s^0.5", 0.0, 1e4, "random walk of the temperature")
+    fraction_walk: Scalar = parameter("1/s^0.5", 0.0, 1e2, "random walk of the martensite fraction")
+    start_temperature: Scalar = parameter("degC", -100.0, 400.0, "temperature believed at the start")
+    start_position_error: Scalar = parameter("rad or m", 0.0, 10.0, "standard deviation of the position at the start")
+    start_velocity_error: Scalar = parameter("rad/s or m/s", 0.0, 1e2, "of the velocity")
+    start_temperature_error: Scalar = parameter("K", 0.0, 1e3, "of the temperature")
+    start_fraction_error: Scalar = parameter("-", 0.0, 1.0, "of the martensite fraction")
+    prediction: AbstractPrediction = Linearised()
+    substeps: int = eqx.field(static=True, default=1)
+
+    def start(self, reading: Scalar) -> tuple[ModelFilterMemory, MeasuredState]:
+        rest = initial_state(self.system, self.system.drive.from_voltage(jnp.zeros_like(reading)))
+        # Strain and stress count from the rest at ambient temperature also where the wire is believed to be warm.
+        believed = vector_of(rest).at[2].set(self.start_temperature)
+        errors = [self.start_position_error, self.start_velocity_error, self.start_temperature_error]
+        belief = Belief(believed, jnp.diag(jnp.stack([*errors, self.start_fraction_error]) ** 2))
+        return self._read(rest, belief, jnp.zeros_like(reading, bool), reading)
+
+    def step(
+        self, memory: ModelFilterMemory, reading: Scalar, voltage: Scalar, period: Scalar
+    ) -> tuple[ModelFilterMemory, MeasuredState]:
+        def transition(vector: Vector) -> tuple[Vector, State]:
+            after = advanced(
+                self.system, with_vector(self.system, memory.state, vector), voltage, period, self.substeps
+            )
+            return vector_of(after), after
+
+        walks = jnp.stack([self.position_walk, self.velocity_walk, self.temperature_walk, self.fraction_walk])
+        before = Belief(vector_of(memory.state), memory.covariance)
+        belief, after = self.prediction.predicted(transition, before, jnp.diag(walks**2) * period)
+        # Rounding alone does not transform.
+        transforming = beyond(jnp.abs(after.wire.martensite_fraction - memory.state.wire.martensite_fraction))
+        return self._read(after, belief, transforming, reading)
+
+    def _read(
+        self, state: State, belief: Belief, transforming: Bool[Array, ""], reading: Scalar
+    ) -> tuple[ModelFilterMemory, MeasuredState]:
+        """Correct by the reading, and make the rest of the state consistent with what came out."""
+        position = jnp.zeros_like(belief.mean).at[0].set(1.0)
+        belief, innovation = corrected(belief, reading, position, self.reading_noise**2)
+        state = with_correction(self.system, state, belief.mean, transforming)
+        return ModelFilterMemory(state, belief.covariance, innovation), truth(state)

@@ -1,0 +1,102 @@
+"""A system under a controller as one thing, and its run as a labelled data set."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+import xarray as xr
+
+from smajax.control.closed_loop import ClosedLoop, check_answers
+from smajax.control.compiled_loop import judged_loop_compiled
+from smajax.control.controllers.base import AbstractController
+from smajax.control.interface import check_interface
+from smajax.control.reference import Reference, resting
+from smajax.core.parameters import check_bounds, parameter_values
+from smajax.data.step_command import clock_of, given
+from smajax.model.load.base import AbstractMovingLoad
+from smajax.model.system import System
+from smajax.model.wire.order import check_order
+from smajax.simulation.dataset import labelled_run
+from smajax.simulation.simulate import DEFAULT_STEP
+
+PERIOD = 0.01  # s, of the controller
+
+
+class Loop(eqx.Module):
+    """A plant and what commands its voltage: `compose(..., controller="pid")`."""
+
+    system: System
+    controller: AbstractController
+
+
+def labelled_loop(system: System, loop: ClosedLoop, **settings: object) -> xr.Dataset:
+    """A closed loop as `labelled_run`, with the command `voltage` (V) and the position `wanted`.
+
+    A mapping among the settings, such as `gains`, becomes JSON.
+    """
+    told = {name: json.dumps(dict(one)) if isinstance(one, Mapping) else one for name, one in settings.items()}
+    found = labelled_run(system, loop.run, {"voltage": loop.voltage}, **told)
+    position = found["position"].attrs["units"]
+    found["wanted"] = ("time", np.asarray(loop.wanted.position), {"units": position, "long_name": "set point"})
+    return found
+
+
+def simulate_loop_dataset(
+    loop: Loop,
+    set_point: float | str | Reference,
+    seconds: float | None = None,
+    dt: float = DEFAULT_STEP,
+    period: float = PERIOD,
+) -> xr.Dataset:
+    """Run a loop from rest: an `xarray.Dataset` over time (s), with the command `voltage` (V) and the position `wanted`.
+
+    set_point: a number (rad or m), text with a unit (`"40 deg"`), levels each with its time (`"40deg:5s,10deg:5s"`, which
+    need no `seconds`), or a `Reference` of samples `dt` apart, which has its own length. The controller is called every
+    `period` seconds and is told the true state; noise, a filter, delays and disturbances are `simulate_closed_loop`'s.
+
+    Raises TypeError for what is no `Loop` (a system without a controller), UnitError for a unit of another kind, ValueError
+    for a coupon, a parameter or gain out of its bounds, a period that is no multiple of `dt`, a run without a length or
+    shorter than a period, and a controller whose answer is no number.
+    """
+    if not isinstance(loop, Loop):
+        raise TypeError(
+            f"expected a Loop, got {type(loop).__name__}: `compose(..., controller='pid')` or `Loop(system, controller)`."
+        )
+    system, controller = loop.system, loop.controller
+    if not isinstance(system.load, AbstractMovingLoad):
+        raise ValueError(
+            f"a {type(system.load).__name__} moves nothing that a controller could lead: give another load."
+        )
+    check_bounds(system)
+    check_order(system)
+    check_interface("", 0.0, period, dt)
+    every = round(period / dt)
+    wanted = _wanted(set_point, system.load.reading[1], seconds, dt)
+    samples = (wanted.position.shape[0] - 1) // every * every + 1
+    if samples <= every:
+        raise ValueError(f"the run is shorter than one control period of {period:g} s.")
+    wanted = Reference(wanted.position[:samples], wanted.velocity[:samples], wanted.acceleration[:samples])
+    run, _ = judged_loop_compiled(system, controller, wanted, dt, every)
+    check_answers(run)
+    return labelled_loop(
+        system, run, dt=dt, period=period, controller=type(controller).__name__, gains=parameter_values(controller)
+    )
+
+
+def _wanted(set_point: float | str | Reference, unit: str, seconds: float | None, dt: float) -> Reference:
+    """The set point over time; `unit` is that of a number."""
+    if isinstance(set_point, Reference):
+        if seconds is not None:
+            raise ValueError("a Reference has its own length: leave `seconds` out.")
+        return set_point
+    asked = given(set_point if isinstance(set_point, str) else f"{float(set_point)!r} {unit}", unit)
+    if seconds is None and asked.seconds is None:
+        raise ValueError(
+            "nothing says how long the run is: give `seconds`, or levels with times ('40deg:5s,10deg:5s')."
+        )
+    # A set point holds from its instant on: a mean over the step before it would come early.
+    return resting(jnp.asarray(asked.at(clock_of([asked], seconds, dt))))

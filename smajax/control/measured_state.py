@@ -1,0 +1,49 @@
+"""What a controller is told once a period: measured, estimated or, in a study, true."""
+
+from __future__ import annotations
+
+import equinox as eqx
+import jax.numpy as jnp
+
+from smajax.core.parameters import parameter
+from smajax.model.types import Scalar, State
+
+
+class MeasuredState(eqx.Module):
+    """Position and what an estimator makes of it. A controller that measures the position only reads nothing else."""
+
+    position: Scalar  # rad, m
+    velocity: Scalar  # rad/s, m/s
+    stress: Scalar  # Pa
+    temperature: Scalar  # C
+    martensite_fraction: Scalar  # -
+    xi_M: Scalar  # amplitude of the heating curve in force (eq. 3.3)
+    xi_A: Scalar  # floor of the cooling curve in force (eq. 3.5)
+
+
+def truth(state: State) -> MeasuredState:
+    """What a perfect estimator would say."""
+    wire = state.wire
+    return MeasuredState(
+        state.motion.position,
+        state.motion.velocity,
+        wire.stress,
+        wire.temperature,
+        wire.martensite_fraction,
+        wire.xi_M,
+        wire.xi_A,
+    )
+
+
+class Sensor(eqx.Module):
+    """Position sensor: Gaussian noise, then the steps of its counter."""
+
+    noise_sigma: Scalar = parameter("rad or m", 0.0, 1.0, "standard deviation of a reading", default=0.0)
+    quantum: Scalar = parameter("rad or m", 0.0, 1.0, "step between two readings; 0: none", default=0.0)
+
+    def reading(self, position: Scalar, noise: Scalar) -> Scalar:
+        """`noise` is a standard normal number."""
+        noisy = position + self.noise_sigma * noise
+        counted = self.quantum > 0.0
+        quantum = jnp.where(counted, self.quantum, 1.0)
+        return jnp.where(counted, quantum * jnp.round(noisy / quantum), noisy)

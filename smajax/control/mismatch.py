@@ -1,0 +1,82 @@
+"""How wrong a plant may be: names and sizes, the same for `simulate --mismatch`, `sweep --over` and `tune --variation`.
+
+`+20%` and `-50%` are changes of what is believed, upwards or downwards; `20%` (and `0.2`) of a variation is both ways.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+from smajax.core.units import UnitError, parse_quantity
+
+# What is looked at by sweeps and tuning: its name on the command line -> the plant's parameter.
+MISMATCHES = {
+    "inertia": "inertia_ratio",
+    "damping": "damping",
+    "convection": "convection_coefficient",
+    "ambient": "ambient_temperature",
+    "payload": "payload_mass",
+    "supply": "amplifier_gain",
+}
+MINUS, BOTH = "\N{MINUS SIGN}", "\N{PLUS-MINUS SIGN}"
+_SIZE = r"\s*(\d+\.?\d*|\.\d+)\s*%\s*"
+_ONE_WAY = re.compile(rf"\s*([-+{MINUS}]){_SIZE}")
+_BOTH_WAYS = re.compile(rf"\s*(?:{BOTH}|\+\s*/?\s*[-{MINUS}]){_SIZE}")
+_UNSIGNED = re.compile(_SIZE)
+
+
+def short_name(name: str) -> str:
+    """`convection` of `convection_coefficient`; any other name as it is."""
+    return next((short for short, own in MISMATCHES.items() if own == name), name)
+
+
+def ratio_of(name: str, text: str, plain: bool = False) -> float | None:
+    """1.2 of `+20%`, 0.5 of `-50%`; None of text that is a value.
+
+    plain: a percentage without a sign is a value too, of a parameter that has no unit.
+    Raises ValueError for a percentage that does not say which way.
+    """
+    found = _ONE_WAY.fullmatch(text)
+    if found is not None:
+        size = float(found[2]) / 100.0
+        return 1.0 + size if found[1] == "+" else 1.0 - size
+    both = _BOTH_WAYS.fullmatch(text) or (None if plain else _UNSIGNED.fullmatch(text))
+    if both is not None:
+        raise ValueError(
+            f"got {name}={text.strip()}, expected +{both[1]}% or -{both[1]}%, a change of what it is, or a value"
+        )
+    return None
+
+
+def variation_of(told: Mapping[str, str]) -> dict[str, float]:
+    """Shares by the names of `MISMATCHES`, of text such as `20%`, `0.2` or `±20%`: 0.2.
+
+    Raises ValueError for what is no share, one way alone, or twice of one parameter.
+    """
+    found: dict[str, float] = {}
+    for name, text in told.items():
+        both = _BOTH_WAYS.fullmatch(text) or _UNSIGNED.fullmatch(text)
+        if _ONE_WAY.fullmatch(text):
+            size = text.strip().lstrip(f"+-{MINUS} ")
+            raise ValueError(
+                f"got {name}={text.strip()}, expected a variation, which goes both ways: {name}={size} is from -{size} to "
+                f"+{size} of what the controller believes."
+            )
+        if short_name(name) in found:
+            raise ValueError(f"{name} is `{short_name(name)}`, which is given already: give it once.")
+        try:
+            found[short_name(name)] = float(both[1]) / 100.0 if both else parse_quantity(text, "1")
+        except UnitError as error:
+            comma = f" ({error})" if re.fullmatch(r"\s*\d*,\d+\s*%?\s*", text) else ""
+            raise ValueError(
+                f"got {name}={text}, expected a share such as {name}=20% or {name}=0.2, with a comma before the next name{comma}."
+            ) from None
+    return found
+
+
+def in_words(believed: float | None, true: float, unit: str) -> str:
+    """`1.2 times (+20 %)`; `+4 K` of a temperature, of which a share tells nothing; "" where nothing is believed, or zero."""
+    if believed is not None and unit == "degC":
+        return f"{true - believed:+.4g} K"
+    return f"{true / believed:.4g} times ({100.0 * (true / believed - 1.0):+.4g} %)" if believed else ""

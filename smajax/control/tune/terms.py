@@ -1,0 +1,126 @@
+r"""What tuning makes small, while a loop runs: the figures of `merit` with a derivative in the gains.
+
+Overshoot, steady error, energy and peak temperature have one as they are (a maximum over time has that of its sample).
+The settling time has none where it jumps from one swing to the next; in its place stands a memory of when the
+angle was outside of the band b last,
+
+    ds/dt = r(e) (t - s),      r = exp((|e|/b - 1)/w)/tau,
+
+which follows the time while the angle is outside and holds it inside. With the softness w -> 0 it is the settling time.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+
+from smajax.control.closed_loop import AbstractWatch
+from smajax.control.figures_of_merit import Judge, Merit
+from smajax.model.types import Scalar, State
+
+FOLLOWS = 0.05  # s, tau: how fast the memory follows at the edge of the band
+STEEPEST = 30.0  # exponent from where on it follows at once
+EARLIEST, LATEST = 0.7, 0.95  # share of the run between which a loop that settles late becomes one that never does
+
+
+class Term(NamedTuple):
+    """A term as a user names and weighs it."""
+
+    label: str
+    unit: str  # shown, and of weights and limits
+    factor: float  # from SI
+
+
+# By the fields of `Terms`.
+TERMS = {
+    "tracking_error": Term("error, weighted by time", "°", 180.0 / np.pi),
+    "overshoot": Term("overshoot", "°", 180.0 / np.pi),
+    "settling_time": Term("settling time", "s", 1.0),
+    "steady_error": Term("steady error", "°", 180.0 / np.pi),
+    "energy": Term("energy into the wire", "J", 1.0),
+    "chatter": Term("chatter of the command", "V/s", 1.0),
+    "peak_temperature": Term("peak temperature", "°C", 1.0),
+}
+FACTORS = np.asarray([term.factor for term in TERMS.values()])
+SETTLING = tuple(TERMS).index("settling_time")
+
+
+class Terms(NamedTuple):
+    """Of one closed loop, SI."""
+
+    tracking_error: Scalar  # rad, mean of |e| weighted by the time since the start
+    overshoot: Scalar  # rad
+    settling_time: Scalar  # s, the memory s at the end: nearly the run's length where it never settles
+    steady_error: Scalar  # rad
+    energy: Scalar  # J
+    chatter: Scalar  # V/s, how far the command moves in a second, up and down
+    peak_temperature: Scalar  # C
+
+
+class _Seen(NamedTuple):
+    judged: Any  # the judge's own
+    outside: Scalar  # s
+    late: Scalar  # rad s^2, sum of t |e| dt
+    command: Scalar  # V, the last one; nan before the first
+    moved: Scalar  # V
+
+
+class TermWatch(AbstractWatch):
+    """Terms and figures of merit of a loop while it runs: (`Terms`, `Merit`)."""
+
+    judge: Judge
+    softness: Scalar  # w, share of the band
+
+    def start(self, state: State) -> _Seen:
+        zero = jnp.zeros_like(state.motion.position)
+        return _Seen(self.judge.start(state), zero, zero, jnp.full_like(zero, jnp.nan), zero)
+
+    def see(self, memory: _Seen, state: State, command: Scalar, dt: Scalar) -> _Seen:
+        judged = self.judge.see(memory.judged, state, command, dt)
+        since = judged.time - judged.began
+        size = jnp.abs(state.motion.position - self.judge.target)
+        steep = (size / self.judge.band - 1.0) / self.softness
+        rate = jnp.exp(jnp.minimum(steep, STEEPEST)) / FOLLOWS
+        first = jnp.isnan(memory.command)
+        return _Seen(
+            judged,
+            memory.outside - jnp.expm1(-rate * dt) * (since - memory.outside),
+            memory.late + since * size * dt,
+            command,
+            memory.moved + jnp.where(first, 0.0, jnp.abs(command - jnp.where(first, command, memory.command))),
+        )
+
+    def result(self, memory: _Seen) -> tuple[Terms, Merit]:
+        merit = self.judge.result(memory.judged)
+        seconds = memory.judged.time - memory.judged.began
+        # To twice the run, which a loop costs that never settles, as the settling time comes near to the steady part.
+        late = jnp.clip((memory.outside / seconds - EARLIEST) / (LATEST - EARLIEST), 0.0, 1.0)
+        terms = Terms(
+            memory.late / (0.5 * seconds**2),
+            merit.overshoot,
+            memory.outside + seconds * late**2 * (3.0 - 2.0 * late),
+            merit.steady_error,
+            merit.energy,
+            memory.moved / seconds,
+            merit.peak_temperature,
+        )
+        return terms, merit
+
+
+def as_shown(terms: Terms) -> Scalar:
+    """The terms as a vector in the units of `TERMS`, shape (terms,)."""
+    return jnp.stack(terms) * jnp.asarray(FACTORS)
+
+
+def as_judged(terms: Terms, merit: Merit, seconds: Scalar | float) -> Scalar:
+    """The same with the settling time itself, and twice the run where there is none: what a user asked for."""
+    settling = jnp.where(jnp.isfinite(merit.settling_time), merit.settling_time, 2.0 * seconds)
+    return as_shown(terms._replace(settling_time=settling))
+
+
+def watch_of(judge: Judge, softness: Scalar) -> TermWatch:
+    """The watch around a judge."""
+    return eqx.tree_at(lambda watch: watch.softness, TermWatch(judge, softness), jnp.asarray(softness, dtype=float))

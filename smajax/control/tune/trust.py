@@ -1,0 +1,126 @@
+r"""Steps by linear programming in a trust region, of a start each (after Madsen 1975, minimax by linear programs).
+
+Every term of every loop is known with its slope at the centre, so the next point minimises, over the steps
+$|d_k| \le \Delta$, the objective of the loops as they would be if they were straight lines held above zero,
+
+    worst   min t + MU v:   sum_j w_j q_mj <= t,   q_mj >= q_mj(0) + grad q_mj . d,   q_mj >= 0,
+                            q_mj(0) + grad q_mj . d <= l_j (1 + v),   v >= 0,
+
+or their mean in the place of t. It becomes the centre when it is better; otherwise Delta shrinks. That looks ahead to
+loops that become the worst on the way, which a slope of the largest cost does not. A loop whose slopes are wild (a
+limit cycle multiplies a difference in every swing) stands still in the model; where the model promises nothing the next
+point is drawn from the trust region.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import sparse
+from scipy.optimize import linprog
+
+from smajax.control.tune.evaluate import Seen
+from smajax.control.tune.members import Members
+from smajax.control.tune.objective import SPREAD, Goal
+
+FIRST, WIDEST, NARROWEST = 0.15, 0.3, 2e-3  # Delta, share of the box by logarithm; below the last a start has ended
+GOOD, WIDER, NARROWER = 0.5, 2.0, 0.4  # share of the promise from which Delta grows, and by how much
+LEAST = 1e-3  # a promise of less is none
+PENALTY = 30.0  # MU, cost of a limit exceeded by its own size
+Memory = dict[str, np.ndarray]
+
+
+def begin(points: np.ndarray) -> Memory:
+    """Nothing known yet: arrays by start."""
+    count = len(points)
+    return {
+        "centre": points.copy(),
+        "value": np.full(count, np.inf),
+        "promise": np.full(count, -np.inf),
+        "radius": np.full(count, FIRST),
+    }
+
+
+def value(goal: Goal, terms: np.ndarray, members: Members) -> np.ndarray:
+    """The objective of terms (C, M, terms) and what its limits cost, (C,)."""
+    return goal.cost(terms, members) + PENALTY * goal.excess(terms)
+
+
+def _shares(goal: Goal, costs: np.ndarray, counted: np.ndarray) -> np.ndarray:
+    """How much each loop counts in a mean, (M,); none less than nothing."""
+    shares = counted / counted.sum()
+    if goal.objective == "mean-variance":
+        inside = costs[counted]
+        shares = shares * (1.0 + SPREAD * (costs - inside.mean()) / max(float(inside.std()), 1e-9))
+    return np.maximum(shares, 0.0)
+
+
+def step(
+    goal: Goal, terms: np.ndarray, slopes: np.ndarray, members: Members, centre: np.ndarray, radius: float
+) -> tuple[np.ndarray, float]:
+    """(next point, the value promised there) from terms (M, terms) and slopes (M, terms, gains) at the centre."""
+    count, gains = len(terms), len(centre)
+    used, counted = np.flatnonzero(goal.weighed), goal.members(members)
+    weights, pieces = goal.weighed[used], np.flatnonzero(counted)
+    # Unknowns: d (gains), t, v, q (loops that count x terms used).
+    worst, lines = goal.objective == "worst", len(pieces) * len(used)
+    cost = np.zeros(gains + 2 + lines)
+    cost[gains], cost[gains + 1] = float(worst), PENALTY
+    if not worst:
+        shares = _shares(goal, terms @ goal.weighed, counted)[pieces]
+        cost[gains + 2 :] = np.outer(shares, weights).ravel()
+    steep = slopes[pieces][:, used].reshape(lines, gains)
+    rows = [sparse.hstack([sparse.csr_matrix(steep), sparse.csr_matrix((lines, 2)), -sparse.identity(lines)])]
+    least = [-terms[pieces][:, used].ravel()]
+    if worst:
+        own = sparse.kron(sparse.identity(len(pieces)), weights[None, :])
+        below = sparse.csr_matrix(-np.ones((len(pieces), 1)))
+        blank = sparse.csr_matrix((len(pieces), gains)), sparse.csr_matrix((len(pieces), 1))
+        rows.append(sparse.hstack([blank[0], below, blank[1], own]))
+        least.append(np.zeros(len(pieces)))
+    for k, bound in zip(goal.limited, goal.bounds, strict=True):
+        rows.append(
+            sparse.hstack(
+                [
+                    sparse.csr_matrix(slopes[:, k] / bound),
+                    sparse.csr_matrix((count, 1)),
+                    sparse.csr_matrix(-np.ones((count, 1))),
+                    sparse.csr_matrix((count, lines)),
+                ]
+            )
+        )
+        least.append(1.0 - terms[:, k] / bound)
+    box = [(max(-radius, -here), min(radius, 1.0 - here)) for here in centre]
+    ends = [*box, (None, None) if worst else (0.0, 0.0), (0.0, None), *[(0.0, None)] * lines]
+    found = linprog(cost, A_ub=sparse.vstack(rows, format="csr"), b_ub=np.concatenate(least), bounds=ends)
+    if found.x is None:  # a matrix that the solver refuses: nothing is promised
+        return centre, np.inf
+    return np.clip(centre + found.x[:gains], 0.0, 1.0), float(found.fun)
+
+
+def move(
+    goal: Goal, seen: Seen, members: Members, points: np.ndarray, memory: Memory, draw: np.random.Generator
+) -> tuple[np.ndarray, Memory, np.ndarray]:
+    """(next points, memory, which starts have ended) after `points` (C, gains) were seen."""
+    new = {name: array.copy() for name, array in memory.items()}
+    values = value(goal, seen.terms, members)
+    calm = ~(seen.failed | seen.wild(goal.used))
+    shape = (len(points), *seen.slopes.shape[1:])
+    terms, slopes = new.setdefault("terms", np.zeros(shape[:3])), new.setdefault("slopes", np.zeros(shape))
+    following = points.copy()
+    for k in range(len(points)):
+        before = new["value"][k]
+        first = not np.isfinite(before)
+        if first or values[k] < before:
+            kept = before - values[k] > GOOD * (before - new["promise"][k])
+            new["radius"][k] *= WIDER if not first and kept else 1.0
+            new["centre"][k], new["value"][k] = points[k], values[k]
+            terms[k] = np.nan_to_num(seen.terms[k])
+            slopes[k] = np.where(calm[k][:, None, None], seen.slopes[k], 0.0)
+        else:
+            new["radius"][k] *= NARROWER
+        radius = new["radius"][k] = min(new["radius"][k], WIDEST)
+        centre = new["centre"][k]
+        asked, new["promise"][k] = step(goal, terms[k], slopes[k], members, centre, float(radius))
+        drawn = np.clip(centre + radius * draw.uniform(-1.0, 1.0, len(centre)), 0.0, 1.0)
+        following[k] = asked if new["promise"][k] < new["value"][k] - LEAST else drawn
+    return following, new, new["radius"] < NARROWEST

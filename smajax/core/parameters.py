@@ -1,0 +1,146 @@
+"""Named physical parameters: unit, bounds and meaning written once beside the field, read by every later stage."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float
+
+from smajax.core.names import of_many
+
+Module = TypeVar("Module", bound=eqx.Module)
+
+
+def _as_float_array(value: Any) -> Any:
+    # Arrays, not Python floats: a float would be static under jit and every new value would compile again.
+    return value if isinstance(value, jax.core.Tracer) else jnp.asarray(value, dtype=float)
+
+
+def parameter(unit: str, low: float, high: float, about: str, **kwargs: Any) -> Any:
+    """A dataclass field for one physical parameter.
+
+    `unit` is SI with temperatures in C; `low` and `high` are the widest values that make physical sense (the bounds
+    within which the simulator promises finite results); `about` is one line for tables and reports.
+    """
+    metadata = {"unit": unit, "low": low, "high": high, "about": about}
+    return eqx.field(converter=_as_float_array, metadata=metadata, **kwargs)
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """Where a parameter lives in a model, and what it is."""
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    about: str
+    path: tuple[str | int, ...]
+
+
+def parameters(model: eqx.Module) -> dict[str, Parameter]:
+    """Every parameter of `model` by name. Effects (anything with an `effect_name`) prefix theirs: `latent_heat.enthalpy`."""
+    found: dict[str, Parameter] = {}
+
+    def walk(node: Any, path: tuple[str | int, ...], prefix: str) -> None:
+        if isinstance(node, (tuple, list)):
+            for index, child in enumerate(node):
+                walk(child, (*path, index), prefix)
+        if not isinstance(node, eqx.Module):
+            return
+        prefix = f"{node.effect_name}." if hasattr(node, "effect_name") else prefix
+        for entry in dataclasses.fields(node):
+            here = (*path, entry.name)
+            if "unit" in entry.metadata:
+                name = prefix + entry.name
+                if name in found:
+                    raise ValueError(
+                        f"Two parameters are named `{name}`, at {found[name].path} and at {here}. Rename one: "
+                        "every stage after this one knows parameters by name."
+                    )
+                meta = entry.metadata
+                found[name] = Parameter(name, meta["unit"], meta["low"], meta["high"], meta["about"], here)
+            else:
+                walk(getattr(node, entry.name), here, prefix)
+
+    walk(model, (), "")
+    return found
+
+
+def _lookup(model: Any, path: tuple[str | int, ...]) -> Any:
+    for key in path:
+        model = model[key] if isinstance(key, int) else getattr(model, key)
+    return model
+
+
+def _select(model: eqx.Module, names: Sequence[str]) -> list[Parameter]:
+    table = parameters(model)
+    unknown = [name for name in names if name not in table]
+    if unknown:
+        told = of_many(unknown[0], table, "`smajax.parameter_values(model)` lists all of this model")
+        raise ValueError(f"No parameter `{unknown[0]}`{told}.")
+    return [table[name] for name in names]
+
+
+def get_parameters(model: eqx.Module, names: Sequence[str]) -> Float[Array, " names"]:
+    """The values of `names`, in that order, SI."""
+    return jnp.stack([jnp.asarray(_lookup(model, entry.path), dtype=float) for entry in _select(model, names)])
+
+
+def parameter_values(model: eqx.Module) -> dict[str, float]:
+    """Every parameter's value by name, SI."""
+    names = list(parameters(model))
+    return dict(zip(names, np.asarray(get_parameters(model, names), dtype=float).tolist(), strict=True))
+
+
+def set_parameters(model: Module, values: Mapping[str, Any]) -> Module:
+    """`model` with the named values put in; everything else is shared.
+
+    Values may be traced, so their bounds are not looked at here: every run does so where it knows them, and `check_bounds`
+    says it before. Raises ValueError when a name is not a parameter of the model.
+    """
+    entries = _select(model, list(values))
+    if not entries:
+        return model
+    where = lambda m: [_lookup(m, entry.path) for entry in entries]  # noqa: E731
+    return eqx.tree_at(where, model, [_as_float_array(values[entry.name]) for entry in entries])
+
+
+def set_vector(model: Module, names: Sequence[str], vector: Float[Array, " names"]) -> Module:
+    """`set_parameters` from a vector in the order of `names`: the form that an optimiser differentiates."""
+    return set_parameters(model, {name: vector[index] for index, name in enumerate(names)})
+
+
+def check_bounds(model: eqx.Module) -> None:
+    """ValueError that names every parameter outside its bounds, with its value and unit.
+
+    Values under `jit`, `vmap` or `grad` are not known yet and are passed over.
+    """
+    wrong = []
+    for entry in parameters(model).values():
+        value = _lookup(model, entry.path)
+        if isinstance(value, jax.core.Tracer):
+            continue
+        found = np.asarray(value)
+        inside = (found >= entry.low) & (found <= entry.high)  # nan is not
+        if not inside.all():
+            first = found[~inside].ravel()[0]
+            wrong.append(f"`{entry.name}` = {first:g} {entry.unit} (from {entry.low:g} to {entry.high:g})")
+    if wrong:
+        raise ValueError(f"outside of the bounds: {'; '.join(wrong)}.")
+
+
+def inside_bounds(model: eqx.Module) -> Bool[Array, ""]:
+    """Whether every parameter lies within its bounds; also of values that are not known yet, lane by lane of a batch."""
+    inside = jnp.asarray(True)
+    for entry in parameters(model).values():
+        value = _lookup(model, entry.path)
+        inside = inside & jnp.all((value >= entry.low) & (value <= entry.high))  # nan is not
+    return inside

@@ -1,0 +1,75 @@
+"""Where a result comes from: versions, code state, every parameter of the model, and a digest that tells two apart."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import platform
+import subprocess
+from collections.abc import Sequence
+from functools import lru_cache
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import equinox as eqx
+import jax
+import numpy as np
+
+from smajax.core import plugins
+from smajax.core.parameters import parameter_values
+
+PACKAGES = ("smajax", "jax", "jaxlib", "equinox", "numpy")
+FIT_PACKAGES = ("smajax", "jax", "equinox", "numpy", "scipy")
+
+
+@lru_cache(maxsize=1)
+def source_mark() -> str:
+    """Hex digest over every module of the package."""
+    digest = hashlib.sha256()
+    for file in sorted(Path(__file__).parents[1].rglob("*.py")):
+        digest.update(file.read_bytes())
+    return digest.hexdigest()
+
+
+def git_state() -> str:
+    """Commit of the working folder, with `+changes` where files differ from it; empty outside a repository."""
+
+    def asked(*words: str) -> str:
+        try:
+            return subprocess.run(["git", *words], capture_output=True, text=True, timeout=5, check=True).stdout.strip()
+        except (OSError, subprocess.SubprocessError):
+            return ""
+
+    commit = asked("rev-parse", "HEAD")
+    return commit + ("+changes" if commit and asked("status", "--porcelain", "-uno") else "")
+
+
+def versions() -> dict[str, str]:
+    return {name: metadata.version(name) for name in PACKAGES} | {"python": platform.python_version()}
+
+
+def digest(model: Any, more: Sequence[str | np.ndarray] = ()) -> str:
+    """Hex digest of the code, of the structure and the numbers of `model`, and of `more`."""
+    mark = hashlib.sha256(f"{source_mark()} {plugins.versions() or ''} {jax.tree.structure(model)}".encode())
+    for leaf in (*jax.tree.leaves(model), *more):
+        mark.update(leaf.encode() if isinstance(leaf, str) else np.ascontiguousarray(leaf).tobytes())
+    return mark.hexdigest()
+
+
+def provenance(model: eqx.Module, **settings: object) -> dict[str, str]:
+    """Attributes of a result: text only, so that every format can hold them; no `git` outside of a repository."""
+    told = {f"version of {name}": version for name, version in versions().items()}
+    told |= {name: str(value) for name, value in settings.items()}
+    commit = git_state()
+    told |= {"git": commit} if commit else {}
+    return told | {"parameters (SI)": json.dumps(parameter_values(model))}
+
+
+def made_with() -> dict[str, str]:
+    """Versions, Python and the machine, in words."""
+    return {
+        **{f"version of {name}": metadata.version(name) for name in FIT_PACKAGES},
+        "python": platform.python_version(),
+        "machine": f"{platform.system()} {platform.machine()}, {jax.default_backend()}",
+    }

@@ -1,0 +1,228 @@
+"""Warnings about numbers that no wire of the declared model gives or stands: mostly a wrong unit or a wrong column."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+
+import numpy as np
+from scipy.signal import lfilter
+from scipy.stats import spearmanr
+
+from smajax.data.experiment.guess import in_levels
+from smajax.data.experiment.model_description import Scale
+from smajax.data.experiment.signals import ReadRun
+from smajax.data.readers.table import Array
+
+# Channel -> (more than a wire takes, the program's own unit, the unit that such numbers usually are in).
+LARGEST: Mapping[str, tuple[float, str, str]] = MappingProxyType(
+    {
+        "voltage": (500.0, "V", "mV"),
+        "current": (100.0, "A", "mA"),
+        "power": (2e3, "W", "mW"),
+        "stress": (5e9, "Pa", "Pa"),
+        "strain": (0.5, "", "percent"),
+        "angle": (4.0 * np.pi, "rad", "deg"),
+        "force": (1e4, "N", "mN"),
+        "mass": (50.0, "kg", "g"),
+    }
+)
+MELTS = 1310.0  # degC, nickel-titanium
+WARMS = 5.0  # K above the air: less transforms nothing
+# Shares of the wire's length: more than any alloy recovers and any bias spring bends, and less than expansion by heat.
+LARGEST_STROKE, SMALLEST_STROKE = 0.3, 1e-4
+COLDEST_IN_K = 200.0  # degC: where a record never falls below, it is of a furnace, or in kelvin
+WARMEST_AIR = 60.0  # degC
+IN_COMMON = 0.9
+FOLLOWS, LEAST = 0.2, 20  # rank correlation of heat and output; samples
+AGAINST = 0.5  # rank correlation of heat and output from which on a wrong sign is a sign turned round
+LAGS = (1, 2, 4, 8)  # time constants through which an output may follow: latent heat and hysteresis hold it back
+# Whether heat makes an output rise or fall, on every moving load. Stress, force and resistance do one or the other by the
+# load and the alloy.
+BY_HEAT: Mapping[str, int] = MappingProxyType({"position": 1, "angle": 1, "temperature": 1, "strain": -1})
+MOVES = 0.5  # share of its samples from which on a signal that never repeats a value moves all the time
+
+
+def _values(read: ReadRun, name: str) -> Array | None:
+    """A channel of the run as measured, or as held constant."""
+    if name in read.signals:
+        return read.signals[name].measured
+    return read.run.inputs.get(name)
+
+
+def _extremes(runs: Sequence[ReadRun], name: str) -> tuple[float, float] | None:
+    found = [values for read in runs if (values := _values(read, name)) is not None and values.size]
+    return (min(float(one.min()) for one in found), max(float(one.max()) for one in found)) if found else None
+
+
+def _size_warnings(runs: Sequence[ReadRun]) -> list[str]:
+    """Channels whose values no wire stands; one sentence a channel."""
+    found: list[str] = []
+    for name, (most, own, other) in LARGEST.items():
+        ends = _extremes(runs, name)
+        if ends is not None and max(map(abs, ends)) > most:
+            size = f"{max(map(abs, ends)):.5g} {own}".strip()
+            found.append(f"the {name} reaches {size}; is it in {other}?")
+    stress = _extremes(runs, "stress")
+    if stress is not None and 0.0 < max(map(abs, stress)) < 1e4:
+        found.append(f"the stress reaches no more than {max(map(abs, stress)):.5g} Pa; is it in MPa?")
+    for name, warmest in (("temperature", COLDEST_IN_K), ("ambient_temperature", WARMEST_AIR)):
+        ends = _extremes(runs, name)
+        if ends is not None and ends[0] > warmest:
+            found.append(f"the {name} never falls below {ends[0]:.5g} degC; is it in K, or in degF?")
+    return found
+
+
+def _heating_warnings(runs: Sequence[ReadRun], scale: Scale, heats: Sequence[str]) -> list[str]:
+    """What the inputs would do to a wire of the declared model with the values where the search starts."""
+    warm: list[tuple[float, float, str]] = []
+    for read in runs:
+        given = {name: read.run.inputs[name] for name in heats if name in read.run.inputs}
+        if len(given) == len(heats):
+            rise = scale.warming(given)
+            warm.append((float(np.mean(rise)), float(np.max(rise)), read.run.name))
+    if not warm or not heats:
+        return []
+    what = " and ".join(f"{name!r}" for name in heats)
+    mean, _, run = max(warm)
+    if scale.ambient + mean > MELTS:
+        return [
+            f"run {run!r}: the mean power of the input {what} would heat the wire to {scale.ambient + mean:.4g} degC, and it "
+            f"melts at {MELTS:g} degC; is the unit right, or is it another quantity, such as a duty in percent?"
+        ]
+    most = max(peak for _, peak, _ in warm)
+    if most < WARMS:
+        return [
+            f"the input {what} at its highest, held for ever, would warm the wire by {most:.2g} K, which transforms nothing; "
+            "is it the right column, and its unit?"
+        ]
+    return []
+
+
+def _stroke_warnings(runs: Sequence[ReadRun], scale: Scale) -> list[str]:
+    """A movement that no wire of this length makes."""
+    ends = _extremes(runs, "position")
+    if ends is None:
+        return []
+    share = (ends[1] - ends[0]) / scale.wire_length
+    told = f"the output 'position' moves by {ends[1] - ends[0]:.3g} m, {share:.3g} times the wire's length of {scale.wire_length:.3g} m"
+    if share > LARGEST_STROKE:
+        return [f"{told}; is it in mm, or is `wire_length` another?"]
+    if 0.0 < share < SMALLEST_STROKE:
+        return [f"{told}; is it in mm or m, and was the wire heated at all?"]
+    return []
+
+
+def _dynamics_warnings(runs: Sequence[ReadRun], scale: Scale, step: float) -> list[str]:
+    """Runs and steps against the time that the wire takes to cool."""
+    slow = f"the wire's time constant rho c_p d / (4 h) of {scale.time_constant:.3g} s where the search starts"
+    found = [
+        f"run {read.run.name!r} lasts {read.run.time[-1] - read.run.time[0]:.3g} s, less than {slow}: it tells little of "
+        "heat and nothing of rest; take a longer run"
+        for read in runs
+        if read.run.time[-1] - read.run.time[0] < scale.time_constant
+    ]
+    if step > 0.5 * scale.time_constant:
+        found.append(f"the step of {step:.3g} s is more than half of {slow}; take a shorter one")
+    return found
+
+
+def _exchange_warnings(runs: Sequence[ReadRun], heats: Sequence[str]) -> list[str]:
+    """A command rests at levels and a sensor moves; the other way round the two columns are exchanged."""
+    first = runs[0]
+    commands = [name for name in heats if name in first.signals]
+    for name in commands:
+        moving = first.signals[name].measured
+        for output in first.run.outputs:
+            resting = first.signals[output].measured
+            if resting.size < 20 or moving.size < 20 or np.ptp(resting) == 0.0:
+                continue
+            if in_levels(resting) and np.unique(moving).size > MOVES * moving.size:
+                return [
+                    f"run {first.run.name!r}: the output {output!r} rests at a few levels and the input {name!r} moves all the "
+                    "time; are the two columns exchanged?"
+                ]
+    return []
+
+
+def _following(
+    runs: Sequence[ReadRun], scale: Scale, heats: Sequence[str], step: float
+) -> Mapping[str, Sequence[Array]]:
+    """Output -> rank correlations of heat and output, by `LAGS`, in each run that tells them.
+
+    Heat is the power through some time constants of the wire; what follows it rises and falls with it, by whatever curve.
+    """
+    following: dict[str, Sequence[Array]] = {}
+    shares = [1.0 - np.exp(-step / (lag * scale.time_constant)) for lag in LAGS]
+    for name in runs[0].run.outputs:
+        found = []
+        for read in runs:
+            given = {channel: read.run.inputs[channel] for channel in heats if channel in read.run.inputs}
+            output = read.run.outputs[name]
+            there = np.isfinite(output)
+            if len(given) < len(heats) or there.sum() < LEAST or np.ptp(output[there]) == 0.0:
+                continue
+            power = scale.warming(given)
+            warm = [lfilter([share], [1.0, share - 1.0], power)[there] for share in shares]
+            if np.ptp(warm[0]) > 0.0:
+                found.append(np.asarray([spearmanr(one, output[there]).statistic for one in warm]))
+        if found:
+            following[name] = found
+    return following
+
+
+def _unrelated_warnings(following: Mapping[str, Sequence[Array]]) -> list[str]:
+    """Outputs that do not follow the heat: files that do not belong together, or samples out of order."""
+    for name, found in following.items():
+        median = float(np.median([abs(by_lag[0]) for by_lag in found]))
+        if median < FOLLOWS:
+            return [
+                f"the output {name!r} hardly follows the heat (rank correlation {median:.2f} in the median run): do "
+                "inputs and outputs belong together, and are the samples in order? What is fitted or found would mean nothing"
+            ]
+    return []
+
+
+def _reversed_warnings(following: Mapping[str, Sequence[Array]]) -> list[str]:
+    """Outputs that move against the heat where the model's move with it, or the other way round."""
+    told = []
+    for name, found in following.items():
+        median = float(np.median([max(by_lag, key=abs) for by_lag in found]))
+        if name in BY_HEAT and BY_HEAT[name] * median < -AGAINST:
+            told.append(
+                f"the output {name!r} moves against the model (rank correlation with the heat {median:.2f} in the median run; "
+                f"the model's {'rises' if BY_HEAT[name] > 0 else 'falls'} with it): is the sensor's sign reversed? Set "
+                f"reversed = true under [channels.{name}], or take it out where it is set"
+            )
+    return told
+
+
+def common_warnings(runs: Sequence[ReadRun]) -> list[str]:
+    """Signals of one run that begin or end at different times: only what all have in common is used."""
+    found = []
+    for read in runs:
+        used = float(read.run.time[-1] - read.run.time[0])
+        name, longest = max(
+            ((name, float(one.time[-1] - one.time[0])) for name, one in read.signals.items()), key=lambda one: one[1]
+        )
+        if used < IN_COMMON * longest - (read.run.time[1] - read.run.time[0]):
+            found.append(
+                f"run {read.run.name!r}: {name!r} lasts {longest:.4g} s, and only {used:.4g} s are common to all signals; the "
+                "rest is not used"
+            )
+    return found
+
+
+def magnitude_warnings(runs: Sequence[ReadRun], scale: Scale | None, heats: Sequence[str], step: float) -> list[str]:
+    """All of them. scale: of the model at its known values and starts; heats: the inputs that heat the wire."""
+    found = [*_size_warnings(runs), *_exchange_warnings(runs, heats)]
+    if scale is not None:
+        found += [*_heating_warnings(runs, scale, heats), *_stroke_warnings(runs, scale)]
+        if heats:
+            following = _following(runs, scale, heats, step)
+            found += [
+                *_dynamics_warnings(runs, scale, step),
+                *_unrelated_warnings(following),
+                *_reversed_warnings(following),
+            ]
+    return found

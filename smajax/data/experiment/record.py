@@ -1,0 +1,131 @@
+"""Experiment: measured runs on uniform clocks, what is known, what is to be found. The record all later stages read."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+
+from smajax.data.readers.table import Array
+
+# What a run may start with that no parameter of the model says: the name in the file -> the parameter, if it is one.
+RUN_STARTS = MappingProxyType({"initial_temperature": "", "initial_martensite_fraction": "start_fraction"})
+
+
+@dataclass(frozen=True)
+class Prior:
+    """A normal distribution of a parameter, or of its logarithm; sigma in the program's own unit, or of the logarithm."""
+
+    mean: float
+    sigma: float
+    logarithmic: bool
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """A parameter to be found, in the program's own unit (SI, degC, rad): low < high, low <= start <= high.
+
+    per_run: each run has a value of its own. `RUN_STARTS` holds the names that are no parameter's.
+    """
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    start: float
+    per_run: bool = False
+    prior: Prior | None = None
+
+
+@dataclass(frozen=True)
+class Output:
+    """A sensor, in the program's own unit.
+
+    noise_sigma: white measurement noise on the clock; noise_how: where that number is from; noise_given: by the file.
+    offset: whether each run has an unknown zero of it.
+    """
+
+    name: str
+    unit: str
+    noise_sigma: float
+    noise_how: str
+    noise_given: bool
+    offset: bool
+
+
+@dataclass(frozen=True)
+class Run:
+    """One measured run on the experiment's clock.
+
+    role: "fit" or "held-out". time (n,): seconds as measured, one step apart. inputs: channel -> (n,), each value
+    holding for the step that begins at its time. outputs: sensor -> (n,) at those times, nan where a sample is missing.
+    parameters: this run's own values, which go before the experiment's. files, sha256: what was read, and the digest of
+    their bytes in order.
+    """
+
+    name: str
+    role: str
+    time: Array
+    inputs: dict[str, Array]
+    outputs: dict[str, Array]
+    parameters: dict[str, float]
+    files: tuple[Path, ...]
+    sha256: str
+
+    @property
+    def output(self) -> Array:
+        """The first sensor: the only one of most experiments."""
+        return next(iter(self.outputs.values()))
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """A validated experiment; every number is in the program's own units (SI, degC, rad).
+
+    effects_only None: every effect is a candidate. warnings: what is allowed and looks wrong, one sentence each.
+    """
+
+    name: str
+    title: str
+    path: Path
+    wire: str
+    load: str
+    drive: str
+    law: str  # of the kinetics; "": the wire's own
+    parameters: dict[str, float]
+    unknowns: tuple[Unknown, ...]
+    step: float
+    clocked: bool  # whether the samples have times; False: only their order is known, and a step is one sample
+    outputs: tuple[Output, ...]
+    effects_only: tuple[str, ...] | None
+    effects_excluded: tuple[str, ...]
+    runs: tuple[Run, ...]
+    warnings: tuple[str, ...]
+
+    @property
+    def offset(self) -> bool:
+        """Whether each run has an unknown zero of some sensor."""
+        return any(output.offset for output in self.outputs)
+
+    @property
+    def output_name(self) -> str:
+        """Of the first output, as the three below: the only one of most experiments."""
+        return self.outputs[0].name
+
+    @property
+    def output_unit(self) -> str:
+        return self.outputs[0].unit
+
+    @property
+    def noise_sigma(self) -> float:
+        return self.outputs[0].noise_sigma
+
+    @property
+    def noise_how(self) -> str:
+        return self.outputs[0].noise_how
+
+    @property
+    def declared_effects(self) -> tuple[str, ...]:
+        """Effects that the base model has already: those of which a parameter is given or unknown."""
+        named = [*self.parameters, *(unknown.name for unknown in self.unknowns)]
+        return tuple(dict.fromkeys(name.split(".", 1)[0] for name in named if "." in name))

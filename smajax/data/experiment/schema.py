@@ -1,0 +1,312 @@
+"""The shape of an experiment file: its sections, keys and their types. Meaning is checked in `load`."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from smajax.core.names import instead
+from smajax.data.experiment.errors import ExperimentError
+
+Quantity = str | float
+LARGEST = 1 << 20  # bytes of an experiment file
+LONGEST = 200  # characters of what was got, in a message
+
+
+class Section(BaseModel):
+    """A table of the file: only the keys written here, each with what is expected of it."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+class ModelSection(Section):
+    """Which base model, and the parameters that are known."""
+
+    wire: str = Field(description="the name of a wire, as text")
+    load: str = Field(description="the name of a load, as text")
+    drive: str = Field(description="the name of a drive, as text ('none' when nothing drives the wire)")
+    law: str = Field(default="", description="the name of a kinetics law, as text; left out, the wire's own")
+    parameters: dict[str, Quantity] = Field(default={}, description="a table of name = 'number unit'")
+
+
+class PriorSection(Section):
+    """What is known of a value before the runs: a normal distribution of it, or of its logarithm."""
+
+    mean: Quantity = Field(description="text like '80 W/m^2/K'")
+    sigma: Quantity | None = Field(default=None, description="text like '10 W/m^2/K'")
+    log_sigma: float | None = Field(default=None, gt=0.0, description="a number above 0; 0.2 is about 20 %")
+
+    @model_validator(mode="after")
+    def _one_spread(self) -> PriorSection:
+        if (self.sigma is None) == (self.log_sigma is None):
+            got = "both sigma and log_sigma" if self.sigma is not None else "neither sigma nor log_sigma"
+            raise ValueError(f"got {got}; give sigma = 'number unit', or log_sigma = 0.2 for one of the logarithm")
+        return self
+
+
+class BoxSection(Section):
+    """A value to be found: its box, where the search starts, and what is known of it."""
+
+    low: Quantity = Field(description="text like '20 W/m^2/K'")
+    high: Quantity = Field(description="text like '400 W/m^2/K'")
+    start: Quantity = Field(description="text like '80 W/m^2/K'")
+    prior: PriorSection | None = Field(default=None, description="a table with mean, and sigma or log_sigma")
+
+
+class UnknownSection(BoxSection):
+    """A parameter to be found."""
+
+    per_run: bool = Field(default=False, description="true (a value of each run's own) or false (one for all runs)")
+    fixed: bool = Field(default=False, description="true (held at start) or false")
+
+    @model_validator(mode="after")
+    def _free(self) -> UnknownSection:
+        if self.fixed and (self.per_run or self.prior is not None):
+            raise ValueError("is fixed, so per_run and prior mean nothing; remove them, or fixed")
+        return self
+
+
+class NuisanceSection(Section):
+    """What is fitted per run and means nothing."""
+
+    offset: bool = Field(default=False, description="true or false: whether the sensor's zero moves from run to run")
+    initial_temperature: BoxSection | None = Field(default=None, description="a table with low, high, start")
+    initial_martensite_fraction: BoxSection | None = Field(default=None, description="a table with low, high, start")
+
+
+class SamplingSection(Section):
+    """The uniform clock that all signals are brought to."""
+
+    step: Quantity = Field(description="text like '50 ms'")
+
+
+class TimeSection(Section):
+    """Where the time is, for files whose signals carry none of their own."""
+
+    kind: Literal["column", "sample"] = Field(default="column", description="'column' or 'sample'")
+    column: str | int | None = Field(default=None, description="the name of the time column, or its number from 1")
+    unit: str = Field(default="s", description="text like 's' or 'ms'")
+    repeated: Literal["refuse", "mean", "last"] = Field(
+        default="refuse", description="'refuse', 'mean' or 'last': what becomes of samples at the same time that differ"
+    )
+
+    @model_validator(mode="after")
+    def _one_way(self) -> TimeSection:
+        if self.kind == "sample" and self.column is not None:
+            raise ValueError("got kind = 'sample' and a column; with 'sample' the clock counts samples: remove one")
+        if self.kind == "column" and self.column is None:
+            raise ValueError("names no column; give column = '...', or kind = 'sample' when there is no time")
+        return self
+
+
+class ChannelSection(Section):
+    """One signal: what it is in the model, and where it is in the files."""
+
+    role: Literal["input", "output"] = Field(description="'input' or 'output'")
+    column: str | int | None = Field(default=None, description="the name of a column, or its number from 1")
+    variable: str | None = Field(default=None, description="the name of a MATLAB variable, as text")
+    unit: str = Field(description="text like 'MPa', or '1' for a plain number")
+    noise: Quantity | None = Field(default=None, description="'estimate', or text like '0.01 mm'")
+    offset: bool | None = Field(
+        default=None, description="true or false: goes before [nuisance] offset for this output"
+    )
+    missing: Literal["refuse", "skip"] = Field(default="refuse", description="'refuse' or 'skip'")
+    reversed: bool = Field(default=False, description="true (the sensor counts the other way round) or false")
+
+    @model_validator(mode="after")
+    def _one_place(self) -> ChannelSection:
+        if self.column is not None and self.variable is not None:
+            raise ValueError("got both column and variable; give column for a text file, variable for a .mat file")
+        if self.role == "input" and self.noise is not None:
+            raise ValueError("got a noise for an input; noise belongs to the output channel, remove it")
+        if self.role == "input" and self.offset is not None:
+            raise ValueError("got an offset for an input; offsets are those of outputs, remove it")
+        if self.role == "input" and self.reversed:
+            raise ValueError("got reversed for an input; only an output's sensor can be mounted the other way round")
+        if self.role == "input" and self.missing == "skip":
+            raise ValueError("got missing = 'skip' for an input; the model needs every sample of it: fill the gaps")
+        if self.role == "output" and self.column is None and self.variable is None:
+            raise ValueError("does not say where the output is; give column (text file) or variable (.mat file)")
+        return self
+
+
+class DataSection(Section):
+    """Where the measured files are."""
+
+    folder: str = Field(description="a folder, relative to this file; it may begin with ${SMAJAX_DATA}")
+    decimal: Literal[",", "."] | None = Field(
+        default=None, description="',' or '.': what stands before the decimals of a number in a text file"
+    )
+
+
+class RunSection(Section):
+    """One measured run."""
+
+    name: str = Field(min_length=1, description="text that names the run")
+    role: Literal["fit", "held-out"] = Field(description="'fit' or 'held-out'")
+    file: str | None = Field(default=None, description="the name of one file with all channels")
+    files: dict[str, str] | None = Field(default=None, description="a table of channel = 'file'")
+    columns: dict[str, str | int] = Field(
+        default={}, description="a table of channel (or time) = 'column', where this run's log calls it otherwise"
+    )
+    units: dict[str, str] = Field(
+        default={}, description="a table of channel (or time) = 'unit', where this run's log has another"
+    )
+    start: Quantity | None = Field(
+        default=None, description="a time in the log, 'number unit', before which it is left out"
+    )
+    end: Quantity | None = Field(
+        default=None, description="a time in the log, 'number unit', after which it is left out"
+    )
+    parameters: dict[str, Quantity] = Field(default={}, description="a table of name = 'number unit'")
+    inputs: dict[str, Quantity] = Field(
+        default={}, description="a table of input = 'number unit', constant in this run"
+    )
+
+    @model_validator(mode="after")
+    def _one_way(self) -> RunSection:
+        if (self.file is None) == (self.files is None):
+            got = "both file and files" if self.file is not None else "neither file nor files"
+            raise ValueError(f"got {got}; give file = '...' for one file, or files = {{channel = '...'}} for several")
+        return self
+
+
+class EffectsSection(Section):
+    """Which candidate effects the search may try."""
+
+    only: list[str] | None = Field(default=None, description="a list of effect names")
+    exclude: list[str] = Field(default=[], description="a list of effect names")
+
+
+class ExperimentFile(Section):
+    """The whole file."""
+
+    title: str = Field(default="", description="one line of text")
+    model: ModelSection = Field(description="a section [model] with wire, load and drive")
+    unknown: dict[str, UnknownSection] = Field(default={}, description="sections [unknown.NAME] with low, high, start")
+    nuisance: NuisanceSection = Field(default=NuisanceSection(), description="a section [nuisance]")
+    sampling: SamplingSection | None = Field(default=None, description="a section [sampling] with step")
+    time: TimeSection | None = Field(default=None, description="a section [time] with column and unit, or kind")
+    channels: dict[str, ChannelSection] = Field(description="sections [channels.NAME] with role, unit and a place")
+    data: DataSection = Field(default=DataSection(folder="."), description="a section [data] with folder")
+    runs: list[RunSection] = Field(min_length=1, description="one section [[runs]] a run, with name, role and file")
+    effects: EffectsSection = Field(default=EffectsSection(), description="a section [effects]")
+
+
+# Sections by place in the file; "*" stands for any name or number.
+_PLACES: dict[tuple[str, ...], type[Section]] = {
+    (): ExperimentFile,
+    ("model",): ModelSection,
+    ("unknown", "*"): UnknownSection,
+    ("unknown", "*", "prior"): PriorSection,
+    ("nuisance",): NuisanceSection,
+    ("nuisance", "initial_temperature"): BoxSection,
+    ("nuisance", "initial_temperature", "prior"): PriorSection,
+    ("nuisance", "initial_martensite_fraction"): BoxSection,
+    ("nuisance", "initial_martensite_fraction", "prior"): PriorSection,
+    ("sampling",): SamplingSection,
+    ("time",): TimeSection,
+    ("channels", "*"): ChannelSection,
+    ("data",): DataSection,
+    ("runs", "*"): RunSection,
+    ("effects",): EffectsSection,
+}
+
+
+def _section_at(place: Sequence[str | int]) -> type[Section] | None:
+    for pattern, section in _PLACES.items():
+        if len(pattern) == len(place) and all(p in ("*", str(k)) for p, k in zip(pattern, place, strict=True)):
+            return section
+    return None
+
+
+def _key_path(place: Sequence[str | int], content: dict[str, Any]) -> str:
+    """`runs.Step02.role` for ("runs", 1, "role"); a run without a name is counted from 1."""
+    parts = [str(part) for part in place]
+    if len(place) > 1 and place[0] == "runs" and isinstance(place[1], int):
+        run = content["runs"][place[1]]
+        name = run.get("name") if isinstance(run, dict) else None
+        parts[1] = name if isinstance(name, str) and name else f"[{place[1] + 1}]"
+    return ".".join(parts)
+
+
+def _depth(place: Sequence[str | int]) -> int:
+    """How many parts of a pydantic location are keys of the file; the rest names members of a union."""
+    sections = [n for n in range(len(place) + 1) if _section_at(place[:n]) is not None]
+    return min(len(place), sections[-1] + 1)
+
+
+def _message(error: Any, content: dict[str, Any]) -> tuple[str, str]:
+    """(key path, message) of one pydantic error."""
+    place = tuple(error["loc"])
+    depth = _depth(place)
+    section = _section_at(place[: depth - 1]) if depth else None
+    field = section.model_fields.get(str(place[depth - 1])) if section is not None and depth else None
+    expected = f"expected {field.description}" if field is not None else "expected a section"
+    # One step further for the entries of a table (parameters, files, inputs) and of a list.
+    entry = len(place) > depth and isinstance(error["input"], str | int | float | bool | list | dict)
+    table = field is not None and any(word in str(field.annotation) for word in ("dict[", "list["))
+    key = _key_path(place[: depth + 1] if entry and table else place[:depth], content)
+    match error["type"]:
+        case "extra_forbidden":
+            known = list(section.model_fields) if section is not None else []
+            return key, f"is not a known key{instead(str(place[depth - 1]), known, 'known here')}"
+        case "missing":
+            return key, f"is missing; {expected}"
+        case "value_error":
+            return key, str(error["ctx"]["error"])
+        case "too_short" | "string_too_short":
+            return key, f"is empty; {expected}"
+    return key, f"got {shortened(repr(error['input']))}, {expected}"
+
+
+def shortened(text: str) -> str:
+    """What a file holds, as far as a message needs it."""
+    return text if len(text) <= LONGEST else f"{text[:LONGEST]}..."
+
+
+def _begin(path: Path) -> str:
+    """What to do with a log that was given in the place of an experiment file."""
+    if path.suffix.lower() == ".toml":
+        return ""
+    return f"; an experiment file is a .toml: if this is a log, `smajax new-experiment {path.name}` begins one from it"
+
+
+def read_schema(path: Path) -> ExperimentFile:
+    """Reads and checks the shape of an experiment file. Raises ExperimentError naming the file and the key."""
+    try:
+        if path.exists() and not path.is_file():
+            raise ExperimentError(
+                path, "", "is no file; expected an experiment file, or the folder of an experiment.toml"
+            )
+        if path.stat().st_size > LARGEST:
+            raise ExperimentError(
+                path, "", f"is larger than {LARGEST:,} bytes; expected an experiment file, not the data"
+            )
+        content = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except FileNotFoundError as error:
+        raise ExperimentError(path, "", "there is no such file; expected an experiment file") from error
+    except OSError as error:
+        raise ExperimentError(path, "", f"cannot be read ({error.strerror})") from error
+    except UnicodeDecodeError as error:
+        raise ExperimentError(
+            path, "", f"is not UTF-8 text ({error.reason} at byte {error.start}){_begin(path)}"
+        ) from error
+    except (ValueError, RecursionError) as error:
+        # Beside its own error the parser lets through those of numbers too long and of brackets too deep.
+        if isinstance(error, ExperimentError):
+            raise
+        raise ExperimentError(path, "", f"is not TOML: {shortened(str(error))}{_begin(path)}") from error
+    try:
+        return ExperimentFile.model_validate(content)
+    except ValidationError as error:
+        found = dict.fromkeys(_message(one, content) for one in error.errors())
+        # A union reports once per member, and an unknown key may be why another is missing: the typo comes first.
+        ordered = sorted(found, key=lambda one: "not a known key" not in one[1])
+        first, *others = ordered
+        more = "".join(f"\n{path}: {key}: {message}" for key, message in others[:4])
+        raise ExperimentError(path, first[0], first[1] + more) from None

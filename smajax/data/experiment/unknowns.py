@@ -1,0 +1,129 @@
+"""The values that an experiment file gives, and those that it leaves to be found."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from smajax.core.units import parse_quantity
+from smajax.core.wording import and_listed
+from smajax.data.experiment.errors import ExperimentError, at_key, check_parameter
+from smajax.data.experiment.model_description import ModelDescription, ParameterInfo
+from smajax.data.experiment.record import RUN_STARTS, Prior, Unknown
+from smajax.data.experiment.schema import BoxSection, ExperimentFile, PriorSection, Quantity
+
+CELSIUS = ParameterInfo("degC", -273.15, 1500.0)  # of a wire as a run starts, which no parameter says
+
+
+def _bounded(path: Path, key: str, value: Quantity, info: ParameterInfo) -> float:
+    """One parameter value in the program's own unit, inside what makes physical sense."""
+    with at_key(path, key):
+        number = parse_quantity(value, info.unit)
+    if not info.low <= number <= info.high:
+        raise ExperimentError(
+            path,
+            key,
+            f"got {value!r}, that is {number:g} {info.unit}; expected {info.low:g} to {info.high:g} {info.unit}",
+        )
+    return number
+
+
+def _presets(file: ExperimentFile) -> str:
+    return f"{file.model.wire} {file.model.load} {file.model.drive}"
+
+
+def given_parameters(
+    path: Path, key: str, values: Mapping[str, Quantity], file: ExperimentFile, known: Mapping[str, ParameterInfo]
+) -> dict[str, float]:
+    """Known values in the program's own units; none of them an unknown too."""
+    found: dict[str, float] = {}
+    for name, value in values.items():
+        where = f"{key}.{name}"
+        check_parameter(path, where, name, known, _presets(file))
+        if name in file.unknown:
+            raise ExperimentError(path, where, f"is given here and is an unknown too; remove this or [unknown.{name}]")
+        found[name] = _bounded(path, where, value, known[name])
+    return found
+
+
+def _prior(path: Path, key: str, section: PriorSection, info: ParameterInfo, low: float) -> Prior:
+    mean = _bounded(path, f"{key}.mean", section.mean, info)
+    if section.log_sigma is not None:
+        if mean <= 0.0 or low < 0.0:
+            what = f"mean = {section.mean!r}" if mean <= 0.0 else "a box that begins below zero"
+            raise ExperimentError(
+                path, f"{key}.log_sigma", f"got {what}, which has no logarithm; give sigma = 'number unit' instead"
+            )
+        return Prior(mean, section.log_sigma, True)
+    with at_key(path, f"{key}.sigma"):
+        sigma = parse_quantity(section.sigma or 0.0, info.unit, difference=True)
+    if sigma <= 0.0:
+        raise ExperimentError(path, f"{key}.sigma", f"got {section.sigma!r}, expected a standard deviation above zero")
+    return Prior(mean, sigma, False)
+
+
+def _unknown(path: Path, key: str, name: str, section: BoxSection, info: ParameterInfo, per_run: bool) -> Unknown:
+    low = _bounded(path, f"{key}.low", section.low, info)
+    high = _bounded(path, f"{key}.high", section.high, info)
+    start = _bounded(path, f"{key}.start", section.start, info)
+    if low >= high:
+        raise ExperimentError(
+            path, f"{key}.low", f"got {section.low!r}, which is not below high = {section.high!r}; exchange the two"
+        )
+    if not low <= start <= high:
+        raise ExperimentError(
+            path,
+            f"{key}.start",
+            f"got {section.start!r}, expected between {section.low!r} and {section.high!r}; move the start into the box, or the "
+            "box to it",
+        )
+    prior = None if section.prior is None else _prior(path, f"{key}.prior", section.prior, info, low)
+    return Unknown(name, info.unit, low, high, start, per_run, prior)
+
+
+def unknowns(path: Path, file: ExperimentFile, known: Mapping[str, ParameterInfo]) -> tuple[Unknown, ...]:
+    """Every section [unknown.NAME], the fixed ones too."""
+    for name in file.unknown:
+        check_parameter(path, f"unknown.{name}", name, known, _presets(file))
+    return tuple(
+        _unknown(path, f"unknown.{name}", name, section, known[name], section.per_run)
+        for name, section in file.unknown.items()
+    )
+
+
+def preset_warnings(wire: str, free: Sequence[Unknown], known: Mapping[str, ParameterInfo]) -> list[str]:
+    """Boxes that leave out what the presets have: those of another wire, mostly, that stayed when the wire was changed."""
+    outside = []
+    for one in free:
+        value = known[one.name].preset if one.name in known else None
+        slack = 1e-9 * (one.high - one.low)  # what a conversion of units leaves
+        if value is not None and not one.low - slack <= value <= one.high + slack:
+            outside.append(
+                f"{one.name} = {value:.4g} {one.unit} (box: {one.low:g} to {one.high:g})".replace(" - ", " ")
+            )
+    if not outside:
+        return []
+    return [
+        f"[unknown]: the preset's own value lies outside the box of {and_listed(outside)}. Were the boxes written for another wire "
+        f"than {wire!r}? `smajax new-experiment LOG --wire {wire}` writes its own; else move low and high, or leave them where you know "
+        "that your bench differs"
+    ]
+
+
+def run_starts(path: Path, file: ExperimentFile, model: ModelDescription) -> tuple[Unknown, ...]:
+    """What each run starts with and nobody measured."""
+    found = []
+    for name, parameter in RUN_STARTS.items():
+        section: BoxSection | None = getattr(file.nuisance, name)
+        if section is None:
+            continue
+        key = f"nuisance.{name}"
+        if name == "initial_temperature" and "temperature" in model.inputs_required:
+            raise ExperimentError(path, key, "the temperature of this load is an input: remove this section")
+        places = {"model.parameters": set(file.model.parameters), "unknown": set(file.unknown)}
+        places |= {f"runs.{run.name}.parameters": set(run.parameters) for run in file.runs}
+        given = [place for place, names in places.items() if parameter in names]
+        if given:
+            raise ExperimentError(path, key, f"is {parameter!r}, which {given[0]} gives too; remove one of the two")
+        found.append(_unknown(path, key, name, section, model.parameters.get(parameter, CELSIUS), True))
+    return tuple(found)

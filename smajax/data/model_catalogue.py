@@ -1,0 +1,108 @@
+"""What an experiment file may name: presets, effects, and every parameter of a combination with unit and bounds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import jax.numpy as jnp
+import numpy as np
+
+from smajax.core.names import listed
+from smajax.core.parameters import parameter_values, parameters, set_parameters
+from smajax.data.experiment.model_description import Catalogue, ModelDescription, ParameterInfo, Scale
+from smajax.model.effects.library import LIBRARY
+from smajax.model.extended import extended
+from smajax.model.load.coupon import AbstractCoupon
+from smajax.model.presets import DRIVES, LOADS, WIRES, build
+from smajax.model.system import System, heating_power
+from smajax.model.wire.heat import mass_per_metre
+from smajax.model.wire.laws import LAWS
+from smajax.model.wire.order import disorder
+from smajax.model.wire.resistance import resistance_per_metre
+from smajax.simulation.sensors import sensors_of
+
+
+def check_together(system: System, load: str, drive: str) -> None:
+    """ValueError unless what is prescribed has no drive, and what is heated has one."""
+    if isinstance(system.load, AbstractCoupon) != (drive == "none"):
+        raise ValueError(
+            f"load `{load}` with drive `{drive}`: a coupon's temperature is prescribed, so it takes the drive `none`; "
+            f"every other load is heated and takes one of {listed(sorted(set(DRIVES) - {'none'}))}."
+        )
+
+
+def describe(wire: str, load: str, drive: str, law: str = "") -> ModelDescription:
+    """Parameters and channels of one combination. ValueError when the three do not go together."""
+    system = build(wire, load, drive, law)
+    check_together(system, load, drive)
+    # An effect is part of the base model when the experiment names a parameter of it.
+    whole = extended(system, candidates(system, None, ()))
+    values = parameter_values(system)
+    return ModelDescription(
+        parameters={
+            entry.name: ParameterInfo(entry.unit, entry.low, entry.high, values.get(entry.name))
+            for entry in parameters(whole).values()
+        },
+        inputs_required=system.load.inputs_required | system.drive.inputs_required,
+        inputs_optional=system.load.inputs_optional | system.drive.inputs_optional | {"ambient_temperature"},
+        outputs=sensors_of(system),
+        inputs_squared=system.drive.inputs_squared,
+        heats=system.drive.inputs_required,
+        effects=frozenset(candidates(system, None, ())),
+        scale=None if isinstance(system.load, AbstractCoupon) else lambda values: _scale(_at(system, values)),
+        disorder=lambda values: disorder(_at(system, values)),
+        inputs_sampled=system.load.inputs_required if isinstance(system.load, AbstractCoupon) else frozenset(),
+    )
+
+
+def _at(system: System, values: Mapping[str, float]) -> System:
+    """The system without effects at those of the values that are its own."""
+    table = parameters(system)
+    return set_parameters(system, {name: value for name, value in values.items() if name in table})
+
+
+def _scale(system: System) -> Scale:
+    """Of a wire all martensite, in still air: tau = rho c_p d / (4 h), T - T_inf = P / (h pi d) at rest (eq. 3.1)."""
+    wire, heat = system.wire, system.wire.heat
+    resistance = resistance_per_metre(wire, (), heat.ambient_temperature, jnp.ones(()))
+    cooling = heat.convection_coefficient * jnp.pi * wire.wire_diameter
+
+    def warming(inputs: Mapping[str, np.ndarray]) -> np.ndarray:
+        given = {name: jnp.asarray(values) for name, values in inputs.items()}
+        return np.asarray(heating_power(system, resistance, given) / cooling, dtype=np.float64)
+
+    return Scale(
+        float(wire.wire_length),
+        float(heat.ambient_temperature),
+        float(mass_per_metre(wire) * heat.specific_heat / cooling),
+        warming,
+    )
+
+
+CATALOGUE = Catalogue(
+    wires=tuple(WIRES),
+    loads=tuple(LOADS),
+    drives=tuple(DRIVES),
+    laws=tuple(LAWS),
+    effects=tuple(LIBRARY),
+    describe=describe,
+)
+
+
+def candidates(
+    system: System, only: tuple[str, ...] | None, excluded: tuple[str, ...], clocked: bool = True
+) -> tuple[str, ...]:
+    """Names of the effects that this system can show: a coupon has no heat balance, no circuit and no guide.
+
+    `clocked`: whether the samples have times; where they have not, what is a matter of seconds is tried only if asked for.
+    """
+    useless = {"heat", "electrical", "mechanics"} if isinstance(system.load, AbstractCoupon) else set()
+    return tuple(
+        name
+        for name, effect in LIBRARY.items()
+        if effect.equation not in useless
+        and effect.applies(system)
+        and (clocked or not effect.needs_time or only is not None)
+        and name not in excluded
+        and (only is None or name in only)
+    )

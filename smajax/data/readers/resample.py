@@ -1,0 +1,127 @@
+"""Signals of different rates on one uniform clock.
+
+An input is a command that holds between its samples, so its value for a step is its mean over that step (a voltage's
+is the root of its mean square, since that is what heats). An output
+is a measurement of something smooth, so its value is the one at the clock instant, averaged over one step when the
+clock is slower than the sensor, which keeps what is faster than the clock from folding into the residual.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from smajax.data.readers.table import Array
+
+# Below this many sensor samples a step there is nothing to average.
+DECIMATION_FROM = 1.05
+# A value more than this share of which would be made up is missing.
+MADE_UP = 0.25
+# Sample intervals without a row from which on samples are missing.
+GAP_INTERVALS = 5.0
+
+
+@dataclass(frozen=True)
+class Resampled:
+    """values (n,) on the clock, and by how much resampling shrank the sigma of white measurement noise (1: not)."""
+
+    values: Array
+    noise_gain: float
+
+
+def uniform_clock(start: float, end: float, step: float) -> Array:
+    """Times start, start + step, ... not beyond end, shape (n,), all in seconds."""
+    # The tolerance keeps the last instant when rounding put the end a hair before it.
+    count = int(np.floor((end - start) / step + 1e-6)) + 1
+    return np.asarray(start + step * np.arange(count), dtype=np.float64)
+
+
+def _piecewise_constant_integral(time: Array, values: Array, at: Array) -> Array:
+    """Integral from time[0] to each of `at` of the signal that holds values[i] from time[i], the last one for ever."""
+    area = np.concatenate([[0.0], np.cumsum(values[:-1] * np.diff(time))])
+    index = np.clip(np.searchsorted(time, at, side="right") - 1, 0, time.size - 1)
+    return area[index] + values[index] * (at - time[index])
+
+
+def _piecewise_linear_integral(time: Array, values: Array, at: Array) -> Array:
+    """Integral from time[0] to each of `at`, inside the samples, of the straight lines between the samples."""
+    area = np.concatenate([[0.0], np.cumsum(0.5 * (values[1:] + values[:-1]) * np.diff(time))])
+    index = np.clip(np.searchsorted(time, at, side="right") - 1, 0, time.size - 2)
+    into = at - time[index]
+    slope = (values[index + 1] - values[index]) / (time[index + 1] - time[index])
+    return area[index] + values[index] * into + 0.5 * slope * into**2
+
+
+def resample_input(time: Array, values: Array, clock: Array, step: float, *, squared: bool = False) -> Array:
+    """Mean of a held signal over each [clock_i, clock_i + step), shape (len(clock),).
+
+    time, values (n,): the samples, each held until the next. The mean is the exact integral over the step, so a pulse
+    of one sample keeps its integral whatever the step. With `squared` it is the root of the mean square, with the sign
+    of the mean: what a signal that acts by its square (the voltage on a heater) amounts to over the step.
+    """
+    if squared:
+        sign = np.where(resample_input(time, values, clock, step) < 0.0, -1.0, 1.0)
+        return np.asarray(sign * np.sqrt(resample_input(time, values**2, clock, step)), dtype=np.float64)
+    edges = np.stack([clock, clock + step])
+    low, high = _piecewise_constant_integral(time, values, edges)
+    # A mean cannot leave the range of what it averages; rounding of the running integral could, by a hair.
+    return np.asarray(np.clip((high - low) / step, values.min(), values.max()), dtype=np.float64)
+
+
+def resample_output(time: Array, values: Array, clock: Array, step: float) -> Resampled:
+    """A measured signal at each clock instant, shape (len(clock),), with its noise gain.
+
+    When the sensor is faster than the clock: the mean, over the window of one step centred on the instant, of the
+    straight lines between the samples. It has no delay, is exact for a ramp and suppresses tones above the clock's
+    Nyquist frequency. Near the ends of the record the window shrinks evenly on both sides, so that it stays centred.
+    Otherwise: the straight line between the neighbouring samples.
+    """
+    per_step = step / float(np.median(np.diff(time)))
+    if per_step < DECIMATION_FROM:
+        return Resampled(values=np.interp(clock, time, values), noise_gain=1.0)
+    half = np.minimum(0.5 * step, np.minimum(clock - time[0], time[-1] - clock))
+    half = np.maximum(half, 0.0)
+    # The integral grows along the run while a window's share does not: centred values keep the rounding small.
+    centre = float(np.mean(values))
+    at_instant = np.interp(clock, time, values)
+    low, high = _piecewise_linear_integral(time, values - centre, np.stack([clock - half, clock + half]))
+    wide = half > 1e-6 * step
+    mean = centre + (high - low) / np.where(wide, 2.0 * half, 1.0)
+    return Resampled(values=np.where(wide, mean, at_instant), noise_gain=window_noise_gain(per_step))
+
+
+def resample_with_gaps(time: Array, values: Array, clock: Array, step: float) -> Resampled:
+    """As `resample_output` where samples are missing (nan, or no row for several intervals): nan where too much is.
+
+    Shorter gaps are bridged by straight lines, so that one lost sample of many in a step loses no step.
+    """
+    known = np.isfinite(values)
+    if not known.any():
+        return Resampled(np.full(clock.size, np.nan), 1.0)
+    # A stretch without rows is one of missing samples at its usual interval.
+    usual = float(np.median(np.diff(time)))
+    long = np.flatnonzero(np.diff(time) > GAP_INTERVALS * usual)
+    at = np.sort(np.concatenate([time, time[long] + usual, time[long + 1] - usual]))
+    here = np.searchsorted(time, at)
+    measured = np.isclose(time[np.minimum(here, time.size - 1)], at, rtol=0.0, atol=1e-9 * usual)
+    lost = ~(measured & known[np.minimum(here, time.size - 1)])
+    found = resample_output(time, np.interp(time, time[known], values[known]), clock, step)
+    made_up = resample_output(at, lost.astype(np.float64), clock, step).values
+    return Resampled(np.where(made_up > MADE_UP, np.nan, found.values), found.noise_gain)
+
+
+def window_noise_gain(samples_per_step: float) -> float:
+    """Sigma of white noise after the window mean of `resample_output`, over its sigma before; about 1/sqrt(samples).
+
+    The sample j away from the instant weighs the integral over the window of the hat function centred on it.
+    """
+    half = 0.5 * samples_per_step
+    reach = np.arange(-int(half) - 2, int(half) + 3, dtype=np.float64)
+
+    def hat_integral(at: Array) -> Array:
+        inside = np.clip(at, -1.0, 1.0)
+        return np.where(inside < 0.0, 0.5 * (1.0 + inside) ** 2, 1.0 - 0.5 * (1.0 - inside) ** 2)
+
+    weights = (hat_integral(half - reach) - hat_integral(-half - reach)) / samples_per_step
+    return float(np.sqrt(np.sum(weights**2)))

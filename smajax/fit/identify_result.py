@@ -1,0 +1,99 @@
+"""What an identification found, as records: no more than the report and a program read."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from smajax.data.experiment.record import Prior
+from smajax.fit.design import Suggestion
+from smajax.fit.directions import Direction
+from smajax.fit.posterior import Posterior
+from smajax.fit.profile import Profile
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """One parameter, in the program's own unit; `parameter[run]` is that run's own."""
+
+    name: str
+    unit: str
+    value: float
+    standard_error: float | None  # None: not told by the runs
+    lower: float
+    upper: float
+    start: float
+    prior: Prior | None
+    remark: str
+
+
+@dataclass(frozen=True)
+class IdentifiedOutput:
+    """One sensor, in the program's own unit."""
+
+    name: str
+    unit: str
+    noise_sigma: float
+    noise_how: str
+    noise_before: float | None  # where it is as the fit leaves it: as the runs' differences showed it
+    ratio: float  # rms of the fit runs' residual over the noise
+
+
+@dataclass(frozen=True)
+class IdentifiedSeries:
+    """One sensor in one run, (n,) each; nan where a sample is missing."""
+
+    output: str
+    measured: np.ndarray
+    simulated: np.ndarray  # with the run's offset
+    spread: np.ndarray  # standard error of the simulation that the parameters' make
+    rmse: float  # nan without a sample
+
+
+@dataclass(frozen=True)
+class IdentifiedRun:
+    """One run as the fitted model simulates it."""
+
+    name: str
+    role: str
+    time: np.ndarray  # (n,)
+    inputs: dict[str, np.ndarray]
+    series: tuple[IdentifiedSeries, ...]
+
+    @property
+    def rmse(self) -> float:
+        """Of the first output."""
+        return self.series[0].rmse
+
+
+@dataclass(frozen=True)
+class Identified:
+    """What the runs told. `correlation` is that of the estimates `correlated`, (K, K)."""
+
+    experiment: str
+    title: str
+    source: str
+    outputs: tuple[IdentifiedOutput, ...]
+    stopped: str
+    check: tuple[str, ...]
+    estimates: tuple[Estimate, ...]
+    own_of_held_out: dict[str, float]  # what is a run's own is found for held-out runs too, all else held
+    correlated: tuple[str, ...]
+    correlation: np.ndarray
+    weak: tuple[str, ...]
+    all_took_part: bool  # whether no parameter is left out of `weak`: held by a bound, or without any effect
+    directions: tuple[Direction, ...]
+    profiles: tuple[Profile, ...]
+    posterior: Posterior | None
+    start_costs: tuple[float, ...]  # mean square over the noise's, of every fit carried to its end
+    ratio: float  # rms of the fit runs' residual over the noise
+    whiteness_p: float
+    normality_p: float
+    independent: float  # samples an independent one
+    robust: bool
+    runs: tuple[IdentifiedRun, ...]
+    suggestions: tuple[Suggestion, ...]
+    step: float  # s from sample to sample of every run; one where only the order of the samples is known
+    clocked: bool  # whether the samples have times
+    provenance: dict[str, str]

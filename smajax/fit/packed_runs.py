@@ -1,0 +1,133 @@
+"""Measured runs of unequal length, packed into one padded batch that the simulator can be mapped over."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from functools import partial
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from smajax.core.parameters import set_parameters
+from smajax.data.experiment.record import RUN_STARTS, Run
+from smajax.model.system import System, initial_state
+from smajax.model.types import Scalar, State, Trajectory
+from smajax.simulation.compiled import simulate_compiled
+from smajax.simulation.sensors import shown_by
+from smajax.simulation.simulate import simulate
+
+
+class RunBatch(eqx.Module):
+    """R runs on N samples each; a shorter run is padded by holding its last input, with mask 0.
+
+    A series is one output of one run: those of the first run first. A missing sample has mask 0 as well.
+    """
+
+    inputs: dict[str, Float[Array, "run time"]]
+    output: Float[Array, "series time"]
+    mask: Float[Array, "series time"]
+    overrides: Float[Array, "run override"]  # values of `override_names`, run by run; also of `RUN_STARTS`
+    override_names: tuple[str, ...] = eqx.field(static=True)
+    dt: float = eqx.field(static=True)
+    outputs: tuple[str, ...] = eqx.field(static=True, default=("reading",))
+
+    @property
+    def runs(self) -> int:
+        return self.output.shape[0] // len(self.outputs)
+
+
+def pack(runs: Sequence[Run], dt: float, defaults: dict[str, float]) -> RunBatch:
+    """Pack `runs` (all with the same channels). `defaults` holds a value for every parameter a run overrides.
+
+    Raises ValueError when the runs' input channels differ, naming the first run that does.
+    """
+    if not runs:
+        raise ValueError("A batch needs at least one run, but `runs` is empty.")
+    channels = sorted(runs[0].inputs)
+    for run in runs:
+        if sorted(run.inputs) != channels:
+            raise ValueError(
+                f"All runs must have the same input channels; `{runs[0].name}` has {channels}, `{run.name}` has "
+                f"{sorted(run.inputs)}. Give every run the same channels (a constant one is fine)."
+            )
+    longest = max(len(run.time) for run in runs)
+    names = tuple(sorted({name for run in runs for name in run.parameters}))
+
+    def padded(values: np.ndarray, mode: str) -> np.ndarray:
+        short = longest - len(values)
+        return np.pad(values, (0, short), mode="edge") if mode == "edge" else np.pad(values, (0, short))
+
+    return RunBatch(
+        inputs={name: jnp.asarray([padded(run.inputs[name], "edge") for run in runs]) for name in channels},
+        output=jnp.asarray([padded(np.nan_to_num(series), "zero") for run in runs for series in run.outputs.values()]),
+        mask=jnp.asarray(
+            [padded(np.isfinite(series).astype(float), "zero") for run in runs for series in run.outputs.values()]
+        ),
+        overrides=jnp.asarray([[run.parameters.get(name, defaults[name]) for name in names] for run in runs]),
+        override_names=names,
+        dt=dt,
+        outputs=tuple(runs[0].outputs),
+    )
+
+
+def halved(batch: RunBatch) -> RunBatch:
+    """The same runs at half the step, for inputs that hold over a step; sample i of `batch` is sample 2 i."""
+    return dataclasses.replace(
+        batch,
+        inputs={name: jnp.repeat(series, 2, axis=1) for name, series in batch.inputs.items()},
+        output=jnp.repeat(batch.output, 2, axis=1),
+        mask=jnp.repeat(batch.mask, 2, axis=1),
+        dt=0.5 * batch.dt,
+    )
+
+
+def _started(
+    system: System, names: Sequence[str], own: Float[Array, " own"], inputs: dict[str, Float[Array, " time"]]
+) -> tuple[System, State | None]:
+    """`system` with a run's own values, and the state it starts in where the model does not say it."""
+    values = dict(zip(names, own, strict=True))
+    celsius = values.pop("initial_temperature", None)
+    here = set_parameters(system, {RUN_STARTS.get(name, name): value for name, value in values.items()})
+    if celsius is None:
+        return here, None
+    # A wire that was not at the air's temperature: at rest as if the air had been as warm.
+    first = {name: series[0] for name, series in inputs.items()}
+    return here, initial_state(here, {**first, "ambient_temperature": celsius})
+
+
+def shown_run(
+    system: System,
+    inputs: dict[str, Float[Array, " time"]],
+    values: Float[Array, " own"],
+    names: Sequence[str],
+    dt: Scalar | float,
+    outputs: Sequence[str],
+) -> Float[Array, "output time"]:
+    """What the sensors show of one run, with its own `values` of `names`."""
+    here, initial = _started(system, names, values, inputs)
+    run = simulate(here, inputs, dt, initial)
+    return jnp.stack([shown_by(here, run, name) for name in outputs])
+
+
+def simulate_batch(system: System, batch: RunBatch) -> Trajectory:
+    """One trajectory per run, numpy's arrays of shape (R, N); outside of `jit`, `vmap` and `grad`."""
+    runs = []
+    for number in range(batch.runs):
+        inputs = {name: series[number] for name, series in batch.inputs.items()}
+        here, initial = _started(system, batch.override_names, batch.overrides[number], inputs)
+        runs.append(simulate_compiled(here, inputs, batch.dt, initial=initial))
+    return jax.tree.map(lambda *leaves: np.stack(leaves), *runs)
+
+
+def shown_batch(
+    system: System, batch: RunBatch, own_names: Sequence[str] = (), own: Float[Array, "run own"] | None = None
+) -> Float[Array, "series time"]:
+    """What the batch's sensors show. `own`: each run's own values of `own_names`."""
+    names = (*batch.override_names, *own_names)
+    values = batch.overrides if own is None else jnp.concatenate([batch.overrides, own], axis=1)
+    one = partial(shown_run, system, names=names, dt=batch.dt, outputs=batch.outputs)
+    return jax.vmap(lambda inputs, own: one(inputs, own))(batch.inputs, values).reshape(batch.output.shape[0], -1)

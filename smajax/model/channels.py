@@ -1,0 +1,31 @@
+"""Input channels that a load or a drive may have, and the unit of each (SI, temperatures in degrees Celsius)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from smajax.core.display_units import Display, display
+
+INPUT_UNITS: Mapping[str, str] = MappingProxyType(
+    {
+        "voltage": "V",
+        "current": "A",
+        "power": "W",
+        "duty": "1",
+        "mass": "kg",
+        "load_torque": "N m",
+        "temperature": "degC",
+        "stress": "Pa",
+        "strain": "1",
+        "ambient_temperature": "degC",
+    }
+)
+
+# The record keeps input channels and model states by name only.
+_CHANNELS = {**INPUT_UNITS, "martensite_fraction": "1"}
+
+
+def channel(name: str) -> Display:
+    """How to show the input channel or model state `name`."""
+    return display(_CHANNELS.get(name, "1"), name)

@@ -1,0 +1,74 @@
+"""A transformation that lags behind the temperature: the faster the wire is heated, the higher its range seems."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+import jax.numpy as jnp
+
+from smajax.core.parameters import parameter
+from smajax.model.effects.base import AbstractEffect
+from smajax.model.types import Scalar, WireState
+from smajax.model.wire.history import DURATION, following
+from smajax.model.wire.kinetics import cooling_width, heating_width
+
+if TYPE_CHECKING:
+    from smajax.model.wire.kinetics import Kinetics
+
+
+LAGGING = "lagging_temperature"
+LAGGING_STRESS = "lagging_stress"
+
+
+class LaggingTransformation(AbstractEffect):
+    r"""$\tau \dot T_k + T_k = T$ and $\tau \dot\sigma_k + \sigma_k = \sigma$, with T_k and sigma_k in both curves.
+
+    The phases follow what drives them, $y = T - \sigma/C$, a time constant late. At a steady rate the ranges are shifted by
+    $\tau \dot y$: up on heating, down on cooling. The late values are carried from step to step, solved together with
+    everything else.
+    """
+
+    time_constant: Scalar = parameter("s", 0.0, 20.0, "tau")
+
+    effect_name: ClassVar[str] = "lagging_transformation"
+    title: ClassVar[str] = "transformation that depends on the rate"
+    equation: ClassVar[str] = "kinetics"
+    formula: ClassVar[str] = (
+        "tau dT_k/dt + T_k = T, likewise sigma_k, in the place of T and sigma in eq. 3.3 and 3.5 (a lag of first order)"
+    )
+    sentence: ClassVar[str] = (
+        "The phases take time to change: when heated or cooled quickly the wire transforms at a higher (lower) "
+        "temperature, and goes on for a moment when the temperature stands still."
+    )
+    switches: ClassVar[tuple[str, ...]] = ("time_constant",)
+    needs_time: ClassVar[bool] = True
+    starts: ClassVar[dict[str, float]] = {"time_constant": 0.1}
+
+    @classmethod
+    def base(cls) -> LaggingTransformation:
+        return cls(time_constant=0.0)
+
+    def kept_at_start(self, temperature: Scalar, stress: Scalar, fraction: Scalar) -> dict[str, Scalar]:
+        return {LAGGING: temperature, LAGGING_STRESS: stress, DURATION: jnp.zeros_like(temperature)}
+
+    def _late(self, temperature: Scalar, stress: Scalar, old: WireState) -> tuple[Scalar, Scalar]:
+        """Both late values at the end of a step from `old`."""
+        return (
+            following(old, LAGGING, old.temperature, temperature, self.time_constant),
+            following(old, LAGGING_STRESS, old.stress, stress, self.time_constant),
+        )
+
+    def kept_after(self, old: WireState, temperature: Scalar, stress: Scalar, fraction: Scalar) -> dict[str, Scalar]:
+        late_temperature, late_stress = self._late(temperature, stress, old)
+        return {LAGGING: late_temperature, LAGGING_STRESS: late_stress}
+
+    def _behind(self, slope: Scalar, temperature: Scalar, stress: Scalar, old: WireState) -> Scalar:
+        """How far y is behind, C."""
+        late_temperature, late_stress = self._late(temperature, stress, old)
+        return late_temperature - temperature - (late_stress - stress) / slope
+
+    def heating_distance(self, law: Kinetics, z: Scalar, temperature: Scalar, stress: Scalar, old: WireState) -> Scalar:
+        return z + self._behind(law.stress_slope_austenite, temperature, stress, old) / heating_width(law)
+
+    def cooling_distance(self, law: Kinetics, z: Scalar, temperature: Scalar, stress: Scalar, old: WireState) -> Scalar:
+        return z + self._behind(law.stress_slope_martensite, temperature, stress, old) / cooling_width(law)

@@ -1,0 +1,62 @@
+"""Young's modulus that differs between the phases, where the base model has one for both."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+import jax.numpy as jnp
+
+from smajax.core.parameters import parameter
+from smajax.model.effects.base import AbstractEffect
+from smajax.model.load.coupon import Coupon
+from smajax.model.types import Scalar
+from smajax.model.wire.constitutive import RateForm
+
+if TYPE_CHECKING:
+    from smajax.model.system import System
+    from smajax.model.wire.wire import Wire
+
+
+class PhaseModulus(AbstractEffect):
+    r"""$E = E_M [1 + a (1 - \xi)]$: eq. 3.15 with $E_A = (1 + a) E_M$.
+
+    A candidate of wires whose base model has one modulus (`wire.stiffness.Constant`, as sec. 3.3 takes it, or $E_A = E_M$);
+    where it has two, give `young_modulus_austenite` as an unknown instead.
+
+    In the source's rate form of eq. 3.2 the modulus multiplies rates alone: transforming under a constant stress $\sigma$ leaves no
+    elastic mismatch $\sigma(1/E_A - 1/E_M)$, and a cycle that heats under one stress and cools under another does not
+    close. The integrated form (`wire.constitutive.IntegratedForm`) has the first and not the second. So a coupon whose
+    stress is given has no such candidate in rate form; `stress_dependent_strain` shows what depends on stress there.
+    """
+
+    contrast: Scalar = parameter("-", -0.5, 5.0, "a: relative change of E from martensite to austenite")
+
+    effect_name: ClassVar[str] = "phase_modulus"
+    title: ClassVar[str] = "Young's modulus depending on the phase"
+    equation: ClassVar[str] = "constitutive"
+    formula: ClassVar[str] = "E = E_M [1 + a (1 - xi)] in eq. 3.2 (Elahinia 2004, eq. 3.15, E_A = (1 + a) E_M)"
+    sentence: ClassVar[str] = (
+        "Austenite is stiffer than martensite: a hot wire stretches less than a cold one when its load changes."
+    )
+    switches: ClassVar[tuple[str, ...]] = ("contrast",)
+    starts: ClassVar[dict[str, float]] = {"contrast": 0.5}
+
+    @classmethod
+    def base(cls) -> PhaseModulus:
+        return cls(contrast=0.0)
+
+    @classmethod
+    def applies(cls, system: System) -> bool:
+        if isinstance(system.load, Coupon) and isinstance(system.wire.constitutive.form, RateForm):
+            return False
+        hot, cold = (float(_own(system.wire, jnp.asarray(phase, float))) for phase in (0.0, 1.0))
+        return abs(hot - cold) < 1e-6 * cold
+
+    def modulus_change(self, wire: Wire, fraction: Scalar) -> Scalar | float:
+        return self.contrast * (1.0 - fraction) * _own(wire, jnp.ones_like(fraction))
+
+
+def _own(wire: Wire, fraction: Scalar) -> Scalar:
+    """The base model's modulus, Pa."""
+    law = wire.constitutive
+    return law.stiffness.young_modulus(law.young_modulus_austenite, law.young_modulus_martensite, fraction)

@@ -1,0 +1,50 @@
+"""A sensor with backlash: it follows only when the play has been taken up."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import jax.numpy as jnp
+
+from smajax.core.parameters import parameter
+from smajax.model.effects.base import AbstractEffect, Extent
+from smajax.model.types import Scalar
+
+# The score test knows a play so small that it is taken up at once: over what it says, from all over which refits begin.
+MORE = (1.0, 16.0)
+
+
+class SensorBacklash(AbstractEffect):
+    r"""$y \to \min(\max(y, x - b), x + b)$, the play operator: y stays until x is b away from it."""
+
+    half_width: Scalar = parameter("m", 0.0, 10.0, "b: half of the play (rad on an arm, - for a strain)")
+
+    effect_name: ClassVar[str] = "sensor_backlash"
+    title: ClassVar[str] = "backlash of the sensor"
+    equation: ClassVar[str] = "sensor"
+    formula: ClassVar[str] = "y = min(max(y_before, x - b), x + b) (play operator)"
+    sentence: ClassVar[str] = (
+        "The sensor's coupling has play: after every turn the reading stays where it is until the play is taken up."
+    )
+    switches: ClassVar[tuple[str, ...]] = ("half_width",)
+    starts: ClassVar[dict[str, float]] = {"half_width": 1e-4}
+    recalls: ClassVar[bool] = True
+
+    @classmethod
+    def base(cls) -> SensorBacklash:
+        return cls(half_width=0.0)
+
+    @classmethod
+    def spans(cls, extent: Extent) -> dict[str, tuple[float, float]]:
+        return {"half_width": (0.0, 0.5 * extent.stroke)}
+
+    @classmethod
+    def begins(cls, told: Mapping[str, float]) -> dict[str, tuple[float, float]]:
+        at = told.get("half_width", 0.0)
+        return {"half_width": (MORE[0] * at, MORE[1] * at)} if at > 0.0 else {}
+
+    def sensed(self, reading: Scalar, time: Scalar, last: Scalar) -> Scalar:
+        # At b = 0 both bounds are x, and the derivative by b is that of the side on which the play lies.
+        low, high = reading - self.half_width, reading + self.half_width
+        return jnp.where(last <= low, low, jnp.where(last >= high, high, last))

@@ -1,0 +1,44 @@
+"""Two-part transformation: a sharp core and long tails."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import jax
+
+from smajax.core.parameters import parameter
+from smajax.model.effects.second_range import AbstractSecondRange
+from smajax.model.types import Scalar
+
+
+class TwoPartTransformation(AbstractSecondRange):
+    r"""$h = (1 - w) h_{core} + w / (1 + e^{(z - 1/2 - s)/b})$ with its own w and s by branch and one width b.
+
+    A transformation in two steps too, whose second never quite ends.
+    """
+
+    width: Scalar = parameter("-", 0.15, 4.0, "b: width of the tails, in transformation ranges")
+
+    effect_name: ClassVar[str] = "two_part_transformation"
+    title: ClassVar[str] = "two-part transformation (sharp core, long tails)"
+    formula: ClassVar[str] = (
+        "h = (1 - w) h_cos(z) + w / (1 + exp[(z - 1/2 - s)/b]) in eq. 3.3 and 3.5, w and s by branch"
+    )
+    sentence: ClassVar[str] = (
+        "Most of the wire transforms in a narrow range while a part of it (its ends, its grips, grains of another "
+        "orientation) follows over a much wider one."
+    )
+    starts: ClassVar[dict[str, float]] = {
+        "heating_weight": 0.15,
+        "cooling_weight": 0.15,
+        "heating_shift": 0.0,
+        "cooling_shift": 0.0,
+        "width": 0.8,
+    }
+
+    @classmethod
+    def base(cls) -> TwoPartTransformation:
+        return cls(heating_weight=0.0, cooling_weight=0.0, heating_shift=0.0, cooling_shift=0.0, width=0.8)
+
+    def second(self, beyond: Scalar) -> Scalar:
+        return jax.nn.sigmoid(-beyond)

@@ -1,0 +1,41 @@
+"""Two-way memory: a trained wire lengthens on cooling with no stress on it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+from smajax.core.parameters import parameter
+from smajax.model.effects.base import AbstractEffect
+from smajax.model.types import Scalar
+
+if TYPE_CHECKING:
+    from smajax.model.wire.wire import Wire
+
+
+class TwoWayMemory(AbstractEffect):
+    r"""$\varepsilon \mathrel{+}= a\,\varepsilon_L (\xi - \xi_s)$: the twinned part of the martensite strains as well.
+
+    For Brinson's split, in which martensite formed without stress gives no strain. Under the laws without a split all
+    martensite is detwinned and eps_L itself is the strain at zero stress: there this changes nothing, and
+    `stress_dependent_strain` says how much a stress adds to it.
+    """
+
+    # Below one: a stress that detwins must not shorten the wire.
+    share: Scalar = parameter("-", 0.0, 0.9, "a: two-way strain over eps_L")
+
+    effect_name: ClassVar[str] = "two_way_memory"
+    title: ClassVar[str] = "two-way memory strain"
+    equation: ClassVar[str] = "constitutive"
+    formula: ClassVar[str] = "strain += a eps_L (xi - xi_s) (eq. 2.16; usual form of the trained two-way strain)"
+    sentence: ClassVar[str] = "The wire is trained: it lengthens on cooling even where hardly any load pulls on it."
+    switches: ClassVar[tuple[str, ...]] = ("share",)
+    starts: ClassVar[dict[str, float]] = {"share": 0.1}
+
+    @classmethod
+    def base(cls) -> TwoWayMemory:
+        return cls(share=0.0)
+
+    def strain(
+        self, wire: Wire, temperature: Scalar, stress: Scalar, fraction: Scalar, detwinned: Scalar
+    ) -> Scalar | float:
+        return self.share * wire.constitutive.recoverable_strain * (fraction - detwinned)

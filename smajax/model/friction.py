@@ -1,0 +1,68 @@
+r"""Friction of a load's guide: each effect of friction has a bristle of its own, which bends before it slips.
+
+LuGre's bristle without damping of its own (Canudas de Wit et al. 1995; with a level of 1 it is Dahl's, 1968): f is the friction
+over its limit at rest, and over a motion x of one direction
+
+    delta df/dx = sign(x) - f/h(v)
+
+with the presliding displacement delta and h the level at a speed over that at rest. A step solves it in closed form.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+
+from smajax.model.effects.base import having
+from smajax.model.load.base import AbstractMovingLoad
+from smajax.model.system import System
+from smajax.model.types import Inputs, Motion, Scalar
+
+
+class Rubbing(NamedTuple):
+    """Friction of one effect at a speed."""
+
+    name: str  # its entry of `Motion.friction`
+    limit: Scalar  # at rest, N (N m on an arm)
+    level: Scalar | float  # h: while it slips, over the limit
+    presliding: Scalar | float  # delta, m (rad)
+
+
+def rubbing(system: System, before: Motion, velocity: Scalar, inputs: Inputs) -> list[Rubbing]:
+    """All friction of a load on its way from `before`; empty where no effect has any.
+
+    `velocity`: what a stage foretells of its end before it is solved, m/s (rad/s). At that or at the speed before, if that
+    is larger: friction that falls with the speed it is solved for has several answers, or none that Newton's method finds.
+    """
+    load = system.load
+    assert isinstance(load, AbstractMovingLoad)
+    speed = load.lever() * jnp.maximum(jnp.abs(before.velocity), jnp.abs(velocity))
+    limits = [(effect, jnp.asarray(effect.friction_limit())) for effect in having(system.effects, "friction_limit")]
+    bearing = having(system.effects, "friction_share")
+    if bearing:
+        at_rest = jnp.abs(load.resistance(load.start(), jnp.zeros_like(velocity), inputs))
+        limits += [(effect, effect.friction_share() * at_rest) for effect in bearing]
+    return [
+        Rubbing(effect.effect_name, limit, effect.friction_level(speed), effect.presliding() / load.lever())
+        for effect, limit in limits
+    ]
+
+
+def bent(one: Rubbing, before: Motion, position: Scalar) -> Scalar:
+    """Motion to a position over what its bristle bends by: well beyond -1..1 it slips."""
+    return (position - before.position) / one.presliding
+
+
+def in_use(one: Rubbing, before: Motion, position: Scalar) -> Scalar:
+    """Share of the limit at rest that holds against a motion to `position`, -1..1."""
+    moved = bent(one, before, position)
+    slipping = jnp.where(moved < 0.0, -one.level, one.level)
+    return slipping + (before.friction[one.name] - slipping) * jnp.exp(-jnp.abs(moved) / one.level)
+
+
+def unbent(one: Rubbing, before: Motion) -> Scalar:
+    """Position at which its friction is none."""
+    share = before.friction[one.name]
+    back = one.level * jnp.log(1.0 + jnp.abs(share) / one.level)
+    return before.position - one.presliding * jnp.sign(share) * back

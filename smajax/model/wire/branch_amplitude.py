@@ -1,0 +1,152 @@
+"""What the kinetics remembers of the path: the amplitudes xi_M and xi_A of eq. 3.26, corrected and as printed."""
+
+from __future__ import annotations
+
+import abc
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Bool
+
+from smajax.model.types import Scalar, WireState
+
+# A share below this is none (`kinetics.martensite_left`): dividing by less would make an amplitude pure rounding.
+FINISHED = 1e-9
+
+
+# A curve that lies beyond the present fraction by less does not: where the wire rests on its curve, the rounding of the
+# stress alone would count as a transformation, or as one missed, and renew an amplitude.
+REST = 1e-10
+ROUNDINGS = 64.0
+
+
+def beyond(gap: Scalar) -> Bool[Array, ""]:
+    """Whether a curve lies beyond the present fraction by more than rounding."""
+    return gap > max(REST, ROUNDINGS * float(jnp.finfo(gap.dtype).eps))
+
+
+class Amplitudes(eqx.Module):
+    """What a renewal carries from step to step."""
+
+    xi_M: Scalar
+    xi_A: Scalar
+    heating_missed: Scalar  # 1 from where the wire was kept from a curve until it follows one again; else 0
+    cooling_missed: Scalar
+
+
+class AbstractRenewal(eqx.Module):
+    """`h` and `k` are the shares of martensite and austenite that the two shapes leave at some temperature and stress."""
+
+    @abc.abstractmethod
+    def start(self, h: Scalar, k: Scalar, xi: Scalar) -> Amplitudes:
+        """Of a wire at rest at the fraction `xi`: xi_M = 1 and xi_A = 0 for cold martensite (sec. 3.7)."""
+
+    @abc.abstractmethod
+    def curves(self, old: WireState, h_old: Scalar, k_old: Scalar, h: Scalar, k: Scalar) -> tuple[Scalar, Scalar]:
+        """xi on the heating and on the cooling curve that belong to `old`, where the shapes leave `h` and `k`."""
+
+    @abc.abstractmethod
+    def renewed(
+        self,
+        old: WireState,
+        heating: Bool[Array, ""],
+        cooling: Bool[Array, ""],
+        h: Scalar,
+        k: Scalar,
+        xi: Scalar,
+    ) -> Amplitudes:
+        """After a step on a branch that ended at the fraction `xi`."""
+
+    @abc.abstractmethod
+    def corrected(self, old: WireState, transforming: Bool[Array, ""], h: Scalar, k: Scalar, xi: Scalar) -> Amplitudes:
+        """After an estimator has put the fraction to `xi`: the next step goes on from there, without a jump."""
+
+
+class Corrected(AbstractRenewal):
+    """Renewed only while the other branch transforms, scaled so that the curve passes through the present state.
+
+    Continuous at a reversal, complete at the end of the range, and blind to a pause. Where the conditions keep the wire
+    from following a curve (Liang's, when the stress falls faster than the temperature), or it starts beyond one, the
+    curve is laid through the present state from then on. So the fraction does not jump when it may follow again, and
+    what was missed is made up for in what is left of the range: all of it, in a fraction of a degree, if hardly any is
+    left. (The source's rates would lose it instead and never complete.)
+    """
+
+    def start(self, h: Scalar, k: Scalar, xi: Scalar) -> Amplitudes:
+        floor = 1.0 - (1.0 - xi) / jnp.maximum(k, FINISHED)
+        return Amplitudes(
+            xi / jnp.maximum(h, FINISHED),
+            jnp.where(xi >= 1.0, 0.0, floor),
+            1.0 * ((h <= FINISHED) & (xi > 0.0)),
+            1.0 * ((k <= FINISHED) & (xi < 1.0)),
+        )
+
+    def curves(self, old: WireState, h_old: Scalar, k_old: Scalar, h: Scalar, k: Scalar) -> tuple[Scalar, Scalar]:
+        return old.xi_M * h, 1.0 - (1.0 - old.xi_A) * k
+
+    def renewed(
+        self,
+        old: WireState,
+        heating: Bool[Array, ""],
+        cooling: Bool[Array, ""],
+        h: Scalar,
+        k: Scalar,
+        xi: Scalar,
+    ) -> Amplitudes:
+        beyond_heating = ~heating & beyond(xi - old.xi_M * h)
+        beyond_cooling = ~cooling & beyond(1.0 - (1.0 - old.xi_A) * k - xi)
+        held = ~heating & ~cooling
+        missed_heating = held & (beyond_heating | (old.heating_missed > 0.5))
+        missed_cooling = held & (beyond_cooling | (old.cooling_missed > 0.5))
+        laid_heating, laid_cooling = xi / jnp.maximum(h, FINISHED), 1.0 - (1.0 - xi) / jnp.maximum(k, FINISHED)
+        return Amplitudes(
+            jnp.where(cooling | beyond_heating | missed_heating, laid_heating, old.xi_M),
+            jnp.where(heating | beyond_cooling | missed_cooling, laid_cooling, old.xi_A),
+            1.0 * missed_heating,
+            1.0 * missed_cooling,
+        )
+
+    def corrected(self, old: WireState, transforming: Bool[Array, ""], h: Scalar, k: Scalar, xi: Scalar) -> Amplitudes:
+        laid = self.start(h, k, xi)
+        # Off both branches a curve ahead of the wire is its memory of where it turned back: that one stays.
+        heating = transforming | beyond(xi - old.xi_M * h)
+        cooling = transforming | beyond(1.0 - (1.0 - old.xi_A) * k - xi)
+        return Amplitudes(
+            jnp.where(heating, laid.xi_M, old.xi_M),
+            jnp.where(cooling, laid.xi_A, old.xi_A),
+            jnp.where(heating, laid.heating_missed, old.heating_missed),
+            jnp.where(cooling, laid.cooling_missed, old.cooling_missed),
+        )
+
+
+class AsPrinted(AbstractRenewal):
+    r"""Eq. 3.26 to the letter with the rates 3.4 and 3.6: $\xi_A = \xi$ while xi falls, $\xi_M = \xi$ whenever not.
+
+    A pause in the middle of heating then shrinks the rest of the transformation, and so does every reversal inside a
+    range: a resumed heating never reaches xi = 0 at A_f'.
+    """
+
+    def start(self, h: Scalar, k: Scalar, xi: Scalar) -> Amplitudes:
+        return Amplitudes(xi, jnp.where(xi >= 1.0, 0.0, xi), jnp.zeros_like(xi), jnp.zeros_like(xi))
+
+    def curves(self, old: WireState, h_old: Scalar, k_old: Scalar, h: Scalar, k: Scalar) -> tuple[Scalar, Scalar]:
+        xi = old.martensite_fraction
+        heated, cooled = xi + old.xi_M * (h - h_old), xi - (1.0 - old.xi_A) * (k - k_old)
+        # The rule can ask for more than there is; here that ends the branch, with the stress still consistent.
+        return jnp.where(heated > 0.0, heated, 0.0), jnp.where(cooled < 1.0, cooled, 1.0)
+
+    def renewed(
+        self,
+        old: WireState,
+        heating: Bool[Array, ""],
+        cooling: Bool[Array, ""],
+        h: Scalar,
+        k: Scalar,
+        xi: Scalar,
+    ) -> Amplitudes:
+        never = jnp.zeros_like(xi)
+        return Amplitudes(jnp.where(heating, old.xi_M, xi), jnp.where(heating, xi, old.xi_A), never, never)
+
+    def corrected(self, old: WireState, transforming: Bool[Array, ""], h: Scalar, k: Scalar, xi: Scalar) -> Amplitudes:
+        # These curves start from the present fraction, whatever it is.
+        return Amplitudes(old.xi_M, old.xi_A, old.heating_missed, old.cooling_missed)

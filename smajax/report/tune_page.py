@@ -1,0 +1,356 @@
+"""A tuning as one self-contained page, and as a record for machines."""
+
+from __future__ import annotations
+
+import html
+import itertools
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from smajax.control.mismatch import MISMATCHES
+from smajax.control.tune.members import BEYOND
+from smajax.control.tune.moves import Moves
+from smajax.control.tune.terms import TERMS
+from smajax.control.tune.tune import Check, Tuned
+from smajax.core.display_units import digits
+from smajax.core.files import csv_text, heading
+from smajax.core.provenance import made_with
+from smajax.core.wording import and_listed, counted
+from smajax.report.html import picture
+from smajax.report.plain_page import bullets, table, whole
+from smajax.report.tune_pictures import before_after
+
+EDGE = 0.02  # of the box, by logarithm
+GROWN = 1.5  # times as much as before
+LEAST_PRICE = 0.1  # J, V/s, 1/s: what is less is nothing, however it grew
+UNITS = {"°": "deg", "°C": "degC"}  # as a file has them
+
+
+def checked_on(found: Tuned, name: str) -> str:
+    """The plants and set points of a check, in words; a share of the air's temperature in kelvins."""
+    if name == "tuned on":
+        return name
+    if name == "inside":
+        return f"never seen: {found.settings.unseen_in_words()}"
+    air = "" if "ambient" in found.settings.variation else f" (the air by {BEYOND * abs(found.air):.3g} K)"
+    return f"never seen: another parameter wrong by {100 * BEYOND:g} %{air}, set points tuned"
+
+
+def gains_of(found: Tuned) -> dict[str, dict[str, Any]]:
+    """Of each gain its value before and after, unit, and box, as the record has them."""
+    return {
+        name: {
+            "before": found.before[name],
+            "after": found.after.values[name],
+            "unit": found.units[name],
+            "box": list(box),
+        }
+        for name, box in found.box.items()
+    }
+
+
+def at_the_edge(gains: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """Those of `gains_of` that ended at a bound of their box."""
+    edge = []
+    for name, one in gains.items():
+        value, (low, high) = one["after"], one["box"]
+        if min(value / low, high / value) < (high / low) ** EDGE:
+            edge.append(name)
+    return edge
+
+
+def broken(found: Tuned, check: Check) -> list[str]:
+    """Which limits the tuned gains do not meet: by how much, where, in how many loops."""
+    told = []
+    for name, limit in found.settings.limits.items():
+        term, values = TERMS[name], check.seen.judged[1, :, list(TERMS).index(name)]
+        over = values > limit
+        if over.any():
+            at = int(np.argmax(values))
+            never = name == "settling_time" and values[at] >= 2.0 * found.settings.seconds
+            worst = "never reached" if never else f"{digits(float(values[at]), 3)} {term.unit}"
+            told.append(
+                f"{term.label} {worst} at {np.degrees(check.members.targets[at]):.3g}° where {limit:g} {term.unit} are "
+                f"asked ({int(over.sum())} of {len(values)} loops)"
+            )
+    return told
+
+
+def met(found: Tuned, check: Check, where: str) -> str:
+    """That every limit is met, and where that says little: a loop that stays short of its set point overshoots nothing."""
+    told = f"Every limit is met in all {check.members.size} closed loops {where}"
+    settled = np.isfinite(np.asarray(check.seen.merits.settling_time)).sum(axis=1)
+    if "settling_time" in found.settings.limits or (settled[1] >= settled[0] and settled[1] > 0):
+        return f"{told}."
+    after = (
+        "none of them settles"
+        if settled[1] == 0
+        else f"only {settled[1]} of them {'settles' if settled[1] == 1 else 'settle'}"
+    )
+    return (
+        f"{told}, but {after} ({settled[0]} with the preset's gains): what never comes to rest at its set point can keep such "
+        "a limit; limit settling_time as well."
+    )
+
+
+def price(found: Tuned) -> list[str]:
+    """What the tuned gains cost: energy, chatter or switching whose median or worst, as the table has them, grew by over half."""
+    seen = found.checks["tuned on"].seen
+    figures = [
+        (TERMS[name].label, TERMS[name].unit, seen.judged[..., list(TERMS).index(name)])
+        for name in ("energy", "chatter")
+    ]
+    figures.append(("switches of the command", "a second", np.asarray(seen.merits.switches_per_second)))
+    grown = []
+    for label, unit, values in figures:
+        for whose, of in (("median", np.median), ("worst", np.max)):
+            before, after = (float(of(one)) for one in values)
+            if after > GROWN * before and after > LEAST_PRICE:
+                grown.append(f"{label} from {digits(before, 3)} to {digits(after, 3)} {unit} in the {whose} loop")
+                break
+    return [f"The tuned gains have their price, where they were tuned: {'; '.join(grown)}."] if grown else []
+
+
+def in_moves(found: Tuned) -> list[str]:
+    """How every loop begins, and what the gains do from one set point to another, which nothing was tuned on."""
+    cold = "Each of these loops is one step from the start, cold and at rest"
+    if found.moves is None:
+        return [f"{cold}: moves from one set point to another were not tried."]
+    moves = found.moves
+    ends = [f"{low:g}° to {high:g}°" for low, high in itertools.pairwise(moves.asked)]
+    overshoot, at = float(moves.overshoot[1].max()), ends[int(np.argmax(moves.overshoot[1]))]
+    never = int((~np.isfinite(moves.settling_time[1])).sum())
+    slowest = float(np.max(moves.settling_time[1], where=np.isfinite(moves.settling_time[1]), initial=0.0))
+    settled = f"{never} of {len(ends)} never settle" if never else f"all settle, in {digits(slowest, 3)} s at most"
+    limits = found.settings.limits
+    missed = [
+        word
+        for word, over in (
+            ("overshoot", overshoot > limits.get("overshoot", np.inf)),
+            ("settling time", (slowest if not never else np.inf) > limits.get("settling_time", np.inf)),
+            ("steady error", float(moves.steady_error[1].max()) > limits.get("steady_error", np.inf)),
+        )
+        if over
+    ]
+    broken_there = f": beyond the limit of {and_listed(missed)}" if missed else ""
+    return [
+        f"{cold}. In {counted(len(ends), 'move')} from one set point to another on the plant as believed, which nothing was "
+        f"tuned on, {settled}, and the largest overshoot is {digits(overshoot, 3)}° ({at}; {digits(float(moves.overshoot[0].max()), 3)}° "
+        f"with the preset's gains){broken_there}."
+    ]
+
+
+def conclusions(found: Tuned) -> list[str]:
+    """What came out, in sentences that say no more than the numbers."""
+    before, after = found.costs
+    tuned, inside = found.checks["tuned on"], found.checks["inside"]
+    told = [f"The cost is {digits(after, 3)} with the tuned gains and {digits(before, 3)} with the preset's."]
+    if dict(found.before) == dict(found.after.values) or (
+        after >= before and found.excesses["tuned on"][1] >= found.excesses["tuned on"][0]
+    ):
+        told = ["Nothing better than the preset's gains was found."]
+    if found.settings.limits:
+        missed = broken(found, tuned)
+        told.append(f"Not every limit is met: {'; '.join(missed)}." if missed else met(found, tuned, "tuned on"))
+        missed = broken(found, inside)
+        told.append(
+            f"Of what was never seen ({found.settings.unseen_in_words()}): {'; '.join(missed)}."
+            if missed
+            else met(found, inside, f"that were never seen ({found.settings.unseen_in_words()})")
+        )
+        if "beyond" in found.checks and (missed := broken(found, found.checks["beyond"])):
+            told.append(f"With a parameter wrong that was not varied: {'; '.join(missed)}.")
+    for name, check in found.checks.items():
+        settled = np.isfinite(np.asarray(check.seen.merits.settling_time)).mean(axis=1)
+        if settled.min() < 1.0:
+            told.append(
+                f"Loops that settle, {checked_on(found, name)}: {100 * settled[0]:.0f} % before, {100 * settled[1]:.0f} % after."
+            )
+    told += in_moves(found)
+    told += price(found)
+    if edge := at_the_edge(gains_of(found)):
+        told.append(f"At a bound of the box, beyond which better gains may lie: {', '.join(edge)}.")
+    descent, evolution = found.descent, found.evolution
+    if evolution.generations:
+        # It begins with where slopes have ended.
+        told.append(
+            f"Slopes ended at a cost of {_ended(evolution.costs[0, 0], evolution.excesses[0, 0])}, the search without them at "
+            f"{_ended(found.costs[1], found.excesses['tuned on'][1])}."
+        )
+    told.append(
+        f"It took {counted(found.simulations, 'closed loop')} in {counted(descent.round, 'round')} by slopes"
+        + (f" and {counted(evolution.generations, 'generation')} without" if evolution.generations else "")
+        + (
+            f"; {descent.wild:,} loops had slopes of no use (a limit cycle multiplies every difference)"
+            if descent.wild
+            else ""
+        )
+        + (f"; {descent.left_out:,} gave numbers that are none" if descent.left_out else "")
+        + "."
+    )
+    return told
+
+
+def _ended(cost: float, excess: float) -> str:
+    return digits(cost, 3) + (f" (a limit exceeded by {100.0 * excess:.2g} %)" if excess > 0.0 else "")
+
+
+def gain_rows(gains: Mapping[str, Mapping[str, Any]]) -> list[list[str]]:
+    """Of `gains_of`: gain, before, after, unit, box, remark."""
+    edge = at_the_edge(gains)
+    return [
+        [
+            name,
+            digits(one["before"]),
+            digits(one["after"]),
+            one["unit"],
+            " … ".join(digits(bound) for bound in one["box"]),
+            "at the bound" if name in edge else "",
+        ]
+        for name, one in gains.items()
+    ]
+
+
+def _figures(found: Tuned, check: Check) -> list[list[str]]:
+    """A row a term: median and worst before and after, and the limits where there are some."""
+    rows = []
+    for column, (name, term) in enumerate(TERMS.items()):
+        cells = []
+        for which in (0, 1):
+            values = check.seen.judged[which, :, column]
+            never = 2.0 * found.settings.seconds if name == "settling_time" else np.inf
+            for value in (float(np.median(values)), float(np.max(values))):
+                cells.append("never" if value >= never else digits(0.0 if abs(value) < 1e-6 else value, 3))
+        if found.settings.limits:
+            limit = found.settings.limits.get(name)
+            cells.append("" if limit is None else f"{limit:g}")
+        rows.append([f"{term.label} ({term.unit})", *cells])
+    return rows
+
+
+def page(found: Tuned, pictures: Mapping[str, bytes], command: str) -> str:
+    """The whole page, pictures inside."""
+    say, settings = html.escape, found.settings
+    head = ["figure", "median before", "worst before", "median after", "worst after"]
+    head += ["limit"] if settings.limits else []
+    parts = [
+        f"<h1>Gains of {say(settings.controller)}, tuned</h1>",
+        bullets(conclusions(found)),
+        f"<p>Tuned on {say(settings.plants_in_words(found.air))}. {say(settings.goal_in_words())}.</p>",
+        picture(
+            pictures["before_after.png"],
+            "angles and figures of merit before and after",
+            "panels",
+            before_after(found, upright=True),
+        ),
+        "<p class=quiet>Above: thick, the plant as believed; thin, plants never seen. Below: from the least to the largest "
+        "over the plants at each set point; squares were tuned on, circles never seen.</p>",
+        "<h2>Gains</h2>",
+        table(["gain", "before", "after", "unit", "box", "remark"], gain_rows(gains_of(found)), (1, 2)),
+    ]
+    for name, check in found.checks.items():
+        what = checked_on(found, name)
+        parts += [
+            f"<h2>{say(what[0].upper() + what[1:])}</h2><p class=quiet>"
+            f"{counted(check.members.size, 'closed loop')} of {settings.seconds:g} s.</p>",
+            table(head, _figures(found, check), range(1, len(head))),
+        ]
+    parts += [
+        "<h2>The search</h2>",
+        picture(pictures["descent.png"], "cost over closed loops"),
+        f"<p class=quiet>{say(settings.between_in_words())}</p>",
+        "<h2>Provenance</h2>",
+        table(["", ""], [["command", command], *map(list, made_with().items())]),
+        "<p class=quiet>The same numbers: tune.json, and loops.csv with every closed loop before and after.</p>",
+    ]
+    return whole(f"Gains of {settings.controller}", [str(part) for part in parts])
+
+
+def loops(found: Tuned) -> str:
+    """CSV, a row a closed loop: which check, whose gains, plant over what is believed, set point, figures (none: never)."""
+    rows = []
+    for name, check in found.checks.items():
+        for which, when in enumerate(("before", "after")):
+            for plant, figures in zip(check.members.rows.tolist(), check.seen.judged[which], strict=True):
+                told = [_plain(found, term, value) for term, value in zip(TERMS, figures, strict=True)]
+                rows.append([name, when, *plant[:-1], float(np.degrees(plant[-1])), *told])
+    terms = [heading(name, UNITS.get(term.unit, term.unit)) for name, term in TERMS.items()]
+    return csv_text(["check", "gains", *(f"{name} ratio" for name in MISMATCHES), "set point [deg]", *terms], rows)
+
+
+def record(found: Tuned, command: str) -> dict[str, Any]:
+    """Everything but the lines; a settling time that is never is null."""
+    descent = found.descent
+    return {
+        "controller": found.settings.controller,
+        "conclusions": conclusions(found),
+        "price": price(found),
+        "asked": found.settings.record(),
+        "gains": gains_of(found),
+        "cost": {"before": found.costs[0], "after": found.costs[1]},
+        "limits_met": found.within_limits if found.settings.limits else None,
+        "checks": {
+            name: {
+                "what": checked_on(found, name),
+                "loops": one.members.size,
+                "limit_exceeded_by_share": {"before": found.excesses[name][0], "after": found.excesses[name][1]},
+                **{
+                    when: {
+                        term: {
+                            "unit": TERMS[term].unit,
+                            "median": _plain(found, term, np.median(one.seen.judged[which, :, column])),
+                            "worst": _plain(found, term, np.max(one.seen.judged[which, :, column])),
+                        }
+                        for column, term in enumerate(TERMS)
+                    }
+                    for which, when in ((0, "before"), (1, "after"))
+                },
+            }
+            for name, one in found.checks.items()
+        },
+        "moves": _moves(found.moves),
+        "search": {
+            "closed_loops": found.simulations,
+            "rounds": descent.round,
+            "slopes_of_no_use": descent.wild,
+            "no_numbers": descent.left_out,
+            "best_cost_within_limits_by_round": _best_so_far(
+                descent.costs[: descent.round], descent.excesses[: descent.round]
+            ),
+            "closed_loops_by_round": descent.ran[: descent.round].tolist(),
+            "generations_without_slopes": found.evolution.generations,
+            "closed_loops_by_generation": found.evolution.ran.tolist(),
+            "best_cost_within_limits_by_generation": _best_so_far(found.evolution.costs, found.evolution.excesses),
+        },
+        "command": command,
+        "made_with": made_with(),
+    }
+
+
+def _moves(moves: Moves | None) -> dict[str, Any] | None:
+    if moves is None:
+        return None
+    settled = np.where(np.isfinite(moves.settling_time), moves.settling_time, np.nan)
+    return {
+        "set_points_deg": moves.asked.tolist(),
+        **{
+            when: {
+                "overshoot_deg": moves.overshoot[k].tolist(),
+                "settling_time_s": settled[k].tolist(),
+                "steady_error_deg": moves.steady_error[k].tolist(),
+            }
+            for k, when in enumerate(("before", "after"))
+        },
+    }
+
+
+def _best_so_far(costs: np.ndarray, excesses: np.ndarray) -> list[float]:
+    """Of candidates (steps, several) within the limits, after each step; infinite before there is one."""
+    return np.minimum.accumulate(np.nanmin(np.where(excesses <= 0.0, costs, np.inf), axis=1)).tolist()
+
+
+def _plain(found: Tuned, term: str, value: float) -> float | None:
+    never = term == "settling_time" and value >= 2.0 * found.settings.seconds
+    return None if never else float(value)

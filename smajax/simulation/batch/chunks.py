@@ -1,0 +1,86 @@
+"""Runs of a batch in chunks over all cores or devices, by whichever engine runs them.
+
+By machine code a run's numbers are the same to the last bit whatever runs beside it; XLA's are on as many devices as there are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Iterator, Sequence
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from smajax.engine import Engine, available_cores, program
+from smajax.engine.facade import kind_of, recalled
+from smajax.engine.xla import block_size, rounded
+from smajax.simulation.batch.axes import Axes
+
+MOST = 1 << 15  # members a chunk, however little is kept of each: what an interruption loses
+Results = Any  # arrays by name: a dictionary, or one of records
+Function = Callable[[Any, dict[str, jax.Array]], Results]
+
+_shapes: dict[Hashable, Any] = {}
+
+
+def result_shapes(function: Function, model: Any, axes: Axes) -> Any:
+    """Shapes and kinds of what one member gives; traced once for each kind of arguments."""
+    one = {name: jnp.zeros(()) for name in axes.names}
+    key = kind_of(function, model, tuple(axes.names))
+    return recalled(_shapes, key, lambda: eqx.filter_eval_shape(function, model, one))
+
+
+def member_bytes(function: Function, model: Any, axes: Axes) -> int:
+    """What is kept of one member, bytes."""
+    leaves = jax.tree.leaves(result_shapes(function, model, axes))
+    return sum(int(np.prod(leaf.shape, dtype=np.int64)) * leaf.dtype.itemsize for leaf in leaves)
+
+
+def chunk_size(function: Function, model: Any, axes: Axes, budget: int, devices: Sequence[jax.Device]) -> int:
+    """Members a chunk, so that its results take at most a quarter of `budget` bytes, and `MOST` at most; chunks are even.
+
+    A quarter: blocks and their concatenation on the device, and the copy that is written while the next chunk runs.
+    Raises ValueError when not even one block fits.
+    """
+    each = member_bytes(function, model, axes)
+    whole = rounded(1, block_size(axes.size, devices), devices)
+    most = budget // 4 // max(each, 1)
+    if most < whole:
+        raise ValueError(
+            f"one member keeps {each:,} bytes, and {budget:,} bytes have no room for {whole} at once (4 copies): keep "
+            "fewer values, every so many steps only (`every`), or measures in the place of trajectories."
+        )
+    wholes = -(-axes.size // whole)
+    count = -(-wholes // max(1, min(most, MOST) // whole))
+    return whole * -(-wholes // count)
+
+
+def chunks(
+    function: Function,
+    model: Any,
+    axes: Axes,
+    size: int,
+    wanted: Sequence[int],
+    devices: Sequence[jax.Device] | None = None,
+    engine: Engine = "auto",
+) -> Iterator[tuple[int, Results]]:
+    """(number, results) of the chunks `wanted`, each of `size` members but for the last, arrays of shape (members, ...).
+
+    While the caller writes one chunk the next is on its way. `devices` are those of XLA, and as many threads otherwise;
+    all that there are where they are not given. Raises Unsupported where `engine` is "native" and the function is not for it.
+    """
+    several = tuple(devices or jax.local_devices())
+    run = program(function, model, tuple(axes.names), engine=engine, devices=several)
+    threads = len(several) if devices else available_cores()
+    block = block_size(axes.size, several)
+    ahead: tuple[int, Callable[[], Results]] | None = None
+    for number in wanted:
+        start, stop = number * size, min((number + 1) * size, axes.size)
+        coming = run.begin(model, axes.members(start, stop), threads, several, block, size)
+        if ahead is not None:
+            yield ahead[0], ahead[1]()
+        ahead = number, coming
+    if ahead is not None:
+        yield ahead[0], ahead[1]()

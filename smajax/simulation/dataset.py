@@ -1,0 +1,78 @@
+"""Trajectories as labelled arrays: an `xarray.Dataset` over time, with units and where it comes from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import jax
+import numpy as np
+import xarray as xr
+
+from smajax.core.parameters import check_bounds
+from smajax.core.provenance import provenance
+from smajax.engine import Engine
+from smajax.model.channels import INPUT_UNITS
+from smajax.model.load.base import AbstractMovingLoad
+from smajax.model.system import System
+from smajax.model.types import Series, State, Trajectory
+from smajax.model.wire.order import check_order
+from smajax.simulation.compiled import simulate_compiled
+from smajax.simulation.measures import SHOWN
+from smajax.simulation.sensors import SENSORS, shown_by
+from smajax.simulation.simulate import DEFAULT_STEP, check_kinds
+
+LABELS = {"martensite_fraction": "martensite fraction", "reading": "reading of the load's sensor"}
+
+
+def _units(system: System) -> dict[str, str]:
+    moves = isinstance(system.load, AbstractMovingLoad)
+    length = "rad" if system.load.reading[1] == "rad" else "m" if moves else "-"
+    own = {"position": length, "velocity": f"{length}/s" if moves else "1/s", "reading": system.load.reading[1]}
+    return {**SHOWN, **SENSORS, "detwinned_fraction": "-", **own}
+
+
+def labelled_run(
+    system: System, run: Trajectory, inputs: Mapping[str, Series] | None = None, **settings: object
+) -> xr.Dataset:
+    """A trajectory as a data set over `time` (s), every variable with `units` (SI, degC, rad) and `long_name`.
+
+    inputs: series of shape (n,) that are kept beside it. settings: attributes, such as `dt`. Force on the wire (N) and its
+    resistance (ohm) are worked out from the states.
+    """
+    units = _units(system)
+    names = [name for name in units if hasattr(run, name)]
+    columns = {name: np.asarray(getattr(run, name)) for name in names}
+    columns |= {name: np.asarray(shown_by(system, run, name)) for name in ("force", "resistance")}
+    given = {name: np.asarray(values) for name, values in (inputs or {}).items() if name not in columns}
+    units |= {name: INPUT_UNITS.get(name, "N m" if name == "load_torque" else "") for name in given}
+    data = {
+        name: ("time", values, {"units": units[name], "long_name": LABELS.get(name, name.replace("_", " "))})
+        for name, values in {**given, **columns}.items()
+    }
+    time = ("time", np.asarray(run.time), {"units": "s", "long_name": "time"})
+    return xr.Dataset(data, {"time": time}, provenance(system, **settings))
+
+
+def simulate_dataset(
+    system: System,
+    inputs: Mapping[str, Series],
+    dt: float = DEFAULT_STEP,
+    tolerance: float | None = None,
+    initial: State | None = None,
+    engine: Engine = "auto",
+) -> xr.Dataset:
+    """`simulate` as an `xarray.Dataset`: `found["position"].plot()` has axes with units, `sma.plot(found)` draws them all.
+
+    Arguments as `simulate_compiled`'s, which does the work. For a call by itself: inside `jit`, `vmap` and `grad` take `simulate`. Raises ValueError as these do, and
+    for a parameter out of its bounds.
+    """
+    check_kinds(system, inputs)
+    if any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves((system, dict(inputs), dt, initial))):
+        raise TypeError(
+            "simulate_dataset() gives labelled numbers, and no gradient, jit or vmap goes through it: use `sma.simulate`, which "
+            "gives the same series."
+        )
+    check_bounds(system)
+    check_order(system)
+    run = simulate_compiled(system, inputs, dt, tolerance, initial, engine)
+    return labelled_run(system, run, inputs, dt=dt, tolerance="none" if tolerance is None else tolerance)

@@ -1,0 +1,52 @@
+"""The input series that act on a system, from those that were recorded: an effect may say that they are late."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import jax
+import jax.numpy as jnp
+from jax import lax
+
+from smajax.model.effects.base import having
+from smajax.model.system import System, recorded_apart
+from smajax.model.types import Scalar, Series
+
+
+def refuse_lag(system: System, what: str) -> None:
+    """ValueError where an effect shifts the input in time, of which `what` knows no series."""
+    for effect in having(system.effects, "input_lag"):
+        raise ValueError(
+            f"`{effect.effect_name}` shifts a recorded input in time, but {what} makes its input as it goes: leave "
+            "the effect out, and give a closed loop its `delay`."
+        )
+
+
+def acting_inputs(system: System, series: Mapping[str, Series], dt: Scalar | float) -> dict[str, Series]:
+    """`series` (each of shape (n,), `dt` seconds apart) with the channels `recorded_apart` as late as the effects say.
+
+    A lag of a part of a step gives the mean over the step of a command that holds between samples, and of what was
+    measured at them the straight line between two. Beyond its ends a series is as at them.
+    """
+    late, acting = having(system.effects, "input_lag"), dict(series)
+    channels = sorted(recorded_apart(system) & set(series))
+    if not late or not channels:
+        return acting
+    last = jnp.shape(acting[channels[0]])[0] - 1
+
+    def shifted(_: None, number: jax.Array) -> tuple[None, list[Scalar]]:
+        lag = sum(effect.input_lag(number * dt) for effect in late) / dt
+        whole = jnp.floor(lag)
+        newer = number - whole.astype(number.dtype)
+        share = lag - whole
+
+        def at(values: Series, place: jax.Array) -> Scalar:
+            return lax.dynamic_index_in_dim(values, jnp.clip(place, 0, last), keepdims=False)
+
+        return None, [
+            (1.0 - share) * at(acting[name], newer) + share * at(acting[name], newer - 1) for name in channels
+        ]
+
+    # One sample after the other: what each member looks up in a place of its own is one number at a time.
+    _, moved = lax.scan(shifted, None, jnp.arange(last + 1))
+    return acting | dict(zip(channels, moved, strict=True))

@@ -1,0 +1,172 @@
+"""The only scan: a system and its input series -> a trajectory. `jit`, `vmap` and `grad` stay outside."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import lax
+
+from smajax.core.names import listed
+from smajax.core.parameters import check_bounds, parameters
+from smajax.model.load.coupon import AbstractCoupon
+from smajax.model.system import System, initial_state
+from smajax.model.types import Scalar, Series, State, Trajectory
+from smajax.simulation.input_delay import acting_inputs
+from smajax.simulation.step import step
+
+# Keeps the arm within 0.05 degrees and the fraction within 1e-3 of the exact solution on the source's rigs, open and
+# closed loop (studies/convergence.py shows error against step).
+DEFAULT_STEP = 0.005  # s
+
+
+def check_kinds(system: Any, inputs: Any) -> None:
+    """TypeError where these are something else altogether."""
+    if not isinstance(system, System):
+        raise TypeError(
+            f"a run is of a `System`, as `compose` makes it, not of {type(system).__name__}; a `Loop` goes to `simulate_loop_dataset`."
+        )
+    if not isinstance(inputs, Mapping):
+        raise TypeError(
+            f"`inputs` is {type(inputs).__name__}; expected channel -> series, such as {{'voltage': series}}."
+        )
+
+
+def check_inputs(system: System, inputs: Mapping[str, Series]) -> int:
+    """Number of samples; ValueError when a channel is missing, unknown, of another length, or not finite where it is known."""
+    check_kinds(system, inputs)
+    required = system.load.inputs_required | system.drive.inputs_required
+    allowed = required | system.load.inputs_optional | system.drive.inputs_optional | {"ambient_temperature"}
+    missing, unknown = sorted(required - set(inputs)), sorted(set(inputs) - allowed)
+    if missing or unknown:
+        raise ValueError(
+            f"`inputs` must have the channels {listed(sorted(required))} and may have {listed(sorted(allowed - required))}, but "
+            f"missing: {listed(missing)}; of no meaning to this load and drive: {listed(unknown)}."
+        )
+    for name, series in inputs.items():
+        check_finite(f"the input `{name}`", series)
+    lengths = {name: jnp.shape(series) for name, series in inputs.items()}
+    if not lengths:
+        raise ValueError("`inputs` is empty: without one series there is no clock. Give e.g. `ambient_temperature`.")
+    if len(set(lengths.values())) != 1 or len(next(iter(lengths.values()))) != 1 or 0 in next(iter(lengths.values())):
+        raise ValueError(
+            f"Every input must be one series of the same length, not empty, but the shapes are {lengths}. Use `jax.vmap` over "
+            "a batch, and `jnp.full(n, value)` for a constant."
+        )
+    return next(iter(lengths.values()))[0]
+
+
+def check_finite(what: str, series: Any) -> None:
+    """ValueError where a series that is known holds something else than finite numbers."""
+    if isinstance(series, jax.core.Tracer):
+        return
+    known = np.asarray(series)
+    if known.dtype.kind not in "fiub":
+        kind = f"of type {known.dtype}" if isinstance(series, np.ndarray) else type(series).__name__
+        raise ValueError(f"{what} is {kind}; expected numbers, a series of shape (n,).")
+    bad = np.flatnonzero(~np.isfinite(known))
+    if bad.size:
+        raise ValueError(f"{what} is {known.ravel()[bad[0]]} at sample {bad[0] + 1}; give finite numbers.")
+
+
+def check_step(dt: Any) -> None:
+    """ValueError for a step that is none, where it is known."""
+    if isinstance(dt, str):
+        raise ValueError(f"`dt` is a number of seconds, not {dt!r}.")
+    if not isinstance(dt, jax.core.Tracer) and jnp.shape(dt) == () and not 0.0 < float(dt) < float("inf"):
+        raise ValueError(f"`dt` is the time between two samples, in seconds and above zero, not {float(dt):g}.")
+
+
+def check_scalars(system: System, dt: Scalar | float, initial: State | None = None) -> None:
+    """ValueError that names the number which is a batch, with its shape; and a step that is none."""
+    check_step(dt)
+    leaves = {f"`{name}`": leaf for name, leaf in _parameter_leaves(system).items()}
+    leaves |= {
+        f"`initial{jax.tree_util.keystr(path)}`": leaf for path, leaf in jax.tree_util.tree_leaves_with_path(initial)
+    }
+    leaves["`dt`"] = dt
+    wrong = {name: jnp.shape(leaf) for name, leaf in leaves.items() if jnp.shape(leaf) != ()}
+    if wrong:
+        told = "; ".join(f"{name} has the axes {shape}" for name, shape in wrong.items())
+        raise ValueError(
+            f"one run takes one number of each, and {told}. Map over the batch: `jax.vmap(run)(values)` with a `run` that puts "
+            "one value in (`set_parameters`), or name what varies in `run_batch`."
+        )
+
+
+def _parameter_leaves(system: System) -> dict[str, Any]:
+    found = {}
+    for name, entry in parameters(system).items():
+        leaf: Any = system
+        for key in entry.path:
+            leaf = leaf[key] if isinstance(key, int) else getattr(leaf, key)
+        found[name] = leaf
+    return found
+
+
+def first_state(system: System, series: Mapping[str, Series], initial: State | None) -> State:
+    """`initial`, or rest with the first inputs. ValueError where `initial` is of a model that remembers other things."""
+    rest = initial_state(system, {name: values[0] for name, values in series.items()})
+    if initial is None:
+        return rest
+    for part, theirs, ours in (
+        ("wire", initial.wire.kept, rest.wire.kept),
+        ("load", initial.motion.friction, rest.motion.friction),
+        ("sensor", initial.sensor, rest.sensor),
+    ):
+        if set(theirs) != set(ours):
+            raise ValueError(
+                f"`initial` remembers {sorted(theirs)} of the {part}, but the effects of this system need "
+                f"{sorted(ours)}. Take a state that a system with the same effects has come to."
+            )
+    return initial
+
+
+def simulate(
+    system: System, inputs: Mapping[str, Series], dt: Scalar | float = DEFAULT_STEP, initial: State | None = None
+) -> Trajectory:
+    """Simulate over the samples of `inputs`, each of shape (n,), SI, `dt` seconds apart.
+
+    The result holds the states at t_0 ... t_{n-1}; input i is held from t_i to t_{i+1} (a coupon's inputs are values
+    at t_i). `initial` defaults to rest with the first inputs. Raises ValueError for missing or ill-shaped inputs, for one
+    that is not finite and a parameter out of its bounds, unless the value is not known yet (`jit`, `vmap`, `grad`).
+    """
+    check_inputs(system, inputs)
+    check_scalars(system, dt, initial)
+    check_bounds(system)
+    series = acting_inputs(system, {name: jnp.asarray(values, dtype=float) for name, values in inputs.items()}, dt)
+    state = first_state(system, series, initial)
+    # Every number of the state then has a derivative where the model has one: a scan some of whose numbers gain theirs
+    # on the way is traced anew for each, and so is all within it.
+    state = jax.tree.map(lambda leaf: leaf + 0.0 * system.start_fraction, state)
+    ahead = isinstance(system.load, AbstractCoupon)
+    held = {name: values[1:] if ahead else values[:-1] for name, values in series.items()}
+
+    def body(state: State, now: dict[str, Scalar]) -> tuple[State, State]:
+        new = step(system, state, now, dt)
+        return new, new
+
+    _, states = lax.scan(body, state, held)
+    return trajectory(state, states)
+
+
+def trajectory(first: State, rest: State) -> Trajectory:
+    """The state at t_0 and the stacked states after it, by name."""
+    states = jax.tree.map(lambda one, more: jnp.concatenate([one[None], more]), first, rest)
+    w, m = states.wire, states.motion
+    return Trajectory(
+        time=states.time,
+        temperature=w.temperature,
+        stress=w.stress,
+        strain=w.strain,
+        martensite_fraction=w.martensite_fraction,
+        xi_M=w.xi_M,
+        xi_A=w.xi_A,
+        detwinned_fraction=w.detwinned_fraction,
+        position=m.position,
+        velocity=m.velocity,
+        reading=states.reading,
+    )

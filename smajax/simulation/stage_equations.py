@@ -1,0 +1,104 @@
+"""What one stage of a step solves: heat, motion and stress at its end, of a moving load."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+
+from smajax.model.effects.base import having
+from smajax.model.friction import in_use, rubbing
+from smajax.model.load.base import AbstractMovingLoad
+from smajax.model.system import System, ambient_temperature, heating_power, load_resistance
+from smajax.model.types import Inputs, Scalar, State
+from smajax.model.wire.constitutive import stress_at
+from smajax.model.wire.heat import cross_section, heat_rate, stored_heat
+from smajax.model.wire.resistance import resistance_per_metre
+
+
+class Unknowns(NamedTuple):
+    """What a stage solves for, in the order of elimination."""
+
+    temperature: Scalar
+    position: Scalar
+    stress: Scalar
+    fraction: Scalar
+
+
+class Stage(eqx.Module):
+    """What a stage starts from: the state before it, and the base values of the scheme."""
+
+    old: State
+    time: Scalar
+    step: Scalar  # g = gamma dt, s
+    heat: Scalar  # H_b, J/m
+    position: Scalar  # x_b
+    velocity: Scalar  # v_b
+    enough: float = eqx.field(static=True)  # how far the last iteration may still move the solution (`stage_solver`)
+    once: bool = eqx.field(static=True)  # differentiated once at most (`step`)
+
+
+def _heating(system: System, stage: Stage, inputs: Inputs, temperature: Scalar, fraction: Scalar) -> Scalar:
+    wire, effects = system.wire, system.effects
+    ohms = resistance_per_metre(wire, effects, temperature, fraction)
+    power = heating_power(system, ohms, inputs, stage.old.wire)
+    ambient = ambient_temperature(system, stage.time, inputs)
+    return heat_rate(wire, effects, temperature, ambient, power, stage.time)
+
+
+def motion_rates(stage: Stage, position: Scalar) -> tuple[Scalar, Scalar]:
+    """(v, a) at the end of a stage that ends at `position`."""
+    velocity = (position - stage.position) / stage.step
+    return velocity, (velocity - stage.velocity) / stage.step
+
+
+def _free_position(system: System, stage: Stage, inputs: Inputs, z: Unknowns) -> Scalar:
+    """The position less what the equation of motion is off by, in units of position; `z.position` where it holds."""
+    load = system.load
+    assert isinstance(load, AbstractMovingLoad)
+    velocity, acceleration = motion_rates(stage, z.position)
+    inertia = load.inertia(inputs)
+    before = stage.old.motion
+    friction = sum(
+        one.limit * in_use(one, before, z.position) for one in rubbing(system, before, stage.velocity, inputs)
+    )
+    pull = load.lever() * cross_section(system.wire) * z.stress
+    resisting = load_resistance(system, stage.time, z.position, velocity, inputs) + friction
+    return z.position - (inertia * acceleration + resisting - pull) * stage.step**2 / inertia
+
+
+class Missed(NamedTuple):
+    """By how much three equations of a stage are missed, each in the unit of the unknown that it is solved for.
+
+    The fourth equation, of the kinetics, depends on the branch.
+    """
+
+    heat: Scalar
+    motion: Scalar
+    stress: Scalar
+    free: Scalar  # not an equation: where the load would be without end stops
+
+
+def equations(system: System, stage: Stage, inputs: Inputs, z: Unknowns) -> Missed:
+    """Heat, motion and stress of a stage, zero at the solution."""
+    wire, effects, load, old = system.wire, system.effects, system.load, stage.old.wire
+    assert isinstance(load, AbstractMovingLoad)
+    heating = _heating(system, stage, inputs, z.temperature, z.fraction)
+    capacity = stored_heat(wire, (), jnp.ones_like(z.temperature), z.fraction)
+    heat = stored_heat(wire, effects, z.temperature, z.fraction) - stage.heat - stage.step * heating
+    taking = having(effects, "heat_of_change")
+    if taking:
+        taken = sum(effect.heat_of_change(wire, old, z.temperature, z.fraction) for effect in taking)
+        # As a rate over the stage, like all else that heats: a later stage of a step is longer than its own base.
+        heat = heat + taken * stage.step / (stage.time - stage.old.time)
+    heat = heat / capacity
+
+    # Projected on the range between the end stops: at a stop the equation reads "position = stop".
+    free = _free_position(system, stage, inputs, z)
+    lower, upper = load.limits()
+    motion = z.position - jnp.where(free < lower, lower, jnp.where(free > upper, upper, free))
+
+    strain = -load.contraction(wire) * (z.position - load.start())
+    asked = stress_at(wire, effects, old, strain, z.temperature, z.stress, z.fraction)
+    return Missed(heat, motion, z.stress - asked, free)

@@ -1,0 +1,285 @@
+r"""One implicit step of a system: temperature, position, stress and martensite fraction solved together.
+
+The source closes heat, kinetics, constitutive law and motion into one algebraic loop (Fig. 3.2). Here each stage of an
+L-stable two-stage SDIRK scheme (order 2, $\gamma = 1 - 1/\sqrt 2$) solves
+
+    heat          H(T, xi) = H_b + g [power - losses]
+    motion        inertia a(x) + resistance(x, v(x)) + friction(x) = lever A_w sigma,  v = (x - x_b)/g, a = (v - v_b)/g;
+                 x is at the end stop where this would carry it beyond (inelastic)
+    constitutive  sigma = stress_at(strain(x), T, xi)                (eq. 3.2, increments exact: nothing drifts)
+    kinetics      xi = closed form of eq. 3.3 or 3.5 at (T, sigma), or unchanged
+
+with g = gamma dt (`stage_solver` says how).
+
+Gradients: the iteration itself is not differentiated. `lax.custom_root` gives the solution the derivatives of the
+implicit function theorem: of any order in forward mode, of the first two where reverse mode is among them.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from typing import NamedTuple, TypeVar
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jax import lax
+
+from smajax.core.checkpointed_scan import recomputed, solved
+from smajax.model.friction import in_use, rubbing
+from smajax.model.load.base import AbstractMovingLoad
+from smajax.model.load.coupon import Coupon, StrainCoupon
+from smajax.model.sensor_reading import followed, reading_of, time_constant
+from smajax.model.system import System, supplied
+from smajax.model.types import Inputs, Motion, Scalar, State, WireState
+from smajax.model.wire.constitutive import strain_at, stress_at
+from smajax.model.wire.heat import stored_heat
+from smajax.model.wire.history import over
+from smajax.model.wire.root import root
+from smajax.model.wire.two_populations import choose_branch, curve_on, open_branches, remembered, settled
+from smajax.simulation.stage_equations import Stage, Unknowns, equations, motion_rates
+from smajax.simulation.stage_solver import Solution, solve, solved_linear
+
+Tree = TypeVar("Tree")
+
+
+class Scheme(NamedTuple):
+    """A diagonally implicit Runge-Kutta scheme whose last stage is its result, in the order in which stages need it.
+
+    Shares of dt. Stage i + 1 starts from `later` moved by `moved[i]` of the slopes of stage i; `later` is then moved by
+    `later_moved[i]` of them.
+    """
+
+    gamma: float
+    ends: tuple[float, ...]  # of the stages
+    moved: tuple[float, ...]
+    later_moved: tuple[float, ...]
+    compared: tuple[float, ...]  # weights less those of a scheme of one order less
+    enough: float  # of `Stage`
+
+
+_TWO, _THREE = 1.0 - 0.5**0.5, 0.435866521508459
+# Alexander 1977: order 2 and 3, L-stable; the stages go forward in time, as a wire with a memory has to.
+ORDER_TWO = Scheme(_TWO, (_TWO, 1.0), (1.0 - _TWO, 0.0), (0.0, 0.0), (0.0, 0.0), enough=1e-4)
+ORDER_THREE = Scheme(
+    gamma=_THREE,
+    ends=(_THREE, 0.5 * (1.0 + _THREE), 1.0),
+    moved=(0.5 * (1.0 - _THREE), 1.5 * _THREE**2 - 5.0 * _THREE + 1.25, 0.0),
+    later_moved=(-1.5 * _THREE**2 + 4.0 * _THREE - 0.25, 0.0, 0.0),
+    compared=(_THREE, -2.0 * _THREE, _THREE),
+    enough=1e-3,  # its square is far below what a step is tolerated to be off by
+)
+
+
+class _Bases(NamedTuple):
+    """What a scheme carries from stage to stage: three numbers each, of H, position and velocity."""
+
+    stage: Stage
+    later: list[Scalar]
+    error: list[Scalar]
+
+
+def _held(tree: Tree) -> Tree:
+    return jax.tree.map(lax.stop_gradient, tree)
+
+
+@eqx.filter_custom_jvp
+def _solved(given: tuple[System, Stage, Inputs]) -> Solution:
+    """The end of a stage."""
+    return solve(*given)
+
+
+@_solved.def_jvp
+def _solved_jvp(primals, tangents):  # type: ignore[no-untyped-def]  # the signature is equinox's
+    return eqx.filter_jvp(_differentiable, primals, tangents)
+
+
+def _differentiable(given: tuple[System, Stage, Inputs]) -> Solution:
+    """The same, and one linear correction: its derivatives, the second too, are then those of the equations' root.
+
+    Only where a derivative is asked for: what the solver leaves is of the size of its tolerance squared, and moves a derivative
+    by some 1e-8 of itself. Where JAX computes what is known beforehand it follows no rule but goes through the correction: without one,
+    forward over reverse mode takes the root for a constant. Derivatives of the first order alone do without.
+    """
+    system, stage, inputs = given
+    wire, effects, old = system.wire, system.effects, stage.old.wire
+    found = solved(solve(_held(system), _held(stage), _held(dict(inputs))))
+
+    def all_four(z: Unknowns) -> Unknowns:
+        missed = equations(system, stage, inputs, z)
+        asked = curve_on(wire.kinetics, effects, old, found.branch, z.temperature, z.stress)
+        return Unknowns(missed.heat, missed.motion, missed.stress, z.fraction - asked)
+
+    def linear(g: Callable[[Unknowns], Unknowns], asked: Unknowns) -> Unknowns:
+        one, zero = jnp.ones_like(asked.fraction), jnp.zeros_like(asked.fraction)
+        columns = [g(Unknowns(*(one if k == at else zero for k in range(4)))) for at in range(4)]
+        return Unknowns(*solved_linear(list(zip(*columns, strict=True)), list(asked))[0])
+
+    def corrected(f: Callable[[Unknowns], Unknowns], rough: Unknowns) -> Unknowns:
+        missed, along = jax.linearize(f, rough)
+        change = linear(along, missed)
+        return Unknowns(*(value - step for value, step in zip(rough, change, strict=True)))
+
+    def as_found(f: Callable[[Unknowns], Unknowns], rough: Unknowns) -> Unknowns:
+        return rough
+
+    z = lax.custom_root(all_four, found.z, as_found if stage.once else corrected, linear)
+    return Solution(z, found.branch, found.free)
+
+
+def _ended(system: System, stage: Stage, inputs: Inputs) -> tuple[WireState, Scalar, Scalar]:
+    """Solve one stage: (the wire at its end, the position, the position without end stops)."""
+    wire, effects, old = system.wire, system.effects, stage.old.wire
+    z, branch, free = _solved((system, stage, dict(inputs)))
+    at = z.temperature, jnp.maximum(z.stress, 0.0)
+    fractions = settled(wire.kinetics, effects, old, branch, z.temperature, z.stress, z.fraction)
+    strain = strain_at(wire, effects, old, *at, fractions[0])
+    return remembered(wire.kinetics, effects, old, branch, *at, strain, fractions), z.position, free
+
+
+def _stage(system: System, stage: Stage, inputs: Inputs) -> tuple[State, Scalar, Scalar, Scalar]:
+    """One stage of a moving load: (state at its end, dH/dt, v, a)."""
+    load = system.load
+    assert isinstance(load, AbstractMovingLoad)
+    begun = over(stage.old.wire, stage.time - stage.old.time)
+    stage = dataclasses.replace(stage, old=dataclasses.replace(stage.old, wire=begun))
+    wire, position, free = _ended(system, stage, inputs)
+    wire = supplied(system, inputs, begun, wire)
+    lower, upper = load.limits()
+    below, above = free < lower, free > upper
+    velocity, acceleration = motion_rates(stage, position)
+    position = jnp.where(below, lower, jnp.where(above, upper, position))
+    velocity = jnp.where(below | above, 0.0, velocity)  # inelastic
+    acceleration = jnp.where(below | above, 0.0, acceleration)
+    # What the heat equation says where it is solved, at the cost of a difference.
+    heating = (
+        stored_heat(system.wire, system.effects, wire.temperature, wire.martensite_fraction) - stage.heat
+    ) / stage.step
+    before = stage.old.motion
+    rubs = rubbing(system, before, stage.velocity, inputs)
+    friction = {one.name: in_use(one, before, position) for one in rubs}
+    new = State(stage.time, wire, Motion(position, velocity, friction), stage.old.reading, stage.old.sensor)
+    return new, heating, velocity, acceleration
+
+
+def _moving_step(
+    system: System, state: State, inputs: Inputs, dt: Scalar, scheme: Scheme, once: bool = False
+) -> tuple[State, tuple[Scalar, Scalar, Scalar]]:
+    """(state at the end, estimated error of H, position and velocity): every stage a backward-Euler solve over gamma dt.
+
+    A stage starts from a base that those before it have moved on.
+    """
+    start = (
+        stored_heat(system.wire, system.effects, state.wire.temperature, state.wire.martensite_fraction),
+        state.motion.position,
+        state.motion.velocity,
+    )
+
+    def body(carry: _Bases, now: tuple[Scalar, ...]) -> tuple[_Bases, None]:
+        ends, moved, later_moved, compared = now
+        new, *slopes = _stage(system, carry.stage, inputs)
+        bases = [base + moved * slope for base, slope in zip(carry.later, slopes, strict=True)]
+        later = [base + later_moved * slope for base, slope in zip(carry.later, slopes, strict=True)]
+        error = [total + compared * slope for total, slope in zip(carry.error, slopes, strict=True)]
+        return _Bases(Stage(new, ends, carry.stage.step, *bases, scheme.enough, once), later, error), None
+
+    gamma = scheme.gamma * dt
+    first = Stage(state, state.time + scheme.ends[0] * dt, gamma, *start, scheme.enough, once)
+    # The time scanned over is that at which the *next* stage ends.
+    times = jnp.stack([state.time + share * dt for share in (*scheme.ends[1:], 1.0)])
+    shares = [jnp.stack([share * dt for share in row]) for row in (scheme.moved, scheme.later_moved, scheme.compared)]
+    none = [0.0 * one for one in start]  # with a derivative, as in `simulate`
+    end, _ = lax.scan(recomputed(body), _Bases(first, list(start), none), (times, *shares))
+    old = end.stage.old
+    heat, position, velocity = end.error
+    return State(end.stage.time, old.wire, old.motion, old.reading, old.sensor), (heat, position, velocity)
+
+
+def _coupon_step(system: System, state: State, inputs: Inputs, dt: Scalar) -> State:
+    """Temperature and stress at the end of the step are prescribed: the fraction follows in closed form."""
+    wire, effects, old = system.wire, system.effects, over(state.wire, dt)
+    temperature, stress = inputs["temperature"], jnp.maximum(inputs["stress"], 0.0)
+    law, at = wire.kinetics, (temperature, stress)
+    branch = choose_branch(law, effects, old, open_branches(law, effects, old), *at)
+    fractions = settled(law, effects, old, branch, *at, curve_on(law, effects, old, branch, *at))
+    strain = strain_at(wire, effects, old, *at, fractions[0])
+    new = remembered(law, effects, old, branch, *at, strain, fractions)
+    return State(state.time + dt, new, state.motion, state.reading, state.sensor)
+
+
+def _strain_coupon_step(system: System, state: State, inputs: Inputs, dt: Scalar) -> State:
+    """Temperature and strain at the end of the step are prescribed: the fraction is the root of one equation.
+
+    For any fraction the strain gives the stress, and with it the curve; fraction less curve rises with the fraction,
+    so the root lies between the present fraction and the end of the branch: Newton's method held in that bracket.
+    """
+    wire, effects, old = system.wire, system.effects, over(state.wire, dt)
+    temperature, strain = inputs["temperature"], inputs["strain"]
+    law, before = wire.kinetics, old.martensite_fraction
+
+    def stress_of(xi: Scalar) -> Scalar:
+        return stress_at(wire, effects, old, strain, temperature, old.stress, xi)
+
+    frozen = stress_of(before)
+    branch = choose_branch(law, effects, old, open_branches(law, effects, old), temperature, frozen)
+
+    def miss(xi: Scalar) -> Scalar:
+        return xi - curve_on(law, effects, old, branch, temperature, stress_of(xi))
+
+    low = jnp.where(branch.heating, 0.0, before)
+    high = jnp.where(branch.cooling, 1.0, before)
+    xi = root(miss, before, low, high)
+    fractions = settled(law, effects, old, branch, temperature, stress_of(xi), xi)
+    stress = stress_of(fractions[0])
+    own = strain_at(wire, effects, old, temperature, stress, fractions[0])
+    new = remembered(law, effects, old, branch, temperature, stress, own, fractions)
+    still = jnp.zeros_like(strain)
+    return State(state.time + dt, new, Motion(-strain, still), state.reading, state.sensor)
+
+
+def step(system: System, state: State, inputs: Inputs, dt: Scalar | float, once: bool = False) -> State:
+    """Advance one system by `dt` seconds with `inputs` (SI, scalars) held.
+
+    Pure and differentiable in every floating argument; `vmap` it over any of them. For a coupon `inputs` are the
+    values at the end of the step. `once`: it will be differentiated once at most, which is quicker; derivatives of the second order
+    are wrong then. The result satisfies the constitutive law against `state` to rounding.
+    """
+    dt = jnp.asarray(dt, dtype=float)
+    if isinstance(system.load, Coupon):
+        new = _coupon_step(system, state, inputs, dt)
+        return _read(system, state, new, new.wire.strain, dt)
+    if isinstance(system.load, StrainCoupon):
+        new = _strain_coupon_step(system, state, inputs, dt)
+        return _read(system, state, new, new.wire.stress, dt)
+    new, _ = _moving_step(system, state, inputs, dt, ORDER_TWO, once)
+    return _read(system, state, new, new.motion.position, dt)
+
+
+def step_and_error(
+    system: System, state: State, inputs: Inputs, dt: Scalar
+) -> tuple[State, tuple[Scalar, Scalar, Scalar]]:
+    """The same of a moving load by the scheme of order 3, and what it may be off by: (C, m or rad, m/s or rad/s)."""
+    new, (heat, position, velocity) = _moving_step(system, state, inputs, dt, ORDER_THREE)
+    capacity = stored_heat(system.wire, (), jnp.ones_like(heat), new.wire.martensite_fraction)
+    # Exact where the load moves evenly over the step, which here may be many times as long as the sensor's lag.
+    lag = time_constant(system.effects)
+    if lag is None:
+        late = new.motion.position
+    else:
+        behind = lag * (new.motion.position - state.motion.position) / dt
+        late = new.motion.position - behind + (followed(state) - state.motion.position + behind) * jnp.exp(-dt / lag)
+    return _with_reading(system, state, new, late), (heat / capacity, position, velocity)
+
+
+def _read(system: System, old: State, new: State, shown: Scalar, dt: Scalar) -> State:
+    """`new` with what the sensor reads of `shown`.
+
+    Backward Euler in the reading: unlike exp(-dt/tau) it has a slope at tau = 0, which a score test needs.
+    """
+    lag = time_constant(system.effects)
+    return _with_reading(system, old, new, shown if lag is None else (lag * followed(old) + dt * shown) / (lag + dt))
+
+
+def _with_reading(system: System, old: State, new: State, late: Scalar) -> State:
+    return State(new.time, new.wire, new.motion, *reading_of(system.effects, late, new.time, old.sensor))

@@ -1,0 +1,171 @@
+"""C6: the printed filter under 8 V for 3 s, then 0 V; the filter over the simulator's own step beside it (Fig. 4.10)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from matplotlib.figure import Figure
+
+from smajax.control.estimators.base import AbstractEstimator
+from smajax.control.estimators.run import estimate
+from smajax.control.measured_state import MeasuredState
+from smajax.control.presets import model_filter, printed_filter
+from smajax.model.types import Series
+from smajax.report.drawing import BLACK, BLUE, RED, keyed, named, panels
+from smajax.simulation.simulate import DEFAULT_STEP
+
+from .rigs import Batched, Recorded, arm, recorded, simulated
+from .row import Result, Row
+
+VOLTS, ON, SECONDS, PERIOD = 8.0, 3.0, 6.0, 0.01
+GUESS_GONE = 0.1  # s: the printed first guess of the stress is 23 MPa off
+AROUND = 0.25  # s on either side of the instant at which the arm turns round
+NOISE = 1e-3  # rad, of the second set of readings
+
+# Field -> (factor to the unit shown, unit, share of its range within which an estimate counts as following).
+SHOWN: dict[str, tuple[float, str, float]] = {
+    "position": (180.0 / np.pi, "°", 0.01),
+    "velocity": (1.0, "rad/s", 0.05),
+    "stress": (1e-6, "MPa", 0.05),
+    "temperature": (1.0, "°C", 0.01),
+}
+
+
+@eqx.filter_jit
+def _estimates(estimator: AbstractEstimator, readings: Batched, volts: Series) -> MeasuredState:
+    return jax.vmap(lambda one: estimate(estimator, one, volts, PERIOD)[1])(readings)
+
+
+def _area(across: Any, up: Any) -> float:
+    """Area inside a closed loop."""
+    return float(abs(np.sum(up * (np.roll(across, -1) - np.roll(across, 1)))) / 2.0)
+
+
+def work(fast: bool) -> Result:
+    """One run of the arm; both filters over its angle, exact and with noise."""
+    # The plant always in finer steps than the filter's: on its own transition, without noise, the model's is exact.
+    system, dt = arm(), DEFAULT_STEP if fast else 0.5 * DEFAULT_STEP
+    count = round(SECONDS / dt) + 1
+    volts = VOLTS * (jnp.arange(count) < round(ON / dt))
+    every = round(PERIOD / dt)
+    true = jax.tree.map(lambda series: series[::every], simulated(system, {"voltage": volts}, dt))
+    drawn = np.random.default_rng(0).standard_normal(true.position.size)
+    readings = jnp.asarray(np.stack([true.position, true.position + NOISE * drawn]))
+    told: dict[str, Recorded] = {
+        name: recorded(_estimates(one, readings, volts[::every]))
+        for name, one in (("printed", printed_filter(system)), ("model", model_filter(system)))
+    }
+
+    time = true.time
+    turns = float(time[np.flatnonzero(true.velocity > 1.0)[-1]])
+    low = true.position <= float(system.load.lower_stop) + 1e-6
+    lands = float(time[np.flatnonzero(low & (time > ON))[0]]) - PERIOD
+    turning = np.abs(time - turns) <= AROUND
+    moving = (time > GUESS_GONE) & (time < lands)
+    # The printed filter on exact readings, as in the source's simulation; the model's has only noise to deal with.
+    lanes = {"printed": 0, "model": 1}
+    errors = {
+        (name, shown): factor * np.abs(getattr(told[name], shown)[lane] - getattr(true, shown))
+        for name, lane in lanes.items()
+        for shown, (factor, _, _) in SHOWN.items()
+    }
+    elsewhere = moving & ~turning
+
+    def rms(name: str, shown: str, lane: int) -> float:
+        off = getattr(told[name], shown)[lane] - getattr(true, shown)
+        return float(np.sqrt(np.mean((off * SHOWN[shown][0])[elsewhere] ** 2)))
+
+    spans = {shown: factor * float(np.ptp(getattr(true, shown))) for shown, (factor, _, _) in SHOWN.items()}
+    follows = all(
+        rms(name, shown, lane) < SHOWN[shown][2] * spans[shown] for name, lane in lanes.items() for shown in SHOWN
+    )
+    peaks = {key: (float(error[turning].max()), float(error[elsewhere].max())) for key, error in errors.items()}
+    mechanical = ("position", "velocity", "stress")
+    largest = all(peaks["printed", shown][0] > peaks["printed", shown][1] for shown in mechanical)
+    loops = {
+        (name, lane): _area(one.temperature[lane], one.martensite_fraction[lane])
+        / _area(true.temperature, true.martensite_fraction)
+        for name, one in told.items()
+        for lane in (0, 1)
+    }
+    landing = {shown: float(errors["printed", shown][time >= lands].max()) for shown in mechanical}
+    at_rest = float(errors["printed", "stress"][-1])
+
+    def draw(figure: Figure) -> None:
+        axes = panels(figure, 2, 3)
+        colours = {"printed": RED, "model": BLUE}
+        titles = ("arm angle (°)", "rate (rad/s)", "stress (MPa)", "temperature (°C)")
+        for one, (shown, (factor, _, _)), title in zip(axes, SHOWN.items(), titles, strict=False):
+            one.plot(time, factor * getattr(true, shown), color=BLACK, linewidth=2.4, alpha=0.35, label="true")
+            for name, estimates in told.items():
+                one.plot(
+                    time,
+                    factor * getattr(estimates, shown)[0],
+                    color=colours[name],
+                    linewidth=1.0,
+                    label=f"{name} filter{' (noise)' if lanes[name] else ''}",
+                )
+            one.axvspan(turns - AROUND, turns + AROUND, color="#f3e9d8", zorder=0)
+            named(one, "time (s)", title)
+        axes[2].set_ylim(0.0, 1.2 * float(true.stress.max()) / 1e6)
+        keyed(axes[1])
+        for name in told:
+            axes[4].semilogy(time, np.maximum(errors[name, "stress"], 1e-4), color=colours[name], linewidth=1.0)
+        axes[4].axvspan(turns - AROUND, turns + AROUND, color="#f3e9d8", zorder=0)
+        named(axes[4], "time (s)", "error of the stress (MPa)")
+        axes[5].plot(true.temperature, np.degrees(true.position), color=BLACK, linewidth=2.4, alpha=0.35)
+        for name, estimates in told.items():
+            axes[5].plot(
+                estimates.temperature[0], np.degrees(estimates.position[0]), color=colours[name], linewidth=1.0
+            )
+        named(axes[5], "temperature (°C)", "arm angle (°)", "hysteresis loop")
+
+    units = {"position": "deg", "velocity": "rad_s", "stress": "MPa", "temperature": "C"}
+    numbers: dict[str, float] = {"turns_s": turns, "lands_s": lands, "printed_stress_error_on_the_stop_MPa": at_rest}
+    for (name, shown), (turn, other) in peaks.items():
+        numbers[f"{name}_{shown}_rms_{units[shown]}"] = rms(name, shown, lanes[name])
+        numbers[f"{name}_{shown}_peak_turning_{units[shown]}"] = turn
+        numbers[f"{name}_{shown}_peak_elsewhere_{units[shown]}"] = other
+    numbers |= {f"printed_{shown}_rms_noisy_{units[shown]}": rms("printed", shown, 1) for shown in SHOWN}
+    numbers |= {
+        f"{name}_martensite_fraction_loop_{'noisy' if lane else 'exact'}": area for (name, lane), area in loops.items()
+    }
+    numbers |= {f"printed_{shown}_peak_landing_{units[shown]}": value for shown, value in landing.items()}
+
+    def listed(name: str) -> str:
+        return ", ".join(f"{rms(name, shown, lanes[name]):.2g} {unit}" for shown, (_, unit, _) in SHOWN.items())
+
+    return Result(
+        holds=follows and largest and abs(loops["printed", 0] - 1.0) < 0.05,
+        found=f"angle, rate, stress and temperature off by {listed('printed')} (rms while the arm moves one way) with the "
+        f"printed filter; where the arm turns round its angle, rate and stress are off by up to "
+        f"{peaks['printed', 'position'][0]:.1f}°, {peaks['printed', 'velocity'][0]:.1f} rad/s and "
+        f"{peaks['printed', 'stress'][0]:.0f} MPa, elsewhere by {peaks['printed', 'position'][1]:.1f}°, "
+        f"{peaks['printed', 'velocity'][1]:.1f} rad/s and {peaks['printed', 'stress'][1]:.0f} MPa; its loop of the "
+        f"fraction over temperature has {100 * loops['printed', 0]:.0f} % of the true area on exact readings and "
+        f"{100 * loops['printed', 1]:.0f} % with {NOISE:g} rad of noise; the filter over the simulator's step is off by {listed('model')} on readings with {NOISE:g} rad of noise",
+        numbers=numbers,
+        draw=draw,
+        caveat="R is not printed; here it equals Q. The temperature, which no reading corrects in the printed filter, is "
+        f"off most while the wire heats, {max(peaks['printed', 'temperature']):.2f} °C (Euler's step), not where the arm "
+        "turns. After the fall this arm meets its lower stop, which the printed equations lack: the impact puts the "
+        f"rate off by {landing['velocity']:.1f} rad/s and the stress by {landing['stress']:.0f} MPa, more than the turn, and "
+        f"at rest there the stress stays {at_rest:.0f} MPa too high, which is what the stop carries. With {NOISE:g} rad of "
+        f"noise the printed filter's stress is off by {rms('printed', 'stress', 1):.1f} MPa, from differences of "
+        f"differences: the claim is judged on exact readings, as in the source's simulation, and the loop by its fraction, for the "
+        "angle is read.",
+    )
+
+
+ROW = Row(
+    "C6",
+    "Fig. 4.10, sec. 4.5",
+    "arm with the extended Kalman filter, 8 V for 3 s, then 0 V",
+    "estimates of angle, rate, stress and temperature follow; the error is largest where the arm reverses; the hysteresis "
+    "loop is reproduced",
+    work,
+)

@@ -1,0 +1,79 @@
+"""C10: the wider the band of NVSC, the smaller the overshoot (Fig. 4.15)."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from smajax.control.presets import temperature_vsc
+from smajax.report.drawing import BLUE, GREY, RED, keyed, named, panels
+
+from .rigs import arm
+from .row import Result, Row
+from .set_points import (
+    Runs,
+    largest_finish_rate,
+    nvsc_without_temperature,
+    overshoot,
+    steady,
+    swept,
+    time_of,
+)
+
+BANDS = (0.0, 10.0, 20.0, 25.0, 27.0, 30.0, 40.0, 60.0, 100.0, 200.0, 400.0)  # C/s
+SHOWN = (0.0, 25.0, 30.0, 60.0, 400.0)
+GONE = 0.1  # degrees: less overshoot than this is none
+
+
+def work(fast: bool) -> Result:
+    """The band swept at 50 degrees, with the temperature control and without it (K_p = 0)."""
+    runs = swept(temperature_vsc(arm()), "temperature_band", BANDS, 50.0, fast)
+    damped = swept(nvsc_without_temperature(arm()), "temperature_band", BANDS, 50.0, fast)
+    over = [overshoot(one) for _, one in runs.values()]
+    over_damped = {band: overshoot(one) for band, (_, one) in damped.items()}
+    preset = temperature_vsc(arm())
+    quickest = largest_finish_rate({band: one for band, one in runs.items() if band >= 100.0})
+    numbers = {f"overshoot_at_{band:g}_C_per_s_deg": value for band, value in zip(BANDS, over, strict=True)}
+    numbers |= {f"steady_error_at_{band:g}_C_per_s_deg": steady(one) for band, (_, one) in runs.items()}
+    first, last = runs[BANDS[0]][1], runs[BANDS[-1]][1]
+    numbers |= {"reach_without_band_s": time_of(first.reach_time), "reach_with_widest_s": time_of(last.reach_time)}
+    numbers |= {f"overshoot_without_K_p_at_{band:g}_C_per_s_deg": value for band, value in over_damped.items()}
+    last_damped = damped[BANDS[-1]][1]
+    numbers |= {"reach_with_widest_without_K_p_s": time_of(last_damped.reach_time), "largest_rate_C_per_s": quickest}
+    falls = all(later <= sooner + GONE for sooner, later in itertools.pairwise(over))
+    gone = next((band for band, value in zip(BANDS, over, strict=True) if value < GONE), np.inf)
+    return Result(
+        holds=bool(falls and over[-1] < GONE and over[0] > 5.0),
+        found=f"the overshoot falls from {over[0]:.0f}° without a band over {numbers['overshoot_at_30_C_per_s_deg']:.1f}° at 30 °C/s "
+        + (f"to less than {GONE}° from {gone:g} °C/s on" if np.isfinite(gone) else f"to {over[-1]:.1f}°"),
+        numbers=numbers,
+        draw=lambda figure: _draw(figure, runs, over, list(over_damped.values())),
+        caveat=f"told the true state. Part of the work is damping: without temperature control (K_p = 0) the overshoot falls too, by "
+        f"{', '.join(f'{over_damped[band]:.1f}' for band in SHOWN)}° at {', '.join(f'{band:g}' for band in SHOWN)} °C/s, for inside the band the command falls with the "
+        f"speed, whatever the temperature. From 100 °C/s on A_f' changes by {quickest:.0f} °C/s at most: a band beyond that does not switch; the preset's is "
+        f"{float(preset.temperature_band):g} °C/s (by search). What the temperature term adds is an earlier arrival, at {BANDS[-1]:g} °C/s after "
+        f"{time_of(last.reach_time):.2f} instead of {time_of(last_damped.reach_time):.2f} s. The wider band costs time: the arm arrives after {time_of(last.reach_time):.1f} instead of {time_of(first.reach_time):.1f} s.",
+    )
+
+
+def _draw(figure: Figure, runs: Runs, over: list[float], over_damped: list[float]) -> None:
+    angle, sizes = panels(figure, 1, 2)
+    for shade, band in zip(np.linspace(0.75, 0.0, len(SHOWN)), SHOWN, strict=True):
+        loop, _ = runs[band]
+        angle.plot(loop.run.time, np.degrees(loop.run.position), color=(shade, shade, 1.0), label=f"{band:g} °C/s")
+    angle.axhline(50.0, color=GREY, linewidth=0.8, linestyle=":")
+    angle.set_xlim(0.0, 6.0)
+    named(angle, "time (s)", "arm angle (°)")
+    keyed(angle)
+    sizes.plot(BANDS, over, "o-", color=BLUE, label="NVSC")
+    sizes.plot(BANDS, over_damped, "x--", color=RED, label="NVSC with K_p = 0")
+    keyed(sizes)
+    sizes.set_xscale("symlog", linthresh=10.0)
+    named(sizes, "band phi_T (°C/s)", "overshoot (°)")
+
+
+ROW = Row(
+    "C10", "Fig. 4.15", "arm, NVSC at 50°, band phi_T swept", "overshoot falls as phi_T grows, and can vanish", work
+)

@@ -1,0 +1,101 @@
+"""C12: stress-based sliding control at set points from -40 to 60 degrees (Fig. 4.18)."""
+
+from __future__ import annotations
+
+import jax.numpy as jnp
+import numpy as np
+from matplotlib.figure import Figure
+
+from smajax.control.controllers.inverse_wire import moving_load
+from smajax.control.presets import printed_filter, quick_stress_sliding
+from smajax.core.parameters import set_parameters
+from smajax.report.drawing import GREY, keyed, named, panels
+
+from .backstepping_runs import shades
+from .rigs import arm
+from .row import Result, Row
+from .set_points import at_set_points, overshoot, steady
+
+TARGETS = tuple(range(-40, 61, 10))  # degrees
+SLACK = {
+    "surface_slope": 20.0,  # 1/s
+    "gain": 9.5e-3,  # N m
+    "boundary": 1.7,  # rad/s
+    "stress_gain": 2e-7,  # V/Pa
+    "stress_integral_gain": 1e-6,  # V/(Pa s)
+}
+
+
+def work(fast: bool) -> Result:
+    """All set points with one set of gains, searched; and with a stress controller that follows less closely."""
+    system = arm()
+    tuned = quick_stress_sliding(system)
+    slack = set_parameters(tuned, SLACK)
+    with_searched, with_slack = at_set_points(tuned, fast, TARGETS), at_set_points(slack, fast, TARGETS)
+    filtered = [one for _, one in at_set_points(tuned, fast, TARGETS, printed_filter(system)).values()]
+    reach_filtered = max(float(one.reach_time) for one in filtered)
+    error_filtered = max(steady(one) for one in filtered)
+    searched, slacked = list(with_searched.values()), list(with_slack.values())
+    reach = np.asarray([one.reach_time for _, one in searched])
+    reach_slack = np.asarray([one.reach_time for _, one in slacked])
+    largest = max(overshoot(one) for _, one in searched)
+    loose = np.asarray([overshoot(one) for _, one in slacked])
+    error = max(steady(one) for _, one in [*searched, *slacked])
+    # The arm's greatest static stress: where gravity's torque falls as fast as the spring's rises.
+    sweep = jnp.linspace(-0.7, 1.6, 2301)
+    torque = moving_load(system).resistance(sweep, jnp.zeros_like(sweep), {})
+    summit = float(jnp.degrees(sweep[jnp.argmax(torque)]))
+    beyond = np.asarray(TARGETS) > summit
+
+    def draw(figure: Figure) -> None:
+        for axes, runs, title in zip(
+            panels(figure, 1, 2),
+            (with_searched, with_slack),
+            ("gains by search", "slacker stress controller"),
+            strict=True,
+        ):
+            for colour, (target, (loop, _)) in zip(shades(len(TARGETS)), runs.items(), strict=True):
+                axes.plot(loop.run.time, np.degrees(loop.run.position), color=colour, label=f"{target}°")
+            axes.axhline(summit, color=GREY, linewidth=0.8, linestyle=":")
+            axes.set_xlim(0.0, 5.0)
+            named(axes, "time (s)", "arm angle (°)", title)
+            keyed(axes)
+
+    return Result(
+        holds=bool(
+            reach.max() < 4.0
+            and reach_slack.max() < 4.0
+            and reach_filtered < 4.0
+            and error < 0.2
+            and error_filtered < 0.5
+            and loose[~beyond].max() < 0.5
+            and loose[-1] > 1.0
+            and (np.diff(loose[beyond]) > 0.0).all()
+        ),
+        found=f"every set point is reached in {reach.min():.1f} to {reach.max():.1f} s; with the searched gains the largest overshoot is "
+        f"{largest:.2f}°; with a slacker stress controller ({reach_slack.max():.1f} s at most) the overshoot stays within {loose[~beyond].max():.1f}° up to "
+        f"the angle of greatest stress ({summit:.0f}°) and grows beyond it to {loose[-1]:.1f}° at 60°; on the printed filter's stress in the place of the true one every set point is "
+        f"reached in {reach_filtered:.1f} s at most and held within {error_filtered:.2f}°",
+        numbers={
+            "slowest_reach_s": float(reach.max()),
+            "slowest_reach_slack_s": float(reach_slack.max()),
+            "slowest_reach_with_filter_s": reach_filtered,
+            "largest_steady_error_with_filter_deg": error_filtered,
+            "largest_overshoot_deg": largest,
+            **{f"overshoot_slack_{at}_deg": float(o) for at, o in zip(TARGETS, loose, strict=True)},
+            "largest_steady_error_deg": error,
+            "angle_of_greatest_stress_deg": summit,
+        },
+        draw=draw,
+        caveat="drawn with the true state; the filter's readings of the angle are exact. Gains are not printed; the searched ones avoid the overshoot that the source sees, "
+        f"those with {', '.join(f'{name} = {value:g}' for name, value in SLACK.items())} show it.",
+    )
+
+
+ROW = Row(
+    "C12",
+    "Fig. 4.18",
+    "arm, stress-based sliding control, -40° to 60°",
+    "reaches every set point in less than 4 s; overshoot grows beyond the angle of greatest stress",
+    work,
+)

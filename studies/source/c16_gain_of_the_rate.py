@@ -1,0 +1,60 @@
+"""C16: approach II with the gain K swept (Fig. 4.21)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from smajax.control.presets import backstepping_two
+from smajax.core.parameters import set_parameters
+
+from .backstepping_runs import ON_ITS_PLANT, degrees, draw_sweep, draw_voltages, plant, runs
+from .row import Result, Row
+
+GAINS = (0.0, 0.3, 1.0, 1.7, 4.0, 10.0)  # 1/s
+TARGET = 0.0
+
+
+def work(fast: bool) -> Result:
+    """One batch over K."""
+    system = plant()
+    tuned = backstepping_two(system)
+    swept = [set_parameters(tuned, {"damping_gain": gain}) for gain in GAINS]
+    loops, merits = runs([system] * len(GAINS), swept, [TARGET] * len(GAINS), fast)
+    angle, time = degrees(loops) - TARGET, loops.run.time[0]
+    overshoot, settling, reach = np.degrees(merits.overshoot), merits.settling_time, merits.reach_time
+    swing = float(np.abs(angle[0][time > 12.0]).max())
+    slow = float(angle[-1][-1])
+    names = [f"K = {gain:g} 1/s" for gain in GAINS]
+    return Result(
+        holds=bool(
+            (np.diff(overshoot) <= 0.0).all()
+            and overshoot[1] > 10.0
+            and swing > 0.95 * overshoot[0]
+            and np.isinf(settling[0])
+            and overshoot[4:].max() < 0.1
+            and reach[4] > 2.0 * reach[3]
+            and np.isinf(reach[5])
+        ),
+        found=f"overshoot {', '.join(f'{o:.1f}°' for o in overshoot[:4])} at K = {', '.join(f'{k:g}' for k in GAINS[:4])} 1/s, none "
+        f"above; K = 0 is marginal: the arm still swings by {swing:.0f}° after 12 s; K = {GAINS[4]:g} takes {reach[4]:.1f} s to come within a "
+        f"degree in the place of {reach[3]:.1f} s, and K = {GAINS[5]:g} is {-slow:.0f}° short after 20 s",
+        numbers={
+            **{f"overshoot_K_{k:g}_deg": float(o) for k, o in zip(GAINS, overshoot, strict=True)},
+            "swing_at_K_0_deg": swing,
+            "reach_K_1.7_s": float(reach[3]),
+            "reach_K_4_s": float(reach[4]),
+            "short_at_K_10_deg": -slow,
+        },
+        draw=lambda figure: draw_sweep(figure, loops, names, TARGET, draw_voltages(loops, names)),
+        caveat=f"{ON_ITS_PLANT}. Unstable near K = 0 is read as marginal: at K = 0 eq. 4.70 asks for x_1'' + x_1 = 0, which can do nothing "
+        "else than keep its swing; it does not grow, and every K > 0 damps that equation.",
+    )
+
+
+ROW = Row(
+    "C16",
+    "Fig. 4.21",
+    "arm, approach II, gain K swept",
+    "small K overshoots, K near 0 is unstable, large K is slow",
+    work,
+)

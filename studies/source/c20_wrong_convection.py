@@ -1,0 +1,57 @@
+"""C20: approach II that believes in a wrong coefficient of convection (Fig. 4.25)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from smajax.control.presets import backstepping_two
+from smajax.core.parameters import set_parameters
+
+from .backstepping_runs import ON_ITS_PLANT, degrees, draw_sweep, draw_voltages, plant, runs
+from .rigs import austenite_range
+from .row import Result, Row
+
+RATIOS = (0.9, 0.95, 0.98, 1.0, 1.05, 1.1)
+TARGET = 20.0
+
+
+def work(fast: bool) -> Result:
+    """One batch over the coefficient believed in."""
+    system = plant()
+    tuned = backstepping_two(system)
+    true = float(system.wire.heat.convection_coefficient)
+    swept = [set_parameters(tuned, {"convection_coefficient": ratio * true}) for ratio in RATIOS]
+    loops, merits = runs([system] * len(RATIOS), swept, [TARGET] * len(RATIOS), fast)
+    angle, overshoot = degrees(loops), np.degrees(merits.overshoot)
+    end, start = angle[:, -1], austenite_range(system, loops.run.stress)[0]
+    hottest = (loops.run.temperature - start).max(axis=1)
+    names = [f"{ratio:g} h_c" for ratio in RATIOS]
+    return Result(
+        holds=bool(
+            (np.diff(end) > 0.0).all()
+            and end[1] < TARGET - 5.0
+            and end[4] > TARGET + 5.0
+            and hottest[5] > hottest[3] + 0.5
+            and abs(end[3] - TARGET) < 0.5
+        ),
+        found=f"at a set point of {TARGET:.0f}° the arm ends at {', '.join(f'{e:.1f}°' for e in end)} where the controller has "
+        f"{', '.join(f'{r:g}' for r in RATIOS)} of the true h_c; "
+        f"at its hottest the wire is {hottest[5]:.1f} °C above A_s' in the place of {hottest[3]:.1f} °C",
+        numbers={
+            **{f"end_{r:g}_hc_deg": float(e) for r, e in zip(RATIOS, end, strict=True)},
+            **{f"overshoot_{r:g}_hc_deg": float(o) for r, o in zip(RATIOS, overshoot, strict=True)},
+            "hottest_above_start_true_C": float(hottest[3]),
+            "hottest_above_start_1.1_hc_C": float(hottest[5]),
+        },
+        draw=lambda figure: draw_sweep(figure, loops, names, TARGET, draw_voltages(loops, names)),
+        caveat=f"{ON_ITS_PLANT}.",
+    )
+
+
+ROW = Row(
+    "C20",
+    "Fig. 4.25",
+    "arm, approach II, the controller's h_c wrong",
+    "too low: moves less than asked; too high: overheats and over-actuates",
+    work,
+)

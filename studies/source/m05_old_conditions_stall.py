@@ -1,0 +1,64 @@
+"""M5: under Liang's and Brinson's conditions the arm does not reach 85 degrees (Fig. 3.7-3.10)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .regulation import draw_regulation, to_85_degrees
+from .rigs import arm, austenite_range
+from .row import Result, Row
+
+
+def work(fast: bool) -> Result:
+    """Sliding control to 85 degrees under each law."""
+    loops = to_85_degrees(fast)
+    numbers: dict[str, float] = {}
+    holds = True
+    for law in ("liang", "brinson"):
+        run = loops[law].run
+        slope = float(arm(law).wire.kinetics.stress_slope_austenite)
+        start, finish = austenite_range(arm(law), run.stress)
+        beyond = np.flatnonzero((run.temperature > finish) & (run.martensite_fraction > 1e-3))
+        crossing = int(beyond[0]) if beyond.size else 0
+        # What the law misses up to the crossing: inside the range the wire cools while the range falls faster.
+        warmer, nearer = np.diff(run.temperature), np.diff(run.temperature - run.stress / slope)
+        missed = (warmer < 0.0) & (nearer > 0.0) & (run.temperature > start)[1:]
+        dt = float(run.time[1] - run.time[0])
+        after = np.arange(len(warmer)) >= crossing
+        cooling_after = float((after & (warmer < 0.0) & (nearer > 0.0)).sum() * dt)
+        missed[crossing:] = False
+        numbers |= {
+            f"{law}_end_deg": float(np.degrees(run.position[-1])),
+            f"{law}_end_fraction": float(run.martensite_fraction[-1]),
+            f"{law}_end_temperature_above_finish_C": float(run.temperature[-1] - finish[-1]),
+            f"{law}_missed_seconds": float(missed.sum() * dt),
+            f"{law}_cooling_seconds_above_finish": cooling_after,
+            f"{law}_warming_above_finish_C": float(run.temperature[-1] - run.temperature[crossing]),
+            f"{law}_missed_warming_C": float(warmer[missed].sum()),
+            f"{law}_missed_drive_C": float(nearer[missed].sum()),
+        }
+        holds &= bool(beyond.size) and numbers[f"{law}_end_deg"] < 84.0 and run.martensite_fraction[-1] > 0.01
+        # The crossing itself is such a moment: the wire cools and still comes to lie above its range.
+        holds &= bool(missed.any()) and bool(warmer[crossing - 1] < 0.0 < nearer[crossing - 1])
+    tanaka = float(np.degrees(loops["tanaka"].run.position[-1]))
+    return Result(
+        holds=holds,
+        found=f"the arm stalls at {numbers['liang_end_deg']:.1f}° (Liang) and {numbers['brinson_end_deg']:.1f}° (Brinson) "
+        f"with xi = {numbers['liang_end_fraction']:.2f} and T above A_f'; on its way there it cools by "
+        f"{-numbers['liang_missed_warming_C']:.2f} °C in moments in which T - sigma/C_A rises by "
+        f"{numbers['liang_missed_drive_C']:.1f} °C, the last of them the one in which T passes A_f'; above it the controller heats on, by "
+        f"{numbers['liang_warming_above_finish_C']:.0f} °C, and nothing transforms",
+        numbers={**numbers, "tanaka_end_deg": tanaka},
+        draw=lambda figure: draw_regulation(figure, loops, "liang"),
+        caveat=f"gains chosen here, the source prints none. Tanaka's law (beside the claim) ends at {tanaka:.0f}°: its "
+        "range has no upper end, so that warming goes on transforming where Liang's is over.",
+    )
+
+
+ROW = Row(
+    "M5",
+    "Fig. 3.7-3.10",
+    "arm, stress-based sliding control to 85°, Liang and Brinson conditions",
+    "the arm does not reach 85°; T exceeds A_f' while xi > 0; as it comes to exceed it dT/dt < 0 and dT/dt - (dsigma/dt)/C_A > 0",
+    work,
+)

@@ -1,0 +1,123 @@
+"""Noise with a memory, and held-out runs that do not bear out what was found: no effect is named for either."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from smajax.attribution.close_loop import close_loop
+from smajax.data.experiment.load import load_experiment
+from smajax.data.experiment.record import Experiment
+from smajax.data.model_catalogue import CATALOGUE
+from smajax.data.readers.noise import estimate_noise
+from studies.attribution_benchmark.cases import cases
+from studies.attribution_benchmark.rigs import show
+from studies.attribution_benchmark.write import write
+
+MEMORY = 0.8  # from one sample to the next
+LACKING, WEAK = "coupon-thermal_expansion-10-02", "coupon-thermal_expansion-1-00"
+FEW = ("thermal_expansion", "creep", "sensor_drift")
+
+
+def _coupon(
+    folder: Path, seed: int, trend: float = 0.0, memory: float = MEMORY, name: str = "coupon-null-0-00"
+) -> Experiment:
+    """A coupon by the independent generator, with AR(1) noise. `trend`: of the fit runs' readings over a run, in noises."""
+    true = write(next(case for case in cases() if case.name == name), folder)
+    experiment = load_experiment(folder / name / "experiment.toml", CATALOGUE)
+    random, sigma = np.random.default_rng(seed), experiment.noise_sigma
+    shown = {run.name: show(true.rig, true.wire, run, true.effects) for run in true.rig.runs(true.wire)}
+    runs = []
+    for run in experiment.runs:
+        drawn = random.normal(size=run.output.size + 200)
+        slow = sigma * np.sqrt(1.0 - memory**2) * lfilter([1.0], [1.0, -memory], drawn)[200:]
+        if run.role == "fit":
+            slow += trend * sigma * np.linspace(-0.5, 0.5, slow.size)
+        else:
+            slow -= trend * sigma * np.linspace(-0.5, 0.5, slow.size)
+        runs.append(dataclasses.replace(run, outputs={experiment.output_name: shown[run.name] + slow}))
+    return dataclasses.replace(experiment, runs=tuple(runs))
+
+
+def _estimated(experiment: Experiment) -> Experiment:
+    """The same where nobody gave the noise: neighbouring samples, of which a noise with a memory shows too little."""
+    fit = [run.output for run in experiment.runs if run.role == "fit"]
+    sigma = float(np.median([estimate_noise(output, 0.0) for output in fit]))
+    (output,) = experiment.outputs
+    return dataclasses.replace(
+        experiment, outputs=(dataclasses.replace(output, noise_sigma=sigma, noise_given=False, noise_how="estimated"),)
+    )
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_a_noise_with_a_memory_gets_no_effect(seed: int, tmp_path: Path) -> None:
+    findings = close_loop(_coupon(tmp_path, seed))
+    assert not any(effect.added for effect in findings.effects)
+    assert not any(term.named for term in findings.unknown)
+
+
+@pytest.mark.parametrize("memory", [pytest.param(0.6, marks=pytest.mark.slow), 0.9])
+def test_a_noise_with_a_memory_that_nobody_gave_is_noise(memory: float, tmp_path: Path) -> None:
+    findings = close_loop(_estimated(_coupon(tmp_path, 0, memory=memory)))
+    assert findings.portrait_after.ratio > 1.5
+    assert findings.verdict == "adequate"
+    assert findings.portrait_after.kept == pytest.approx(memory, abs=0.05)
+    assert any("first-order filter" in line for line in findings.summary)
+
+
+@pytest.mark.slow  # a loop with one effect to find
+def test_what_is_missing_is_found_beside_a_noise_with_a_memory_that_nobody_gave(tmp_path: Path) -> None:
+    findings = close_loop(_estimated(_coupon(tmp_path, 0, memory=0.6, name=LACKING)))
+    assert [effect.name for effect in findings.effects if effect.added] == ["thermal_expansion"]
+    assert findings.verdict == "explained"
+    assert findings.portrait_before.kept == 0.0
+
+
+def _thinned(experiment: Experiment, by: int) -> Experiment:
+    """Every so manieth sample."""
+
+    def every(series: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+        return {name: values[::by] for name, values in series.items()}
+
+    runs = [
+        dataclasses.replace(run, time=run.time[::by], inputs=every(run.inputs), outputs=every(run.outputs))
+        for run in experiment.runs
+    ]
+    return dataclasses.replace(experiment, step=by * experiment.step, runs=tuple(runs))
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_an_effect_that_a_short_log_cannot_tell_from_a_slow_noise_is_looked_into(
+    seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = _coupon(tmp_path, seed, memory=0.5, name=WEAK)
+    short = dataclasses.replace(_estimated(_thinned(whole, 4)), effects_only=FEW)
+    findings = close_loop(short)
+    assert [effect.name for effect in findings.effects if effect.added] == ["thermal_expansion"]
+    monkeypatch.setattr("smajax.attribution.search.TOO_MUCH_FOR_NOISE", np.inf)
+    assert close_loop(short).verdict == "adequate"
+
+
+def test_what_the_held_out_runs_do_not_bear_out_is_not_named(tmp_path: Path) -> None:
+    """All fit runs drift upwards and the held-out ones downwards: a drift that is found is no property of the bench."""
+    findings = close_loop(_coupon(tmp_path, 0, trend=12.0))
+    assert not any(effect.added for effect in findings.effects)
+    assert findings.verdict == "not in the library"
+    assert any("set aside: error on the held-out runs" in entry.why for entry in findings.rounds)
+    assert "not confirmed" in findings.summary[0]
+    held_out = [run for run in findings.runs if run.role == "held-out"]
+    assert all(run.rmse_after == run.rmse_before for run in held_out)
+
+
+def test_a_right_effect_outlives_its_wrong_companion(tmp_path: Path) -> None:
+    """The same drift beside an effect that is there: the held-out runs refuse the drift alone."""
+    findings = close_loop(_coupon(tmp_path, 0, trend=20.0, name=LACKING))
+    assert [effect.name for effect in findings.effects if effect.added] == ["thermal_expansion"]
+    assert "sensor drift would lower the error" in findings.summary[0].replace("Sensor", "sensor")
+    assert "not confirmed" in findings.summary[0]
+    assert findings.verdict == "partly explained"

@@ -1,0 +1,92 @@
+"""A friction with which the load may jump has to keep its gain at half the step; what does not is not taken."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from smajax.attribution.cross_validation import Model, Search
+from smajax.attribution.search import taken_of
+from smajax.attribution.step_size_check import kept_at_half_the_step
+from smajax.core.parameters import parameters
+from smajax.core.result_cache import Kept
+from smajax.fit.packed_runs import RunBatch, halved, simulate_batch
+from smajax.fit.predicted import misfits
+from smajax.fit.problem import Problem
+from smajax.model.extended import extended
+from smajax.model.presets import build
+
+DT, SAMPLES, NOISE = 0.1, 300, 1e-5
+TRUE = {"limit": 0.5, "sliding": 0.9, "speed": 1e-3, "bend": 1e-4}
+HEAT, FRICTION = ("latent_heat",), ("stribeck_friction",)
+
+
+@pytest.fixture(scope="module")
+def setting() -> Search:
+    """A weight that rubs, whatever the step; the candidates are its friction and latent heat."""
+    time = np.arange(SAMPLES) * DT
+    inputs = {
+        "voltage": jnp.asarray([8.0 * np.abs(np.sin(np.pi * time / 15.0)), 10.0 * np.abs(np.sin(np.pi * time / 10.0))])
+    }
+    base = build("flexinol_table_3_2", "dead_weight", "voltage")
+    rubbing = extended(base, FRICTION, {f"stribeck_friction.{name}": value for name, value in TRUE.items()})
+    blank = RunBatch(inputs, jnp.zeros((2, SAMPLES)), jnp.ones((2, SAMPLES)), jnp.zeros((2, 0)), (), DT)
+    shown = simulate_batch(rubbing, halved(blank)).reading[:, ::2]
+    noise = NOISE * np.random.default_rng(1).normal(size=shown.shape)
+    batch = RunBatch(inputs, shown + noise, blank.mask, blank.overrides, (), DT)
+    problem = Problem.build(extended(base, HEAT + FRICTION, {}), batch, NOISE, False)
+    bounds = {entry.name: (entry.low, entry.high) for entry in parameters(problem.system).values()}
+    return Search(problem, ("convection_coefficient",), bounds, HEAT + FRICTION, Kept(), "{:.3g} m".format)
+
+
+def _model(setting: Search, effects: tuple[str, ...], **values: float) -> Model:
+    point = setting.problem.start_values()
+    for name, value in values.items():
+        point[setting.problem.names.index(f"{effects[0]}.{name}")] = value
+    (misfit,) = misfits(setting.problem, [point])
+    return Model(effects, point, float((misfit**2).sum()) / NOISE**2, misfit, setting.rmse(misfit))
+
+
+def _by_chance(setting: Search, model: Model, share: float) -> Model:
+    """As if at the step of the fit alone the jumps of another friction fell where the log's do."""
+    lucky = np.sqrt(share) * model.left_out
+    return Model(model.effects, model.values, share * model.cost, lucky, setting.rmse(lucky))
+
+
+def test_a_friction_that_is_there_keeps_its_gain(setting: Search) -> None:
+    base, rubbing = _model(setting, ()), _model(setting, FRICTION, **TRUE)
+    assert kept_at_half_the_step(setting, rubbing, base) == pytest.approx(1.0, abs=0.02)
+    assert taken_of(setting, [rubbing], base)[0] is rubbing
+
+
+def test_what_cannot_jump_is_not_asked(setting: Search) -> None:
+    base = _model(setting, ())
+    assert kept_at_half_the_step(setting, _by_chance(setting, _model(setting, HEAT), 0.01), base) == 1.0
+
+
+def test_a_partner_that_gains_lends_nothing_to_a_friction_that_does_not(setting: Search) -> None:
+    """Of both together more than half would be left at half the step: all of it is the partner's."""
+    base = _model(setting, ())
+    both = _model(setting, FRICTION + HEAT, **{**TRUE, "limit": 0.0})
+    pair = _by_chance(setting, both, 0.05)
+    apart = dataclasses.replace(base, cost=4.0 * base.cost)
+    assert kept_at_half_the_step(setting, pair, apart) < 0.1
+    alone = _by_chance(setting, _model(setting, FRICTION, **{**TRUE, "limit": 0.0}), 0.05)
+    assert kept_at_half_the_step(setting, alone, apart) > 0.7
+
+
+def test_a_gain_that_hangs_on_the_step_is_not_taken_and_the_next_best_is(setting: Search) -> None:
+    base = _model(setting, ())
+    lucky = _by_chance(setting, _model(setting, FRICTION, **{**TRUE, "limit": 0.0}), 0.01)
+    assert kept_at_half_the_step(setting, lucky, base) < 0.1
+    best, _, enough, why = taken_of(setting, [lucky], base)
+    assert not enough
+    assert "of its gain at half the step" in why
+    real = _by_chance(setting, _model(setting, HEAT), 0.1)
+    best, _, enough, why = taken_of(setting, [lucky, real], base)
+    assert enough
+    assert best is real
+    assert why.startswith("stribeck_friction keeps")

@@ -1,0 +1,306 @@
+"""Unknown terms: nothing where they are zero, the right equation first where something hidden is, none where nothing is."""
+
+from __future__ import annotations
+
+import dataclasses
+from functools import cache
+from typing import ClassVar
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.interpolate import BSpline
+
+from smajax.attribution.cross_validation import Model, Search
+from smajax.attribution.findings import UnknownTerm
+from smajax.attribution.formulas import formulas
+from smajax.attribution.unknown.ranges import Sought
+from smajax.attribution.unknown.spline import COUNT, design, spline
+from smajax.attribution.unknown.terms import UNKNOWN
+from smajax.attribution.unknown_term import Terms, in_place_of, unknown_terms, with_terms
+from smajax.attribution.unknown_words import told_of
+from smajax.core.result_cache import Kept
+from smajax.fit.levenberg_marquardt import fit_in_box
+from smajax.fit.packed_runs import RunBatch, simulate_batch
+from smajax.fit.predicted import misfits, shown_at
+from smajax.fit.problem import Problem
+from smajax.fit.sensitivity import sensitivity
+from smajax.model.effects.base import AbstractEffect
+from smajax.model.presets import build
+from smajax.model.system import System
+from smajax.model.types import Scalar
+from smajax.model.wire.wire import Wire
+
+DT, SAMPLES, NOISE = 0.05, 180, 1e-4
+BOUNDS = {"convection_coefficient": (50.0, 400.0), "specific_heat": (100.0, 900.0), "recoverable_strain": (0.01, 0.1)}
+# Volts, held for 0.75 s each.
+LEVELS = (
+    (9.0, 9.0, 4.0, 0.0, 8.0, 9.5, 5.5, 3.0, 7.5, 10.0, 2.0, 0.0),
+    (7.0, 8.5, 6.0, 4.5, 10.0, 10.0, 5.0, 1.0, 9.0, 6.5, 3.5, 5.0),
+    (11.0, 8.0, 6.5, 5.0, 0.0, 0.0, 8.5, 9.5, 7.5, 4.0, 9.0, 3.0),
+)
+
+
+class _JumpingLoss(AbstractEffect):
+    """Convection that sets in above a temperature."""
+
+    effect_name: ClassVar[str] = "jumping_loss"
+    equation: ClassVar[str] = "heat"
+
+    @classmethod
+    def base(cls) -> _JumpingLoss:
+        return cls()
+
+    def heat_loss(self, wire: Wire, temperature: Scalar, ambient: Scalar) -> Scalar | float:
+        surface = jnp.pi * wire.wire_diameter
+        return 60.0 * surface * (temperature - ambient) * jax.nn.sigmoid((temperature - 75.0) / 4.0)
+
+
+class _WavyStrain(AbstractEffect):
+    """A strain that no line in the fraction describes."""
+
+    effect_name: ClassVar[str] = "wavy_strain"
+    equation: ClassVar[str] = "constitutive"
+
+    @classmethod
+    def base(cls) -> _WavyStrain:
+        return cls()
+
+    def strain(
+        self, wire: Wire, temperature: Scalar, stress: Scalar, fraction: Scalar, detwinned: Scalar
+    ) -> Scalar | float:
+        return 2e-3 * jnp.sin(2.0 * jnp.pi * fraction)
+
+
+class _BentScale(AbstractEffect):
+    """A sensor whose scale is bent."""
+
+    effect_name: ClassVar[str] = "bent_scale"
+    equation: ClassVar[str] = "sensor"
+
+    @classmethod
+    def base(cls) -> _BentScale:
+        return cls()
+
+    def sensed(self, reading: Scalar, time: Scalar, last: Scalar) -> Scalar:
+        return reading + 8e-4 * jnp.sin(reading / 4e-3)
+
+
+@cache
+def _base() -> System:
+    return build("flexinol_table_3_2", "dead_weight", "voltage")
+
+
+def _inputs() -> dict[str, jax.Array]:
+    return {"voltage": jnp.repeat(jnp.asarray(LEVELS), SAMPLES // len(LEVELS[0]), axis=1)}
+
+
+def _blank() -> RunBatch:
+    shape = (len(LEVELS), SAMPLES)
+    return RunBatch(_inputs(), jnp.zeros(shape), jnp.ones(shape), jnp.zeros((len(LEVELS), 0)), (), DT)
+
+
+def _setting(*hidden: AbstractEffect, seed: int = 5) -> tuple[Search, Model]:
+    """A search without a library, and the base model fitted to runs with something hidden in them."""
+    truth = simulate_batch(dataclasses.replace(_base(), effects=hidden), _blank()).reading
+    noise = NOISE * np.random.default_rng(seed).normal(size=truth.shape)
+    batch = dataclasses.replace(_blank(), output=jnp.asarray(truth + noise))
+    problem = Problem.build(_base(), batch, NOISE, False)
+    search = Search(problem, tuple(BOUNDS), BOUNDS, (), Kept(), lambda value: f"{1e3 * value:.3g} mm")
+    (fit,) = fit_in_box(problem, [problem.lane(tuple(BOUNDS), BOUNDS, problem.start_values())], enough=1e-5)
+    (misfit,) = misfits(problem, [fit.values])
+    return search, Model((), fit.values, fit.cost, misfit, search.rmse(misfit))
+
+
+@cache
+def _screened() -> tuple[Terms, np.ndarray, Sought]:
+    return with_terms(*_setting())
+
+
+def test_a_spline_of_seven_coefficients_is_de_boors() -> None:
+    step = 1.0 / (COUNT - 3)
+    knots = step * np.arange(-3, COUNT + 1)
+    coefficients = np.random.default_rng(1).normal(size=COUNT)
+    share = np.linspace(0.0, 1.0, 101)
+    expected = BSpline(knots, coefficients, 3)(share)
+    np.testing.assert_allclose(design(share) @ coefficients, expected, atol=1e-12)
+    found = spline([jnp.asarray(one) for one in coefficients], jnp.asarray([-0.5, *share, 2.0]))
+    np.testing.assert_allclose(found, [expected[0], *expected, expected[-1]], atol=1e-12)
+
+
+def test_terms_at_zero_leave_the_model_as_it_is() -> None:
+    search, values, found = _screened()
+    assert {term.effect_name for term in found.terms} == set(UNKNOWN)
+    alone, _ = _setting()
+    (with_all,) = shown_at(search.problem, [values])
+    (without,) = shown_at(alone.problem, [_setting()[1].values])
+    np.testing.assert_allclose(with_all, without, rtol=0.0, atol=1e-11)
+
+
+def test_derivatives_by_every_coefficient_are_those_of_differences() -> None:
+    """Away from zero, where every term bends the runs."""
+    search, values, _ = _screened()
+    names = [name for name in search.problem.names if name.split(".")[0] in UNKNOWN]
+    slots = [search.problem.names.index(name) for name in names]
+    here = np.array(values)
+    here[slots] = 0.05 * np.random.default_rng(2).normal(size=len(slots))
+    at = sensitivity(search.problem, here, names)
+    step = 1e-6
+    shift = step * np.eye(len(here))[slots]
+    ahead, behind = misfits(search.problem, here + shift), misfits(search.problem, here - shift)
+    differences = (ahead - behind) / (2.0 * step * NOISE)
+    for k, name in enumerate(names):
+        exact = at.jacobian[..., k]
+        missed = float(np.linalg.norm(differences[k] - exact))
+        assert missed < 1e-3 * float(np.linalg.norm(exact)) + 1e-3, name
+
+
+def test_a_sensors_error_is_added_once_to_every_sample() -> None:
+    search, values, found = _screened()
+    term = next(one for one in found.terms if one.effect_name == "unknown_reading_of_value")
+    here = np.array(values)
+    coefficients = np.linspace(-0.2, 0.3, COUNT)
+    here[[search.problem.names.index(name) for name in search.coefficients(term.effect_name)]] = coefficients
+    ideal, shown = shown_at(search.problem, [values, here])
+    share = (ideal - float(term.low)) / float(term.width)
+    expected = ideal + float(term.scale) * (design(share.ravel()) @ coefficients).reshape(ideal.shape)
+    np.testing.assert_allclose(shown, expected, rtol=0.0, atol=1e-11)
+
+
+HIDDEN: dict[str, type[AbstractEffect]] = {"heat": _JumpingLoss, "constitutive": _WavyStrain, "sensor": _BentScale}
+
+
+@cache
+def _found(equation: str) -> tuple[UnknownTerm, ...]:
+    return unknown_terms(*_setting(HIDDEN[equation].base())).terms
+
+
+@pytest.mark.parametrize(("equation", "level"), [("heat", 2.0), ("constitutive", 1.1), ("sensor", 1.1)])
+def test_the_equation_that_something_is_hidden_in_comes_first(equation: str, level: float) -> None:
+    """Down to so many times the noise on runs left out, from at least 1.2 times it, and no other equation as well."""
+    terms = _found(equation)
+    best = terms[0]
+    assert best.named, best.why
+    assert best.equation == equation
+    assert {term.equation for term in terms if term.name in best.alike} <= {equation}
+    assert best.left_out_after < level * NOISE
+    assert best.left_out_before > 1.2 * NOISE
+    told = told_of(terms, lambda value: f"{1e3 * value:.2g} mm")
+    assert f"it lives in the {equation} equation" in told[0]
+    assert best.samples.sum() == len(LEVELS) * SAMPLES
+
+
+def test_the_function_learnt_is_the_one_hidden() -> None:
+    """The bent scale of a sensor, but for what a stroke that is a little longer takes over: the line in it."""
+    best = _found("sensor")[0]
+    truth = 8e-4 * np.sin(best.at / 4e-3)
+    seen = np.interp(best.at, 0.5 * (best.cells[1:] + best.cells[:-1]), best.samples) > 4
+
+    def bent(values: np.ndarray) -> np.ndarray:
+        line = np.polynomial.Polynomial.fit(best.at[seen], values[seen], 1)
+        return values[seen] - line(best.at[seen])
+
+    assert np.sqrt(np.mean((bent(best.values) - bent(truth)) ** 2)) < 0.15 * np.std(bent(truth))
+
+
+@pytest.mark.parametrize(("share", "gives_way"), [(0.95, True), (0.1, False)], ids=["little", "nearly all"])
+def test_effects_that_explain_less_than_one_unknown_function_give_way_to_it(share: float, gives_way: bool) -> None:
+    setting, first = _setting(_BentScale.base())
+    left = share * first.left_out
+    effects = Model(("latent_heat",), first.values, share**2 * first.cost, left, share * first.left_out_rmse)
+    found = in_place_of(setting, first, effects)
+    assert (found is not None) == gives_way
+    if found is not None:
+        assert found.terms[0].equation == "sensor"
+        assert found.model is not None
+        assert found.model.left_out_rmse < 1.1 * NOISE
+
+
+@pytest.mark.parametrize("there", [True, False], ids=["there too", "another bench"])
+def test_held_out_runs_bear_out_a_term_or_refuse_it(there: bool) -> None:
+    """Of a bent scale: a held-out run that was read on it, and one that was not."""
+    setting, first = _setting(_BentScale.base())
+    batch = setting.problem.batch
+    plain = simulate_batch(setting.problem.system_at(jnp.asarray(first.values)), batch).reading
+    setting.held_out = dataclasses.replace(batch, output=batch.output if there else plain)
+    terms = unknown_terms(setting, first).terms
+    best = terms[0]
+    assert best.equation == "sensor"
+    assert best.named == there
+    assert best.held_out_before is not None
+    assert best.held_out_after is not None
+    assert (best.held_out_after < best.held_out_before) == there
+    told = told_of(terms, lambda value: f"{1e3 * value:.2g} mm")[0]
+    assert ("it lives in the sensor equation" in told and "on those held out" in told) == there
+    assert ("the held-out runs do not bear it out" in told) != there
+
+
+def test_where_nothing_is_missing_no_term_is_better_than_none() -> None:
+    terms = unknown_terms(*_setting()).terms
+    assert terms
+    assert not any(term.named for term in terms)
+    assert "Nor do these runs say in which equation" in told_of(terms, str)[0]
+
+
+def test_a_formula_that_is_in_the_dictionary_is_found_and_one_that_is_too_long_is_not() -> None:
+    low, width = 0.0, 80.0
+    share = np.linspace(0.0, 1.0, 201)
+    x = low + width * share
+    rng = np.random.default_rng(4)
+    for truth, text in ((3e-4 * x**2, "^2"), (0.9 / (1.0 + np.exp(-(x - 44.0) / 2.0)), "tanh((T - 44)")):
+        coefficients = np.linalg.lstsq(design(share), truth, rcond=None)[0]
+        sigma = 5e-3
+        noisy = coefficients + sigma * rng.normal(size=COUNT)
+        best = formulas(low, width, noisy, sigma**2 * np.eye(COUNT), 200.0, "T")[0]
+        assert text in best.text
+        assert best.numbers <= 2
+        np.testing.assert_allclose(best.curve, truth, atol=0.1 * np.max(truth))
+
+
+def test_a_formula_is_of_the_function_even_where_the_parameters_could_take_it_over() -> None:
+    """A resistance scaled as a whole is a convection scaled: that way lies R = 0, which is no formula for its bend."""
+    share = np.linspace(0.0, 1.0, 201)
+    truth = 0.1 * np.cos(4.0 * share)
+    coefficients = np.linalg.lstsq(design(share), truth, rcond=None)[0]
+    scaled = 1.0 + coefficients
+    covariance = 1e-4 * np.eye(COUNT) + 10.0 * np.outer(scaled, scaled)
+    best = formulas(0.0, 1.0, coefficients, covariance, 500.0, "s")[0]
+    # As high a shift as the function is large, but not on to -1.
+    np.testing.assert_allclose(best.curve, truth, atol=0.12)
+    assert np.corrcoef(best.curve, truth)[0, 1] > 0.95
+
+
+@pytest.mark.parametrize("size", [0.0, 1e-12, 1e12, np.nan])
+@pytest.mark.parametrize("width", [0.0, 1e-9, 1e9])
+def test_no_function_is_too_small_or_too_narrow_for_formulas(size: float, width: float) -> None:
+    """One that stayed at zero, over a state that did not move: there is no formula, and no end of the loop."""
+    coefficients = size * np.random.default_rng(0).normal(size=COUNT)
+    found = formulas(0.3 * width, width, coefficients, 1e-4 * np.eye(COUNT), 100.0, "T")
+    assert all(np.isfinite(one.curve).all() for one in found)
+    assert bool(found) == (width > 0.0 and size > 0.0)
+
+
+def _told(named: bool, *alike: str) -> tuple[str, ...]:
+    empty = np.zeros(0)
+
+    def term(name: str, first: bool) -> UnknownTerm:
+        of = UNKNOWN[name]
+        said = (of.symbol, of.state, of.state_unit, of.unit)
+        arrays = (empty, empty, empty, empty, empty, empty)
+        others = alike if first else ()
+        return UnknownTerm(
+            name, of.title, of.equation, *said, named and first, others, "", 0.5, 2.0, 1.0, None, None, *arrays, ()
+        )
+
+    names = ("unknown_loss_of_temperature", "unknown_heat_of_fraction", "unknown_reading_of_time")
+    return told_of([term(name, k == 0) for k, name in enumerate(names)], str)
+
+
+def test_an_equation_is_named_only_where_no_other_does_as_well() -> None:
+    assert "it lives in the heat equation" in _told(True)[0]
+    assert "it lives in the heat equation" in _told(True, "unknown_heat_of_fraction")[0]
+    assert "or a stored heat" in _told(True, "unknown_heat_of_fraction")[0]
+    undecided = _told(True, "unknown_reading_of_time")[0]
+    assert "do not tell whether it lives in the heat equation or the sensor equation" in undecided
+    assert "lives in" not in _told(False)[0]

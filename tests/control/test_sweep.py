@@ -1,0 +1,192 @@
+"""The sweep: its lanes are single closed loops, its folder is whole, and what is finished is not computed again."""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import json
+from pathlib import Path
+from typing import Any
+
+import equinox as eqx
+import jax
+import numpy as np
+import pytest
+import xarray as xr
+
+from smajax.control.closed_loop import simulate_closed_loop
+from smajax.control.figures_of_merit import MERIT_UNITS, Merit, merit
+from smajax.control.gains_file import Gains
+from smajax.control.interface import Interface
+from smajax.control.measured_state import Sensor
+from smajax.control.presets import CONTROLLERS
+from smajax.control.reference import clock, constant
+from smajax.control.sweep import Grid, closed_loops, lanes, ratios
+from smajax.core.parameters import get_parameters, set_parameters
+from smajax.report.sweep_run import SweepSettings, goes_on, run_sweep
+from studies.source.rigs import arm
+from tests.helpers.in_browser import HOSTILE, faults
+
+RATIOS = ("payload_ratio", "supply_ratio")
+SETTINGS = SweepSettings(("vsc3",), "payload", "supply", 2, (0.0, 30.0), (1.0,), seconds=3.0)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("sweep")
+    run_sweep(arm(), SETTINGS, out, lambda what, share: None, f"smajax sweep --out {HOSTILE}")
+    return out
+
+
+def test_a_lane_is_the_single_loop_of_that_plant(folder: Path) -> None:
+    with (folder / "vsc3.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 2 * 2 * 2
+    row = rows[-1]
+    assert (row["payload_ratio"], row["supply_ratio"], row["set_point_deg"]) == ("2", "2", "30")
+    system = arm()
+    names = ["payload_mass", "amplifier_gain"]
+    doubled = dict(zip(names, 2.0 * np.asarray(get_parameters(system, names)), strict=True))
+    plant = set_parameters(system, doubled)
+    controller = CONTROLLERS["vsc3"].make(system)
+    loop = eqx.filter_jit(simulate_closed_loop)(plant, controller, constant(clock(3.0, 0.01), np.radians(30.0)), 0.01)
+    one = merit(loop, plant)
+    assert float(row["energy_J"]) == pytest.approx(float(one.energy), rel=1e-5)
+    assert float(row["overshoot_deg"]) == pytest.approx(float(np.degrees(one.overshoot)), rel=1e-5, abs=1e-6)
+    assert float(row["peak_temperature_degC"]) == pytest.approx(float(one.peak_temperature), rel=1e-5)
+
+
+def test_the_folder_is_whole(folder: Path) -> None:
+    page = (folder / "index.html").read_text(encoding="utf-8")
+    assert page.count('src="data:image/png;base64,') == page.count('srcset="data:image/png;base64,') == 3
+    assert 'href="vsc3.csv"' in page
+    assert "Ambient: 0.5 to 2 times the 20 °C believed is air that is -10 to +20 K off." in page
+    for name in ("comparison.png", "vsc3_maps.png", "vsc3_lines.png", "vsc3.csv"):
+        assert (folder / name).stat().st_size > 300
+    record = json.loads((folder / "sweep.json").read_text(encoding="utf-8"))
+    assert record["sweep"]["loops"] == 8
+    assert record["sweep"]["failed"] == {"vsc3": 0}
+    assert not list(folder.rglob("*.part*"))
+
+
+def test_the_data_set_holds_every_row(folder: Path) -> None:
+    with xr.open_dataset(folder / "sweep.nc", engine="scipy") as found, open(folder / "vsc3.csv") as file:
+        rows = list(csv.DictReader(file))
+        assert found["overshoot"].size == len(rows) == 8
+        for row in rows:
+            (gain,) = (float(row[name]) for name in row if name.endswith("_ratio") and name not in RATIOS)
+            at = {name: float(row[name]) for name in RATIOS} | {"gain_ratio": gain}
+            at["set_point"] = np.radians(float(row["set_point_deg"]))
+            one = found.sel(controller="vsc3").sel(at, method="nearest")
+            assert float(one["energy"]) == pytest.approx(float(row["energy_J"]), rel=1e-5)
+            assert np.degrees(float(one["overshoot"])) == pytest.approx(float(row["overshoot_deg"]), rel=1e-5, abs=1e-6)
+        assert {name: one.attrs["units"] for name, one in found.data_vars.items()} == {**MERIT_UNITS, "failed_at": "s"}
+        assert [field.name for field in dataclasses.fields(Merit)] == list(MERIT_UNITS)
+
+
+def test_one_mismatch_alone_is_swept_as_a_curve(tmp_path: Path, folder: Path, browser: Any) -> None:
+    """Its loops are those of the map where the other mismatch is 1."""
+    alone = dataclasses.replace(SETTINGS, second="", points=3)
+    run_sweep(arm(), alone, tmp_path, lambda what, share: None, f"smajax sweep {HOSTILE}")
+    with (tmp_path / "vsc3.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [(row["payload_ratio"], row["set_point_deg"]) for row in rows] == [
+        (ratio, angle) for ratio in ("0.5", "1", "2") for angle in ("0", "30")
+    ]
+    assert not any("supply" in name for name in rows[0])
+    system = arm()
+    believed = np.asarray(get_parameters(system, ["payload_mass"]))[0]
+    plant = set_parameters(system, {"payload_mass": 2.0 * believed})
+    controller = CONTROLLERS["vsc3"].make(system)
+    loop = eqx.filter_jit(simulate_closed_loop)(plant, controller, constant(clock(3.0, 0.01), np.radians(30.0)), 0.01)
+    assert float(rows[-1]["energy_J"]) == pytest.approx(float(merit(loop, plant).energy), rel=1e-5)
+    with xr.open_dataset(tmp_path / "sweep.nc", engine="scipy") as found:
+        assert found["energy"].dims == ("controller", "payload_ratio", "set_point", "gain_ratio")
+        assert float(found["energy"][0, 2, 1, 0]) == pytest.approx(float(rows[-1]["energy_J"]), rel=1e-5)
+    record = json.loads((tmp_path / "sweep.json").read_text(encoding="utf-8"))
+    assert (record["sweep"]["mismatches"], record["sweep"]["loops"]) == (["payload"], 6)
+    page = (tmp_path / "index.html").read_text(encoding="utf-8")
+    assert "<h2>Mismatch of payload</h2>" in page
+    assert "On all mismatches of payload it settles" in page
+    assert faults(browser, tmp_path / "index.html") == []
+
+
+def test_the_page_in_a_browser(folder: Path, browser: Any) -> None:
+    assert faults(browser, folder / "index.html") == []
+
+
+def test_what_is_finished_is_kept(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    before = (folder / "vsc3.csv").read_bytes()
+
+    def never(*_: object, **__: object) -> None:
+        raise AssertionError("computed again")
+
+    monkeypatch.setattr("smajax.report.sweep_run.closed_loops", never)
+    run_sweep(arm(), SETTINGS, folder, lambda what, share: None)
+    assert (folder / "vsc3.csv").read_bytes() == before
+    other = SweepSettings(("vsc3",), "payload", "supply", 2, (0.0, 31.0), (1.0,), seconds=3.0)
+    with pytest.raises(AssertionError, match="computed again"):
+        run_sweep(arm(), other, folder, lambda what, share: None)
+    # Another law is another plant, though every parameter is the same.
+    with pytest.raises(AssertionError, match="computed again"):
+        run_sweep(arm("liang"), SETTINGS, folder, lambda what, share: None)
+
+
+def test_unknown_names_are_answered_with_those_there_are(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="backstepping2"):
+        run_sweep(arm(), SweepSettings(("vsc4",)), tmp_path, lambda what, share: None)
+    with pytest.raises(ValueError, match="printed"):
+        run_sweep(arm(), dataclasses.replace(SETTINGS, filtered="kalman"), tmp_path, lambda what, share: None)
+    for pair in (("payload", "wind"), ("payload", "payload"), ("", ""), ("wind", "")):
+        with pytest.raises(ValueError, match="convection"):
+            Grid(*pair, ratios(3), np.zeros(1), np.ones(1))
+    with pytest.raises(ValueError, match="convection"):
+        lanes({"wind": 1.2}, 0.0)
+
+
+def test_an_odd_grid_has_the_plant_as_believed_in_it() -> None:
+    assert np.min(np.abs(ratios(15) - 1.0)) < 1e-12
+    assert ratios(15)[[0, -1]] == pytest.approx([0.5, 2.0])
+
+
+@pytest.mark.parametrize("name", sorted(CONTROLLERS))
+def test_every_controller_has_its_main_gain(name: str) -> None:
+    preset = CONTROLLERS[name]
+    assert float(get_parameters(preset.make(arm()), [preset.main_gain])[0]) > 0.0
+
+
+def test_noise_sample_time_and_delay_reach_the_loop() -> None:
+    """A lane with all three is the single loop with them; a period that is no whole number of steps is answered."""
+    system, every = arm(), 2
+    controller, gain = CONTROLLERS["vsc3"].make(system), CONTROLLERS["vsc3"].main_gain
+    rows, sensor = lanes({}, 0.3), Sensor(noise_sigma=0.01)
+    between = Interface(None, sensor, every, 3)
+    found = closed_loops(system, controller, gain, rows, seconds=2.0, interface=between, seed=5).merits
+    plain = closed_loops(system, controller, gain, rows, seconds=2.0).merits
+    key = jax.random.fold_in(jax.random.key(5), 0)
+    wanted = constant(clock(2.0, 0.01), 0.3)
+    loop = eqx.filter_jit(simulate_closed_loop)(
+        system, controller, wanted, 0.01, every, sensor=sensor, key=key, delay=3
+    )
+    # Judged while it runs, as its trajectory is afterwards.
+    one = merit(loop, system)
+    for field in dataclasses.fields(one):
+        assert float(getattr(found, field.name)[0]) == pytest.approx(
+            float(getattr(one, field.name)), rel=1e-6, abs=1e-8
+        )
+    assert abs(float(found.energy[0]) / float(plain.energy[0]) - 1.0) > 1e-3
+
+
+def test_a_period_between_two_steps_is_answered(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="whole number"):
+        run_sweep(arm(), dataclasses.replace(SETTINGS, period=0.015), tmp_path, lambda what, share: None)
+
+
+def test_only_controllers_may_be_added_to_a_folder() -> None:
+    before = SETTINGS.record()
+    assert json.loads(json.dumps(before)) == before
+    assert goes_on(before, dataclasses.replace(SETTINGS, controllers=("pid", "vsc3")).record())
+    assert not goes_on(before, dataclasses.replace(SETTINGS, controllers=("pid",)).record())
+    assert not goes_on(before, dataclasses.replace(SETTINGS, seconds=4.0).record())
+    tuned = (Gains("vsc3", {"boundary": 0.1}),)
+    assert not goes_on(before, dataclasses.replace(SETTINGS, tuned=tuned).record())

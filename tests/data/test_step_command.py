@@ -1,0 +1,35 @@
+"""The increment of a coarse sensor is read off its log."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from smajax.data.readers.resolution_levels import likeliest_increment
+
+
+def _strokes(rng: np.random.Generator) -> list[np.ndarray]:
+    """Three runs that rest at both ends and pass slowly between, each with a zero of its own."""
+    time = np.linspace(0.0, 1.0, 800)
+    return [
+        1e-2 * np.clip(1.6 * np.sin(np.pi * count * time) ** 2 - 0.3, 0.0, 1.0) + zero
+        for count, zero in zip((1, 2, 3), rng.uniform(-1e-3, 1e-3, 3), strict=True)
+    ]
+
+
+@pytest.mark.parametrize("share", [0.03, 0.071, 0.12])
+def test_the_increment_of_a_staircase_is_found(share: float) -> None:
+    rng, increment = np.random.default_rng(3), share * 1e-2
+    logs = []
+    for zero, stroke in enumerate(_strokes(rng)):
+        stairs = increment * np.round(stroke / increment) + 1e-4 * zero
+        logs.append(stairs + 0.05 * increment * rng.normal(size=stroke.size))
+    assert likeliest_increment(logs, 0.05 * increment) == pytest.approx(increment, rel=0.5 * share)
+
+
+def test_a_smooth_log_has_no_increment() -> None:
+    rng = np.random.default_rng(4)
+    logs = [stroke + 1e-5 * rng.normal(size=stroke.size) for stroke in _strokes(rng)]
+    assert likeliest_increment(logs, 1e-5) == 0.0
+    still = [1e-6 * rng.normal(size=100)]
+    assert likeliest_increment(still, 1e-6) == 0.0

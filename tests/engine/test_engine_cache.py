@@ -1,0 +1,162 @@
+"""Machine code that is kept on disk: under the program's own text, the same numbers in another process, and never another program's."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from smajax.engine import cache, facade, native
+from smajax.model.presets import build
+from smajax.model.system import System
+from smajax.model.types import Trajectory
+from smajax.simulation.compiled import simulate_compiled
+
+ARM = build("niti_table_3_1", "arm", "amplified_voltage")
+OTHER = build("niti_table_3_1", "dead_weight", "voltage")
+HEATED = {"voltage": jnp.full(120, 7.0)}
+
+
+@contextmanager
+def _programs_in(place: str | None) -> Iterator[None]:
+    before = jax.config.values["jax_compilation_cache_dir"]
+    jax.config.update("jax_compilation_cache_dir", place)
+    try:
+        yield
+    finally:
+        jax.config.update("jax_compilation_cache_dir", before)
+
+
+@pytest.fixture
+def programs(tmp_path: Path) -> Iterator[Path]:
+    """An empty folder for programs, and nothing remembered of them in this process."""
+    remembered = dict(facade._programs)
+    facade._programs.clear()
+    with _programs_in(str(tmp_path)):
+        yield tmp_path / "native"
+    facade._programs.clear()
+    facade._programs.update(remembered)
+
+
+def _run(system: System = ARM) -> Trajectory:
+    return simulate_compiled(system, HEATED, 0.01)
+
+
+def _same(one: Trajectory, other: Trajectory) -> bool:
+    return all(np.array_equal(a, b) for a, b in zip(jax.tree.leaves(one), jax.tree.leaves(other), strict=True))
+
+
+def test_what_is_kept_is_read_and_is_the_same_to_the_bit(programs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made = _run()
+    assert len(list(programs.iterdir())) == 1
+    facade._programs.clear()
+
+    def never(*_: object) -> None:
+        raise AssertionError("compiled although it was kept")
+
+    monkeypatch.setattr(native, "compiled", never)
+    read = _run()
+    assert isinstance(read, Trajectory)
+    assert _same(made, read)
+
+
+def test_another_process_reads_it_too(programs: Path) -> None:
+    code = (
+        "import numpy as np, jax.numpy as jnp\nfrom smajax.core.runtime import prepare\nprepare()\n"
+        "from smajax.simulation.compiled import simulate_compiled\nfrom smajax.model.presets import build\n"
+        "run = simulate_compiled(build('niti_table_3_1', 'arm', 'amplified_voltage'), {'voltage': jnp.full(120, 7.0)}, 0.01)\n"
+        "print(run.position[-1].hex())"
+    )
+    env = {**os.environ, "JAX_COMPILATION_CACHE_DIR": str(programs.parent)}
+    first, second = (
+        subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, check=True).stdout
+        for _ in range(2)
+    )
+    assert first == second == f"{float(_run().position[-1]).hex()}\n"
+    assert len(list(programs.iterdir())) == 1
+
+
+@pytest.mark.parametrize("spoilt", ["cut", "changed", "empty", "of a later version"])
+def test_a_damaged_program_is_made_anew(programs: Path, spoilt: str) -> None:
+    made = _run()
+    (path,) = programs.iterdir()
+    raw = path.read_bytes()
+    path.write_bytes(
+        {
+            "cut": raw[:-7],
+            "changed": raw[:-100] + b"!" + raw[-99:],
+            "empty": b"",
+            "of a later version": raw.replace(b"program 2", b"program 3", 1),
+        }[spoilt]
+    )
+    facade._programs.clear()
+    assert _same(_run(), made)
+    assert path.read_bytes() == raw
+
+
+def test_one_programs_file_is_never_anothers(programs: Path) -> None:
+    _run(OTHER)
+    (other,) = programs.iterdir()
+    kept = other.read_bytes()
+    made = _run()
+    (path,) = set(programs.iterdir()) - {other}
+    path.write_bytes(kept)
+    facade._programs.clear()
+    assert _same(_run(), made)
+
+
+def test_a_comment_changes_no_key_and_an_equation_does(programs: Path) -> None:
+    def plain(model: Any, own: dict[str, Any]) -> Any:
+        return model * own["a"] + 1.0
+
+    def explained(model: Any, own: dict[str, Any]) -> Any:
+        """The same, and what it means."""
+        return model * own["a"] + 1.0  # one more
+
+    def other(model: Any, own: dict[str, Any]) -> Any:
+        return model * own["a"] + 1.0 + 1e-16
+
+    def kept(function: Any, model: Any) -> int:
+        run = facade.program(function, model, ("a",), engine="native")
+        np.testing.assert_allclose(run(model, {"a": np.arange(3.0)}, 1), np.asarray(model) * np.arange(3.0) + 1.0)
+        return len(list(programs.iterdir()))
+
+    assert kept(plain, jnp.asarray(2.0)) == 1
+    assert kept(explained, jnp.asarray(5.0)) == 1  # nor do a model's numbers
+    assert kept(other, jnp.asarray(2.0)) == 2
+    assert kept(plain, 2.0) == 3  # a number that is no array is part of the program
+
+
+def test_a_program_of_other_versions_is_not_used(programs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    _run()
+    (first,) = programs.iterdir()
+    facade._programs.clear()
+    monkeypatch.setattr(cache, "versions", lambda: "Python 3.99, smajax 0.0.9")
+    _run()
+    assert len(list(programs.iterdir())) == 2
+    assert cache.key_of("text") != first.name
+
+
+@pytest.mark.parametrize("place", [None, "gs://bucket/programs"])
+def test_nothing_is_kept_without_a_folder_of_this_machine(place: str | None) -> None:
+    with _programs_in(place):
+        assert cache.folder() is None
+
+
+def test_the_oldest_programs_make_room(programs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    _run()
+    (first,) = programs.iterdir()
+    os.utime(first, (1.0, 1.0))
+    monkeypatch.setattr(cache, "LARGEST", first.stat().st_size + 100)
+    _run(OTHER)
+    (left,) = programs.iterdir()
+    assert left != first

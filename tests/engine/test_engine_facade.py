@@ -1,0 +1,212 @@
+"""Whatever goes wrong with machine code, XLA gives the numbers and one warning says why; asked for by name, it is the error."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import warnings
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from smajax.data.open_experiment import open_experiment
+from smajax.engine import EngineError, EngineWarning, Unsupported, arithmetic, cache, jax_versions, native, translate
+from smajax.engine import program as compiled_program
+from smajax.engine.facade import _programs
+from smajax.fit.experiment_problem import declared_problem
+from smajax.fit.predicted import shown_and_slopes
+from smajax.model.presets import build
+from smajax.simulation.compiled import simulate_compiled
+
+DEMO = Path(__file__).parents[2] / "smajax" / "data" / "demo" / "latent" / "experiment.toml"
+Break = Callable[[pytest.MonkeyPatch], object]
+
+
+@pytest.fixture
+def forgetful() -> Iterator[None]:
+    """Nothing remembered of programs, before and after."""
+    remembered = dict(_programs)
+    _programs.clear()
+    yield
+    _programs.clear()
+    _programs.update(remembered)
+
+
+def _demo() -> tuple[np.ndarray, np.ndarray]:
+    """What the demo's sensors show at the start of its fit, and all slopes: what every fit of it is made of."""
+    experiment = open_experiment(DEMO)
+    problem = declared_problem(experiment, [run for run in experiment.runs if run.role == "fit"][:1])
+    start = np.asarray(problem.start_values())
+    return shown_and_slopes(problem, start[None], np.eye(len(start))[None])
+
+
+@pytest.fixture(scope="module")
+def right() -> tuple[np.ndarray, np.ndarray]:
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setenv("SMAJAX_ENGINE", "native")
+        return _demo()
+
+
+def _fails(message: str) -> Callable[..., Any]:
+    def failing(*_: Any, **__: Any) -> Any:
+        raise RuntimeError(message)
+
+    return failing
+
+
+def _without_llvmlite(patched: pytest.MonkeyPatch) -> None:
+    for name in ("llvmlite", "llvmlite.binding"):
+        patched.setitem(sys.modules, name, None)
+
+
+# What is broken -> (how, what the warning says, the error under "native").
+BROKEN: dict[str, tuple[Break, str, type[Exception]]] = {
+    "a primitive that is unknown": (
+        lambda patched: patched.setattr(
+            translate, "ELEMENTWISE", {name: one for name, one in arithmetic.ELEMENTWISE.items() if name != "max"}
+        ),
+        "the operation `max`",
+        Unsupported,
+    ),
+    "a parameter renamed": (
+        lambda patched: patched.setattr(
+            jax_versions,
+            "TABLE",
+            {**jax_versions.TABLE, "scan": {**jax_versions.TABLE["scan"], "carry": ("carried", "borne")}},
+        ),
+        "`scan` of this version of JAX: it has no parameter that says its carry",
+        Unsupported,
+    ),
+    "a group of a scan's arguments renamed": (
+        lambda patched: patched.setattr(
+            jax_versions,
+            "TABLE",
+            {**jax_versions.TABLE, "scan": {**jax_versions.TABLE["scan"], "constants": (jax_versions._counted(7),)}},
+        ),
+        "no parameter that says its constants",
+        Unsupported,
+    ),
+    "a fault of the translator": (
+        lambda patched: patched.setattr(translate, "row", _fails("out of step")),
+        "RuntimeError: out of step, while the operation `scan` was translated",
+        RuntimeError,
+    ),
+    "LLVM refuses the text": (
+        lambda patched: (
+            patched.setattr(native, "compiled", _fails("expected type")),
+            patched.setattr(cache, "load", lambda key: None),
+        )[0],
+        "RuntimeError: expected type",
+        RuntimeError,
+    ),
+    "machine code that does not load": (
+        lambda patched: patched.setattr(native, "Kernel", _fails("no such section")),
+        "no such section",
+        RuntimeError,
+    ),
+    "no llvmlite": (
+        _without_llvmlite,
+        "machine code needs llvmlite",
+        ImportError,
+    ),
+}
+
+
+@pytest.mark.usefixtures("forgetful")
+@pytest.mark.parametrize("what", BROKEN)
+def test_the_demos_numbers_come_out_of_xla(
+    what: str, monkeypatch: pytest.MonkeyPatch, right: tuple[np.ndarray, np.ndarray]
+) -> None:
+    broken, said, error = BROKEN[what]
+    broken(monkeypatch)
+    with pytest.warns(EngineWarning, match=said) as told:
+        found = _demo()
+    for one, other in zip(found, right, strict=True):
+        np.testing.assert_allclose(one, other, rtol=0.0, atol=1e-9 * float(np.abs(other).max()))
+    (line,) = {str(one.message) for one in told}
+    assert "several times slower" in line
+    if error is not ImportError:
+        assert f"jax {jax.__version__}" in line
+        assert "smajax doctor --json" in line
+    _programs.clear()
+    monkeypatch.setenv("SMAJAX_ENGINE", "native")
+    with pytest.raises(error):
+        _demo()
+
+
+@pytest.mark.usefixtures("forgetful")
+def test_a_corrupt_cache_entry_is_compiled_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, right: tuple[np.ndarray, np.ndarray]
+) -> None:
+    """No warning, the same numbers, and a sound entry afterwards."""
+    monkeypatch.setattr(cache, "folder", lambda: tmp_path)
+    _demo()
+    (entry,) = tmp_path.iterdir()
+    sound = entry.read_bytes()
+    entry.write_bytes(sound[:100] + bytes(len(sound) - 100))
+    _programs.clear()
+    np.testing.assert_array_equal(_demo()[0], right[0])
+    assert entry.read_bytes() == sound
+
+
+@pytest.mark.usefixtures("forgetful")
+def test_a_reason_is_said_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of two programs of different rigs, with Python's own filters."""
+    monkeypatch.setattr(native, "compiled", _fails("expected type"))
+    monkeypatch.setattr(cache, "load", lambda key: None)
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("default")
+        for wire, load, drive in (
+            ("niti_table_3_1", "arm", "amplified_voltage"),
+            ("flexinol_table_3_2", "dead_weight", "voltage"),
+        ):
+            simulate_compiled(build(wire, load, drive), {"voltage": jnp.full(5, 5.0)}, 0.01)
+    assert sum("expected type" in str(one.message) for one in told) == 1
+
+
+@pytest.mark.usefixtures("forgetful")
+def test_what_the_function_itself_raises_is_raised_by_every_engine() -> None:
+    def impossible(model: Any, own: dict[str, Any]) -> Any:
+        raise KeyError("no such load")
+
+    for engine in ("auto", "native", "xla"):
+        with pytest.raises(KeyError, match="no such load"):
+            compiled_program(impossible, None, ("a",), engine=engine)(None, {"a": np.ones(3)})
+
+
+def test_engines_that_there_are_not_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    arm = build("niti_table_3_1", "arm", "amplified_voltage")
+    with pytest.raises(EngineError, match=r"engine is 'llvm'; expected one of auto, native, xla"):
+        simulate_compiled(arm, {"voltage": jnp.full(5, 5.0)}, engine="llvm")  # type: ignore[arg-type]
+    monkeypatch.setenv("SMAJAX_ENGINE", "gpu")
+    with pytest.raises(EngineError, match=r"SMAJAX_ENGINE is 'gpu'"):
+        simulate_compiled(arm, {"voltage": jnp.full(5, 5.0)})
+    told = subprocess.run(
+        [sys.executable, "-m", "smajax", "doctor"], capture_output=True, text=True, env=dict(os.environ), timeout=120
+    )
+    assert told.returncode == 2
+    assert "SMAJAX_ENGINE is 'gpu'" in told.stderr
+    assert "Traceback" not in told.stderr
+
+
+def test_the_old_name_of_the_engine_goes_on_for_one_version() -> None:
+    with pytest.warns(DeprecationWarning, match='"native" now'):
+        run = compiled_program(lambda model, own: own["a"] + 1.0, None, ("a",), engine="lanes")  # type: ignore[arg-type]
+    assert run.native is not None
+
+
+def test_the_engine_knows_nothing_of_wires_files_or_reports() -> None:
+    code = (
+        "import sys\n"
+        "for name in ('jinja2', 'pydantic', 'xarray', 'matplotlib', 'pint', 'typer', 'rich', 'llvmlite'): sys.modules[name] = None\n"
+        "import smajax.engine\n"
+        "print(*sorted(name for name in sys.modules if name.startswith('smajax.')))"
+    )
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    assert {".".join(name.split(".")[:2]) for name in loaded} == {"smajax.core", "smajax.engine"}

@@ -1,0 +1,207 @@
+"""Another package adds an effect and a load by entry points alone; what cannot be used is refused by name."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from smajax.core.plugins import EFFECTS, PluginError, brought
+from smajax.model.effects.library import _OWN, _wrong
+
+PACKAGE = """
+from typing import ClassVar
+
+from smajax import AbstractEffect, parameter
+from smajax.model.load.dead_weight import DeadWeight
+
+
+class Still(AbstractEffect):
+    title: ClassVar[str] = "breeze"
+    equation: ClassVar[str] = "heat"
+    formula: ClassVar[str] = "P' = k (T - T_inf)"
+    sentence: ClassVar[str] = "Moving air takes more heat away."
+    switches: ClassVar[tuple[str, ...]] = ("strength",)
+    starts: ClassVar[dict[str, float]] = {"strength": 0.1}
+    strength: object = parameter("W/(m K)", 0.0, 10.0, "k", default=0.0)
+
+    @classmethod
+    def base(cls):
+        return cls()
+
+
+class Breeze(Still):
+    effect_name: ClassVar[str] = "breeze"
+
+    def heat_loss(self, wire, temperature, ambient):
+        return self.strength * (temperature - ambient)
+
+
+def bucket():
+    return DeadWeight(load_mass=1.0, damping=20.0)
+
+
+def heap():
+    return 3.0
+
+
+class Gale(Breeze):
+    effect_name: ClassVar[str] = "gale"
+
+    def heat_loss(self, wire, temperature, ambient):
+        return self.strength * (temperature - ambient) + 1.0
+
+
+class Misspelt(Still):
+    effect_name: ClassVar[str] = "misspelt"
+
+    def heat_los(self, wire, temperature, ambient):
+        return self.strength * (temperature - ambient)
+
+
+class Switched(Breeze):
+    effect_name: ClassVar[str] = "switched"
+    switches: ClassVar[tuple[str, ...]] = ("strenght",)
+
+
+class Started(Breeze):
+    effect_name: ClassVar[str] = "started"
+    starts: ClassVar[dict[str, float]] = {"x": 0.1}
+
+
+nothing = 3
+"""
+LOOK = """
+import json
+from smajax.control.compose import compose
+from smajax.simulation.compiled import simulate_compiled
+import jax.numpy as jnp
+from smajax.model.effects.library import LIBRARY
+from smajax.core.plugins import versions
+ends = []
+for strength in ("0 W/m/K", "0.1 W/m/K"):
+    system = compose("flexinol_table_3_2", "bucket", "voltage", values={"breeze.strength": strength})
+    ends.append(float(simulate_compiled(system, {"voltage": jnp.full(101, 3.0)}, 0.01).temperature[-1]))
+print(json.dumps([list(LIBRARY)[-1], float(system.load.load_mass), ends, versions()]))
+"""
+
+
+def _installed(folder: Path, points: str) -> dict[str, str]:
+    """A package as an installer leaves it, and the environment in which it is found."""
+    (folder / "airflow.py").write_text(PACKAGE)
+    info = folder / "airflow-1.2.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: airflow\nVersion: 1.2\n")
+    (info / "entry_points.txt").write_text(points)
+    return _with(folder)
+
+
+def _with(folder: Path) -> dict[str, str]:
+    return {**os.environ, "PYTHONPATH": os.pathsep.join([str(folder), os.environ.get("PYTHONPATH", "")])}
+
+
+def _asked(code: str, environment: dict[str, str], cwd: Path) -> subprocess.CompletedProcess[str]:
+    here = str(Path(__file__).parents[2])
+    path = os.pathsep.join([here, environment["PYTHONPATH"]])
+    return subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        cwd=cwd,
+        env={**environment, "PYTHONPATH": path},
+        check=False,
+    )
+
+
+def test_an_effect_and_a_load_of_another_package(tmp_path: Path) -> None:
+    points = "[smajax.model.effects]\nbreeze = airflow:Breeze\n[smajax.loads]\nbucket = airflow:bucket\n"
+    told = _asked(LOOK, _installed(tmp_path, points), tmp_path)
+    assert told.returncode == 0, told.stderr
+    last, mass, (still, moving), versions = json.loads(told.stdout)
+    assert (last, mass) == ("breeze", 1.0)
+    assert moving < still - 1.0
+    assert versions == ["smajax.model.effects breeze airflow 1.2", "smajax.loads bucket airflow 1.2"]
+
+
+@pytest.mark.parametrize(
+    ("point", "told"),
+    [
+        ("latent_heat = airflow:Breeze", "of airflow 1.2 in the group 'smajax.effects' has a name that is taken"),
+        ("draft = airflow:Breeze", "calls itself 'breeze'"),
+        ("breeze = airflow:nothing", "expected a class of `smajax.AbstractEffect`"),
+        ("breeze = airflow:missing", "cannot be loaded"),
+        ("misspelt = airflow:Misspelt", "changes no equation: it has none of the methods stored_heat"),
+        ("switched = airflow:Switched", "has switches that are none of its parameters: strenght; these are strength"),
+        ("started = airflow:Started", "has starts that are none of its parameters: x; these are strength"),
+    ],
+)
+def test_what_cannot_be_used_is_refused_by_name(
+    point: str, told: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _installed(tmp_path, f"[smajax.model.effects]\n{point}\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(PluginError, match=re.escape(told)):
+        brought(EFFECTS, _OWN, _wrong)
+
+
+@pytest.mark.parametrize(
+    ("points", "told"),
+    [
+        (
+            "[smajax.model.effects]\ngale = airflow:Gale\n",
+            "the effect 'gale', which must change nothing at its base value",
+        ),
+        ("[smajax.model.effects]\ndraft = airflow:Breeze\n", "calls itself 'breeze'"),
+        ("[smajax.model.effects]\nbreeze = nowhere:Breeze\n", "cannot be loaded (ModuleNotFoundError"),
+        ("[smajax.loads]\nbucket = nowhere:bucket\n", "cannot be loaded (ModuleNotFoundError"),
+        ("[smajax.loads]\nweight = airflow:DeadWeight\n", "is the class DeadWeight, which cannot be called without"),
+        ("[smajax.loads]\nheap = airflow:heap\n", "returns 3.0; expected a function without arguments"),
+    ],
+)
+def test_the_doctor_says_what_is_wrong_with_a_plug_in_and_blames_nothing_else(
+    points: str, told: str, tmp_path: Path
+) -> None:
+    code = "import sys; sys.argv = ['smajax', 'doctor']; from smajax.cli.main import main; main()"
+    ended = _asked(code, _installed(tmp_path, points), tmp_path)
+    assert ended.returncode == 3, ended.stderr
+    assert told in ended.stdout
+    assert "several times slower" not in ended.stdout
+    assert "1 remark." in ended.stdout
+
+
+def test_the_loop_refuses_an_effect_that_is_not_neutral_and_says_by_how_much(tmp_path: Path) -> None:
+    demo = Path(__file__).parents[2] / "smajax" / "data" / "demo" / "latent" / "experiment.toml"
+    code = f"import sys; sys.argv = ['smajax', 'close-loop', {str(demo)!r}]; from smajax.cli.main import main; main()"
+    ended = _asked(code, _installed(tmp_path, "[smajax.model.effects]\ngale = airflow:Gale\n"), tmp_path)
+    assert ended.returncode == 2, ended.stderr
+    assert re.search(r"changes the position by up to [0-9.]+ mm, the temperature by up to [0-9.]+ °C", ended.stderr)
+    assert "Traceback" not in ended.stderr
+    neutral = "from smajax.core.runtime import prepare; prepare(); from smajax.attribution.neutral import check_neutral; check_neutral()"
+    (tmp_path / "airflow-1.2.dist-info" / "entry_points.txt").write_text(
+        "[smajax.model.effects]\nbreeze = airflow:Breeze\n"
+    )
+    ended = _asked(neutral, _with(tmp_path), tmp_path)
+    assert ended.returncode == 0, ended.stderr
+
+
+def test_a_load_that_is_no_preset_is_refused_without_a_traceback(tmp_path: Path) -> None:
+    environment = _installed(tmp_path, "[smajax.loads]\nweight = airflow:DeadWeight\n")
+    code = "import sys; sys.argv = ['smajax', 'simulate', 'flexinol_table_3_2', 'weight', 'voltage', '--step', '3V:1s']; from smajax.cli.main import main; main()"
+    ended = _asked(code, environment, tmp_path)
+    assert ended.returncode == 2, ended.stderr
+    assert "cannot be called without arguments" in ended.stderr
+    assert "Traceback" not in ended.stderr
+
+
+def test_the_command_line_says_it_without_a_traceback(tmp_path: Path) -> None:
+    environment = _installed(tmp_path, "[smajax.model.effects]\nlatent_heat = airflow:Breeze\n")
+    code = "import sys; sys.argv = ['smajax', 'effects']; from smajax.cli.main import main; main()"
+    ended = _asked(code, environment, tmp_path)
+    assert ended.returncode == 2, ended.stderr
+    assert "a name that is taken: rename it there, or uninstall" in " ".join(ended.stderr.split())
+    assert "Traceback" not in ended.stderr

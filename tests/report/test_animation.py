@@ -1,0 +1,99 @@
+"""A run as a moving picture: drawn, moving, and true to the phase diagram."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from PIL import Image
+
+from smajax.model.presets import build
+from smajax.model.types import Trajectory
+from smajax.model.wire.kinetics import heating_temperature
+from smajax.report.animation import animate, animate_run, moving, ranges
+from smajax.simulation.compiled import simulate_compiled
+
+ARM = build("niti_table_3_1", "arm", "amplified_voltage")
+PULSE = {"voltage": jnp.where(jnp.arange(801) < 400, 8.0, 0.0)}  # V, 10 ms apart
+
+
+@pytest.fixture(scope="module")
+def up_and_down() -> Trajectory:
+    return simulate_compiled(ARM, PULSE, 0.01)
+
+
+def frames(path: Path) -> list[np.ndarray]:
+    """The pictures of a GIF, (height, width, 3) each."""
+    with Image.open(path) as file:
+        found = []
+        for number in range(getattr(file, "n_frames", 1)):
+            file.seek(number)
+            found.append(np.asarray(file.convert("RGB"), dtype=float))
+    return found
+
+
+def test_an_arm_moves_beside_its_phase_diagram(up_and_down: Trajectory, tmp_path: Path) -> None:
+    path = animate(ARM, up_and_down, tmp_path / "arm.gif", frames=12)
+    assert [file.name for file in tmp_path.iterdir()] == ["arm.gif"]
+    pictures = frames(path)
+    assert len(pictures) == 12
+    half = pictures[0].shape[1] // 2
+    for picture in pictures:
+        assert picture[:, :half].std() > 5.0
+        assert picture[:, half:].std() > 5.0
+    # Up and down again: in the middle the arm is elsewhere, at the end nearly where it was.
+    changed = [np.abs(picture[:, :half] - pictures[0][:, :half]).mean() for picture in pictures]
+    assert max(changed) > 2.0 * changed[-1]
+    # The path only grows.
+    drawn = [float((picture[:, half:].sum(axis=2) < 200.0).sum()) for picture in pictures]
+    assert drawn[-1] > 1.2 * drawn[0]
+
+
+def test_upright_it_fits_a_telephone_and_says_how_far_it_is(up_and_down: Trajectory, tmp_path: Path) -> None:
+    said: list[tuple[str, float]] = []
+    path = tmp_path / "upright.gif"
+    path.write_bytes(
+        moving(ARM, up_and_down, frames=5, upright=True, progress=lambda what, share: said.append((what, share)))
+    )
+    pictures = frames(path)
+    height, width = pictures[0].shape[:2]
+    assert width < 360
+    assert height > 1.5 * width
+    for half in (slice(None, height // 2), slice(height // 2, None)):
+        assert pictures[0][half].std() > 5.0
+        assert np.abs(pictures[2][half] - pictures[0][half]).mean() > 0.5
+    assert {what for what, _ in said} == {"drawing the load moving, for telephones"}
+    shares = [share for _, share in said]
+    assert shares == sorted(shares)
+    assert shares[-1] == 1.0
+
+
+def test_a_weight_is_drawn_from_its_inputs(tmp_path: Path) -> None:
+    system = build("flexinol_table_3_2", "dead_weight", "flexinol_voltage")
+    path = animate_run(system, {"voltage": jnp.full(401, 5.5)}, tmp_path / "weight.gif", 0.02, frames=4)
+    pictures = frames(path)
+    assert len(pictures) == 4
+    assert np.abs(pictures[-1] - pictures[0]).max() > 50.0
+
+
+def test_the_ranges_are_where_the_kinetics_has_them() -> None:
+    law = ARM.wire.kinetics
+    stress = np.asarray([0.0, 75e6, 200e6])
+    found = ranges(law, stress)
+    for at, pulled in enumerate(jnp.asarray(stress)):
+        assert heating_temperature(law, found["A_f'"][at], pulled) == pytest.approx(float(law.austenite_finish))
+        assert found["M_s'"][at] == pytest.approx(float(law.martensite_start) + pulled / 10.3e6)
+
+
+def test_what_cannot_be_drawn_is_told(up_and_down: Trajectory, tmp_path: Path) -> None:
+    coupon = build("niti_table_3_1", "coupon", "none")
+    with pytest.raises(ValueError, match="Coupon moves nothing"):
+        animate(coupon, up_and_down, tmp_path / "a.gif")
+    with pytest.raises(ValueError, match=r"ends in .gif; got `a.mp4`"):
+        animate(ARM, up_and_down, tmp_path / "a.mp4")
+    with pytest.raises(ValueError, match="90 frames of 1 samples"):
+        animate(ARM, jax.tree.map(lambda series: series[:1], up_and_down), tmp_path / "a.gif")
+    assert list(tmp_path.iterdir()) == []

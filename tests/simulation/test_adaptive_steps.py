@@ -1,0 +1,134 @@
+"""Steps as long as the error allows: as accurate as asked, fewer, and the same run whatever the samples."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from smajax.core.parameters import set_parameters
+from smajax.engine import program
+from smajax.model.system import initial_state
+from smajax.model.types import Inputs, Scalar, State
+from smajax.simulation.adaptive_steps import advance
+from smajax.simulation.batch.axes import zipped
+from smajax.simulation.batch.run_batch import run_batch
+from smajax.simulation.measures import Last
+from smajax.simulation.step import step, step_and_error
+from studies.source.rigs import arm
+
+SECONDS = 4.0
+VOLTAGE = np.linspace(5.5, 8.5, 12)  # the fast ones throw the arm past the slack wire
+LIGHT = set_parameters(arm(), {"payload_mass": 0.9 * 0.0572})  # none of them meets the upper stop
+
+
+def _positions(dt: float, tolerance: float | None, every: int) -> tuple[np.ndarray, np.ndarray]:
+    keep = ("position", "martensite_fraction")
+    axes = zipped(voltage=VOLTAGE)
+    found = run_batch(LIGHT, {}, axes, seconds=SECONDS, dt=dt, every=every, keep=keep, tolerance=tolerance)
+    return np.degrees(found["position"].to_numpy()), found["martensite_fraction"].to_numpy()
+
+
+@pytest.fixture(scope="module")
+def exact() -> tuple[np.ndarray, np.ndarray]:
+    """By fixed steps so short that they are ten times as accurate as what is compared."""
+    return _positions(0.00025, None, 200)
+
+
+@pytest.mark.parametrize(("tolerance", "angle", "fraction"), [(1e-3, 0.2, 4e-4), (1e-4, 0.03, 1e-4)])
+def test_a_tolerance_bounds_the_error(exact, tolerance, angle, fraction):
+    position, xi = _positions(0.05, tolerance, 1)
+    assert np.abs(position - exact[0]).max() < angle
+    assert np.abs(xi - exact[1]).max() < fraction
+
+
+def test_fewer_steps_than_fixed_ones_of_the_same_accuracy():
+    """Steps of 5 ms are 0.04 degrees off; these are more accurate, with less than a third of the stages."""
+
+    def counted(model, own):
+        inputs = {"voltage": own["voltage"]}
+        start = initial_state(model, inputs)
+
+        def one(carry, _):
+            state, tried, taken = carry
+            state, tried, more = advance(model, state, inputs, jnp.asarray(0.05), tried, jnp.asarray(1e-4))
+            return (state, tried, taken + more), None
+
+        (_, _, taken), _ = jax.lax.scan(one, (start, jnp.asarray(0.05), jnp.zeros((), int)), None, 80)
+        return {"taken": taken}
+
+    taken = program(counted, LIGHT, ("voltage",), engine="native")(LIGHT, {"voltage": VOLTAGE}, 1)["taken"]
+    assert 3 * taken.mean() < 2 * SECONDS / 0.005 / 3
+
+
+def _walked(scheme: Callable[..., State], begin: State, inputs: Inputs, dt: Scalar, seconds: Scalar | float) -> State:
+    """`seconds` after `begin` by equal steps of `dt`."""
+
+    def body(at: tuple[State, Scalar]) -> tuple[State, Scalar]:
+        return scheme(at[0], inputs, dt), at[1] + dt
+
+    return jax.lax.while_loop(lambda at: at[1] < seconds - 0.5 * dt, body, (begin, jnp.zeros_like(dt)))[0]
+
+
+def _order_three(state: State, inputs: Inputs, dt: Scalar) -> State:
+    return step_and_error(LIGHT, state, inputs, dt)[0]
+
+
+def _order_two(state: State, inputs: Inputs, dt: Scalar) -> State:
+    return step(LIGHT, state, inputs, dt)
+
+
+def test_the_scheme_is_of_order_three_where_nothing_bends():
+    """An arm under a wire that is heated, before it transforms: error against step."""
+
+    def run(model, own):
+        inputs = {"voltage": jnp.asarray(6.0)}
+        return _walked(_order_three, initial_state(LIGHT, inputs), inputs, own["dt"], 0.2).wire.temperature
+
+    steps = 0.2 / np.array([10.0, 20.0, 40.0, 2000.0])
+    *coarse, best = program(run, None, ("dt",), engine="native")(None, {"dt": steps}, 1)
+    errors = np.abs(np.array(coarse) - best)
+    assert errors[0] / errors[1] > 6.0
+    assert errors[1] / errors[2] > 6.0
+
+
+def test_the_estimate_is_of_the_size_of_the_error():
+    """Over 40 ms of an arm on its way, at several moments."""
+
+    def run(model, own):
+        inputs = {"voltage": jnp.asarray(7.0)}
+        here = _walked(_order_two, initial_state(LIGHT, inputs), inputs, jnp.asarray(0.005), own["at"])
+        one, error = step_and_error(LIGHT, here, inputs, jnp.asarray(0.04))
+        best = _walked(_order_two, here, inputs, jnp.asarray(0.0001), 0.04)
+        return one.motion.position - best.motion.position, error[1]
+
+    off, error = program(run, None, ("at",), engine="native")(None, {"at": np.linspace(1.0, 2.5, 16)}, 1)
+    assert (np.abs(off) < 1.5 * np.abs(error)).all()
+    assert np.abs(error).max() > 0.0
+
+
+def test_time_ends_where_it_was_asked_to_and_measures_are_kept():
+    found = run_batch(
+        arm(), {}, zipped(voltage=[6.0, 8.0]), seconds=1.0, dt=0.1, measures=(Last("position"),), tolerance=1e-3
+    )
+    np.testing.assert_allclose(found["time"], np.arange(11) * 0.1)
+    np.testing.assert_array_equal(found["last_position"], found["position"][:, -1])
+    assert found.attrs["tolerance"] == "0.001"
+
+
+def test_a_series_of_inputs_is_met_at_every_sample():
+    """A voltage that is off every second tenth of a second."""
+    series = np.where(np.arange(41) % 2 == 0, 7.0, 0.0)
+    ours = run_batch(arm(), {"voltage": jnp.asarray(series)}, zipped(payload_mass=[0.06]), dt=0.1, tolerance=1e-5)
+    fine = np.append(np.repeat(series[:-1], 50), series[-1])
+    exact = run_batch(arm(), {"voltage": jnp.asarray(fine)}, zipped(payload_mass=[0.06]), dt=0.002, every=50)
+    np.testing.assert_allclose(ours["temperature"], exact["temperature"], atol=2e-3)
+
+
+@pytest.mark.parametrize("tolerance", [0.0, -1e-4])
+def test_no_tolerance_at_all_is_refused(tolerance):
+    with pytest.raises(ValueError, match="1e-4"):
+        run_batch(arm(), {}, zipped(voltage=[6.0]), seconds=1.0, tolerance=tolerance)

@@ -1,0 +1,105 @@
+"""One run as machine code is the run that XLA compiles, for every load, law and effect."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from smajax.core.parameters import get_parameters, parameters, set_parameters, set_vector
+from smajax.engine import program
+from smajax.model.effects.library import LIBRARY
+from smajax.model.extended import extended
+from smajax.model.presets import build
+from smajax.model.system import System
+from smajax.model.wire.laws import LAWS, under_law
+from smajax.simulation.compiled import simulate_compiled
+from smajax.simulation.simulate import simulate
+
+SAMPLES, DT = 241, 0.025
+RIGS = {
+    "arm": (build("niti_table_3_1", "arm", "amplified_voltage"), "voltage", 8.0),
+    "dead_weight": (build("flexinol_table_3_2", "dead_weight", "voltage"), "voltage", 12.0),
+    "bias_spring": (build("flexinol_ht_500um", "bias_spring", "duty"), "duty", 0.3),
+}
+
+
+def _inputs(channel: str, top: float) -> dict[str, jax.Array]:
+    """On, off and on again, so that it turns around on the way."""
+    return {channel: jnp.where((jnp.arange(SAMPLES) // 80) % 2 == 0, top, 0.0)}
+
+
+def _same(system: System, inputs: dict[str, jax.Array]) -> None:
+    ours, theirs = simulate_compiled(system, inputs, DT), eqx.filter_jit(simulate)(system, inputs, DT)
+    assert float(np.ptp(theirs.martensite_fraction)) > 0.2
+    for name in (
+        "time",
+        "temperature",
+        "stress",
+        "strain",
+        "martensite_fraction",
+        "xi_M",
+        "xi_A",
+        "position",
+        "reading",
+    ):
+        one, other = np.asarray(getattr(ours, name)), np.asarray(getattr(theirs, name))
+        np.testing.assert_allclose(one, other, rtol=0.0, atol=1e-9 * float(np.abs(other).max()), err_msg=name)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_every_law_is_that_of_xla(law):
+    system, channel, top = RIGS["arm"]
+    _same(dataclasses.replace(system, wire=under_law(system.wire, law)), _inputs(channel, top))
+
+
+@pytest.mark.parametrize("rig", ["dead_weight", "bias_spring"])
+def test_every_effect_is_that_of_xla(rig):
+    """All of the library at once, each a little on."""
+    system, channel, top = RIGS[rig]
+    full = extended(system, tuple(LIBRARY))
+    table = parameters(full)
+    names = [name for name in table if "." in name]
+    values = get_parameters(full, names)
+    on = {name: 0.99 * float(value) + 0.01 * table[name].high for name, value in zip(names, values, strict=True)}
+    _same(set_parameters(full, on), _inputs(channel, top))
+
+
+def test_derivatives_along_any_direction_are_the_differences():
+    """Forward mode through the whole run, by machine code: every parameter of the arm at once."""
+    system, channel, top = RIGS["arm"]
+    names = tuple(parameters(system))
+    inputs = _inputs(channel, top)
+    at = np.asarray(get_parameters(system, names))
+    towards = at * np.random.default_rng(0).uniform(-1.0, 1.0, len(at))
+
+    def along(model, own):
+        def reading(share):
+            there = jnp.asarray(at) + share * jnp.asarray(towards)
+            return simulate(set_vector(model, names, there), inputs, DT).reading
+
+        return jax.jvp(reading, (own["share"],), (jnp.ones_like(own["share"]),))
+
+    run = program(along, system, ("share",), engine="native")
+    step = 1e-6
+    values, slopes = run(system, {"share": np.array([-step, 0.0, step])}, 1)
+    difference = (values[2] - values[0]) / (2.0 * step)
+    # Where a sample lies within a difference's reach of a kink, one of the two is on the other side.
+    close = np.abs(difference - slopes[1]) < 2e-4 * np.abs(difference).max()
+    assert close.mean() > 0.98
+
+
+def test_steps_of_its_own_are_told_apart_from_fixed_ones():
+    system, channel, _ = RIGS["arm"]
+    few, many = np.full(31, 7.0), np.full(301, 7.0)
+    own = simulate_compiled(system, {channel: jnp.asarray(few)}, 0.1, 1e-4)
+    fixed = simulate_compiled(system, {channel: jnp.asarray(many)}, 0.01)
+    assert 0.0 < np.abs(own.position - fixed.position[::10]).max() < np.radians(0.2)
+    with pytest.raises(ValueError, match="1e-4"):
+        simulate_compiled(system, {channel: jnp.asarray(few)}, 0.1, 0.0)
+    with pytest.raises(ValueError, match="voltage"):
+        simulate_compiled(system, {}, 0.1)

@@ -1,0 +1,175 @@
+"""Slopes of measures by parameters, backwards through machine code: the forward ones, those of differences, and kept as all else."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from smajax.core.parameters import get_parameters, parameters, set_parameters
+from smajax.core.units import convert
+from smajax.engine import program
+from smajax.model.effects.library import LIBRARY
+from smajax.model.extended import extended
+from smajax.model.presets import build
+from smajax.model.system import System
+from smajax.simulation.batch.axes import Axes, grid, sampled, zipped
+from smajax.simulation.batch.run_batch import recipe_of, run_batch
+from smajax.simulation.batch.single_run import Recipe, _run, slope_name
+from smajax.simulation.measures import AbstractMeasure, Last, Mean, MeanSquare, TimeAbove
+from tests.engine.test_engine import same_batch
+from tests.model.test_every_effect import RIGS, _rig
+
+ARM = build("niti_table_3_1", "arm", "amplified_voltage")
+TRACKED = MeanSquare("position", jnp.linspace(-0.7, 0.2, 101), 0.1)
+BY = ("voltage", "wire_diameter", "payload_mass", "austenite_start")
+SPREAD: dict[str, Any] = {"seconds": 2.0, "dt": 0.02, "keep": ()}
+
+
+def _along(asked: tuple[Recipe, dict[str, float]], own: dict[str, jax.Array]) -> dict[str, jax.Array]:
+    """The measures' derivatives along a direction, forwards."""
+    recipe, way = asked
+    at = {name: own[name] if name in own else get_parameters(recipe.system, [name])[0] for name in way}
+
+    def measured(at: dict[str, jax.Array]) -> dict[str, jax.Array]:
+        found = _run(recipe, own | at)
+        return {one.name: found[one.name] for one in recipe.measures}
+
+    return jax.jvp(measured, (at,), ({name: jnp.asarray(step) for name, step in way.items()},))[1]
+
+
+def _same_as_forward(
+    system: System,
+    inputs: dict[str, Any],
+    axes: Axes,
+    measures: tuple[AbstractMeasure, ...],
+    by: tuple[str, ...],
+    **more: Any,
+) -> None:
+    """Along a way that moves every parameter by about its own size, or a little of its room where it is zero."""
+    found = run_batch(system, inputs, axes, measures=measures, slopes=by, engine="native", keep=(), **more)
+    members, table = axes.members(0, axes.size), parameters(system)
+    sizes = {
+        name: abs(float(members[name][0] if name in members else get_parameters(system, [name])[0])) for name in by
+    }
+    sizes = {name: size or 1e-2 * (table[name].high - table[name].low) for name, size in sizes.items()}
+    rng = np.random.default_rng(1)
+    way = {name: size * rng.uniform(0.5, 1.0) * rng.choice([-1.0, 1.0]) for name, size in sizes.items()}
+    recipe = recipe_of(system, inputs, axes, measures=measures, slopes=by, keep=(), **more)
+    ahead = program(_along, (recipe, way), tuple(members), engine="native")((recipe, way), members, 1)
+    for one in measures:
+        parts = [found[slope_name(one.name, name)].to_numpy().ravel() * step for name, step in way.items()]
+        scale = np.abs(parts).sum(axis=0).max()
+        assert scale > 0.0
+        np.testing.assert_allclose(
+            np.sum(parts, axis=0), ahead[one.name], rtol=0.0, atol=1e-9 * scale, err_msg=one.name
+        )
+
+
+def test_backwards_it_is_what_it_is_forwards() -> None:
+    axes = sampled(13, voltage=(5.5, 8.5), payload_mass=(0.05, 0.09), seed=1)
+    _same_as_forward(ARM, {}, axes, (TRACKED, Mean("temperature")), BY, seconds=2.0, dt=0.02)
+
+
+def test_they_are_those_of_differences() -> None:
+    change = 1e-4
+    volts, mass = np.array([6.0, 7.0, 8.0]), np.array([0.05, 0.06, 0.07])
+    found = run_batch(ARM, {}, zipped(voltage=volts, payload_mass=mass), measures=(TRACKED,), slopes=BY, **SPREAD)
+
+    def moved(**by: np.ndarray) -> np.ndarray:
+        axes = zipped({"voltage": volts, "payload_mass": mass, **by})
+        return run_batch(ARM, {}, axes, measures=(TRACKED,), **SPREAD)[TRACKED.name].to_numpy()
+
+    at = {"voltage": volts, "payload_mass": mass}
+    for name in BY:
+        value = at[name] if name in at else np.full(3, float(get_parameters(ARM, [name])[0]))
+        step = change * np.abs(value)
+        difference = (moved(**{name: value + step}) - moved(**{name: value - step})) / (2.0 * step)
+        np.testing.assert_allclose(
+            found[slope_name(TRACKED.name, name)], difference, rtol=2e-3, atol=1e-3 * np.abs(difference).max()
+        )
+
+
+def test_they_have_the_unit_of_the_measure_over_that_of_the_parameter() -> None:
+    measures = (Last("position"), Last("velocity"), Mean("temperature"), TRACKED)
+    by = (*BY, "convection_coefficient", "start_fraction")
+    recipe = recipe_of(ARM, {}, grid(voltage=[6.0]), measures=measures, slopes=by, **SPREAD)
+    units = recipe.units()
+    assert units["last_position_by_voltage"] == "rad/V"
+    assert (units["last_velocity"], units["last_velocity_by_start_fraction"]) == ("rad/s", "rad/s")
+    assert units["mean_square_position_by_start_fraction"] == "-"
+    assert units["mean_temperature_by_austenite_start"] == "K/K"
+    assert units["mean_square_position_by_wire_diameter"] == "1/m"
+    # One that a program can read.
+    assert convert(1.0, units["mean_temperature_by_convection_coefficient"], "K m^2 K/mW") == pytest.approx(1e-3)
+
+
+def test_they_are_streamed_with_all_else_and_gone_on_with(tmp_path: Path) -> None:
+    axes = sampled(40, voltage=(5.5, 8.5), seed=2)
+    asked: dict[str, Any] = {"measures": (Last("position"),), "slopes": ("voltage", "damping"), **SPREAD}
+    here = run_batch(ARM, {}, axes, **asked)
+    for _ in range(2):
+        there = run_batch(ARM, {}, axes, out=tmp_path / "batch", **asked)
+        for name in here.data_vars:
+            np.testing.assert_array_equal(here[name], there[name])
+            assert here[name].attrs["units"] == there[name].attrs["units"]
+    with pytest.raises(ValueError, match="another batch"):
+        run_batch(ARM, {}, axes, out=tmp_path / "batch", **{**asked, "slopes": ("voltage",)})
+
+
+@pytest.mark.parametrize(
+    ("more", "told"),
+    [
+        ({"slopes": ("volts",)}, "inputs that `axes` vary .voltage."),
+        ({"slopes": ("damping", "damping")}, "twice"),
+        ({"slopes": ("damping",), "measures": ()}, "give `measures`"),
+        ({"slopes": ("damping",), "tolerance": 1e-4}, "leave `tolerance` out"),
+        (
+            {"slopes": ("damping",), "measures": (TimeAbove("position", 0.1),)},
+            "time_above_position moves by whole steps",
+        ),
+        ({"slopes": ("ambient_temperature",), "inputs": {"ambient_temperature": 25.0}}, "stands in for the parameter"),
+    ],
+)
+def test_what_has_no_slopes_is_told(more: dict[str, Any], told: str) -> None:
+    with pytest.raises(ValueError, match=told):
+        run_batch(ARM, axes=grid(voltage=[6.0]), **{"inputs": {}, "measures": (TRACKED,), **SPREAD, **more})
+
+
+def test_a_member_gone_wrong_spoils_no_other() -> None:
+    """A wire that melts has no slopes to trust; those beside it are as without it."""
+    asked: dict[str, Any] = {"measures": (Last("temperature"),), "slopes": ("voltage",), **SPREAD}
+    alone = run_batch(ARM, {}, zipped(voltage=[6.0, 7.0]), **asked)
+    beside = run_batch(ARM, {}, zipped(voltage=[6.0, 1e200, 7.0]), **asked)
+    assert beside["status"].values.tolist()[1] != 0
+    np.testing.assert_array_equal(beside["last_temperature_by_voltage"][[0, 2]], alone["last_temperature_by_voltage"])
+
+
+@pytest.mark.slow
+def test_they_are_those_of_xla() -> None:
+    axes = sampled(13, voltage=(5.5, 8.5), payload_mass=(0.05, 0.09), seed=1)
+    asked: dict[str, Any] = {"measures": (TRACKED, Mean("temperature")), "slopes": BY, **SPREAD}
+    same_batch(
+        run_batch(ARM, {}, axes, engine="native", **asked), run_batch(ARM, {}, axes, engine="xla", **asked), 1e-9
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "effect", [name for name in sorted(LIBRARY) if any(LIBRARY[name].applies(rig[0]) for rig in RIGS.values())]
+)
+def test_with_each_effect_backwards_is_what_it_is_forwards(effect: str) -> None:
+    system, channel, top = RIGS[_rig(effect)]
+    full = extended(system, (effect,))
+    table = parameters(full)
+    starts = {f"{effect}.{key}": value for key, value in LIBRARY[effect].starts.items()}
+    full = set_parameters(full, {name: value for name, value in starts.items() if name in table})
+    command = top * np.concatenate([np.ones(60), np.full(30, 0.6), np.zeros(30)])
+    middle = float(get_parameters(full, ["convection_coefficient"])[0])
+    axes = sampled(5, convection_coefficient=(0.7 * middle, 1.3 * middle), seed=3)
+    inputs = {channel: jnp.asarray(command)}
+    _same_as_forward(full, inputs, axes, (Mean("reading"), Mean("temperature")), tuple(table), dt=0.05)
