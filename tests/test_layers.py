@@ -1,0 +1,82 @@
+"""Rooms: imports point to the left only, no circle among modules, no thirteenth entry at the top; imports for types included."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from graphlib import CycleError, TopologicalSorter
+from pathlib import Path
+
+PACKAGE = Path(__file__).parents[1] / "smajax"
+ORDER = ["core", "engine", "model", "simulation", "data", "fit", "control", "attribution", "report", "cli"]
+
+# Known, and being taken out.
+ARROWS_UP = {("smajax.attribution.unknown_words", "smajax.report.unknown_pictures")}
+MODULES_IN_A_CIRCLE = {
+    "smajax.model.effects.base",
+    "smajax.model.load.base",
+    "smajax.model.sensor_reading",
+    "smajax.model.system",
+    "smajax.model.wire.constitutive",
+    "smajax.model.wire.heat",
+    "smajax.model.wire.history",
+    "smajax.model.wire.kinetics",
+    "smajax.model.wire.resistance",
+    "smajax.model.wire.two_populations",
+    "smajax.model.wire.wire",
+}
+
+FILES = {".".join(p.relative_to(PACKAGE.parent).with_suffix("").parts): p for p in PACKAGE.rglob("*.py")}
+MODULES = {name.removesuffix(".__init__"): path for name, path in FILES.items()}
+
+
+def imported(module: str) -> Iterator[str]:
+    """Modules of the package that `module` imports: anywhere in its file, so within `if TYPE_CHECKING` and functions too."""
+    package = module if MODULES[module].name == "__init__.py" else module.rpartition(".")[0]
+    for node in ast.walk(ast.parse(MODULES[module].read_text("utf-8"))):
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            levels = package.split(".")
+            above = ".".join(levels[: len(levels) - node.level + 1]) if node.level else ""
+            source = ".".join(part for part in (above, node.module) if part)
+            names = [f"{source}.{a.name}" if f"{source}.{a.name}" in MODULES else source for a in node.names]
+        else:
+            continue
+        yield from (name for name in names if name in MODULES and name != module)
+
+
+IMPORTS = {module: set(imported(module)) for module in MODULES}
+
+
+def place(module: str) -> float:
+    """Of a module's room in the order. The top of the package gathers the public names, for users and for the command line."""
+    name = module.split(".")[1] if "." in module else ""
+    return ORDER.index(name) if name in ORDER else ORDER.index("cli") - 0.5
+
+
+def test_imports_point_to_rooms_on_the_left():
+    rooms = {module for module in MODULES if module.split(".")[1:2] and module.split(".")[1] in ORDER}
+    up = {(module, other) for module in rooms for other in IMPORTS[module] if place(other) > place(module)}
+    assert not up - ARROWS_UP, f"the order is {' < '.join(ORDER)}"
+    assert not ARROWS_UP - up, "these are gone: take them off the list of known ones"
+
+
+def test_no_circle_among_modules():
+    graph = {m: {o for o in others if {m, o} - MODULES_IN_A_CIRCLE} for m, others in IMPORTS.items()}
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as circle:
+        raise AssertionError(" -> ".join(reversed(circle.args[1]))) from None
+    if MODULES_IN_A_CIRCLE:
+        try:
+            TopologicalSorter(IMPORTS).prepare()
+        except CycleError:
+            return
+        raise AssertionError("no circle is left: empty MODULES_IN_A_CIRCLE")
+
+
+def test_at_most_twelve_entries_at_the_top():
+    entries = {p.name for p in PACKAGE.iterdir() if not p.name.startswith(("__init__", "__pycache__", "."))}
+    assert len(entries) <= 12, sorted(entries)
+    assert set(ORDER) <= entries
