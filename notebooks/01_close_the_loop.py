@@ -39,7 +39,7 @@ for run in experiment.runs:
 if os.environ.get("SMAJAX_FAST"):
     experiment = dataclasses.replace(experiment, effects_only=("latent_heat", "sensor_lag"))
 out = Path(tempfile.mkdtemp())
-findings = close_loop(experiment, memory=out / "fits", progress=lambda what, share: None)
+findings = close_loop(experiment, memory=out / "fits", progress=lambda event: None)
 print(findings.verdict)
 print(*findings.summary, sep="\n")
 

@@ -24,7 +24,7 @@ from smajax.attribution.step_size_check import integration_error
 from smajax.attribution.unknown_term import Lacking, in_place_of, unknown_terms
 from smajax.attribution.unknown_words import told_of
 from smajax.attribution.verdict import cannot_know, shown, summary, unexplained, verdict
-from smajax.core.progress import Progress, quiet, say_checked
+from smajax.core.progress import Progress, Stage, as_progress, quiet, report_checks
 from smajax.core.provenance import made_with
 from smajax.core.result_cache import Kept
 from smajax.data.experiment.record import Experiment
@@ -58,9 +58,10 @@ def close_loop(
     refuse_what_only_identify_does(experiment)
     check_neutral()
     began = clock.monotonic()
+    progress = as_progress(progress)
     job = job_of(experiment)
     kept = Kept(memory)
-    progress("checking what these runs can tell", 0.0)
+    progress(Stage("checking what these runs can tell", 0.0))
     start = job.problem.start_values()
     setting = Search(
         job.problem,
@@ -77,8 +78,8 @@ def close_loop(
     at_start = sensitivity(job.problem, start, job.unknowns)
     can_tell = identifiability(at_start, job.unknowns, job.bounds)
     check = [*experiment.warnings, *can_tell]
-    progress("checking what these runs can tell", 1.0)
-    say_checked(progress, experiment.warnings, can_tell)
+    progress(Stage("checking what these runs can tell", 1.0))
+    report_checks(progress, experiment.warnings, can_tell)
 
     first, final = search(setting, setting.base(start, seed))
     lacking: Lacking | None = None
@@ -105,7 +106,7 @@ def close_loop(
 
     final, compared, refused = borne_out(job, setting, first, final)
 
-    progress("standard errors and pictures", 0.0)
+    progress(Stage("standard errors and pictures", 0.0))
     before = parameters_found(job, setting, first, start)
     after = parameters_found(job, setting, final, start) if final.effects else before
     intervals = bootstrapped(setting, final, seed)
@@ -113,7 +114,7 @@ def close_loop(
     mistaken = rivals(setting, final, job.fit_runs)
     runs, portrait_before, portrait_after = compared
     integration = integration_error(job, final)
-    progress("standard errors and pictures", 1.0)
+    progress(Stage("standard errors and pictures", 1.0))
     answer = verdict(final.effects, portrait_after)
     if lacking is None:
         more = answer in ("partly explained", "not in the library") and not any(one.noise for one in lone)

@@ -21,7 +21,7 @@ from smajax.attribution.findings import Round
 from smajax.attribution.residual_diagnostics import all_noise
 from smajax.attribution.run_extent import extent_of
 from smajax.attribution.score_test import Score, scaled, switches
-from smajax.core.progress import Progress, quiet
+from smajax.core.progress import Message, Progress, quiet
 from smajax.core.result_cache import Kept
 from smajax.core.whiteness import correlation_time, split_runs
 from smajax.fit.levenberg_marquardt import MOST_STEPS, Fit, fit_in_box
@@ -107,7 +107,7 @@ class Search:
         """Keep a round and say what came of it."""
         self.rounds.append(done)
         told = f"round {done.number}: {done.chosen or 'nothing added'}; {done.why}"
-        self.progress(f"say: {told}", 1.0)
+        self.progress(Message(f"{told}"))
 
     def set_aside(self, model: Model, why: str, effects: Sequence[str] = ()) -> None:
         """Note a round in which `effects` go, or all that was added."""

@@ -23,6 +23,7 @@ from smajax.attribution.unknown.ranges import Sought, sought
 from smajax.attribution.unknown.spline import COUNT, design
 from smajax.attribution.unknown.terms import UNKNOWN, AbstractUnknown
 from smajax.core.parameters import parameters
+from smajax.core.progress import Stage
 from smajax.core.whiteness import correlation_time, split_runs
 from smajax.data.experiment.record import Prior
 from smajax.fit.predicted import misfits
@@ -111,10 +112,10 @@ def unknown_terms(setting: Search, final: Model) -> Lacking:
     search, values, found = with_terms(setting, final)
     if not search.candidates:
         return Lacking()
-    search.progress("looking for the equation that lacks something", 0.0)
+    search.progress(Stage("looking for the equation that lacks something", 0.0))
     scores = screened(search, values)
     chosen = _best_of_each(scores, REFITTED)
-    search.progress("looking for the equation that lacks something", 1.0)
+    search.progress(Stage("looking for the equation that lacks something", 1.0))
     if not chosen:
         return Lacking()
     base = Fitted((), search.known(dataclasses.replace(final, values=values)))

@@ -16,7 +16,7 @@ import numpy as np
 from smajax.cli import explicit_arm
 from smajax.core.machine import machine
 from smajax.core.parameters import parameter_values
-from smajax.core.progress import Progress, quiet
+from smajax.core.progress import Progress, Stage, quiet
 from smajax.engine import available_cores
 from smajax.simulation.batch.axes import sampled, zipped
 from smajax.simulation.batch.run_batch import run_batch
@@ -59,16 +59,16 @@ def bench(count: int = 8192, peers: int = 16, progress: Progress = quiet) -> dic
         return time.perf_counter() - begin
 
     first = once()
-    progress("smajax", 0.4)
+    progress(Stage("smajax", 0.4))
     best = min(once() for _ in range(REPEATS))
-    progress("smajax", 1.0)
+    progress(Stage("smajax", 1.0))
     box = axes.members(0, peers)
     own = run_batch(system, {}, zipped(box), keep=("position",), **asked)["position"].to_numpy()
     times = np.arange(own.shape[-1]) * SAMPLE
     others, began = [], time.perf_counter()
     for number in range(peers):
         others.append(_lsoda(p, float(box["voltage"][number]), float(box["payload_mass"][number]), times))
-        progress("scipy", (number + 1) / peers)
+        progress(Stage("scipy", (number + 1) / peers))
     each = (time.perf_counter() - began) / peers
     apart = float(np.abs(np.degrees(own) - np.asarray(others)).max())
     return {

@@ -9,75 +9,73 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, ProgressColumn, Task, TaskID, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, ProgressColumn, Task, TaskID, TextColumn, TimeElapsedColumn
+from rich.progress import Progress as Bars
 from rich.text import Text
 
-from smajax.core.compiling import TOLD, compilations_told
-from smajax.core.progress import Progress as Report
+from smajax.core.compiling import compilations_reported
+from smajax.core.progress import Compiling, Event, Message, Progress, Stage, WarningMessage
 
-# Where stderr is no terminal nothing is said, so that a program that calls us has a clean one; with `lines` a log of a
+# Where stderr is no terminal nothing is written, so that a program that calls us has a clean one; with `lines` a log of a
 # build has a line for each stage. A person who waits there for minutes is told so, unless the variable is set.
 VARIABLE = "SMAJAX_PROGRESS"
 HOW = f"No terminal here, so progress is not drawn; {VARIABLE}=lines writes a line for each stage, and {VARIABLE}=none leaves this one out."
+COMPILING = "compiling, the first time only"
 
 
 @contextmanager
-def shown(console: Console, told_how: bool = False) -> Iterator[Report]:
-    """Yields `report(what, share)`; share 1 closes the stage.
+def shown(console: Console, told_how: bool = False) -> Iterator[Progress]:
+    """Yields `progress(event)`, see `smajax.core.progress`; a warning is written wherever stderr goes.
 
-    What begins with "say: " is a sentence, not a stage; what begins with "warn: " is said wherever stderr goes.
     told_how: where nothing is drawn, say once how to get progress; for long work whose result is words for a person.
     """
     if sys.stderr.isatty():
-        with _bars(console) as report:
-            yield report
+        with _bars(console) as progress:
+            yield progress
     elif os.environ.get(VARIABLE) == "lines":
-        with _lines(console) as report:
-            yield report
+        with _lines(console) as progress:
+            yield progress
     else:
         if told_how and VARIABLE not in os.environ:
             console.print(HOW, markup=False, highlight=False, soft_wrap=True)
         yield _warnings(console)
 
 
-def _sentence(what: str) -> str:
-    """What is told and is no stage; empty for a stage."""
-    kind, _, told = what.partition(": ")
-    return told if kind in ("say", "warn") else ""
+def _warnings(console: Console) -> Progress:
+    def show(event: Event) -> None:
+        if isinstance(event, WarningMessage):
+            console.print(f"warning: {event.text}", markup=False, highlight=False, soft_wrap=True)
 
-
-def _warnings(console: Console) -> Report:
-    def warned(what: str, share: float) -> None:
-        if what.startswith("warn: "):
-            console.print(f"warning: {_sentence(what)}", markup=False, highlight=False, soft_wrap=True)
-
-    return warned
+    return show
 
 
 @contextmanager
-def _lines(console: Console) -> Iterator[Report]:
+def _lines(console: Console) -> Iterator[Progress]:
     began, last, compiled = clock.monotonic(), "", "none"
 
-    def said(told: str) -> None:
-        console.print(f"[{clock.monotonic() - began:6.1f} s] {told}", markup=False, highlight=False, soft_wrap=True)
+    def write(text: str) -> None:
+        console.print(f"[{clock.monotonic() - began:6.1f} s] {text}", markup=False, highlight=False, soft_wrap=True)
 
-    def line(what: str, share: float) -> None:
-        nonlocal last
-        if _sentence(what) or (what != last and share < 1.0):
-            said(_sentence(what) or what)
-            last = what
+    def show(event: Event) -> None:
+        nonlocal last, compiled
+        match event:
+            case Message(text) | WarningMessage(text):
+                write(text)
+                last = text
+            case Stage(name, share):
+                if name != last and share < 1.0:
+                    write(name)
+                    last = name
+            case Compiling(active):
+                if active and compiled != last:  # once a stage
+                    write(COMPILING)
+                    compiled = last
 
-    def compiles(now: bool) -> None:
-        nonlocal compiled
-        if now and compiled != last:  # once a stage
-            said(TOLD)
-            compiled = last
-
-    with compilations_told(compiles):
-        yield line
+    with compilations_reported(show):
+        yield show
 
 
-class _Left(ProgressColumn):
+class _TimeLeft(ProgressColumn):
     """Time left at the pace of the whole stage: steps of a minute each have no pace within the last seconds.
 
     While a program is compiled, that it is.
@@ -88,7 +86,7 @@ class _Left(ProgressColumn):
     def render(self, task: Task) -> Text:
         """Counts down between two shares; nothing is promised before the first."""
         if self.compiling and not task.finished:
-            return Text(TOLD)
+            return Text(COMPILING)
         share, now, at = task.completed, task.elapsed or 0.0, float(task.fields["at"])
         if task.finished or not 0.0 < share < 1.0:
             return Text("")
@@ -97,25 +95,28 @@ class _Left(ProgressColumn):
 
 
 @contextmanager
-def _bars(console: Console) -> Iterator[Report]:
-    left = _Left()
-
-    def compiles(now: bool) -> None:
-        left.compiling = now
-
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), left)
-    with Progress(*columns, console=console) as bar, compilations_told(compiles):
+def _bars(console: Console) -> Iterator[Progress]:
+    time_left = _TimeLeft()
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), time_left)
+    with Bars(*columns, console=console) as bars:
         open_tasks: dict[str, TaskID] = {}
 
-        def move(what: str, share: float) -> None:
-            if told := _sentence(what):
-                bar.console.print(told, markup=False, highlight=False)
-                return
-            if what not in open_tasks:
-                open_tasks[what] = bar.add_task(what, total=1.0, at=0.0)
-            task = open_tasks[what]
-            bar.update(task, completed=share, at=next(one.elapsed or 0.0 for one in bar.tasks if one.id == task))
+        def move(name: str, share: float) -> None:
+            if name not in open_tasks:
+                open_tasks[name] = bars.add_task(name, total=1.0, at=0.0)
+            task = open_tasks[name]
+            bars.update(task, completed=share, at=next(one.elapsed or 0.0 for one in bars.tasks if one.id == task))
             if share >= 1.0:
-                open_tasks.pop(what)
+                open_tasks.pop(name)
 
-        yield move
+        def show(event: Event) -> None:
+            match event:
+                case Message(text) | WarningMessage(text):
+                    bars.console.print(text, markup=False, highlight=False)
+                case Stage(name, share):
+                    move(name, share)
+                case Compiling(active):
+                    time_left.compiling = active
+
+        with compilations_reported(show):
+            yield show

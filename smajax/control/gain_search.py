@@ -20,7 +20,7 @@ from smajax.control.estimators.base import AbstractEstimator
 from smajax.control.figures_of_merit import Merit, judged_loop
 from smajax.control.reference import clock, constant
 from smajax.core.parameters import set_vector
-from smajax.core.progress import Progress, quiet
+from smajax.core.progress import Progress, Stage, quiet
 from smajax.model.system import System
 from smajax.model.types import Scalar
 
@@ -109,7 +109,7 @@ def search_gains(
         middle, spread = elite.mean(axis=0), KEPT * spread + (1.0 - KEPT) * elite.std(axis=0)
         points = np.clip(middle + spread * draw.standard_normal(points.shape), low, high)
         points[0] = np.log(best[1])
-        progress("searching gains", (number + 1) / rounds)
+        progress(Stage("searching gains", (number + 1) / rounds))
     assert best is not None
     gains = {name: float(value) for name, value in zip(names, best[1], strict=True)}
     return Found(gains, best[0], best[2], candidates * rounds)

@@ -24,7 +24,7 @@ from smajax.control.mismatch import MISMATCHES
 from smajax.control.reference import Reference, clock, constant
 from smajax.core.names import instead
 from smajax.core.parameters import get_parameters, set_vector
-from smajax.core.progress import Progress, quiet
+from smajax.core.progress import Progress, Stage, quiet
 from smajax.model.system import System
 from smajax.model.types import Scalar, Series
 from smajax.simulation.batch.axes import zipped
@@ -172,7 +172,7 @@ def _run(
     found = []
     for number, answer in chunks(function, rig, axes, min(CHUNK, len(rows)), range(count)):
         found.append(answer)
-        progress("sweeping", (number + 1) / count)
+        progress(Stage("sweeping", (number + 1) / count))
     return jax.tree.map(lambda *leaves: np.concatenate(leaves), *found)
 
 

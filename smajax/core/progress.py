@@ -1,18 +1,98 @@
-"""How long work tells how far it is."""
+"""Progress of long work, as typed events: how far a stage is, a sentence, a warning, a compilation.
+
+Whoever does the work calls `progress(event)`; whoever shows it decides what becomes of each kind.
+"""
 
 from __future__ import annotations
 
+import inspect
+import warnings
 from collections.abc import Callable, Iterable
-
-Progress = Callable[[str, float], None]  # (what, share done 0..1)
-
-
-def quiet(what: str, share: float) -> None:
-    """Progress for nobody."""
+from dataclasses import dataclass
+from typing import Any, TypeAlias
 
 
-def say_checked(progress: Progress, warnings: Iterable[str], can_tell: Iterable[str]) -> None:
-    """What was found before a fit: what looks wrong, which is said wherever stderr goes, and what the runs can tell."""
-    for kind, lines in (("warn", warnings), ("say", can_tell)):
-        for line in lines:
-            progress(f"{kind}: check: {line}", 1.0)
+@dataclass(frozen=True)
+class Stage:
+    """A stage of the work, and which share of it is done, 0..1; a share of 1 ends the stage."""
+
+    name: str
+    share: float
+
+
+@dataclass(frozen=True)
+class Message:
+    """A sentence about the work; shown where progress is shown."""
+
+    text: str
+
+
+@dataclass(frozen=True)
+class WarningMessage:
+    """What looks wrong; shown even where progress is not."""
+
+    text: str
+
+
+@dataclass(frozen=True)
+class Compiling:
+    """A program has been compiling for some seconds, or (`active` false) has been compiled. May come from another thread."""
+
+    active: bool
+
+
+Event: TypeAlias = Stage | Message | WarningMessage | Compiling
+Progress: TypeAlias = Callable[[Event], None]
+
+
+def quiet(event: Event) -> None:
+    """Progress that is shown to no one."""
+
+
+def report_checks(progress: Progress, warned: Iterable[str], identifiable: Iterable[str]) -> None:
+    """What was found before a fit: what looks wrong, as warnings, and what the runs determine, as messages."""
+    for line in warned:
+        progress(WarningMessage(f"check: {line}"))
+    for line in identifiable:
+        progress(Message(f"check: {line}"))
+
+
+def as_progress(callback: Callable[..., Any]) -> Progress:
+    """`callback` as one that takes events; one of two arguments (text, share) is adapted, with a DeprecationWarning.
+
+    Public functions that take `progress` call this, until version 0.2: before, progress was `(what, share)`, with
+    "say: " or "warn: " before a sentence.
+    """
+    if callback is quiet or not _takes_two(callback):
+        return callback
+    warnings.warn(
+        "progress is called with one event (smajax.core.progress: Stage, Message, WarningMessage) now, and no longer "
+        "with (what, share); a callback of two arguments is not called from version 0.2 on",
+        DeprecationWarning,
+        stacklevel=3,
+    )
+
+    def adapted(event: Event) -> None:
+        match event:
+            case Stage(name, share):
+                callback(name, share)
+            case Message(text):
+                callback(f"say: {text}", 1.0)
+            case WarningMessage(text):
+                callback(f"warn: {text}", 1.0)
+
+    return adapted
+
+
+def _takes_two(callback: Callable[..., Any]) -> bool:
+    """Whether `callback` has to be called with two positional arguments."""
+    try:
+        signature = inspect.signature(callback)
+    except (TypeError, ValueError):  # a built-in function has none
+        return False
+    needed = [
+        one
+        for one in signature.parameters.values()
+        if one.kind in (one.POSITIONAL_ONLY, one.POSITIONAL_OR_KEYWORD) and one.default is one.empty
+    ]
+    return len(needed) == 2

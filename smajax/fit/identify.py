@@ -14,7 +14,7 @@ import numpy as np
 from scipy import stats
 
 from smajax.core.names import listed
-from smajax.core.progress import Progress, quiet, say_checked
+from smajax.core.progress import Progress, as_progress, quiet, report_checks
 from smajax.core.provenance import made_with
 from smajax.core.result_cache import Kept
 from smajax.core.whiteness import LAGS, WHITE, correlation_time, split_runs, whiteness_p_value
@@ -81,6 +81,7 @@ def identify(
     """
     if jnp.zeros(()).dtype != jnp.float64:
         raise ValueError("identify needs float64: call `jax.config.update('jax_enable_x64', True)` first.")
+    progress = as_progress(progress)
     fit_runs = [run for run in experiment.runs if run.role == "fit"]
     unknowns = free_by_name(experiment, fit_runs)
     names = tuple(unknowns)
@@ -105,7 +106,7 @@ def identify(
     every = identifiability(_of_fit_runs(at_start, experiment, problem), names, bounds)
     can_tell = [line for line in every if "move together" not in line]
     check = [*experiment.warnings, *can_tell]
-    say_checked(progress, experiment.warnings, can_tell)
+    report_checks(progress, experiment.warnings, can_tell)
     fits = from_many_starts(problem, names, bounds, seed, starts, progress, kept)
 
     def again(what: str) -> Callable[[Problem, np.ndarray], Fit]:

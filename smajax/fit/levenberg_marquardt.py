@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from smajax.core.progress import Progress, quiet
+from smajax.core.progress import Progress, Stage, quiet
 from smajax.core.result_cache import Kept
 from smajax.fit.predicted import in_parts, shown_and_slopes
 from smajax.fit.problem import Lane, Problem
@@ -198,7 +198,7 @@ def fit_in_box(
     for number in range(begun, most):
         kept.save(key, _packed(walks, number), last=False)
         going = [k for k in everyone if not walks[k].reason]
-        progress(what, max(1.0 - len(going) / max(len(lanes), 1), number / most))
+        progress(Stage(what, max(1.0 - len(going) / max(len(lanes), 1), number / most)))
         if not going:
             break
         steps = [_step(walks[k]) for k in going]
@@ -206,7 +206,7 @@ def fit_in_box(
         for k, step, answer in zip(going, steps, evaluated(going, tried), strict=True):
             _judged(walks[k], step, *answer, enough=enough)
     kept.save(key, _packed(walks, most))
-    progress(what, 1.0)
+    progress(Stage(what, 1.0))
     ended = []
     for lane, walk in zip(lanes, walks, strict=True):
         done = bool(walk.reason) and np.isfinite(walk.cost)

@@ -14,7 +14,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from smajax.core.progress import Progress, quiet
+from smajax.core.progress import Progress, Stage, quiet
 from smajax.core.result_cache import Kept
 from smajax.fit.problem import Problem
 
@@ -135,13 +135,13 @@ def posterior(
         places, accepted = known["places"], known["accepted"]
         here = places[-1]
     for block in range(len(places) // BLOCK, blocks):
-        progress("drawing from the posterior", block / blocks)
+        progress(Stage("drawing from the posterior", block / blocks))
         keys = jax.random.split(jax.random.fold_in(walk, block), (BLOCK, CHAINS))
         new, taken = _advance(problem, given, jnp.asarray(here), keys)
         here = np.asarray(new[-1])
         places, accepted = np.concatenate([places, new]), np.concatenate([accepted, taken])
         kept.save(key, {"places": places, "accepted": accepted}, last=block == blocks - 1)
-    progress("drawing from the posterior", 1.0)
+    progress(Stage("drawing from the posterior", 1.0))
     whole = np.swapaxes(places[-draws:], 0, 1)
     found = values[index] + whole @ factor.T
     half = draws // 2

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from scipy.stats import qmc
 
-from smajax.core.progress import Progress, quiet
+from smajax.core.progress import Progress, Stage, quiet
 from smajax.core.result_cache import Kept
 from smajax.fit.levenberg_marquardt import ENOUGH, Fit, fit_in_box
 from smajax.fit.predicted import squares
@@ -92,10 +92,10 @@ def from_many_starts(
     if tried and names:
         box = np.asarray([bounds[name] for name in names])
         drawn = box_points(start, [problem.names.index(name) for name in names], box, tried, seed)
-        progress(f"simulating at {tried} points of the box", 0.0)
+        progress(Stage(f"simulating at {tried} points of the box", 0.0))
         cost = _costs(problem, drawn, kept)
         points += list(drawn[np.argsort(cost)[: BEGUN - 1]])
-        progress(f"simulating at {tried} points of the box", 1.0)
+        progress(Stage(f"simulating at {tried} points of the box", 1.0))
 
     def lanes(values: Sequence[np.ndarray]) -> list[Lane]:
         return [problem.lane(names, bounds, one) for one in values]

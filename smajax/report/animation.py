@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from smajax.core.files import replace
-from smajax.core.progress import Progress, quiet
+from smajax.core.progress import Progress, Stage, quiet
 from smajax.model.load.arm import Arm
 from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.system import System
@@ -82,7 +82,7 @@ def moving(
             f"got {frames} frames of {samples} samples in {seconds:g} s: give at least 2 of each, and a time above 0."
         )
     stage = "drawing the load moving" + (", for telephones" if upright else "")
-    progress(stage, 0.0)
+    progress(Stage(stage, 0.0))
     shown = np.unique(np.linspace(0, samples - 1, frames).round().astype(int))
     figure = Figure(figsize=UPRIGHT if upright else SIZE, dpi=DPI, layout="constrained")
     canvas = FigureCanvasAgg(figure)
@@ -97,9 +97,9 @@ def moving(
             for artist in draw(int(sample)):
                 figure.draw_artist(artist)
         images.append(Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB").quantize(COLOURS))
-        progress(stage, 0.8 * (number + 1) / len(shown))
+        progress(Stage(stage, 0.8 * (number + 1) / len(shown)))
     film = _gif(images, round(1e3 * seconds / len(images)))
-    progress(stage, 1.0)
+    progress(Stage(stage, 1.0))
     return film
 
 

@@ -19,7 +19,7 @@ from smajax.control.single_run import Ran
 from smajax.core.display_units import axis_label, digits, display, label
 from smajax.core.files import as_netcdf, csv_text, heading, json_text, replace
 from smajax.core.parameters import parameter_values, parameters
-from smajax.core.progress import Progress, quiet
+from smajax.core.progress import Progress, Stage, quiet
 from smajax.model.load.base import AbstractMovingLoad
 from smajax.report.animation import moving
 from smajax.report.drawing import BLUE, GREY, RED, UPRIGHT, named, panels
@@ -323,14 +323,14 @@ def write_run(
     ran: Ran, folder: Path, title: str, command: str, animated: bool = False, progress: Progress = quiet
 ) -> Path:
     """All files of a run into `folder`, each in one step; the path of the page. animated: a film too (no coupon)."""
-    progress("pictures", 0.0)
+    progress(Stage("pictures", 0.0))
     image = drawn(ran.found)
     replace(folder / "simulate.csv", as_csv(ran.found))
     replace(folder / "simulate.nc", as_netcdf(ran.found))
     replace(folder / "simulate.json", json_text(record(ran, command)))
     replace(folder / "simulate.png", image)
     replace(folder / "simulate.svg", drawn(ran.found, "svg"))
-    progress("pictures", 1.0)
+    progress(Stage("pictures", 1.0))
     films = (
         [moving(ran.system, ran.found, upright=each, progress=progress) for each in (False, True)] if animated else []
     )

@@ -24,7 +24,7 @@ from smajax.control.sweep import Grid, closed_loops, lanes, positions, ratios
 from smajax.core.files import as_netcdf, replace, writing
 from smajax.core.names import instead
 from smajax.core.parameters import get_parameters
-from smajax.core.progress import Progress
+from smajax.core.progress import Event, Message, Progress, Stage
 from smajax.core.provenance import digest
 from smajax.core.result_cache import arrays
 from smajax.core.wording import aligned
@@ -142,7 +142,7 @@ def run_sweep(
             f"{name}_maps.png", (10.0, 7.6), partial(draw_maps if grid.second else draw_over_one, grid=grid, swept=one)
         )
         drawn(f"{name}_lines.png", (11.0, 6.2), partial(draw_lines, time=time, ratios=LINES, swept=one, target=target))
-        progress(f"say: {name}: {grid.size:,} closed loops; {failures(one)}. {over_mismatches(grid, one)}", 1.0)
+        progress(Message(f"{name}: {grid.size:,} closed loops; {failures(one)}. {over_mismatches(grid, one)}"))
     drawn("comparison.png", (10.0, 11.0), partial(draw_comparison, targets=targets, merits=compared))
     replace(out / "sweep.json", as_json(targets, compared, grid, swept, settings.between, command))
     replace(out / "sweep.nc", as_netcdf(as_dataset(grid, swept, settings.between, command)))
@@ -168,8 +168,8 @@ def _controller(
             system, settings.filtered, settings.noise, settings.period, settings.dt, settings.delay
         )
 
-        def told(_: str, share: float) -> None:
-            progress(f"sweeping {name}", share)
+        def swept(event: Event) -> None:
+            progress(dataclasses.replace(event, name=f"sweeping {name}") if isinstance(event, Stage) else event)
 
         # One batch, one program: the grid, and the plant as believed at every set point.
         rows = np.concatenate([grid.lanes(), lanes({}, grid.targets)])
@@ -177,7 +177,7 @@ def _controller(
         lines = np.concatenate([lanes({one: np.asarray(LINES)}, target) for one in MISMATCHES])
         controller = tuned[-1].put(system) if tuned else preset.make(system)
         asked: dict[str, Any] = {"seconds": settings.seconds, "dt": settings.dt, "interface": interface}
-        found = closed_loops(system, controller, gain, rows, **asked, progress=told)
+        found = closed_loops(system, controller, gain, rows, **asked, progress=swept)
         drawn = positions(system, controller, gain, lines, **asked).reshape(len(MISMATCHES), len(LINES), -1)
         inside, alone = slice(grid.size), grid.size + np.arange(len(grid.targets))
         record: dict[str, Any] = {"failed": found.failed_at[inside].reshape(grid.shape)}

@@ -14,7 +14,7 @@ from smajax.control.tune.evolve import load as load_evolution
 from smajax.control.tune.settings import TuneSettings
 from smajax.control.tune.tune import Tuned, tune
 from smajax.core.files import json_text, replace
-from smajax.core.progress import Progress, quiet
+from smajax.core.progress import Message, Progress, quiet
 from smajax.core.provenance import digest, made_with
 from smajax.model.system import System
 from smajax.report.tune_page import loops, page, record
@@ -89,9 +89,9 @@ def tune_into(
 
     after, known = load(out / STATE), load_evolution(out / FINISH)
     if after is not None and not after.ended:
-        progress(f"say: going on after round {after.round}" if after.round else "say: going on from the starts", 1.0)
+        progress(Message(f"going on after round {after.round}" if after.round else "going on from the starts"))
     elif after is not None and known is not None and known.generations < settings.finish:
-        progress(f"say: going on after generation {known.generations}", 1.0)
+        progress(Message(f"going on after generation {known.generations}"))
     found = tune(system, settings, after=after, known=known, keep=keep, progress=progress)
     told = {"tuned": settings.record(), "command": command, **made_with()}
     write_gains(out / GAINS, found.after, found.units, told)

@@ -39,7 +39,7 @@ def main() -> None:
         seconds=asked.seconds,
         keep=(),
         measures=(Last("position"), Largest("stress"), Smallest("martensite_fraction")),
-        progress=lambda what, share: print(f"process {process}: {what} {share:.0%}", flush=True),
+        progress=lambda event: print(f"process {process}: {event}", flush=True),
     )
 
 

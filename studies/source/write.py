@@ -11,7 +11,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from smajax.core.files import csv_text, replace, writing
-from smajax.core.progress import Progress
+from smajax.core.progress import Message, Progress, Stage
 from smajax.core.provenance import made_with, source_mark
 from smajax.report.drawing import UPRIGHT
 from smajax.report.html import picture
@@ -90,16 +90,17 @@ def draw(rows: Sequence[Row], folder: Path, fast: bool, progress: Progress) -> l
             (folder / name).unlink()
         if stale:
             progress(
-                f"say: {sum(name.endswith('.json') for name in stale)} figures of another version of smajax or another setting are gone.",
-                1.0,
+                Message(
+                    f"{sum(name.endswith('.json') for name in stale)} figures of another version of smajax or another setting are gone."
+                )
             )
         replace(mark, setting)
     drawn = []
     for index, row in enumerate(rows):
-        progress(f"{row.name}: {row.system}", 0.0)
+        progress(Stage(f"{row.name}: {row.system}", 0.0))
         drawn.append(_kept(row, folder) or _made(row, folder, fast))
-        progress(f"{row.name}: {row.system}", 1.0)
-        progress(f"say: {row.name} {drawn[-1].verdict} ({index + 1} of {len(rows)})", 1.0)
+        progress(Stage(f"{row.name}: {row.system}", 1.0))
+        progress(Message(f"{row.name} {drawn[-1].verdict} ({index + 1} of {len(rows)})"))
     return drawn
 
 

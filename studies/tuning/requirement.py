@@ -22,7 +22,7 @@ from smajax.control.tune.objective import Goal
 from smajax.control.tune.settings import TuneSettings
 from smajax.control.tune.terms import TERMS
 from smajax.control.tune.tune import Tuned, rig_of, tune
-from smajax.core.progress import Progress
+from smajax.core.progress import Message, Progress
 from smajax.model.system import System
 from studies.tuning.record import HERE
 
@@ -156,7 +156,7 @@ def _passes(system: System, controller: str, plan: Plan, progress: Progress) -> 
             generations_without_slopes=found.evolution.generations,
             slopes_of_no_use=found.descent.wild,
         )
-        progress(f"say: {controller}: pass {number + 1} exceeds the margin by {worst:.3f}", 1.0)
+        progress(Message(f"{controller}: pass {number + 1} exceeds the margin by {worst:.3f}"))
         if best is None or worst < least:
             best, least = found, worst
         if worst <= 0.0 or worst > HOPELESS:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from smajax.control.presets import CONTROLLERS
 from smajax.core.files import replace
-from smajax.core.progress import Progress
+from smajax.core.progress import Event, Message, Progress
 from smajax.core.runtime import prepare
 from studies.source.rigs import arm
 from studies.tuning.peers import PROBLEMS, Problem, searched
@@ -29,10 +29,10 @@ FAST_WAYS = {way: (0,) for way in WAYS}
 FAST_PLAN = Plan((0.0, 30.0), 30.0, 4, 2, 3, 2, 4, 8, 1, 3.0)
 
 
-def say(what: str, share: float) -> None:
-    """Progress for a log."""
-    if what.startswith("say: "):
-        print(what.removeprefix("say: "), flush=True)
+def say(event: Event) -> None:
+    """Progress as lines of a log."""
+    if isinstance(event, Message):
+        print(event.text, flush=True)
 
 
 def compare(
@@ -53,7 +53,7 @@ def compare(
                     continue
                 found = searched(arm(), problem, way, candidates * members, seed)
                 keep(path, "peers", name, found)
-                progress(f"say: {name}: cost {found['course'][-1][1]:.4g} in {found['closed_loops']} loops", 1.0)
+                progress(Message(f"{name}: cost {found['course'][-1][1]:.4g} in {found['closed_loops']} loops"))
 
 
 def require(path: Path, names: list[str], plan: Plan, again: bool, progress: Progress = say) -> None:
@@ -63,7 +63,7 @@ def require(path: Path, names: list[str], plan: Plan, again: bool, progress: Pro
             continue
         found = requirement(arm(), name, plan, progress, keep=path.name == "results.json")
         keep(path, "requirement", name, found)
-        progress(f"say: {name}: {'met' if found['met'] else 'not met'}, {found['limit_exceeded_by_share']}", 1.0)
+        progress(Message(f"{name}: {'met' if found['met'] else 'not met'}, {found['limit_exceeded_by_share']}"))
 
 
 def main(arguments: list[str]) -> None:

@@ -8,24 +8,25 @@ import re
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
+import warnings
 from pathlib import Path
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from rich.progress import Progress
+from rich.progress import Progress as Bars
 from typer.testing import CliRunner
 
 from smajax.cli.command import renamed
 from smajax.cli.command.base import console, numbers, pairs, texts, understood
 from smajax.cli.main import app, main
-from smajax.cli.progress_display import VARIABLE, _Left, shown
+from smajax.cli.progress_display import VARIABLE, _TimeLeft, shown
 from smajax.control.compose import compose, with_values
 from smajax.control.mismatch import MISMATCHES, variation_of
 from smajax.control.tune.terms import TERMS
 from smajax.core.parameters import parameter_values
+from smajax.core.progress import Compiling, Event, Message, Progress, Stage, WarningMessage, as_progress, quiet
 from smajax.engine import program
 from smajax.model.presets import build
 
@@ -212,8 +213,8 @@ def test_progress_is_silent_where_nobody_looks(
     for setting, told in (("", ""), ("lines", "fitting")):
         monkeypatch.setenv(VARIABLE, setting)
         with shown(console()) as progress:
-            progress("fitting", 0.0)
-            progress("say: one more thing", 1.0)
+            progress(Stage("fitting", 0.0))
+            progress(Message("one more thing"))
         said = capsys.readouterr().err
         assert told in said
         assert bool(said) is bool(told)
@@ -227,7 +228,7 @@ def test_how_to_see_progress_is_said_once_to_a_person_without_a_terminal(
     def said(told_how: bool) -> str:
         with shown(console(), told_how) as progress:
             for share in (0.0, 1.0):
-                progress("fitting", share)
+                progress(Stage("fitting", share))
         return capsys.readouterr().err
 
     assert said(True).count("SMAJAX_PROGRESS=lines") == 1
@@ -251,7 +252,7 @@ def test_long_work_says_how_to_see_progress_and_for_a_machine_does_not(
 class _AtOnce:
     """A timer that waits for nothing."""
 
-    def __init__(self, seconds: float, function: Callable[[bool], None], args: tuple[bool]) -> None:
+    def __init__(self, seconds: float, function: Progress, args: tuple[Event]) -> None:
         self.start = lambda: function(*args)
 
     def cancel(self) -> None: ...
@@ -264,11 +265,11 @@ def test_a_stage_that_waits_for_a_compilation_says_so(
     monkeypatch.setattr("smajax.core.compiling.threading.Timer", _AtOnce)
     monkeypatch.setattr("smajax.engine.cache.folder", lambda: None)
     with shown(console()) as progress:
-        progress("fitting", 0.0)
+        progress(Stage("fitting", 0.0))
         for power in (2, 3):  # programs that no other test has
             jax.jit(lambda x, power=power: jnp.sinc(x) ** power)(np.ones(7))
-        progress("fitting", 1.0)
-        progress("simulating", 0.0)
+        progress(Stage("fitting", 1.0))
+        progress(Stage("simulating", 0.0))
         # A program of our own, which is not looked for on the disk.
         program(lambda model, own: {"a": jnp.sinc(own["a"]) ** 5}, None, ("a",), engine="native")
     jax.jit(lambda x: jnp.sinc(x) ** 4)(np.ones(7))  # nobody looks any more
@@ -278,8 +279,8 @@ def test_a_stage_that_waits_for_a_compilation_says_so(
 
 
 def test_a_bar_says_that_a_program_is_compiled_and_until_when() -> None:
-    waits = _Left()
-    bar = Progress()
+    waits = _TimeLeft()
+    bar = Bars()
     bar.add_task("fitting", total=1.0, at=0.0)
     (task,) = bar.tasks
     assert waits.render(task).plain == ""
@@ -294,9 +295,26 @@ def test_a_warning_is_said_wherever_stderr_leads(
 ) -> None:
     monkeypatch.setenv(VARIABLE, "")
     with shown(console()) as progress:
-        progress("fitting", 0.0)
-        progress("warn: check: is it in mm?", 1.0)
+        progress(Stage("fitting", 0.0))
+        progress(WarningMessage("check: is it in mm?"))
     assert capsys.readouterr().err == "warning: check: is it in mm?\n"
+
+
+def test_a_callback_of_text_and_share_is_adapted_for_a_version_with_a_warning() -> None:
+    calls: list[tuple[str, float]] = []
+
+    def old(what: str, share: float) -> None:
+        calls.append((what, share))
+
+    with pytest.warns(DeprecationWarning, match="one event"):
+        progress = as_progress(old)
+    for event in (Stage("fitting", 0.5), Message("a sentence"), WarningMessage("is it in mm?"), Compiling(True)):
+        progress(event)
+    assert calls == [("fitting", 0.5), ("say: a sentence", 1.0), ("warn: is it in mm?", 1.0)]
+    assert as_progress(quiet) is quiet
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert as_progress(progress) is progress
 
 
 @pytest.mark.parametrize("command", ["simulate", "sweep", "tune", "identify", "close-loop", "figures", "bench"])

@@ -23,6 +23,7 @@ from smajax.control.presets import CONTROLLERS
 from smajax.control.reference import clock, constant
 from smajax.control.sweep import Grid, closed_loops, lanes, ratios
 from smajax.core.parameters import get_parameters, set_parameters
+from smajax.core.progress import quiet
 from smajax.report.sweep_run import SweepSettings, goes_on, run_sweep
 from studies.source.rigs import arm
 from tests.helpers.in_browser import HOSTILE, faults
@@ -34,7 +35,7 @@ SETTINGS = SweepSettings(("vsc3",), "payload", "supply", 2, (0.0, 30.0), (1.0,),
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("sweep")
-    run_sweep(arm(), SETTINGS, out, lambda what, share: None, f"smajax sweep --out {HOSTILE}")
+    run_sweep(arm(), SETTINGS, out, quiet, f"smajax sweep --out {HOSTILE}")
     return out
 
 
@@ -87,7 +88,7 @@ def test_the_data_set_holds_every_row(folder: Path) -> None:
 def test_one_mismatch_alone_is_swept_as_a_curve(tmp_path: Path, folder: Path, browser: Any) -> None:
     """Its loops are those of the map where the other mismatch is 1."""
     alone = dataclasses.replace(SETTINGS, second="", points=3)
-    run_sweep(arm(), alone, tmp_path, lambda what, share: None, f"smajax sweep {HOSTILE}")
+    run_sweep(arm(), alone, tmp_path, quiet, f"smajax sweep {HOSTILE}")
     with (tmp_path / "vsc3.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert [(row["payload_ratio"], row["set_point_deg"]) for row in rows] == [
@@ -122,21 +123,21 @@ def test_what_is_finished_is_kept(folder: Path, monkeypatch: pytest.MonkeyPatch)
         raise AssertionError("computed again")
 
     monkeypatch.setattr("smajax.report.sweep_run.closed_loops", never)
-    run_sweep(arm(), SETTINGS, folder, lambda what, share: None)
+    run_sweep(arm(), SETTINGS, folder, quiet)
     assert (folder / "vsc3.csv").read_bytes() == before
     other = SweepSettings(("vsc3",), "payload", "supply", 2, (0.0, 31.0), (1.0,), seconds=3.0)
     with pytest.raises(AssertionError, match="computed again"):
-        run_sweep(arm(), other, folder, lambda what, share: None)
+        run_sweep(arm(), other, folder, quiet)
     # Another law is another plant, though every parameter is the same.
     with pytest.raises(AssertionError, match="computed again"):
-        run_sweep(arm("liang"), SETTINGS, folder, lambda what, share: None)
+        run_sweep(arm("liang"), SETTINGS, folder, quiet)
 
 
 def test_unknown_names_are_answered_with_those_there_are(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="backstepping2"):
-        run_sweep(arm(), SweepSettings(("vsc4",)), tmp_path, lambda what, share: None)
+        run_sweep(arm(), SweepSettings(("vsc4",)), tmp_path, quiet)
     with pytest.raises(ValueError, match="printed"):
-        run_sweep(arm(), dataclasses.replace(SETTINGS, filtered="kalman"), tmp_path, lambda what, share: None)
+        run_sweep(arm(), dataclasses.replace(SETTINGS, filtered="kalman"), tmp_path, quiet)
     for pair in (("payload", "wind"), ("payload", "payload"), ("", ""), ("wind", "")):
         with pytest.raises(ValueError, match="convection"):
             Grid(*pair, ratios(3), np.zeros(1), np.ones(1))
@@ -179,7 +180,7 @@ def test_noise_sample_time_and_delay_reach_the_loop() -> None:
 
 def test_a_period_between_two_steps_is_answered(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="whole number"):
-        run_sweep(arm(), dataclasses.replace(SETTINGS, period=0.015), tmp_path, lambda what, share: None)
+        run_sweep(arm(), dataclasses.replace(SETTINGS, period=0.015), tmp_path, quiet)
 
 
 def test_only_controllers_may_be_added_to_a_folder() -> None:

@@ -38,6 +38,7 @@ from smajax.control.tune.settings import TuneSettings
 from smajax.control.tune.terms import TERMS
 from smajax.core.display_units import digits
 from smajax.core.parameters import get_parameters, parameters
+from smajax.core.progress import Event
 from smajax.report.sweep_run import SweepSettings, run_sweep
 from smajax.report.tune_folder import OURS, ended, tune_into
 from smajax.report.tune_page import met, price
@@ -63,8 +64,8 @@ SETTINGS = TuneSettings(
 )
 
 
-def silent(what: str, share: float) -> None:
-    """Progress for nobody."""
+def silent(event: Event) -> None:
+    """Progress that is shown to no one."""
 
 
 @pytest.fixture(scope="module")

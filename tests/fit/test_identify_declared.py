@@ -13,7 +13,7 @@ import pytest
 
 from smajax.attribution.close_loop import close_loop
 from smajax.core.parameters import set_parameters
-from smajax.core.progress import Progress, quiet
+from smajax.core.progress import Event, Progress, Stage, quiet
 from smajax.data.experiment.errors import ExperimentError
 from smajax.data.experiment.load import load_experiment
 from smajax.data.experiment.record import Experiment
@@ -248,8 +248,12 @@ def test_a_killed_identification_goes_on_to_the_same_end(tmp_path: Path) -> None
     experiment = _loaded(path)
     seen: list[str] = []
 
-    def killed(what: str, share: float) -> None:
-        seen.append(what)
+    def noted(event: Event) -> None:
+        if isinstance(event, Stage):
+            seen.append(event.name)
+
+    def killed(event: Event) -> None:
+        noted(event)
         if seen.count("beginning fits") == 4:
             raise Stopped
 
@@ -259,7 +263,7 @@ def test_a_killed_identification_goes_on_to_the_same_end(tmp_path: Path) -> None
     assert list((tmp_path / "fits").glob("*.npz"))
     assert not list((tmp_path / "fits").glob("*.partial.npz"))
     first, seen = list(seen), []
-    resumed = identify(experiment, starts=4, memory=tmp_path / "fits", progress=lambda what, _: seen.append(what))
+    resumed = identify(experiment, starts=4, memory=tmp_path / "fits", progress=noted)
     assert first.count("beginning fits") == 4
     # The states of the first rounds may be younger than the last one that was kept, by a second at most.
     assert seen.count("beginning fits") <= 7

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from smajax.core.progress import Event, Stage
 from smajax.model.presets import build
 from smajax.model.types import Trajectory
 from smajax.model.wire.kinetics import heating_temperature
@@ -53,11 +54,14 @@ def test_an_arm_moves_beside_its_phase_diagram(up_and_down: Trajectory, tmp_path
 
 
 def test_upright_it_fits_a_telephone_and_says_how_far_it_is(up_and_down: Trajectory, tmp_path: Path) -> None:
-    said: list[tuple[str, float]] = []
+    stages: list[Stage] = []
+
+    def progress(event: Event) -> None:
+        assert isinstance(event, Stage)
+        stages.append(event)
+
     path = tmp_path / "upright.gif"
-    path.write_bytes(
-        moving(ARM, up_and_down, frames=5, upright=True, progress=lambda what, share: said.append((what, share)))
-    )
+    path.write_bytes(moving(ARM, up_and_down, frames=5, upright=True, progress=progress))
     pictures = frames(path)
     height, width = pictures[0].shape[:2]
     assert width < 360
@@ -65,8 +69,8 @@ def test_upright_it_fits_a_telephone_and_says_how_far_it_is(up_and_down: Traject
     for half in (slice(None, height // 2), slice(height // 2, None)):
         assert pictures[0][half].std() > 5.0
         assert np.abs(pictures[2][half] - pictures[0][half]).mean() > 0.5
-    assert {what for what, _ in said} == {"drawing the load moving, for telephones"}
-    shares = [share for _, share in said]
+    assert {stage.name for stage in stages} == {"drawing the load moving, for telephones"}
+    shares = [stage.share for stage in stages]
     assert shares == sorted(shares)
     assert shares[-1] == 1.0
 

@@ -19,6 +19,7 @@ import xarray as xr
 
 from smajax.core.checkpointed_scan import checkpointed_scan
 from smajax.core.parameters import get_parameters, parameters, set_parameters, set_vector
+from smajax.core.progress import Stage
 from smajax.core.provenance import provenance
 from smajax.model.presets import build
 from smajax.simulation.batch.axes import Axes, grid, sampled, zipped
@@ -148,8 +149,8 @@ def _files(folder: Path) -> dict[str, bytes]:
 def _stop_after(count: int):
     calls = []
 
-    def progress(what: str, share: float) -> None:
-        calls.append(share)
+    def progress(event: Stage) -> None:
+        calls.append(event.share)
         if len(calls) == count:
             raise KeyboardInterrupt
 
@@ -180,7 +181,7 @@ def test_what_was_stopped_goes_on_to_the_same_bytes(small_chunks: None, tmp_path
     half = opened(tmp_path / "stopped")
     assert np.isnan(half["position"].values).any()
     told: list[float] = []
-    _batch(axes, out=tmp_path / "stopped", progress=lambda what, share: told.append(share))
+    _batch(axes, out=tmp_path / "stopped", progress=lambda event: told.append(event.share))
     assert told == [1.0], "one chunk was missing"
     assert _files(tmp_path / "stopped") == _files(tmp_path / "whole")
     np.testing.assert_array_equal(whole["position"], _batch(axes)["position"])

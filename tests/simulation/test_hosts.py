@@ -31,7 +31,7 @@ import numpy as np
 from smajax.simulation.batch.axes import grid
 from smajax.model.presets import build
 
-def progress(what, share):
+def progress(event):
     print("chunk", flush=True)
     if slow:
         import time

@@ -57,6 +57,7 @@ def identify_command(
     from smajax.cli.command.folder import FolderTaken, check_path, claimed
     from smajax.cli.progress_display import shown
     from smajax.core.files import json_text
+    from smajax.core.progress import Message
     from smajax.data.experiment.asked import asked_of
     from smajax.data.experiment.errors import ExperimentError
     from smajax.data.experiment.load import load_experiment
@@ -84,7 +85,7 @@ def identify_command(
             shown(console(), told_how=not json_out) as progress,
         ):
             if any((out / "fits").glob("*.npz")):
-                progress(f"say: Fits kept in {out / 'fits'} are gone on with where they are of the same work.", 1.0)
+                progress(Message(f"Fits kept in {out / 'fits'} are gone on with where they are of the same work."))
             found = identify(
                 loaded,
                 starts=starts,

@@ -142,6 +142,7 @@ def simulate(
     from smajax.control.gains_file import GainsFileError
     from smajax.control.single_run import Asked, AskedError, AskedLoop, channels, run_closed, run_open
     from smajax.core.files import json_text
+    from smajax.core.progress import Stage
     from smajax.core.wording import aligned
     from smajax.data.step_command import reads_file
     from smajax.report.simulate_page import OWN, merit_rows, mismatch_rows, record, rest_rows, summary_rows, write_run
@@ -181,7 +182,7 @@ def simulate(
             asked = Asked(**{**vars(asked), "inputs": {**series, stepped: step}})
             options[f"inputs.{stepped}"] = "--step"
         with resumable(), shown(console()) as progress:
-            progress("simulating the run", 0.0)
+            progress(Stage("simulating the run", 0.0))
             loop: AskedLoop | None = None
             if closed:
                 loop = AskedLoop(
@@ -198,7 +199,7 @@ def simulate(
                 ran = run_closed(asked, loop)
             else:
                 ran = run_open(asked)
-            progress("simulating the run", 1.0)
+            progress(Stage("simulating the run", 1.0))
     except KeyError as error:
         raise typer.BadParameter(error.args[0]) from None
     except AskedError as error:

@@ -19,7 +19,7 @@ from smajax.control.tune.evaluate import Rig
 from smajax.control.tune.members import Members
 from smajax.control.tune.objective import Goal, rank
 from smajax.core.files import writing
-from smajax.core.progress import Progress, quiet
+from smajax.core.progress import Progress, Stage, quiet
 from smajax.core.result_cache import arrays
 
 POPULATION = 24  # candidates of a generation
@@ -118,7 +118,7 @@ def evolve(
         seen = known
     number, search, begins, rest = 0, _search(start, seed, 0), start, False
     for k in range(generations):
-        progress(what, k / generations)
+        progress(Stage(what, k / generations))
         fresh = k == 0 or rest or search.should_stop()
         if fresh and k:
             number, begins = number + 1, seen.upto(k).best
@@ -135,5 +135,5 @@ def evolve(
             keep(seen)
         values = rank(seen.costs[k], seen.excesses[k])
         search.tell(list(zip(points, np.where(np.isfinite(values), values, 1e300), strict=True)))
-    progress(what, 1.0)
+    progress(Stage(what, 1.0))
     return seen.upto(generations)

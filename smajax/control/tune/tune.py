@@ -20,7 +20,7 @@ from smajax.control.tune.moves import Moves, moved
 from smajax.control.tune.objective import Goal, rank
 from smajax.control.tune.settings import TuneSettings
 from smajax.core.parameters import get_parameters, parameters
-from smajax.core.progress import Progress, quiet
+from smajax.core.progress import Progress, Stage, quiet
 from smajax.model.system import System
 
 LEAST_LOOPS = 8
@@ -104,23 +104,23 @@ def tune(
     members = tuned_on(settings.set_points, settings.variation, settings.seed)
     what = f"tuning {settings.controller}"
     if after is None:
-        progress(f"{what}: {settings.tried} points of the box", 0.0)
+        progress(Stage(f"{what}: {settings.tried} points of the box", 0.0))
         now = begin(rig, goal, members, effort, rig.point(settings.start) if settings.start else rig.before)
         keep(now)
-        progress(f"{what}: {settings.tried} points of the box", 1.0)
+        progress(Stage(f"{what}: {settings.tried} points of the box", 1.0))
     else:
         now, rig.simulations = after, after.simulations
     while not now.ended:
-        progress(what, now.round / effort.rounds)
+        progress(Stage(what, now.round / effort.rounds))
         now = one_round(rig, goal, members, effort, now)
         keep(now)
-    progress(what, 1.0)
-    progress("judging", 0.0)
+    progress(Stage(what, 1.0))
+    progress(Stage("judging", 0.0))
     # Rounds judge at the step of tuning; of what they leave the best at a finer one is taken. The preset and what was begun
     # from are among them.
     begun = (rig.point(settings.start),) if settings.start else ()
     best = _best_of(rig, goal, members, (rig.before, *begun, *now.best))
-    progress("judging", 1.0)
+    progress(Stage("judging", 1.0))
     evolution = evolve(
         rig,
         goal,
@@ -133,7 +133,7 @@ def tune(
         progress=progress,
         what=f"{what}, without slopes",
     )
-    progress("judging", 0.0)
+    progress(Stage("judging", 0.0))
     best = _best_of(rig, goal, members, (rig.point(best), evolution.best))
     searched = rig.simulations
     pair = np.stack([rig.before, rig.point(best)])
@@ -144,7 +144,7 @@ def tune(
     judged = {}
     for k, (name, some) in enumerate(checks.items()):
         judged[name] = Check(some, rig.judged(pair, some))
-        progress("judging", (k + 1) / (len(checks) + 1))
+        progress(Stage("judging", (k + 1) / (len(checks) + 1)))
     here = judged["tuned on"]
     cost = goal.cost(here.seen.judged, members)
     excesses = {name: goal.excess(one.seen.judged) for name, one in judged.items()}
@@ -152,7 +152,7 @@ def tune(
     tuned = Gains(settings.controller, best)
     lines = _lines(rig, settings, tuned, checks["inside"])
     moves = moved(rig, (rig.controller, tuned.put(rig.system)), settings.set_points)
-    progress("judging", 1.0)
+    progress(Stage("judging", 1.0))
     return Tuned(
         settings,
         dict(zip(rig.names, np.asarray(get_parameters(rig.controller, rig.names)).tolist(), strict=True)),

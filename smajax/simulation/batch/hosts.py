@@ -14,7 +14,7 @@ from typing import Any
 import jax
 import xarray as xr
 
-from smajax.core.progress import Progress, quiet
+from smajax.core.progress import Progress, as_progress, quiet
 from smajax.model.system import System
 from smajax.model.types import Series
 from smajax.simulation.batch.axes import Axes
@@ -56,6 +56,7 @@ def run_batch_here(
     The folder must be one that all processes see. Raises TimeoutError when process 0 does not lay the store out.
     Run again, with any number of processes, it goes on with the chunks that are missing.
     """
+    progress = as_progress(progress)
     folder = Path(out)
     recipe = recipe_of(system, inputs, axes, dt=dt, **settings)
     devices = tuple(jax.local_devices())

@@ -15,7 +15,7 @@ import xarray as xr
 from smajax.core.machine import available_memory
 from smajax.core.names import listed
 from smajax.core.parameters import Parameter, check_bounds, parameters
-from smajax.core.progress import Progress, quiet
+from smajax.core.progress import Progress, Stage, as_progress, quiet
 from smajax.core.provenance import digest, provenance
 from smajax.engine import Engine
 from smajax.model.load.coupon import AbstractCoupon
@@ -229,6 +229,7 @@ def run_batch(
     runaway heat, not of what cannot be.
     Raises ValueError for what does not fit together, a parameter of `system` out of its bounds, and when `out` holds another batch.
     """
+    progress = as_progress(progress)
     recipe = recipe_of(
         system,
         inputs,
@@ -251,7 +252,7 @@ def run_batch(
     count = -(-axes.size // size)
     for number, found in chunks(member, recipe, axes, size, range(count), devices, engine):
         parts.append(found)
-        progress("simulating", (number + 1) / count)
+        progress(Stage("simulating", (number + 1) / count))
     whole = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     return labelled(whole, axes, recipe.units(), np.arange(recipe.steps // every + 1) * every * dt, _told(recipe))
 
@@ -306,7 +307,7 @@ def fill(
         chunks(member, recipe, store.axes, store.chunk, wanted, devices, engine), start=1
     ):
         store.write(number, found)
-        progress("simulating", done / len(wanted))
+        progress(Stage("simulating", done / len(wanted)))
 
 
 def _with_unit(units: Mapping[str, str], name: str) -> dict[str, str]:
