@@ -46,7 +46,7 @@ package: $(READY)
 	build/try/env/bin/python -m pip install --quiet --disable-pip-version-check dist/*.whl
 	mkdir build/try/empty
 	cd build/try/empty && ../env/bin/smajax --version && ../env/bin/smajax presets && ../env/bin/smajax doctor \
-	  && ../env/bin/smajax simulate --step 7V:2s --out run && ../env/bin/python -c 'import smajax; smajax.simulate_dataset'
+	  && ../env/bin/smajax simulate --step 7V:2s --out run && ../env/bin/smajax figures M9 --fast && ../env/bin/python -c 'import smajax; smajax.simulate_dataset'
 
 format: $(READY)
 	$(BIN)/ruff check --fix .

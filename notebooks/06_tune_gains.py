@@ -19,8 +19,8 @@ import matplotlib.pyplot as plt  # noqa: E402
 import numpy as np  # noqa: E402
 
 from smajax.control.tune.settings import TuneSettings  # noqa: E402
+from smajax.model.rigs import arm  # noqa: E402
 from smajax.report.tune_folder import tune_into  # noqa: E402
-from studies.source.rigs import arm  # noqa: E402
 
 fast = bool(os.environ.get("SMAJAX_FAST"))
 settings = TuneSettings(

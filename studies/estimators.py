@@ -26,9 +26,10 @@ from smajax.control.estimators.run import estimate
 from smajax.control.estimators.unscented import Unscented
 from smajax.control.presets import model_filter, printed_filter
 from smajax.core.parameters import get_parameters, set_parameters
+from smajax.model.rigs import arm
 from smajax.model.system import System
 from smajax.report.drawing import BLUE, GREEN, GREY, RED, keyed, named, panels
-from studies.source.rigs import arm, recorded, simulated
+from studies.source.rigs import recorded, simulated
 
 PICTURE = Path(__file__).parent / "estimators.png"
 PERIOD, STEP, SECONDS, NOISE = 0.01, 0.005, 5.0, 1e-3

@@ -10,8 +10,8 @@ from smajax.core.parameters import get_parameters, parameters
 from smajax.core.runtime import prepare
 from smajax.model.preset_sources import ORIGINS
 from smajax.model.presets import DRIVES, LOADS, WIRES
+from smajax.model.rigs import arm
 from smajax.model.wire.laws import LAWS, detwinning
-from studies.source.rigs import arm
 
 BELIEVED = ("arm", "believed", "system")  # fields that hold a plant
 PAGE = Path(__file__).parent / "parameters.md"

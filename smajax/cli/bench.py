@@ -18,10 +18,10 @@ from smajax.core.machine import machine
 from smajax.core.parameters import parameter_values
 from smajax.core.progress import Progress, Stage, quiet
 from smajax.engine import available_cores
+from smajax.model.rigs import arm
 from smajax.simulation.batch.axes import sampled, zipped
 from smajax.simulation.batch.run_batch import run_batch
 from smajax.simulation.measures import Last
-from studies.source.rigs import arm
 
 SECONDS, SAMPLE = 10.0, 0.05
 VOLTAGES, PAYLOADS = (5.5, 8.5), (0.8, 0.95)  # V; of the preset's

@@ -70,7 +70,7 @@ def run(
 ) -> Result:
     """Simulate `members`, rows of (voltage in V, payload mass in kg), over `steps` of `dt` s.
 
-    `system` is `studies.source.rigs.arm()` with any parameters; `precision` is "double" or "float". Of the first
+    `system` is `smajax.model.rigs.arm()` with any parameters; `precision` is "double" or "float". Of the first
     `recorded` members every `every`-th sample comes back, the first one included.
     """
     if precision not in PRECISIONS:

@@ -23,6 +23,7 @@ import numpy as np
 from smajax.core.parameters import get_parameters, parameters, set_vector
 from smajax.core.runtime import prepare
 from smajax.engine import program
+from smajax.model.rigs import arm
 from smajax.model.system import System
 from smajax.simulation.batch.axes import grid
 from smajax.simulation.batch.run_batch import recipe_of
@@ -31,7 +32,6 @@ from smajax.simulation.measures import MeanSquare
 from smajax.simulation.simulate import DEFAULT_STEP
 from studies.benchmarks import tracking
 from studies.benchmarks.timed import timed
-from studies.source.rigs import arm
 
 REPEATS = 3
 LONGEST_REPEATED = 20000  # steps

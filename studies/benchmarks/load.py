@@ -163,9 +163,9 @@ def _runs(count: int, place: Path) -> Work:
 def _day(hours: int, place: Path) -> Work:
     import jax.numpy as jnp
 
+    from smajax.model.rigs import arm
     from smajax.simulation.batch.axes import grid
     from smajax.simulation.batch.run_batch import run_batch
-    from studies.source.rigs import arm
 
     steps = round(3600.0 * hours / DAY_STEP)
     # A step of the supply every minute, as a series of the whole day.

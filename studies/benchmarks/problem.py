@@ -14,11 +14,11 @@ import numpy as np
 
 from smajax.cli import explicit_arm as equations
 from smajax.core.parameters import parameter_values
+from smajax.model.rigs import arm
 from smajax.simulation.batch.axes import Axes, sampled
 from studies.benchmarks.given import Given, load, save
 from studies.reference.wire_parameters import ArmParameters
 from studies.reference.wire_reference import simulate_arm
-from studies.source.rigs import arm
 
 SECONDS = 10.0
 EVERY = 0.05  # s between compared samples

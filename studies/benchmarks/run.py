@@ -74,8 +74,8 @@ class Plan:
 def _cpp(plan: Plan) -> Part:
     import os
 
+    from smajax.model.rigs import arm
     from studies.benchmarks.given import load
-    from studies.source.rigs import arm
 
     given = load(plan.file())
     rows = np.stack([given.voltage, given.payload_mass], axis=1)

@@ -10,11 +10,11 @@ from pathlib import Path
 
 from smajax.core.machine import peak_memory
 from smajax.core.runtime import prepare
+from smajax.model.rigs import arm
 from smajax.simulation.batch.run_batch import run_batch
 from studies.benchmarks import problem
 from studies.benchmarks.single import TOLERANCE
 from studies.benchmarks.throughput import MEASURES
-from studies.source.rigs import arm
 
 
 def main() -> None:

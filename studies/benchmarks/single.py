@@ -15,12 +15,12 @@ import equinox as eqx
 import jax
 
 from smajax.core.runtime import prepare
+from smajax.model.rigs import arm
 from smajax.model.types import Trajectory
 from smajax.simulation.compiled import simulate_compiled
 from smajax.simulation.simulate import DEFAULT_STEP, simulate
 from studies.benchmarks import problem
 from studies.benchmarks.given import load
-from studies.source.rigs import arm
 
 REPEATS = 10
 TOLERANCE = 3e-4

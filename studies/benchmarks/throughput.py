@@ -19,13 +19,13 @@ import numpy as np
 from smajax.core.machine import peak_memory
 from smajax.core.runtime import prepare
 from smajax.engine import available_cores
+from smajax.model.rigs import arm
 from smajax.simulation.batch.axes import zipped
 from smajax.simulation.batch.run_batch import run_batch
 from smajax.simulation.measures import Last
 from smajax.simulation.simulate import DEFAULT_STEP
 from studies.benchmarks import problem
 from studies.benchmarks.given import Given, load
-from studies.source.rigs import arm
 
 MEASURES = (Last("position"), Last("martensite_fraction"))
 REPEATS = 3

@@ -16,9 +16,9 @@ import numpy as np
 from smajax.control.controllers.base import AbstractController
 from smajax.control.figures_of_merit import Merit
 from smajax.control.gain_search import merits_of, search_gains
+from smajax.model.rigs import arm
 from smajax.model.system import System
 from smajax.model.types import Scalar
-from studies.source.rigs import arm
 
 Cost = Callable[[Merit, float], Scalar]
 HERE = Path(__file__).parent

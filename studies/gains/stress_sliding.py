@@ -6,8 +6,8 @@ from typing import Any
 
 from smajax.control.gain_search import regulation_cost
 from smajax.control.presets import STRESS_BOX, quick_stress_sliding
+from smajax.model.rigs import arm
 from studies.gains.record import main, searched
-from studies.source.rigs import arm
 
 TARGETS = [-40.0, -20.0, 0.0, 20.0, 40.0, 60.0]  # degrees
 

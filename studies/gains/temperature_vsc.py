@@ -8,9 +8,9 @@ import jax.numpy as jnp
 
 from smajax.control.figures_of_merit import Merit
 from smajax.control.presets import PASSING_BOX, temperature_vsc
+from smajax.model.rigs import arm
 from smajax.model.types import Scalar
 from studies.gains.record import main, or_never, searched
-from studies.source.rigs import arm
 
 
 def as_soon_and_no_further(one: Merit, seconds: float) -> Scalar:

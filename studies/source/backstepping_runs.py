@@ -22,6 +22,7 @@ from smajax.control.measured_state import Sensor
 from smajax.control.presets import with_printed_law
 from smajax.control.reference import clock, constant
 from smajax.model.load.base import AbstractMovingLoad
+from smajax.model.rigs import arm
 from smajax.model.system import System, initial_state
 from smajax.model.types import Motion, Scalar, State
 from smajax.model.wire.heat import cross_section
@@ -29,7 +30,7 @@ from smajax.model.wire.wire import start
 from smajax.report.drawing import GREY, keyed, named, panels
 from smajax.simulation.simulate import DEFAULT_STEP
 
-from .rigs import Recorded, arm, recorded
+from .rigs import Recorded, recorded
 
 Tree = TypeVar("Tree")
 PERIOD, SECONDS = 0.01, 20.0

@@ -14,11 +14,12 @@ from smajax.control.estimators.base import AbstractEstimator
 from smajax.control.estimators.run import estimate
 from smajax.control.measured_state import MeasuredState
 from smajax.control.presets import model_filter, printed_filter
+from smajax.model.rigs import arm
 from smajax.model.types import Series
 from smajax.report.drawing import BLACK, BLUE, RED, keyed, named, panels
 from smajax.simulation.simulate import DEFAULT_STEP
 
-from .rigs import Batched, Recorded, arm, recorded, simulated
+from .rigs import Batched, Recorded, recorded, simulated
 from .row import Result, Row
 
 VOLTS, ON, SECONDS, PERIOD = 8.0, 3.0, 6.0, 0.01

@@ -8,9 +8,10 @@ from matplotlib.figure import Figure
 
 from smajax.control.presets import vsc3, vsc3_of_section_4_6
 from smajax.model.load.arm import Arm
+from smajax.model.rigs import arm
 from smajax.report.drawing import BLUE, GREY, RED, named, panels
 
-from .rigs import Recorded, arm, austenite_range, martensite_range
+from .rigs import Recorded, austenite_range, martensite_range
 from .row import Result, Row
 from .set_points import regulated
 

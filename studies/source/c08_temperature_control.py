@@ -7,9 +7,10 @@ from collections.abc import Iterable
 from matplotlib.figure import Figure
 
 from smajax.control.presets import printed_filter, temperature_vsc, vsc3_of_section_4_6
+from smajax.model.rigs import arm
 from smajax.report.drawing import keyed, panels
 
-from .rigs import Recorded, arm
+from .rigs import Recorded
 from .row import Result, Row
 from .set_points import (
     PERIOD,

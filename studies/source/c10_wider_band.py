@@ -8,9 +8,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from smajax.control.presets import temperature_vsc
+from smajax.model.rigs import arm
 from smajax.report.drawing import BLUE, GREY, RED, keyed, named, panels
 
-from .rigs import arm
 from .row import Result, Row
 from .set_points import (
     Runs,

@@ -6,9 +6,9 @@ from matplotlib.figure import Figure
 
 from smajax.control.figures_of_merit import Merit
 from smajax.control.presets import pid, pid_tuned_at, quick_stress_sliding
+from smajax.model.rigs import arm
 from smajax.report.drawing import keyed, panels
 
-from .rigs import arm
 from .row import Result, Row
 from .set_points import at_set_points, draw_angles, measures, overshoot, steady
 

@@ -9,10 +9,10 @@ from matplotlib.figure import Figure
 from smajax.control.controllers.inverse_wire import moving_load
 from smajax.control.presets import printed_filter, quick_stress_sliding
 from smajax.core.parameters import set_parameters
+from smajax.model.rigs import arm
 from smajax.report.drawing import GREY, keyed, named, panels
 
 from .backstepping_runs import shades
-from .rigs import arm
 from .row import Result, Row
 from .set_points import at_set_points, overshoot, steady
 

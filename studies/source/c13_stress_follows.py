@@ -7,9 +7,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from smajax.control.presets import printed_filter, quick_stress_sliding
+from smajax.model.rigs import arm
 from smajax.report.drawing import BLUE, GREY, RED, keyed, named, panels
 
-from .rigs import arm
 from .row import Result, Row
 from .set_points import at_set_points
 

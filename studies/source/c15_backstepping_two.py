@@ -8,11 +8,12 @@ from matplotlib.figure import Figure
 from smajax.control.controllers.inverse_wire import strain_at_angle
 from smajax.control.presets import backstepping_two, printed_filter
 from smajax.core.parameters import set_parameters
+from smajax.model.rigs import arm
 from smajax.model.wire.constitutive import young_modulus
 from smajax.report.drawing import BLACK, BLUE, GREY, RED, keyed, named, panels
 
 from .backstepping_runs import ON_ITS_PLANT, SECONDS, degrees, plant, runs
-from .rigs import arm, austenite_range, martensite_range
+from .rigs import austenite_range, martensite_range
 from .row import Result, Row
 
 SHOWN = 40.0  # degrees

@@ -6,11 +6,12 @@ import jax.numpy as jnp
 import numpy as np
 from matplotlib.figure import Figure
 
+from smajax.model.rigs import arm
 from smajax.model.wire.constitutive import IntegratedForm
 from smajax.report.drawing import BLUE, named, panels
 from smajax.simulation.simulate import DEFAULT_STEP
 
-from .rigs import arm, simulated
+from .rigs import simulated
 from .row import Result, Row
 from .voltage_step import stepped
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from .rigs import arm, austenite_range
+from smajax.model.rigs import arm
+
+from .rigs import austenite_range
 from .row import Result, Row
 from .voltage_step import draw_step, stepped
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from smajax.model.rigs import arm
+
 from .regulation import draw_regulation, to_85_degrees
-from .rigs import arm, austenite_range
+from .rigs import austenite_range
 from .row import Result, Row
 
 

@@ -8,9 +8,10 @@ import jax.numpy as jnp
 import numpy as np
 from matplotlib.figure import Figure
 
+from smajax.model.rigs import coupon
 from smajax.report.drawing import LAW_COLOURS, LAW_STYLES, keyed, named, panels
 
-from .rigs import LAWS, austenite_range, coupon, simulated
+from .rigs import LAWS, austenite_range, simulated
 from .row import Result, Row
 
 COLD, POINT_1 = 23.0, 99.0  # C; point 1 lies in mid-range at 180 MPa: A_s' = 94.1, A_f' = 104.1

@@ -5,10 +5,11 @@ from __future__ import annotations
 import jax.numpy as jnp
 import numpy as np
 
+from smajax.model.rigs import arm
 from smajax.simulation.simulate import DEFAULT_STEP
 
 from .regulation import PERIOD, draw_regulation
-from .rigs import LAWS, arm, controlled
+from .rigs import LAWS, controlled
 from .row import Result, Row
 
 TARGETS = (-20.0, 0.0, -10.0)  # degrees, 10 s each

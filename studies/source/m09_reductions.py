@@ -10,11 +10,12 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from smajax.core.parameters import set_parameters
+from smajax.model.rigs import coupon
 from smajax.model.system import System
 from smajax.model.wire.conditions import AbstractConditions, Brinson, BrinsonAsPrinted
 from smajax.report.drawing import LAW_COLOURS, keyed, named, panels
 
-from .rigs import batch, coupon
+from .rigs import batch
 from .row import Result, Row
 
 

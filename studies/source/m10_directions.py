@@ -9,10 +9,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from smajax.core.parameters import set_parameters
+from smajax.model.rigs import coupon
 from smajax.report.drawing import BLUE, GREY, RED, keyed, named, panels
 from smajax.simulation.simulate import simulate
 
-from .rigs import austenite_range, coupon, martensite_range
+from .rigs import austenite_range, martensite_range
 from .row import Result, Row
 
 STRESS = 150e6  # Pa, at both points

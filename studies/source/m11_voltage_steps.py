@@ -8,12 +8,13 @@ import jax.numpy as jnp
 import numpy as np
 from matplotlib.figure import Figure
 
+from smajax.model.rigs import dead_weight
 from smajax.model.types import Trajectory
 from smajax.model.wire.constitutive import RateForm
 from smajax.report.drawing import BLUE, keyed, named, panels
 from smajax.simulation.simulate import DEFAULT_STEP, simulate
 
-from .rigs import dead_weight, recorded, simulated
+from .rigs import recorded, simulated
 from .row import Result, Row
 
 VOLTS = np.arange(1.0, 17.0)

@@ -9,10 +9,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from smajax.core.parameters import get_parameters, set_vector
+from smajax.model.rigs import dead_weight
 from smajax.report.drawing import BLUE, named, panels
 from smajax.simulation.simulate import simulate
 
-from .rigs import dead_weight
 from .row import Result, Row
 
 # One trial against the next: the room's air, the draught, and how the wire sits in its clamps.

@@ -6,12 +6,13 @@ import jax.numpy as jnp
 import numpy as np
 from matplotlib.figure import Figure
 
+from smajax.model.rigs import coupon
 from smajax.model.wire.constitutive import young_modulus
 from smajax.model.wire.heat import cross_section
 from smajax.model.wire.resistance import resistance_per_metre
 from smajax.report.drawing import BLUE, GREY, keyed, named, panels
 
-from .rigs import batch, coupon
+from .rigs import batch
 from .row import Result, Row
 
 BIAS, ADDED = 100e6, 20e6  # Pa: the stress held, and what an added mass puts on top

@@ -8,11 +8,12 @@ import jax.numpy as jnp
 import numpy as np
 from matplotlib.figure import Figure
 
+from smajax.model.rigs import coupon
 from smajax.model.system import System
 from smajax.model.wire.branch_amplitude import AbstractRenewal, AsPrinted, Corrected
 from smajax.report.drawing import BLUE, GREEN, RED, keyed, named, panels
 
-from .rigs import Recorded, coupon, simulated
+from .rigs import Recorded, simulated
 from .row import Result, Row
 
 STRESS = 100e6  # Pa: A_s' = 82.5, A_f' = 92.5, M_s' = 66.5, M_f' = 56.5

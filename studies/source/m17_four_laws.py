@@ -9,9 +9,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from smajax.core.parameters import set_parameters
+from smajax.model.rigs import coupon
 from smajax.report.drawing import LAW_COLOURS, LAW_STYLES, keyed, named, panels
 
-from .rigs import LAWS, coupon, simulated
+from .rigs import LAWS, simulated
 from .row import Result, Row
 
 STRESS = 150e6  # Pa, of the thermal cycle

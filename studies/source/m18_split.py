@@ -6,9 +6,10 @@ import jax.numpy as jnp
 import numpy as np
 from matplotlib.figure import Figure
 
+from smajax.model.rigs import coupon
 from smajax.report.drawing import BLUE, LAW_COLOURS, RED, keyed, named, panels
 
-from .rigs import coupon, simulated
+from .rigs import simulated
 from .row import Result, Row
 
 COLD, LOAD = 23.0, 100e6

@@ -7,9 +7,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from smajax.core.parameters import set_parameters
+from smajax.model.rigs import coupon
 from smajax.report.drawing import BLUE, RED, named, panels
 
-from .rigs import coupon, simulated
+from .rigs import simulated
 from .row import Result, Row
 
 # A_s = 68, A_f = 78, M_s = 52 C: title, temperature, fraction at the start, largest stress.

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from smajax.control.presets import pid, pid_tuned_at
+from smajax.model.rigs import arm
 
-from .rigs import arm
 from .set_points import Runs, at_set_points, overshoot, regulated, steady, time_of
 
 

@@ -9,10 +9,11 @@ import jax.numpy as jnp
 import numpy as np
 from matplotlib.figure import Figure
 
+from smajax.model.rigs import arm
 from smajax.report.drawing import LAW_COLOURS, LAW_STYLES, keyed, named, panels
 from smajax.simulation.simulate import DEFAULT_STEP
 
-from .rigs import LAWS, Recorded, arm, austenite_range, controlled
+from .rigs import LAWS, Recorded, austenite_range, controlled
 
 SECONDS, PERIOD = 20.0, 0.01
 

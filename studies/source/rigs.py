@@ -1,8 +1,7 @@
-"""The source's rigs as the figures use them: one choice for all rows of a rig, made in the presets."""
+"""The source's rigs (`smajax.model.rigs`) simulated: compiled once for all rows of a rig, results in numpy."""
 
 from __future__ import annotations
 
-import dataclasses
 from typing import Any
 
 import equinox as eqx
@@ -12,11 +11,8 @@ from jaxtyping import Array, Float
 
 from smajax.control.closed_loop import ClosedLoop, simulate_closed_loop
 from smajax.control.presets import stress_sliding
-from smajax.model.presets import build
 from smajax.model.system import System
 from smajax.model.types import Series, Trajectory
-from smajax.model.wire.constitutive import AbstractForm, IntegratedForm, RateForm
-from smajax.model.wire.laws import under_law
 from smajax.simulation.simulate import simulate
 
 Batched = Float[Array, "runs time"]
@@ -24,33 +20,6 @@ Batched = Float[Array, "runs time"]
 Recorded = Any
 
 LAWS = ("tanaka", "liang", "brinson", "enhanced")
-
-
-def arm(law: str = "enhanced", form: AbstractForm | None = None) -> System:
-    """The rotary arm of section 3.1, with the rate form (eq. 3.2) of the constitutive law, as section 3.3 has it."""
-    return _formed(_under(build("niti_table_3_1", "arm", "amplified_voltage"), law), form or RateForm())
-
-
-def dead_weight(law: str = "enhanced", form: AbstractForm | None = None) -> System:
-    """The hanging mass of section 3.5.
-
-    With the integrated form (eq. 4.51) of the constitutive law: under the rate form a cycle does not close (M11).
-    """
-    return _formed(_under(build("flexinol_table_3_2", "dead_weight", "flexinol_voltage"), law), form)
-
-
-def coupon(law: str = "enhanced", load: str = "coupon", form: AbstractForm | None = None) -> System:
-    """The wire of Table 3.2 on a prescribed path of temperature and stress (or strain), integrated form."""
-    return _formed(_under(build("flexinol_table_3_2", load, "none"), law), form)
-
-
-def _formed(system: System, form: AbstractForm | None) -> System:
-    constitutive = dataclasses.replace(system.wire.constitutive, form=form or IntegratedForm())
-    return dataclasses.replace(system, wire=dataclasses.replace(system.wire, constitutive=constitutive))
-
-
-def _under(system: System, law: str) -> System:
-    return dataclasses.replace(system, wire=under_law(system.wire, law))
 
 
 def recorded(run: Trajectory | ClosedLoop) -> Recorded:

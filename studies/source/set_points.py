@@ -21,12 +21,13 @@ from smajax.control.figures_of_merit import Merit, merit
 from smajax.control.presets import temperature_vsc
 from smajax.control.reference import clock, constant
 from smajax.core.parameters import set_parameters, set_vector
+from smajax.model.rigs import arm
 from smajax.model.system import System
 from smajax.model.types import Scalar
 from smajax.report.drawing import BLACK, BLUE, GREEN, GREY, RED, named, panels
 from smajax.simulation.simulate import DEFAULT_STEP
 
-from .rigs import Recorded, arm, austenite_range
+from .rigs import Recorded, austenite_range
 
 SECONDS, PERIOD = 10.0, 0.01
 SET_POINTS = (-30.0, -15.0, 0.0, 10.0, 20.0, 40.0, 50.0, 65.0)  # degrees

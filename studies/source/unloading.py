@@ -7,9 +7,10 @@ import functools
 import jax.numpy as jnp
 import numpy as np
 
+from smajax.model.rigs import dead_weight
 from smajax.simulation.simulate import DEFAULT_STEP
 
-from .rigs import LAWS, Recorded, batch, dead_weight
+from .rigs import LAWS, Recorded, batch
 
 INITIAL_MASS = 0.363  # kg: the captions'; the text says 388 g, eq. 3.23 uses 343 g
 # Under a constant h_c 16 V is far above the range at 363 g; this one leaves the fraction of the experiment (M13).

@@ -6,11 +6,12 @@ import jax.numpy as jnp
 import numpy as np
 from matplotlib.figure import Figure
 
+from smajax.model.rigs import arm
 from smajax.model.wire.constitutive import AbstractForm
 from smajax.report.drawing import BLUE, GREY, RED, keyed, named, panels
 from smajax.simulation.simulate import DEFAULT_STEP
 
-from .rigs import Recorded, arm, austenite_range, simulated
+from .rigs import Recorded, austenite_range, simulated
 
 SECONDS = 30.0
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import html
 import json
 from collections.abc import Sequence
@@ -74,11 +75,19 @@ def _made(row: Row, folder: Path, fast: bool) -> Drawn:
     return Drawn(row, bool(result.holds), result.found, result.caveat)
 
 
+def _figures_mark() -> str:
+    """Hex digest of the figures' own modules, which `source_mark` does not see: they are outside the package."""
+    digest = hashlib.sha256()
+    for file in sorted(Path(__file__).parent.glob("*.py")):
+        digest.update(file.read_bytes())
+    return digest.hexdigest()
+
+
 def draw(rows: Sequence[Row], folder: Path, fast: bool, progress: Progress) -> list[Drawn]:
     """Make each row, or take it from `folder` where an interrupted call of this code and setting has finished it."""
     folder.mkdir(parents=True, exist_ok=True)
     mark = folder / MARK
-    setting = f"{'fast' if fast else 'full'} {source_mark()}\n"
+    setting = f"{'fast' if fast else 'full'} {source_mark()} {_figures_mark()}\n"
     if not mark.exists() or mark.read_text(encoding="utf-8") != setting:
         stale = [
             name

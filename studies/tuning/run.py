@@ -14,7 +14,7 @@ from smajax.control.presets import CONTROLLERS
 from smajax.core.files import replace
 from smajax.core.progress import Event, Message, Progress
 from smajax.core.runtime import prepare
-from studies.source.rigs import arm
+from smajax.model.rigs import arm
 from studies.tuning.peers import PROBLEMS, Problem, searched
 from studies.tuning.picture import draw
 from studies.tuning.record import HERE, keep, kept

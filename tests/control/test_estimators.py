@@ -23,11 +23,11 @@ from smajax.control.estimators.unscented import Unscented
 from smajax.control.measured_state import Sensor
 from smajax.control.presets import model_filter, printed_filter, stress_sliding
 from smajax.core.parameters import get_parameters, set_parameters, set_vector
+from smajax.model.rigs import arm, coupon, dead_weight
 from smajax.model.system import initial_state
 from smajax.model.types import Motion
 from smajax.model.wire.branch_amplitude import AsPrinted
 from smajax.simulation.simulate import simulate
-from studies.source.rigs import arm, coupon, dead_weight
 
 PERIOD, COUNT, NOISE = 0.01, 450, 1e-3
 ARM = arm()

@@ -24,8 +24,8 @@ from smajax.control.reference import clock, constant
 from smajax.control.sweep import Grid, closed_loops, lanes, ratios
 from smajax.core.parameters import get_parameters, set_parameters
 from smajax.core.progress import quiet
+from smajax.model.rigs import arm
 from smajax.report.sweep_run import SweepSettings, goes_on, run_sweep
-from studies.source.rigs import arm
 from tests.helpers.in_browser import HOSTILE, faults
 
 RATIOS = ("payload_ratio", "supply_ratio")

@@ -39,10 +39,10 @@ from smajax.control.tune.terms import TERMS
 from smajax.core.display_units import digits
 from smajax.core.parameters import get_parameters, parameters
 from smajax.core.progress import Event
+from smajax.model.rigs import arm
 from smajax.report.sweep_run import SweepSettings, run_sweep
 from smajax.report.tune_folder import OURS, ended, tune_into
 from smajax.report.tune_page import met, price
-from studies.source.rigs import arm
 from tests.helpers.in_browser import HOSTILE, faults
 
 SECONDS, ROWS = 3.0, 10  # as the sweep of test_sweep.py: programs are compiled once

@@ -17,11 +17,11 @@ from smajax.core.checkpointed_scan import checkpointed_scan, recomputed, solved
 from smajax.engine import Engine, EngineWarning, Unsupported, program
 from smajax.engine.kernel import Kernel, compiled
 from smajax.engine.translate import VECTORS, translate
+from smajax.model.rigs import arm
 from smajax.simulation.batch.axes import sampled, zipped
 from smajax.simulation.batch.chunks import chunks
 from smajax.simulation.batch.run_batch import run_batch
 from smajax.simulation.measures import Largest, Last, Mean, MeanSquare
-from studies.source.rigs import arm
 
 Function = Callable[..., jax.Array]
 Numbers = tuple[Any, ...]

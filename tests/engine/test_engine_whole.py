@@ -15,10 +15,10 @@ from smajax.control.tune.members import tuned_on
 from smajax.core.parameters import get_parameters, parameters, set_parameters
 from smajax.model.effects.library import LIBRARY
 from smajax.model.extended import extended
+from smajax.model.rigs import arm
 from smajax.simulation.batch.axes import sampled
 from smajax.simulation.batch.chunks import chunks
 from smajax.simulation.batch.run_batch import run_batch
-from studies.source.rigs import arm
 from tests.engine.test_engine import same_batch
 from tests.model.test_every_effect import RIGS, _rig
 

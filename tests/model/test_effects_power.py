@@ -19,12 +19,12 @@ from smajax.model.effects.end_conduction import DEPTH, EndConduction
 from smajax.model.effects.library import LIBRARY
 from smajax.model.extended import extended
 from smajax.model.presets import build
+from smajax.model.rigs import arm
 from smajax.model.system import System, initial_state
 from smajax.model.wire.heat import mass_per_metre
 from smajax.simulation.batch.axes import grid
 from smajax.simulation.batch.run_batch import run_batch
 from smajax.simulation.compiled import simulate_compiled
-from studies.source.rigs import arm
 
 DT = 0.05
 RIGS = {

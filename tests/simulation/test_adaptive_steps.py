@@ -11,6 +11,7 @@ import pytest
 
 from smajax.core.parameters import set_parameters
 from smajax.engine import program
+from smajax.model.rigs import arm
 from smajax.model.system import initial_state
 from smajax.model.types import Inputs, Scalar, State
 from smajax.simulation.adaptive_steps import advance
@@ -18,7 +19,6 @@ from smajax.simulation.batch.axes import zipped
 from smajax.simulation.batch.run_batch import run_batch
 from smajax.simulation.measures import Last
 from smajax.simulation.step import step, step_and_error
-from studies.source.rigs import arm
 
 SECONDS = 4.0
 VOLTAGE = np.linspace(5.5, 8.5, 12)  # the fast ones throw the arm past the slack wire

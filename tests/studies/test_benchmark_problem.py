@@ -14,10 +14,10 @@ from scipy.integrate import solve_ivp
 
 from smajax.cli import explicit_arm as equations
 from smajax.core.parameters import set_parameters
+from smajax.model.rigs import arm
 from smajax.simulation.simulate import simulate
 from studies.benchmarks import numba_arm, numba_peer, peers, problem
 from studies.benchmarks.given import Given, load
-from studies.source.rigs import arm
 
 SOLVED = 4
 DT = 0.005  # s

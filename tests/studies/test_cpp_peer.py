@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 from smajax.core.parameters import get_parameters, parameter_values, set_parameters
+from smajax.model.rigs import arm
 from smajax.model.system import System
 from smajax.model.types import Scalar, Trajectory
 from smajax.simulation.simulate import simulate
 from studies.benchmarks import cpp, numba_arm
-from studies.source.rigs import arm
 
 DT, STEPS = 0.005, 2000
 

@@ -10,8 +10,8 @@ import pytest
 
 from smajax.control import presets as presets
 from smajax.core.parameters import get_parameters
+from smajax.model.rigs import arm
 from studies.gains.record import HERE
-from studies.source.rigs import arm
 
 ARM = arm()
 RECORDED = [

@@ -141,6 +141,10 @@ def estimators(incomplete: str) -> list[str]:
 
 
 def figures(incomplete: str) -> list[str]:
-    from studies.source.catalogue import CHAPTERS, every_row
+    from smajax.cli.source_figures import load
 
-    return _offered([*CHAPTERS, *(row.name for row in every_row())], incomplete)
+    try:
+        catalogue = load("catalogue")
+    except FileNotFoundError:
+        return []  # the command itself says what to do
+    return _offered([*catalogue.CHAPTERS, *(row.name for row in catalogue.every_row())], incomplete)

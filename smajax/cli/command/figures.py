@@ -32,8 +32,10 @@ def figures(
 ) -> None:
     """Draw the source's figures, each with the number that proves it, and print which claims hold.
 
-    Exit code 3 when one that was asked for does not. Figures that lie in the folder already stay on its page. Ctrl-C loses
-    nothing: the same command goes on with the figures that are missing.
+    Exit code 3 when one that was asked for does not. Figures that lie in the folder already stay on its page. After
+    Ctrl-C the same command draws the figures that are missing.
+
+    The figures are not part of the package `smajax`: a wheel brings them as `smajax_studies`, a checkout as `studies/source`.
 
     Example:  smajax figures M7 C12 --out figures
     """
@@ -42,28 +44,28 @@ def figures(
     prepare()
     from smajax.cli.command.folder import claimed
     from smajax.cli.progress_display import shown
-    from studies.source.catalogue import CHAPTERS, rows
-    from studies.source.write import as_text, draw, write_pages
+    from smajax.cli.source_figures import load
 
+    catalogue, write = load("catalogue"), load("write")
     try:
-        asked = [row for name in names or CHAPTERS for row in rows(name)]
+        requested = [row for name in names or catalogue.CHAPTERS for row in catalogue.rows(name)]
     except KeyError as error:
         raise typer.BadParameter(error.args[0], param_hint="NAME") from None
     setting = {"setting": "fast" if fast else "full"}
-    kept = "Finished figures are kept: the same command goes on."
+    resume = "Finished figures are cached: the same command resumes."
     with (
-        resumable(kept, out, "[MC]*.json"),
+        resumable(resume, out, "[MC]*.json"),
         claimed(out, "figures", setting, OWN, overwrite),
         shown(console(), told_how=not json_out) as progress,
     ):
-        drawn = draw(list(dict.fromkeys(asked)), out, fast, progress)
-        page = write_pages(out)
+        drawn = write.draw(list(dict.fromkeys(requested)), out, fast, progress)
+        page = write.write_pages(out)
     if json_out:
         typer.echo(
             json.dumps({one.row.name: {"holds": one.holds, "found": one.found, "note": one.caveat} for one in drawn})
         )
     else:
-        typer.echo(as_text(drawn))
+        typer.echo(write.as_text(drawn))
         typer.echo(f"Page: {page.resolve()}")
     if open_page:
         browse(page)

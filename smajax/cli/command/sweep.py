@@ -99,8 +99,8 @@ def sweep(
     from smajax.control.mismatch import short_name
     from smajax.control.presets import CONTROLLERS
     from smajax.control.sweep import check_mismatches
+    from smajax.model.rigs import arm
     from smajax.report.sweep_run import SweepSettings, as_text, files_of, goes_on, run_sweep
-    from studies.source.rigs import arm
 
     try:
         tuned = tuple(read_gains(path, arm()) for path in gains or ())

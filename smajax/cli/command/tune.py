@@ -122,9 +122,9 @@ def tune(
     from smajax.control.tune.objective import REGULATION
     from smajax.control.tune.settings import TuneSettings
     from smajax.control.tune.terms import TERMS
+    from smajax.model.rigs import arm
     from smajax.report.tune_folder import OURS, STATE, ended, tune_into
     from smajax.report.tune_page import gain_rows, record
-    from studies.source.rigs import arm
 
     try:
         begun = read_gains(start, arm()) if start is not None else None
