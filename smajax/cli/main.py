@@ -1,4 +1,4 @@
-"""The command line: which commands there are. Each is a file in `command/`."""
+"""The command line: which commands there are. Each is a file in `commands/`."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from typing import Annotated
 
 import typer
 
-from smajax.cli.command.base import console, insistent
-from smajax.cli.command.close_loop import close_loop_command, demo
-from smajax.cli.command.figures import figures
-from smajax.cli.command.identify import identify_command
-from smajax.cli.command.listing import effects, presets
-from smajax.cli.command.machine import bench, doctor
-from smajax.cli.command.new_experiment import new_experiment
-from smajax.cli.command.positional import Command
-from smajax.cli.command.renamed import as_now
-from smajax.cli.command.simulate import simulate
-from smajax.cli.command.sweep import sweep
-from smajax.cli.command.tune import tune
+from smajax.cli.commands.close_loop import close_loop_command, demo
+from smajax.cli.commands.figures import figures
+from smajax.cli.commands.identify import identify_command
+from smajax.cli.commands.listing import effects, presets
+from smajax.cli.commands.machine import bench, doctor
+from smajax.cli.commands.new_experiment import new_experiment
+from smajax.cli.commands.simulate import simulate
+from smajax.cli.commands.sweep import sweep
+from smajax.cli.commands.tune import tune
+from smajax.cli.options import console, insistent
+from smajax.cli.positional import Command
+from smajax.cli.renamed import as_now
 
 EXIT_CODES = """\
 Exit codes: 0 done; 1 a defect of smajax (a traceback says where); 2 input or options that cannot be used, with what to do;
@@ -109,7 +109,7 @@ def main() -> None:
             )
             raise SystemExit(2) from None
         # Imported when there is an error: `--help` does not wait for them.
-        from smajax.cli.command.folder import FolderTaken
+        from smajax.cli.result_folder import FolderTaken
         from smajax.core.plugins import PluginError
         from smajax.core.units import UnitError
         from smajax.data.experiment.errors import ExperimentError

@@ -16,7 +16,7 @@ from smajax.control.controllers.base import AbstractController
 from smajax.control.interface import check_interface
 from smajax.control.reference import Reference, resting
 from smajax.core.parameters import check_bounds, parameter_values
-from smajax.data.step_command import clock_of, given
+from smajax.data.text_input import clock_of, given
 from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.system import System
 from smajax.model.wire.order import check_order

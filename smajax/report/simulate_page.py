@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 
 from smajax.control.figures_of_merit import MERIT_UNITS, STEADY, Rest
 from smajax.control.mismatch import in_words
-from smajax.control.single_run import Ran
+from smajax.control.run_request import Ran
 from smajax.core.display_units import axis_label, digits, display, label
 from smajax.core.files import as_netcdf, csv_text, heading, json_text, replace
 from smajax.core.parameters import parameter_values, parameters

@@ -8,11 +8,11 @@ from typing import Any
 
 from smajax.control.gains_file import write_gains
 from smajax.control.presets import CONTROLLERS
-from smajax.control.tune.descent import Descent, load
-from smajax.control.tune.evolve import Evolution
-from smajax.control.tune.evolve import load as load_evolution
+from smajax.control.tune.cma_es import Evolution
+from smajax.control.tune.cma_es import load as load_evolution
+from smajax.control.tune.multistart import Descent, load
 from smajax.control.tune.settings import TuneSettings
-from smajax.control.tune.tune import Tuned, tune
+from smajax.control.tune.tuning import Tuned, tune
 from smajax.core.files import json_text, replace
 from smajax.core.progress import Message, Progress, quiet
 from smajax.core.provenance import digest, made_with

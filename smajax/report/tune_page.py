@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from smajax.control.mismatch import MISMATCHES
-from smajax.control.tune.members import BEYOND
 from smajax.control.tune.moves import Moves
+from smajax.control.tune.scenarios import BEYOND
 from smajax.control.tune.terms import TERMS
-from smajax.control.tune.tune import Check, Tuned
+from smajax.control.tune.tuning import Check, Tuned
 from smajax.core.display_units import digits
 from smajax.core.files import csv_text, heading
 from smajax.core.provenance import made_with

@@ -8,7 +8,7 @@ from matplotlib.ticker import FuncFormatter
 
 from smajax.control.tune.objective import rank
 from smajax.control.tune.terms import TERMS
-from smajax.control.tune.tune import Tuned
+from smajax.control.tune.tuning import Tuned
 from smajax.report.pictures import AFTER, BEFORE, MEASURED, QUIET, as_png, new_figure, tidy
 
 WIDE = 9.6  # inches

@@ -18,10 +18,10 @@ from cmaes import CMA
 from scipy.optimize import minimize
 
 from smajax.control.presets import CONTROLLERS
-from smajax.control.tune.descent import Effort, begin, one_round
 from smajax.control.tune.evaluate import LOOPS, STEP, Rig
-from smajax.control.tune.members import Members, tuned_on
+from smajax.control.tune.multistart import Effort, begin, one_round
 from smajax.control.tune.objective import Goal
+from smajax.control.tune.scenarios import Members, tuned_on
 from smajax.model.system import System
 
 VARIATION = {"inertia": 0.2, "damping": 0.2, "convection": 0.2}

@@ -17,11 +17,11 @@ from scipy.stats import qmc
 from smajax.control.gains_file import write_gains
 from smajax.control.mismatch import MISMATCHES
 from smajax.control.tune.evaluate import Rig
-from smajax.control.tune.members import Members, tuned_on
 from smajax.control.tune.objective import Goal
+from smajax.control.tune.scenarios import Members, tuned_on
 from smajax.control.tune.settings import TuneSettings
 from smajax.control.tune.terms import TERMS
-from smajax.control.tune.tune import Tuned, rig_of, tune
+from smajax.control.tune.tuning import Tuned, rig_of, tune
 from smajax.core.progress import Message, Progress
 from smajax.model.system import System
 from studies.tuning.record import HERE

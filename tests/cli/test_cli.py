@@ -18,9 +18,9 @@ import pytest
 from rich.progress import Progress as Bars
 from typer.testing import CliRunner
 
-from smajax.cli.command import renamed
-from smajax.cli.command.base import console, numbers, pairs, texts, understood
+from smajax.cli import renamed
 from smajax.cli.main import app, main
+from smajax.cli.options import console, numbers, pairs, texts, understood
 from smajax.cli.progress_display import VARIABLE, _TimeLeft, shown
 from smajax.control.compose import compose, with_values
 from smajax.control.mismatch import MISMATCHES, variation_of
@@ -182,7 +182,7 @@ def test_what_is_kept_is_said_only_where_something_is(tmp_path: Path, finished: 
     if finished:
         (tmp_path / "fits" / f"{'0f' * 16}.npz").write_text("")
     code = (
-        "import pathlib, sys\nfrom smajax.cli.command.base import FITS, resumable\n"
+        "import pathlib, sys\nfrom smajax.cli.options import FITS, resumable\n"
         "with resumable('Kept.', pathlib.Path(sys.argv[1]), FITS):\n    raise KeyboardInterrupt"
     )
     told = subprocess.run([sys.executable, "-c", code, str(tmp_path)], capture_output=True, text=True, check=False)
@@ -194,7 +194,7 @@ def test_ctrl_c_while_garbage_is_collected_ends_the_command() -> None:
     """What a callback of the collector raises is dropped by Python: Ctrl-C is given again until it is answered."""
     code = (
         "import gc, os, signal, time\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n"
-        "from smajax.cli.command.base import resumable\n"
+        "from smajax.cli.options import resumable\n"
         "def swallow(phase, info):\n    gc.callbacks.remove(swallow)\n    os.kill(os.getpid(), signal.SIGINT)\n"
         "    time.sleep(0.1)\n"
         "with resumable():\n    gc.callbacks.append(swallow)\n    gc.collect()\n    print('went on', flush=True)\n"

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from smajax.cli.command.base import FITS
-from smajax.cli.command.folder import MARK, FolderTaken, claimed
 from smajax.cli.main import app
+from smajax.cli.options import FITS
+from smajax.cli.result_folder import MARK, FolderTaken, claimed
 from smajax.core.progress import quiet
 from studies.source.row import Result, Row
 from studies.source.write import MARK as FIGURES_MARK

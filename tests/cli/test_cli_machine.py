@@ -17,14 +17,14 @@ import scipy.io
 import xarray as xr
 from typer.testing import CliRunner
 
-from smajax.cli import doctor
-from smajax.cli.bench import bench, in_words
+from smajax.cli import installation as doctor
+from smajax.cli.benchmark import bench, in_words
 from smajax.cli.main import app
 from smajax.core.parameters import parameter_values
+from smajax.data.experiment.column_guess import columns_of
+from smajax.data.experiment.draft import begun
 from smajax.data.experiment.errors import ExperimentError
-from smajax.data.experiment.guess import columns_of
 from smajax.data.experiment.load import load_experiment
-from smajax.data.experiment.template import begun
 from smajax.data.model_catalogue import CATALOGUE
 from smajax.data.readers.read import read_table
 from smajax.data.readers.table import MeasuredDataError

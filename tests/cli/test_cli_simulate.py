@@ -14,15 +14,15 @@ import xarray as xr
 from PIL import Image
 from typer.testing import CliRunner
 
-from smajax.cli.command.folder import FolderTaken
 from smajax.cli.main import app
+from smajax.cli.result_folder import FolderTaken
 from smajax.control.compose import compose
 from smajax.control.mismatch import MISMATCHES
-from smajax.control.single_run import Asked, AskedLoop, run_closed, run_open
+from smajax.control.run_request import Asked, AskedLoop, run_closed, run_open
 from smajax.control.sweep import mismatched
 from smajax.core.parameters import parameter_values, set_parameters
 from smajax.core.units import UnitError
-from smajax.data.step_command import clock_of, given, levels
+from smajax.data.text_input import clock_of, given, levels
 from smajax.model.presets import build
 from smajax.report.simulate_page import as_csv, conclusions, summary_rows, write_run
 from smajax.simulation.compiled import simulate_compiled

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from smajax.cli.command.folder import MARK, FolderTaken, claimed
+from smajax.cli.result_folder import MARK, FolderTaken, claimed
 from smajax.core.files import replace, writing
 from smajax.core.result_cache import Kept
 from tests.helpers.small_bench import bench, log, refused, smajax
@@ -134,7 +134,7 @@ def test_another_result_is_refused_and_overwritten_when_asked(tmp_path: Path) ->
 def test_two_programs_never_write_into_one_folder(tmp_path: Path) -> None:
     """The second is refused while the first is at work, and goes on when it has ended, even by kill -9."""
     code = (
-        "import sys, time\nfrom pathlib import Path\nfrom smajax.cli.command.folder import claimed\n"
+        "import sys, time\nfrom pathlib import Path\nfrom smajax.cli.result_folder import claimed\n"
         "with claimed(Path(sys.argv[1]), 'sweep', {}, []):\n    print('in', flush=True)\n    time.sleep(60)"
     )
     out = tmp_path / "out"

@@ -20,7 +20,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from smajax.cli.command.folder import MARK
+from smajax.cli.result_folder import MARK
 from tests.helpers.small_bench import bench
 
 

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from smajax.control.tune import evolve as module
-from smajax.control.tune.evolve import POPULATION, Evolution, evolve, load
-from smajax.control.tune.members import Members, tuned_on
+from smajax.control.tune import cma_es as module
+from smajax.control.tune.cma_es import POPULATION, Evolution, evolve, load
 from smajax.control.tune.objective import Goal
+from smajax.control.tune.scenarios import Members, tuned_on
 from smajax.control.tune.terms import TERMS
 
 COLUMNS = list(TERMS)

@@ -25,7 +25,7 @@ from smajax.control.sweep import Grid, closed_loops, lanes, ratios
 from smajax.core.parameters import get_parameters, set_parameters
 from smajax.core.progress import quiet
 from smajax.model.rigs import arm
-from smajax.report.sweep_run import SweepSettings, goes_on, run_sweep
+from smajax.report.sweep_folder import SweepSettings, goes_on, run_sweep
 from tests.helpers.in_browser import HOSTILE, faults
 
 RATIOS = ("payload_ratio", "supply_ratio")
@@ -122,7 +122,7 @@ def test_what_is_finished_is_kept(folder: Path, monkeypatch: pytest.MonkeyPatch)
     def never(*_: object, **__: object) -> None:
         raise AssertionError("computed again")
 
-    monkeypatch.setattr("smajax.report.sweep_run.closed_loops", never)
+    monkeypatch.setattr("smajax.report.sweep_folder.closed_loops", never)
     run_sweep(arm(), SETTINGS, folder, quiet)
     assert (folder / "vsc3.csv").read_bytes() == before
     other = SweepSettings(("vsc3",), "payload", "supply", 2, (0.0, 31.0), (1.0,), seconds=3.0)

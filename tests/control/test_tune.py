@@ -17,9 +17,9 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from smajax.cli.command.base import UNMET
-from smajax.cli.command.folder import MARK
 from smajax.cli.main import app
+from smajax.cli.options import UNMET
+from smajax.cli.result_folder import MARK
 from smajax.control.closed_loop import simulate_closed_loop
 from smajax.control.figures_of_merit import Merit, merit_by_set_point
 from smajax.control.gain_search import regulation_cost
@@ -28,19 +28,19 @@ from smajax.control.presets import CONTROLLERS
 from smajax.control.reference import resting
 from smajax.control.sweep import closed_loops, lanes
 from smajax.control.tune import trust
-from smajax.control.tune.descent import Descent, Effort, begin, load, one_round
+from smajax.control.tune.cma_es import Evolution
 from smajax.control.tune.evaluate import STEP, Rig
-from smajax.control.tune.evolve import Evolution
-from smajax.control.tune.members import between, never_seen, tuned_on
 from smajax.control.tune.moves import walk
+from smajax.control.tune.multistart import Descent, Effort, begin, load, one_round
 from smajax.control.tune.objective import Goal, rank, value_and_slope
+from smajax.control.tune.scenarios import between, never_seen, tuned_on
 from smajax.control.tune.settings import TuneSettings
 from smajax.control.tune.terms import TERMS
 from smajax.core.display_units import digits
 from smajax.core.parameters import get_parameters, parameters
 from smajax.core.progress import Event
 from smajax.model.rigs import arm
-from smajax.report.sweep_run import SweepSettings, run_sweep
+from smajax.report.sweep_folder import SweepSettings, run_sweep
 from smajax.report.tune_folder import OURS, ended, tune_into
 from smajax.report.tune_page import met, price
 from tests.helpers.in_browser import HOSTILE, faults

@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from smajax.cli.command.base import DEMOS
+from smajax.cli.options import DEMOS
 from smajax.data.experiment.errors import ExperimentError
 from smajax.data.experiment.load import load_experiment
 from smajax.data.experiment.magnitude import BY_HEAT

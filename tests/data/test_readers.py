@@ -13,11 +13,11 @@ import pytest
 import scipy.io
 import xarray as xr
 
-from smajax.data.experiment.guess import columns_of
+from smajax.data.experiment.column_guess import columns_of
 from smajax.data.readers import headers
-from smajax.data.readers.extras import needed
+from smajax.data.readers.duplicate_times import once
+from smajax.data.readers.optional_packages import needed
 from smajax.data.readers.read import read_table
-from smajax.data.readers.repeated import once
 from smajax.data.readers.table import MeasuredDataError, check_time
 
 

@@ -11,7 +11,7 @@ import pytest
 from smajax.control.presets import CONTROLLERS
 from smajax.control.tune import evaluate
 from smajax.control.tune.evaluate import STEP, Rig
-from smajax.control.tune.members import tuned_on
+from smajax.control.tune.scenarios import tuned_on
 from smajax.core.parameters import get_parameters, parameters, set_parameters
 from smajax.model.effects.library import LIBRARY
 from smajax.model.extended import extended

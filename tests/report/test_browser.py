@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from smajax.control.single_run import Asked, AskedLoop, run_closed
+from smajax.control.run_request import Asked, AskedLoop, run_closed
 from smajax.core.progress import quiet
 from smajax.report.plain_page import table, whole
 from smajax.report.simulate_page import write_run

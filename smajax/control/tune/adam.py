@@ -11,8 +11,8 @@ import numpy as np
 import optax
 
 from smajax.control.tune.evaluate import Seen
-from smajax.control.tune.members import Members
 from smajax.control.tune.objective import Goal, multiplied, rank, value_and_slope
+from smajax.control.tune.scenarios import Members
 
 STEP = 0.06  # of a gain, share of its box by logarithm
 LONGEST = 10.0  # units of the cost per box: longer slopes are cut to that

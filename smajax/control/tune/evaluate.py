@@ -23,7 +23,7 @@ from smajax.control.mismatch import MISMATCHES
 from smajax.control.presets import Box, ControllerPreset
 from smajax.control.reference import clock, constant
 from smajax.control.sweep import NUMBER, TARGET, mismatched
-from smajax.control.tune.members import Members
+from smajax.control.tune.scenarios import Members
 from smajax.control.tune.terms import TERMS, Terms, as_judged, as_shown, watch_of
 from smajax.core.parameters import check_bounds, get_parameters, set_parameters, set_vector
 from smajax.model.system import System

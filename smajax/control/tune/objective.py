@@ -22,7 +22,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from smajax.control.tune.evaluate import Seen
-from smajax.control.tune.members import Members
+from smajax.control.tune.scenarios import Members
 from smajax.control.tune.terms import TERMS
 from smajax.core.names import instead
 from smajax.model.types import Scalar

@@ -8,10 +8,10 @@ from typing import Any
 
 from smajax.control.interface import between_in_words, check_interface, check_set_points
 from smajax.control.presets import CONTROLLERS
-from smajax.control.tune.descent import Effort
 from smajax.control.tune.evaluate import STEP
-from smajax.control.tune.members import BESIDE, check_variation
+from smajax.control.tune.multistart import Effort
 from smajax.control.tune.objective import REGULATION, Goal
+from smajax.control.tune.scenarios import BESIDE, check_variation
 from smajax.control.tune.terms import TERMS
 from smajax.core.names import instead
 from smajax.model.system import System

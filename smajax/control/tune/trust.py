@@ -19,8 +19,8 @@ from scipy import sparse
 from scipy.optimize import linprog
 
 from smajax.control.tune.evaluate import Seen
-from smajax.control.tune.members import Members
 from smajax.control.tune.objective import SPREAD, Goal
+from smajax.control.tune.scenarios import Members
 
 FIRST, WIDEST, NARROWEST = 0.15, 0.3, 2e-3  # Delta, share of the box by logarithm; below the last a start has ended
 GOOD, WIDER, NARROWER = 0.5, 2.0, 0.4  # share of the promise from which Delta grows, and by how much

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 
 from smajax.core.units import UnitError, convert
-from smajax.data.experiment.guess import MEANT, TIME
+from smajax.data.experiment.column_guess import MEANT, TIME
 from smajax.data.experiment.schema import ChannelSection, RunSection, TimeSection
 from smajax.data.readers.headers import unit_in
 

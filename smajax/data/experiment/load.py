@@ -11,12 +11,12 @@ import numpy as np
 
 from smajax.core.names import instead
 from smajax.core.units import UnitError, convert, parse_quantity
+from smajax.data.experiment.column_overrides import own_columns
+from smajax.data.experiment.data_folder import data_folder
 from smajax.data.experiment.errors import ExperimentError, at_key, check_name
-from smajax.data.experiment.folder import data_folder
 from smajax.data.experiment.headings import heading_warnings
 from smajax.data.experiment.magnitude import common_warnings, magnitude_warnings
 from smajax.data.experiment.model_description import WIRE_SIZES, Catalogue, ModelDescription
-from smajax.data.experiment.own_columns import own_columns
 from smajax.data.experiment.plausibility import (
     constant_warnings,
     copy_warnings,

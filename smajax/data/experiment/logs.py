@@ -6,8 +6,8 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from smajax.data.experiment.column_guess import COUPON, DRIVES, GUESS, TIME, Column, columns_of
 from smajax.data.experiment.grouping import RunFiles, paired
-from smajax.data.experiment.guess import COUPON, DRIVES, GUESS, TIME, Column, columns_of
 from smajax.data.readers.table import MeasuredDataError, NoColumnError, Table
 
 

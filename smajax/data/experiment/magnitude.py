@@ -9,7 +9,7 @@ import numpy as np
 from scipy.signal import lfilter
 from scipy.stats import spearmanr
 
-from smajax.data.experiment.guess import in_levels
+from smajax.data.experiment.column_guess import in_levels
 from smajax.data.experiment.model_description import Scale
 from smajax.data.experiment.signals import ReadRun
 from smajax.data.readers.table import Array

@@ -11,14 +11,14 @@ from pathlib import Path
 import numpy as np
 
 from smajax.core.units import convert, parse_quantity
+from smajax.data.experiment.column_guess import TIME
+from smajax.data.experiment.column_overrides import own_columns
 from smajax.data.experiment.errors import ExperimentError, at_key
-from smajax.data.experiment.guess import TIME
-from smajax.data.experiment.own_columns import own_columns
-from smajax.data.experiment.readings import check_readings
+from smajax.data.experiment.reading_limits import check_readings
 from smajax.data.experiment.record import Run
 from smajax.data.experiment.schema import ChannelSection, RunSection, TimeSection
+from smajax.data.readers.duplicate_times import once
 from smajax.data.readers.noise import detect_quantum
-from smajax.data.readers.repeated import once
 from smajax.data.readers.resample import resample_input, resample_output, resample_with_gaps, uniform_clock
 from smajax.data.readers.table import Array, MeasuredDataError, NoColumnError, Table, check_time
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from smajax.core.units import is_unit
-from smajax.data.readers.moments import NANO, moment, past_midnight
+from smajax.data.readers.clock_times import NANO, moment, past_midnight
 from smajax.data.readers.table import Array, MeasuredDataError, Table
 
 COMMENT_MARKS = ("#", "%")

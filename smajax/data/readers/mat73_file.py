@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from smajax.data.readers.extras import needed
+from smajax.data.readers.optional_packages import needed
 from smajax.data.readers.table import Array, MeasuredDataError, Table
 
 LARGEST = 1 << 29  # numbers of one variable, 4 GiB

@@ -11,7 +11,7 @@ import numpy as np
 
 from smajax.core.names import listed
 from smajax.data.readers.mat73_file import read_mat73
-from smajax.data.readers.mat_sound import sound_arrays
+from smajax.data.readers.mat_integrity import sound_arrays
 from smajax.data.readers.table import Array, MeasuredDataError, Table
 
 _MAGIC = b"MATLAB "

@@ -7,9 +7,9 @@ from pathlib import Path
 from types import MappingProxyType
 
 from smajax.core.names import listed, nearest
-from smajax.data.readers.columns_file import read_netcdf, read_parquet
 from smajax.data.readers.csv_file import read_csv
 from smajax.data.readers.mat_file import read_mat
+from smajax.data.readers.parquet_netcdf import read_netcdf, read_parquet
 from smajax.data.readers.table import MeasuredDataError, Table
 
 # Endings of text tables; how one is written its first lines say.

@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from smajax.cli.command.base import INSIDE
+from smajax.cli.options import INSIDE
 from smajax.core.files import json_text, replace, sweep_up
 
 MARK = ".smajax.json"

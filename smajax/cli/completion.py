@@ -91,7 +91,7 @@ def objectives(incomplete: str) -> list[str]:
 
 
 def rules(incomplete: str) -> list[str]:
-    from smajax.control.tune.descent import RULES
+    from smajax.control.tune.multistart import RULES
 
     return _offered(RULES, incomplete)
 
@@ -104,7 +104,7 @@ def _before(ctx: typer.Context) -> list[str]:
 def values(ctx: typer.Context, incomplete: str) -> list[str]:
     """Parameters of the model that the words before name, short names first."""
     from smajax.control.mismatch import MISMATCHES
-    from smajax.control.single_run import Asked
+    from smajax.control.run_request import Asked
     from smajax.core.parameters import parameters
     from smajax.model.presets import DRIVES, LOADS, WIRES
 
@@ -129,7 +129,7 @@ def unknowns_declared(ctx: typer.Context, incomplete: str) -> list[str]:
 
 
 def demos(incomplete: str) -> list[str]:
-    from smajax.cli.command.base import DEMOS
+    from smajax.cli.options import DEMOS
 
     return _offered(DEMOS, incomplete)
 

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from smajax.data.experiment.column_guess import TIME
 from smajax.data.experiment.errors import check_name
-from smajax.data.experiment.guess import TIME
 from smajax.data.experiment.schema import ChannelSection, RunSection, TimeSection
 
 Places = tuple[Mapping[str, ChannelSection], TimeSection | None]

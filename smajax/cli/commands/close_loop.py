@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from smajax.cli.command import complete
-from smajax.cli.command.base import (
+from smajax.cli import completion
+from smajax.cli.options import (
     DEMOS,
     FITS,
     Json,
@@ -35,9 +35,9 @@ def _loop(experiment: Path, out: Path, command: str, overwrite: bool, told_how: 
 
     prepare()
     from smajax.attribution.close_loop import close_loop
-    from smajax.cli.command.folder import check_path, claimed
     from smajax.cli.progress_display import shown
-    from smajax.data.experiment.asked import asked_of
+    from smajax.cli.result_folder import check_path, claimed
+    from smajax.data.experiment.fingerprint import asked_of
     from smajax.data.experiment.load import load_experiment
     from smajax.data.model_catalogue import CATALOGUE
     from smajax.report.write import write_report
@@ -91,7 +91,9 @@ def close_loop_command(
 
 def demo(
     out: Annotated[Path, typer.Option(help="folder for the reports")] = Path("demo-report"),
-    only: Annotated[str | None, typer.Option(help=f"one of {', '.join(DEMOS)}", autocompletion=complete.demos)] = None,
+    only: Annotated[
+        str | None, typer.Option(help=f"one of {', '.join(DEMOS)}", autocompletion=completion.demos)
+    ] = None,
     overwrite: Overwrite = False,
     json_out: Json = False,
     open_page: Open = False,

@@ -28,7 +28,7 @@ from smajax.core.names import instead
 from smajax.core.parameters import parameter_values, parameters
 from smajax.core.wording import and_listed
 from smajax.data.experiment.magnitude import MELTS
-from smajax.data.step_command import clock_of, given
+from smajax.data.text_input import clock_of, given
 from smajax.model.channels import INPUT_UNITS
 from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.load.coupon import AbstractCoupon

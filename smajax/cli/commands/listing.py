@@ -8,15 +8,15 @@ from typing import Annotated, Any
 
 import typer
 
-from smajax.cli.command import complete
-from smajax.cli.command.base import Json, until_nobody_reads
+from smajax.cli import completion
+from smajax.cli.options import Json, until_nobody_reads
 from smajax.core.wording import aligned
 
 
 def effects(
     names: Annotated[
         list[str] | None,
-        typer.Argument(help="effects, or equations whose effects to list", autocompletion=complete.effects),
+        typer.Argument(help="effects, or equations whose effects to list", autocompletion=completion.effects),
     ] = None,
     json_out: Json = False,
 ) -> None:
@@ -107,7 +107,7 @@ def _told(part: Any, without: Collection[str]) -> dict[str, dict[str, Any]]:
 def presets(
     names: Annotated[
         list[str] | None,
-        typer.Argument(help="a wire, a load, a drive: list their parameters", autocompletion=complete.presets),
+        typer.Argument(help="a wire, a load, a drive: list their parameters", autocompletion=completion.presets),
     ] = None,
     json_out: Json = False,
 ) -> None:

@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from smajax.cli.command import complete
-from smajax.cli.command.base import (
+from smajax.cli import completion
+from smajax.cli.options import (
     UNMET,
     Json,
     Open,
@@ -33,7 +33,8 @@ def tune(
     controller: Annotated[
         str,
         typer.Argument(
-            help="pid, vsc1, vsc2, vsc3, nvsc, sld, backstepping1 or backstepping2", autocompletion=complete.controllers
+            help="pid, vsc1, vsc2, vsc3, nvsc, sld, backstepping1 or backstepping2",
+            autocompletion=completion.controllers,
         ),
     ],
     set_points: Annotated[
@@ -44,28 +45,28 @@ def tune(
         typer.Option(
             help="how wrong the plant may be: damping=20%,payload=50% (or 0.2, 0.5) of what the controller believes, both ways; "
             "may be repeated",
-            autocompletion=complete.shares_of_mismatches,
+            autocompletion=completion.shares_of_mismatches,
         ),
     ] = None,
     objective: Annotated[
-        str, typer.Option(help="nominal, worst or mean-variance", autocompletion=complete.objectives)
+        str, typer.Option(help="nominal, worst or mean-variance", autocompletion=completion.objectives)
     ] = "worst",
     weights: Annotated[
         list[str] | None,
         typer.Option(
             help="of tracking_error, overshoot, settling_time, steady_error, energy, chatter, peak_temperature; default "
             "settling_time=1,overshoot=1,steady_error=2 (a second, a degree, half a degree)",
-            autocompletion=complete.terms,
+            autocompletion=completion.terms,
         ),
     ] = None,
     limits: Annotated[
         list[str] | None,
         typer.Option(
             help="of the same, met in every loop: settling_time=4,overshoot=2deg; in s, deg, J, V/s or degC where it says no unit",
-            autocompletion=complete.terms,
+            autocompletion=completion.terms,
         ),
     ] = None,
-    by: Annotated[str, typer.Option(help="trust-region or adam", autocompletion=complete.rules)] = "trust-region",
+    by: Annotated[str, typer.Option(help="trust-region or adam", autocompletion=completion.rules)] = "trust-region",
     start: Annotated[
         Path | None, typer.Option(help="gains.json to begin from, in the place of the preset's gains")
     ] = None,
@@ -83,7 +84,9 @@ def tune(
     seconds: Annotated[float, quantity("length of each closed loop", "s", 0.1, 86_400.0)] = 10.0,
     estimator: Annotated[
         str,
-        typer.Option(help="`printed` or `model` filter; none: told the true state", autocompletion=complete.estimators),
+        typer.Option(
+            help="`printed` or `model` filter; none: told the true state", autocompletion=completion.estimators
+        ),
     ] = "",
     noise: Annotated[float, quantity("noise of the angle's readings (1 sigma)", "deg", 0.0, 360.0)] = 0.0,
     period: Annotated[float, quantity("sample time of the controller, a multiple of 10 ms", "s")] = 0.01,
@@ -114,12 +117,12 @@ def tune(
     from smajax.core.runtime import prepare
 
     prepare(cores=True)
-    from smajax.cli.command.folder import FolderTaken, claimed
     from smajax.cli.progress_display import shown
+    from smajax.cli.result_folder import FolderTaken, claimed
     from smajax.control.gains_file import GainsFileError, read_gains
     from smajax.control.mismatch import variation_of
-    from smajax.control.tune.members import check_variation
     from smajax.control.tune.objective import REGULATION
+    from smajax.control.tune.scenarios import check_variation
     from smajax.control.tune.settings import TuneSettings
     from smajax.control.tune.terms import TERMS
     from smajax.model.rigs import arm

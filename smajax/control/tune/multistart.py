@@ -16,8 +16,8 @@ from scipy.stats import qmc
 
 from smajax.control.tune import adam, trust
 from smajax.control.tune.evaluate import Rig
-from smajax.control.tune.members import Members
 from smajax.control.tune.objective import Goal, rank
+from smajax.control.tune.scenarios import Members
 from smajax.core.files import writing
 from smajax.core.names import instead
 from smajax.core.result_cache import arrays

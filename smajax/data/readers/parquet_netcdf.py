@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from smajax.data.readers.extras import needed
-from smajax.data.readers.moments import EPOCH
+from smajax.data.readers.clock_times import EPOCH
+from smajax.data.readers.optional_packages import needed
 from smajax.data.readers.table import Array, MeasuredDataError, Table
 
 

@@ -8,8 +8,8 @@ from typing import Annotated
 
 import typer
 
-from smajax.cli.command import complete
-from smajax.cli.command.base import UNMET, Json
+from smajax.cli import completion
+from smajax.cli.options import UNMET, Json
 
 
 def new_experiment(
@@ -22,16 +22,16 @@ def new_experiment(
     load: Annotated[
         str,
         typer.Option(
-            help="of a log with a position: dead_weight (default) or bias_spring", autocompletion=complete.loads
+            help="of a log with a position: dead_weight (default) or bias_spring", autocompletion=completion.loads
         ),
     ] = "",
     wire: Annotated[
-        str, typer.Option(help="of `smajax presets`; the bounds are around its values", autocompletion=complete.wires)
+        str, typer.Option(help="of `smajax presets`; the bounds are around its values", autocompletion=completion.wires)
     ] = "",
     drive: Annotated[
         str,
         typer.Option(
-            help="of `smajax presets`; takes the input channels that it needs", autocompletion=complete.drives
+            help="of `smajax presets`; takes the input channels that it needs", autocompletion=completion.drives
         ),
     ] = "",
     decimal: Annotated[
@@ -56,9 +56,9 @@ def new_experiment(
 
     prepare()
     from smajax.core.files import replace
+    from smajax.data.experiment.draft import begun
     from smajax.data.experiment.errors import ExperimentError
     from smajax.data.experiment.load import load_experiment
-    from smajax.data.experiment.template import begun
     from smajax.data.model_catalogue import CATALOGUE
 
     guessed = begun(files, out, title, load, wire, drive, decimal)

@@ -16,8 +16,8 @@ import numpy as np
 from cmaes import CMA
 
 from smajax.control.tune.evaluate import Rig
-from smajax.control.tune.members import Members
 from smajax.control.tune.objective import Goal, rank
+from smajax.control.tune.scenarios import Members
 from smajax.core.files import writing
 from smajax.core.progress import Progress, Stage, quiet
 from smajax.core.result_cache import arrays

@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from smajax.cli.command import complete
-from smajax.cli.command.base import (
+from smajax.cli import completion
+from smajax.cli.options import (
     Json,
     Open,
     Overwrite,
@@ -32,14 +32,14 @@ def sweep(
         typer.Option(
             help="pid, vsc1, vsc2, vsc3, nvsc, sld, backstepping1, backstepping2 (with commas), or `all`; default all, "
             "or those of the gains files",
-            autocompletion=complete.several_controllers,
+            autocompletion=completion.several_controllers,
         ),
     ] = None,
     over: Annotated[
         str,
         typer.Option(
             help="the two mismatches of the maps, or one of curves; names alone: each goes from -50% to +100%",
-            autocompletion=complete.mismatches,
+            autocompletion=completion.mismatches,
         ),
     ] = "convection,damping",
     points: Annotated[
@@ -62,7 +62,9 @@ def sweep(
     seconds: Annotated[float, quantity("length of each closed loop", "s", 0.1, 86_400.0)] = 10.0,
     estimator: Annotated[
         str,
-        typer.Option(help="`printed` or `model` filter; none: told the true state", autocompletion=complete.estimators),
+        typer.Option(
+            help="`printed` or `model` filter; none: told the true state", autocompletion=completion.estimators
+        ),
     ] = "",
     noise: Annotated[float, quantity("noise of the angle's readings (1 sigma)", "deg", 0.0, 360.0)] = 0.0,
     period: Annotated[float, quantity("sample time of the controller, a multiple of 10 ms", "s")] = 0.01,
@@ -93,14 +95,14 @@ def sweep(
     from smajax.core.runtime import prepare
 
     prepare(cores=True)
-    from smajax.cli.command.folder import FolderTaken, claimed
     from smajax.cli.progress_display import shown
+    from smajax.cli.result_folder import FolderTaken, claimed
     from smajax.control.gains_file import GainsFileError, read_gains
     from smajax.control.mismatch import short_name
     from smajax.control.presets import CONTROLLERS
     from smajax.control.sweep import check_mismatches
     from smajax.model.rigs import arm
-    from smajax.report.sweep_run import SweepSettings, as_text, files_of, goes_on, run_sweep
+    from smajax.report.sweep_folder import SweepSettings, as_text, files_of, goes_on, run_sweep
 
     try:
         tuned = tuple(read_gains(path, arm()) for path in gains or ())

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from smajax.cli.command.base import UNMET, Json, console, resumable, within
+from smajax.cli.options import UNMET, Json, console, resumable, within
 
 
 def doctor(
@@ -24,7 +24,7 @@ def doctor(
     from smajax.core.runtime import prepare
 
     prepare()
-    from smajax.cli import doctor as surgery
+    from smajax.cli import installation as surgery
     from smajax.core.wording import counted
 
     freed = surgery.clear_cache() if clear_cache else None
@@ -101,8 +101,8 @@ def bench(
     from smajax.core.runtime import prepare
 
     prepare(cores=True)
-    from smajax.cli.bench import bench as timed
-    from smajax.cli.bench import in_words
+    from smajax.cli.benchmark import bench as timed
+    from smajax.cli.benchmark import in_words
     from smajax.cli.progress_display import shown
     from smajax.core.files import json_text, replace
 

@@ -12,12 +12,12 @@ from smajax.control.interface import interface_of
 from smajax.control.mismatch import MISMATCHES
 from smajax.control.presets import CONTROLLERS
 from smajax.control.sweep import positions
-from smajax.control.tune.descent import Descent, begin, one_round
+from smajax.control.tune.cma_es import Evolution, evolve
 from smajax.control.tune.evaluate import LOOPS, STEP, Rig, Seen
-from smajax.control.tune.evolve import Evolution, evolve
-from smajax.control.tune.members import Members, never_seen, tuned_on
 from smajax.control.tune.moves import Moves, moved
+from smajax.control.tune.multistart import Descent, begin, one_round
 from smajax.control.tune.objective import Goal, rank
+from smajax.control.tune.scenarios import Members, never_seen, tuned_on
 from smajax.control.tune.settings import TuneSettings
 from smajax.core.parameters import get_parameters, parameters
 from smajax.core.progress import Progress, Stage, quiet

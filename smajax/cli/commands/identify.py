@@ -9,8 +9,8 @@ from typing import Annotated, Any
 
 import typer
 
-from smajax.cli.command import complete
-from smajax.cli.command.base import FITS, Json, Open, Overwrite, browse, console, resumable, within
+from smajax.cli import completion
+from smajax.cli.options import FITS, Json, Open, Overwrite, browse, console, resumable, within
 
 OWN = ("identify.html", "identify.json", "parameters.csv", "runs.csv", FITS)
 
@@ -31,7 +31,7 @@ def identify_command(
     profile: Annotated[
         str,
         typer.Option(
-            help="parameters to draw a profile of, with commas, or `all`", autocompletion=complete.unknowns_declared
+            help="parameters to draw a profile of, with commas, or `all`", autocompletion=completion.unknowns_declared
         ),
     ] = "",
     robust: Annotated[bool, typer.Option("--robust", help="Huber's loss: samples far off count less")] = False,
@@ -54,12 +54,12 @@ def identify_command(
     from smajax.core.runtime import prepare
 
     prepare()
-    from smajax.cli.command.folder import FolderTaken, check_path, claimed
     from smajax.cli.progress_display import shown
+    from smajax.cli.result_folder import FolderTaken, check_path, claimed
     from smajax.core.files import json_text
     from smajax.core.progress import Message
-    from smajax.data.experiment.asked import asked_of
     from smajax.data.experiment.errors import ExperimentError
+    from smajax.data.experiment.fingerprint import asked_of
     from smajax.data.experiment.load import load_experiment
     from smajax.data.model_catalogue import CATALOGUE
     from smajax.fit.experiment_problem import free_by_name

@@ -8,8 +8,8 @@ from typing import Annotated
 
 import typer
 
-from smajax.cli.command import complete
-from smajax.cli.command.base import UNMET, Json, Open, Overwrite, browse, console, resumable
+from smajax.cli import completion
+from smajax.cli.options import UNMET, Json, Open, Overwrite, browse, console, resumable
 
 OWN = (".made-by", "index.html", "README.md", "figures.csv", "[MC][0-9].*", "[MC][0-9][0-9].*")
 
@@ -19,7 +19,7 @@ def figures(
         list[str] | None,
         typer.Argument(
             help="chapters (chapter3, chapter4) and single figures (M7 C12); default all",
-            autocompletion=complete.figures,
+            autocompletion=completion.figures,
         ),
     ] = None,
     out: Annotated[Path, typer.Option(help="folder for the pictures, the numbers (JSON) and the table")] = Path(
@@ -42,8 +42,8 @@ def figures(
     from smajax.core.runtime import prepare
 
     prepare()
-    from smajax.cli.command.folder import claimed
     from smajax.cli.progress_display import shown
+    from smajax.cli.result_folder import claimed
     from smajax.cli.source_figures import load
 
     catalogue, write = load("catalogue"), load("write")

@@ -14,7 +14,7 @@ from smajax.core.names import instead
 from smajax.core.parameters import parameter_values, parameters
 from smajax.core.units import convert
 from smajax.core.wording import and_listed
-from smajax.data.experiment.guess import (
+from smajax.data.experiment.column_guess import (
     COUPON,
     DRIVES,
     GUESS,

@@ -8,8 +8,8 @@ from typing import Annotated
 
 import typer
 
-from smajax.cli.command import complete
-from smajax.cli.command.base import (
+from smajax.cli import completion
+from smajax.cli.options import (
     Json,
     Open,
     Overwrite,
@@ -40,12 +40,12 @@ def _inputs(option: str, several: Sequence[str] | None) -> dict[str, str]:
 
 def simulate(
     wire: Annotated[
-        str, typer.Argument(help="a wire of `smajax presets`", autocompletion=complete.wires)
+        str, typer.Argument(help="a wire of `smajax presets`", autocompletion=completion.wires)
     ] = "niti_table_3_1",
-    load: Annotated[str, typer.Argument(help="a load of `smajax presets`", autocompletion=complete.loads)] = "arm",
+    load: Annotated[str, typer.Argument(help="a load of `smajax presets`", autocompletion=completion.loads)] = "arm",
     drive: Annotated[
         str,
-        typer.Argument(help="a drive of `smajax presets`; `none` for a coupon", autocompletion=complete.drives),
+        typer.Argument(help="a drive of `smajax presets`; `none` for a coupon", autocompletion=completion.drives),
     ] = "amplified_voltage",
     step: Annotated[
         str | None,
@@ -71,11 +71,11 @@ def simulate(
             help="parameters: wire.heat.convection_coefficient=80, convection_coefficient='80 W/m^2/K' or "
             "latent_heat.enthalpy='20 J/g', which adds that effect; in SI, degC or rad where it says no unit; payload=+20% is "
             "that much more than the preset has; may be repeated",
-            autocompletion=complete.values,
+            autocompletion=completion.values,
         ),
     ] = None,
     law: Annotated[
-        str, typer.Option(help="kinetics: tanaka, liang, brinson or enhanced", autocompletion=complete.laws)
+        str, typer.Option(help="kinetics: tanaka, liang, brinson or enhanced", autocompletion=completion.laws)
     ] = "",
     seconds: Annotated[
         float | None, quantity("length of the run; default: that of the inputs", "s", above=0.0, like="10s")
@@ -88,7 +88,7 @@ def simulate(
         Path | None, typer.Option(help="gains.json of `smajax tune`: a closed loop of the arm by that controller")
     ] = None,
     controller: Annotated[
-        str, typer.Option(help="a closed loop by this controller's preset gains", autocompletion=complete.controllers)
+        str, typer.Option(help="a closed loop by this controller's preset gains", autocompletion=completion.controllers)
     ] = "",
     set_point: Annotated[
         str | None,
@@ -101,12 +101,14 @@ def simulate(
         typer.Option(
             help="how the plant is wrong: damping=+20%,payload=-50% of what the controller believes, or any parameter's value as "
             "--set; may be repeated",
-            autocompletion=complete.values,
+            autocompletion=completion.values,
         ),
     ] = None,
     estimator: Annotated[
         str,
-        typer.Option(help="`printed` or `model` filter; none: told the true state", autocompletion=complete.estimators),
+        typer.Option(
+            help="`printed` or `model` filter; none: told the true state", autocompletion=completion.estimators
+        ),
     ] = "",
     noise: Annotated[float, quantity("noise of the angle's readings (1 sigma)", "deg", 0.0, 360.0)] = 0.0,
     period: Annotated[float, quantity("sample time of the controller, a multiple of --dt", "s")] = 0.01,
@@ -137,14 +139,14 @@ def simulate(
     from smajax.core.runtime import prepare
 
     prepare()
-    from smajax.cli.command.folder import check_path, claimed
     from smajax.cli.progress_display import shown
+    from smajax.cli.result_folder import check_path, claimed
     from smajax.control.gains_file import GainsFileError
-    from smajax.control.single_run import Asked, AskedError, AskedLoop, channels, run_closed, run_open
+    from smajax.control.run_request import Asked, AskedError, AskedLoop, channels, run_closed, run_open
     from smajax.core.files import json_text
     from smajax.core.progress import Stage
     from smajax.core.wording import aligned
-    from smajax.data.step_command import reads_file
+    from smajax.data.text_input import reads_file
     from smajax.report.simulate_page import OWN, merit_rows, mismatch_rows, record, rest_rows, summary_rows, write_run
 
     check_path(out)
