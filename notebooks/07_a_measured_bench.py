@@ -24,7 +24,8 @@ import numpy as np  # noqa: E402
 from smajax.core.parameters import set_parameters  # noqa: E402
 from smajax.data.experiment.load import load_experiment  # noqa: E402
 from smajax.data.model_catalogue import CATALOGUE  # noqa: E402
-from smajax.model.extended import base_model, extended  # noqa: E402
+from smajax.fit.base_model import base_model  # noqa: E402
+from smajax.model.extended import extended  # noqa: E402
 from smajax.simulation.compiled import simulate_compiled  # noqa: E402
 
 studies = next(one / "studies" for one in (Path.cwd(), *Path.cwd().parents) if (one / "studies").is_dir())
