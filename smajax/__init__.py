@@ -11,8 +11,11 @@ from one process to the next; `jax.config.update("jax_enable_x64", True)` asks f
 
 from __future__ import annotations
 
+import sys
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
+
+from smajax.core.moved_modules import install as _old_paths
 
 if TYPE_CHECKING:
     from smajax.attribution.close_loop import close_loop as close_loop
@@ -148,3 +151,7 @@ def __getattr__(name: str) -> Any:
 def __dir__() -> list[str]:
     own = (name for name in globals() if name.startswith("__"))
     return sorted({*own, *NAMES, *MODULES, "__version__"})
+
+
+# Module paths of version 0.1, and functions before modules of their name.
+_old_paths(sys.modules[__name__])
