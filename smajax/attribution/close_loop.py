@@ -26,7 +26,7 @@ from smajax.attribution.unknown_words import told_of
 from smajax.attribution.verdict import cannot_know, shown, summary, unexplained, verdict
 from smajax.core.progress import Progress, Stage, as_progress, quiet, report_checks
 from smajax.core.provenance import made_with
-from smajax.core.result_cache import Kept
+from smajax.core.result_cache import ResultCache
 from smajax.data.experiment.record import Experiment
 from smajax.fit.sensitivity import sensitivity
 from smajax.fit.uncertainty import identifiability
@@ -60,7 +60,7 @@ def close_loop(
     began = clock.monotonic()
     progress = as_progress(progress)
     job = job_of(experiment)
-    kept = Kept(memory)
+    cache = ResultCache(memory)
     progress(Stage("checking what these runs can tell", 0.0))
     start = job.problem.start_values()
     setting = Search(
@@ -68,7 +68,7 @@ def close_loop(
         job.unknowns,
         job.bounds,
         job.candidates,
-        kept,
+        cache,
         lambda value: shown(value, experiment.output_unit, experiment.output_name),
         progress,
         experiment.outputs[0].noise_given,
@@ -159,7 +159,7 @@ def close_loop(
             len(job.fit_runs),
             integration,
             assumed(job),
-            after.uncertainty.together,
+            after.uncertainty.correlated_groups,
         ),
         check=tuple(check),
         output_name=experiment.output_name,
@@ -176,18 +176,18 @@ def close_loop(
         rivals=mistaken,
         unknown=unknown,
         lone_runs=lone,
-        provenance=_provenance(experiment, kept, command, seed, clock.monotonic() - began),
+        provenance=_provenance(experiment, cache, command, seed, clock.monotonic() - began),
     )
 
 
-def _provenance(experiment: Experiment, kept: Kept, command: str, seed: int, seconds: float) -> dict[str, str]:
+def _provenance(experiment: Experiment, cache: ResultCache, command: str, seed: int, seconds: float) -> dict[str, str]:
     return {
         **made_with(),
         "command": command,
         "seed": str(seed),
         "step": f"{experiment.step} s",
         "seconds": f"{seconds:.0f}",
-        "batches of fits taken from an earlier, interrupted run": str(kept.reused),
+        "batches of fits taken from an earlier, interrupted run": str(cache.reused),
         "sha256 of the experiment file": hashlib.sha256(experiment.path.read_bytes()).hexdigest(),
         **{f"sha256 of {run.name}": run.sha256 for run in experiment.runs},
     }

@@ -12,8 +12,8 @@ from smajax.attribution.score_test import Score, scaled, switches
 from smajax.attribution.search import start_values
 from smajax.core.whiteness import correlation_time, split_runs
 from smajax.data.experiment.record import Run
-from smajax.fit.design import trial
-from smajax.fit.predicted import shown_at
+from smajax.fit.design import candidate_problem
+from smajax.fit.predicted import predicted_at
 from smajax.fit.sensitivity import Sensitivity, sensitivity
 
 ALIKE = 0.7  # of an effect's trace: from here on a rival is worth a refit
@@ -108,10 +108,10 @@ def weights(costs: np.ndarray) -> np.ndarray:
 def separating_run(setting: Search, one: Model, other: Model, runs: Sequence[Run]) -> tuple[str, float]:
     """(the candidate run on which two fitted models differ most, rms difference over the noise); "" without a candidate."""
     problem, index = setting.restricted((*one.effects, *other.effects))
-    candidates, there = trial(problem, one.values[index], runs)
+    candidates, there = candidate_problem(problem, one.values[index], runs)
     if not candidates:
         return "", float("nan")
-    first, second = shown_at(there, [model.values[index] for model in (one, other)])
+    first, second = predicted_at(there, [model.values[index] for model in (one, other)])
     apart = np.sqrt(np.mean(there.centred(first - second) ** 2, axis=1)) / float(setting.problem.noise_sigma)
     best = int(np.argmax(np.nan_to_num(apart, nan=-1.0)))
     return list(candidates)[best], float(apart[best])

@@ -22,15 +22,15 @@ from smajax.attribution.residual_diagnostics import all_noise
 from smajax.attribution.run_extent import extent_of
 from smajax.attribution.score_test import Score, scaled, switches
 from smajax.core.progress import Message, Progress, quiet
-from smajax.core.result_cache import Kept
+from smajax.core.result_cache import ResultCache
 from smajax.core.whiteness import correlation_time, split_runs
-from smajax.fit.levenberg_marquardt import MOST_STEPS, Fit, fit_in_box
+from smajax.fit.levenberg_marquardt import MAX_STEPS, Fit, FitSettings, levenberg_marquardt
 from smajax.fit.packed_runs import RunBatch
 from smajax.fit.predicted import misfits
 from smajax.fit.problem import Problem
 from smajax.fit.sensitivity import sensitivity
-from smajax.fit.starts import from_many_starts, hopped
-from smajax.fit.uncertainty import held
+from smajax.fit.starts import multistart, perturbed_restarts
+from smajax.fit.uncertainty import at_bound
 from smajax.model.effects.base import Extent
 from smajax.model.effects.library import LIBRARY
 
@@ -53,7 +53,7 @@ class Start:
     effects: tuple[str, ...]
     values: np.ndarray  # (P,), in the order of the whole library's problem
     weights: np.ndarray | None = None  # of the runs, (R,); None: all alike
-    tie: float = 0.0  # of `Problem.lane`
+    tie: float = 0.0  # of `Problem.task`
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ class Search:
     unknowns: tuple[str, ...]
     bounds: Mapping[str, tuple[float, float]]
     candidates: tuple[str, ...]
-    kept: Kept
+    cache: ResultCache
     shown: Callable[[float], str]  # an error in the unit that an engineer reads
     progress: Progress = quiet
     noise_given: bool = True  # by the experiment file; else estimated
@@ -122,7 +122,7 @@ class Search:
     def loose(self, effects: Sequence[str], values: np.ndarray) -> list[str]:
         """Those of them that no bound holds at `values`."""
         place = self.problem.names.index
-        return [name for name in self.free(effects) if not held(float(values[place(name)]), *self.bounds[name])]
+        return [name for name in self.free(effects) if not at_bound(float(values[place(name)]), *self.bounds[name])]
 
     @cached_property
     def extent(self) -> Extent:
@@ -165,11 +165,11 @@ class Search:
         enough: float = ENOUGH,
         hops: bool = False,
         carried: Sequence[str] = (),
-        most: int = MOST_STEPS,
+        most: int = MAX_STEPS,
     ) -> tuple[list[Fit], np.ndarray]:
         """Fit every start: (fits with full parameter vectors, misfit of all runs at each, (S, R, N)).
 
-        `hops`: each from points near its end as well (`fit.starts.hopped`). `carried`: effects that the model holds besides,
+        `hops`: each from points near its end as well (`fit.starts.perturbed_restarts`). `carried`: effects that the model holds besides,
         as it did in the fits before, whose program then serves again. `most`: steps.
         """
         sets = sorted({start.effects for start in starts})
@@ -180,13 +180,14 @@ class Search:
             together = [one for part, _ in parts for one in part]
             return [together[k] for k in order], np.concatenate([found for _, found in parts])[order]
         problem, index = self.restricted([*carried, *(name for start in starts for name in start.effects)])
-        lanes = [
-            problem.lane(self.free(start.effects), self.bounds, start.values[index], start.weights, start.tie)
+        tasks = [
+            problem.task(self.free(start.effects), self.bounds, start.values[index], start.weights, start.tie)
             for start in starts
         ]
-        fits = fit_in_box(problem, lanes, most=most, enough=enough, kept=self.kept, progress=self.progress, what=what)
+        settings = FitSettings(most, enough, self.cache, self.progress, what)
+        fits = levenberg_marquardt(problem, tasks, settings)
         if hops:
-            fits = hopped(problem, lanes, fits, enough=enough, kept=self.kept, progress=self.progress, what=what)
+            fits = perturbed_restarts(problem, tasks, fits, settings)
         found = misfits(problem, [one.values for one in fits])
         return [self.whole(one, start.values, index) for start, one in zip(starts, fits, strict=True)], found
 
@@ -194,15 +195,14 @@ class Search:
         """The base model fitted, from `start` and from many points of its box."""
         problem, index = self.restricted(())
         here = eqx.tree_at(lambda one: one.system, problem, problem.system_at(jnp.asarray(start[index])))
-        fits = from_many_starts(
+        fits = multistart(
             here,
             self.unknowns,
             self.bounds,
             seed,
-            progress=self.progress,
-            kept=self.kept,
-            enough=ENOUGH,
-            what="fitting the base model",
+            settings=FitSettings(
+                tolerance=ENOUGH, cache=self.cache, progress=self.progress, stage="fitting the base model"
+            ),
         )
         return self.whole(fits[0], start, index)
 

@@ -43,7 +43,7 @@ class ParameterFinding:
     lower: float
     upper: float
     start: float
-    remark: str = ""  # "at its lower bound", "moves together with ...", ...
+    remark: str = ""  # "at its lower bound", "correlated with ...", ...
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ import numpy as np
 
 from smajax.attribution.cross_validation import Search, nudged
 from smajax.attribution.score_test import memory_of, score_of, switches, without
-from smajax.fit.predicted import shown_and_slopes
+from smajax.fit.predicted import predicted_and_derivatives
 from smajax.fit.sensitivity import Sensitivity, sensitivity
 from smajax.model.effects.library import LIBRARY
 
@@ -52,7 +52,7 @@ def looked_at(setting: Search, values: np.ndarray, effects: Sequence[str], fitte
             points.append(here)
             towards.append(np.eye(len(values))[[index(name)]])
             whose.append((number, name))
-    _, slopes = shown_and_slopes(setting.problem, np.stack(points), np.stack(towards))
+    _, slopes = predicted_and_derivatives(setting.problem, np.stack(points), np.stack(towards))
     columns = -setting.problem.centred(slopes[:, 0]) / np.asarray(setting.problem.noise)
     jacobian = at.jacobian.copy()
     found = Looked(dataclasses.replace(at, jacobian=jacobian))

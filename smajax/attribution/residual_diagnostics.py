@@ -102,7 +102,7 @@ def _kept(residuals: Sequence[np.ndarray], noise_sigma: float) -> float:
     found = first_order(residuals)
     independent = sum(len(run) for run in residuals) / correlation_time(residuals)
     enough = independent > LEAST_INDEPENDENT and found.p_value > WHITE
-    return found.kept if enough and 0.0 < found.kept < KEPT and found.sigma < FED * noise_sigma else 0.0
+    return found.coefficient if enough and 0.0 < found.coefficient < KEPT and found.sigma < FED * noise_sigma else 0.0
 
 
 def all_noise(residuals: Sequence[np.ndarray], noise_sigma: float, noise_given: bool = True) -> bool:

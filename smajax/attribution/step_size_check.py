@@ -12,7 +12,7 @@ import numpy as np
 from smajax.attribution.cross_validation import Model, Search, Start, base_value
 from smajax.attribution.job import Job
 from smajax.fit.packed_runs import halved, simulate_batch
-from smajax.fit.predicted import shown_at
+from smajax.fit.predicted import predicted_at
 from smajax.fit.problem import Problem
 from smajax.model.effects.library import LIBRARY
 from smajax.model.load.coupon import AbstractCoupon
@@ -38,7 +38,7 @@ def kept_at_half_the_step(setting: Search, new: Model, old: Model) -> float:
         without = min(without, fit.cost)
     problem, index = setting.restricted(new.effects)
     fine = Problem.build(problem.system, halved(problem.batch), problem.noise_sigma, problem.offset)
-    misfit = problem.centred(problem.measured - shown_at(fine, [new.values[index]])[0][:, ::2])
+    misfit = problem.centred(problem.measured - predicted_at(fine, [new.values[index]])[0][:, ::2])
     cost = float(np.sum((np.asarray(misfit) / np.asarray(problem.noise)) ** 2))
     return (without - cost) / (without - new.cost) if without > new.cost else 0.0
 

@@ -62,7 +62,7 @@ def with_terms(setting: Search, final: Model) -> tuple[Terms, np.ndarray, Sought
     whole = dataclasses.replace(system, effects=(*system.effects, *found.terms))
     own = [name for name in parameters(whole) if name.split(".")[0] in names]
     known = {name: Prior(0.0, WEAK, False) for name in own}
-    problem = Problem.build(whole, plain.batch, plain.noise_sigma, plain.offset, known=known)
+    problem = Problem.build(whole, plain.batch, plain.noise_sigma, plain.offset, priors=known)
     bounds = {**setting.bounds, **dict.fromkeys(own, (-1.0, 1.0))}
     unknowns = tuple(setting.free(final.effects))
     search = Terms(
@@ -70,7 +70,7 @@ def with_terms(setting: Search, final: Model) -> tuple[Terms, np.ndarray, Sought
         unknowns,
         bounds,
         names,
-        setting.kept,
+        setting.cache,
         setting.shown,
         setting.progress,
         setting.noise_given,

@@ -1,4 +1,4 @@
-"""Work kept on disk by its content, so that a fit that was interrupted goes on where it stopped, to the same end."""
+"""Results and states cached on disk by content: an interrupted fit resumes where it stopped, with the same result."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ import numpy as np
 from smajax.core.files import writing
 from smajax.core.provenance import digest
 
-SELDOM = 1.0  # s between two states of the same work
+SAVE_INTERVAL = 1.0  # s between two states of unfinished work
 
 
 def arrays(path: Path) -> dict[str, np.ndarray] | None:
-    """Named arrays of a file; None where there is none, or one that was damaged, which is work to be done again."""
+    """Named arrays of a file; None where there is none, or a damaged one, whose work is done again."""
     try:
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as kept:
-            return dict(kept)
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as content:
+            return dict(content)
     except (OSError, ValueError, EOFError, KeyError, SyntaxError, tokenize.TokenError, zipfile.BadZipFile, zlib.error):
         return None
 
 
-class Kept:
-    """A folder of finished and unfinished work; without a folder, nothing is kept.
+class ResultCache:
+    """A folder of finished and unfinished work; without a folder, nothing is cached.
 
-    A key covers code, data, model, where the work starts and its settings: what is found under it is the same work.
+    A key covers code, data, model, initial values and settings: a hit is the result of the same work.
     """
 
     def __init__(self, folder: Path | None = None) -> None:
@@ -42,22 +42,22 @@ class Kept:
         """`work`: a pytree of arrays; settings: anything that can be printed, or arrays."""
         if self.folder is None:
             return ""
-        told = [one if isinstance(one, np.ndarray) else repr(one) for one in settings]
-        return digest(work, told)[:32]
+        content = [one if isinstance(one, np.ndarray) else repr(one) for one in settings]
+        return digest(work, content)[:32]
 
     def load(self, key: str) -> dict[str, np.ndarray] | None:
-        """What was kept under `key`."""
+        """The record cached under `key`; None on a miss."""
         path = self._path(key)
         if path is None or not path.exists():
             return None
-        found = arrays(path)
-        self.reused += found is not None
-        return found
+        record = arrays(path)
+        self.reused += record is not None
+        return record
 
     def save(self, key: str, record: Mapping[str, Any], *, last: bool = True) -> None:
-        """Keep arrays under `key`, whole or not at all. A state that is not the `last` one is kept once a second."""
+        """Cache arrays under `key`, whole or not at all. States before the `last` one are saved at most once a second."""
         path = self._path(key)
-        if path is None or (not last and clock.monotonic() - self._saved < SELDOM):
+        if path is None or (not last and clock.monotonic() - self._saved < SAVE_INTERVAL):
             return
         path.parent.mkdir(parents=True, exist_ok=True)
         with writing(path) as file:

@@ -19,7 +19,7 @@ def autocorrelation(series: np.ndarray, lags: int) -> np.ndarray:
     """Autocorrelation at lags 0..`lags` of one run's residual (n,), mean removed."""
     centred = series - series.mean()
     power = float(centred @ centred)
-    # What rounding leaves of a constant is no signal.
+    # Rounding errors of a constant are no signal.
     if power <= len(series) * (ROUNDING * float(np.abs(series).max(initial=0.0))) ** 2:
         return np.concatenate([[1.0], np.zeros(lags)])
     reach = min(lags, len(series) - 1)
@@ -27,12 +27,12 @@ def autocorrelation(series: np.ndarray, lags: int) -> np.ndarray:
         size = fft.next_fast_len(len(series) + reach, real=True)
         sums = fft.irfft(np.abs(fft.rfft(centred, size)) ** 2, size)[: reach + 1]
         return np.concatenate([sums / power, np.zeros(lags - reach)])
-    found = [1.0] + [float(centred[:-lag] @ centred[lag:]) / power for lag in range(1, reach + 1)]
-    return np.asarray(found + [0.0] * (lags - reach))
+    values = [1.0] + [float(centred[:-lag] @ centred[lag:]) / power for lag in range(1, reach + 1)]
+    return np.asarray(values + [0.0] * (lags - reach))
 
 
 def whiteness_p_value(runs: Sequence[np.ndarray], lags: int = LAGS) -> float:
-    """Ljung-Box over all runs at once: the chance of such autocorrelations in white noise.
+    """Ljung-Box over all runs at once: the probability of such autocorrelations in white noise.
 
     Q = sum over runs of n (n + 2) sum_k r_k^2 / (n - k), chi-square with as many degrees of freedom
     as lags were taken over all runs.
@@ -56,24 +56,24 @@ def _ljung_box(runs: Sequence[np.ndarray], lags: int) -> tuple[float, int]:
 
 
 class FirstOrder(NamedTuple):
-    """A series as the noise of a first-order filter, AR(1): r_k = kept r_(k-1) + e_k."""
+    """A series as the noise of a first-order filter, AR(1): r_k = a r_(k-1) + e_k."""
 
-    kept: float  # share of the sample before
+    coefficient: float  # a
     sigma: float  # of e, in the unit of the series
-    p_value: float  # chance of the autocorrelations of e in white noise: small where there is more than such a noise
+    p_value: float  # probability of such autocorrelations of e in white noise: small where AR(1) is not enough
 
 
 def first_order(runs: Sequence[np.ndarray], lags: int = LAGS) -> FirstOrder:
-    """The AR(1) nearest to all runs at once, each about its mean, by least squares; Ljung-Box on what it leaves."""
+    """The AR(1) nearest to all runs at once, each about its mean, by least squares; Ljung-Box on the innovations e."""
     centred = [run - run.mean() for run in runs if len(run) > 1]
     power = sum(float(run[:-1] @ run[:-1]) for run in centred)
     if power == 0.0:
         return FirstOrder(0.0, 0.0, 1.0)
-    kept = sum(float(run[1:] @ run[:-1]) for run in centred) / power
-    left = [run[1:] - kept * run[:-1] for run in centred]
-    statistic, freedom = _ljung_box(left, lags)
-    sigma = float(np.sqrt(np.mean(np.concatenate(left) ** 2)))
-    return FirstOrder(kept, sigma, float(stats.chi2.sf(statistic, freedom - 1)) if freedom > 1 else 1.0)
+    coefficient = sum(float(run[1:] @ run[:-1]) for run in centred) / power
+    innovations = [run[1:] - coefficient * run[:-1] for run in centred]
+    statistic, freedom = _ljung_box(innovations, lags)
+    sigma = float(np.sqrt(np.mean(np.concatenate(innovations) ** 2)))
+    return FirstOrder(coefficient, sigma, float(stats.chi2.sf(statistic, freedom - 1)) if freedom > 1 else 1.0)
 
 
 def correlation_time(runs: Sequence[np.ndarray]) -> float:
@@ -98,8 +98,8 @@ def bartlett_sum(scores: np.ndarray, lags: int) -> np.ndarray:
         around = np.zeros(size)
         around[: lags + 1], around[size - lags :] = weights, weights[:0:-1]
         near = fft.irfft(fft.rfft(scores, size, axis=0) * fft.rfft(around)[:, None], size, axis=0)[:count]
-        found = scores.T @ near
-        return np.asarray(0.5 * (found + found.T))
+        product = scores.T @ near
+        return np.asarray(0.5 * (product + product.T))
     total = scores.T @ scores
     for lag in range(1, lags + 1):
         cross = scores[:-lag].T @ scores[lag:]

@@ -1,4 +1,4 @@
-"""Which run to do next: candidate inputs within what was applied already, ranked by what they would tell."""
+"""Which run to do next: candidate inputs within what was applied already, ranked by their expected information."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from smajax.fit.sensitivity import sensitivity
 from smajax.model.channels import channel
 
 LEVELS = (0.4, 0.6, 0.8, 1.0)  # of the range that was applied
-HELD = 3  # values at most of an input that is held
-SEEN = 1e-12
+MAX_LEVELS = 3  # of an input that is constant within a run
+REGULARISATION = 1e-12  # of the information matrix
 
 
 @dataclass(frozen=True)
 class Suggestion:
-    """A run that was not done: what it applies, and what it would tell."""
+    """A run that was not done: its inputs and its expected information."""
 
     what: str
     inputs: dict[str, np.ndarray]  # channel -> (n,)
@@ -44,19 +44,19 @@ def _shapes(count: int) -> dict[str, np.ndarray]:
     }
 
 
-def _held(runs: Sequence[Run], name: str) -> list[float]:
+def _levels(runs: Sequence[Run], name: str) -> list[float]:
     values = sorted({round(float(np.median(run.inputs[name])), 12) for run in runs})
-    return values if len(values) <= HELD else [values[0], values[len(values) // 2], values[-1]]
+    return values if len(values) <= MAX_LEVELS else [values[0], values[len(values) // 2], values[-1]]
 
 
-def _told(name: str, value: float) -> str:
-    """The value of an input (SI) as a reader sees it: `93 °C`."""
-    shown = channel(name)
-    return f"{digits(shown.of(value))} {shown.unit}".strip()
+def _with_unit(name: str, value: float) -> str:
+    """The value of an input (SI) in its display unit: `93 °C`."""
+    display = channel(name)
+    return f"{digits(display.of(value))} {display.unit}".strip()
 
 
 def candidate_runs(runs: Sequence[Run]) -> dict[str, dict[str, np.ndarray]]:
-    """Inputs by what they are in words: the channel that varies most takes each course, the others the values they had.
+    """Inputs by their description: the channel that varies most takes each course, the others the values they had.
 
     Empty where nothing varies within a run.
     """
@@ -72,23 +72,25 @@ def candidate_runs(runs: Sequence[Run]) -> dict[str, dict[str, np.ndarray]]:
     low = min(float(run.inputs[main].min()) for run in runs)
     high = max(float(run.inputs[main].max()) for run in runs)
     others = [name for name in runs[0].inputs if name != main]
-    found = {}
+    candidates = {}
     for (shape, course), level in itertools.product(_shapes(count).items(), LEVELS):
-        for values in itertools.product(*(_held(runs, name) for name in others)):
+        for values in itertools.product(*(_levels(runs, name) for name in others)):
             top = low + level * (high - low)
-            said = "".join(f", {label(name)} {_told(name, value)}" for name, value in zip(others, values, strict=True))
+            constant = "".join(
+                f", {label(name)} {_with_unit(name, value)}" for name, value in zip(others, values, strict=True)
+            )
             series = {name: np.full(count, value) for name, value in zip(others, values, strict=True)}
-            found[f"{label(main)} {shape}, up to {_told(main, top)}{said}"] = {
+            candidates[f"{label(main)} {shape}, up to {_with_unit(main, top)}{constant}"] = {
                 main: low + course * (top - low),
                 **series,
             }
-    return found
+    return candidates
 
 
-def trial(
+def candidate_problem(
     problem: Problem, values: np.ndarray, runs: Sequence[Run]
 ) -> tuple[dict[str, dict[str, np.ndarray]], Problem]:
-    """(candidate runs by what they are in words, the problem that has them as its runs) at the fit `values` (P,)."""
+    """(candidate runs by their description, the problem that has them as its runs) at the fit `values` (P,)."""
     candidates = candidate_runs(runs)
     batch = problem.batch
     series = list(candidates.values())
@@ -96,11 +98,11 @@ def trial(
         return {}, problem
     length = len(next(iter(series[0].values())))
     blank = jnp.zeros((len(series) * len(batch.outputs), length))
-    # Parameters that a run overrides: as they were in the first one; what is each run's own: as in the mean of them.
-    own = problem.own_at(jnp.asarray(values)).mean(axis=0, keepdims=True)
-    overrides = jnp.repeat(jnp.concatenate([batch.overrides[:1], own], axis=1), len(series), axis=0)
+    # Parameters that a run overrides: as in the first one; those with one value for each run: the mean of them.
+    mean = problem.per_run_at(jnp.asarray(values)).mean(axis=0, keepdims=True)
+    overrides = jnp.repeat(jnp.concatenate([batch.overrides[:1], mean], axis=1), len(series), axis=0)
     inputs = {name: jnp.asarray(np.stack([one[name] for one in series])) for name in batch.inputs}
-    overridden = (*batch.override_names, *problem.own.names)
+    overridden = (*batch.override_names, *problem.per_run.names)
     runs_to_try = RunBatch(inputs, blank, jnp.ones_like(blank), overrides, overridden, batch.dt, outputs=batch.outputs)
     system = problem.system_at(jnp.asarray(values))
     return candidates, Problem.build(system, runs_to_try, problem.noise_sigma, problem.offset)
@@ -112,28 +114,28 @@ def suggestions(
     """The `count` best candidates for the parameters `names` at the fit `values` (P,), best first; D-optimal.
 
     The information of a run is that of its Jacobian at the fit, each run's offset taken off where the experiment has
-    one: it holds for the model as fitted, and knows nothing of an effect that the model lacks.
+    one: it holds for the model as fitted, not for an effect that the model lacks.
     """
-    candidates, to_try = trial(problem, values, runs)
+    candidates, to_try = candidate_problem(problem, values, runs)
     if not candidates or not names:
         return ()
     scale = np.asarray([abs(values[problem.names.index(name)]) or 1.0 for name in names])
     at = sensitivity(problem, values, names)
-    here, priors = at.columns(names) * scale, at.prior_columns(names) * scale
+    columns, priors = at.columns(names) * scale, at.prior_columns(names) * scale
     shared = [name for name in names if name in to_try.names]
     there = sensitivity(to_try, to_try.start_values(), shared)
-    known = here.T @ here / inflation + priors.T @ priors + SEEN * np.eye(len(names))
-    before = np.sqrt(np.diag(np.linalg.inv(known)))
-    found = []
+    information = columns.T @ columns / inflation + priors.T @ priors + REGULARISATION * np.eye(len(names))
+    before = np.sqrt(np.diag(np.linalg.inv(information)))
+    ranked = []
     by_run = np.zeros((len(candidates), to_try.measured.size // len(candidates), len(names)))
     by_run[..., [list(names).index(name) for name in shared]] = there.jacobian.reshape(len(candidates), -1, len(shared))
     for (what, one), jacobian in zip(candidates.items(), by_run, strict=True):
-        tells = jacobian * scale
-        if not np.isfinite(tells).all():
+        added = jacobian * scale
+        if not np.isfinite(added).all():
             continue
-        after = known + tells.T @ tells / inflation
-        gain = 0.5 * float(np.linalg.slogdet(after)[1] - np.linalg.slogdet(known)[1])
+        after = information + added.T @ added / inflation
+        gain = 0.5 * float(np.linalg.slogdet(after)[1] - np.linalg.slogdet(information)[1])
         errors = np.sqrt(np.diag(np.linalg.inv(after))) / before
         shrinks = {name: float(error) for name, error in zip(names, errors, strict=True) if name in shared}
-        found.append(Suggestion(what, one, gain, shrinks))
-    return tuple(sorted(found, key=lambda one: -one.information)[:count])
+        ranked.append(Suggestion(what, one, gain, shrinks))
+    return tuple(sorted(ranked, key=lambda one: -one.information)[:count])

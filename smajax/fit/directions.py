@@ -1,4 +1,4 @@
-"""Which combinations of parameters the runs cannot tell, in words: the weak singular vectors of the Jacobian."""
+"""Combinations of parameters that the runs determine poorly, in words: the weak singular vectors of the Jacobian."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ UNBOUND = 1e6  # relative: nothing in the runs depends on it
 class Direction:
     """A combination of relative changes, the largest of them 1, and the standard error of going along it.
 
-    temperatures: names whose changes are relative to `KELVINS`, and are told in kelvins.
+    temperatures: names whose changes are relative to `KELVINS`, and are said in kelvins.
     """
 
     shares: dict[str, float]
@@ -33,12 +33,14 @@ class Direction:
         if self.relative_error >= UNBOUND:
             if len(named) == 1:
                 return f"Nothing in these runs depends on {next(iter(named))}."
-            return f"The runs do not see {and_listed(list(named))} move together: no one of them is known by itself."
+            return f"These runs determine only a combination of {and_listed(list(named))}: none of them is identifiable by itself."
         if len(named) == 1:
             name = next(iter(named))
             return f"{name} is known to {self._size(name, 1.0)} only."
-        moves = and_listed([f"{name} by {self._size(name, share, '+')}" for name, share in named.items()])
-        return f"{and_listed(list(named))} move together: {moves}, all at once, is one standard error."
+        changes = and_listed([f"{name} by {self._size(name, share, '+')}" for name, share in named.items()])
+        return (
+            f"{and_listed(list(named))} are correlated: a change of {changes} at the same time is one standard error."
+        )
 
     def _size(self, name: str, share: float, sign: str = "") -> str:
         """One standard error of `name`, in per cent of its value or in kelvins."""
@@ -55,21 +57,21 @@ def directions(
 ) -> tuple[Direction, ...]:
     """All directions of `names`, weakest first. `inflation` is the variance of an independent sample over the noise's.
 
-    temperatures: those of `names` in degrees Celsius, of which a share of the value means nothing.
+    temperatures: those of `names` in degrees Celsius, of whose values a share means nothing.
     """
     scale = np.asarray([KELVINS if name in temperatures else abs(values[name]) or 1.0 for name in names])
-    # A prior's row is a sample whose noise is one, and not the residual's.
+    # A prior's row is a sample whose noise is one, unlike the residual's.
     whole = np.concatenate([at.columns(names), np.sqrt(inflation) * at.prior_columns(names)])
     _, singular, rows = np.linalg.svd(whole * scale, full_matrices=False)
-    found = []
+    combinations = []
     for value, row in zip(singular[::-1], rows[::-1], strict=True):
         largest = row[np.argmax(np.abs(row))]
         error = float(np.sqrt(inflation) / value * abs(largest)) if value > 0.0 else np.inf
         shares = dict(zip(names, (row / largest).tolist(), strict=True))
-        found.append(Direction(shares, min(error, UNBOUND), frozenset(temperatures) & shares.keys()))
-    return tuple(found)
+        combinations.append(Direction(shares, min(error, UNBOUND), frozenset(temperatures) & shares.keys()))
+    return tuple(combinations)
 
 
-def weak_ones(found: Sequence[Direction]) -> list[str]:
-    """Sentences about the combinations that are poorly known; none when all are well known."""
-    return [one.sentence() for one in found if one.relative_error > WEAK]
+def weak_combinations(combinations: Sequence[Direction]) -> list[str]:
+    """Sentences about the combinations that are poorly determined; none when all are well determined."""
+    return [direction.sentence() for direction in combinations if direction.relative_error > WEAK]

@@ -1,4 +1,4 @@
-"""An experiment's runs as a least-squares problem: outputs with their noise, priors, and what is each run's own."""
+"""An experiment's runs as a least-squares problem: outputs with their noise, priors, and values of single runs."""
 
 from __future__ import annotations
 
@@ -11,27 +11,29 @@ from smajax.core.parameters import parameter_values
 from smajax.data.experiment.record import Experiment, Run, Unknown
 from smajax.fit.base_model import base_model
 from smajax.fit.packed_runs import pack
-from smajax.fit.problem import Own, Problem
+from smajax.fit.problem import PerRun, Problem
 
 
 def free_by_name(experiment: Experiment, runs: Sequence[Run]) -> dict[str, Unknown]:
-    """Every value to be found with these runs: `name`, or `name[run]` where each run has its own, those last."""
+    """Every unknown of these runs: `name`, or `name[run]` where it has one value for each run, those last."""
     shared = {unknown.name: unknown for unknown in experiment.unknowns if not unknown.per_run}
-    own = {f"{unknown.name}[{run.name}]": unknown for run in runs for unknown in experiment.unknowns if unknown.per_run}
-    return {**shared, **own}
+    per_run = {
+        f"{unknown.name}[{run.name}]": unknown for run in runs for unknown in experiment.unknowns if unknown.per_run
+    }
+    return {**shared, **per_run}
 
 
 def declared_problem(experiment: Experiment, runs: Sequence[Run]) -> Problem:
     """The base model, and `runs` as they were measured."""
     model = base_model(experiment)
-    own = [unknown for unknown in experiment.unknowns if unknown.per_run]
-    start = jnp.asarray(np.tile([unknown.start for unknown in own], (len(runs), 1)), dtype=float)
+    per_run = [unknown for unknown in experiment.unknowns if unknown.per_run]
+    start = jnp.asarray(np.tile([unknown.start for unknown in per_run], (len(runs), 1)), dtype=float)
     sigmas = jnp.asarray([output.noise_sigma for output in experiment.outputs])
     return Problem.build(
         model,
         pack(runs, experiment.step, parameter_values(model)),
         sigmas if len(sigmas) > 1 else sigmas[0],
         tuple(output.offset for output in experiment.outputs),
-        Own(tuple(unknown.name for unknown in own), tuple(run.name for run in runs), start),
+        PerRun(tuple(unknown.name for unknown in per_run), tuple(run.name for run in runs), start),
         {name: one.prior for name, one in free_by_name(experiment, runs).items() if one.prior is not None},
     )

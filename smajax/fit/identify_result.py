@@ -1,4 +1,4 @@
-"""What an identification found, as records: no more than the report and a program read."""
+"""The result of an identification, as records that the report and programs read."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from smajax.fit.profile import Profile
 
 @dataclass(frozen=True)
 class Estimate:
-    """One parameter, in the program's own unit; `parameter[run]` is that run's own."""
+    """One parameter, SI (temperatures in degrees Celsius); `parameter[run]` is the value of that run."""
 
     name: str
     unit: str
     value: float
-    standard_error: float | None  # None: not told by the runs
+    standard_error: float | None  # None: not identifiable
     lower: float
     upper: float
     start: float
@@ -30,13 +30,13 @@ class Estimate:
 
 @dataclass(frozen=True)
 class IdentifiedOutput:
-    """One sensor, in the program's own unit."""
+    """One sensor, SI (temperatures in degrees Celsius)."""
 
     name: str
     unit: str
     noise_sigma: float
     noise_how: str
-    noise_before: float | None  # where it is as the fit leaves it: as the runs' differences showed it
+    noise_before: float | None  # where it is estimated with the fit: as estimated before, from differences of samples
     ratio: float  # rms of the fit runs' residual over the noise
 
 
@@ -47,7 +47,7 @@ class IdentifiedSeries:
     output: str
     measured: np.ndarray
     simulated: np.ndarray  # with the run's offset
-    spread: np.ndarray  # standard error of the simulation that the parameters' make
+    spread: np.ndarray  # standard error of the simulation, from those of the parameters
     rmse: float  # nan without a sample
 
 
@@ -69,7 +69,7 @@ class IdentifiedRun:
 
 @dataclass(frozen=True)
 class Identified:
-    """What the runs told. `correlation` is that of the estimates `correlated`, (K, K)."""
+    """Result of `identify`. `correlation` is that of the estimates `correlated`, (K, K)."""
 
     experiment: str
     title: str
@@ -78,15 +78,15 @@ class Identified:
     stopped: str
     check: tuple[str, ...]
     estimates: tuple[Estimate, ...]
-    own_of_held_out: dict[str, float]  # what is a run's own is found for held-out runs too, all else held
+    own_of_held_out: dict[str, float]  # values of single held-out runs, fitted with all others fixed
     correlated: tuple[str, ...]
     correlation: np.ndarray
     weak: tuple[str, ...]
-    all_took_part: bool  # whether no parameter is left out of `weak`: held by a bound, or without any effect
+    all_took_part: bool  # whether `weak` covers every parameter: none at a bound or without any effect
     directions: tuple[Direction, ...]
     profiles: tuple[Profile, ...]
     posterior: Posterior | None
-    start_costs: tuple[float, ...]  # mean square over the noise's, of every fit carried to its end
+    start_costs: tuple[float, ...]  # mean square over the noise's, of every fit that was run until its end
     ratio: float  # rms of the fit runs' residual over the noise
     whiteness_p: float
     normality_p: float

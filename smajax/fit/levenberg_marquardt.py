@@ -1,14 +1,14 @@
-"""Levenberg-Marquardt within a box, many fits at once: derivatives in one batched program, the small algebra here.
+"""Levenberg-Marquardt within bounds, many fits at once: derivatives in one batched program, the small algebra here.
 
-The box is kept by holding what a step would carry beyond its bound, not by a map onto the whole line: on such a map a
-bound is infinitely far away and a narrow valley bends, and a fit that takes 20 steps here took 150 there
+Bounds limit each step; they are no map onto the whole line: on such a map a
+bound is infinitely far away and a narrow minimum bends, and a fit that takes 20 steps here took 150 there
 (`studies/coverage`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from dataclasses import fields as fields_of
 from typing import Any
 
@@ -16,18 +16,19 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from smajax.core.progress import Progress, Stage, quiet
-from smajax.core.result_cache import Kept
-from smajax.fit.predicted import in_parts, shown_and_slopes
-from smajax.fit.problem import Lane, Problem
+from smajax.core.result_cache import ResultCache
+from smajax.fit.predicted import chunks, predicted_and_derivatives
+from smajax.fit.problem import FitTask, Problem
 
-MOST_STEPS = 120
-ENOUGH = 1e-8  # of the cost: what a step that is the last one may still lower it by, and promise to; scipy's too
-STILL = 1e-12  # of the box
-DAMPED = 1e-1  # share of the squared columns that damping begins with
-HOPELESS = 1e10  # damping at which no step is a better one
-AT_MOST = 0.7  # of the way to a bound
-NEAR = 1e-3  # of the box: from here on the bound itself may be reached
-BLIND = 1e-14  # of the largest squared column: a parameter that nothing depends on
+MAX_STEPS = 120
+TOLERANCE = 1e-8  # of the cost: what the last step may still lower it by, and predict; scipy's too
+MIN_WIDTH = 1e-12  # of the range between the bounds
+INITIAL_DAMPING = 1e-1  # share of the squared columns
+MAX_DAMPING = 1e10  # at which no step lowers the cost
+FRACTION_TO_BOUND = 0.7  # a step goes at most this share of the way to a bound
+NEAR_BOUND = 1e-3  # of the range: from here on the bound itself may be reached
+MIN_SCALE = 1e-14  # of the largest squared column, for a parameter on which nothing depends
+TINY = 1e-300  # no division by zero
 
 
 @dataclass(frozen=True)
@@ -41,175 +42,197 @@ class Fit:
     steps: int
 
 
-@dataclass
-class _Walk:
-    """Where one fit is; places are shares of the box."""
+@dataclass(frozen=True)
+class FitSettings:
+    """How fits are run. `stage`: the name under which `progress` reports them."""
 
-    place: np.ndarray
-    cost: float
-    slope: np.ndarray  # J^T r
-    square: np.ndarray  # J^T J
-    scale: np.ndarray  # largest squared columns so far
-    damping: float = DAMPED
+    max_steps: int = MAX_STEPS
+    tolerance: float = TOLERANCE
+    cache: ResultCache = field(default_factory=ResultCache)
+    progress: Progress = quiet
+    stage: str = "fitting"
+
+
+@dataclass
+class LMState:
+    """State of one fit of F free parameters; `y` is in shares of the range between the bounds."""
+
+    y: np.ndarray  # (F,)
+    cost: float  # r^T r
+    gradient: np.ndarray  # J^T r
+    hessian: np.ndarray  # J^T J
+    scale: np.ndarray  # largest squared columns so far (Marquardt's scaling)
+    damping: float = INITIAL_DAMPING
     growth: float = 2.0
     steps: int = 0
     reason: str = ""
 
 
-Equations = tuple[float, np.ndarray, np.ndarray]  # r^T r, J^T r, J^T J of one fit, by shares of its box
+NormalEquations = tuple[float, np.ndarray, np.ndarray]  # r^T r, J^T r, J^T J of one fit, by shares of its range
 
 
 def _normal_equations(
-    problem: Problem, lanes: Sequence[Lane], places: Sequence[np.ndarray], outputs: np.ndarray | None
-) -> list[Equations]:
-    """Of every lane at its place. Directions of all lanes go side by side, whatever each of them frees."""
-    points = np.stack([lane.at(place) for lane, place in zip(lanes, places, strict=True)])
-    most = max(1, *(len(lane.slots) for lane in lanes))
-    towards = np.zeros((len(lanes), most, points.shape[1]))
-    for own, lane in zip(towards, lanes, strict=True):
-        own[np.arange(len(lane.slots)), lane.slots] = lane.high - lane.low
-    shown, slopes = shown_and_slopes(problem, points, towards)
-    found = []
-    for k, (lane, place) in enumerate(zip(lanes, places, strict=True)):
+    problem: Problem, tasks: Sequence[FitTask], ys: Sequence[np.ndarray], outputs: np.ndarray | None
+) -> list[NormalEquations]:
+    """Of every task at its y. Directions of all tasks go side by side, whatever each of them frees."""
+    points = np.stack([task.values_at(y) for task, y in zip(tasks, ys, strict=True)])
+    most = max(1, *(len(task.slots) for task in tasks))
+    tangents = np.zeros((len(tasks), most, points.shape[1]))
+    for rows, task in zip(tangents, tasks, strict=True):
+        rows[np.arange(len(task.slots)), task.slots] = task.high - task.low
+    predicted, derivatives = predicted_and_derivatives(problem, points, tangents)
+    equations = []
+    for k, (task, y) in enumerate(zip(tasks, ys, strict=True)):
         measured = problem.measured if outputs is None else outputs[k]
-        weight = np.repeat(np.sqrt(lane.weights), len(problem.batch.outputs))[:, None] / np.asarray(problem.noise)
-        residual = weight * problem.centred(measured - shown[k])
-        jacobian = -weight * problem.centred(slopes[k, : len(lane.slots)])
-        value = np.concatenate([residual.ravel(), problem.priors.rows(points[k]), lane.tie * (place - lane.place)])
-        known = problem.priors.slopes(points[k])[:, lane.slots] * (lane.high - lane.low)
-        rows = np.concatenate([jacobian.reshape(len(lane.slots), residual.size), known.T, np.diag(lane.tie)], axis=1)
-        with np.errstate(over="ignore", invalid="ignore"):  # a step to where a load jumps: it will not be taken
-            found.append((float(value @ value), rows @ value, rows @ rows.T))
-    return found
+        weight = np.repeat(np.sqrt(task.weights), len(problem.batch.outputs))[:, None] / np.asarray(problem.noise)
+        residual = weight * problem.centred(measured - predicted[k])
+        jacobian = -weight * problem.centred(derivatives[k, : len(task.slots)])
+        drift = task.regularisation * (y - task.initial_guess)
+        value = np.concatenate([residual.ravel(), problem.priors.rows(points[k]), drift])
+        prior = problem.priors.slopes(points[k])[:, task.slots] * (task.high - task.low)
+        columns = jacobian.reshape(len(task.slots), residual.size), prior.T, np.diag(task.regularisation)
+        rows = np.concatenate(columns, axis=1)
+        with np.errstate(over="ignore", invalid="ignore"):  # a step to where a load jumps: it will be rejected
+            equations.append((float(value @ value), rows @ value, rows @ rows.T))
+    return equations
 
 
-def _step(walk: _Walk) -> np.ndarray:
+def _step(state: LMState) -> np.ndarray:
     """The damped step within its bounds, solved exactly: least squares by the Cholesky factor of the damped equations."""
-    least = BLIND * max(float(walk.scale.max()), 1e-300)
-    damped = walk.square + walk.damping * np.diag(np.maximum(walk.scale, least))
-    # Most of the way to a bound at a time: a first long step must not end in a corner that no later one leads out of.
-    low = np.where(walk.place < NEAR, 0.0, (1.0 - AT_MOST) * walk.place) - walk.place
-    high = np.where(walk.place > 1.0 - NEAR, 1.0, 1.0 - (1.0 - AT_MOST) * (1.0 - walk.place)) - walk.place
+    least = MIN_SCALE * max(float(state.scale.max()), TINY)
+    damped = state.hessian + state.damping * np.diag(np.maximum(state.scale, least))
+    # Part of the way to a bound at a time: a long first step must not end in a corner that no later one leaves.
+    y, part = state.y, 1.0 - FRACTION_TO_BOUND
+    low = np.where(y < NEAR_BOUND, 0.0, part * y) - y
+    high = np.where(y > 1.0 - NEAR_BOUND, 1.0, 1.0 - part * (1.0 - y)) - y
     try:
         factor = np.linalg.cholesky(damped)
-        free = -np.linalg.solve(damped, walk.slope)
+        newton = -np.linalg.solve(damped, state.gradient)
     except np.linalg.LinAlgError:
-        return np.zeros_like(walk.place)  # to rounding: more damping makes it positive
-    if np.all((low <= free) & (free <= high)):
-        return free
-    # Without a point between them a bound is no choice.
-    wide = np.where(high > low, high, low + STILL)
+        return np.zeros_like(y)  # singular to rounding: more damping makes it positive definite
+    if np.all((low <= newton) & (newton <= high)):
+        return newton
+    # scipy refuses bounds without a point between them.
+    wide = np.where(high > low, high, low + MIN_WIDTH)
     with np.errstate(divide="ignore", invalid="ignore"):  # scipy's way along a bound may be of no length
-        held = lsq_linear(factor.T, -np.linalg.solve(factor, walk.slope), (low, wide), method="bvls").x
-    return np.clip(held, low, high) if np.isfinite(held).all() else np.zeros_like(walk.place)
+        bounded = lsq_linear(factor.T, -np.linalg.solve(factor, state.gradient), (low, wide), method="bvls").x
+    return np.clip(bounded, low, high) if np.isfinite(bounded).all() else np.zeros_like(y)
 
 
-def _judged(
-    walk: _Walk, step: np.ndarray, cost: float, slope: np.ndarray, square: np.ndarray, enough: float = ENOUGH
-) -> None:
-    """Take the step or not, and say so when it was the last."""
-    promised = -(2.0 * walk.slope @ step + step @ walk.square @ step)
-    known = np.isfinite(cost) and np.isfinite(slope).all() and np.isfinite(square).all()
-    gained = walk.cost - cost if known else -np.inf
-    walk.steps += 1
-    small = 0.0 < promised < enough * walk.cost
-    if gained > 0.0:
-        share = gained / max(promised, 1e-300)
-        walk.place, walk.cost = np.clip(walk.place + step, 0.0, 1.0), cost
-        walk.slope, walk.square = slope, square
-        walk.scale = np.maximum(walk.scale, np.diag(square))
-        walk.damping *= max(0.1, 1.0 - (2.0 * min(share, 1.0) - 1.0) ** 3)
-        walk.growth = 2.0
-        if small and gained < enough * walk.cost:
-            walk.reason = f"it has converged, no step lowers the cost by more than {enough:.0e} of it"
+def _update(state: LMState, step: np.ndarray, there: NormalEquations, tolerance: float = TOLERANCE) -> None:
+    """Accept or reject the step by the normal equations at its end (Nielsen 1999), and say when it was the last."""
+    cost, gradient, hessian = there
+    predicted = -(2.0 * state.gradient @ step + step @ state.hessian @ step)
+    actual = state.cost - cost if _is_finite(there) else -np.inf
+    state.steps += 1
+    small = 0.0 < predicted < tolerance * state.cost
+    if actual > 0.0:
+        ratio = actual / max(predicted, TINY)
+        state.y, state.cost = np.clip(state.y + step, 0.0, 1.0), cost
+        state.gradient, state.hessian = gradient, hessian
+        state.scale = np.maximum(state.scale, np.diag(hessian))
+        state.damping *= max(0.1, 1.0 - (2.0 * min(ratio, 1.0) - 1.0) ** 3)
+        state.growth = 2.0
+        if small and actual < tolerance * state.cost:
+            state.reason = f"it has converged, no step lowers the cost by more than {tolerance:.0e} of it"
     else:
-        walk.damping *= walk.growth
-        walk.growth *= 2.0
-        if small or walk.damping > HOPELESS:
-            walk.reason = "it has converged, no step lowers the cost any more"
+        state.damping *= state.growth
+        state.growth *= 2.0
+        if small or state.damping > MAX_DAMPING:
+            state.reason = "it has converged, no step lowers the cost any more"
 
 
-def _packed(walks: Sequence[_Walk], rounds: int) -> dict[str, np.ndarray]:
-    """Where all fits are, as arrays; those of fits with fewer free parameters are filled up with zeros."""
-    most = max((len(walk.place) for walk in walks), default=0)
+def _is_finite(equations: NormalEquations) -> bool:
+    return all(bool(np.isfinite(part).all()) for part in equations)
 
-    def filled(value: np.ndarray | float | str) -> np.ndarray:
-        one = np.asarray(value)
-        return np.pad(one, [(0, most - size) for size in one.shape]) if one.ndim else one
+
+def _initial_state(task: FitTask, equations: NormalEquations) -> LMState:
+    cost, gradient, hessian = equations
+    finite = _is_finite(equations)
+    state = LMState(task.initial_guess, cost if finite else np.inf, gradient, hessian, np.diag(hessian).copy())
+    if not finite:
+        state.reason = "the model gives no number at the start"
+    elif not len(task.slots):
+        state.reason = "no parameter is free"
+    return state
+
+
+def _packed(states: Sequence[LMState], rounds: int) -> dict[str, np.ndarray]:
+    """All fits' states as arrays; those of fits with fewer free parameters are padded with zeros."""
+    most = max((len(state.y) for state in states), default=0)
+
+    def padded(value: np.ndarray | float | str) -> np.ndarray:
+        array = np.asarray(value)
+        return np.pad(array, [(0, most - size) for size in array.shape]) if array.ndim else array
 
     fields = {
-        field.name: np.asarray([filled(getattr(walk, field.name)) for walk in walks]) for field in fields_of(_Walk)
+        entry.name: np.asarray([padded(getattr(state, entry.name)) for state in states]) for entry in fields_of(LMState)
     }
     return {**fields, "rounds": np.asarray(rounds)}
 
 
-def _unpacked(record: Mapping[str, np.ndarray], lanes: Sequence[Lane]) -> list[_Walk]:
+def _unpacked(record: Mapping[str, np.ndarray], tasks: Sequence[FitTask]) -> list[LMState]:
     def cut(value: np.ndarray, size: int) -> Any:
         return value[(slice(size),) * value.ndim] if value.ndim else value.item()
 
-    rows = zip(*(record[field.name] for field in fields_of(_Walk)), strict=True)
+    rows = zip(*(record[entry.name] for entry in fields_of(LMState)), strict=True)
     return [
-        _Walk(*(cut(np.asarray(one), len(lane.slots)) for one in row)) for lane, row in zip(lanes, rows, strict=True)
+        LMState(*(cut(np.asarray(part), len(task.slots)) for part in row))
+        for task, row in zip(tasks, rows, strict=True)
     ]
 
 
-def fit_in_box(
+def levenberg_marquardt(
     problem: Problem,
-    lanes: Sequence[Lane],
+    tasks: Sequence[FitTask],
+    settings: FitSettings | None = None,
     *,
     outputs: np.ndarray | None = None,
-    most: int = MOST_STEPS,
-    enough: float = ENOUGH,
-    kept: Kept | None = None,
-    progress: Progress = quiet,
-    what: str = "fitting",
 ) -> list[Fit]:
-    """Fit every lane from its own values.
+    """Fit every task from its own values.
 
-    A fit ends when a step lowers its cost by less than `enough` of it and promised no more. With `kept`, where every fit
-    is is written as it goes, and the same call goes on from there to the same end. `outputs`, (lanes, series, N):
-    measured outputs of each lane's own, as in repeated experiments.
+    A fit ends when a step lowers its cost by less than the tolerance and predicted no more. States are cached as the
+    rounds go: the same call resumes an interrupted one, with the same result. `outputs`, (tasks, series, N): measured
+    outputs of each task, as in repeated experiments.
     """
-    directions = max([len(lane.slots) for lane in lanes], default=1)
+    settings = settings or FitSettings()
+    cache, progress = settings.cache, settings.progress
+    directions = max([len(task.slots) for task in tasks], default=1)
 
-    def evaluated(some: Sequence[int], places: Sequence[np.ndarray]) -> list[Equations]:
-        found: list[Equations] = []
-        for cut in in_parts(problem, len(some), directions):
-            part = list(some[cut])
-            own = None if outputs is None else outputs[np.asarray(part)]
-            found += _normal_equations(problem, [lanes[k] for k in part], places[cut], own)
-        return found
+    def evaluate(indices: Sequence[int], ys: Sequence[np.ndarray]) -> list[NormalEquations]:
+        equations: list[NormalEquations] = []
+        for cut in chunks(problem, len(indices), directions):
+            part = list(indices[cut])
+            measured = None if outputs is None else outputs[np.asarray(part)]
+            equations += _normal_equations(problem, [tasks[k] for k in part], ys[cut], measured)
+        return equations
 
-    everyone = range(len(lanes))
-    kept = kept or Kept()
-    key = kept.key((problem, list(lanes)), "fit in box", outputs if outputs is not None else "", most, enough)
-    known = kept.load(key)
-    if known is not None:
-        walks, begun = _unpacked(known, lanes), int(known["rounds"])
+    everyone = range(len(tasks))
+    settled = settings.max_steps, settings.tolerance
+    key = cache.key((problem, list(tasks)), "levenberg_marquardt", outputs if outputs is not None else "", *settled)
+    cached = cache.load(key)
+    if cached is not None:
+        states, begin = _unpacked(cached, tasks), int(cached["rounds"])
     else:
-        walks, begun = [], 0
-        at = [lane.place for lane in lanes]
-        for own, place, (cost, slope, square) in zip(lanes, at, evaluated(everyone, at), strict=True):
-            lost = not (np.isfinite(cost) and np.isfinite(slope).all() and np.isfinite(square).all())
-            walk = _Walk(place, cost if not lost else np.inf, slope, square, np.diag(square).copy())
-            idle = "" if len(own.slots) else "no parameter is free"
-            walk.reason = "the model gives no number at the start" if lost else idle
-            walks.append(walk)
-    for number in range(begun, most):
-        kept.save(key, _packed(walks, number), last=False)
-        going = [k for k in everyone if not walks[k].reason]
-        progress(Stage(what, max(1.0 - len(going) / max(len(lanes), 1), number / most)))
+        first = evaluate(everyone, [task.initial_guess for task in tasks])
+        states, begin = [_initial_state(task, at) for task, at in zip(tasks, first, strict=True)], 0
+    for number in range(begin, settings.max_steps):
+        cache.save(key, _packed(states, number), last=False)
+        going = [k for k in everyone if not states[k].reason]
+        share = max(1.0 - len(going) / max(len(tasks), 1), number / settings.max_steps)
+        progress(Stage(settings.stage, share))
         if not going:
             break
-        steps = [_step(walks[k]) for k in going]
-        tried = [np.clip(walks[k].place + step, 0.0, 1.0) for k, step in zip(going, steps, strict=True)]
-        for k, step, answer in zip(going, steps, evaluated(going, tried), strict=True):
-            _judged(walks[k], step, *answer, enough=enough)
-    kept.save(key, _packed(walks, most))
-    progress(Stage(what, 1.0))
-    ended = []
-    for lane, walk in zip(lanes, walks, strict=True):
-        done = bool(walk.reason) and np.isfinite(walk.cost)
-        reason = walk.reason or f"{most} steps were not enough"
-        ended.append(Fit(lane.at(walk.place), walk.cost, done, reason, walk.steps))
-    return ended
+        steps = [_step(states[k]) for k in going]
+        tried = [np.clip(states[k].y + step, 0.0, 1.0) for k, step in zip(going, steps, strict=True)]
+        for k, step, there in zip(going, steps, evaluate(going, tried), strict=True):
+            _update(states[k], step, there, settings.tolerance)
+    cache.save(key, _packed(states, settings.max_steps))
+    progress(Stage(settings.stage, 1.0))
+    return [_ended(task, state, settings.max_steps) for task, state in zip(tasks, states, strict=True)]
+
+
+def _ended(task: FitTask, state: LMState, max_steps: int) -> Fit:
+    converged = bool(state.reason) and bool(np.isfinite(state.cost))
+    reason = state.reason or f"{max_steps} steps were not enough"
+    return Fit(task.values_at(state.y), state.cost, converged, reason, state.steps)

@@ -1,4 +1,4 @@
-"""Noise of outputs estimated with the fit: what the model leaves of each, until the weights that it gives settle."""
+"""Noise of outputs estimated with the fit: the rms of each output's residual, repeated until the weights settle."""
 
 from __future__ import annotations
 
@@ -15,25 +15,25 @@ from smajax.fit.problem import Problem
 from smajax.fit.robust import NORMAL
 
 ROUNDS = 20
-SETTLED = 1e-3  # relative change of a sigma that changes no weight worth a step
-LEAST = 1e-9  # of an output's largest value: a model that leaves nothing must not get all the weight
+SETTLED = 1e-3  # relative change of a sigma; a smaller one is not worth a fit
+LEAST = 1e-9  # of an output's largest value: an output without a residual must not get all the weight
 
 
 def residual_sigmas(problem: Problem, values: np.ndarray, free: int, robust: bool = False) -> np.ndarray:
-    """Sigma of each output (SI) as `values` (P,) leave it, the `free` parameters and the offsets counted off.
+    """Sigma of each output (SI) from the residual at `values` (P,), less the degrees of freedom of `free` and offsets.
 
-    That of the greatest likelihood but for the count; `robust`: from the median, which samples far off do not move.
+    The maximum-likelihood estimate but for the degrees of freedom; `robust`: from the median, which ignores outliers.
     """
     count = len(problem.batch.outputs)
     misfit, mask = misfits(problem, values[None])[0], np.asarray(problem.batch.mask) > 0
-    found = np.empty(count)
+    sigmas = np.empty(count)
     for k in range(count):
-        own, here = misfit[k::count][mask[k::count]], mask[k::count]
-        spent = free * own.size / max(mask.sum(), 1) + problem.offset[k] * int(here.any(axis=1).sum())
-        left = np.sqrt(own.size / max(own.size - spent, 1.0))
-        spread = NORMAL * float(np.median(np.abs(own))) if robust else float(np.sqrt(np.mean(own**2)))
-        found[k] = max(left * spread, LEAST * float(np.abs(np.asarray(problem.batch.output)).max()), 1e-300)
-    return found
+        residual, measured = misfit[k::count][mask[k::count]], mask[k::count]
+        used = free * residual.size / max(mask.sum(), 1) + problem.offset[k] * int(measured.any(axis=1).sum())
+        correction = np.sqrt(residual.size / max(residual.size - used, 1.0))
+        spread = NORMAL * float(np.median(np.abs(residual))) if robust else float(np.sqrt(np.mean(residual**2)))
+        sigmas[k] = max(correction * spread, LEAST * float(np.abs(np.asarray(problem.batch.output)).max()), 1e-300)
+    return sigmas
 
 
 def fit_with_noise(
@@ -44,18 +44,18 @@ def fit_with_noise(
     fit: Callable[[Problem, np.ndarray], Fit],
     robust: bool = False,
 ) -> tuple[Problem, Fit]:
-    """(problem with the noise of the outputs `estimated` as the fit leaves it, fit).
+    """(problem with the noise of the outputs `estimated` from the residual, fit).
 
-    `fit` is called with a problem and the values to start from. Weights and fit in turn come to the greatest likelihood
-    of both, in which each sigma is profiled out: sum of n ln sigma.
+    `fit` is called with a problem and the values to start from. Alternating weights and fit maximises the
+    likelihood of both, in which each sigma is profiled out: sum of n ln sigma.
     """
-    found, which = first, np.asarray(estimated)
+    best, which = first, np.asarray(estimated)
     for _ in range(ROUNDS):
         before = np.broadcast_to(np.asarray(problem.noise_sigma), which.shape)
-        sigmas = np.where(which, residual_sigmas(problem, found.values, free, robust), before)
+        sigmas = np.where(which, residual_sigmas(problem, best.values, free, robust), before)
         if float(np.abs(sigmas / before - 1.0).max()) < SETTLED:
             break
         problem = eqx.tree_at(lambda one: one.noise_sigma, problem, jnp.asarray(sigmas))
-        new = fit(problem, found.values)
-        found = dataclasses.replace(new, steps=new.steps + found.steps)
-    return problem, found
+        new = fit(problem, best.values)
+        best = dataclasses.replace(new, steps=new.steps + best.steps)
+    return problem, best

@@ -1,4 +1,4 @@
-"""Measured runs of unequal length, packed into one padded batch that the simulator can be mapped over."""
+"""Measured runs of unequal length, packed into one padded batch over which the simulator can be mapped."""
 
 from __future__ import annotations
 
@@ -86,12 +86,12 @@ def halved(batch: RunBatch) -> RunBatch:
 
 
 def _started(
-    system: System, names: Sequence[str], own: Float[Array, " own"], inputs: dict[str, Float[Array, " time"]]
+    system: System, names: Sequence[str], values: Float[Array, " name"], inputs: dict[str, Float[Array, " time"]]
 ) -> tuple[System, State | None]:
-    """`system` with a run's own values, and the state it starts in where the model does not say it."""
-    values = dict(zip(names, own, strict=True))
-    celsius = values.pop("initial_temperature", None)
-    here = set_parameters(system, {RUN_STARTS.get(name, name): value for name, value in values.items()})
+    """`system` with one run's values of `names`, and the state it starts in where the model does not say it."""
+    overrides = dict(zip(names, values, strict=True))
+    celsius = overrides.pop("initial_temperature", None)
+    here = set_parameters(system, {RUN_STARTS.get(name, name): value for name, value in overrides.items()})
     if celsius is None:
         return here, None
     # A wire that was not at the air's temperature: at rest as if the air had been as warm.
@@ -99,15 +99,15 @@ def _started(
     return here, initial_state(here, {**first, "ambient_temperature": celsius})
 
 
-def shown_run(
+def predict_run(
     system: System,
     inputs: dict[str, Float[Array, " time"]],
-    values: Float[Array, " own"],
+    values: Float[Array, " name"],
     names: Sequence[str],
     dt: Scalar | float,
     outputs: Sequence[str],
 ) -> Float[Array, "output time"]:
-    """What the sensors show of one run, with its own `values` of `names`."""
+    """Predicted sensor outputs of one run, with its `values` of `names`."""
     here, initial = _started(system, names, values, inputs)
     run = simulate(here, inputs, dt, initial)
     return jnp.stack([shown_by(here, run, name) for name in outputs])
@@ -123,11 +123,11 @@ def simulate_batch(system: System, batch: RunBatch) -> Trajectory:
     return jax.tree.map(lambda *leaves: np.stack(leaves), *runs)
 
 
-def shown_batch(
-    system: System, batch: RunBatch, own_names: Sequence[str] = (), own: Float[Array, "run own"] | None = None
+def predict_batch(
+    system: System, batch: RunBatch, more_names: Sequence[str] = (), more: Float[Array, "run name"] | None = None
 ) -> Float[Array, "series time"]:
-    """What the batch's sensors show. `own`: each run's own values of `own_names`."""
-    names = (*batch.override_names, *own_names)
-    values = batch.overrides if own is None else jnp.concatenate([batch.overrides, own], axis=1)
-    one = partial(shown_run, system, names=names, dt=batch.dt, outputs=batch.outputs)
-    return jax.vmap(lambda inputs, own: one(inputs, own))(batch.inputs, values).reshape(batch.output.shape[0], -1)
+    """Predicted sensor outputs of the batch. `more`: each run's values of `more_names`, beside its overrides."""
+    names = (*batch.override_names, *more_names)
+    values = batch.overrides if more is None else jnp.concatenate([batch.overrides, more], axis=1)
+    one = partial(predict_run, system, names=names, dt=batch.dt, outputs=batch.outputs)
+    return jax.vmap(lambda inputs, row: one(inputs, row))(batch.inputs, values).reshape(batch.output.shape[0], -1)

@@ -1,4 +1,4 @@
-"""What is known of parameters before the runs, as residuals beside those of the runs."""
+"""Prior distributions of parameters, as residuals beside those of the runs."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ class Priors(eqx.Module):
     sigma: Float[Array, " prior"]  # in the parameter's unit, or of the logarithm
 
     @classmethod
-    def of(cls, names: Sequence[str], known: Mapping[str, Prior]) -> Priors:
-        """`known` by name; names that are not among `names` are left out."""
-        here = {names.index(name): prior for name, prior in known.items() if name in names}
-        means, sigmas = (np.asarray([getattr(prior, part) for prior in here.values()]) for part in ("mean", "sigma"))
-        logarithmic = tuple(prior.logarithmic for prior in here.values())
-        return cls(tuple(here), logarithmic, jnp.asarray(means, dtype=float), jnp.asarray(sigmas, dtype=float))
+    def of(cls, names: Sequence[str], priors: Mapping[str, Prior]) -> Priors:
+        """`priors` by name; those of names that are not among `names` are left out."""
+        by_slot = {names.index(name): prior for name, prior in priors.items() if name in names}
+        means, sigmas = (np.asarray([getattr(prior, part) for prior in by_slot.values()]) for part in ("mean", "sigma"))
+        logarithmic = tuple(prior.logarithmic for prior in by_slot.values())
+        return cls(tuple(by_slot), logarithmic, jnp.asarray(means, dtype=float), jnp.asarray(sigmas, dtype=float))
 
     def rows(self, values: ArrayOf) -> ArrayOf:
         r"""$(\theta - \mu)/\sigma$ or $\ln(\theta/\mu)/\sigma$ of values (P,): (K,).
@@ -38,18 +38,22 @@ class Priors(eqx.Module):
         Their squares are minus twice the log-density. Of numpy's and of JAX's arrays alike.
         """
         xp = values.__array_namespace__()
-        mean, sigma, bent = xp.asarray(self.mean), xp.asarray(self.sigma), np.asarray(self.logarithmic, dtype=bool)
+        mean, sigma, logarithmic = (
+            xp.asarray(self.mean),
+            xp.asarray(self.sigma),
+            np.asarray(self.logarithmic, dtype=bool),
+        )
         at = values[np.asarray(self.slots, dtype=int)]
-        ratio = xp.where(bent, at / xp.where(bent, mean, 1.0), 1.0)
+        ratio = xp.where(logarithmic, at / xp.where(logarithmic, mean, 1.0), 1.0)
         # A value at zero is infinitely far off; a finite one lets a fit come back from a bound there.
-        return xp.where(bent, xp.log(xp.maximum(ratio, LEAST)), at - mean) / sigma
+        return xp.where(logarithmic, xp.log(xp.maximum(ratio, LEAST)), at - mean) / sigma
 
     def slopes(self, values: np.ndarray) -> np.ndarray:
         """Derivative of `rows` by every value, (K, P)."""
-        bent, slots = np.asarray(self.logarithmic, dtype=bool), np.asarray(self.slots, dtype=int)
+        logarithmic, slots = np.asarray(self.logarithmic, dtype=bool), np.asarray(self.slots, dtype=int)
         at = values[slots]
-        least = LEAST * np.where(bent, np.asarray(self.mean), 1.0)
-        found = np.zeros((len(slots), len(values)))
-        inner = np.where(bent, np.where(at > least, 1.0 / np.maximum(at, least), 0.0), 1.0)
-        found[np.arange(len(slots)), slots] = inner / np.asarray(self.sigma)
-        return found
+        least = LEAST * np.where(logarithmic, np.asarray(self.mean), 1.0)
+        derivatives = np.zeros((len(slots), len(values)))
+        inner = np.where(logarithmic, np.where(at > least, 1.0 / np.maximum(at, least), 0.0), 1.0)
+        derivatives[np.arange(len(slots)), slots] = inner / np.asarray(self.sigma)
+        return derivatives

@@ -1,4 +1,4 @@
-"""Runs, model and noise as one least-squares problem; each lane of a batch frees its own parameters."""
+"""Runs, model and noise as one least-squares problem; each fit of a batch frees its own parameters."""
 
 from __future__ import annotations
 
@@ -13,46 +13,46 @@ from jaxtyping import Array, Float
 
 from smajax.core.parameters import get_parameters, parameters, set_vector
 from smajax.data.experiment.record import Prior
-from smajax.fit.packed_runs import RunBatch, shown_batch
+from smajax.fit.packed_runs import RunBatch, predict_batch
 from smajax.fit.priors import Priors
 from smajax.model.system import System
 
 ArrayOf = TypeVar("ArrayOf", bound=Any)
-# How near to a bound the logit that ties a parameter to its start is taken, as a share of the box.
+# How near to a bound the logit that regularises a parameter is taken, as a share of the range.
 NEAREST = 1e-3
 
 
-class Lane(NamedTuple):
-    """One fit of many: what it frees, in which box, and where it starts. F free parameters."""
+class FitTask(NamedTuple):
+    """One fit of many: what it frees, within which bounds, and its initial guess. F free parameters."""
 
     slots: np.ndarray  # (F,), index into the parameter vector
     low: np.ndarray  # (F,)
     high: np.ndarray  # (F,)
     values: np.ndarray  # every parameter of the problem, (P,)
     weights: np.ndarray  # (R,): 0 leaves a run out
-    tie: np.ndarray  # (F,): pull back to the start, in the residual's unit per box
+    regularisation: np.ndarray  # (F,): pull back to the initial guess, in the residual's unit per range
 
     @property
-    def place(self) -> np.ndarray:
-        """The start, in shares of the box, (F,)."""
+    def initial_guess(self) -> np.ndarray:
+        """In shares of the range between the bounds, (F,)."""
         return np.clip((self.values[self.slots] - self.low) / (self.high - self.low), 0.0, 1.0)
 
-    def at(self, place: np.ndarray) -> np.ndarray:
-        """The whole parameter vector, (P,), at a place of the box."""
+    def values_at(self, y: np.ndarray) -> np.ndarray:
+        """The whole parameter vector, (P,), at shares `y` (F,) of the range."""
         values = np.array(self.values)
-        values[self.slots] = self.low + place * (self.high - self.low)
+        values[self.slots] = self.low + y * (self.high - self.low)
         return values
 
 
-class Own(eqx.Module):
-    """Parameters of which each run has a value of its own."""
+class PerRun(eqx.Module):
+    """Parameters that have one value for each run."""
 
     names: tuple[str, ...] = eqx.field(static=True)
     runs: tuple[str, ...] = eqx.field(static=True)
-    start: Float[Array, "run own"]
+    start: Float[Array, "run parameter"]
 
     @property
-    def in_full(self) -> tuple[str, ...]:
+    def full_names(self) -> tuple[str, ...]:
         """`convection_coefficient[Step01]`, those of the first run first."""
         return tuple(f"{name}[{run}]" for run in self.runs for name in self.names)
 
@@ -60,7 +60,7 @@ class Own(eqx.Module):
 class Problem(eqx.Module):
     """A model that carries all candidate effects at their base values, and the runs to fit it to.
 
-    P parameters: those of the model, then each run's own.
+    P parameters: those of the model, then those with one value for each run.
     """
 
     system: System
@@ -68,7 +68,7 @@ class Problem(eqx.Module):
     batch: RunBatch
     noise_sigma: Float[Array, "*output"]  # of the one output, or of each
     offset: tuple[bool, ...] = eqx.field(static=True)  # of each output
-    own: Own
+    per_run: PerRun
     priors: Priors
 
     @classmethod
@@ -78,14 +78,14 @@ class Problem(eqx.Module):
         batch: RunBatch,
         noise_sigma: float | Array,
         offset: bool | tuple[bool, ...],
-        own: Own | None = None,
-        known: Mapping[str, Prior] = MappingProxyType({}),
+        per_run: PerRun | None = None,
+        priors: Mapping[str, Prior] = MappingProxyType({}),
     ) -> Problem:
-        """`offset`: whether each run has an unknown zero of an output, one for all or one each. `known`: priors."""
-        own = own or Own((), tuple(str(run) for run in range(batch.runs)), jnp.zeros((batch.runs, 0)))
-        names = (*parameters(system), *own.in_full)
+        """`offset`: whether each run has an unknown zero of an output, one for all or one each."""
+        per_run = per_run or PerRun((), tuple(str(run) for run in range(batch.runs)), jnp.zeros((batch.runs, 0)))
+        names = (*parameters(system), *per_run.full_names)
         zero = (offset,) * len(batch.outputs) if isinstance(offset, bool) else offset
-        return cls(system, names, batch, jnp.asarray(noise_sigma), zero, own, Priors.of(names, known))
+        return cls(system, names, batch, jnp.asarray(noise_sigma), zero, per_run, Priors.of(names, priors))
 
     @property
     def noise(self) -> Float[Array, "series 1"]:
@@ -96,30 +96,30 @@ class Problem(eqx.Module):
     @property
     def shared(self) -> tuple[str, ...]:
         """The names of the model's parameters, which all runs share."""
-        return self.names[: len(self.names) - self.own.start.size]
+        return self.names[: len(self.names) - self.per_run.start.size]
 
     def start_values(self) -> np.ndarray:
-        """The model's own values in the order of `names`, and each run's: shape (P,)."""
-        return np.concatenate([np.asarray(get_parameters(self.system, self.shared)), np.ravel(self.own.start)])
+        """The model's values in the order of `names`, then each run's: shape (P,)."""
+        return np.concatenate([np.asarray(get_parameters(self.system, self.shared)), np.ravel(self.per_run.start)])
 
-    def lane(
+    def task(
         self,
         free: Sequence[str],
         bounds: Mapping[str, tuple[float, float]],
         values: np.ndarray,
         weights: np.ndarray | None = None,
-        tie: float = 0.0,
-    ) -> Lane:
-        """A lane that frees `free` within `bounds`, starting from `values`.
+        regularisation: float = 0.0,
+    ) -> FitTask:
+        """A task that frees `free` within `bounds`, starting from `values`.
 
-        `tie`: of the parameters' logits in the box, so that one near a bound is held to its own size.
+        `regularisation`: of the parameters' logits between their bounds, so that one near a bound may change by its size.
         """
         slots = np.asarray([self.names.index(name) for name in free], dtype=int)
         low, high = (np.asarray([bounds[name][side] for name in free], dtype=float) for side in (0, 1))
         full = np.ones(self.batch.runs) if weights is None else np.asarray(weights, dtype=float)
-        loose = Lane(slots, low, high, np.asarray(values, dtype=float), full, np.zeros(len(free)))
-        share = np.clip(loose.place, NEAREST, 1.0 - NEAREST)
-        return loose._replace(tie=tie / (share * (1.0 - share)))
+        loose = FitTask(slots, low, high, np.asarray(values, dtype=float), full, np.zeros(len(free)))
+        share = np.clip(loose.initial_guess, NEAREST, 1.0 - NEAREST)
+        return loose._replace(regularisation=regularisation / (share * (1.0 - share)))
 
     def with_output(self, output: Float[Array, "series time"]) -> Problem:
         """The same with other measured outputs."""
@@ -131,24 +131,24 @@ class Problem(eqx.Module):
         return np.asarray(self.batch.output)
 
     def system_at(self, values: Float[Array, " parameter"]) -> System:
-        """The model, without what is each run's own."""
+        """The model, without the values of single runs."""
         return set_vector(self.system, self.shared, values[: len(self.shared)])
 
-    def own_at(self, values: Float[Array, " parameter"]) -> Float[Array, "run own"]:
-        """Each run's own values."""
-        return values[len(self.shared) :].reshape(self.own.start.shape)
+    def per_run_at(self, values: Float[Array, " parameter"]) -> Float[Array, "run parameter"]:
+        """The values of each run."""
+        return values[len(self.shared) :].reshape(self.per_run.start.shape)
 
-    def shown(self, values: Float[Array, " parameter"]) -> Float[Array, "series time"]:
-        """What the sensors show of the simulated runs."""
-        return shown_batch(self.system_at(values), self.batch, self.own.names, self.own_at(values))
+    def predict(self, values: Float[Array, " parameter"]) -> Float[Array, "series time"]:
+        """Sensor outputs of the simulated runs."""
+        return predict_batch(self.system_at(values), self.batch, self.per_run.names, self.per_run_at(values))
 
     def misfit(self, values: Float[Array, " parameter"]) -> Float[Array, "series time"]:
         """Measured minus simulated, each run's best offset taken off where the experiment declares one; 0 in padding."""
-        return self.misfit_of(self.shown(values))
+        return self.misfit_of(self.predict(values))
 
-    def misfit_of(self, shown: Float[Array, "series time"]) -> Float[Array, "series time"]:
-        """`misfit` of what the sensors show."""
-        return self.centred(self.batch.output - shown)
+    def misfit_of(self, predicted: Float[Array, "series time"]) -> Float[Array, "series time"]:
+        """`misfit` of predicted sensor outputs."""
+        return self.centred(self.batch.output - predicted)
 
     def centred(self, raw: ArrayOf) -> ArrayOf:
         """(..., series, N) with each run's best offset taken off where the experiment declares one; 0 in padding.

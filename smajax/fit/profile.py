@@ -1,4 +1,4 @@
-"""Profile likelihood: a parameter held at values beside its estimate, all others fitted again at each."""
+"""Profile likelihood: a parameter fixed at values beside its estimate, all others fitted again at each."""
 
 from __future__ import annotations
 
@@ -7,14 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from smajax.core.progress import Progress, quiet
-from smajax.core.result_cache import Kept
-from smajax.fit.levenberg_marquardt import Fit, fit_in_box
+from smajax.fit.levenberg_marquardt import Fit, FitSettings, levenberg_marquardt
 from smajax.fit.problem import Problem
 
 ERRORS = (-2.8, -2.1, -1.4, -0.7, 0.7, 1.4, 2.1, 2.8)  # standard errors from the estimate
-SPARE = 0.1  # share of the box, for a parameter that has no standard error
-ALIKE = 0.1  # rise of the cost that tells nothing apart
+SPARE = 0.1  # share of the range, for a parameter that has no standard error
+EQUAL_COST = 0.1  # rise of the cost, in variances of an independent sample, up to which two fits are the same minimum
 WITHIN = 1.959964  # square root of the 95 % point of chi-square with one degree of freedom
 
 
@@ -27,7 +25,7 @@ class Profile:
     rise: np.ndarray  # over the least, in units of the variance of an independent sample
     low: float | None  # 95 % interval; None: not reached by the last value, which may be the bound
     high: float | None
-    better: bool  # whether a lower cost was found on the way than the fit's
+    better: bool  # whether the cost is lower somewhere than at the fit
 
 
 def _crossing(values: np.ndarray, root: np.ndarray) -> float | None:
@@ -40,26 +38,26 @@ def _crossing(values: np.ndarray, root: np.ndarray) -> float | None:
 
 
 def _parts(problem: Problem, fit: Fit) -> tuple[float, float]:
-    """(squares of what runs leave, of what is known before)."""
-    known = float(np.sum(np.square(problem.priors.rows(fit.values))))
-    return fit.cost - known, known
+    """(squares of the runs' residuals, of the priors')."""
+    prior = float(np.sum(np.square(problem.priors.rows(fit.values))))
+    return fit.cost - prior, prior
 
 
 def profiles(
     problem: Problem,
-    asked: Sequence[str],
+    requested: Sequence[str],
     names: Sequence[str],
     bounds: Mapping[str, tuple[float, float]],
     best: Fit,
     errors: Mapping[str, float | None],
     inflation: float,
-    progress: Progress = quiet,
-    kept: Kept | None = None,
+    settings: FitSettings | None = None,
 ) -> tuple[Profile, ...]:
-    """Profiles of the parameters `asked`, which are among the fitted `names`; `best` is their fit."""
+    """Profiles of the parameters `requested`, which are among the fitted `names`; `best` is their fit."""
+    settings = settings or FitSettings(stage="profiles")
     index = problem.names.index
-    lanes, points = [], []
-    for name in asked:
+    tasks, points = [], []
+    for name in requested:
         low, high = bounds[name]
         error = errors[name] or SPARE * (high - low)
         others = [other for other in names if other != name]
@@ -67,19 +65,19 @@ def profiles(
         for value in sorted({min(max(here + share * error, low), high) for share in ERRORS} - {here}):
             start = np.array(best.values)
             start[index(name)] = value
-            lanes.append(problem.lane(others, bounds, start))
+            tasks.append(problem.task(others, bounds, start))
             points.append((name, value))
-    solved = fit_in_box(problem, lanes, kept=kept, progress=progress, what="profiles") if lanes else []
-    found, (least, before) = [], _parts(problem, best)
-    for name in asked:
+    solved = levenberg_marquardt(problem, tasks, settings) if tasks else []
+    drawn, (least, least_prior) = [], _parts(problem, best)
+    for name in requested:
         tried = [(value, *_parts(problem, one)) for (of, value), one in zip(points, solved, strict=True) if of == name]
-        tried = sorted([*tried, (float(best.values[index(name)]), least, before)])
-        values, cost, known = np.asarray(tried).T
-        # What is known before is known as it was said, whatever the residual's noise turns out to be.
-        rise = (cost - least) / inflation + known - before
+        tried = sorted([*tried, (float(best.values[index(name)]), least, least_prior)])
+        values, cost, prior = np.asarray(tried).T
+        # A prior is as narrow as it was declared, whatever the residual's noise turns out to be.
+        rise = (cost - least) / inflation + prior - least_prior
         middle = int(np.argmin(np.abs(values - best.values[index(name)])))
         root = np.sqrt(np.maximum(rise, 0.0))
         down = _crossing(values[middle::-1], root[middle::-1])
         up = _crossing(values[middle:], root[middle:])
-        found.append(Profile(name, values, rise, down, up, bool(rise.min() < -ALIKE)))
-    return tuple(found)
+        drawn.append(Profile(name, values, rise, down, up, bool(rise.min() < -EQUAL_COST)))
+    return tuple(drawn)

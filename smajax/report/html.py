@@ -98,7 +98,7 @@ def _parameter_rows(findings: Findings) -> list[dict[str, Any]]:
                 "after": _fitted(after.get(name)),
                 "bounds": f"{shown(any_.lower, any_.unit, name).text} … {shown(any_.upper, any_.unit, name).text}",
                 "remark": _remarks(before.get(name), after.get(name)),
-                "entangled": any(word in any_.remark for word in ("moves together", "combination")),
+                "entangled": any(word in any_.remark for word in ("correlated with", "combination")),
             }
         )
     return rows

@@ -40,7 +40,7 @@ def _run_rows(found: Identified) -> tuple[list[str], list[list[str]]]:
 
 def _what_to_do(found: Identified) -> str:
     """About parameters of which the runs see one combination; empty where there are none."""
-    if not any("move together" in one for one in found.weak):
+    if not any("are correlated" in one for one in found.weak):
         return ""
     where = "such runs are ranked below" if found.suggestions else "<code>--design</code> ranks such runs"
     return (

@@ -20,7 +20,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from smajax.core.runtime import prepare
-from smajax.fit.levenberg_marquardt import MOST_STEPS, Fit, fit_in_box
+from smajax.fit.levenberg_marquardt import MAX_STEPS, Fit, FitSettings, levenberg_marquardt
 from smajax.fit.sensitivity import sensitivity
 from smajax.fit.uncertainty import uncertainty
 from studies.coverage.rig import BOUNDS, NOISE, Rig, rig
@@ -30,13 +30,13 @@ SEED = 6
 WITHIN = 1.959964
 
 
-def repeated(rig: Rig, count: int, most: int = MOST_STEPS) -> tuple[list[Fit], np.ndarray]:
+def repeated(rig: Rig, count: int, most: int = MAX_STEPS) -> tuple[list[Fit], np.ndarray]:
     """Fits of `count` noisy repetitions, and their outputs (count, R, N)."""
     exact = np.asarray(rig.problem.batch.output)
     noise = NOISE * np.random.default_rng(SEED).standard_normal((count, *exact.shape))
     outputs = exact + noise
-    lane = rig.problem.lane(rig.names, BOUNDS, rig.start)
-    return fit_in_box(rig.problem, [lane] * count, outputs=outputs, most=most), outputs
+    task = rig.problem.task(rig.names, BOUNDS, rig.start)
+    return levenberg_marquardt(rig.problem, [task] * count, FitSettings(most), outputs=outputs), outputs
 
 
 def errors(rig: Rig, solutions: list[Fit], outputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -84,8 +84,8 @@ def study(fast: bool) -> dict[str, Any]:
     """Everything as numbers."""
     dt, fine, count, peers = (0.02, 0.02, 40, 2) if fast else (0.02, 0.005, 200, 20)
     exact = rig(fine)
-    lane = exact.problem.lane(exact.names, BOUNDS, exact.start)
-    best = fit_in_box(exact.problem, [lane])[0]
+    task = exact.problem.task(exact.names, BOUNDS, exact.start)
+    best = levenberg_marquardt(exact.problem, [task])[0]
     index = exact.problem.names.index
     without = {name: float(best.values[index(name)] / exact.truth[name] - 1.0) for name in exact.names}
     here = rig(dt)

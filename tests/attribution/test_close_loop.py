@@ -160,8 +160,8 @@ def test_each_cluster_that_moves_together_has_one_line_with_advice() -> None:
         return ParameterFinding(name, "-", 0.5, 0.1, 0.0, 1.0, 0.5, remark)
 
     several = (
-        found("specific_heat", "moves together with convection_coefficient"),
-        found("convection_coefficient", "moves together with specific_heat"),
+        found("specific_heat", "correlated with convection_coefficient"),
+        found("convection_coefficient", "correlated with specific_heat"),
         found("damping", "known from its prior; the runs add next to nothing"),
     )
     pair = ("specific_heat", "convection_coefficient")

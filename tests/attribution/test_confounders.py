@@ -11,7 +11,7 @@ import pytest
 from smajax.attribution.bootstrap import bootstrapped
 from smajax.attribution.confounders import imitation, rivals, separating_run
 from smajax.attribution.cross_validation import Model, Search, Start
-from smajax.core.result_cache import Kept
+from smajax.core.result_cache import ResultCache
 from smajax.data.experiment.record import Run
 from smajax.fit.packed_runs import RunBatch, simulate_batch
 from smajax.fit.problem import Problem
@@ -51,7 +51,7 @@ def _setting() -> tuple[Search, Model, list[Run]]:
     batch = dataclasses.replace(blank, output=jnp.asarray(exact + noise))
     candidates = ("latent_heat", "phase_resistance")
     problem = Problem.build(extended(base, candidates), batch, NOISE, False)
-    setting = Search(problem, ("convection_coefficient",), BOUNDS, candidates, Kept(), "{:.3g} m".format)
+    setting = Search(problem, ("convection_coefficient",), BOUNDS, candidates, ResultCache(), "{:.3g} m".format)
     values = problem.start_values()
     values[problem.names.index("latent_heat.enthalpy")] = TRUE
     ones = np.ones((3, SAMPLES))

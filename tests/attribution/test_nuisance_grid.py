@@ -13,7 +13,7 @@ from smajax.attribution.nuisance_grid import looked_at
 from smajax.attribution.run_extent import extent_of
 from smajax.attribution.search import scores_at, start_values
 from smajax.core.parameters import parameters, set_parameters
-from smajax.core.result_cache import Kept
+from smajax.core.result_cache import ResultCache
 from smajax.fit.packed_runs import RunBatch, simulate_batch
 from smajax.fit.problem import Problem
 from smajax.model.extended import extended
@@ -35,7 +35,7 @@ def _setting(time: float, lasting: float) -> Search:
     noise = NOISE * np.random.default_rng(2).normal(size=truth.shape)
     batch = dataclasses.replace(blank, output=truth + noise)
     bounds = {name: (entry.low, entry.high) for name, entry in parameters(full).items()}
-    return Search(Problem.build(full, batch, NOISE, False), (), bounds, EFFECTS, Kept(), "{:.3g} m".format)
+    return Search(Problem.build(full, batch, NOISE, False), (), bounds, EFFECTS, ResultCache(), "{:.3g} m".format)
 
 
 def _base(setting: Search) -> Model:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from smajax.attribution.cross_validation import FOLDS, Fitted, Model, Search
-from smajax.core.result_cache import Kept
+from smajax.core.result_cache import ResultCache
 from smajax.fit.levenberg_marquardt import Fit
 from smajax.fit.packed_runs import RunBatch, simulate_batch
 from smajax.fit.predicted import misfits
@@ -31,7 +31,7 @@ def _setting() -> Search:
     noise = NOISE * np.random.default_rng(7).normal(size=truth.shape)
     batch = RunBatch(inputs, truth + noise, blank.mask, blank.overrides, (), DT)
     problem = Problem.build(extended(base, ("latent_heat",), {}), batch, NOISE, False)
-    return Search(problem, ("convection_coefficient",), BOUNDS, ("latent_heat",), Kept(), "{:.3g} m".format)
+    return Search(problem, ("convection_coefficient",), BOUNDS, ("latent_heat",), ResultCache(), "{:.3g} m".format)
 
 
 def _at(setting: Search, enthalpy: float) -> Fit:

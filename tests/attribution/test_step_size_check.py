@@ -12,7 +12,7 @@ from smajax.attribution.cross_validation import Model, Search
 from smajax.attribution.search import taken_of
 from smajax.attribution.step_size_check import kept_at_half_the_step
 from smajax.core.parameters import parameters
-from smajax.core.result_cache import Kept
+from smajax.core.result_cache import ResultCache
 from smajax.fit.packed_runs import RunBatch, halved, simulate_batch
 from smajax.fit.predicted import misfits
 from smajax.fit.problem import Problem
@@ -39,7 +39,7 @@ def setting() -> Search:
     batch = RunBatch(inputs, shown + noise, blank.mask, blank.overrides, (), DT)
     problem = Problem.build(extended(base, HEAT + FRICTION, {}), batch, NOISE, False)
     bounds = {entry.name: (entry.low, entry.high) for entry in parameters(problem.system).values()}
-    return Search(problem, ("convection_coefficient",), bounds, HEAT + FRICTION, Kept(), "{:.3g} m".format)
+    return Search(problem, ("convection_coefficient",), bounds, HEAT + FRICTION, ResultCache(), "{:.3g} m".format)
 
 
 def _model(setting: Search, effects: tuple[str, ...], **values: float) -> Model:

@@ -20,10 +20,10 @@ from smajax.attribution.unknown.spline import COUNT, design, spline
 from smajax.attribution.unknown.terms import UNKNOWN
 from smajax.attribution.unknown_term import Terms, in_place_of, unknown_terms, with_terms
 from smajax.attribution.unknown_words import told_of
-from smajax.core.result_cache import Kept
-from smajax.fit.levenberg_marquardt import fit_in_box
+from smajax.core.result_cache import ResultCache
+from smajax.fit.levenberg_marquardt import FitSettings, levenberg_marquardt
 from smajax.fit.packed_runs import RunBatch, simulate_batch
-from smajax.fit.predicted import misfits, shown_at
+from smajax.fit.predicted import misfits, predicted_at
 from smajax.fit.problem import Problem
 from smajax.fit.sensitivity import sensitivity
 from smajax.model.effects.base import AbstractEffect
@@ -107,8 +107,10 @@ def _setting(*hidden: AbstractEffect, seed: int = 5) -> tuple[Search, Model]:
     noise = NOISE * np.random.default_rng(seed).normal(size=truth.shape)
     batch = dataclasses.replace(_blank(), output=jnp.asarray(truth + noise))
     problem = Problem.build(_base(), batch, NOISE, False)
-    search = Search(problem, tuple(BOUNDS), BOUNDS, (), Kept(), lambda value: f"{1e3 * value:.3g} mm")
-    (fit,) = fit_in_box(problem, [problem.lane(tuple(BOUNDS), BOUNDS, problem.start_values())], enough=1e-5)
+    search = Search(problem, tuple(BOUNDS), BOUNDS, (), ResultCache(), lambda value: f"{1e3 * value:.3g} mm")
+    (fit,) = levenberg_marquardt(
+        problem, [problem.task(tuple(BOUNDS), BOUNDS, problem.start_values())], FitSettings(tolerance=1e-5)
+    )
     (misfit,) = misfits(problem, [fit.values])
     return search, Model((), fit.values, fit.cost, misfit, search.rmse(misfit))
 
@@ -133,8 +135,8 @@ def test_terms_at_zero_leave_the_model_as_it_is() -> None:
     search, values, found = _screened()
     assert {term.effect_name for term in found.terms} == set(UNKNOWN)
     alone, _ = _setting()
-    (with_all,) = shown_at(search.problem, [values])
-    (without,) = shown_at(alone.problem, [_setting()[1].values])
+    (with_all,) = predicted_at(search.problem, [values])
+    (without,) = predicted_at(alone.problem, [_setting()[1].values])
     np.testing.assert_allclose(with_all, without, rtol=0.0, atol=1e-11)
 
 
@@ -162,7 +164,7 @@ def test_a_sensors_error_is_added_once_to_every_sample() -> None:
     here = np.array(values)
     coefficients = np.linspace(-0.2, 0.3, COUNT)
     here[[search.problem.names.index(name) for name in search.coefficients(term.effect_name)]] = coefficients
-    ideal, shown = shown_at(search.problem, [values, here])
+    ideal, shown = predicted_at(search.problem, [values, here])
     share = (ideal - float(term.low)) / float(term.width)
     expected = ideal + float(term.scale) * (design(share.ravel()) @ coefficients).reshape(ideal.shape)
     np.testing.assert_allclose(shown, expected, rtol=0.0, atol=1e-11)

@@ -14,7 +14,7 @@ import pytest
 
 from smajax.cli.result_folder import MARK, FolderTaken, claimed
 from smajax.core.files import replace, writing
-from smajax.core.result_cache import Kept
+from smajax.core.result_cache import ResultCache
 from tests.helpers.small_bench import bench, log, refused, smajax
 
 WIRE = ("flexinol_table_3_2", "dead_weight", "flexinol_voltage", "--step", "5V:1s")
@@ -154,17 +154,17 @@ def test_two_programs_never_write_into_one_folder(tmp_path: Path) -> None:
 
 
 def test_work_that_was_damaged_is_done_again(tmp_path: Path) -> None:
-    kept = Kept(tmp_path)
+    kept = ResultCache(tmp_path)
     kept.save("a" * 32, {"values": np.arange(1000.0)})
     path = tmp_path / f"{'a' * 32}.npz"
     whole = path.read_bytes()
     assert kept.load("a" * 32) is not None
     for content in (b"", whole[:100], whole[:-30], whole[:60] + b"\xff" * 200 + whole[260:], b"PK\x03\x04"):
         path.write_bytes(content)
-        assert Kept(tmp_path).load("a" * 32) is None
+        assert ResultCache(tmp_path).load("a" * 32) is None
     with writing(path) as file:
         np.savez(file, object=np.array([{}], dtype=object))
-    assert Kept(tmp_path).load("a" * 32) is None  # pickled: never opened
+    assert ResultCache(tmp_path).load("a" * 32) is None  # pickled: never opened
 
 
 def test_a_cap_on_memory_makes_chunks_smaller(tmp_path: Path) -> None:
@@ -201,11 +201,11 @@ print(sizes[0], float(np.sum(found["temperature"].values)))
 
 
 def test_a_clock_that_is_set_back_loses_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Kept work is known by its content, so a file from the future is as good as another."""
-    kept = Kept(tmp_path)
+    """ResultCache work is known by its content, so a file from the future is as good as another."""
+    kept = ResultCache(tmp_path)
     kept.save("b" * 32, {"values": np.arange(3.0)})
     os.utime(tmp_path / f"{'b' * 32}.npz", (4e9, 4e9))
-    found = Kept(tmp_path).load("b" * 32)
+    found = ResultCache(tmp_path).load("b" * 32)
     assert found is not None
     np.testing.assert_array_equal(found["values"], np.arange(3.0))
     log(tmp_path / "a.csv")

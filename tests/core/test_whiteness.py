@@ -63,7 +63,7 @@ def test_the_noise_of_a_first_order_filter_is_told_from_a_trend() -> None:
     random = np.random.default_rng(7)
     made = [lfilter([0.3], [1.0, -0.8], random.normal(size=1200))[200:] for _ in range(3)]
     found = first_order(made)
-    assert found.kept == pytest.approx(0.8, abs=0.03)
+    assert found.coefficient == pytest.approx(0.8, abs=0.03)
     assert found.sigma == pytest.approx(0.3, rel=0.05)
     assert found.p_value > WHITE
     slow = [random.normal(size=1000) + np.sin(np.linspace(0.0, 9.0, 1000)) for _ in range(3)]

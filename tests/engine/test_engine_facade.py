@@ -20,7 +20,7 @@ from smajax.engine import EngineError, EngineWarning, Unsupported, arithmetic, c
 from smajax.engine import program as compiled_program
 from smajax.engine.facade import _programs
 from smajax.fit.experiment_problem import declared_problem
-from smajax.fit.predicted import shown_and_slopes
+from smajax.fit.predicted import predicted_and_derivatives
 from smajax.model.presets import build
 from smajax.simulation.compiled import simulate_compiled
 
@@ -43,7 +43,7 @@ def _demo() -> tuple[np.ndarray, np.ndarray]:
     experiment = open_experiment(DEMO)
     problem = declared_problem(experiment, [run for run in experiment.runs if run.role == "fit"][:1])
     start = np.asarray(problem.start_values())
-    return shown_and_slopes(problem, start[None], np.eye(len(start))[None])
+    return predicted_and_derivatives(problem, start[None], np.eye(len(start))[None])
 
 
 @pytest.fixture(scope="module")

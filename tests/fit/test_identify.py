@@ -1,4 +1,4 @@
-"""Identification: the truth found, with errors that say how well, and what the runs cannot tell is said."""
+"""Identification: the truth within its standard errors, and which parameters are not identifiable."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from smajax.data.experiment.record import Experiment
 from smajax.data.model_catalogue import CATALOGUE
 from smajax.data.readers.read import read_table
 from smajax.fit.design import candidate_runs
-from smajax.fit.directions import Direction, directions, weak_ones
+from smajax.fit.directions import Direction, directions, weak_combinations
 from smajax.fit.identify import identify
 from smajax.fit.identify_result import Identified
 from smajax.fit.robust import huber_weights
@@ -152,7 +152,7 @@ def test_huber_weights_fall_as_one_over_the_distance() -> None:
     assert weights[-1] == 0.0
 
 
-def test_what_moves_together_is_said() -> None:
+def test_correlated_parameters_are_said() -> None:
     rng = np.random.default_rng(1)
     columns = rng.standard_normal((400, 3))
     columns[:, 1] = -2.0 * columns[:, 0] + 1e-3 * columns[:, 1]
@@ -160,9 +160,9 @@ def test_what_moves_together_is_said() -> None:
     told = directions(at, ("a", "b", "c"), {"a": 1.0, "b": 1.0, "c": 10.0}, 1.0)
     assert set(told[0].shares) == {"a", "b", "c"}
     assert told[0].shares["b"] / told[0].shares["a"] == pytest.approx(0.5, rel=1e-2)
-    sentences = weak_ones(told)
+    sentences = weak_combinations(told)
     assert len(sentences) >= 1
-    assert "a and b move together" in sentences[0]
+    assert "a and b are correlated" in sentences[0]
 
 
 def test_a_temperature_moves_by_kelvins_wherever_its_zero_lies() -> None:
@@ -173,7 +173,8 @@ def test_a_temperature_moves_by_kelvins_wherever_its_zero_lies() -> None:
     for value in (70.0, 0.5):  # degC
         one = directions(at, ("a", "start"), {"a": 1.0, "start": value}, 1.0, ["start"])[0]
         told = re.fullmatch(
-            r"a and start move together: a by (.*) % and start by (.*) K, all at once.*", one.sentence()
+            r"a and start are correlated: a change of a by (.*) % and start by (.*) K at the same time.*",
+            one.sentence(),
         )
         assert told is not None
         assert float(told[2]) == pytest.approx(0.2 * float(told[1]), rel=0.06)  # two digits each
@@ -181,7 +182,7 @@ def test_a_temperature_moves_by_kelvins_wherever_its_zero_lies() -> None:
     assert alone.sentence() == "start is known to 2 K only."
 
 
-def test_the_next_run_is_one_that_tells_more(experiment: Experiment, found: Identified) -> None:
+def test_the_suggested_run_adds_information(experiment: Experiment, found: Identified) -> None:
     gains = [one.information for one in found.suggestions]
     assert len(gains) == 5
     assert gains == sorted(gains, reverse=True)
@@ -229,8 +230,8 @@ def test_the_page_has_a_column_of_profiles_where_one_was_drawn(found: Identified
     assert bare == [row[:place] + row[place + 1 :] for row in drawn]
 
 
-def test_the_page_says_what_to_do_about_parameters_that_move_together(found: Identified) -> None:
-    weak = ("a and b move together: a by +3 % and b by -3 %, all at once, is one standard error.",)
+def test_the_page_says_what_to_do_about_correlated_parameters(found: Identified) -> None:
+    weak = ("a and b are correlated: a change of a by +3 % and b by -3 % at the same time is one standard error.",)
     advice = "measure one by itself and give it under <code>[model.parameters]</code>"
     bare = dataclasses.replace(found, weak=weak, suggestions=())
     assert f"{advice} in the place of" in page(bare)

@@ -135,7 +135,7 @@ def test_a_second_sensor_tells_more_and_the_noise_of_each_is_found(tmp_path: Pat
     assert len(both.outputs) == 2
     for output in both.outputs:
         assert output.noise_sigma == pytest.approx(NOISE[output.name], rel=0.1)
-        assert output.noise_how == "as the fit leaves it"
+        assert output.noise_how == "estimated with the fit"
         assert output.ratio == pytest.approx(1.0, abs=0.02)
     assert _error(both, "austenite_start") < 0.8 * _error(alone, "austenite_start")
     for name, truth in TRUTH.items():
@@ -265,19 +265,19 @@ def test_a_killed_identification_goes_on_to_the_same_end(tmp_path: Path) -> None
     first, seen = list(seen), []
     resumed = identify(experiment, starts=4, memory=tmp_path / "fits", progress=noted)
     assert first.count("beginning fits") == 4
-    # The states of the first rounds may be younger than the last one that was kept, by a second at most.
+    # The states of the first rounds may be younger than the last one that was cached, by a second at most.
     assert seen.count("beginning fits") <= 7
 
     def numbers(found: Identified) -> str:
         return json.dumps({**record(found), "provenance": {}})
 
     assert numbers(resumed) == numbers(undisturbed)
-    assert "stages taken from an earlier run of the same" in resumed.provenance
+    assert "stages read from the cache" in resumed.provenance
     # Other data are other work.
     other = identify(
         _loaded(coupon_file(tmp_path, unknown_section() + BOTH, seed=6)), starts=4, memory=tmp_path / "fits"
     )
-    assert "stages taken from an earlier run of the same" not in other.provenance
+    assert "stages read from the cache" not in other.provenance
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Error bars: right where the runs tell a parameter, withheld where they do not."""
+"""Standard errors: right where a parameter is identifiable, none where it is not."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def test_standard_errors_are_those_of_least_squares_when_the_residual_is_white()
     assert not any(found.remark.values())
 
 
-def test_a_residual_with_a_memory_widens_the_errors() -> None:
+def test_an_autocorrelated_residual_widens_the_errors() -> None:
     """AR(1) with phi in residual and regressor: the variance grows by (1 + phi^2) / (1 - phi^2)."""
     rng = np.random.default_rng(2)
     phi, spread = 0.8, []
@@ -44,7 +44,7 @@ def test_a_residual_with_a_memory_widens_the_errors() -> None:
     assert np.mean(spread) == pytest.approx(expected, rel=0.15)
 
 
-def test_three_parameters_of_which_the_runs_see_two_have_no_standard_error() -> None:
+def test_three_parameters_of_which_two_combinations_are_identifiable_have_no_standard_error() -> None:
     rng = np.random.default_rng(3)
     columns = rng.normal(size=(500, 3))
     columns[:, 2] = columns[:, 0] + columns[:, 1]
@@ -68,7 +68,7 @@ def test_a_parameter_known_worse_than_its_range_has_no_standard_error() -> None:
     at = _sensitivity(rng.normal(size=(500, 2)) * [1.0, 1e-3], rng.normal(size=500))
     found = uncertainty(at, "ab", VALUES, BOUNDS)
     assert found.standard_error["b"] is None
-    assert "range open" in found.remark["b"]
+    assert "range undetermined" in found.remark["b"]
 
 
 def test_a_parameter_on_its_bound_has_no_standard_error() -> None:
@@ -88,88 +88,92 @@ def _estimates_with(covariance: np.ndarray, seed: int, samples: int = 4000) -> S
     return Sensitivity(names, rng.normal(size=(1, samples)), jacobian[None], np.ones((1, samples)))
 
 
-def _told_of(at: Sensitivity) -> tuple[list[str], dict[str, str]]:
-    """(the lines of parameters that move together, remarks)."""
+def _correlated(at: Sensitivity) -> tuple[list[str], dict[str, str]]:
+    """(the lines of correlated parameters, remarks)."""
     bounds = dict.fromkeys(at.names, (-100.0, 100.0))
     lines = identifiability(at, at.names, bounds)
     remark = uncertainty(at, at.names, dict.fromkeys(at.names, 1.0), bounds).remark
-    return [line for line in lines if "move together" in line], remark
+    return [line for line in lines if "are correlated" in line], remark
 
 
-def test_two_pairs_that_move_together_are_two_lines() -> None:
+def test_two_correlated_pairs_are_two_lines() -> None:
     covariance = np.eye(5)
     covariance[0, 1] = covariance[1, 0] = 0.995
     covariance[3, 4] = covariance[4, 3] = -0.9996
-    lines, remark = _told_of(_estimates_with(covariance, 7))
+    lines, remark = _correlated(_estimates_with(covariance, 7))
     assert [line.split(":")[0] for line in lines] == [
-        "a and b move together in these runs (correlation up to 0.995)",
-        "d and e move together in these runs (correlation up to 0.999)",
+        "a and b are correlated in these runs (correlation up to 0.995)",
+        "d and e are correlated in these runs (correlation up to 0.999)",
     ]
     assert remark == {
-        "a": "moves together with b",
-        "b": "moves together with a",
+        "a": "correlated with b",
+        "b": "correlated with a",
         "c": "",
-        "d": "moves together with e",
-        "e": "moves together with d",
+        "d": "correlated with e",
+        "e": "correlated with d",
     }
 
 
-def test_clusters_that_move_together_are_told_apart() -> None:
+def test_groups_of_correlated_parameters_are_separated() -> None:
     covariance = np.kron(np.eye(2), np.asarray([[1.0, 0.999], [0.999, 1.0]]))
     at = _estimates_with(covariance, 9)
     bounds = dict.fromkeys(at.names, (-1e6, 1e6))
     found = uncertainty(at, at.names, dict.fromkeys(at.names, 1.0), bounds)
-    assert found.together == (("a", "b"), ("c", "d"))
-    assert found.remark["a"] == "moves together with b"
+    assert found.correlated_groups == (("a", "b"), ("c", "d"))
+    assert found.remark["a"] == "correlated with b"
 
 
-def test_six_that_move_together_are_one_line_and_short_remarks() -> None:
-    lines, remark = _told_of(_estimates_with(0.01 * np.eye(6) + 0.99, 8))
+def test_six_correlated_ones_are_one_line_and_short_remarks() -> None:
+    lines, remark = _correlated(_estimates_with(0.01 * np.eye(6) + 0.99, 8))
     assert lines == [
-        "a, b, c, d, e and f move together in these runs (correlation up to 0.990): fix one of them or measure runs that "
-        "tell them apart."
+        "a, b, c, d, e and f are correlated in these runs (correlation up to 0.990): fix one of them or measure runs that "
+        "separate them."
     ]
-    assert remark["a"] == "moves together with b and 4 others"
-    assert {remark[name] for name in "bcdef"} == {"moves together with a and 4 others"}
+    assert remark["a"] == "correlated with b and 4 others"
+    assert {remark[name] for name in "bcdef"} == {"correlated with a and 4 others"}
 
 
-def test_a_chain_is_one_cluster_though_its_ends_differ() -> None:
+def test_a_chain_is_one_group_though_its_ends_differ() -> None:
     """A random walk from a to d: each estimate goes with the next one, a and d less than the limit."""
     steps = np.tril(np.ones((4, 4))) * [1.0, 0.15, 0.15, 0.15]
     covariance = steps @ steps.T
     assert covariance[0, 3] / np.sqrt(covariance[3, 3]) < 0.98
-    lines, _ = _told_of(_estimates_with(covariance, 9))
+    lines, _ = _correlated(_estimates_with(covariance, 9))
     assert len(lines) == 1
-    assert lines[0].startswith("a, b, c and d move together")
+    assert lines[0].startswith("a, b, c and d are correlated")
 
 
 @pytest.mark.parametrize(
-    ("names", "rank", "told"),
+    ("names", "rank", "sentence"),
     [
-        ("a", 0, "No unknown shows in these runs (Jacobian of 500 samples, rank 0)."),
-        ("a", 1, "The one unknown shows in these runs (Jacobian of 500 samples, rank 1)."),
-        ("ab", 2, "All 2 unknowns show in these runs (Jacobian of 500 samples, rank 2)."),
-        ("abc", 2, "Only 2 combinations of the 3 unknowns show in these runs (Jacobian of 500 samples, rank 2)"),
+        ("a", 0, "No unknown is identifiable from these runs (Jacobian of 500 samples, rank 0)."),
+        ("a", 1, "The one unknown is identifiable from these runs (Jacobian of 500 samples, rank 1)."),
+        ("ab", 2, "All 2 unknowns are identifiable from these runs (Jacobian of 500 samples, rank 2)."),
+        (
+            "abc",
+            2,
+            "Only 2 combinations are identifiable of the 3 unknowns from these runs (Jacobian of 500 samples, rank 2)",
+        ),
     ],
 )
-def test_how_many_unknowns_show_is_said_first(names: str, rank: int, told: str) -> None:
+def test_how_many_unknowns_are_identifiable_is_said_first(names: str, rank: int, sentence: str) -> None:
     rng = np.random.default_rng(3)
     columns = rng.normal(size=(500, rank)) @ np.eye(rank, len(names))
     columns[:, rank:] = columns[:, :1] if rank else 0.0
     line = identifiability(_sensitivity(columns, rng.normal(size=500)), names, BOUNDS)[0]
-    assert line.startswith(told)
+    assert line.startswith(sentence)
 
 
 def test_a_weak_parameter_within_a_degeneracy_has_no_error_either() -> None:
-    """Its own column is short beside those it goes with: the way along what nobody sees moves it all the same."""
+    """Its column is short beside those of the others: the direction that is not identifiable changes it all the same."""
     rng = np.random.default_rng(11)
     columns = rng.normal(size=(400, 3)) * [1.0, 0.02, 1.0]
-    columns[:, 2] = columns[:, 0] + columns[:, 1]  # (1, 1, -1) is seen by nothing
+    columns[:, 2] = columns[:, 0] + columns[:, 1]  # (1, 1, -1) has no effect
     found = uncertainty(_sensitivity(columns, 1e-3 * rng.normal(size=400)), "abc", VALUES, BOUNDS)
     assert set(found.standard_error.values()) == {None}
 
 
-def test_no_variance_of_a_residual_with_a_memory_is_below_zero() -> None:
+def test_no_variance_of_an_autocorrelated_residual_is_below_zero() -> None:
     rng = np.random.default_rng(12)
     for _ in range(300):
         columns = rng.normal(size=(24, 2))
@@ -181,7 +185,7 @@ def test_no_variance_of_a_residual_with_a_memory_is_below_zero() -> None:
 
 
 def test_few_independent_samples_make_no_small_error() -> None:
-    """A coupon of 240 samples whose residual has a memory: a slow column tells no more than its independent samples."""
+    """A coupon of 240 samples with an autocorrelated residual: a slow column has no more information than its independent samples."""
     rng = np.random.default_rng(13)
     column = np.linspace(-1.0, 1.0, 240)[:, None]
     z = []

@@ -391,6 +391,6 @@ def test_a_remark_that_parameters_move_together_leads_to_what_can_be_done(findin
         page = findings_to_html(made)
         return page[page.index('<section id="parameters"') : page.index('<section id="residual"')]
 
-    assert 'href="#cannot-know"' in section("moves together with specific_heat")
-    assert 'href="#cannot-know"' in section("the runs see only a combination of it with specific_heat")
+    assert 'href="#cannot-know"' in section("correlated with specific_heat")
+    assert 'href="#cannot-know"' in section("only a combination of it with specific_heat is identifiable")
     assert 'href="#cannot-know"' not in section("at its lower bound")

@@ -56,7 +56,7 @@ def test_reverse_mode_agrees_with_forward_mode() -> None:
 
 
 def test_problem_slots_reach_the_parameter_they_name() -> None:
-    """A lane that frees one parameter changes that one and nothing else."""
+    """A fit that frees one parameter changes that one and nothing else."""
     from smajax.fit.packed_runs import RunBatch
 
     system, inputs = CASES["dead_weight"]
@@ -66,9 +66,9 @@ def test_problem_slots_reach_the_parameter_they_name() -> None:
     )
     problem = Problem.build(system, batch, 1e-5, True)
     start = problem.start_values()
-    lane = problem.lane(["specific_heat"], {"specific_heat": (200.0, 1000.0)}, start)
-    same = lane.at(lane.place)
+    task = problem.task(["specific_heat"], {"specific_heat": (200.0, 1000.0)}, start)
+    same = task.values_at(task.initial_guess)
     np.testing.assert_allclose(same[:-1], start[:-1], rtol=1e-12)
-    moved = lane.at(lane.place + 0.1)
+    moved = task.values_at(task.initial_guess + 0.1)
     changed = [name for k, name in enumerate(problem.names) if abs(moved[k] - start[k]) > 1e-12 * abs(start[k])]
     assert changed == ["specific_heat"]

@@ -11,7 +11,7 @@ import numpy as np
 from smajax.attribution.close_loop import SEED
 from smajax.attribution.cross_validation import Search
 from smajax.core.parameters import parameter_values, parameters
-from smajax.core.result_cache import Kept
+from smajax.core.result_cache import ResultCache
 from smajax.data.experiment.load import load_experiment
 from smajax.data.experiment.record import Experiment
 from smajax.data.model_catalogue import CATALOGUE, candidates
@@ -64,6 +64,6 @@ def opened(folder: Path) -> Bench:
         batch = pack(runs, experiment.step, parameter_values(full))
         problem = Problem.build(full, batch, experiment.noise_sigma, experiment.offset)
         free = tuple(unknown.name for unknown in experiment.unknowns)
-        return Search(problem, free, bounds, names, Kept(), str)
+        return Search(problem, free, bounds, names, ResultCache(), str)
 
     return Bench(experiment, search("fit"), search("held-out"))
