@@ -1,8 +1,8 @@
-"""What the site takes from the repository when it is built, and its equations as MathML: nothing is kept twice.
+"""What the site takes from the repository when it is built, and its equations as MathML: nothing is stored twice.
 
-A page links a file of the repository by its path, as it does where the repository is read by itself (`../tests/x.py`).
+A page links a file of the repository by its path, so that the link also works in the repository (`../tests/x.py`).
 Pages and pictures of `studies/` become part of the site; any other text file that a page links becomes a page that
-shows it. A link that leads to nothing ends the build.
+shows it. A broken link ends the build.
 """
 
 from __future__ import annotations
@@ -32,7 +32,23 @@ LINK = re.compile(r"(\]\()([^)#\s]+)((?:#[^)\s]*)?\))")
 LABELLED = re.compile(r"\[([^\[\]]*)\]\(([^)#\s]+)\)")
 FENCED = re.compile(r"^(```|~~~).*?^\1[ \t]*$", re.MULTILINE | re.DOTALL)
 MATHS = re.compile(r'<(span|div) class="arithmatex">(.*?)</\1>', re.DOTALL)
-ASIDE = ("__init__", "__main__")  # of modules
+# Where the reference shows a module that no page names: on the page of its folder, the longest that fits.
+PAGE_OF = {
+    "smajax": "names",
+    "smajax.core": "core",
+    "smajax.engine": "engine",
+    "smajax.model": "loads-and-drives",
+    "smajax.model.wire": "wire",
+    "smajax.model.effects": "effects",
+    "smajax.simulation": "simulation",
+    "smajax.simulation.batch": "batches",
+    "smajax.data": "experiments",
+    "smajax.fit": "fits",
+    "smajax.control": "control",
+    "smajax.attribution": "attribution",
+    "smajax.report": "reports",
+    "smajax.cli": "commands",
+}
 LANGUAGES = {".py": "python", ".toml": "toml", ".json": "json", ".slurm": "bash", ".cpp": "cpp", ".yml": "yaml"}
 
 
@@ -60,7 +76,7 @@ def linked(page: str, text: str) -> list[str]:
 
 
 def on_files(files: Files, config: Any) -> Files:
-    """Puts in what the pages of the site and of the studies link."""
+    """Add what the pages of the site and of the studies link."""
     taken = [path.relative_to(ROOT).as_posix() for one in TAKEN for path in sorted(ROOT.glob(one))]
     taken += [path.relative_to(ROOT).as_posix() for one in PICTURES for path in sorted(ROOT.glob(one))]
     pages = [f"docs/{file.src_uri}" for file in files.documentation_pages()]
@@ -76,21 +92,21 @@ def on_files(files: Files, config: Any) -> Files:
             files.append(File.generated(config, place(path), content=shown))
         else:
             files.append(File.generated(config, place(path), abs_src_path=str(source)))
-    files.append(File.generated(config, "reference/other.md", content=others(files)))
     return files
 
 
-def others(files: Files) -> str:
-    """A page of the modules that no page of the reference names, so that a new one is never left out."""
+def unlisted(source: str, files: Files) -> list[str]:
+    """Modules that belong to this page of the reference and that no page names, so that a new one is never left out."""
     pages = [file for file in files.documentation_pages() if file.src_uri.startswith("reference/")]
-    told = "\n".join(file.content_string for file in pages)
-    package = ROOT / "smajax"
-    paths = [path.relative_to(ROOT).with_suffix("") for path in sorted(package.rglob("*.py"))]
-    names = [".".join(path.parts) for path in paths if path.name not in ASIDE and "figures" not in path.parts]
-    left = [f"::: {name}" for name in names if not re.search(rf"^::: {re.escape(name)}$", told, re.MULTILINE)]
-    return (
-        "\n\n".join(["# Everything else", "Commands, pages of commands, and what several stages share.", *left]) + "\n"
-    )
+    text = "\n".join(file.content_string for file in pages)
+    listed = set(re.findall(r"^::: (\S+)$", text, re.MULTILINE))
+    paths = [path.relative_to(ROOT).with_suffix("") for path in sorted((ROOT / "smajax").rglob("*.py"))]
+    names = [".".join(path.parts) for path in paths if not path.name.startswith("_")]
+
+    def page(name: str) -> str:
+        return PAGE_OF[max((folder for folder in PAGE_OF if name.startswith(f"{folder}.")), key=len)]
+
+    return [name for name in names if name not in listed and f"reference/{page(name)}.md" == source]
 
 
 def origin(source: str) -> str:
@@ -99,10 +115,12 @@ def origin(source: str) -> str:
 
 
 def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str:
-    """Links of the repository as links of the site; a folder's is its name alone."""
+    """Links of the repository as links of the site, a folder's as plain text; a page of the reference with all its modules."""
     here = page.file.src_uri
     if here.startswith("repository/"):
         return markdown
+    if here.startswith("reference/"):
+        markdown += "".join(f"\n::: {name}\n" for name in unlisted(here, files))
     mine = origin(here)
 
     def path_of(target: str) -> str:
@@ -129,7 +147,7 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str
 
 
 def on_page_content(content: str, page: Any, config: Any, files: Files) -> str:
-    """LaTeX as MathML, which browsers draw by themselves."""
+    """LaTeX as MathML, which browsers render without a library."""
 
     def shown(match: re.Match[str]) -> str:
         text = html.unescape(match[2]).strip()

@@ -22,7 +22,7 @@ SAID = {
     "LOADS": "Presets of loads by name.",
     "WIRES": "Presets of wires by name.",
     "effects": "The effects, each in a module of its own.",
-    "load_experiment": "Read an experiment file and its runs, with the presets, effects and parameters that there are.",
+    "load_experiment": "Read an experiment file and its runs, with all presets, effects and parameters.",
 }
 # (heading, names) of the public names.
 STAGES = (
@@ -46,7 +46,7 @@ STAGES = (
         ),
     ),
     ("Measured runs", ("load_experiment", "identify", "write_identified", "close_loop", "write_report")),
-    ("Parts of one's own", ("AbstractEffect", "AbstractMovingLoad", "parameter", "effects")),
+    ("Your own parts", ("AbstractEffect", "AbstractMovingLoad", "parameter", "effects")),
 )
 
 
@@ -77,7 +77,7 @@ def _stages() -> list[tuple[str, tuple[str, ...]]]:
 
 def _row(name: str) -> str:
     if name in smajax.MODULES:
-        module = f"smajax.{name}"
+        module = smajax.MODULES[name]
         page = "effects.md" if name == "effects" else f"{_page_of(module)}#{module}"
         return f"| [`{name}`]({page}) | module | {SAID.get(name) or _first_paragraph(getattr(smajax, name))} |"
     module, own = smajax.NAMES[name]
@@ -94,10 +94,10 @@ def names() -> str:
         "",
         MADE,
         "",
-        "`import smajax as sma` has these, as `sma.compose` and so on. What else there is lies in modules, on the pages that these lead to.",
-        "A name here is not changed at once: the old one goes on working for a minor version, with a warning.",
+        "`import smajax as sma` has these names, as `sma.compose` and so on. Everything else is in modules, on the pages that these link.",
+        "When a name here changes, the old one keeps working for a minor version, with a DeprecationWarning.",
         "",
-        'JAX\'s precision is yours to set, before the first array: `jax.config.update("jax_enable_x64", True)`.',
+        'Set JAX\'s precision before the first array: `jax.config.update("jax_enable_x64", True)`.',
     ]
     for heading, members in _stages():
         lines += ["", f"## {heading}", "", "| name | | |", "|---|---|---|", *(_row(name) for name in members)]
@@ -118,8 +118,8 @@ def effects() -> str:
         "",
         MADE,
         "",
-        f"What the base model may lack: {len(own)} effects, one class each, and one method an equation. An effect of your own:",
-        "[how to](../how-to/add-an-effect.md).",
+        f"What the base model may lack: {len(own)} effects, one class each, with one method per equation. To add your own:",
+        "[how to add an effect](../how-to/add-an-effect.md).",
     ]
     for equation in EQUATIONS:
         lines += ["", f"## {equation.capitalize()}", "", "| effect | what it is | what it changes |", "|---|---|---|"]
