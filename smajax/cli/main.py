@@ -110,6 +110,7 @@ def main() -> None:
             raise SystemExit(2) from None
         # Imported when there is an error: `--help` does not wait for them.
         from smajax.cli.result_folder import FolderTaken
+        from smajax.core.extras import MissingExtraError
         from smajax.core.plugins import PluginError
         from smajax.core.units import UnitError
         from smajax.data.experiment.errors import ExperimentError
@@ -122,7 +123,17 @@ def main() -> None:
                 "finished is kept."
             )
         elif not isinstance(
-            error, (EngineError, ExperimentError, FolderTaken, MeasuredDataError, OSError, PluginError, UnitError)
+            error,
+            (
+                EngineError,
+                ExperimentError,
+                FolderTaken,
+                MeasuredDataError,
+                MissingExtraError,
+                OSError,
+                PluginError,
+                UnitError,
+            ),
         ):
             raise
         console().print(f"Error: {error}", style="red", markup=False, highlight=False, soft_wrap=True)

@@ -14,6 +14,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from smajax.core.extras import MissingExtraError, optional_package
 from smajax.core.progress import Progress, Stage, quiet
 from smajax.core.result_cache import ResultCache
 from smajax.fit.problem import Problem
@@ -92,12 +93,9 @@ def _advance(
 def library() -> Any:
     """blackjax. ValueError says how to install it."""
     try:
-        import blackjax
-    except ImportError:
-        raise ValueError(
-            "a posterior needs the optional extra `bayes`: pip install 'smajax[bayes]' (or pip install blackjax)."
-        ) from None
-    return blackjax
+        return optional_package("blackjax", "bayes", "a posterior")
+    except MissingExtraError as error:
+        raise ValueError(str(error)) from None
 
 
 def posterior(

@@ -77,10 +77,12 @@ def tune_into(
 ) -> Tuned:
     """Tune, or go on where this tuning was interrupted, and write the folder, each file in one step.
 
-    Raises ValueError for settings that make no sense, and for a folder that holds something else.
+    Raises ValueError for settings that make no sense and for a folder that holds something else, MissingExtraError without a
+    package that the settings need.
     """
     asked = _asked(system, settings)
     check_folder(out, asked)
+    settings.check_packages()
     out.mkdir(parents=True, exist_ok=True)
     replace(out / ASKED, json_text(asked))
 

@@ -5,14 +5,17 @@ With limits `trust` comes much further in as many loops (studies/tuning).
 
 from __future__ import annotations
 
+from functools import lru_cache
+from typing import Any
+
 import jax
 import jax.numpy as jnp
 import numpy as np
-import optax
 
 from smajax.control.tune.evaluate import Seen
 from smajax.control.tune.objective import Goal, multiplied, rank, value_and_slope
 from smajax.control.tune.scenarios import Members
+from smajax.core.extras import optional_package
 
 STEP = 0.06  # of a gain, share of its box by logarithm
 LONGEST = 10.0  # units of the cost per box: longer slopes are cut to that
@@ -20,14 +23,20 @@ PATIENCE, SHORTER, SHORTEST = 2, 0.5, 0.02  # rounds without a better candidate;
 SHARP = 0.1  # T of the soft maximum, share of the cost
 WEIGHT, HEAVIER, HEAVIEST = 4.0, 1.6, 200.0  # rho at first, after every update of the multipliers, and at most
 UPDATED = 4  # rounds between two of them
-RULE = optax.chain(optax.clip_by_global_norm(LONGEST), optax.adam(STEP, b1=0.7, b2=0.9))
 Memory = dict[str, np.ndarray]
+
+
+@lru_cache(maxsize=1)
+def rule() -> Any:
+    """optax's gradient transformation. MissingExtraError says how to install optax."""
+    optax = optional_package("optax", "tune", "`--by adam`", "or take `--by trust-region`")
+    return optax.chain(optax.clip_by_global_norm(LONGEST), optax.adam(STEP, b1=0.7, b2=0.9))
 
 
 def begin(points: np.ndarray, members: Members, limits: int) -> Memory:
     """Nothing known yet: arrays by start."""
     count = len(points)
-    state = jax.tree.leaves(jax.vmap(RULE.init)(jnp.asarray(points)))
+    state = jax.tree.leaves(jax.vmap(rule().init)(jnp.asarray(points)))
     return {f"moment {k}": np.asarray(leaf) for k, leaf in enumerate(state)} | {
         "reach": np.ones(count),
         "waited": np.zeros(count, int),
@@ -50,10 +59,10 @@ def move(
     new["best"][better], new["best rank"][better] = points[better], order[better]
     sharp = np.where(np.isfinite(cost), SHARP * np.maximum(cost, 1e-6), 1.0)
     slope = value_and_slope(goal, seen, members, sharp, new["multipliers"], new["rho"])[1]
-    like = jax.tree.structure(jax.vmap(RULE.init)(jnp.asarray(points)))
+    like = jax.tree.structure(jax.vmap(rule().init)(jnp.asarray(points)))
     names = [name for name in new if name.startswith("moment ")]
     state = jax.tree.unflatten(like, [jnp.asarray(new[name]) for name in names])
-    steps, state = jax.vmap(RULE.update)(jnp.asarray(np.nan_to_num(slope)), state)
+    steps, state = jax.vmap(rule().update)(jnp.asarray(np.nan_to_num(slope)), state)
     following = np.clip(points + new["reach"][:, None] * np.asarray(steps), 0.0, 1.0)
     # Copies: what jax gives must not be written to.
     new |= {name: np.array(leaf) for name, leaf in zip(names, jax.tree.leaves(state), strict=True)}

@@ -11,16 +11,21 @@ import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING
 
 import numpy as np
-from cmaes import CMA
 
 from smajax.control.tune.evaluate import Rig
 from smajax.control.tune.objective import Goal, rank
 from smajax.control.tune.scenarios import Members
+from smajax.core.extras import optional_package
 from smajax.core.files import writing
 from smajax.core.progress import Progress, Stage, quiet
 from smajax.core.result_cache import arrays
+
+if TYPE_CHECKING:
+    from cmaes import CMA
 
 POPULATION = 24  # candidates of a generation
 FIRST, AGAIN = 0.12, 0.04  # sigma of a search as it begins, and of one around its end: share of the box by logarithm
@@ -85,14 +90,20 @@ def load(path: Path) -> Evolution | None:
     return found if (found.costs.shape, found.excesses.shape, found.ran.shape) == shapes else None
 
 
+def package() -> ModuleType:
+    """cmaes. MissingExtraError says how to install it."""
+    return optional_package("cmaes", "tune", "the search without slopes (CMA-ES)", "or leave it out with `--finish 0`")
+
+
 def _search(mean: np.ndarray, seed: int, number: int) -> CMA:
-    return CMA(
+    found: CMA = package().CMA(
         mean=np.array(mean),
         sigma=AGAIN if number else FIRST,
         bounds=np.tile([0.0, 1.0], (len(mean), 1)),
         seed=int(np.random.default_rng([seed, number]).integers(2**31)),
         population_size=POPULATION,
     )
+    return found
 
 
 def evolve(

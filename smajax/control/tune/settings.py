@@ -8,6 +8,7 @@ from typing import Any
 
 from smajax.control.interface import between_in_words, check_interface, check_set_points
 from smajax.control.presets import CONTROLLERS
+from smajax.control.tune import adam, cma_es
 from smajax.control.tune.evaluate import STEP
 from smajax.control.tune.multistart import Effort
 from smajax.control.tune.objective import REGULATION, Goal
@@ -71,6 +72,13 @@ class TuneSettings:
         if self.unseen < 1:
             raise ValueError(f"the check needs at least one plant, not {self.unseen}.")
         _ = self.goal, self.effort  # they check themselves
+
+    def check_packages(self) -> None:
+        """MissingExtraError without a package that these settings need: before the work, and not in the middle of it."""
+        if self.by == "adam":
+            adam.rule()
+        if self.finish:
+            cma_es.package()
 
     def plants_in_words(self, air: float = 20.0) -> str:
         """On which plants gains are tuned. `air`: degC as believed, of which a share is told in kelvins."""

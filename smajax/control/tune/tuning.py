@@ -97,9 +97,10 @@ def tune(
 
     after, known: where an interrupted tuning stood, by slopes and without; it goes on from there to the same end.
 
-    Raises ValueError for settings that make no sense.
+    Raises ValueError for settings that make no sense, MissingExtraError without a package that they need.
     """
     settings.check(system)
+    settings.check_packages()
     rig, goal, effort = rig_of(system, settings), settings.goal, settings.effort
     members = tuned_on(settings.set_points, settings.variation, settings.seed)
     what = f"tuning {settings.controller}"

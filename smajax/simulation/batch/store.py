@@ -9,15 +9,23 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import zarr
 
+from smajax.core.extras import optional_package
 from smajax.simulation.batch.axes import Axes, Dimension
+
+if TYPE_CHECKING:
+    import zarr
 
 MARK = "done"  # one number a chunk: 1 when it is whole
 DIGEST, CHUNK, AXES = "digest", "chunk", "axes"
+
+
+def _zarr() -> Any:
+    """zarr. MissingExtraError says how to install it."""
+    return optional_package("zarr", "store", "a batch on disk")
 
 
 class Store:
@@ -31,7 +39,7 @@ class Store:
     def opened(cls, folder: Path) -> Store:
         """An existing one. FileNotFoundError when there is none."""
         try:
-            return cls(folder, zarr.open_group(folder, mode="r+"))
+            return cls(folder, _zarr().open_group(folder, mode="r+"))
         except FileNotFoundError:
             raise FileNotFoundError(f"there is no batch in {folder}.") from None
 
@@ -48,7 +56,7 @@ class Store:
         """A new one with nothing in it. `shapes` are those of one member; `attributes` have the digest of what is run."""
         # Laid out beside its place and renamed: a folder under its own name is whole.
         part = folder.with_name(f"{folder.name}.part")
-        group = zarr.open_group(part, mode="w", zarr_format=3)
+        group = _zarr().open_group(part, mode="w", zarr_format=3)
         for name, (shape, dtype) in shapes.items():
             array = group.create_array(
                 name,
