@@ -9,7 +9,7 @@ import tomllib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-import numpy as np
+import jax.numpy as jnp
 import pytest
 
 from smajax.cli.main import main
@@ -124,5 +124,5 @@ def test_a_batch_in_memory_needs_no_store(monkeypatch: pytest.MonkeyPatch) -> No
 
     monkeypatch.setitem(sys.modules, "zarr", None)
     system = sma.build("flexinol_table_3_2", "dead_weight", "voltage")
-    found = sma.run_batch(system, {"voltage": np.full(3, 1.0)}, sma.grid(wire_diameter=[1.5e-4, 2e-4]), dt=0.01)
+    found = sma.run_batch(system, {"voltage": jnp.full(3, 1.0)}, sma.grid(wire_diameter=[1.5e-4, 2e-4]), dt=0.01)
     assert found.sizes["wire_diameter"] == 2
