@@ -2,7 +2,7 @@
 # # From measured runs to the missing effect
 #
 # A virtual bench lifts a weight with a wire whose latent heat the base model leaves out. The loop gets six logged
-# runs and an experiment file, and has to find that out. Open this file as a notebook (jupytext) or run it as it is.
+# runs and an experiment file, and has to identify it. Open this file as a notebook (jupytext) or run it as it is.
 
 # %%
 import dataclasses
@@ -21,7 +21,7 @@ from smajax.data.model_catalogue import CATALOGUE  # noqa: E402
 from smajax.report.write import write_report  # noqa: E402
 
 # %% [markdown]
-# The experiment: what is known, what is to be found within which bounds, and which runs are held out.
+# The experiment: the known parameters, the unknown ones with their bounds, and the held-out runs.
 
 # %%
 with resources.as_file(resources.files("smajax") / "data" / "demo" / "latent") as folder:
@@ -32,8 +32,8 @@ for run in experiment.runs:
     print(f"{run.name:15s} {run.role:10s} {len(run.time)} samples")
 
 # %% [markdown]
-# The loop: every effect of the library is tried, which takes minutes. Finished fits are kept in a folder, so it can be
-# interrupted. With `SMAJAX_FAST=1` two candidates are.
+# The loop tries every effect of the library, which takes minutes. Finished fits are cached in a folder, so that an interrupted loop
+# resumes. With `SMAJAX_FAST=1` it tries two candidates.
 
 # %%
 if os.environ.get("SMAJAX_FAST"):

@@ -1,7 +1,7 @@
 # %% [markdown]
 # # First simulation
 #
-# An arm on a wire, a step of voltage, and what the wire goes through on the way: wire x load x drive, by name.
+# An arm on a wire, a step of voltage, and the states of the wire: wire x load x drive, by name.
 
 # %%
 import jax
@@ -29,8 +29,8 @@ for name in ("convection_coefficient", "austenite_finish", "payload_mass"):
     print(f"{name:24s} {entry.low:g} to {entry.high:g} {entry.unit}: {entry.about}")
 
 # %% [markdown]
-# Inputs are series, SI, `dt` apart. 7.2 V stop inside of the transformation range; 7.3 V carry the arm past the angle of greatest stress, where the
-# transformation temperatures fall and it runs through by itself.
+# Inputs are series, SI, `dt` apart. 7.2 V stop inside the transformation range. 7.3 V carry the arm past the angle of greatest stress, where the
+# transformation temperatures fall and the arm runs to the end by itself.
 
 # %%
 dt = 0.005
@@ -52,7 +52,7 @@ angle.legend()
 plane.set(xlabel="temperature (°C)", ylabel="stress (MPa)")
 
 # %% [markdown]
-# A heavier payload at the same voltage. The program was compiled once: values are no part of it.
+# A heavier payload at the same voltage. The program is compiled once, because values are not part of it.
 
 # %%
 heavier = set_parameters(arm, {"payload_mass": 0.065})  # kg

@@ -1,8 +1,8 @@
 # %% [markdown]
 # # The source's shortcoming, and its fix
 #
-# Under Liang's and Brinson's conditions an arm on its way to 85 degrees stalls half way, with a wire that is hotter than it needs to be. Under the
-# enhanced conditions it arrives. Both are in the gallery as M5 and M6; here they are made by hand.
+# Under Liang's and Brinson's conditions an arm on its way to 85 degrees stalls half way, with a wire that is hotter than necessary. Under the
+# enhanced conditions it reaches 85 degrees. Both are in the gallery as M5 and M6; here they are simulated step by step.
 
 # %%
 import dataclasses
@@ -32,9 +32,9 @@ for law, loop in loops.items():
     print(f"{law}: ends at {ends[law]:.1f} degrees with xi = {loop.run.martensite_fraction[-1]:.3f}")
 
 # %% [markdown]
-# Why. Beyond 17 degrees the stress falls as the arm rises, and the whole range of transformation falls with it. There are moments in which the wire cools
-# while it comes to lie higher in its range: T falls, T - sigma/C_A rises. Liang's condition, dT/dt > 0, transforms nothing in them. The enhanced
-# condition asks for the second, and goes on.
+# The reason: beyond 17 degrees the stress falls as the arm rises, and the transformation range falls with it. At times the wire cools
+# but moves up in its range: T falls while T - sigma/C_A rises. Under Liang's condition, dT/dt > 0, nothing transforms at these times. The enhanced
+# condition requires T - sigma/C_A to rise, so the transformation continues.
 
 # %%
 run, law = loops["liang"].run, arm.wire.kinetics

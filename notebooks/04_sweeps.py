@@ -1,7 +1,7 @@
 # %% [markdown]
 # # Sweeps
 #
-# Any parameter and any input may vary: as a grid, as samples of a box, and as products of these. Results are labelled, with units.
+# Any parameter and any input may vary: on a grid, as samples of a box, and as products of these. Results are labelled, with units.
 
 # %%
 import os
@@ -20,34 +20,34 @@ from smajax.simulation.batch.axes import grid, sampled  # noqa: E402
 from smajax.simulation.batch.run_batch import good, run_batch, told_of  # noqa: E402
 from smajax.simulation.measures import Largest, Last  # noqa: E402
 
-members = 64 if os.environ.get("SMAJAX_FAST") else 4096
+runs = 64 if os.environ.get("SMAJAX_FAST") else 4096
 
 # %% [markdown]
-# How sure is the stroke at each voltage when payload, convection and air are known to a few per cent only? `keep=()` stores no trajectories, `measures`
-# are taken while a run goes on, and `tolerance` lets each run take its own steps.
+# How certain is the stroke at each voltage if payload, convection and air are known only to a few per cent? `keep=()` stores no trajectories, `measures`
+# are updated during a run, and `tolerance` selects adaptive steps.
 
 # %%
 arm = build("niti_table_3_1", "arm", "amplified_voltage")
 voltages = [6.0, 6.5, 7.0, 7.5, 8.0]
 box = {"payload_mass": (0.054, 0.060), "convection_coefficient": (140.0, 160.0), "ambient_temperature": (18.0, 22.0)}
-found = run_batch(
+result = run_batch(
     arm,
     {},
-    grid(voltage=voltages) * sampled(members, **box),
+    grid(voltage=voltages) * sampled(runs, **box),
     seconds=20.0,
     dt=0.05,
     tolerance=1e-4,
     keep=(),
     measures=(Last("position"), Largest("stress"), Largest("temperature")),
 )
-print(told_of(found))
-angles = np.degrees(good(found)["last_position"])
+print(told_of(result))
+angles = np.degrees(good(result)["last_position"])
 spread = (angles.quantile(0.95, "sample") - angles.quantile(0.05, "sample")).values
 for volts, middle, wide in zip(voltages, angles.median("sample").values, spread, strict=True):
     print(f"{volts} V: {middle:6.1f} degrees, nine in ten within {wide:.1f}")
 
 # %% [markdown]
-# The spread is largest in the middle, where the wire is partly transformed and the arm near its unstable angle: a voltage alone does not hold it there.
+# The spread is largest in the middle, where the wire is partly transformed and the arm near its unstable angle. A voltage alone does not hold it there.
 
 # %%
 figure, axes = plt.subplots(figsize=(5, 3.4), layout="constrained")
@@ -55,14 +55,14 @@ axes.boxplot([angles.sel(voltage=volts).dropna("sample").values for volts in vol
 axes.set(xlabel="voltage (V)", ylabel="angle after 20 s (degrees)")
 
 # %% [markdown]
-# With `out` the results are streamed to a store, a chunk at a time, and the same call goes on where it was stopped. `smajax.simulation.batch.run_batch.opened` reads it again, with its coordinates.
+# With `out` the results are streamed to a store, one chunk at a time, and the same call resumes where it stopped. `smajax.simulation.batch.run_batch.opened` opens the store again, with its coordinates.
 
 # %%
 store = Path(tempfile.mkdtemp()) / "stored"
-kept = run_batch(
+stored = run_batch(
     arm,
     {},
-    sampled(members, voltage=(6.0, 8.0)),
+    sampled(runs, voltage=(6.0, 8.0)),
     seconds=10.0,
     dt=0.05,
     tolerance=1e-4,
@@ -71,5 +71,8 @@ kept = run_batch(
     out=store,
 )
 print(
-    kept["last_position"].attrs, "in", sum(file.stat().st_size for file in store.rglob("*") if file.is_file()), "bytes"
+    stored["last_position"].attrs,
+    "in",
+    sum(file.stat().st_size for file in store.rglob("*") if file.is_file()),
+    "bytes",
 )

@@ -25,25 +25,25 @@ for run in experiment.runs:
 print(len(experiment.unknowns), "unknowns, of them of effects:", ", ".join(experiment.declared_effects))
 
 # %% [markdown]
-# From many points of the box, the best carried to their end with exact derivatives. Fewer starts are quicker, and may end higher.
+# The fit starts from many points of the box, and the best converge with exact derivatives. Fewer starts are quicker, and may end in a higher local minimum.
 
 # %%
-found = identify(experiment, starts=0 if os.environ.get("SMAJAX_FAST") else 64)
-for one in found.estimates:
-    error = "not told by these runs" if one.standard_error is None else f"± {one.standard_error:.3g}"
+result = identify(experiment, starts=0 if os.environ.get("SMAJAX_FAST") else 64)
+for one in result.estimates:
+    error = "not identifiable from these runs" if one.standard_error is None else f"± {one.standard_error:.3g}"
     print(f"{one.name:42s} {one.value:12.5g} {error} {one.unit} {one.remark}")
 
 # %% [markdown]
-# What counts is the stress that no fit saw.
+# The held-out stress validates the fit.
 
 # %%
-errors = {run.name: (run.role, 100 * run.series[0].rmse) for run in found.runs}
+errors = {run.name: (run.role, 100 * run.series[0].rmse) for run in result.runs}
 for name, (role, error) in errors.items():
     print(f"{name:10s} {role:10s} {error:.3f} % strain")
 
 # %%
-figure, axes = plt.subplots(1, len(found.runs), figsize=(12, 3.2), sharey=True, layout="constrained")
-for panel, run, measured in zip(axes, found.runs, experiment.runs, strict=True):
+figure, axes = plt.subplots(1, len(result.runs), figsize=(12, 3.2), sharey=True, layout="constrained")
+for panel, run, measured in zip(axes, result.runs, experiment.runs, strict=True):
     temperature = measured.inputs["temperature"]
     panel.plot(temperature, 100 * run.series[0].measured, linewidth=3, alpha=0.4, label="measured")
     panel.plot(temperature, 100 * run.series[0].simulated, linewidth=1.2, label="simulated")

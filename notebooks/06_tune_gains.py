@@ -1,8 +1,8 @@
 # %% [markdown]
 # # Tune gains
 #
-# The gains of a controller that switches with a layer (VSC3), moved so that the worst of all loops costs least: several set points at once, on the plant as
-# believed and with 20 % errors of its damping, with a limit on the overshoot. On the command line:
+# The gains of a switching controller with a boundary layer (VSC3) are moved to lower the cost of the worst loop: several set points at once, on the nominal
+# plant and with 20 % errors of its damping, with a limit on the overshoot. On the command line:
 #
 #     smajax tune vsc3 --set-points 0,30 --variation damping=20% --limits overshoot=0.1 --out tuned
 
@@ -39,24 +39,24 @@ print(settings.plants_in_words())
 print(settings.goal_in_words())
 
 # %% [markdown]
-# Every loop gives the slopes of every term in every gain with it; a step is the least of the largest of all loops' straight lines, within a trust region.
-# Near the end another loop is the worst after every step, and slopes say little: a search without them (CMA-ES) follows, `finish` generations of it.
-# Rounds and generations are kept in the folder, so it can be interrupted.
+# Every loop also returns the derivatives of every term in every gain. A step minimises the largest of all loops' linear models within a trust region.
+# Near the end another loop is the worst after every step, and derivatives say little. A derivative-free search (CMA-ES) of `finish` generations follows.
+# Rounds and generations are cached in the folder, so that an interrupted tuning resumes.
 
 # %%
 out = Path(tempfile.mkdtemp()) / "tuned"
-found = tune_into(arm(), settings, out)
-for name, before in found.before.items():
-    print(f"{name:16s} {before:8.3g} -> {found.after.values[name]:8.3g} {found.units[name]}")
-print(f"worst cost {found.costs[0]:.2f} -> {found.costs[1]:.2f}")
-print(f"limits met, also on plants that tuning never saw: {found.within_limits}")
+result = tune_into(arm(), settings, out)
+for name, before in result.before.items():
+    print(f"{name:16s} {before:8.3g} -> {result.after.values[name]:8.3g} {result.units[name]}")
+print(f"worst cost {result.costs[0]:.2f} -> {result.costs[1]:.2f}")
+print(f"limits met, also on plants that were not used for tuning: {result.within_limits}")
 
 # %%
 figure, panels = plt.subplots(1, 2, figsize=(9, 3.4), sharey=True, layout="constrained")
-for panel, angles, title in zip(panels, found.lines.angles, ("before", "after"), strict=True):
-    panel.plot(found.lines.time, np.degrees(angles.T), linewidth=0.8)
+for panel, angles, title in zip(panels, result.lines.angles, ("before", "after"), strict=True):
+    panel.plot(result.lines.time, np.degrees(angles.T), linewidth=0.8)
     panel.set(xlabel="time (s)", title=title)
 panels[0].set_ylabel("angle (degrees)")
 
 # %% [markdown]
-# `smajax sweep --gains tuned/gains.json` runs what was found on ten thousand plants.
+# `smajax sweep --gains tuned/gains.json` runs the tuned gains on ten thousand plants.

@@ -6,8 +6,8 @@
 #
 #     smajax close-loop studies/bias_spring_bench/experiment.toml --out report
 #
-# so its report is kept in `studies/bias_spring_bench/report.json`. This notebook reads the log, reads the report, simulates both models that the report
-# tells anew, and looks at what was found. With `SMAJAX_WHOLE=1` it closes the loop itself.
+# so its report is stored in `studies/bias_spring_bench/report.json`. This notebook reads the log and the report, simulates both models of the report
+# again, and examines the result. With `SMAJAX_WHOLE=1` it closes the loop itself.
 
 # %%
 import json
@@ -47,16 +47,18 @@ print(report["verdict"])
 print(*report["summary"], sep="\n")
 
 # %% [markdown]
-# The verdict is *partly explained*: effects were found that predict left-out runs better, and more than noise is left. Which, and how sure of each:
+# The verdict is *partly explained*: the effects added predict left-out runs better, but the residual is still more than noise. The effects and their coefficients:
 
 # %%
 for effect in report["effects"]:
     if effect["added"]:
-        told = ", ".join(f"{name} {one['value']:.3g} {one['unit']}" for name, one in effect["coefficients"].items())
-        print(f"{effect['title']}: {told}")
+        coefficients = ", ".join(
+            f"{name} {one['value']:.3g} {one['unit']}" for name, one in effect["coefficients"].items()
+        )
+        print(f"{effect['title']}: {coefficients}")
 
 # %% [markdown]
-# Do the numbers do what they say? Both models once more, from the parameters alone, on the log. Each run's own zero is taken off.
+# A check of the numbers: both models are simulated from the parameters alone and compared with the log. Each run's own zero is subtracted.
 
 # %%
 added = [effect["name"] for effect in report["effects"] if effect["added"]]
@@ -68,36 +70,36 @@ models = {
     "before": set_parameters(base, values["before"]),
     "after": set_parameters(extended(base, added), values["after"]),
 }
-shown: dict[str, dict[str, np.ndarray]] = {}
+curves: dict[str, dict[str, np.ndarray]] = {}
 errors: dict[tuple[str, str], float] = {}
-for run, told in zip(experiment.runs, report["runs"], strict=True):
+for run, entry in zip(experiment.runs, report["runs"], strict=True):
     for when, model in models.items():
         reading = np.asarray(simulate_compiled(model, run.inputs, experiment.step).reading)[: run.output.size]
-        missed = run.output - reading
-        shown.setdefault(run.name, {"measured": run.output})[when] = reading + missed.mean()
-        errors[run.name, when] = float(np.std(missed))
+        residual = run.output - reading
+        curves.setdefault(run.name, {"measured": run.output})[when] = reading + residual.mean()
+        errors[run.name, when] = float(np.std(residual))
     print(
         f"{run.name:10s} {run.role:10s} "
         + " -> ".join(f"{1e3 * errors[run.name, when]:.3f}" for when in models)
         + " mm"
     )
-    print(f"{'':21s} the report says {1e3 * told['rmse_before']:.3f} -> {1e3 * told['rmse_after']:.3f} mm")
+    print(f"{'':21s} the report says {1e3 * entry['rmse_before']:.3f} -> {1e3 * entry['rmse_after']:.3f} mm")
 
 # %% [markdown]
-# Where the base model is wrong by kind: in Step02 the slider creeps *back* while the power stays on, and advances when it is cut. Thermal expansion of each
-# phase does that; no parameter of the base model does.
+# A qualitative error of the base model: in Step02 the slider creeps *back* while the power stays on, and advances when it is cut. Thermal expansion of each
+# phase explains that; no parameter of the base model does.
 
 # %%
 figure, axes = plt.subplots(1, 2, figsize=(10, 3.4), layout="constrained")
 for panel, name in zip(axes, ("Step02", "Step03_PR"), strict=True):
     time = next(run.time for run in experiment.runs if run.name == name)
-    for when, series in shown[name].items():
+    for when, series in curves[name].items():
         panel.plot(time, 1e3 * series, label=when, linewidth=3 if when == "measured" else 1.2, alpha=0.8)
     panel.set(xlabel="time (s)", ylabel="position (mm)", title=name)
 axes[0].legend()
 
 # %% [markdown]
-# The conclusion, no more than the numbers allow: expansion of each phase is missing from the base model; a transformation in two steps with
-# long tails and a draught help, and may in part stand in for something that the library does not hold (a draught that ends at
-# a bound in every run is hardly one); and the run of another day is off by five times the error of the fit runs, which no effect of the wire explains.
+# The conclusion that the numbers support: expansion of each phase is missing from the base model. A transformation in two steps with
+# long tails and a draught help, and may in part stand in for something outside the library (a draught that ends at
+# a bound in every run is not plausible). The error of the run of another day is five times that of the fit runs, and no effect of the wire explains it.
 print(*report["unexplained"], sep="\n")

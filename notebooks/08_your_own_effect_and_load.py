@@ -1,7 +1,7 @@
 # %% [markdown]
 # # Your own effect and your own load
 #
-# An effect is a class that overrides the one method of the equation it changes. A load is one equation of motion. Neither has to be registered to be used.
+# An effect is a class that overrides the one method of the equation it changes. A load is one equation of motion. Neither needs registering to be used.
 
 # %%
 import dataclasses
@@ -24,7 +24,7 @@ from smajax.model.wire.constitutive import IntegratedForm  # noqa: E402
 from smajax.simulation.compiled import simulate_compiled  # noqa: E402
 
 # %% [markdown]
-# The effect: a fan that comes on slowly, so that the air around the wire gets colder in time.
+# The effect: a fan that comes on slowly and cools the air around the wire over time.
 
 
 # %%
@@ -83,8 +83,8 @@ class TiltingWeight(AbstractMovingLoad):
 
 
 # %% [markdown]
-# Both at once, and what the parameters are called: an effect's have its name before them. The integrated form of the constitutive law closes every
-# cycle; under the rate form, the default, four pulses would creep (M11).
+# Both at once, with the names of their parameters: those of an effect begin with its name. Under the integrated form of the constitutive law every
+# cycle closes; under the rate form, the default, four pulses would creep (M11).
 
 # %%
 load = TiltingWeight(load_mass=0.15, damping=20.0, lever_length=0.03)
@@ -103,7 +103,7 @@ for name, each in strokes.items():
     print(f"{name}: " + ", ".join(f"{1e3 * stroke:.1f}" for stroke in each) + " mm")
 
 # %% [markdown]
-# At its base value an effect changes nothing, to the last bit: the extended model holds the base model.
+# At its base value an effect changes nothing, to the last bit: the extended model contains the base model.
 
 # %%
 nothing = dataclasses.replace(still, effects=(FanComingOn.base(),))

@@ -1,12 +1,12 @@
 # %% [markdown]
-# # The source's own discovery, made again by the loop
+# # The source's own discovery, reproduced by the loop
 #
-# A mass hangs on a warm wire. Part of it is taken off and put back: temperature and load are what they were, and the wire stays shorter than before. Elahinia
-# (2004, sec. 3.5) measured 0.32, 0.27 and 0.28 mm (eq. 3.16) where the model of his time, whose branches ask for the sign of dT/dt, has nothing at all. What he
-# found missing is the stress rate (eq. 3.17, 3.18): a branch is followed where $\dot T - \dot\sigma/C$ points into its range.
+# A mass hangs on a warm wire. Part of it is removed and put back: temperature and load return to their values, but the wire stays shorter than before. Elahinia
+# (2004, sec. 3.5) measured 0.32, 0.27 and 0.28 mm (eq. 3.16). Earlier models, whose branches depend on the sign of dT/dt, predict none of it. He
+# found that the stress rate is missing (eq. 3.17, 3.18): a branch is followed where $\dot T - \dot\sigma/C$ points into its range.
 #
-# Here the loop makes that discovery. The runs come from a generator that shares no code with the package, under the conditions with the stress rate; the loop is
-# given the older ones and the whole library. `SMAJAX_FAST=1` lets it choose among what resembles it most only.
+# Here the loop reproduces that discovery. The runs come from a generator that shares no code with the package, under the conditions with the stress rate. The loop
+# gets the older conditions and the whole library. With `SMAJAX_FAST=1` it chooses only among the most similar effects.
 
 # %%
 import os
@@ -44,7 +44,7 @@ axes[1].plot(run.time, position)
 axes[1].set_ylabel("position, mm")
 axes[1].set_xlabel("time, s")
 print(
-    f"after the mass is back the load hangs {abs(net):.2f} mm off where it was; measured for 96 g: {[1e3 * one for one in NET]} mm"
+    f"after the mass is back the load hangs {abs(net):.2f} mm from its earlier position; measured for 96 g: {[1e3 * one for one in NET]} mm"
 )
 
 # %% [markdown]
@@ -63,7 +63,7 @@ share = added[0].coefficients["share"].value
 held_out = next(one for one in findings.runs if one.role == "held-out")
 print(f"share of the wire that follows the stress rate too: {share:.4f}")
 figure, axis = plt.subplots(figsize=(7, 3))
-axis.plot(held_out.time, 1e3 * held_out.measured, ".", ms=2, label="measured, never seen by the fit")
+axis.plot(held_out.time, 1e3 * held_out.measured, ".", ms=2, label="measured, held out")
 axis.plot(held_out.time, 1e3 * held_out.before, label=f"without: {1e3 * held_out.rmse_before:.2f} mm")
 axis.plot(held_out.time, 1e3 * held_out.after, label=f"with the stress rate: {1e3 * held_out.rmse_after:.3f} mm")
 axis.set_xlabel("time, s")
@@ -71,9 +71,9 @@ axis.set_ylabel("position, mm")
 axis.legend()
 
 # %% [markdown]
-# ## And with the newer ones
+# ## The loop with the enhanced conditions
 #
-# Given the conditions with the stress rate, the loop has nothing to add, and says so. The whole study, with both laws and all candidates, is `python -m studies.stress_rate.run`.
+# With the conditions that include the stress rate the loop adds nothing, and says so. The whole study, with both laws and all candidates, is `python -m studies.stress_rate.run`.
 
 # %%
 path = write(folder / "enhanced", "enhanced")
