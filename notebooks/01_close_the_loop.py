@@ -18,6 +18,7 @@ jax.config.update("jax_enable_x64", True)
 from smajax.attribution.close_loop import close_loop  # noqa: E402
 from smajax.data.experiment.load import load_experiment  # noqa: E402
 from smajax.data.model_catalogue import CATALOGUE  # noqa: E402
+from smajax.report.narrative import narrate  # noqa: E402
 from smajax.report.write import write_report  # noqa: E402
 
 # %% [markdown]
@@ -41,7 +42,7 @@ if os.environ.get("SMAJAX_FAST"):
 out = Path(tempfile.mkdtemp())
 findings = close_loop(experiment, memory=out / "fits", progress=lambda event: None)
 print(findings.verdict)
-print(*findings.summary, sep="\n")
+print(*narrate(findings).summary, sep="\n")
 
 # %% [markdown]
 # Every number of the page is in `findings`; the page itself is one file.

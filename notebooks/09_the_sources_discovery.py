@@ -23,6 +23,7 @@ import numpy as np  # noqa: E402
 from smajax.attribution.close_loop import close_loop  # noqa: E402
 from smajax.data.experiment.load import load_experiment  # noqa: E402
 from smajax.data.model_catalogue import CATALOGUE  # noqa: E402
+from smajax.report.narrative import narrate  # noqa: E402
 from studies.stress_rate.run import NET, write  # noqa: E402
 
 folder = Path(tempfile.mkdtemp())
@@ -53,9 +54,10 @@ print(
 # %%
 findings = close_loop(experiment)
 print(findings.verdict)
-print(*findings.summary, sep="\n")
-for number in findings.rounds:
-    print(number.number, number.chosen or "nothing added", "-", number.why)
+narrative = narrate(findings)
+print(*narrative.summary, sep="\n")
+for done, why in zip(findings.rounds, narrative.rounds, strict=True):
+    print(done.number, done.chosen or "nothing added", "-", why)
 
 # %%
 added = [effect for effect in findings.effects if effect.added]
@@ -80,4 +82,4 @@ path = write(folder / "enhanced", "enhanced")
 if os.environ.get("SMAJAX_FAST"):
     path.write_text(f'{path.read_text()}\n[effects]\nonly = ["minor_loops", "latent_heat"]\n', encoding="utf-8")
 content = close_loop(load_experiment(path, CATALOGUE))
-print(content.verdict, content.summary[0])
+print(content.verdict, narrate(content).summary[0])

@@ -51,6 +51,7 @@ if TYPE_CHECKING:
     from smajax.model.system import System as System
     from smajax.model.wire.laws import under_law as under_law
     from smajax.report.identify_page import write_identified as write_identified
+    from smajax.report.narrative import narrate as narrate
     from smajax.report.plot import plot as plot
     from smajax.report.write import write_report as write_report
     from smajax.simulation import measures as _measures
@@ -91,6 +92,7 @@ NAMES = {
     "identify": ("smajax.fit.identify", "identify"),
     "load_experiment": ("smajax.data.open_experiment", "open_experiment"),
     "merit": ("smajax.control.figures_of_merit", "merit"),
+    "narrate": ("smajax.report.narrative", "narrate"),
     "parameter": ("smajax.core.parameters", "parameter"),
     "parameter_values": ("smajax.core.parameters", "parameter_values"),
     "plot": ("smajax.report.plot", "plot"),

@@ -45,7 +45,7 @@ STAGES = (
             "reference",
         ),
     ),
-    ("Measured runs", ("load_experiment", "identify", "write_identified", "close_loop", "write_report")),
+    ("Measured runs", ("load_experiment", "identify", "write_identified", "close_loop", "narrate", "write_report")),
     ("Your own parts", ("AbstractEffect", "AbstractMovingLoad", "parameter", "effects")),
 )
 

@@ -11,7 +11,7 @@ PACKAGE = Path(__file__).parents[1] / "smajax"
 ORDER = ["core", "engine", "model", "simulation", "data", "fit", "control", "attribution", "report", "cli"]
 
 # Known, and being taken out.
-ARROWS_UP = {("smajax.attribution.unknown_words", "smajax.report.unknown_pictures")}
+ARROWS_UP: set[tuple[str, str]] = set()
 MODULES_IN_A_CIRCLE = {
     "smajax.model.effects.base",
     "smajax.model.load.base",

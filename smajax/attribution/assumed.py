@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from smajax.attribution.findings import AssumedParameter
 from smajax.attribution.job import Job
-from smajax.core.display_units import digits, display
 from smajax.core.parameters import get_parameters, parameters
 from smajax.data.experiment.model_description import WIRE_SIZES
 from smajax.fit.base_model import base_model
@@ -13,27 +13,22 @@ from smajax.fit.base_model import base_model
 LOGGED = {"mass": "load_mass", "ambient_temperature": "ambient_temperature"}  # input channel -> what it replaces
 
 
-def assumed(job: Job) -> dict[str, str]:
-    """Parameters of the base model that are not fitted and that no log gives: name -> value and unit as a reader sees them."""
-    model = base_model(job.experiment)
-    logged = {own for channel, own in LOGGED.items() if all(channel in run.inputs for run in job.experiment.runs)}
+def assumed(job: Job) -> tuple[AssumedParameter, ...]:
+    """Parameters of the base model that are not fitted and that no log gives."""
+    experiment, model = job.experiment, base_model(job.experiment)
+    logged = {own for channel, own in LOGGED.items() if all(channel in run.inputs for run in experiment.runs)}
     table = {name: entry for name, entry in parameters(model).items() if name not in {*job.unknowns, *logged}}
     values = np.asarray(get_parameters(model, list(table))) if table else ()
-    return {
-        name: f"{digits(display(entry.unit, name).of(float(value)))} {display(entry.unit, name).unit}".strip()
-        for (name, entry), value in zip(table.items(), values, strict=True)
-    }
-
-
-def sizes_not_given(job: Job) -> list[str]:
-    """Sizes of the wire and numbers of the load that are the presets' in every run, with their values."""
-    experiment, table = job.experiment, parameters(base_model(job.experiment))
     own = set.intersection(*({*run.parameters} for run in experiment.runs))
-    return [
-        f"{name} {value}"
-        for name, value in assumed(job).items()
-        if (name in WIRE_SIZES or table[name].path[0] == "load") and name not in {*experiment.parameters, *own}
-    ]
+    return tuple(
+        AssumedParameter(
+            name,
+            entry.unit,
+            float(value),
+            (name in WIRE_SIZES or entry.path[0] == "load") and name not in {*experiment.parameters, *own},
+        )
+        for (name, entry), value in zip(table.items(), values, strict=True)
+    )
 
 
 def expansion_not_given(job: Job) -> tuple[float, float] | None:

@@ -1,29 +1,39 @@
-"""The main job: experiment -> check -> base fit -> residual -> search -> extended model -> findings."""
+"""The main job, stage by stage: experiment -> base fit -> search -> evidence -> held-out validation -> findings."""
 
 from __future__ import annotations
 
 import hashlib
 import time as clock
+import warnings
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import jax.numpy as jnp
+import numpy as np
 
-from smajax.attribution.assumed import assumed, expansion_not_given, sizes_not_given
-from smajax.attribution.bootstrap import bootstrapped
-from smajax.attribution.confounders import rivals
-from smajax.attribution.cross_validation import FORETELLS, Search
-from smajax.attribution.findings import Findings, LoneRun
-from smajax.attribution.found import asks_for_more, effects_found, parameters_found
-from smajax.attribution.held_out import borne_out
-from smajax.attribution.job import job_of
+from smajax.attribution.assumed import assumed, expansion_not_given
+from smajax.attribution.bootstrap import bootstrap_intervals
+from smajax.attribution.config import AttributionConfig
+from smajax.attribution.confounders import confounders
+from smajax.attribution.cross_validation import Model, Search
+from smajax.attribution.findings import (
+    Findings,
+    NoiseWithoutRun,
+    OutlierRun,
+    PredictsTooLittle,
+    Rejected,
+    Verdict,
+)
+from smajax.attribution.found import effects_found, parameters_found
+from smajax.attribution.held_out import Compared, validated
+from smajax.attribution.job import Job, job_of
 from smajax.attribution.neutral import check_neutral
-from smajax.attribution.outlier_run import lone_runs
-from smajax.attribution.refusal import refuse_what_only_identify_does
+from smajax.attribution.outlier_run import outlier_runs
+from smajax.attribution.refusal import refuse_keys_of_identify
 from smajax.attribution.search import search
-from smajax.attribution.step_size_check import integration_error
+from smajax.attribution.step_size_check import step_size_error_of
 from smajax.attribution.unknown_term import Lacking, in_place_of, unknown_terms
-from smajax.attribution.unknown_words import told_of
-from smajax.attribution.verdict import cannot_know, shown, summary, unexplained, verdict
+from smajax.attribution.verdict import verdict_of
 from smajax.core.progress import Progress, Stage, as_progress, quiet, report_checks
 from smajax.core.provenance import made_with
 from smajax.core.result_cache import ResultCache
@@ -32,21 +42,51 @@ from smajax.fit.sensitivity import sensitivity
 from smajax.fit.uncertainty import identifiability
 
 SEED = 2004
+CHECKING, WRITING = "checking what these runs determine", "standard errors and pictures"
 
 
-def close_loop(
+@dataclass(frozen=True)
+class Context:
+    """What every stage of one loop shares; `setting` collects the rounds and the evidence."""
+
+    job: Job
+    setting: Search
+    start: np.ndarray  # (P,), start values of the parameters of base model and library
+    check: tuple[str, ...]
+    seed: int
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """The models so far, and what the stages since the search have found out."""
+
+    base: Model
+    final: Model
+    lacking: Lacking | None = None  # unknown terms, where they have been asked for
+    superseded: tuple[str, ...] = ()
+    outliers: tuple[OutlierRun, ...] = ()
+
+    @property
+    def one_outlier(self) -> bool:
+        """Whether without one run all the others are explained."""
+        return any(run.residual_is_noise for run in self.outliers)
+
+
+def close_loop(  # keywords, which a caller names one by one
     experiment: Experiment,
     *,
     memory: Path | None = None,
     progress: Progress = quiet,
     command: str = "",
     seed: int = SEED,
-    apart: bool = False,
+    compile_per_model: bool = False,
+    config: AttributionConfig | None = None,
+    apart: bool | None = None,
 ) -> Findings:
-    """Fit the base model, look at what it leaves, find what it lacks, and judge on runs the fit never saw.
+    """Fit the base model, look at what it leaves, find what it lacks, and validate on runs the fit never saw.
 
-    `memory` is a folder for finished fits: a loop that was interrupted goes on from there. `apart`: of `Search`. Held-out runs are simulated
-    when the search is over: they refuse what they do not bear out, and nothing is added
+    `memory` is a folder for finished fits: a loop that was interrupted resumes from there. `compile_per_model`: of `Search`.
+    Held-out runs are simulated when the search is over: they reject what they do not validate, and nothing is added
     for them. The caller chooses precision; anything but float64 is refused with a ValueError, because the
     differences that decide here are far below float32's rounding over a run. Raises PluginError for an effect of another
     package that changes the model at its base value: every verdict would be wrong.
@@ -55,13 +95,35 @@ def close_loop(
         raise ValueError(
             "close_loop needs float64, but JAX runs in float32. Call `jax.config.update('jax_enable_x64', True)` first."
         )
-    refuse_what_only_identify_does(experiment)
-    check_neutral()
+    if apart is not None:
+        warnings.warn("`apart` is `compile_per_model` now; it goes in version 0.3", DeprecationWarning, stacklevel=2)
+        compile_per_model = apart
     began = clock.monotonic()
-    progress = as_progress(progress)
-    job = job_of(experiment)
+    refuse_keys_of_identify(experiment)
+    check_neutral()
     cache = ResultCache(memory)
-    progress(Stage("checking what these runs can tell", 0.0))
+    settings = config or AttributionConfig()
+    context = prepared(experiment, cache, as_progress(progress), seed, compile_per_model, settings)
+    base = context.setting.base(context.start, seed)
+    outcome = Outcome(*search(context.setting, base))
+    outcome = against_an_unknown_term(context, outcome)
+    outcome = against_an_outlier_run(context, outcome)
+    final, compared, rejected = validated(context.job, context.setting, outcome.base, outcome.final)
+    found = findings_of(context, replace(outcome, final=final), compared, rejected)
+    return replace(found, provenance=_provenance(experiment, cache, command, seed, clock.monotonic() - began))
+
+
+def prepared(  # the stage's inputs, each once
+    experiment: Experiment,
+    cache: ResultCache,
+    progress: Progress,
+    seed: int,
+    compile_per_model: bool,
+    config: AttributionConfig,
+) -> Context:
+    """The experiment as a problem, and what its runs determine, from the Jacobian at the start values."""
+    job = job_of(experiment)
+    progress(Stage(CHECKING, 0.0))
     start = job.problem.start_values()
     setting = Search(
         job.problem,
@@ -69,99 +131,79 @@ def close_loop(
         job.bounds,
         job.candidates,
         cache,
-        lambda value: shown(value, experiment.output_unit, experiment.output_name),
         progress,
         experiment.outputs[0].noise_given,
         job.held_out,
-        apart,
+        compile_per_model,
+        config,
     )
-    at_start = sensitivity(job.problem, start, job.unknowns)
-    can_tell = identifiability(at_start, job.unknowns, job.bounds)
-    check = [*experiment.warnings, *can_tell]
-    progress(Stage("checking what these runs can tell", 1.0))
-    report_checks(progress, experiment.warnings, can_tell)
+    identifiable = identifiability(sensitivity(job.problem, start, job.unknowns), job.unknowns, job.bounds)
+    progress(Stage(CHECKING, 1.0))
+    report_checks(progress, experiment.warnings, identifiable)
+    return Context(job, setting, start, (*experiment.warnings, *identifiable), seed)
 
-    first, final = search(setting, setting.base(start, seed))
-    lacking: Lacking | None = None
-    aside: tuple[str, ...] = ()
-    if final.effects and not setting.is_noise(final.values):
-        lacking = in_place_of(setting, first, final)
-        if lacking is not None:
-            final, aside = first, final.effects
-        elif not setting.foretells(final.left_out_rmse):
-            share = max(setting.foretold(final.left_out_rmse), 0.0)
-            why = f"with it the model foretells {share:.0%} of the motion in runs left out, and under {FORETELLS:.0%} an effect means nothing"
-            setting.set_aside(final, why)
-            final = first
 
-    lone: tuple[LoneRun, ...] = ()
-    if not setting.is_noise(final.values):
-        names = [run.name for run in job.fit_runs]
-        lone = lone_runs(setting, first, names)
-        if final.effects and not any(one.noise for one in lone):
-            lone = lone_runs(setting, final, names) or lone
-        elif final.effects:
-            setting.set_aside(final, f"without {lone[0].run} what the base model leaves is noise")
-            final, lacking = first, None
+def against_an_unknown_term(context: Context, outcome: Outcome) -> Outcome:
+    """Evidence, where more than noise is left: one unknown function, or nothing at all, in the place of the effects."""
+    setting, base, final = context.setting, outcome.base, outcome.final
+    if not final.effects or setting.is_noise(final.values):
+        return outcome
+    lacking = in_place_of(setting, base, final)
+    if lacking is not None:
+        return replace(outcome, final=base, lacking=lacking, superseded=final.effects)
+    if not setting.predicts(final.left_out_rmse):
+        share = max(setting.explained_variance(final.left_out_rmse), 0.0)
+        setting.set_aside(final, PredictsTooLittle(share, setting.config.least_explained_variance))
+        return replace(outcome, final=base)
+    return outcome
 
-    final, compared, refused = borne_out(job, setting, first, final)
 
-    progress(Stage("standard errors and pictures", 0.0))
-    before = parameters_found(job, setting, first, start)
-    after = parameters_found(job, setting, final, start) if final.effects else before
-    intervals = bootstrapped(setting, final, seed)
-    effects = effects_found(job, setting, final, after, intervals)
-    mistaken = rivals(setting, final, job.fit_runs)
-    runs, portrait_before, portrait_after = compared
-    integration = integration_error(job, final)
-    progress(Stage("standard errors and pictures", 1.0))
-    answer = verdict(final.effects, portrait_after)
+def against_an_outlier_run(context: Context, outcome: Outcome) -> Outcome:
+    """Evidence, where more than noise is left: one run that does not agree with the others, in the place of the effects."""
+    setting, base, final = context.setting, outcome.base, outcome.final
+    if setting.is_noise(final.values):
+        return outcome
+    names = [run.name for run in context.job.fit_runs]
+    outcome = replace(outcome, outliers=outlier_runs(setting, base, names))
+    if not final.effects:
+        return outcome
+    if not outcome.one_outlier:
+        return replace(outcome, outliers=outlier_runs(setting, final, names) or outcome.outliers)
+    setting.set_aside(final, NoiseWithoutRun(outcome.outliers[0].run))
+    return replace(outcome, final=base, lacking=None)
+
+
+def unknown_terms_of(context: Context, outcome: Outcome, verdict: Verdict) -> tuple[Lacking, tuple[str, ...]]:
+    """(unknown terms, effects that they supersede): sought where something is missing that is in all runs."""
+    setting, lacking = context.setting, outcome.lacking
     if lacking is None:
-        more = answer in ("partly explained", "not in the library") and not any(one.noise for one in lone)
-        lacking = unknown_terms(setting, final) if more else Lacking()
-    if lacking.terms and not setting.foretells(lacking.terms[0].left_out_after):
-        lacking, aside = Lacking(), ()
-    unknown = lacking.terms
-    blind = answer == "not in the library" and not unknown and not setting.foretells(final.left_out_rmse)
-    foretold = setting.foretold(final.left_out_rmse) if blind else None
-    added = tuple(f"{name}." for name in final.effects)
-    opening, *rest = summary(
-        answer,
-        experiment,
-        runs,
-        effects,
-        portrait_after,
-        len(job.candidates),
-        aside,
-        foretold,
-        refused,
-        [one.name for one in after.parameters if one.name.startswith(added) and asks_for_more(one)],
-        [one for one in mistaken if one.weight > 0.5],
-        sizes_not_given(job),
-        [one for one in after.parameters if not one.name.startswith(added) and asks_for_more(one)],
-        integration,
-        lone,
-        expansion_not_given(job),
-    )
+        missing = verdict in (Verdict.PARTLY_EXPLAINED, Verdict.NOT_IN_LIBRARY) and not outcome.one_outlier
+        lacking = unknown_terms(setting, outcome.final) if missing else Lacking()
+    if lacking.terms and not setting.predicts(lacking.terms[0].left_out_after):
+        return Lacking(), ()
+    return lacking, outcome.superseded
+
+
+def findings_of(context: Context, outcome: Outcome, compared: Compared, rejected: Rejected | None) -> Findings:
+    """The record of all stages."""
+    job, setting, experiment = context.job, context.setting, context.job.experiment
+    base, final = outcome.base, outcome.final
+    runs, residual_before, residual_after = compared
+    setting.progress(Stage(WRITING, 0.0))
+    before = parameters_found(job, setting, base, context.start)
+    after = parameters_found(job, setting, final, context.start) if final.effects else before
+    effects = effects_found(job, setting, final, after, bootstrap_intervals(setting, final, context.seed))
+    mistaken = confounders(setting, final, job.fit_runs)
+    step_size_error = step_size_error_of(job, final)
+    setting.progress(Stage(WRITING, 1.0))
+    verdict = verdict_of(final.effects, residual_after, setting.config)
+    lacking, superseded = unknown_terms_of(context, outcome, verdict)
     return Findings(
         experiment=experiment.name,
         title=experiment.title,
         source=experiment.path.name,
-        verdict=answer,
-        summary=(opening, *told_of(unknown, setting.shown), *rest),
-        unexplained=unexplained(answer, experiment, runs, portrait_after),
-        cannot_know=cannot_know(
-            experiment,
-            after.parameters,
-            effects,
-            setting.rounds,
-            mistaken,
-            len(job.fit_runs),
-            integration,
-            assumed(job),
-            after.uncertainty.correlated_groups,
-        ),
-        check=tuple(check),
+        verdict=verdict,
+        check=context.check,
         output_name=experiment.output_name,
         output_unit=experiment.output_unit,
         noise_sigma=experiment.noise_sigma,
@@ -170,13 +212,25 @@ def close_loop(
         before=before.parameters,
         after=after.parameters,
         effects=effects,
-        portrait_before=portrait_before,
-        portrait_after=portrait_after,
+        residual_before=residual_before,
+        residual_after=residual_after,
         rounds=tuple(setting.rounds),
-        rivals=mistaken,
-        unknown=unknown,
-        lone_runs=lone,
-        provenance=_provenance(experiment, cache, command, seed, clock.monotonic() - began),
+        explained_variance=setting.explained_variance(final.left_out_rmse),
+        step=experiment.step,
+        step_size_error=step_size_error,
+        offset=experiment.offset,
+        wire=experiment.wire,
+        load=experiment.load,
+        declared=tuple(experiment.parameters),
+        assumed=assumed(job),
+        preset_expansion=expansion_not_given(job),
+        correlated=after.uncertainty.correlated_groups,
+        confounders=mistaken,
+        superseded=superseded,
+        rejected=rejected,
+        unknown=lacking.terms,
+        outlier_runs=outcome.outliers,
+        config=setting.config,
     )
 
 

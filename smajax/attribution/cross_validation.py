@@ -1,13 +1,13 @@
-"""Models of one experiment with some effects of the library: fitted, and judged on runs left out.
+"""Models of one experiment with some effects of the library: fitted, and cross-validated.
 
-A model is judged by its error on each fit run in turn, fitted to the others; the held-out runs are not looked at. It is
+A model is scored by its error on each fit run in turn, fitted to the others; the held-out runs are not looked at. It is
 better than another when it predicts left-out runs better beyond a penalty per coefficient and beyond chance.
 """
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
@@ -16,12 +16,13 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
+from smajax.attribution.config import AttributionConfig
 from smajax.attribution.every_effect import EVERY
-from smajax.attribution.findings import Round
+from smajax.attribution.findings import Comparison, Reason, Round
 from smajax.attribution.residual_diagnostics import all_noise
 from smajax.attribution.run_extent import extent_of
 from smajax.attribution.score_test import Score, scaled, switches
-from smajax.core.progress import Message, Progress, quiet
+from smajax.core.progress import Progress, Result, quiet
 from smajax.core.result_cache import ResultCache
 from smajax.core.whiteness import correlation_time, split_runs
 from smajax.fit.levenberg_marquardt import MAX_STEPS, Fit, FitSettings, levenberg_marquardt
@@ -34,16 +35,7 @@ from smajax.fit.uncertainty import at_bound
 from smajax.model.effects.base import Extent
 from smajax.model.effects.library import LIBRARY
 
-PENALTY = 0.01  # by how much of its mean square a coefficient must lower the error on left-out runs
-CHANCE = 0.5  # by how many standard errors of the paired difference, too: with three or four runs that error is wide
-CHANCE_ON_ONE = 2.0  # the same where there is one run and what is compared are fits to it
-NUDGE = 1e-3  # share of an effect's start at which its score is taken
-INSIDE = 0.03  # a refit starts at least this share of the box away from bounds to which a poorer model was driven
-TOLD = 1.0  # to what share of itself the other runs must tell an effect's size for a left-out run to count
-LOOSE = 1.0  # how far a fold's parameters may stray for nothing, in logits of the box
-FORETELLS = 0.5  # share of the motion in left-out runs that a model has to foretell for its effects to mean anything
-FOLDS = 12  # at most so many parts of the runs are left out in turn: one run each up to that many
-ENOUGH = 1e-5  # of its cost: where a refit ends
+DEFAULT = AttributionConfig()
 
 
 @dataclass(frozen=True)
@@ -87,33 +79,33 @@ class Evidence:
 
 @dataclass
 class Search:
-    """The search's settings and memory."""
+    """The search's settings, and what it has found so far."""
 
     problem: Problem
     unknowns: tuple[str, ...]
     bounds: Mapping[str, tuple[float, float]]
     candidates: tuple[str, ...]
     cache: ResultCache
-    shown: Callable[[float], str]  # an error in the unit that an engineer reads
     progress: Progress = quiet
     noise_given: bool = True  # by the experiment file; else estimated
     held_out: RunBatch | None = None  # which no fit sees, and which refuse an unknown term in the end
-    apart: bool = False  # a program for each set of effects: pays where many experiments of one kind follow each other
+    compile_per_model: bool = (
+        False  # a program for each set of effects: pays where many experiments of one kind follow each other
+    )
+    config: AttributionConfig = DEFAULT
     evidence: dict[str, Evidence] = field(default_factory=dict)
     rounds: list[Round] = field(default_factory=list)
     path: list[Model] = field(default_factory=list)  # the models that were added to, the base model first
 
     def note(self, done: Round) -> None:
-        """Keep a round and say what came of it."""
+        """Record a round and report it."""
         self.rounds.append(done)
-        told = f"round {done.number}: {done.chosen or 'nothing added'}; {done.why}"
-        self.progress(Message(f"{told}"))
+        self.progress(Result(done))
 
-    def set_aside(self, model: Model, why: str, effects: Sequence[str] = ()) -> None:
-        """Note a round in which `effects` go, or all that was added."""
+    def set_aside(self, model: Model, reason: Reason, effects: Sequence[str] = ()) -> None:
+        """Note a round in which `effects` are removed, or all that was added."""
         tried = ((" + ".join(model.effects), model.left_out_rmse),)
-        gone = " + ".join(effects or model.effects)
-        self.note(Round(len(self.rounds) + 1, tried, f"without {gone}", f"set aside: {why}"))
+        self.note(Round(len(self.rounds) + 1, tried, " + ".join(effects or model.effects), reason, removed=True))
 
     def free(self, effects: Sequence[str]) -> list[str]:
         """Every free parameter of a model with `effects`."""
@@ -142,7 +134,7 @@ class Search:
         values = np.array(model.values)
         for name in self.free(model.effects):
             low, high = self.bounds[name]
-            room, place = INSIDE * (high - low), self.problem.names.index(name)
+            room, place = self.config.bound_distance * (high - low), self.problem.names.index(name)
             values[place] = np.clip(values[place], low + room, high - room)
         return values
 
@@ -162,24 +154,25 @@ class Search:
         starts: Sequence[Start],
         what: str,
         *,
-        enough: float = ENOUGH,
+        enough: float | None = None,
         hops: bool = False,
-        carried: Sequence[str] = (),
+        resident: Sequence[str] = (),
         most: int = MAX_STEPS,
     ) -> tuple[list[Fit], np.ndarray]:
         """Fit every start: (fits with full parameter vectors, misfit of all runs at each, (S, R, N)).
 
-        `hops`: each from points near its end as well (`fit.starts.perturbed_restarts`). `carried`: effects that the model holds besides,
+        `hops`: each from points near its end as well (`fit.starts.perturbed_restarts`). `resident`: effects that the model holds besides,
         as it did in the fits before, whose program then serves again. `most`: steps.
         """
+        enough = self.config.convergence if enough is None else enough
         sets = sorted({start.effects for start in starts})
-        if self.apart and len(sets) > 1:
+        if self.compile_per_model and len(sets) > 1:
             places = [[k for k, start in enumerate(starts) if start.effects == one] for one in sets]
             parts = [self.fit([starts[k] for k in some], what, enough=enough, hops=hops, most=most) for some in places]
             order = np.argsort(np.concatenate(places))
             together = [one for part, _ in parts for one in part]
             return [together[k] for k in order], np.concatenate([found for _, found in parts])[order]
-        problem, index = self.restricted([*carried, *(name for start in starts for name in start.effects)])
+        problem, index = self.restricted([*resident, *(name for start in starts for name in start.effects)])
         tasks = [
             problem.task(self.free(start.effects), self.bounds, start.values[index], start.weights, start.tie)
             for start in starts
@@ -201,7 +194,10 @@ class Search:
             self.bounds,
             seed,
             settings=FitSettings(
-                tolerance=ENOUGH, cache=self.cache, progress=self.progress, stage="fitting the base model"
+                tolerance=self.config.convergence,
+                cache=self.cache,
+                progress=self.progress,
+                stage="fitting the base model",
             ),
         )
         return self.whole(fits[0], start, index)
@@ -224,12 +220,12 @@ class Search:
 
     def all_noise(self, misfit: np.ndarray, mask: np.ndarray) -> bool:
         """Whether a misfit (SI) is measurement noise, as far as `mask` goes, both (R, N)."""
-        return all_noise(split_runs(misfit, mask), float(self.problem.noise_sigma), self.noise_given)
+        return all_noise(split_runs(misfit, mask), float(self.problem.noise_sigma), self.noise_given, self.config)
 
     def rmse(self, misfit: np.ndarray) -> float:
         return float(np.sqrt((misfit**2).sum() / np.asarray(self.problem.batch.mask).sum()))
 
-    def foretold(self, left_out_rmse: float) -> float:
+    def explained_variance(self, left_out_rmse: float) -> float:
         """Share of the mean square of the motion in the fit runs, each about its mean, that a left-out error leaves explained."""
         mask = np.asarray(self.problem.batch.mask)
         measured = np.asarray(self.problem.measured)
@@ -237,81 +233,83 @@ class Search:
         motion = self.rmse((measured - mean) * mask)
         return 1.0 - (left_out_rmse / motion) ** 2 if motion > 0.0 else 1.0
 
-    def foretells(self, left_out_rmse: float) -> bool:
-        """Whether a model with that error has anything to do with these runs (`FORETELLS`)."""
-        return self.foretold(left_out_rmse) > FORETELLS
+    def predicts(self, left_out_rmse: float) -> bool:
+        """Whether a model with that error explains enough of these runs for its effects to mean anything."""
+        return self.explained_variance(left_out_rmse) > self.config.least_explained_variance
 
-    def judged(
-        self, fitted: Sequence[Fitted], present: Model | None = None, carried: Sequence[str] = ()
+    def cross_validated(
+        self, fitted: Sequence[Fitted], present: Model | None = None, resident: Sequence[str] = ()
     ) -> list[Model]:
-        """Leave each fit run out in turn, refit to the others, and predict the one left out (of many, `FOLDS` parts).
+        """Leave each fit run out in turn, refit to the others, and predict the one left out (of many, `most_folds` parts).
 
-        A fold starts at the fit to all runs and is tied to it, each parameter to within about `LOOSE` of its logit in
-        the box: else a direction that the others hardly tell runs wherever the last iteration happened to take it, and
+        A fold starts at the fit to all runs and is tied to it, each parameter to within about `fold_tie` of its logit in
+        the box: else a direction that the others hardly determine runs wherever the last iteration happened to take it, and
         with it the prediction. In such a direction the fold keeps what the run left out said: where the others do not
-        tell the size of what is new (`told_without`), `present`'s error stands and the effect is credited with nothing.
-        A fold that follows all runs better than the fit to all has come to a better valley: that fit begins there again.
+        determine the size of what is new (`determined_without`), `present`'s error stands and the effect counts for nothing.
+        A fold that follows all runs better than the fit to all has come to a better local minimum: that fit begins there again.
         """
         parts = self.parts()
-        folded = self.folded(fitted, carried)
+        folded = self.folded(fitted, resident)
         better = {
             place: deeper.values
             for place, (entry, (_, deeper)) in enumerate(zip(fitted, folded, strict=True))
-            if deeper.cost < (1.0 - PENALTY) * entry.solution.cost
+            if deeper.cost < (1.0 - self.config.penalty) * entry.solution.cost
         }
         if better:
             starts = [Start(fitted[place].effects, values) for place, values in better.items()]
-            again, _ = self.fit(starts, "refitting where a fold did better", hops=True, carried=carried)
+            again, _ = self.fit(starts, "refitting where a fold did better", hops=True, resident=resident)
             fitted, folded = list(fitted), list(folded)
             for place, fit in zip(better, again, strict=True):
                 fitted[place] = Fitted(fitted[place].effects, fit)
-            for place, one in zip(better, self.folded([fitted[place] for place in better], carried), strict=True):
+            for place, one in zip(better, self.folded([fitted[place] for place in better], resident), strict=True):
                 folded[place] = one
         models = []
         for entry, (own, _) in zip(fitted, folded, strict=True):
             left_out = np.stack([own[fold, run] for run, fold in enumerate(parts.argmax(axis=0))])
             model = Model(entry.effects, entry.solution.values, entry.solution.cost, left_out, self.rmse(left_out))
-            models.append(model if present is None else self.credited(entry, model, present))
+            models.append(model if present is None else self.counted(entry, model, present))
         return models
 
-    def folded(self, fitted: Sequence[Fitted], carried: Sequence[str] = ()) -> list[tuple[np.ndarray, Fit]]:
+    def folded(self, fitted: Sequence[Fitted], resident: Sequence[str] = ()) -> list[tuple[np.ndarray, Fit]]:
         """Every fit refitted without each part of the runs: the misfit of all runs at each fold, and the one best for all."""
         parts = self.parts()
         # With one run nothing can be left out: the fit itself is all there is, and the report says so.
         folds = list(1.0 - parts) if len(parts) > 1 else [np.ones(1)]
         levels = self.levels(fitted)
         starts = [
-            Start(entry.effects, entry.solution.values, weights, np.sqrt(level) / LOOSE)
+            Start(entry.effects, entry.solution.values, weights, np.sqrt(level) / self.config.fold_tie)
             for entry, level in zip(fitted, levels, strict=True)
             for weights in folds
         ]
-        fits, found = self.fit(starts, "predicting runs left out", carried=carried)
+        fits, found = self.fit(starts, "predicting runs left out", resident=resident)
         costs = np.nan_to_num((found**2).sum(axis=(1, 2)) / float(self.problem.noise_sigma) ** 2, nan=np.inf)
-        told = []
+        folds_of_each = []
         for first in range(0, len(starts), len(folds)):
             best = first + int(np.argmin(costs[first : first + len(folds)]))
-            told.append((found[first : first + len(folds)], dataclasses.replace(fits[best], cost=float(costs[best]))))
-        return told
+            folds_of_each.append(
+                (found[first : first + len(folds)], dataclasses.replace(fits[best], cost=float(costs[best])))
+            )
+        return folds_of_each
 
     def levels(self, fitted: Sequence[Fitted]) -> list[float]:
-        """Variance that one effective sample of each fit's residual has, over the noise's: memory counts as noise."""
+        """Variance that one effective sample of each fit's residual has, over the noise's: autocorrelation counts as noise."""
         mask = np.asarray(self.problem.batch.mask)
         found = misfits(self.problem, [entry.solution.values for entry in fitted]) / float(self.problem.noise_sigma)
         return [float((one**2).sum() / mask.sum()) * correlation_time(split_runs(one, mask)) for one in found]
 
-    def credited(self, entry: Fitted, model: Model, present: Model) -> Model:
-        """`model` with `present`'s error on the runs that alone tell the size of what is new (`told_without`)."""
+    def counted(self, entry: Fitted, model: Model, present: Model) -> Model:
+        """`model` with `present`'s error on the runs that alone determine the size of what is new (`determined_without`)."""
         if len(model.left_out) == 1:
             return model
-        told = self.told_without(entry, present)
-        left_out = np.where(told[:, None], model.left_out, present.left_out)
+        determined = self.determined_without(entry, present)
+        left_out = np.where(determined[:, None], model.left_out, present.left_out)
         return dataclasses.replace(model, left_out=left_out, left_out_rmse=self.rmse(left_out))
 
-    def told_without(self, entry: Fitted, present: Model) -> np.ndarray:
-        """Run by run: do the other runs tell the size of what is new against `present`? Shape (R,).
+    def determined_without(self, entry: Fitted, present: Model) -> np.ndarray:
+        """Run by run: do the other runs determine the size of what is new against `present`? Shape (R,).
 
         They do when the trace of the new coefficients in them, less what the other free parameters absorb, stands out
-        of the residual so far that its size is known to within `TOLD` of itself. Two new effects are taken together:
+        of the residual so far that its size is known to within `effect_size_error` of itself. Two new effects are taken together:
         how they share a trace is no matter here.
         """
         index, values = self.problem.names.index, entry.solution.values
@@ -321,37 +319,33 @@ class Search:
         others = [name for name in self.loose(entry.effects, values) if name not in own]
         at = sensitivity(self.problem, values, [*own, *others])
         level = float(np.mean(at.residual() ** 2)) * correlation_time(split_runs(at.misfit, at.mask))
-        told = []
+        determined = []
         parts = self.parts()
         for part in parts:
             rest = dataclasses.replace(at, mask=at.mask * (1.0 - part)[:, None])
             trace = rest.columns(own) @ size
             basis = np.linalg.qr(scaled(rest.columns(others)))[0]
             trace = trace - basis @ (basis.T @ trace)
-            told.append(float(trace @ trace) * TOLD**2 > level)
-        return np.asarray(told)[parts.argmax(axis=0)]
+            determined.append(float(trace @ trace) * self.config.effect_size_error**2 > level)
+        return np.asarray(determined)[parts.argmax(axis=0)]
 
     def parts(self) -> np.ndarray:
-        """Which runs are left out together, (parts, R) of zeros and ones: each alone, or every `FOLDS`-th of many."""
-        runs = self.problem.batch.runs
-        return np.eye(min(runs, FOLDS))[:, np.arange(runs) % FOLDS]
+        """Which runs are left out together, (parts, R) of zeros and ones: each alone, or every `most_folds`-th of many."""
+        runs, most = self.problem.batch.runs, self.config.most_folds
+        return np.eye(min(runs, most))[:, np.arange(runs) % most]
 
-    def better(self, new: Model, old: Model, chance: float | None = None) -> tuple[bool, str]:
+    def better(self, new: Model, old: Model, chance: float | None = None) -> tuple[bool, Comparison]:
         """Does `new` predict left-out runs better, beyond its extra coefficients and beyond `chance` standard errors?"""
+        several = len(old.left_out) > 1
         if chance is None:
-            chance = CHANCE if len(old.left_out) > 1 else CHANCE_ON_ONE
+            chance = self.config.standard_errors if several else self.config.standard_errors_one_run
         extra = len(self.free(new.effects)) - len(self.free(old.effects))
         gain = 1.0 - (new.left_out_rmse / old.left_out_rmse) ** 2
         z = paired(old.left_out, new.left_out, np.asarray(self.problem.batch.mask))
         # The fit itself must gain as well: a left-out run of its own kind can favour a needless coefficient by luck.
         fitted = 1.0 - new.cost / old.cost if old.cost > 0.0 else 0.0
-        enough = min(gain, fitted) > PENALTY * extra and z > chance
-        left_out = "left-out runs" if len(old.left_out) > 1 else "the one fit run itself"
-        told = (
-            f"error on {left_out} {self.shown(old.left_out_rmse)} -> {self.shown(new.left_out_rmse)} "
-            f"({gain:+.0%} of its mean square, {z:.1f} standard errors)"
-        )
-        return enough, told
+        enough = min(gain, fitted) > self.config.penalty * extra and z > chance
+        return enough, Comparison(old.left_out_rmse, new.left_out_rmse, gain, z, several)
 
 
 def base_value(coefficient: str) -> float:
@@ -361,10 +355,10 @@ def base_value(coefficient: str) -> float:
 
 
 def paired(old: np.ndarray, new: np.ndarray, mask: np.ndarray) -> float:
-    """Mean drop of the squared error over its standard error, on blocks longer than the residual's memory.
+    """Mean drop of the squared error over its standard error, on blocks longer than the residual's correlation time.
 
-    All samples of a left-out run share the error of the one fit that foretells it, which blocks do not see. Over three or
-    four runs that cannot be told from an effect that shows in one of them alone: the held-out runs have to.
+    All samples of a left-out run share the error of the one fit that predicts it, which blocks do not see. Over three or
+    four runs that is not distinguished from an effect that shows in one of them alone: the held-out runs have to.
     """
     gains, block = [], int(np.ceil(2.0 * correlation_time(split_runs(old, mask))))
     for before, after, valid in zip(old, new, mask, strict=True):
@@ -384,5 +378,7 @@ def nudged(setting: Search, values: np.ndarray, effects: Sequence[str]) -> np.nd
     found = np.array(values)
     for effect in effects:
         for name in switches(effect):
-            found[setting.problem.names.index(name)] += NUDGE * LIBRARY[effect].starts[name.removeprefix(f"{effect}.")]
+            found[setting.problem.names.index(name)] += (
+                setting.config.nudge * LIBRARY[effect].starts[name.removeprefix(f"{effect}.")]
+            )
     return found

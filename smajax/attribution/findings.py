@@ -1,17 +1,31 @@
-"""What one closed loop found: the record that the loop fills and that the report and its JSON are written from.
+"""What one closed loop found: numbers and enums, which `smajax.report.narrative` puts into words.
 
 Arrays are numpy, SI, temperatures in degrees Celsius, angles in radians; nothing in here simulates or fits.
 """
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from enum import StrEnum
+from importlib import import_module
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
+from smajax.attribution.config import AttributionConfig
+
 Role = Literal["fit", "held-out"]
-Verdict = Literal["adequate", "explained", "partly explained", "not in the library"]
+
+
+class Verdict(StrEnum):
+    """By whether something was added, and whether what is left of the fit runs is noise."""
+
+    ADEQUATE = "adequate"
+    EXPLAINED = "explained"
+    PARTLY_EXPLAINED = "partly explained"
+    NOT_IN_LIBRARY = "not in the library"
 
 
 @dataclass(frozen=True)
@@ -34,7 +48,7 @@ class RunFinding:
 
 @dataclass(frozen=True)
 class ParameterFinding:
-    """One fitted number. `standard_error` is None when the runs cannot tell it (then `remark` says so)."""
+    """One fitted number. `standard_error` is None when the runs do not determine it (then `remark` says so)."""
 
     name: str
     unit: str
@@ -43,7 +57,22 @@ class ParameterFinding:
     lower: float
     upper: float
     start: float
-    remark: str = ""  # "at its lower bound", "correlated with ...", ...
+    remark: str = ""  # of `smajax.fit.uncertainty`: "at its lower bound", ...
+
+    @property
+    def limited(self) -> bool:
+        """Whether it ends at a bound that it might lie beyond: a share of all or of nothing is not."""
+        return self.remark.startswith("at its") and (self.unit, self.lower, self.upper) != ("-", 0.0, 1.0)
+
+
+@dataclass(frozen=True)
+class AssumedParameter:
+    """A parameter of the base model that no fit and no log gives."""
+
+    name: str
+    unit: str
+    value: float  # SI
+    size_not_given: bool  # a size of the wire or a number of the load that is the preset's in every run
 
 
 @dataclass(frozen=True)
@@ -62,26 +91,124 @@ class EffectFinding:
     title: str  # "latent heat of transformation"
     equation: str  # the equation it changes: heat, electrical, kinetics, constitutive, mechanics, sensor, input
     formula: str  # the change itself, plain text, with its source
-    sentence: str  # one sentence for an engineer: what it would mean if it were there
     added: bool
     coefficients: dict[str, CoefficientFinding]
     evidence: dict[str, float]  # score_statistic, score_p_value, leave_one_out_rmse, leave_one_out_gain, rmse_fit, ...
 
 
 @dataclass(frozen=True)
-class Portrait:
-    """What the residual (measured minus model) of the fit runs looks like."""
+class ResidualDiagnostics:
+    """Of the residual (measured minus model) of the fit runs."""
 
     rmse: float
     noise_sigma: float
     ratio: float  # rmse / noise_sigma
     white: bool
     whiteness_p_value: float
-    independent: float  # samples that its memory leaves
+    independent: float  # samples over the correlation time
     by_phase: dict[str, dict[str, float]]  # "heating, transforming" -> {samples, share_of_squared_error, mean, rmse}
     correlation: dict[str, float]  # with time, input, temperature, martensite_fraction, stress, rate
-    sentences: tuple[str, ...]
-    kept: float = 0.0  # of the sample before, where it is taken as a first-order noise larger than estimated; else 0
+    # Of a first-order autoregressive noise, where the residual is taken as one that is larger than estimated; else 0.
+    filter_coefficient: float = 0.0
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Error on runs left out in turn (or on the one fit run) without something and with it."""
+
+    rmse_without: float  # SI
+    rmse_with: float
+    gain: float  # share of the mean square
+    standard_errors: float  # by which it is ahead
+    left_out: bool  # whether runs were left out
+
+
+@dataclass(frozen=True)
+class ResidualIsNoise:
+    """Nothing is looked for in noise."""
+
+
+@dataclass(frozen=True)
+class NothingSignificant:
+    """No candidate stands out in the score test."""
+
+    candidates: int
+    largest_gain: float  # share of the mean square that the best one promises
+
+
+@dataclass(frozen=True)
+class StepDependent:
+    """Effects that lose their gain when the step is halved."""
+
+    effects: str  # joined by " + "
+    gain_kept: float  # share
+
+
+@dataclass(frozen=True)
+class Scored:
+    """The best candidate was compared with the model before; None where only step-dependent ones were left."""
+
+    comparison: Comparison | None
+    step_dependent: tuple[StepDependent, ...] = ()
+
+
+@dataclass(frozen=True)
+class RoundLimit:
+    """The search ends after so many rounds, whatever more there may be."""
+
+    rounds: int
+
+
+@dataclass(frozen=True)
+class NoLongerNeeded:
+    """An effect that the others have made needless: what it still brings is not enough."""
+
+    comparison: Comparison
+
+
+@dataclass(frozen=True)
+class PredictsTooLittle:
+    """With the effects the model explains too little of the motion in left-out runs for them to mean anything."""
+
+    explained_variance: float
+    least: float
+
+
+@dataclass(frozen=True)
+class NoiseWithoutRun:
+    """Without one run the base model leaves noise."""
+
+    run: str
+
+
+@dataclass(frozen=True)
+class UnknownTermBetter:
+    """One unknown function in one equation predicts left-out runs better than all the effects."""
+
+    title: str
+    rmse_effects: float  # SI
+    rmse_term: float
+
+
+@dataclass(frozen=True)
+class HeldOutWorse:
+    """The held-out runs do not validate the effects."""
+
+    rmse_without: float  # SI
+    rmse_with: float
+
+
+Reason: TypeAlias = (
+    ResidualIsNoise
+    | NothingSignificant
+    | Scored
+    | RoundLimit
+    | NoLongerNeeded
+    | PredictsTooLittle
+    | NoiseWithoutRun
+    | UnknownTermBetter
+    | HeldOutWorse
+)
 
 
 @dataclass(frozen=True)
@@ -90,34 +217,44 @@ class Round:
 
     number: int
     tried: tuple[tuple[str, float], ...]  # ("latent_heat + radiation", leave-one-out rmse)
-    chosen: str  # "" when the search stopped here
-    why: str
-    alike: tuple[str, ...] = ()  # what left-out runs cannot tell from the chosen one, chosen because it is simplest
+    chosen: str  # what was added, or taken out; "" when the search stopped here
+    reason: Reason
+    indistinguishable: tuple[str, ...] = ()  # what left-out runs do not distinguish from the chosen one
+    removed: bool = False  # `chosen` was taken out
 
 
 @dataclass(frozen=True)
-class Rival:
+class Confounder:
     """A candidate that could be mistaken for an effect that was added."""
 
     effect: str
-    rival: str
-    alike: float  # share of the effect's trace in these runs that the rival could have left, 0..1
-    weight: float  # of the model that has it instead, among the model and all its rivals, 0..1
+    confounder: str
+    overlap: float  # share of the effect's trace in these runs that the confounder could have left, 0..1
+    weight: float  # of the model that has it instead, among the model and all its confounders, 0..1
     left_out_rmse: float  # SI
     separating_run: str  # the run on which the two fitted models differ most; "" where none was looked for
     separation: float  # by how many times the noise, rms
 
 
 @dataclass(frozen=True)
-class LoneRun:
-    """A fit run that the others do not go with, by the model fitted to these alone; errors in SI."""
+class OutlierRun:
+    """A fit run that does not agree with the others, by the model fitted to these alone; errors in SI."""
 
     run: str
     effects: tuple[str, ...]  # of that model; none: the base model
-    noise: bool  # whether what it leaves of the others is noise
+    residual_is_noise: bool  # whether what it leaves of the others is noise
     others_with: float  # error on the others, fitted to all runs
     others_without: float  # and to the others alone
-    foretold: float  # error on this run, by the fit to the others
+    predicted_rmse: float  # error on this run, by the fit to the others
+
+
+@dataclass(frozen=True)
+class Rejected:
+    """Effects that the held-out runs did not validate, and the error there; SI."""
+
+    effects: tuple[str, ...]
+    rmse_without: float
+    rmse_with: float
 
 
 @dataclass(frozen=True)
@@ -125,7 +262,7 @@ class Formula:
     """A simple formula for a function that was learnt, SI; `curve`: its values along the function's range."""
 
     text: str  # "0.12 + 3.1e-05 T^2"
-    missed: float  # chi-square against the learnt function
+    chi_square: float  # against the learnt function
     numbers: int  # that it has
     bic: float
     curve: np.ndarray
@@ -142,9 +279,9 @@ class UnknownTerm:
     state: str  # in words
     state_unit: str
     unit: str  # of the function
-    named: bool  # the one that foretells left-out runs best, better than the model without it beyond chance, and held-out ones better
-    alike: tuple[str, ...]  # terms that left-out runs cannot tell from the named one
-    why: str
+    named: bool  # the one that predicts left-out runs best, better than the model without it beyond chance, and held-out ones better
+    indistinguishable: tuple[str, ...]  # terms that left-out runs do not distinguish from the named one
+    comparison: Comparison | None  # of the best one with none
     score_gain: float
     left_out_before: float
     left_out_after: float
@@ -159,16 +296,25 @@ class UnknownTerm:
     formulas: tuple[Formula, ...]
 
 
+# The names of before, until version 0.3; sentences are in `smajax.report.narrative` now.
+_RENAMED = {
+    "portrait_before": "residual_before",
+    "portrait_after": "residual_after",
+    "rivals": "confounders",
+    "lone_runs": "outlier_runs",
+}
+_NARRATED = ("summary", "unexplained", "cannot_know")
+
+
 @dataclass(frozen=True)
 class Findings:
     experiment: str  # short name
     title: str
     source: str  # path of the experiment file as given
     verdict: Verdict
-    summary: tuple[str, ...]  # the answer, in sentences
-    unexplained: tuple[str, ...]  # what stays unexplained
-    cannot_know: tuple[str, ...]  # what these runs cannot tell
-    check: tuple[str, ...]  # what was said before anything was fitted
+    check: tuple[
+        str, ...
+    ]  # what the experiment file and the Jacobian at the start gave rise to, before anything was fitted
     output_name: str
     output_unit: str  # SI
     noise_sigma: float
@@ -177,10 +323,56 @@ class Findings:
     before: tuple[ParameterFinding, ...]
     after: tuple[ParameterFinding, ...]
     effects: tuple[EffectFinding, ...]
-    portrait_before: Portrait
-    portrait_after: Portrait
+    residual_before: ResidualDiagnostics
+    residual_after: ResidualDiagnostics
     rounds: tuple[Round, ...]
-    rivals: tuple[Rival, ...] = ()
+    explained_variance: float  # share of the motion in left-out runs that the final model predicts
+    step: float  # s, of the integration
+    step_size_error: float  # SI of the output: by how much halving the step changes what the final model gives
+    offset: bool  # whether each run has its own zero
+    wire: str  # presets
+    load: str
+    declared: tuple[str, ...] = ()  # parameters that the experiment file gives
+    assumed: tuple[AssumedParameter, ...] = ()
+    preset_expansion: tuple[float, float] | None = (
+        None  # 1/K, martensite and austenite, that the preset's theta_T alone gives
+    )
+    correlated: tuple[tuple[str, ...], ...] = ()  # clusters of parameters whose estimates are correlated
+    confounders: tuple[Confounder, ...] = ()
+    superseded: tuple[str, ...] = ()  # effects that one unknown term supersedes
+    rejected: Rejected | None = None
     unknown: tuple[UnknownTerm, ...] = ()  # terms sought for what the library does not hold, best first
-    lone_runs: tuple[LoneRun, ...] = ()  # fit runs that the others do not go with
+    outlier_runs: tuple[OutlierRun, ...] = ()
+    config: AttributionConfig = field(default_factory=AttributionConfig)
     provenance: dict[str, str] = field(default_factory=dict)  # versions, seed, data hashes, command, seconds
+
+    @property
+    def added(self) -> tuple[EffectFinding, ...]:
+        """The effects of the final model."""
+        return tuple(effect for effect in self.effects if effect.added)
+
+    @property
+    def fit_runs(self) -> int:
+        return sum(run.role == "fit" for run in self.runs)
+
+    def __getattr__(self, name: str) -> Any:
+        """The names of before, with a DeprecationWarning."""
+        if name in _RENAMED:
+            return _warned(name, f"findings.{_RENAMED[name]}", getattr(self, _RENAMED[name]))
+        if name in _NARRATED:
+            # By its name: what finds nothing of the report, but for users of the old name.
+            narrated = import_module("smajax.report.narrative").narrate(self)
+            return _warned(name, f"smajax.report.narrate(findings).{name}", getattr(narrated, name))
+        raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+
+
+def _warned(old: str, now: str, value: Any) -> Any:
+    warnings.warn(f"findings.{old} is {now} now; it goes in version 0.3", DeprecationWarning, stacklevel=3)
+    return value
+
+
+def pooled_rmse(runs: Sequence[RunFinding], role: Role, which: Literal["before", "after"]) -> float:
+    """Root mean square error over all samples of the runs with `role`, SI; NaN when there are none."""
+    squares = [getattr(run, f"rmse_{which}") ** 2 * len(run.time) for run in runs if run.role == role]
+    samples = [len(run.time) for run in runs if run.role == role]
+    return float(np.sqrt(sum(squares) / sum(samples))) if samples else float("nan")

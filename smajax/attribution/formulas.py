@@ -20,7 +20,7 @@ import numpy as np
 from smajax.attribution.findings import Formula
 from smajax.attribution.unknown.spline import design
 
-OFFERED = 3
+OFFERED = 3  # formulas shown; each is of another kind
 # By how much a formula may differ from the function for nothing, in shares of its size: at most so where the model's
 # parameters could take the difference over (the covariance is that of small changes), at least so anywhere.
 FREE, EXACT = 0.3, 1e-6

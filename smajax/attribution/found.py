@@ -1,4 +1,4 @@
-"""The final model as a reader is told it: parameters with their errors, effects with their evidence."""
+"""The final model as findings: parameters with their errors, effects with their evidence."""
 
 from __future__ import annotations
 
@@ -53,19 +53,19 @@ def effects_found(
     """Every candidate with its evidence: added ones first, the strongest of them at the head, then by score."""
     left = [name for name in job.candidates if name not in final.effects]
     last = {score.effects[0]: score for score in scores_at(setting, final, left)[0]} if left else {}
-    told = {parameter.name: parameter for parameter in after.parameters}
+    fitted = {parameter.name: parameter for parameter in after.parameters}
     findings = []
     for name in job.candidates:
         effect, seen = LIBRARY[name], setting.evidence.get(name, Evidence())
         coefficients = {
             full.split(".", 1)[1]: CoefficientFinding(
-                told[full].value,
-                told[full].standard_error,
-                told[full].unit,
-                spread(intervals.get(full), told[full].standard_error),
+                fitted[full].value,
+                fitted[full].standard_error,
+                fitted[full].unit,
+                spread(intervals.get(full), fitted[full].standard_error),
             )
             for full in setting.coefficients(name)
-            if full in told
+            if full in fitted
         }
         evidence = {
             "score_gain": seen.first_score.gain if seen.first_score else float("nan"),
@@ -84,7 +84,6 @@ def effects_found(
                 effect.title,
                 effect.equation,
                 effect.formula,
-                effect.sentence,
                 name in final.effects,
                 coefficients,
                 evidence,
@@ -99,13 +98,8 @@ def effects_found(
 
 
 def spread(interval: tuple[float, float] | None, error: float | None) -> tuple[float, float] | None:
-    """What fits to runs drawn anew say, where it is wide enough to say something.
+    """The interval of fits to runs drawn anew, where it is wide enough to mean something.
 
     Where it is narrower than the standard error either way the tie to the fit holds the value there, and not the runs.
     """
     return None if interval is None or error is None or interval[1] - interval[0] < 2.0 * error else interval
-
-
-def asks_for_more(one: ParameterFinding) -> bool:
-    """Whether a parameter is at a bound that it might lie beyond: a share of all or of nothing is not."""
-    return one.remark.startswith("at its") and (one.unit, one.lower, one.upper) != ("-", 0.0, 1.0)

@@ -1,62 +1,62 @@
-"""Runs that no fit saw: simulated when the search is over, no effect is added for them, and they refuse what they do not bear out."""
+"""Runs that no fit saw: simulated when the search is over, no effect is added for them, and they reject what they do not validate."""
 
 from __future__ import annotations
+
+from typing import Literal
 
 import jax.numpy as jnp
 import numpy as np
 
+from smajax.attribution.config import AttributionConfig
 from smajax.attribution.cross_validation import Model, Search
-from smajax.attribution.findings import Portrait, RunFinding
+from smajax.attribution.findings import HeldOutWorse, Rejected, ResidualDiagnostics, RunFinding, pooled_rmse
 from smajax.attribution.job import Job
-from smajax.attribution.residual_diagnostics import portrait
+from smajax.attribution.residual_diagnostics import diagnosed
 from smajax.attribution.search import fewer
-from smajax.attribution.verdict import pooled
 from smajax.core.parameters import parameter_values
 from smajax.data.experiment.record import Run
 from smajax.fit.packed_runs import RunBatch, pack, simulate_batch
 from smajax.fit.problem import Problem
 from smajax.model.types import Trajectory
 
-# Of an effect beside others: by so much the error on held-out runs may be larger with it than without it by chance.
-WORSE = 0.02
-Compared = tuple[tuple[RunFinding, ...], Portrait, Portrait]
-Refused = tuple[tuple[str, ...], float, float]  # effects, error on the held-out runs without and with them
+Compared = tuple[tuple[RunFinding, ...], ResidualDiagnostics, ResidualDiagnostics]
 
 
-def borne_out(job: Job, setting: Search, first: Model, final: Model) -> tuple[Model, Compared, Refused | None]:
-    """What the held-out runs leave of `final`: (model, every run by it, what they refused).
+def validated(job: Job, setting: Search, first: Model, final: Model) -> tuple[Model, Compared, Rejected | None]:
+    """What the held-out runs leave of `final`: (model, every run by it, what they rejected).
 
-    No fit sees them and nothing is added for them. They refuse: the effect that came last first, as long as with it their
-    error is larger than without it, or no smaller than the base model's. It may be larger by `WORSE` where others are left.
+    No fit sees them and nothing is added for them. They reject the effect that came last first, as long as with it their
+    error is larger than without it, or no smaller than the base model's. It may be larger by `held_out_tolerance` where others are left.
     """
 
-    def held_out(compared: Compared, which: str = "after") -> float:
-        return pooled(compared[0], "held-out", which)
+    def held_out(compared: Compared, which: Literal["before", "after"] = "after") -> float:
+        return pooled_rmse(compared[0], "held-out", which)
 
-    compared = whole = compare(job, first, final)
+    compared = whole = compare(job, first, final, setting.config)
     left = final
     while left.effects:
         rest = fewer(setting, left) if len(left.effects) > 1 else first
-        without = compare(job, first, rest)
+        without = compare(job, first, rest, setting.config)
         now = held_out(compared)
-        if not (now >= held_out(compared, "before") or now > (1.0 + WORSE) * held_out(without)):
+        if not (
+            now >= held_out(compared, "before") or now > (1.0 + setting.config.held_out_tolerance) * held_out(without)
+        ):
             break
         left, compared = rest, without
     gone = tuple(name for name in final.effects if name not in left.effects)
     if not gone:
         return left, compared, None
     without_them, with_them = held_out(compared), held_out(whole)
-    told = f"error on the held-out runs {setting.shown(without_them)} without and {setting.shown(with_them)} with it"
-    setting.set_aside(final, told, gone)
-    return left, compared, (gone, without_them, with_them)
+    setting.set_aside(final, HeldOutWorse(without_them, with_them), gone)
+    return left, compared, Rejected(gone, without_them, with_them)
 
 
 def _simulated(problem: Problem, values: np.ndarray, batch: RunBatch) -> Trajectory:
     return simulate_batch(problem.system_at(jnp.asarray(values)), batch)
 
 
-def compare(job: Job, first: Model, final: Model) -> Compared:
-    """Every run, held-out ones included, by both models; and the portraits of the fit runs' residuals."""
+def compare(job: Job, first: Model, final: Model, config: AttributionConfig) -> Compared:
+    """Every run, held-out ones included, by both models; and the diagnostics of the fit runs' residuals."""
     experiment = job.experiment
     batch = pack(experiment.runs, experiment.step, parameter_values(job.problem.system))
     before = _simulated(job.problem, first.values, batch)
@@ -98,8 +98,8 @@ def compare(job: Job, first: Model, final: Model) -> Compared:
     noise = experiment.noise_sigma, experiment.outputs[0].noise_given
     return (
         tuple(runs),
-        portrait(residuals["before"], states["before"], *noise),
-        portrait(residuals["after"], states["after"], *noise),
+        diagnosed(residuals["before"], states["before"], *noise, config),
+        diagnosed(residuals["after"], states["after"], *noise, config),
     )
 
 

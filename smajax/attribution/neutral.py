@@ -49,18 +49,18 @@ def shift(effect: type[AbstractEffect]) -> str:
         with_it = dataclasses.replace(system, effects=(effect.base(),))
         plain, changed = simulate_compiled(system, inputs, DT), simulate_compiled(with_it, inputs, DT)
         name, unit = system.load.reading
-        told = []
+        changes = []
         for what, unit_of in (("reading", unit), ("temperature", "degC"), ("stress", "Pa")):
             before, after = np.asarray(getattr(plain, what)), np.asarray(getattr(changed, what))
             called = name if what == "reading" else what
             if not np.isfinite(after).all():
-                told.append(f"the {label(called)} to no number")
+                changes.append(f"the {label(called)} to no number")
                 continue
             most = float(np.abs(after - before).max())
             if most > NOTHING * max(float(np.ptp(before)), 1e-3 * float(np.abs(before).max())):
                 seen = display(unit_of, called)
-                told.append(f"the {label(called)} by up to {digits(seen.of(most), 3)} {seen.unit}".rstrip())
-        return ", ".join(told)
+                changes.append(f"the {label(called)} by up to {digits(seen.of(most), 3)} {seen.unit}".rstrip())
+        return ", ".join(changes)
     return ""
 
 
@@ -71,13 +71,13 @@ def not_neutral() -> list[str]:
     for name, effect in of_others().items():
         begin = f"{points.get(name, name)} brings the effect {name!r}, which"
         try:
-            told = shift(effect)
+            changes = shift(effect)
         except Exception as error:
             faults.append(f"{begin} cannot be simulated ({error!r}): mend or uninstall that package.")
             continue
-        if told:
+        if changes:
             faults.append(
-                f"{begin} must change nothing at its base value and changes {told}: mend its methods or `base` there, or "
+                f"{begin} must change nothing at its base value and changes {changes}: mend its methods or `base` there, or "
                 "uninstall that package."
             )
     return faults

@@ -1,4 +1,4 @@
-"""At which values of its other coefficients an effect is looked at while its switches are off.
+"""Grid of nuisance values: at which values of its other coefficients an effect is scanned while its switches are off.
 
 A time, a width or a scale means nothing until the effect is on, but the trace that switching it on would leave depends on
 it: a draught is only seen by a score test that looks at about the time at which it blew. Each effect says at which
@@ -14,14 +14,14 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from smajax.attribution.cross_validation import Search, nudged
-from smajax.attribution.score_test import memory_of, score_of, switches, without
+from smajax.attribution.score_test import samples_per_independent, score_of, switches, without
 from smajax.fit.predicted import predicted_and_derivatives
 from smajax.fit.sensitivity import Sensitivity, sensitivity
 from smajax.model.effects.library import LIBRARY
 
 
 @dataclass(frozen=True)
-class Looked:
+class Scanned:
     """Sensitivities with every effect at its best place; by effect, that place (full names) and among how many it is."""
 
     at: Sensitivity
@@ -29,7 +29,7 @@ class Looked:
     looks: dict[str, int] = field(default_factory=dict)
 
 
-def looked_at(setting: Search, values: np.ndarray, effects: Sequence[str], fitted: Sequence[str]) -> Looked:
+def scanned(setting: Search, values: np.ndarray, effects: Sequence[str], fitted: Sequence[str]) -> Scanned:
     """Misfit and its derivatives at `values` (P,), where `fitted` are the loose parameters.
 
     `effects`, which are off, are each at the place whose trace promises most beside what the fitted parameters absorb.
@@ -41,7 +41,7 @@ def looked_at(setting: Search, values: np.ndarray, effects: Sequence[str], fitte
         for place in LIBRARY[effect].places(setting.extent)
     ]
     if not options:
-        return Looked(at)
+        return Scanned(at)
     index = setting.problem.names.index
     points, towards, whose = [], [], []
     for number, (effect, place) in enumerate(options):
@@ -55,16 +55,16 @@ def looked_at(setting: Search, values: np.ndarray, effects: Sequence[str], fitte
     _, slopes = predicted_and_derivatives(setting.problem, np.stack(points), np.stack(towards))
     columns = -setting.problem.centred(slopes[:, 0]) / np.asarray(setting.problem.noise)
     jacobian = at.jacobian.copy()
-    found = Looked(dataclasses.replace(at, jacobian=jacobian))
+    found = Scanned(dataclasses.replace(at, jacobian=jacobian))
     basis, residual = without(at, fitted)
-    memory = memory_of(at)
-    best = {effect: score_of((effect,), at, basis, residual, setting.bounds, memory).gain for effect, _ in options}
+    correlation = samples_per_independent(at)
+    best = {effect: score_of((effect,), at, basis, residual, setting.bounds, correlation).gain for effect, _ in options}
     for number, (effect, place) in enumerate(options):
         found.looks[effect] = found.looks.get(effect, 1) + 1
         own = [(k, name) for k, (whom, name) in enumerate(whose) if whom == number]
         rows = columns[[k for k, _ in own]]
         there = Sensitivity(tuple(name for _, name in own), at.misfit, np.moveaxis(rows, 0, -1), at.mask)
-        score = score_of((effect,), there, basis, residual, setting.bounds, memory)
+        score = score_of((effect,), there, basis, residual, setting.bounds, correlation)
         if score.gain > best[effect]:
             best[effect], found.place[effect] = score.gain, place
             for k, name in own:

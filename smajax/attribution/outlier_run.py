@@ -1,4 +1,4 @@
-"""A fit run that does not go with the others: without it a model leaves nothing but noise in them.
+"""An outlier run: a fit run that does not agree with the others: without it a model leaves nothing but noise in them.
 
 It may not belong there (another wire, another day, the readings of another run, an input that was not as logged), or it
 alone shows what the model lacks; the runs cannot say which. Asked only where more than noise is left when the search has
@@ -12,40 +12,35 @@ from collections.abc import Sequence
 import numpy as np
 
 from smajax.attribution.cross_validation import Model, Search, Start
-from smajax.attribution.findings import LoneRun
+from smajax.attribution.findings import OutlierRun
 from smajax.fit.predicted import misfits
 
-LEAST = 3  # fit runs: of two that disagree either may be the wrong one
-LEAST_TO_LEAN = 4  # and where the others are not noise without it: a model fits any two runs far better than three
-LEANS = 2.0  # times by which the error on the others then falls
-LOOKED_AT = 12  # runs at most, those of which the model leaves most
 
+def outlier_runs(setting: Search, model: Model, names: Sequence[str]) -> tuple[OutlierRun, ...]:
+    """The fit runs without any one of which `model`, fitted anew, leaves noise in all the others; most influential first.
 
-def lone_runs(setting: Search, model: Model, names: Sequence[str]) -> tuple[LoneRun, ...]:
-    """The fit runs without any one of which `model`, fitted anew, leaves noise in all the others; most telling first.
-
-    Where there is none, the one run without which the error on the others falls by `LEANS`, if any. `names` of the fit runs, in their order. Fits begin at the
-    fit to all runs, which a wrong run may have drawn into a valley of its own, and at the experiment's start values.
+    Where there is none, the one run without which the error on the others falls by `influential_ratio`, if any. `names` of the fit runs, in their order. Fits begin at the
+    fit to all runs, which a wrong run may have drawn into a local minimum of its own, and at the experiment's start values.
     """
-    problem = setting.problem
+    problem, config = setting.problem, setting.config
     runs = problem.batch.runs
-    if runs < LEAST:
+    if runs < config.outlier_least_runs:
         return ()
     mask = np.asarray(problem.batch.mask)
     (whole,) = misfits(problem, [model.values])
-    worst = np.argsort(-(whole**2).sum(axis=1), kind="stable")[:LOOKED_AT]
+    worst = np.argsort(-(whole**2).sum(axis=1), kind="stable")[: config.outlier_most_runs]
     everyone = np.arange(runs)
     places = [setting.inside(model)]
     if not model.effects:
         places.append(problem.start_values())
     starts = [Start(model.effects, place, (everyone != run).astype(float)) for run in worst for place in places]
     fits, found = setting.fit(starts, "leaving out each run for good", hops=True)
-    told = []
+    outliers = []
     for first, run in zip(range(0, len(starts), len(places)), worst, strict=True):
         best = min(range(first, first + len(places)), key=lambda k: fits[k].cost)
         left, others = found[best], everyone != run
-        told.append(
-            LoneRun(
+        outliers.append(
+            OutlierRun(
                 names[run],
                 model.effects,
                 setting.all_noise(left[others], mask[others]),
@@ -54,10 +49,13 @@ def lone_runs(setting: Search, model: Model, names: Sequence[str]) -> tuple[Lone
                 _rms(left[[run]], mask[[run]]),
             )
         )
-    told.sort(key=lambda one: one.others_without / one.others_with)
-    noise = tuple(one for one in told if one.noise)
-    leans = runs >= LEAST_TO_LEAN and told[0].others_without * LEANS < told[0].others_with
-    return noise or (told[0],) * leans
+    outliers.sort(key=lambda one: one.others_without / one.others_with)
+    noise = tuple(one for one in outliers if one.residual_is_noise)
+    influential = (
+        runs >= config.influential_least_runs
+        and outliers[0].others_without * config.influential_ratio < outliers[0].others_with
+    )
+    return noise or (outliers[0],) * influential
 
 
 def _rms(misfit: np.ndarray, mask: np.ndarray) -> float:

@@ -9,7 +9,7 @@ from smajax.data.experiment.record import RUN_STARTS, Experiment
 from smajax.model.presets import build
 
 
-def refuse_what_only_identify_does(experiment: Experiment) -> None:
+def refuse_keys_of_identify(experiment: Experiment) -> None:
     """ExperimentError for the keys of an experiment file that this loop would otherwise pass over in silence."""
 
     def refuse(key: str, what: str) -> None:

@@ -1,4 +1,4 @@
-"""Portrait of a residual: its size against the noise, its memory, and where in a run it lives."""
+"""Residual diagnostics: its size against the noise, its autocorrelation, and in which phases of a run it is large."""
 
 from __future__ import annotations
 
@@ -6,24 +6,11 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from smajax.attribution.findings import Portrait
+from smajax.attribution.config import AttributionConfig
+from smajax.attribution.findings import ResidualDiagnostics
 from smajax.core.whiteness import WHITE, correlation_time, first_order, whiteness_p_value
-from smajax.core.wording import times_noise
 
-# A residual may miss the noise level by this share of its mean square and still be called noise: a noise sigma is
-# rarely known better, and no effect worth a name hides in 2 %.
-LEFT_OVER = 0.02
-# A noise with a memory misses its own level by more: by so many standard errors of its mean square it is still noise, but
-# not by more than the second share. A third of the noise may hide in that.
-ERRORS, MOST_LEFT_OVER = 2.0, 0.1
-# A residual without memory of up to so many times the declared noise is noise that was declared too small. One that is
-# larger belongs to data that the model knows nothing of, such as shuffled ones.
-DECLARED_TOO_SMALL = 3.0
-# A noise that was estimated from neighbouring samples is its fast part alone. A residual that is the noise of a first-order
-# filter and nothing beyond is that noise with its slow part: what a model lacks has another memory, which a test on some
-# hundred samples sees at a trace of the noise's size. The filter may keep so much of the sample before, what it is fed is so
-# many times the estimate at most (1.6 times where it keeps nearly all), and so many independent samples have to be there.
-KEPT, FED, LEAST_INDEPENDENT = 0.95, 2.0, 50
+DEFAULT = AttributionConfig()
 
 
 def phase_of(fraction: np.ndarray, temperature: np.ndarray, ambient: float) -> np.ndarray:
@@ -36,13 +23,14 @@ def phase_of(fraction: np.ndarray, temperature: np.ndarray, ambient: float) -> n
     return np.where(moving, np.where(rate < 0.0, "heating, transforming", "cooling, transforming"), resting)
 
 
-def portrait(
+def diagnosed(
     residuals: Sequence[np.ndarray],
     states: Sequence[Mapping[str, np.ndarray]],
     noise_sigma: float,
     noise_given: bool = True,
-) -> Portrait:
-    """Portrait of the fit runs' residuals (SI, one array of shape (n,) a run). `noise_given`: and not estimated.
+    config: AttributionConfig = DEFAULT,
+) -> ResidualDiagnostics:
+    """Of the fit runs' residuals (SI, one array of shape (n,) a run). `noise_given`: and not estimated.
 
     `states` gives, run by run, series of the model to hold the residual against; `temperature` and
     `martensite_fraction` are needed, others (inputs, stress, rates) are correlated as well.
@@ -71,8 +59,7 @@ def portrait(
         )
     ratio = rmse / noise_sigma
     white = p_value > WHITE
-    kept = 0.0 if noise_given else _kept(residuals, noise_sigma)
-    return Portrait(
+    return ResidualDiagnostics(
         rmse,
         noise_sigma,
         ratio,
@@ -81,58 +68,37 @@ def portrait(
         len(everything) / correlation_time(residuals),
         by_phase,
         correlation,
-        _sentences(ratio, white, kept, by_phase, correlation),
-        kept,
+        0.0 if noise_given else _filter_coefficient(residuals, noise_sigma, config),
     )
 
 
-def noise_like(found: Portrait) -> bool:
-    """Nothing left to explain: no memory beyond chance, or no larger than the noise but for what its memory accounts for."""
-    return found.kept > 0.0 or _is_noise(found.ratio, found.white, found.independent)
+def noise_like(found: ResidualDiagnostics, config: AttributionConfig = DEFAULT) -> bool:
+    """Nothing left to explain: white, or no larger than the noise but for what its autocorrelation accounts for."""
+    return found.filter_coefficient > 0.0 or _is_noise(found.ratio, found.white, found.independent, config)
 
 
-def _is_noise(ratio: float, white: bool, independent: float) -> bool:
+def _is_noise(ratio: float, white: bool, independent: float, config: AttributionConfig) -> bool:
     excess = 1.0 - (1.0 / max(ratio, 1e-9)) ** 2
-    chance = ERRORS * float(np.sqrt(2.0 / max(independent, 1.0)))
-    return excess <= min(max(LEFT_OVER, chance), MOST_LEFT_OVER) or (white and ratio < DECLARED_TOO_SMALL)
+    chance = config.noise_excess_errors * float(np.sqrt(2.0 / max(independent, 1.0)))
+    allowed = min(max(config.noise_excess, chance), config.most_noise_excess)
+    return excess <= allowed or (white and ratio < config.white_noise_ratio)
 
 
-def _kept(residuals: Sequence[np.ndarray], noise_sigma: float) -> float:
-    """Share of the sample before that a first-order filter keeps whose noise the residual is; 0 where it is none."""
+def _filter_coefficient(residuals: Sequence[np.ndarray], noise_sigma: float, config: AttributionConfig) -> float:
+    """Coefficient of the first-order autoregressive noise that the residual is; 0 where it is none."""
     found = first_order(residuals)
     independent = sum(len(run) for run in residuals) / correlation_time(residuals)
-    enough = independent > LEAST_INDEPENDENT and found.p_value > WHITE
-    return found.coefficient if enough and 0.0 < found.coefficient < KEPT and found.sigma < FED * noise_sigma else 0.0
+    enough = independent > config.least_independent and found.p_value > WHITE
+    small = found.sigma < config.most_filter_noise * noise_sigma
+    return found.coefficient if enough and 0.0 < found.coefficient < config.most_filter_coefficient and small else 0.0
 
 
-def all_noise(residuals: Sequence[np.ndarray], noise_sigma: float, noise_given: bool = True) -> bool:
-    """`noise_like` of residuals (SI, one array of shape (n,) a run) whose portrait nobody needs."""
+def all_noise(
+    residuals: Sequence[np.ndarray], noise_sigma: float, noise_given: bool = True, config: AttributionConfig = DEFAULT
+) -> bool:
+    """`noise_like` of residuals (SI, one array of shape (n,) a run), without the rest of their diagnostics."""
     everything = np.concatenate(residuals)
     ratio = float(np.sqrt(np.mean(everything**2))) / noise_sigma
     independent = len(everything) / correlation_time(residuals)
-    plain = _is_noise(ratio, whiteness_p_value(residuals) > WHITE, independent)
-    return plain or (not noise_given and _kept(residuals, noise_sigma) > 0.0)
-
-
-def _sentences(
-    ratio: float,
-    white: bool,
-    kept: float,
-    by_phase: Mapping[str, Mapping[str, float]],
-    correlation: Mapping[str, float],
-) -> tuple[str, ...]:
-    memory = "has no memory" if white else "has a memory: one sample tells the next"
-    if kept > 0.0 and not white:
-        memory = f"has the memory of a first-order noise, which keeps {kept:.2f} of the sample before, and none beyond"
-    told = [f"The residual is {times_noise(ratio, 'the measurement noise')} and {memory}."]
-    if white or kept > 0.0:
-        return tuple(told)
-    worst = max(by_phase, key=lambda name: by_phase[name]["share_of_squared_error"])
-    told.append(
-        f"{by_phase[worst]['share_of_squared_error']:.0%} of its square falls into the phase “{worst}” "
-        f"({by_phase[worst]['samples'] / sum(entry['samples'] for entry in by_phase.values()):.0%} of the samples)."
-    )
-    strongest = max(correlation, key=lambda name: abs(correlation[name]))
-    if abs(correlation[strongest]) > 0.2:
-        told.append(f"It goes most with {strongest.replace('_', ' ')} (correlation {correlation[strongest]:+.2f}).")
-    return tuple(told)
+    plain = _is_noise(ratio, whiteness_p_value(residuals) > WHITE, independent, config)
+    return plain or (not noise_given and _filter_coefficient(residuals, noise_sigma, config) > 0.0)

@@ -1,11 +1,11 @@
-"""Score test: which effects would lower the misfit, told from one Jacobian at the present fit, before any refit.
+"""Score test: which effects would lower the misfit, by one Jacobian at the present fit, before any refit.
 
 Each coefficient is looked at where it is switched off. The columns of the fitted parameters are projected out first:
 what they can absorb is no evidence for an effect. What remains of the coefficient's column against what remains of the
 residual gives the gain that a small coefficient would bring, its sign, and a p-value under the hypothesis that nothing
-is missing: then the residual is noise, of as many independent samples as its memory leaves (`memory_of`), and the
+is missing: then the residual is noise, of as many independent samples as its autocorrelation leaves (`samples_per_independent`), and the
 statistic is chi-square. Where something is missing every effect
-that is not orthogonal to it stands out, so the p-value says *whether* to search; *what* is found is judged on runs
+that is not orthogonal to it stands out, so the p-value says *whether* to search; *what* is found is scored on runs
 left out.
 """
 
@@ -48,9 +48,9 @@ def score_of(
     basis: np.ndarray,
     residual: np.ndarray,
     bounds: Mapping[str, tuple[float, float]],
-    memory: float,
+    correlation: float,
 ) -> Score:
-    """Of one effect or two, in the residual and beside the directions of `without`; `memory`: of `memory_of`."""
+    """Of one effect or two, in the residual and beside the directions of `without`; `correlation`: of `samples_per_independent`."""
     coefficients = [name for effect in names for name in switches(effect)]
     # misfit = measured - model: a coefficient lowers it along minus its derivative.
     columns = -at.columns(coefficients)
@@ -69,7 +69,7 @@ def score_of(
     before = float(residual @ residual)
     after = residual - columns @ found
     gain = max(0.0, 1.0 - float(after @ after) / before) if before else 0.0
-    statistic = gain * len(residual) / memory
+    statistic = gain * len(residual) / correlation
     return Score(
         names,
         gain,
@@ -84,9 +84,9 @@ def screen(
 ) -> tuple[list[Score], list[Score]]:
     """(single effects, pairs), each ranked by gain. `fitted` are the loose parameters at the present fit."""
     basis, residual = without(at, fitted)
-    memory = memory_of(at)
-    singles = [score_of((name,), at, basis, residual, bounds, memory) for name in candidates]
-    pairs = [score_of(two, at, basis, residual, bounds, memory) for two in itertools.combinations(candidates, 2)]
+    correlation = samples_per_independent(at)
+    singles = [score_of((name,), at, basis, residual, bounds, correlation) for name in candidates]
+    pairs = [score_of(two, at, basis, residual, bounds, correlation) for two in itertools.combinations(candidates, 2)]
     rank = lambda score: -score.gain  # noqa: E731
     return sorted(singles, key=rank), sorted(pairs, key=rank)
 
@@ -98,10 +98,10 @@ def without(at: Sensitivity, fitted: Sequence[str]) -> tuple[np.ndarray, np.ndar
     return basis, residual - basis @ (basis.T @ residual)
 
 
-def memory_of(at: Sensitivity) -> float:
-    """Samples per independent one, as far as noise accounts for them: with a memory it is matched by a slow trace far more easily.
+def samples_per_independent(at: Sensitivity) -> float:
+    """Samples per independent one, as far as noise accounts for them: an autocorrelated one is matched by a slow trace far more easily.
 
-    What is larger than the noise is no noise, and its memory no reason for doubt.
+    What is larger than the noise is no noise, and its autocorrelation no reason for doubt.
     """
     noise = min(1.0, 1.0 / max(float(np.mean(at.residual() ** 2)), 1e-300))
     return 1.0 + noise * (correlation_time(split_runs(at.misfit, at.mask)) - 1.0)

@@ -1,4 +1,4 @@
-"""Does what an effect gains hang on the step of the integration?
+"""Step-size check: does what an effect gains depend on the step of the integration?
 
 A load that sticks and jumps may jump a step earlier or later by rounding alone. A fit can choose the coefficients whose
 row of jumps happens to fall where the log's does, and gains what no wire does: at half the step the gain is gone.
@@ -18,7 +18,7 @@ from smajax.model.effects.library import LIBRARY
 from smajax.model.load.coupon import AbstractCoupon
 
 
-def kept_at_half_the_step(setting: Search, new: Model, old: Model) -> float:
+def gain_kept_at_half_step(setting: Search, new: Model, old: Model) -> float:
     """Share of what lets the load jump gains in the squared error of all fit runs that it keeps, unfitted, at half the step.
 
     The gain is of `new` on `old`, or on `old` with the partner that was added beside it: a partner's gain is not its own.
@@ -34,7 +34,7 @@ def kept_at_half_the_step(setting: Search, new: Model, old: Model) -> float:
         for effect in jumping:
             for name in setting.coefficients(effect):
                 values[setting.problem.names.index(name)] = base_value(name)
-        (fit,), _ = setting.fit([Start(partner, values)], "looking at half the step")
+        (fit,), _ = setting.fit([Start(partner, values)], "checking at half the step")
         without = min(without, fit.cost)
     problem, index = setting.restricted(new.effects)
     fine = Problem.build(problem.system, halved(problem.batch), problem.noise_sigma, problem.offset)
@@ -43,7 +43,7 @@ def kept_at_half_the_step(setting: Search, new: Model, old: Model) -> float:
     return (without - cost) / (without - new.cost) if without > new.cost else 0.0
 
 
-def integration_error(job: Job, final: Model) -> float:
+def step_size_error_of(job: Job, final: Model) -> float:
     """By how much the output (rms, worst fit run, SI, offset aside) changes when the step is halved."""
     if isinstance(job.problem.system.load, AbstractCoupon):
         return 0.0  # a closed form at each sample

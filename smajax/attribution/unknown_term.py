@@ -1,8 +1,8 @@
 """Where something is missing that no effect of the library accounts for: an unknown term in each equation in turn.
 
 Each term (`smajax.attribution.unknown.terms`) is a smooth function of one state. All are screened by the score test at the final
-model of the search; the best of each equation are refitted together with the model's parameters and judged as effects
-are, on runs left out. The held-out runs can refuse the best. What is learnt is a function: drawn over the states that the runs went through, and compared with
+model of the search; the best of each equation are refitted together with the model's parameters and cross-validated as effects
+are. The held-out runs can reject the best. What is learnt is a function: drawn over the states that the runs went through, and compared with
 simple formulas.
 """
 
@@ -16,7 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from smajax.attribution.cross_validation import Fitted, Model, Search, Start, paired
-from smajax.attribution.findings import UnknownTerm
+from smajax.attribution.findings import UnknownTerm, UnknownTermBetter
 from smajax.attribution.formulas import formulas
 from smajax.attribution.score_test import Score, screen
 from smajax.attribution.unknown.ranges import Sought, sought
@@ -30,16 +30,6 @@ from smajax.fit.predicted import misfits
 from smajax.fit.problem import Problem
 from smajax.fit.sensitivity import sensitivity
 from smajax.fit.uncertainty import covariance_of, uncertainty
-
-REFITTED = 6  # terms
-JUDGED = 6  # of them, taken to the left-out runs
-# Standard errors by which a term must do better than none, and than another that does better than none, to be named: of
-# a dozen that were tried the best is one standard error ahead by luck alone.
-APART = 2.0
-TOWARDS, INSIDE = 0.5, 0.8  # of the score test's estimate, and at most this share of the largest: where a refit begins
-WEAK = 1.0  # sigma of the prior of every coefficient about zero, in shares of the largest: a fit is then well posed
-GRID = 61  # points at which a function is drawn
-CELLS = 20  # of its range, in which samples are counted
 
 
 @dataclass
@@ -61,7 +51,7 @@ def with_terms(setting: Search, final: Model) -> tuple[Terms, np.ndarray, Sought
     names = tuple(term.effect_name for term in found.terms)
     whole = dataclasses.replace(system, effects=(*system.effects, *found.terms))
     own = [name for name in parameters(whole) if name.split(".")[0] in names]
-    known = {name: Prior(0.0, WEAK, False) for name in own}
+    known = {name: Prior(0.0, setting.config.term_prior_sigma, False) for name in own}
     problem = Problem.build(whole, plain.batch, plain.noise_sigma, plain.offset, priors=known)
     bounds = {**setting.bounds, **dict.fromkeys(own, (-1.0, 1.0))}
     unknowns = tuple(setting.free(final.effects))
@@ -71,10 +61,10 @@ def with_terms(setting: Search, final: Model) -> tuple[Terms, np.ndarray, Sought
         bounds,
         names,
         setting.cache,
-        setting.shown,
         setting.progress,
         setting.noise_given,
         setting.held_out,
+        config=setting.config,
     )
     return search, problem.start_values(), found
 
@@ -97,7 +87,7 @@ def _best_of_each(scores: Sequence[Score], count: int) -> list[Score]:
 
 @dataclass(frozen=True)
 class Lacking:
-    """What was learnt of each term that came to the runs left out, best first; the model with it if the first is named."""
+    """What was learnt of each term that came to the left-out runs, best first; the model with it if the first is named."""
 
     terms: tuple[UnknownTerm, ...] = ()
     model: Model | None = None
@@ -106,48 +96,52 @@ class Lacking:
 def unknown_terms(setting: Search, final: Model) -> Lacking:
     """An unknown term in each equation in turn, beside `final`.
 
-    The first is `named` when it foretells left-out runs better than the final model does, by `Search.better` and `APART`
-    standard errors, and the held-out runs better at all. Terms that do better than none, too, and that it is not as far ahead of, stand in `alike`.
+    The first is `named` when it predicts left-out runs better than the final model does, by `Search.better` and
+    `term_standard_errors`, and the held-out runs better at all. Terms that do better than none, too, and that it is not as far ahead of, stand in `indistinguishable`.
     """
+    config = setting.config
     search, values, found = with_terms(setting, final)
     if not search.candidates:
         return Lacking()
     search.progress(Stage("looking for the equation that lacks something", 0.0))
     scores = screened(search, values)
-    chosen = _best_of_each(scores, REFITTED)
+    chosen = _best_of_each(scores, config.terms_refitted)
     search.progress(Stage("looking for the equation that lacks something", 1.0))
     if not chosen:
         return Lacking()
     base = Fitted((), search.known(dataclasses.replace(final, values=values)))
-    fitted = refitted(search, chosen, values)[:JUDGED]
-    present = search.judged([base])[0]
-    judged = sorted(search.judged(fitted, present), key=lambda model: model.left_out_rmse)
-    best = judged[0]
-    enough, why = search.better(best, present, APART)
-    # One run fits too well to name anything: there is none to foretell.
+    fitted = refitted(search, chosen, values)[: config.terms_scored]
+    present = search.cross_validated([base])[0]
+    scored = sorted(search.cross_validated(fitted, present), key=lambda model: model.left_out_rmse)
+    best = scored[0]
+    enough, comparison = search.better(best, present, config.term_standard_errors)
+    # One run fits too well to name anything: there is none to predict.
     enough = enough and len(present.left_out) > 1
-    borne_out = _on_held_out(search, present, best) if enough and search.held_out is not None else None
-    if borne_out is not None and borne_out[1] >= borne_out[0]:
-        enough, why = (
-            False,
-            f"{why}; but on the held-out runs {search.shown(borne_out[0])} -> {search.shown(borne_out[1])}",
-        )
-    rivals = [
+    held_out = _on_held_out(search, present, best) if enough and search.held_out is not None else None
+    enough = enough and (held_out is None or not held_out[1] >= held_out[0])
+    others = [
         model
-        for model in judged[1:]
-        if model.left_out_rmse < present.left_out_rmse and not search.better(best, model, APART)[0]
+        for model in scored[1:]
+        if model.left_out_rmse < present.left_out_rmse
+        and not search.better(best, model, config.term_standard_errors)[0]
     ]
-    told = []
+    terms = []
     gains = {score.effects: score.gain for score in scores}
-    for model in judged:
+    for model in scored:
         ahead = model is best and enough
-        alike = tuple(rival.effects[0] for rival in rivals) if ahead else ()
-        said = why if model is best else ""
-        learnt = _learnt(search, found, model, present, gains[model.effects], ahead, alike, said)
-        if model is best and borne_out is not None:
-            learnt = dataclasses.replace(learnt, held_out_before=borne_out[0], held_out_after=borne_out[1])
-        told.append(learnt)
-    return Lacking(tuple(told), best if enough else None)
+        term = _learnt(search, found, model, present, gains[model.effects])
+        if model is best:
+            before, after = held_out if held_out is not None else (None, None)
+            term = dataclasses.replace(
+                term,
+                named=ahead,
+                indistinguishable=tuple(other.effects[0] for other in others) if ahead else (),
+                comparison=comparison,
+                held_out_before=before,
+                held_out_after=after,
+            )
+        terms.append(term)
+    return Lacking(tuple(terms), best if enough else None)
 
 
 def _on_held_out(search: Terms, *models: Model) -> list[float]:
@@ -160,24 +154,20 @@ def _on_held_out(search: Terms, *models: Model) -> list[float]:
 
 
 def in_place_of(setting: Search, first: Model, final: Model) -> Lacking | None:
-    """One unknown term in the base model `first` that foretells left-out runs better than all the effects of `final`.
+    """One unknown term in the base model `first` that predicts left-out runs better than all the effects of `final`.
 
-    By `APART` standard errors, or at all where it has no more coefficients than they have. Then these are what the
-    library has that comes near it, and none of them is missing: a round is noted in which they are set aside.
+    By `term_standard_errors`, or at all where it has no more coefficients than they have. Then these are what the
+    library has that comes near it, and none of them is missing: a round is noted in which they are removed.
     """
     found = unknown_terms(setting, first)
     if found.model is None or found.model.left_out_rmse >= final.left_out_rmse:
         return None
     ahead = paired(final.left_out, found.model.left_out, np.asarray(setting.problem.batch.mask))
     spent = sum(len(setting.coefficients(effect)) for effect in final.effects)
-    if ahead <= APART and spent < COUNT:
+    if ahead <= setting.config.term_standard_errors and spent < COUNT:
         return None
     term = found.terms[0]
-    setting.set_aside(
-        final,
-        f"{term.title} alone foretells left-out runs better than all of them, "
-        f"{setting.shown(final.left_out_rmse)} -> {setting.shown(term.left_out_after)}",
-    )
+    setting.set_aside(final, UnknownTermBetter(term.title, final.left_out_rmse, term.left_out_after))
     return found
 
 
@@ -185,13 +175,15 @@ def refitted(search: Terms, chosen: Sequence[Score], values: np.ndarray) -> list
     """Every chosen term fitted together with the model's parameters, best first.
 
     Each from zero, where it cannot end worse than the model without it, and from some way towards what the score test
-    says, because a run whose transformation begins elsewhere lies in another valley.
+    says, because a run whose transformation begins elsewhere lies in another local minimum.
     """
-    starts = []
+    config, starts = search.config, []
     for score in chosen:
         ahead = np.array(values)
         for name, size in score.coefficients.items():
-            ahead[search.problem.names.index(name)] = np.clip(TOWARDS * size, -INSIDE, INSIDE)
+            ahead[search.problem.names.index(name)] = np.clip(
+                config.term_start_share * size, -config.term_start_limit, config.term_start_limit
+            )
         starts += [Start(score.effects, values), Start(score.effects, ahead)]
     solutions, _ = search.fit(starts, "refitting unknown terms")
     every = sorted(zip(starts, solutions, strict=True), key=lambda pair: pair[1].cost)
@@ -211,9 +203,6 @@ def _learnt(
     model: Model,
     present: Model,
     gain: float,
-    named: bool,
-    alike: tuple[str, ...],
-    why: str,
 ) -> UnknownTerm:
     """The function, its band, where the runs went, and formulas for it."""
     term = _term(found, model)
@@ -224,13 +213,13 @@ def _learnt(
     share = np.clip((found.states[term.effect_name] - low) / width, 0.0, 1.0)
     # About the mean over the samples, where a constant changes nothing.
     centre = design(share).mean(axis=0) if term.only_changes else np.zeros(len(own))
-    grid = np.linspace(0.0, 1.0, GRID)
+    grid = np.linspace(0.0, 1.0, search.config.term_points)
     basis = design(grid) - centre
     covariance, held_ones = (_covariance(search, model, own, names) * scale**2 for names in ((*others, *own), own))
     error, error_held = (
         np.sqrt(np.maximum(np.einsum("ni,ij,nj->n", basis, one, basis), 0.0)) for one in (covariance, held_ones)
     )
-    counts = np.histogram(share, CELLS, (0.0, 1.0))[0]
+    counts = np.histogram(share, search.config.term_bins, (0.0, 1.0))[0]
     mask = np.asarray(search.problem.batch.mask)
     misfit = misfits(search.problem, [model.values])[0]
     samples = float(mask.sum()) / correlation_time(split_runs(misfit, mask))
@@ -244,9 +233,9 @@ def _learnt(
         state=term.state,
         state_unit=state_unit,
         unit=unit,
-        named=named,
-        alike=alike,
-        why=why,
+        named=False,
+        indistinguishable=(),
+        comparison=None,
         score_gain=gain,
         left_out_before=present.left_out_rmse,
         left_out_after=model.left_out_rmse,
@@ -256,7 +245,7 @@ def _learnt(
         values=scale * basis @ at,
         error=error,
         error_held=error_held,
-        cells=low + width * np.linspace(0.0, 1.0, CELLS + 1),
+        cells=low + width * np.linspace(0.0, 1.0, search.config.term_bins + 1),
         samples=counts,
         formulas=tuple(
             dataclasses.replace(one, curve=one.curve - _mean(one.curve, share) if term.only_changes else one.curve)
@@ -278,9 +267,9 @@ def _covariance(search: Terms, model: Model, own: Sequence[str], names: Sequence
     at = sensitivity(search.problem, model.values, names)
     values = {name: float(model.values[search.problem.names.index(name)]) for name in names}
     known = uncertainty(at, names, values, search.bounds)
-    told, covariance = covariance_of(at, names, known)
-    whole = WEAK**2 * np.eye(len(own))
-    here = [(row, told.index(name)) for row, name in enumerate(own) if name in told]
+    determined, covariance = covariance_of(at, names, known)
+    whole = search.config.term_prior_sigma**2 * np.eye(len(own))
+    here = [(row, determined.index(name)) for row, name in enumerate(own) if name in determined]
     rows, columns = [row for row, _ in here], [column for _, column in here]
     whole[np.ix_(rows, rows)] = covariance[np.ix_(columns, columns)]
     return whole

@@ -1,4 +1,4 @@
-"""Progress of long work, as typed events: how far a stage is, a sentence, a warning, a compilation.
+"""Progress of long work, as typed events: how far a stage is, a sentence, a warning, a compilation, an intermediate result.
 
 Whoever does the work calls `progress(event)`; whoever shows it decides what becomes of each kind.
 """
@@ -41,7 +41,14 @@ class Compiling:
     active: bool
 
 
-Event: TypeAlias = Stage | Message | WarningMessage | Compiling
+@dataclass(frozen=True)
+class Result:
+    """An intermediate result, as a record; whoever shows it knows its type and puts it into words."""
+
+    record: object
+
+
+Event: TypeAlias = Stage | Message | WarningMessage | Compiling | Result
 Progress: TypeAlias = Callable[[Event], None]
 
 
@@ -60,14 +67,14 @@ def report_checks(progress: Progress, warned: Iterable[str], identifiable: Itera
 def as_progress(callback: Callable[..., Any]) -> Progress:
     """`callback` as one that takes events; one of two arguments (text, share) is adapted, with a DeprecationWarning.
 
-    Public functions that take `progress` call this, until version 0.2: before, progress was `(what, share)`, with
+    Public functions that take `progress` call this, until version 0.3: before, progress was `(what, share)`, with
     "say: " or "warn: " before a sentence.
     """
     if callback is quiet or not _takes_two(callback):
         return callback
     warnings.warn(
         "progress is called with one event (smajax.core.progress: Stage, Message, WarningMessage) now, and no longer "
-        "with (what, share); a callback of two arguments is not called from version 0.2 on",
+        "with (what, share); a callback of two arguments is not called from version 0.3 on",
         DeprecationWarning,
         stacklevel=3,
     )

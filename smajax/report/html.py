@@ -12,26 +12,29 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
-from smajax.attribution.findings import Findings, ParameterFinding
+from smajax.attribution.findings import Findings, ParameterFinding, Verdict
 from smajax.core.display_units import chance, correlation, digits, display, label, p_value, share, with_error
 from smajax.report import pictures
+from smajax.report.narrative import Narrative, narrate
+from smajax.report.narrative.rounds import chosen_text
+from smajax.report.narrative.unknown import units
 from smajax.report.plain_page import breakable
-from smajax.report.unknown_pictures import function_learnt, units
+from smajax.report.unknown_pictures import function_learnt
 
 VERDICTS = {
-    "adequate": ("The model is adequate", "good"),
-    "explained": ("The missing physics is found", "good"),
-    "partly explained": ("Part of the missing physics is found", "fair"),
-    "not in the library": ("Something is missing that the library does not hold", "poor"),
+    Verdict.ADEQUATE: ("The model is adequate", "good"),
+    Verdict.EXPLAINED: ("The missing physics is found", "good"),
+    Verdict.PARTLY_EXPLAINED: ("Part of the missing physics is found", "fair"),
+    Verdict.NOT_IN_LIBRARY: ("Something is missing that the library does not hold", "poor"),
 }
 # Headings of the evidence in the order of the stages; a number with no heading here is shown under its own name.
 EVIDENCE = {
-    "score_gain": "score test: gain foretold",
+    "score_gain": "score test: predicted gain",
     "score_p_value": "score p-value",
     "alone_rmse_fit": "fit runs, with it alone",
     "leave_one_out_rmse": "left-out runs, with it alone",
     "leave_one_out_rmse_without": "left-out runs, final model without it",
-    "score_gain_at_the_end": "gain foretold at the end",
+    "score_gain_at_the_end": "predicted gain at the end",
     "score_p_value_at_the_end": "p-value at the end",
 }
 # Said of the effects that were added, but no column of the table of all candidates.
@@ -56,7 +59,7 @@ def shown(value: float | None, unit: str, quantity: str = "", count: int = 4, ze
 
 
 def estimate(value: float, error: float | None, unit: str, quantity: str = "") -> Shown:
-    """`value ± standard error` for a table cell; the value alone where the runs cannot tell."""
+    """`value ± standard error` for a table cell; the value alone where the runs do not determine it."""
     seen = display(unit, quantity)
     return Shown(with_error(seen.of(value), None if error is None else seen.of(error)), value)
 
@@ -86,6 +89,7 @@ def _parameter_rows(findings: Findings) -> list[dict[str, Any]]:
     """One row a parameter, before and after side by side, in the order of the record."""
     before = {found.name: found for found in findings.before}
     after = {found.name: found for found in findings.after}
+    correlated = {name for cluster in findings.correlated for name in cluster}
     rows = []
     for name in dict.fromkeys([*before, *after]):
         any_ = after.get(name) or before[name]
@@ -98,7 +102,7 @@ def _parameter_rows(findings: Findings) -> list[dict[str, Any]]:
                 "after": _fitted(after.get(name)),
                 "bounds": f"{shown(any_.lower, any_.unit, name).text} … {shown(any_.upper, any_.unit, name).text}",
                 "remark": _remarks(before.get(name), after.get(name)),
-                "entangled": any(word in any_.remark for word in ("correlated with", "combination")),
+                "entangled": name in correlated or "combination" in any_.remark,
             }
         )
     return rows
@@ -138,7 +142,7 @@ def _evidence_unit(findings: Findings, name: str) -> str:
 
 
 def _phase_rows(findings: Findings) -> list[dict[str, Any]]:
-    before, after = findings.portrait_before.by_phase, findings.portrait_after.by_phase
+    before, after = findings.residual_before.by_phase, findings.residual_after.by_phase
     return [
         {
             "phase": phase,
@@ -159,7 +163,7 @@ def _samples(by_phase: Mapping[str, Mapping[str, float]], phase: str) -> Shown:
 
 
 def _correlations(findings: Findings) -> list[dict[str, Any]]:
-    before, after = findings.portrait_before.correlation, findings.portrait_after.correlation
+    before, after = findings.residual_before.correlation, findings.residual_after.correlation
 
     def cell(held: Mapping[str, float], name: str) -> Shown:
         return Shown(correlation(held.get(name)), held.get(name))
@@ -186,8 +190,8 @@ def _runs(findings: Findings) -> list[dict[str, Any]]:
 
 
 def _unknown(findings: Findings) -> list[dict[str, Any]]:
-    """The terms, with a picture of the one that is named and of those that cannot be told from it."""
-    drawn = {name for term in findings.unknown if term.named for name in (term.name, *term.alike)}
+    """The terms, with a picture of the one that is named and of those that are not distinguished from it."""
+    drawn = {name for term in findings.unknown if term.named for name in (term.name, *term.indistinguishable)}
     return [
         {
             "term": term,
@@ -197,8 +201,9 @@ def _unknown(findings: Findings) -> list[dict[str, Any]]:
     ]
 
 
-def findings_to_html(findings: Findings) -> str:
+def findings_to_html(findings: Findings, narrative: Narrative | None = None) -> str:
     """The whole page, as text. Names and sentences of the record are escaped; numbers are those of the record."""
+    words = narrative or narrate(findings)
     environment = Environment(
         loader=FileSystemLoader(Path(__file__).parent),
         autoescape=True,
@@ -213,6 +218,8 @@ def findings_to_html(findings: Findings) -> str:
 
     return environment.get_template("template.html").render(
         f=findings,
+        words=words,
+        rounds=[(entry, chosen_text(entry), why) for entry, why in zip(findings.rounds, words.rounds, strict=True)],
         verdict_title=title,
         tone=tone,
         unit=display(findings.output_unit, findings.output_name).unit,
@@ -227,8 +234,8 @@ def findings_to_html(findings: Findings) -> str:
         # Without offsets in the fit they are exactly zero.
         offsets=any(run.offset_before or run.offset_after for run in findings.runs),
         held_out=any(run.role == "held-out" for run in findings.runs),
-        left_out=sum(run.role == "fit" for run in findings.runs) > 1,
-        added=[effect for effect in findings.effects if effect.added],
+        left_out=findings.fit_runs > 1,
+        added=findings.added,
         ranked=pictures.ranked(findings.effects),
         evidence=_evidence(findings),
         columns=[name for name in _evidence(findings) if name not in ASIDE],

@@ -1,10 +1,12 @@
-"""The findings as plain JSON values: the same numbers as the page, SI and unrounded, for a program to read."""
+"""The findings as plain JSON values: the same numbers as the page, SI and unrounded, and the sentences beside them."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping
+import warnings
+from collections.abc import Mapping, Sequence
+from enum import StrEnum
 from typing import Any
 
 import numpy as np
@@ -14,9 +16,29 @@ from smajax.attribution.findings import (
     EffectFinding,
     Findings,
     ParameterFinding,
+    ResidualDiagnostics,
+    Round,
     RunFinding,
     UnknownTerm,
 )
+from smajax.report.narrative import Narrative, narrate
+from smajax.report.narrative.rounds import chosen_text
+
+# (where, key of before) -> key of today; "" is the top. The old ones are read until version 0.3.
+RENAMED: Mapping[tuple[str, str], str] = {
+    ("", "portrait_before"): "residual_before",
+    ("", "portrait_after"): "residual_after",
+    ("", "rivals"): "confounders",
+    ("", "lone_runs"): "outlier_runs",
+    ("residual_before", "kept"): "filter_coefficient",
+    ("residual_after", "kept"): "filter_coefficient",
+    ("confounders", "rival"): "confounder",
+    ("confounders", "alike"): "overlap",
+    ("outlier_runs", "noise"): "residual_is_noise",
+    ("outlier_runs", "foretold"): "predicted_rmse",
+    ("rounds", "alike"): "indistinguishable",
+    ("unknown", "alike"): "indistinguishable",
+}
 
 
 def plain(value: Any) -> Any:
@@ -24,6 +46,8 @@ def plain(value: Any) -> Any:
 
     Raises TypeError for anything that has no JSON form.
     """
+    if isinstance(value, StrEnum):
+        return value.value
     if value is None or isinstance(value, str):
         return value
     if isinstance(value, (bool, np.bool_)):
@@ -73,27 +97,27 @@ def _coefficient(found: CoefficientFinding) -> dict[str, Any]:
     }
 
 
-def _effect(effect: EffectFinding) -> dict[str, Any]:
+def _effect(effect: EffectFinding, narrative: Narrative) -> dict[str, Any]:
     return {
         "name": effect.name,
         "title": effect.title,
         "equation": effect.equation,
         "formula": effect.formula,
-        "sentence": effect.sentence,
+        "sentence": narrative.effects.get(effect.name, ""),
         "added": effect.added,
         "coefficients": {name: _coefficient(found) for name, found in effect.coefficients.items()},
         "evidence": effect.evidence,
     }
 
 
-def _unknown(term: UnknownTerm) -> dict[str, Any]:
+def _unknown(term: UnknownTerm, why: str) -> dict[str, Any]:
     return {
         "name": term.name,
         "title": term.title,
         "equation": term.equation,
         "named": term.named,
-        "alike": term.alike,
-        "why": term.why,
+        "indistinguishable": term.indistinguishable,
+        "why": why,
         "score_gain": term.score_gain,
         "leave_one_out_rmse_without": term.left_out_before,
         "leave_one_out_rmse": term.left_out_after,
@@ -111,20 +135,35 @@ def _unknown(term: UnknownTerm) -> dict[str, Any]:
         },
         "samples": {"edges": term.cells, "counts": term.samples},
         "formulas": [
-            {"text": one.text, "chi_square": one.missed, "numbers": one.numbers, "bic": one.bic}
+            {"text": one.text, "chi_square": one.chi_square, "numbers": one.numbers, "bic": one.bic}
             for one in term.formulas
         ],
     }
 
 
-def findings_to_json(findings: Findings) -> dict[str, Any]:
+def _residual(found: ResidualDiagnostics, sentences: Sequence[str]) -> dict[str, Any]:
+    return {**dataclasses.asdict(found), "sentences": sentences}
+
+
+def _round(entry: Round, why: str) -> dict[str, Any]:
+    return {
+        "number": entry.number,
+        "tried": [{"model": model, "leave_one_out_rmse": rmse} for model, rmse in entry.tried],
+        "chosen": chosen_text(entry),
+        "why": why,
+        "indistinguishable": entry.indistinguishable,
+    }
+
+
+def findings_to_json(findings: Findings, narrative: Narrative | None = None) -> dict[str, Any]:
     """The record without its time series, ready for `json.dumps(..., allow_nan=False)`."""
+    words = narrative or narrate(findings)
     record = {
         "experiment": findings.experiment,
         "title": findings.title,
         "source": findings.source,
         "verdict": findings.verdict,
-        "summary": findings.summary,
+        "summary": words.summary,
         "output": {
             "name": findings.output_name,
             "unit": findings.output_unit,
@@ -134,25 +173,40 @@ def findings_to_json(findings: Findings) -> dict[str, Any]:
         "runs": [_run(run) for run in findings.runs],
         "before": {"parameters": {found.name: _parameter(found) for found in findings.before}},
         "after": {"parameters": {found.name: _parameter(found) for found in findings.after}},
-        "effects": [_effect(effect) for effect in findings.effects],
-        "portrait_before": dataclasses.asdict(findings.portrait_before),
-        "portrait_after": dataclasses.asdict(findings.portrait_after),
-        "rounds": [
-            {
-                "number": entry.number,
-                "tried": [{"model": model, "leave_one_out_rmse": rmse} for model, rmse in entry.tried],
-                "chosen": entry.chosen,
-                "why": entry.why,
-                "alike": entry.alike,
-            }
-            for entry in findings.rounds
-        ],
-        "rivals": [dataclasses.asdict(rival) for rival in findings.rivals],
-        "lone_runs": [dataclasses.asdict(one) for one in findings.lone_runs],
-        "unknown": [_unknown(term) for term in findings.unknown],
-        "unexplained": findings.unexplained,
-        "cannot_know": findings.cannot_know,
-        "check": findings.check,
+        "effects": [_effect(effect, words) for effect in findings.effects],
+        "residual_before": _residual(findings.residual_before, words.residual_before),
+        "residual_after": _residual(findings.residual_after, words.residual_after),
+        "rounds": [_round(entry, why) for entry, why in zip(findings.rounds, words.rounds, strict=True)],
+        "confounders": [dataclasses.asdict(one) for one in findings.confounders],
+        "outlier_runs": [dataclasses.asdict(one) for one in findings.outlier_runs],
+        "unknown": [_unknown(term, why) for term, why in zip(findings.unknown, words.unknown, strict=True)],
+        "unexplained": words.unexplained,
+        "cannot_know": words.cannot_know,
+        "check": words.check,
         "provenance": findings.provenance,
     }
     return {key: plain(value) for key, value in record.items()}
+
+
+def with_current_keys(record: Mapping[str, Any]) -> dict[str, Any]:
+    """A record of `report.json`, as `json.loads` gives it, with the keys of today; DeprecationWarning where it has old ones."""
+    old: dict[str, str] = {}
+
+    def renamed(place: str, entry: Any) -> Any:
+        if isinstance(entry, list):
+            return [renamed(place, one) for one in entry]
+        if not isinstance(entry, Mapping):
+            return entry
+        found = {}
+        for key, value in entry.items():
+            now = RENAMED.get((place, key), key)
+            if now != key:
+                old[f"{place}.{key}".removeprefix(".")] = now
+            found[now] = value if place else renamed(now, value)
+        return found
+
+    found = dict(renamed("", record))
+    if old:
+        told = ", ".join(f"{key} ({now} now)" for key, now in old.items())
+        warnings.warn(f"keys of an older report.json, read until version 0.3: {told}", DeprecationWarning, stacklevel=2)
+    return found

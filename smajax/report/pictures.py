@@ -14,7 +14,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from smajax.attribution.findings import EffectFinding, Findings, Portrait, RunFinding
+from smajax.attribution.findings import EffectFinding, Findings, ResidualDiagnostics, RunFinding
 from smajax.core.display_units import Display, axis_label, display, label
 from smajax.model.channels import channel
 
@@ -238,10 +238,10 @@ def ranked(effects: Sequence[EffectFinding]) -> list[EffectFinding]:
 
 def residual_by_phase(findings: Findings) -> bytes | None:
     """By phase of the wire: where the squared error sits beside where the samples are, and the rms error itself."""
-    portraits = [("before", findings.portrait_before, BEFORE, 0.2), ("after", findings.portrait_after, AFTER, -0.2)]
+    diagnostics = [("before", findings.residual_before, BEFORE, 0.2), ("after", findings.residual_after, AFTER, -0.2)]
     if nothing_added(findings):
-        portraits = [("base model", findings.portrait_after, AFTER, 0.0)]
-    phases = list(dict.fromkeys(phase for _, portrait, _, _ in portraits for phase in portrait.by_phase))
+        diagnostics = [("base model", findings.residual_after, AFTER, 0.0)]
+    phases = list(dict.fromkeys(phase for _, residual, _, _ in diagnostics for phase in residual.by_phase))
     if not phases:
         return None
     shown = display(findings.output_unit, findings.output_name)
@@ -249,15 +249,15 @@ def residual_by_phase(findings: Findings) -> bytes | None:
     share, error = figure.subplots(1, 2, sharey=True)
     places = np.arange(len(phases))[::-1]
 
-    def column(portrait: Portrait, key: str) -> np.ndarray:
-        return np.array([portrait.by_phase.get(phase, {}).get(key, np.nan) for phase in phases], dtype=float)
+    def column(residual: ResidualDiagnostics, key: str) -> np.ndarray:
+        return np.array([residual.by_phase.get(phase, {}).get(key, np.nan) for phase in phases], dtype=float)
 
-    for name, portrait, colour, shift in portraits:
-        share.barh(places + shift, 100.0 * column(portrait, "share_of_squared_error"), 0.36, color=colour, label=name)
-        error.barh(places + shift, shown.of(1.0) * column(portrait, "rmse"), 0.36, color=colour)
+    for name, residual, colour, shift in diagnostics:
+        share.barh(places + shift, 100.0 * column(residual, "share_of_squared_error"), 0.36, color=colour, label=name)
+        error.barh(places + shift, shown.of(1.0) * column(residual, "rmse"), 0.36, color=colour)
     # A tick on each bar: the phases, and so the samples in one, are each model's own.
-    for _, portrait, _, shift in portraits:
-        samples = column(portrait, "samples")
+    for _, residual, _, shift in diagnostics:
+        samples = column(residual, "samples")
         whole = np.nansum(samples)
         if whole > 0.0:
             share.plot(100.0 * samples / whole, places + shift, "|", color=MEASURED, markersize=11)

@@ -45,9 +45,3 @@ def function_learnt(term: UnknownTerm) -> bytes:
     for axes in rows:
         tidy(axes)
     return as_png(figure)
-
-
-def units(term: UnknownTerm) -> str:
-    """`f in W/m, T - T_inf in K`."""
-    named = ((name, unit) for name, unit in (("f", term.unit), (term.symbol, term.state_unit)))
-    return ", ".join(f"{name} in {unit}" if unit != "-" else f"{name} a plain number" for name, unit in named)

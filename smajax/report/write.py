@@ -10,6 +10,7 @@ from smajax.core.files import replace
 from smajax.report.csv_files import PARAMETERS, RUNS, findings_parameters, findings_runs
 from smajax.report.html import findings_to_html
 from smajax.report.json_file import findings_to_json
+from smajax.report.narrative import narrate
 
 
 def write_report(findings: Findings, folder: Path) -> Path:
@@ -25,8 +26,9 @@ def write_report(findings: Findings, folder: Path) -> Path:
             f"got {str(folder)!r} to write the report into, which is a file or lies below one; expected a folder, "
             "existing or new; give another one"
         ) from error
-    page = findings_to_html(findings)
-    record = json.dumps(findings_to_json(findings), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    narrative = narrate(findings)
+    page = findings_to_html(findings, narrative)
+    record = json.dumps(findings_to_json(findings, narrative), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
     # The record goes first: where the page is, its numbers are too.
     replace(folder / "report.json", record)
     replace(folder / PARAMETERS, findings_parameters(findings))

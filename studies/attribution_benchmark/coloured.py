@@ -67,13 +67,13 @@ def closed(experiment: Experiment) -> dict[str, Any]:
     """What the loop says: verdict, effects, what is left over the estimate, what such a filter keeps."""
     from smajax.attribution.close_loop import close_loop
 
-    found = close_loop(experiment, apart=True)
-    portrait = found.portrait_after
+    found = close_loop(experiment, compile_per_model=True)
+    residual = found.residual_after
     return {
         "verdict": found.verdict,
         "added": [effect.name for effect in found.effects if effect.added],
-        "ratio": portrait.ratio,
-        "kept": portrait.kept,
+        "ratio": residual.ratio,
+        "kept": residual.filter_coefficient,
     }
 
 

@@ -97,7 +97,7 @@ def equation_of(group: str) -> str:
 
 def _told_among(term: Mapping[str, Any], terms: Sequence[Mapping[str, Any]]) -> bool:
     """Whether an unknown term is the one named, or said to do alike."""
-    return term["named"] or any(one["named"] and term["name"] in one["alike"] for one in terms)
+    return term["named"] or any(one["named"] and term["name"] in one["indistinguishable"] for one in terms)
 
 
 def _error(runs: Sequence[Mapping[str, Any]], role: str, which: str, noise: float) -> float:
@@ -127,10 +127,10 @@ def judge(truth: Mapping[str, Any], report: Mapping[str, Any], seconds: float) -
     """From truth.json and the report's JSON."""
     noise = report["output"]["noise_sigma"]
     added = tuple(effect["name"] for effect in report["effects"] if effect["added"])
-    rivals = [one["rival"] for one in report["rivals"] if one["weight"] >= CONFUSABLE]
+    confounders = [one["confounder"] for one in report["confounders"] if one["weight"] >= CONFUSABLE]
     # Of rounds that lasted: what was likened to an effect that was taken out again is on no page.
     lasting = [entry for entry in report["rounds"] if set(entry["chosen"].split(" + ")) <= set(added)]
-    alike = [name for entry in lasting for model in entry["alike"] for name in model.split(" + ")]
+    alike = [name for entry in lasting for model in entry["indistinguishable"] for name in model.split(" + ")]
     unknown = [term["equation"] for term in report["unknown"] if _told_among(term, report["unknown"])]
     return Judged(
         case=truth["case"],
@@ -142,7 +142,7 @@ def judge(truth: Mapping[str, Any], report: Mapping[str, Any], seconds: float) -
         equations=equations_of(truth),
         verdict=report["verdict"],
         added=added,
-        named=tuple(dict.fromkeys([*added, *rivals, *alike])),
+        named=tuple(dict.fromkeys([*added, *confounders, *alike])),
         where=tuple(dict.fromkeys([*(LIBRARY[name].equation for name in added), *unknown])),
         fit_before=_error(report["runs"], "fit", "before", noise),
         fit_after=_error(report["runs"], "fit", "after", noise),

@@ -11,10 +11,13 @@ import pytest
 from scipy.signal import lfilter
 
 from smajax.attribution.close_loop import close_loop
+from smajax.attribution.config import AttributionConfig
+from smajax.attribution.findings import HeldOutWorse
 from smajax.data.experiment.load import load_experiment
 from smajax.data.experiment.record import Experiment
 from smajax.data.model_catalogue import CATALOGUE
 from smajax.data.readers.noise import estimate_noise
+from smajax.report.narrative import narrate
 from studies.attribution_benchmark.cases import cases
 from studies.attribution_benchmark.rigs import show
 from studies.attribution_benchmark.write import write
@@ -55,27 +58,27 @@ def _estimated(experiment: Experiment) -> Experiment:
 
 
 @pytest.mark.parametrize("seed", range(2))
-def test_a_noise_with_a_memory_gets_no_effect(seed: int, tmp_path: Path) -> None:
+def test_a_noise_that_is_autocorrelated_gets_no_effect(seed: int, tmp_path: Path) -> None:
     findings = close_loop(_coupon(tmp_path, seed))
     assert not any(effect.added for effect in findings.effects)
     assert not any(term.named for term in findings.unknown)
 
 
 @pytest.mark.parametrize("memory", [pytest.param(0.6, marks=pytest.mark.slow), 0.9])
-def test_a_noise_with_a_memory_that_nobody_gave_is_noise(memory: float, tmp_path: Path) -> None:
+def test_autocorrelated_noise_that_was_not_declared_is_noise(memory: float, tmp_path: Path) -> None:
     findings = close_loop(_estimated(_coupon(tmp_path, 0, memory=memory)))
-    assert findings.portrait_after.ratio > 1.5
+    assert findings.residual_after.ratio > 1.5
     assert findings.verdict == "adequate"
-    assert findings.portrait_after.kept == pytest.approx(memory, abs=0.05)
-    assert any("first-order filter" in line for line in findings.summary)
+    assert findings.residual_after.filter_coefficient == pytest.approx(memory, abs=0.05)
+    assert any("first-order autoregressive noise" in line for line in narrate(findings).summary)
 
 
 @pytest.mark.slow  # a loop with one effect to find
-def test_what_is_missing_is_found_beside_a_noise_with_a_memory_that_nobody_gave(tmp_path: Path) -> None:
+def test_what_is_missing_is_found_beside_autocorrelated_noise_that_was_not_declared(tmp_path: Path) -> None:
     findings = close_loop(_estimated(_coupon(tmp_path, 0, memory=0.6, name=LACKING)))
     assert [effect.name for effect in findings.effects if effect.added] == ["thermal_expansion"]
     assert findings.verdict == "explained"
-    assert findings.portrait_before.kept == 0.0
+    assert findings.residual_before.filter_coefficient == 0.0
 
 
 def _thinned(experiment: Experiment, by: int) -> Experiment:
@@ -92,32 +95,31 @@ def _thinned(experiment: Experiment, by: int) -> Experiment:
 
 
 @pytest.mark.parametrize("seed", range(2))
-def test_an_effect_that_a_short_log_cannot_tell_from_a_slow_noise_is_looked_into(
-    seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_effect_that_a_short_log_cannot_tell_from_a_slow_noise_is_looked_into(seed: int, tmp_path: Path) -> None:
     whole = _coupon(tmp_path, seed, memory=0.5, name=WEAK)
     short = dataclasses.replace(_estimated(_thinned(whole, 4)), effects_only=FEW)
     findings = close_loop(short)
     assert [effect.name for effect in findings.effects if effect.added] == ["thermal_expansion"]
-    monkeypatch.setattr("smajax.attribution.search.TOO_MUCH_FOR_NOISE", np.inf)
-    assert close_loop(short).verdict == "adequate"
+    assert close_loop(short, config=AttributionConfig(gain_in_noise=np.inf)).verdict == "adequate"
 
 
-def test_what_the_held_out_runs_do_not_bear_out_is_not_named(tmp_path: Path) -> None:
+def test_what_the_held_out_runs_do_not_validate_is_not_named(tmp_path: Path) -> None:
     """All fit runs drift upwards and the held-out ones downwards: a drift that is found is no property of the bench."""
     findings = close_loop(_coupon(tmp_path, 0, trend=12.0))
     assert not any(effect.added for effect in findings.effects)
     assert findings.verdict == "not in the library"
-    assert any("set aside: error on the held-out runs" in entry.why for entry in findings.rounds)
-    assert "not confirmed" in findings.summary[0]
+    assert any(isinstance(entry.reason, HeldOutWorse) for entry in findings.rounds)
+    assert findings.rejected is not None
+    assert findings.rejected.rmse_with > findings.rejected.rmse_without
+    assert "not confirmed" in narrate(findings).summary[0]
     held_out = [run for run in findings.runs if run.role == "held-out"]
     assert all(run.rmse_after == run.rmse_before for run in held_out)
 
 
 def test_a_right_effect_outlives_its_wrong_companion(tmp_path: Path) -> None:
-    """The same drift beside an effect that is there: the held-out runs refuse the drift alone."""
+    """The same drift beside an effect that is there: the held-out runs reject the drift alone."""
     findings = close_loop(_coupon(tmp_path, 0, trend=20.0, name=LACKING))
     assert [effect.name for effect in findings.effects if effect.added] == ["thermal_expansion"]
-    assert "sensor drift would lower the error" in findings.summary[0].replace("Sensor", "sensor")
-    assert "not confirmed" in findings.summary[0]
+    assert findings.rejected is not None
+    assert findings.rejected.effects == ("sensor_drift",)
     assert findings.verdict == "partly explained"

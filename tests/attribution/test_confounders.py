@@ -1,4 +1,4 @@
-"""What could be mistaken for an effect, and how far an estimate hangs on which runs there happened to be."""
+"""What could be mistaken for an effect, and how far an estimate depends on which runs there happened to be."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from smajax.attribution.bootstrap import bootstrapped
-from smajax.attribution.confounders import imitation, rivals, separating_run
+from smajax.attribution.bootstrap import bootstrap_intervals
+from smajax.attribution.config import AttributionConfig
+from smajax.attribution.confounders import confounders, overlap, separating_run
 from smajax.attribution.cross_validation import Model, Search, Start
 from smajax.core.result_cache import ResultCache
 from smajax.data.experiment.record import Run
@@ -29,15 +30,15 @@ BOUNDS = {
 }
 
 
-def test_imitation_is_the_share_of_a_trace_that_another_could_leave() -> None:
+def test_overlap_is_the_share_of_a_trace_that_another_could_leave() -> None:
     rng = np.random.default_rng(0)
     fitted, trace, other = np.linalg.qr(rng.standard_normal((200, 3)))[0].T
     columns = np.stack([fitted, 0.6 * trace + 0.8 * other + 3.0 * fitted, other, fitted], axis=1)
     at = Sensitivity(("fitted", "mixed", "other", "same"), np.zeros((1, 200)), columns[None], np.ones((1, 200)))
-    assert imitation(at, 5.0 * trace + 7.0 * fitted, ["fitted"], ["mixed"]) == pytest.approx(0.6)
-    assert imitation(at, trace, ["fitted"], ["mixed", "other"]) == pytest.approx(1.0)
-    assert imitation(at, trace, ["fitted"], ["same"]) == 0.0
-    assert imitation(at, fitted, ["fitted"], ["mixed"]) == 0.0
+    assert overlap(at, 5.0 * trace + 7.0 * fitted, ["fitted"], ["mixed"]) == pytest.approx(0.6)
+    assert overlap(at, trace, ["fitted"], ["mixed", "other"]) == pytest.approx(1.0)
+    assert overlap(at, trace, ["fitted"], ["same"]) == 0.0
+    assert overlap(at, fitted, ["fitted"], ["mixed"]) == 0.0
 
 
 def _setting() -> tuple[Search, Model, list[Run]]:
@@ -51,7 +52,7 @@ def _setting() -> tuple[Search, Model, list[Run]]:
     batch = dataclasses.replace(blank, output=jnp.asarray(exact + noise))
     candidates = ("latent_heat", "phase_resistance")
     problem = Problem.build(extended(base, candidates), batch, NOISE, False)
-    setting = Search(problem, ("convection_coefficient",), BOUNDS, candidates, ResultCache(), "{:.3g} m".format)
+    setting = Search(problem, ("convection_coefficient",), BOUNDS, candidates, ResultCache())
     values = problem.start_values()
     values[problem.names.index("latent_heat.enthalpy")] = TRUE
     ones = np.ones((3, SAMPLES))
@@ -79,16 +80,16 @@ def at_base_of(setting: Search, model: Model) -> Model:
     return dataclasses.replace(model, effects=(), values=values)
 
 
-def test_a_rival_is_refitted_and_weighed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("smajax.attribution.confounders.ALIKE", 0.01)  # of two that these runs tell apart well
+def test_a_confounder_is_refitted_and_weighed() -> None:
     setting, model, runs = _setting()
+    setting.config = AttributionConfig(overlap_refitted=0.01)  # of two that these runs distinguish well
     model = dataclasses.replace(model, values=setting.fit([Start(model.effects, model.values)], "fit")[0][0].values)
-    low, high = bootstrapped(setting, model, seed=1)["latent_heat.enthalpy"]
+    low, high = bootstrap_intervals(setting, model, seed=1)["latent_heat.enthalpy"]
     assert 0.95 * TRUE < low <= high < 1.05 * TRUE
     assert low < high
-    (found,) = rivals(setting, model, runs)
-    assert (found.effect, found.rival) == ("latent_heat", "phase_resistance")
-    assert 0.01 < found.alike < 0.1
+    (found,) = confounders(setting, model, runs)
+    assert (found.effect, found.confounder) == ("latent_heat", "phase_resistance")
+    assert 0.01 < found.overlap < 0.1
     # Latent heat is far stronger than the noise here: the other one does not do.
     assert found.weight < 1e-3
     assert found.left_out_rmse > 2.0 * NOISE

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from scipy.stats import qmc
 
 from smajax.attribution.close_loop import close_loop
-from smajax.attribution.verdict import pooled
+from smajax.attribution.findings import pooled_rmse
 from smajax.control.closed_loop import ClosedLoop, simulate_closed_loop
 from smajax.control.measured_state import Sensor
 from smajax.control.presets import CONTROLLERS, model_filter
@@ -31,6 +31,7 @@ from smajax.model.system import System, heating_power
 from smajax.model.wire.heat import heat_rate, mass_per_metre, stored_heat
 from smajax.model.wire.order import ORDER
 from smajax.model.wire.resistance import resistance_per_metre
+from smajax.report.narrative import narrate
 from smajax.simulation.batch.axes import zipped
 from smajax.simulation.batch.run_batch import run_batch
 from smajax.simulation.batch.single_run import COLDEST, GOOD, HOTTEST, NOT_FINITE, RUNAWAY
@@ -275,9 +276,11 @@ def test_data_that_do_not_belong_together_are_not_explained(tmp_path: Path, shuf
     assert findings.verdict == "not in the library"
     assert not any(one.added for one in findings.effects)
     assert not any(term.named for term in findings.unknown)
-    assert "belong together" in findings.summary[0]
-    assert pooled(findings.runs, "held-out", "after") > 50.0 * findings.noise_sigma
+    assert findings.explained_variance < findings.config.least_explained_variance
+    assert "belong together" in narrate(findings).summary[0]
+    assert pooled_rmse(findings.runs, "held-out", "after") > 50.0 * findings.noise_sigma
     if shuffled:
         assert any(
-            "times the declared noise: either the noise was declared too small or" in line for line in findings.summary
+            "times the declared noise: either the noise was declared too small or" in line
+            for line in narrate(findings).summary
         )

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from smajax.attribution.cross_validation import Model, Search
-from smajax.attribution.nuisance_grid import looked_at
+from smajax.attribution.nuisance_grid import scanned
 from smajax.attribution.run_extent import extent_of
 from smajax.attribution.search import scores_at, start_values
 from smajax.core.parameters import parameters, set_parameters
@@ -35,7 +35,7 @@ def _setting(time: float, lasting: float) -> Search:
     noise = NOISE * np.random.default_rng(2).normal(size=truth.shape)
     batch = dataclasses.replace(blank, output=truth + noise)
     bounds = {name: (entry.low, entry.high) for name, entry in parameters(full).items()}
-    return Search(Problem.build(full, batch, NOISE, False), (), bounds, EFFECTS, ResultCache(), "{:.3g} m".format)
+    return Search(Problem.build(full, batch, NOISE, False), (), bounds, EFFECTS, ResultCache())
 
 
 def _base(setting: Search) -> Model:
@@ -60,14 +60,14 @@ def test_a_draught_is_looked_for_when_it_blew(time: float, lasting: float) -> No
 
 
 def _gain_at_two_seconds(setting: Search, base: Model) -> float:
-    at = looked_at(setting, base.values, ("radiation",), ()).at
+    at = scanned(setting, base.values, ("radiation",), ()).at
     column, residual = at.columns(["draught.change"])[:, 0], at.residual()
     return float((column @ residual) ** 2 / (column @ column) / (residual @ residual))
 
 
 def test_having_looked_at_many_places_counts_against_a_score() -> None:
     setting = _setting(12.0, 7.5)
-    looked = looked_at(setting, _base(setting).values, EFFECTS, ())
+    looked = scanned(setting, _base(setting).values, EFFECTS, ())
     assert looked.looks["draught"] > 5
     assert "radiation" not in looked.looks
     extent = extent_of(setting.problem)

@@ -12,6 +12,7 @@ from smajax.attribution.close_loop import close_loop
 from smajax.data.experiment.load import load_experiment
 from smajax.data.experiment.record import Experiment
 from smajax.data.model_catalogue import CATALOGUE
+from smajax.report.narrative import narrate
 from studies.attribution_benchmark.cases import cases
 from studies.attribution_benchmark.rigs import show
 from studies.attribution_benchmark.write import write
@@ -45,8 +46,8 @@ def test_a_run_of_another_wire_is_named(wrong: int, tried: tuple[str, ...] | Non
     experiment = dataclasses.replace(_coupon(tmp_path, wrong), effects_only=tried)
     name = [run.name for run in experiment.runs if run.role == "fit"][wrong]
     findings = close_loop(experiment)
-    assert [one.run for one in findings.lone_runs if one.noise] == [name]
+    assert [one.run for one in findings.outlier_runs if one.residual_is_noise] == [name]
     assert findings.verdict == "not in the library"
     assert not any(effect.added for effect in findings.effects)
-    assert "one run alone" in findings.summary[0]
-    assert name in findings.summary[0]
+    assert "one run alone" in narrate(findings).summary[0]
+    assert name in narrate(findings).summary[0]

@@ -6,13 +6,16 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from smajax.attribution.config import AttributionConfig
 from smajax.attribution.residual_diagnostics import all_noise
 from smajax.attribution.score_test import Score, screen
-from smajax.attribution.search import PLACES, all_starts, start_values
+from smajax.attribution.search import all_starts, start_values
 from smajax.core.whiteness import correlation_time, whiteness_p_value
 from smajax.fit.sensitivity import Sensitivity
 from smajax.model.effects.library import LIBRARY
 from smajax.model.effects.stribeck_friction import all_over
+
+POINTS = AttributionConfig().sobol_starts
 
 NAMES = ("convection_coefficient", "latent_heat.enthalpy", "ambient_drift.rate", "sensor_lag.time_constant")
 BOUNDS = {NAMES[0]: (1.0, 500.0), NAMES[1]: (0.0, 6e4), NAMES[2]: (-0.1, 0.1), NAMES[3]: (0.0, 3.0)}
@@ -86,14 +89,14 @@ def test_a_refit_of_a_friction_that_sticks_begins_from_all_over_its_sizes_and_sp
     told = Score(("stribeck_friction",), 0.5, 9.0, 0.0, {names[1]: score})
     first, *others = all_starts(begun, names, told, bounds)
     np.testing.assert_array_equal(first, start_values(begun, names, told, bounds))
-    assert len(others) == (PLACES if score else 0)
+    assert len(others) == (POINTS if score else 0)
     if others:
         places = np.asarray(others)
         assert set(places[:, 0]) == {450.0}
         for column, (low, high) in enumerate(all_over({"limit": score}, "limit").values(), 1):
             share = np.log(places[:, column] / low) / np.log(high / low)
             # Each quarter of the range, by logarithm, has its part of them.
-            np.testing.assert_array_equal(np.histogram(share, bins=4, range=(0.0, 1.0))[0], PLACES // 4)
+            np.testing.assert_array_equal(np.histogram(share, bins=4, range=(0.0, 1.0))[0], POINTS // 4)
     latent = Score(("latent_heat",), 0.5, 9.0, 0.0, {NAMES[1]: 6e3})
     assert len(all_starts(np.zeros(4), NAMES, latent, BOUNDS)) == 1
 
@@ -104,7 +107,7 @@ def test_a_refit_of_a_play_begins_beyond_what_its_score_says() -> None:
     told = Score(("sensor_backlash",), 0.1, 9.0, 0.0, {names[0]: 0.01})
     places = np.asarray(all_starts(np.zeros(1), names, told, {names[0]: (0.0, 1.0)}))[:, 0]
     assert places[0] == LIBRARY["sensor_backlash"].starts["half_width"]
-    assert len(places) == PLACES + 1
+    assert len(places) == POINTS + 1
     assert 0.01 <= places[1:].min() < 0.012 < 0.12 < places.max() <= 0.16
     silent = Score(("sensor_backlash",), 0.1, 9.0, 0.0, {names[0]: 0.0})
     assert all_starts(np.zeros(1), names, silent, small) == [2.5e-5]

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from smajax.attribution.cross_validation import FOLDS, Fitted, Model, Search
+from smajax.attribution.cross_validation import Fitted, Model, Search
 from smajax.core.result_cache import ResultCache
 from smajax.fit.levenberg_marquardt import Fit
 from smajax.fit.packed_runs import RunBatch, simulate_batch
@@ -31,7 +31,7 @@ def _setting() -> Search:
     noise = NOISE * np.random.default_rng(7).normal(size=truth.shape)
     batch = RunBatch(inputs, truth + noise, blank.mask, blank.overrides, (), DT)
     problem = Problem.build(extended(base, ("latent_heat",), {}), batch, NOISE, False)
-    return Search(problem, ("convection_coefficient",), BOUNDS, ("latent_heat",), ResultCache(), "{:.3g} m".format)
+    return Search(problem, ("convection_coefficient",), BOUNDS, ("latent_heat",), ResultCache())
 
 
 def _at(setting: Search, enthalpy: float) -> Fit:
@@ -45,10 +45,10 @@ def test_an_effect_that_one_run_alone_shows_is_not_told_without_it() -> None:
     nothing = np.full((2, SAMPLES), 5e-3)
     present = Model((), _at(setting, 0.0).values, 2.0, nothing, setting.rmse(nothing))
     entry = Fitted(("latent_heat",), _at(setting, 2e4))
-    assert setting.told_without(entry, present).tolist() == [False, True]
-    judged = setting.judged([entry], present)[0]
-    np.testing.assert_array_equal(judged.left_out[0], present.left_out[0])
-    assert np.sqrt(np.mean(judged.left_out[1] ** 2)) < 1.2 * NOISE
+    assert setting.determined_without(entry, present).tolist() == [False, True]
+    scored = setting.cross_validated([entry], present)[0]
+    np.testing.assert_array_equal(scored.left_out[0], present.left_out[0])
+    assert np.sqrt(np.mean(scored.left_out[1] ** 2)) < 1.2 * NOISE
 
 
 def test_a_fit_that_a_fold_has_passed_goes_on_from_there() -> None:
@@ -57,7 +57,7 @@ def test_a_fit_that_a_fold_has_passed_goes_on_from_there() -> None:
     off = _at(setting, 5e3)
     (misfit,) = misfits(setting.problem, [off.values])
     short = dataclasses.replace(off, cost=float((misfit**2).sum()) / NOISE**2)
-    (model,) = setting.judged([Fitted(("latent_heat",), short)])
+    (model,) = setting.cross_validated([Fitted(("latent_heat",), short)])
     assert short.cost > 4.0 * 2 * SAMPLES
     assert model.cost < 1.2 * 2 * SAMPLES
     assert model.values[setting.problem.names.index("latent_heat.enthalpy")] == pytest.approx(2e4, rel=0.02)
@@ -76,7 +76,7 @@ def test_a_model_that_predicts_left_out_runs_worse_is_not_better() -> None:
     )[0]
 
 
-@pytest.mark.parametrize("runs", [1, 5, FOLDS, 500])
+@pytest.mark.parametrize("runs", [1, 5, 12, 500])
 def test_every_run_is_left_out_once_and_never_in_more_than_so_many_parts(runs: int) -> None:
     setting = _setting()
     blank = setting.problem.batch
@@ -85,5 +85,5 @@ def test_every_run_is_left_out_once_and_never_in_more_than_so_many_parts(runs: i
     )
     setting.problem = Problem.build(setting.problem.system, many, NOISE, False)
     parts = setting.parts()
-    assert parts.shape == (min(runs, FOLDS), runs)
+    assert parts.shape == (min(runs, setting.config.most_folds), runs)
     np.testing.assert_array_equal(parts.sum(axis=0), 1.0)

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from smajax.attribution.cross_validation import Model, Search
-from smajax.attribution.search import taken_of
-from smajax.attribution.step_size_check import kept_at_half_the_step
+from smajax.attribution.search import accepted_of
+from smajax.attribution.step_size_check import gain_kept_at_half_step
 from smajax.core.parameters import parameters
 from smajax.core.result_cache import ResultCache
 from smajax.fit.packed_runs import RunBatch, halved, simulate_batch
@@ -39,7 +39,7 @@ def setting() -> Search:
     batch = RunBatch(inputs, shown + noise, blank.mask, blank.overrides, (), DT)
     problem = Problem.build(extended(base, HEAT + FRICTION, {}), batch, NOISE, False)
     bounds = {entry.name: (entry.low, entry.high) for entry in parameters(problem.system).values()}
-    return Search(problem, ("convection_coefficient",), bounds, HEAT + FRICTION, ResultCache(), "{:.3g} m".format)
+    return Search(problem, ("convection_coefficient",), bounds, HEAT + FRICTION, ResultCache())
 
 
 def _model(setting: Search, effects: tuple[str, ...], **values: float) -> Model:
@@ -58,13 +58,13 @@ def _by_chance(setting: Search, model: Model, share: float) -> Model:
 
 def test_a_friction_that_is_there_keeps_its_gain(setting: Search) -> None:
     base, rubbing = _model(setting, ()), _model(setting, FRICTION, **TRUE)
-    assert kept_at_half_the_step(setting, rubbing, base) == pytest.approx(1.0, abs=0.02)
-    assert taken_of(setting, [rubbing], base)[0] is rubbing
+    assert gain_kept_at_half_step(setting, rubbing, base) == pytest.approx(1.0, abs=0.02)
+    assert accepted_of(setting, [rubbing], base)[0] is rubbing
 
 
 def test_what_cannot_jump_is_not_asked(setting: Search) -> None:
     base = _model(setting, ())
-    assert kept_at_half_the_step(setting, _by_chance(setting, _model(setting, HEAT), 0.01), base) == 1.0
+    assert gain_kept_at_half_step(setting, _by_chance(setting, _model(setting, HEAT), 0.01), base) == 1.0
 
 
 def test_a_partner_that_gains_lends_nothing_to_a_friction_that_does_not(setting: Search) -> None:
@@ -73,20 +73,22 @@ def test_a_partner_that_gains_lends_nothing_to_a_friction_that_does_not(setting:
     both = _model(setting, FRICTION + HEAT, **{**TRUE, "limit": 0.0})
     pair = _by_chance(setting, both, 0.05)
     apart = dataclasses.replace(base, cost=4.0 * base.cost)
-    assert kept_at_half_the_step(setting, pair, apart) < 0.1
+    assert gain_kept_at_half_step(setting, pair, apart) < 0.1
     alone = _by_chance(setting, _model(setting, FRICTION, **{**TRUE, "limit": 0.0}), 0.05)
-    assert kept_at_half_the_step(setting, alone, apart) > 0.7
+    assert gain_kept_at_half_step(setting, alone, apart) > 0.7
 
 
 def test_a_gain_that_hangs_on_the_step_is_not_taken_and_the_next_best_is(setting: Search) -> None:
     base = _model(setting, ())
     lucky = _by_chance(setting, _model(setting, FRICTION, **{**TRUE, "limit": 0.0}), 0.01)
-    assert kept_at_half_the_step(setting, lucky, base) < 0.1
-    best, _, enough, why = taken_of(setting, [lucky], base)
+    assert gain_kept_at_half_step(setting, lucky, base) < 0.1
+    best, _, enough, reason = accepted_of(setting, [lucky], base)
     assert not enough
-    assert "of its gain at half the step" in why
+    assert reason.comparison is None
     real = _by_chance(setting, _model(setting, HEAT), 0.1)
-    best, _, enough, why = taken_of(setting, [lucky, real], base)
+    best, _, enough, reason = accepted_of(setting, [lucky, real], base)
     assert enough
     assert best is real
-    assert why.startswith("stribeck_friction keeps")
+    assert [one.effects for one in reason.step_dependent] == ["stribeck_friction"]
+    assert reason.step_dependent[0].gain_kept < 0.1
+    assert reason.comparison is not None

@@ -55,7 +55,7 @@ GIVEN_UP = {
     "valleys": "local_minima",
 }
 # Names that are still to be renamed. Take a name off the list with its rename.
-ALLOWED = {"told_of", "portrait_before", "portrait_after", "kept", "rivals", "lone_runs", "alike"}
+ALLOWED = {"told_of"}
 # Plain English in names. A word that is neither here nor in the glossary is a new term: explain it there, or choose another.
 PLAIN = set(
     [
@@ -103,6 +103,7 @@ PLAIN = set(
         "extended",
         "fast",
         "figure",
+        "filter",
         "finish",
         "formula",
         "function",
@@ -116,6 +117,7 @@ PLAIN = set(
         "identified",
         "identify",
         "independent",
+        "indistinguishable",
         "input",
         "interval",
         "json",
@@ -131,6 +133,7 @@ PLAIN = set(
         "moving",
         "name",
         "named",
+        "narrate",
         "new",
         "number",
         "objective",

@@ -6,13 +6,16 @@ import numpy as np
 
 from smajax.attribution.findings import (
     CoefficientFinding,
+    Comparison,
     EffectFinding,
     Findings,
     ParameterFinding,
-    Portrait,
+    ResidualDiagnostics,
     Role,
     Round,
     RunFinding,
+    Scored,
+    Verdict,
 )
 
 NOISE = 2.0e-5  # m
@@ -62,9 +65,9 @@ def made_phase(samples: float, share: float, mean: float, rmse: float) -> dict[s
     return {"samples": samples, "share_of_squared_error": share, "mean": mean, "rmse": rmse}
 
 
-def made_portrait(rmse: float, white: bool, sentences: tuple[str, ...], moved: float = 0.0) -> Portrait:
+def made_residual(rmse: float, white: bool, moved: float = 0.0) -> ResidualDiagnostics:
     """`moved` samples go from cooling to rest: each model has its own phases."""
-    return Portrait(
+    return ResidualDiagnostics(
         rmse=rmse,
         noise_sigma=NOISE,
         ratio=rmse / NOISE,
@@ -87,7 +90,6 @@ def made_portrait(rmse: float, white: bool, sentences: tuple[str, ...], moved: f
             "not transforming": made_phase(1670.0 + moved, 0.04, 0.0, rmse * 0.2),
         },
         correlation={"time": 0.01, "input": 0.34 if not white else 0.02, "martensite_fraction": NAN},
-        sentences=sentences,
     )
 
 
@@ -97,7 +99,6 @@ def made_effect(name: str, title: str, equation: str, left_out: float, added: bo
         title=title,
         equation=equation,
         formula="m c_p dT/dt = ... + m dH dxi/dt (Elahinia 2004, eq. 3.1 with the latent heat that it leaves out)",
-        sentence="The wire takes up heat while it turns into austenite and gives it back while it returns.",
         added=added,
         coefficients={"enthalpy": CoefficientFinding(24187.3, 210.6, "J/kg")} if added else {},
         evidence={
@@ -108,6 +109,7 @@ def made_effect(name: str, title: str, equation: str, left_out: float, added: bo
             "leave_one_out_rmse_of_the_base_model": 0.9e-3,
             "leave_one_out_gain": 0.95 if added else NAN,
             "score_p_value_at_the_end": NAN if added else 2.0e-12,
+            "score_gain_at_the_end": NAN if added else 0.004,
         },
     )
 
@@ -119,13 +121,7 @@ def made_findings() -> Findings:
         experiment="latent",
         title="Dead weight, 75 g",
         source="latent/experiment.toml",
-        verdict="explained",
-        summary=(
-            "The model lacks the latent heat of transformation: 24.2 ± 0.2 J/g.",
-            "With it the error on runs that were held out falls from 1.1 mm to 0.020 mm, the noise of the measurement.",
-        ),
-        unexplained=(),
-        cannot_know=("Convection coefficient and specific heat move together: no run cools from above 90 °C.",),
+        verdict=Verdict.EXPLAINED,
         check=("3 runs, 2 to fit and 1 held out; 1200 samples each at 20 Hz.",),
         output_name="position",
         output_unit="m",
@@ -148,16 +144,24 @@ def made_findings() -> Findings:
             made_effect("latent_heat", "latent heat of transformation", "heat", 2.04e-5, added=True),
             made_effect("sensor_lag", "lag of the sensor", "sensor", NAN),
         ),
-        portrait_before=made_portrait(1.1e-3, False, ("71 % of it lies in heating while transforming.",)),
-        portrait_after=made_portrait(2.0e-5, True, ("The residual is white.",), moved=60.0),
+        residual_before=made_residual(1.1e-3, False),
+        residual_after=made_residual(2.0e-5, True, moved=60.0),
         rounds=(
             Round(
                 1,
                 (("base", 1.1e-3), ("latent_heat", 2.04e-5), ("radiation", 1.02e-3)),
                 "latent_heat",
-                "Best by far.",
+                Scored(Comparison(1.1e-3, 2.04e-5, 0.9997, 41.0, True)),
             ),
-            Round(2, (("latent_heat + radiation", 2.05e-5),), "", "Nothing more is gained on runs left out."),
+            Round(
+                2, (("latent_heat + radiation", 2.05e-5),), "", Scored(Comparison(2.04e-5, 2.05e-5, -0.01, -0.3, True))
+            ),
         ),
+        explained_variance=0.998,
+        step=0.02,
+        step_size_error=0.0,
+        offset=True,
+        wire="flexinol_table_3_2",
+        load="dead_weight",
         provenance={"smajax": "0.1.0", "seed": "0", "command": "smajax close-loop latent/experiment.toml"},
     )

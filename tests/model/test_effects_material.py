@@ -13,7 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from smajax.attribution.cross_validation import NUDGE
+from smajax.attribution.config import AttributionConfig
 from smajax.core.parameters import parameter_values, parameters, set_parameters
 from smajax.engine import program
 from smajax.model.effects.library import LIBRARY
@@ -24,6 +24,8 @@ from smajax.model.types import Trajectory
 from smajax.model.wire.laws import under_law
 from smajax.simulation.compiled import simulate_compiled
 from smajax.simulation.simulate import simulate
+
+NUDGE = AttributionConfig().nudge
 
 DT = 0.05
 DEAD_WEIGHT = build("flexinol_table_3_2", "dead_weight", "voltage")

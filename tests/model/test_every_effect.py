@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from smajax.attribution.cross_validation import NUDGE
+from smajax.attribution.config import AttributionConfig
 from smajax.core.parameters import get_parameters, parameters, set_parameters, set_vector
 from smajax.core.units import convert
 from smajax.engine import program
@@ -21,6 +21,8 @@ from smajax.model.presets import build
 from smajax.model.system import System
 from smajax.simulation.simulate import simulate
 from tests.model.test_effects_material import RIGS as ELSEWHERE
+
+NUDGE = AttributionConfig().nudge
 
 DT = 0.05
 # The first on which an effect applies shows it.

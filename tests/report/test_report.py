@@ -15,12 +15,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from smajax.attribution.findings import Findings, Formula, UnknownTerm
+from smajax.attribution.findings import Comparison, Findings, Formula, UnknownTerm
 from smajax.core.display_units import correlation, digits, display, p_value, share, with_error
 from smajax.data.readers.read import read_table
 from smajax.report import pictures
 from smajax.report.html import findings_to_html
-from smajax.report.json_file import findings_to_json
+from smajax.report.json_file import RENAMED, findings_to_json, with_current_keys
+from smajax.report.narrative import narrate
 from smajax.report.write import write_report
 from tests.helpers.made_findings import NAN, NOISE, made_effect, made_findings
 
@@ -84,7 +85,7 @@ def test_the_files_are_written_whole_and_nothing_else(folder, page):
 
 
 def test_the_folder_is_made(findings, tmp_path, monkeypatch):
-    monkeypatch.setattr("smajax.report.write.findings_to_html", lambda findings: "page")
+    monkeypatch.setattr("smajax.report.write.findings_to_html", lambda findings, narrative: "page")
     assert write_report(findings, tmp_path / "a" / "b").read_text() == "page"
 
 
@@ -164,7 +165,11 @@ def test_names_are_text_and_never_markup(page):
 
 def test_the_verdict_comes_first(page, findings):
     text = " ".join(page.text)
-    assert text.index(findings.summary[0]) < text.index("Error of every run") < text.index("What was added, and why")
+    assert (
+        text.index(narrate(findings).summary[0])
+        < text.index("Error of every run")
+        < text.index("What was added, and why")
+    )
 
 
 def test_every_contents_entry_leads_somewhere(page):
@@ -347,8 +352,8 @@ def _unknown_term(name: str, named: bool, alike: tuple[str, ...] = ()) -> Unknow
         state_unit="K",
         unit="W/m",
         named=named,
-        alike=alike,
-        why="error on left-out runs 1.8 mm -> 0.2 mm" if named else "",
+        indistinguishable=alike,
+        comparison=Comparison(1.8e-3, 2.0e-4, 0.99, 9.0, True) if named else None,
         score_gain=0.85,
         left_out_before=1.8e-3,
         left_out_after=2.0e-4,
@@ -373,9 +378,9 @@ def test_unknown_terms_are_told_drawn_and_recorded(findings, page):
     assert "What no effect of the library accounts for" not in " ".join(page.text)
     assert "1.27 (1 + tanh((T - T_inf - 52.4)/4.51))/2" in text
     assert "f in W/m, T - T_inf in K" in text
-    # The best and the one that is not told from it are drawn, the third is a row of the table only.
+    # The best and the one that is not distinguished from it are drawn, the third is a row of the table only.
     assert len(told.images()) == len(page.images()) + 2
-    assert text.count("not told from the best") == 1
+    assert text.count("not distinguished from the best") == 1
     record = json.loads(json.dumps(findings_to_json(with_terms), allow_nan=False))["unknown"]
     assert [one["named"] for one in record] == [True, False, False]
     assert record[0]["function"]["values"] == pytest.approx(terms[0].values.tolist())
@@ -384,13 +389,35 @@ def test_unknown_terms_are_told_drawn_and_recorded(findings, page):
     assert findings_to_json(findings)["unknown"] == []
 
 
-def test_a_remark_that_parameters_move_together_leads_to_what_can_be_done(findings: Findings) -> None:
-    def section(remark: str) -> str:
+def test_correlated_parameters_lead_to_what_can_be_done(findings: Findings) -> None:
+    def section(remark: str = "", correlated: tuple[tuple[str, ...], ...] = ()) -> str:
         first, *rest = findings.after
-        made = dataclasses.replace(findings, after=(dataclasses.replace(first, remark=remark), *rest))
-        page = findings_to_html(made)
+        after = (dataclasses.replace(first, remark=remark), *rest)
+        page = findings_to_html(dataclasses.replace(findings, after=after, correlated=correlated))
         return page[page.index('<section id="parameters"') : page.index('<section id="residual"')]
 
-    assert 'href="#cannot-know"' in section("correlated with specific_heat")
+    assert 'href="#cannot-know"' in section(correlated=((findings.after[0].name, findings.after[1].name),))
     assert 'href="#cannot-know"' in section("only a combination of it with specific_heat is identifiable")
     assert 'href="#cannot-know"' not in section("at its lower bound")
+
+
+def test_a_record_with_the_keys_of_before_is_read(findings: Findings) -> None:
+    """Until version 0.2, with a warning for each."""
+    new = findings_to_json(findings)
+    back = {now: key for (place, key), now in RENAMED.items() if not place}
+    old = {back.get(key, key): value for key, value in new.items()}
+    old["rounds"] = [
+        {"alike" if key == "indistinguishable" else key: value for key, value in one.items()} for one in new["rounds"]
+    ]
+    with pytest.warns(DeprecationWarning, match=r"portrait_before \(residual_before now\).*rounds.alike"):
+        assert with_current_keys(old) == new
+    assert with_current_keys(new) == new
+
+
+def test_the_names_of_before_are_read_with_a_warning(findings: Findings) -> None:
+    with pytest.warns(DeprecationWarning, match="residual_after"):
+        assert findings.portrait_after is findings.residual_after
+    with pytest.warns(DeprecationWarning, match="narrate"):
+        assert findings.summary == narrate(findings).summary
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        _ = findings.nothing

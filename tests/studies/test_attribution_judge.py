@@ -24,7 +24,7 @@ from studies.attribution_benchmark.tables import (
 def _report(
     verdict: str,
     added: list[str],
-    rivals: list[tuple[str, float]] = [],  # noqa: B006
+    confounders: list[tuple[str, float]] = [],  # noqa: B006
     unknown: str = "",
     or_else: str = "",
     likened: list[str] = [],  # noqa: B006
@@ -38,11 +38,14 @@ def _report(
         "output": {"noise_sigma": 1.0},
         "runs": runs,
         "effects": [{"name": name, "added": True} for name in added] + [{"name": "radiation", "added": False}],
-        "rivals": [{"rival": name, "weight": weight} for name, weight in rivals],
-        "rounds": [{"chosen": " + ".join(added), "alike": likened}, {"chosen": "drag", "alike": ["latent_heat"]}],
+        "confounders": [{"confounder": name, "weight": weight} for name, weight in confounders],
+        "rounds": [
+            {"chosen": " + ".join(added), "indistinguishable": likened},
+            {"chosen": "drag", "indistinguishable": ["latent_heat"]},
+        ],
         "unknown": [
-            {"name": "one", "equation": unknown, "named": True, "alike": ["other"] if or_else else []},
-            {"name": "other", "equation": or_else, "named": False, "alike": []},
+            {"name": "one", "equation": unknown, "named": True, "indistinguishable": ["other"] if or_else else []},
+            {"name": "other", "equation": or_else, "named": False, "indistinguishable": []},
         ]
         if unknown
         else [],
@@ -68,7 +71,7 @@ CASES = {
         True,
         True,
     ),
-    "a rival of no weight": (
+    "a confounder of no weight": (
         judge(_truth("single", HEAT), _report("explained", ["phase_specific_heat"], [("latent_heat", 1e-3)]), 1.0),
         False,
         True,

@@ -40,6 +40,7 @@ def _loop(experiment: Path, out: Path, command: str, overwrite: bool, told_how: 
     from smajax.data.experiment.fingerprint import asked_of
     from smajax.data.experiment.load import load_experiment
     from smajax.data.model_catalogue import CATALOGUE
+    from smajax.report.narrative import narrated
     from smajax.report.write import write_report
 
     check_path(out)
@@ -49,13 +50,16 @@ def _loop(experiment: Path, out: Path, command: str, overwrite: bool, told_how: 
         claimed(out, "close-loop", asked_of(loaded), OWN, overwrite),
         shown(console(), told_how) as progress,
     ):
-        findings = close_loop(loaded, memory=out / "fits", progress=progress, command=command)
+        in_words = narrated(progress, loaded.output_unit, loaded.output_name)
+        findings = close_loop(loaded, memory=out / "fits", progress=in_words, command=command)
         return findings, write_report(findings, out)
 
 
 def _say(findings: Findings, page: Path) -> None:
+    from smajax.report.narrative import narrate
+
     typer.echo(f"\n{findings.title}\nVerdict: {findings.verdict}")
-    for sentence in findings.summary:
+    for sentence in narrate(findings).summary:
         typer.echo(f"  {sentence}")
     typer.echo(f"Report: {page.resolve()}")
 

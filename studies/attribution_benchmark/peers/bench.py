@@ -64,6 +64,6 @@ def opened(folder: Path) -> Bench:
         batch = pack(runs, experiment.step, parameter_values(full))
         problem = Problem.build(full, batch, experiment.noise_sigma, experiment.offset)
         free = tuple(unknown.name for unknown in experiment.unknowns)
-        return Search(problem, free, bounds, names, ResultCache(), str)
+        return Search(problem, free, bounds, names, ResultCache())
 
     return Bench(experiment, search("fit"), search("held-out"))

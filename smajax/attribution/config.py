@@ -1,0 +1,110 @@
+"""Thresholds of the attribution in one place, each with its reason.
+
+A number that only makes one numerical method work (the tolerance of a test for rank, say) stays in that method's module.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class AttributionConfig:
+    """Every threshold of the search, its checks and its report. Shares are 0..1; nothing here has a unit."""
+
+    # Is the residual noise?
+    noise_excess: float = (
+        0.02  # of its mean square; a noise is rarely known better, and no effect worth a name hides in 2 %
+    )
+    noise_excess_errors: float = (
+        2.0  # standard errors of that mean square: autocorrelated noise misses its own level by more
+    )
+    most_noise_excess: float = 0.1  # but never more than this: a third of the noise may hide in it
+    white_noise_ratio: float = (
+        3.0  # a white residual this large is noise declared too small; a larger one, unrelated data
+    )
+    # A noise estimated from neighbouring samples is its fast part. A first-order autoregressive residual is that noise with its slow part.
+    most_filter_coefficient: float = 0.95  # beyond it a slow trace of physics looks the same
+    most_filter_noise: float = 2.0  # innovation over the estimate; 1.6 where the coefficient is near one
+    least_independent: int = 50  # samples; with fewer the test cannot reject a first-order noise
+
+    # Cross-validation: when is a model better?
+    penalty: float = 0.01  # of the mean square on left-out runs that each coefficient has to gain
+    standard_errors: float = 0.5  # of the paired difference, too: with three or four runs that error is wide
+    standard_errors_one_run: float = 2.0  # with one run what is compared are fits to it
+    effect_size_error: float = (
+        1.0  # relative error to which the other runs determine an effect's size for a left-out run to count
+    )
+    fold_tie: float = 1.0  # how far a fold's parameters may move at no cost, in logits of the box
+    least_explained_variance: float = 0.5  # of the motion in left-out runs; below it the model's effects mean nothing
+    most_folds: int = 12  # parts of the runs left out in turn: one run each up to that many
+    nudge: float = (
+        1e-3  # share of an effect's start value at which its score is taken: at exactly zero some have no slope
+    )
+    bound_distance: float = 0.03  # of the box: how far from a bound a refit starts to which a poorer model was driven
+    convergence: float = 1e-5  # relative decrease of the cost at which a refit ends
+    final_convergence: float = 1e-8  # of the final model: standard errors need the optimum
+
+    # Search
+    significance: float = 1e-3  # of the score tests of one round, counted together
+    gain_in_noise: float = 0.2  # of the residual's square: a slow effect as large as the noise may pass for slow noise
+    singles_refitted: int = 8  # effects in a round
+    pairs_refitted: int = 2  # pairs of effects in a round
+    cost_ratio: float = 2.0  # to the best: from the second round on a candidate farther behind is not cross-validated
+    most_rounds: int = 6  # a bench with more effects at once is not identifiable with a handful of runs
+    gain_kept_at_half_step: float = 0.5  # of an effect with which the load may jump; less is the integration's gain
+    sobol_starts: int = 32  # in the ranges of an effect with several local minima; a power of two, for Sobol's points
+    first_steps: int = 8  # from each start, before the worse ones are dropped
+    starts_continued: int = 4  # taken to convergence
+
+    # Outlier run
+    outlier_least_runs: int = 3  # of two runs that disagree either may be the wrong one
+    influential_least_runs: int = (
+        4  # where the others are not noise without it: a model fits any two runs far better than three
+    )
+    influential_ratio: float = 2.0  # by which the error on the other runs then falls
+    outlier_most_runs: int = 12  # looked at, those of the largest residual first: each costs a refit
+
+    # Held-out runs
+    held_out_tolerance: float = (
+        0.02  # by which their error may be larger with an effect beside others than without it, by chance
+    )
+
+    # Bootstrap over runs
+    bootstrap_draws: int = 32  # three runs can be drawn in ten ways only: more draws tell no more
+    bootstrap_interval: tuple[float, float] = (2.5, 97.5)  # percentiles
+    bootstrap_least_runs: int = 3  # two can be drawn in three ways
+
+    # Confounders
+    overlap_refitted: float = 0.7  # of an effect's trace: a candidate that overlaps less cannot take its place
+    confounders_refitted: int = 3  # of each effect
+    weight_draws: int = 2000  # of the Bayesian bootstrap; weights to 0.01
+    separating_weight: float = 0.01  # from which a run that separates the two is looked for
+
+    # Unknown terms
+    terms_refitted: int = 6  # about one an equation
+    terms_scored: int = 6  # of them, taken to the left-out runs
+    term_standard_errors: float = (
+        2.0  # ahead of none, and of another: of a dozen tried the best is one ahead by chance alone
+    )
+    term_start_share: float = 0.5  # of the score test's estimate: where a refit starts
+    term_start_limit: float = 0.8  # of the largest coefficient: a start stays off the bound
+    term_prior_sigma: float = (
+        1.0  # of every coefficient about zero, in shares of the largest: the fit is then well posed
+    )
+    term_points: int = 61  # at which the function is tabulated
+    term_bins: int = 20  # of its range, in which samples are counted
+
+    # When the report warns
+    wrong_noise: float = 1.2  # residual over noise, or the other way round: the noise was declared wrongly
+    noise_may_be_wrong: float = 2.0  # residual over noise up to which the noise itself may be what is wrong
+    held_out_ratio: float = 1.3  # error of a held-out run over that of the fit runs, and more where it has few samples:
+    held_out_chance: float = 5.0  # by this over the root of twice their number
+    worse_than_base: float = 1.02  # error of a held-out run over the base model's
+    faint_p_value: float = 0.01  # corrected for the candidates: a trace below the noise is reported
+    step_error_of_error: float = 0.5  # change at half the step over the error: the model depends on the step
+    step_error_of_noise: float = 0.5  # change at half the step over the noise: a shorter step is advised
+    large_load_share: float = 0.2  # of the load, wrong or shifting: a size of the bench is as likely to be wrong
+    expansion_cancelled: float = 0.3  # share of the preset's expansion to within which one found is its negative
+    confounder_mentioned: float = 0.05  # weight from which a confounder is named
+    confounder_preferred: float = 0.5  # weight from which left-out runs prefer it

@@ -1,0 +1,70 @@
+"""Findings in words: what the numbers allow, and nothing beyond.
+
+In: `smajax.attribution.findings.Findings`, numbers and enums. Out: a `Narrative`, sentences for the page, the record and the
+terminal; `narrated` does the same for the rounds of a search while it runs. Nothing here computes a result: thresholds
+are those of `findings.config`, and each module writes one part. `verdict` has the summary and `caveats` what is to be
+minded; `limits` what the runs do not determine; `residual`, `rounds` and `unknown` the parts of the same name.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from smajax.attribution.findings import Findings, Round
+from smajax.core.progress import Event, Message, Progress, Result
+from smajax.model.effects.library import LIBRARY
+from smajax.report.narrative.limits import cannot_know
+from smajax.report.narrative.residual import residual_sentences, unexplained
+from smajax.report.narrative.rounds import chosen_text, reason_text
+from smajax.report.narrative.unknown import comparison_sentence
+from smajax.report.narrative.values import error_text
+from smajax.report.narrative.verdict import summary
+
+
+@dataclass(frozen=True)
+class Narrative:
+    """The sentences of one report, each part in the order of the findings that it is about."""
+
+    summary: tuple[str, ...]  # the answer, the verdict first
+    unexplained: tuple[str, ...]
+    cannot_know: tuple[str, ...]  # what these runs do not determine
+    check: tuple[str, ...]
+    residual_before: tuple[str, ...]
+    residual_after: tuple[str, ...]
+    rounds: tuple[str, ...]  # why each ended so
+    unknown: tuple[str, ...]  # how each term compares with none; "" but for the best
+    effects: dict[str, str]  # what each candidate would mean, by its name
+
+
+def narrate(findings: Findings) -> Narrative:
+    """The whole report in sentences."""
+    return Narrative(
+        summary=summary(findings),
+        unexplained=unexplained(findings),
+        cannot_know=cannot_know(findings),
+        check=findings.check,
+        residual_before=residual_sentences(findings.residual_before),
+        residual_after=residual_sentences(findings.residual_after),
+        rounds=tuple(
+            reason_text(entry.reason, findings.output_unit, findings.output_name) for entry in findings.rounds
+        ),
+        unknown=tuple(comparison_sentence(findings, term) for term in findings.unknown),
+        effects={effect.name: LIBRARY[effect.name].sentence for effect in findings.effects if effect.name in LIBRARY},
+    )
+
+
+def narrated(progress: Progress, unit: str, quantity: str) -> Progress:
+    """`progress` that gets each round of a search as a message; `unit` (SI) and `quantity` of the output."""
+
+    def in_words(event: Event) -> None:
+        if isinstance(event, Result) and isinstance(event.record, Round):
+            done = event.record
+            text = chosen_text(done) or "nothing added"
+            progress(Message(f"round {done.number}: {text}; {reason_text(done.reason, unit, quantity)}"))
+        else:
+            progress(event)
+
+    return in_words
+
+
+__all__ = ["Narrative", "error_text", "narrate", "narrated"]

@@ -1,0 +1,202 @@
+"""What is to be minded beside the verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from smajax.attribution.findings import EffectFinding, Findings, OutlierRun, RunFinding, Verdict, pooled_rmse
+from smajax.core.display_units import digits
+from smajax.core.wording import and_listed
+from smajax.report.narrative.values import assumed_text, error_text, value_text
+
+NAMED_SIZES = 4  # in a sentence
+NOTHING_MORE = (Verdict.ADEQUATE, Verdict.EXPLAINED)
+
+
+def of_an_outlier(findings: Findings) -> list[str]:
+    """A run that does not agree with the others, beside a verdict that is about more than it."""
+    if not findings.outlier_runs:
+        return []
+    first = findings.outlier_runs[0]
+    model = "the extended model" if first.effects else "the base model"
+    left = ", which is noise" if first.residual_is_noise else ""
+    return [
+        f"Mind: {first.run} does not agree with the others. Fitted without it, the error of {model} on the other {findings.fit_runs - 1} fit runs "
+        f"falls from {error_text(findings, first.others_with)} to {error_text(findings, first.others_without)}{left}. {look_at(first)}"
+    ]
+
+
+def look_at(outlier: OutlierRun) -> str:
+    """What to do about it."""
+    return (
+        f"{outlier.run} may not belong to the others (another wire, another day, another run's readings, an input that was not as "
+        'logged), or it alone shows what the model lacks. Look at it first; give it role = "held-out" and run again to assess '
+        "the others without it."
+    )
+
+
+def of_the_noise(findings: Findings) -> Iterator[str]:
+    """A residual that is hardly larger than the noise, or whose noise has a slow part."""
+    after, config = findings.residual_after, findings.config
+    if findings.verdict not in NOTHING_MORE and not after.white and after.ratio < config.noise_may_be_wrong:
+        yield (
+            f"What is left is no more than {after.ratio:.2f} times the noise: noise that is larger than declared, or autocorrelated, looks the "
+            "same. Look at a stretch of the log in which nothing moves before you look for physics."
+        )
+    if after.filter_coefficient > 0.0 and not after.white and after.ratio > config.wrong_noise:
+        yield (
+            f"Mind: what is left is {after.ratio:.2f} times the noise that was estimated from neighbouring samples, and is first-order "
+            f"autoregressive noise with coefficient {after.filter_coefficient:.2f}, and nothing beyond. It is taken as the sensor's: the "
+            "slow part of such a noise does not show in neighbours. Give the noise as a number if you know it to be smaller."
+        )
+
+
+def of_a_faint_trace(findings: Findings) -> list[str]:
+    """A trace below the noise that the score test sees all the same, for a verdict that nothing more is missing."""
+    left = [
+        one
+        for one in findings.effects
+        if not one.added and np.isfinite(one.evidence.get("score_p_value_at_the_end", np.nan))
+    ]
+    if findings.verdict not in NOTHING_MORE or not left:
+        return []
+    first = min(left, key=lambda one: one.evidence["score_p_value_at_the_end"])
+    chance = min(1.0, len(left) * first.evidence["score_p_value_at_the_end"])
+    if chance > findings.config.faint_p_value:
+        return []
+    fitted = first.evidence["score_gain_at_the_end"] > findings.config.gain_in_noise
+    return [
+        f"Mind: {first.title} leaves a trace in the score test (p = {digits(chance, 2)} after {len(left)} candidates) that would take "
+        f"{first.evidence['score_gain_at_the_end']:.1%} of the residual's square"
+        + (
+            ", but runs left out are not predicted better with it."
+            if fitted
+            else ": smaller than what is looked into, so it was not fitted."
+        )
+    ]
+
+
+def of_the_step(findings: Findings) -> list[str]:
+    """A model whose answer depends on the step: where a load sticks and jumps, the step says when."""
+    error = max(pooled_rmse(findings.runs, "fit", "after"), findings.noise_sigma)
+    change = findings.step_size_error
+    if not change > findings.config.step_error_of_error * error:
+        return []
+    return [
+        f"Mind: halving the step of {findings.step:g} s changes what the model gives by {error_text(findings, change)}, {change / error:.1f} times its "
+        "error on the fit runs: what was fitted may be the integration's and not the wire's. Take a shorter step under [sampling] "
+        "and run again before you believe it."
+    ]
+
+
+def of_bounds(findings: Findings) -> Iterator[str]:
+    """Coefficients of what was added, and parameters of the base model, that end at a bound."""
+    added = tuple(f"{effect.name}." for effect in findings.added)
+    limited = [one for one in findings.after if one.limited]
+    coefficients = [one.name for one in limited if one.name.startswith(added)]
+    if coefficients:
+        yield (
+            f"Mind: {and_listed(coefficients)} {'ends' if len(coefficients) == 1 else 'end'} at a bound. The runs ask for more of the "
+            "effect than is likely: it may stand in for another."
+        )
+    own = [one for one in limited if not one.name.startswith(added)]
+    if own:
+        ends = [f"{one.name} ends {one.remark} of {value_text(one.value, one.unit, one.name).strip()}" for one in own]
+        its = "its bounds" if len(own) == 1 else "their bounds"
+        yield (
+            f"Mind: {and_listed(ends)}. The truth may lie beyond, and what was fitted beside it makes up for that: widen "
+            f"{its} in the experiment file where physics allows it, or look at what is taken as known."
+        )
+
+
+def of_confounders(findings: Findings) -> Iterator[str]:
+    """Candidates that left-out runs prefer to what was added."""
+    titles = {effect.name: effect.title for effect in findings.effects}
+    speak = "runs left out prefer" if findings.fit_runs > 1 else "the one fit run prefers"
+    for one in findings.confounders:
+        if one.weight > findings.config.confounder_preferred:
+            yield f"Mind: {speak} {titles[one.confounder]} to {titles[one.effect]} (weight {one.weight:.2f})."
+
+
+def of_the_preset(findings: Findings, effect: EffectFinding) -> str:
+    """What an expansion says that takes back the one of the preset's theta_T: nothing of the wire, but of what was taken as known."""
+    expansion = findings.preset_expansion
+    if effect.name != "thermal_expansion" or expansion is None:
+        return ""
+    found = [effect.coefficients[phase] for phase in ("martensite", "austenite")]
+    if any(
+        abs(one.value - preset)
+        > max(findings.config.expansion_cancelled * abs(preset), 3.0 * (one.standard_error or 0.0))
+        for one, preset in zip(found, expansion, strict=True)
+    ):
+        return ""
+    return (
+        f"The thermal expansion that was found ({found[0].value:.2g} and {found[1].value:.2g} 1/K) takes back the one that the base model has by its "
+        f"preset's thermal_modulus ({-expansion[0]:.2g} and {-expansion[1]:.2g}): it says nothing of the wire, but that its thermal strain is not the preset's. "
+        "Give thermal_modulus in [model.parameters] ('0 MPa/K' where the wire shows none) and run again: in rate form it also leaves a strain "
+        "with every cycle, and other effects that are named here may make up for that."
+    )
+
+
+def of_a_size(findings: Findings, effect: EffectFinding) -> list[str]:
+    """The other reading of a load that is wrong by a large share, where sizes of the bench were never given."""
+    share = effect.coefficients.get("share")
+    sizes = [assumed_text(one) for one in findings.assumed if one.size_not_given]
+    large = findings.config.large_load_share
+    if effect.name not in ("wrong_load", "load_shift") or share is None or abs(share.value) < large or not sizes:
+        return []
+    named = and_listed([*sizes[:NAMED_SIZES], *["others"] * (len(sizes) > NAMED_SIZES)])
+    return [
+        f"A load that is off by {share.value:+.0%} may as well be a size of the bench that the experiment file never gives: {named} are "
+        "the presets'. Give yours in [model.parameters] and run again."
+    ]
+
+
+def held_out_off(findings: Findings) -> list[RunFinding]:
+    """The held-out runs whose error is larger than the fit runs' beyond chance."""
+    config = findings.config
+    level = max(pooled_rmse(findings.runs, "fit", "after"), findings.noise_sigma)
+    return [
+        run
+        for run in findings.runs
+        if run.role == "held-out"
+        and run.rmse_after > (config.held_out_ratio + config.held_out_chance / np.sqrt(2.0 * len(run.time))) * level
+    ]
+
+
+def held_out_warnings(findings: Findings) -> list[str]:
+    """One sentence for each held-out run that the final model predicts clearly worse than it fits."""
+    return [
+        f"{run.name}, which was held out, is off by {error_text(findings, run.rmse_after)}, "
+        f"{run.rmse_after / pooled_rmse(findings.runs, 'fit', 'after'):.1f} times the fit runs' error: the model misses what shows "
+        "there and not in them, or something was different then (another day, another state of the wire)."
+        for run in held_out_off(findings)
+    ]
+
+
+def of_the_test(findings: Findings) -> Iterator[str]:
+    """How far what was found has been tested, and whether the noise was declared rightly."""
+    if findings.fit_runs < 2:
+        yield "There is one fit run only: effects were assessed on the fit itself, no run could be left out."
+    worse = [
+        run.name
+        for run in findings.runs
+        if run.role == "held-out" and run.rmse_after > findings.config.worse_than_base * run.rmse_before
+    ]
+    if worse:
+        yield f"Mind: on {', '.join(worse)}, which the fit never saw, the extended model does worse than the base model."
+    if not any(run.role == "held-out" for run in findings.runs):
+        yield "No run was held out, so nothing here was tested on data that the fit never saw."
+    after, wrong = findings.residual_after, findings.config.wrong_noise
+    if after.white and after.ratio > wrong:
+        yield (
+            f"What is left is white but {after.ratio:.1f} times the declared noise: either the noise was declared too small or "
+            "something fast is missing, or the samples are not those of these inputs."
+        )
+    if after.ratio < 1.0 / wrong:
+        yield (
+            f"What is left is {after.ratio:.2f} times the declared noise: the noise was declared too large, and an effect "
+            "smaller than it may hide. Declare it smaller, or as 'estimate', and run again."
+        )

@@ -1,0 +1,118 @@
+"""What these runs do not determine, whatever the fit says."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from smajax.attribution.findings import Findings
+from smajax.core.wording import and_listed
+from smajax.report.narrative.values import assumed_text, error_text
+
+
+def cannot_know(findings: Findings) -> tuple[str, ...]:
+    """One sentence or two for each thing."""
+    return (
+        *_ties(findings),
+        *_confounders(findings),
+        *_correlated(findings),
+        *_remarks(findings),
+        *_weak_test(findings),
+        *_integration(findings),
+        *_assumed(findings),
+    )
+
+
+def separated(findings: Findings) -> str:
+    """What to do about parameters of which the runs determine one combination."""
+    return (
+        "Measure one of them by itself and give it under [model.parameters] in the place of [unknown], or add a fit run that "
+        "separates them (another load, a slower or a hotter one): "
+        f"`smajax identify {findings.source} --design` ranks such runs."
+    )
+
+
+def _ties(findings: Findings) -> Iterator[str]:
+    titles = {effect.name: effect.title for effect in findings.effects}
+    added = {effect.name for effect in findings.added}
+
+    def named(model: str) -> str:
+        return " with ".join(titles[name] for name in model.split(" + "))
+
+    for entry in findings.rounds:
+        if entry.indistinguishable and not entry.removed and set(entry.chosen.split(" + ")) <= added:
+            others = " or ".join(named(model) for model in entry.indistinguishable)
+            yield (
+                f"Whether it is {named(entry.chosen)}, or {others}: runs left out do "
+                "not distinguish them. The one that predicts them best was accepted, or a part of it that does as well."
+            )
+
+
+def _confounders(findings: Findings) -> Iterator[str]:
+    titles = {effect.name: effect.title for effect in findings.effects}
+    for one in findings.confounders:
+        if one.weight > findings.config.confounder_mentioned:
+            separating = (
+                f" A run with {one.separating_run} would separate them by {one.separation:.1f} times the noise."
+                if one.separating_run
+                else ""
+            )
+            yield (
+                f"Whether it is {titles[one.effect]} or {titles[one.confounder]}: their traces in these runs overlap by {one.overlap:.2f}, "
+                f"and the runs give the second a weight of {one.weight:.2f}.{separating}"
+            )
+
+
+def _correlated(findings: Findings) -> Iterator[str]:
+    for cluster in findings.correlated:
+        yield (
+            f"{and_listed(list(cluster))} are correlated in these runs: what one has too much another makes up for, so each is known "
+            f"less well than alone. {separated(findings)}"
+        )
+
+
+def _remarks(findings: Findings) -> Iterator[str]:
+    known = {name for cluster in findings.correlated for name in cluster}
+    for one in findings.after:
+        if one.remark and one.name not in known:
+            measured = one.standard_error is not None
+            yield f"{one.name}: {one.remark}" + (
+                ": known less well than alone." if measured else "; its value is not measured by these runs."
+            )
+    blended = [one.name for one in findings.after if "combination" in one.remark]
+    if blended:
+        yield (
+            f"Of {and_listed(blended)} these runs determine combinations alone. {separated(findings)} Where the equations have their "
+            "product alone (density and specific heat) no run separates them."
+        )
+
+
+def _weak_test(findings: Findings) -> Iterator[str]:
+    if findings.fit_runs == 2:
+        yield "With two fit runs the left-out test is weak: give at least three of different kinds."
+    elif findings.fit_runs == 1:
+        yield "With one fit run no run can be left out to test an effect: give at least three of different kinds."
+    if findings.offset:
+        yield "The zero of the output: each run has its own offset, fitted to that run, also for held-out runs."
+
+
+def _integration(findings: Findings) -> Iterator[str]:
+    error = findings.step_size_error
+    if error > 0.0:
+        large = error > findings.config.step_error_of_noise * findings.noise_sigma
+        yield (
+            f"Anything below {error_text(findings, error)}: by so much the "
+            f"model's output changes when the step of {findings.step:g} s is halved"
+            + (". That is not small beside the noise: take a shorter step." if large else ".")
+        )
+
+
+def _assumed(findings: Findings) -> Iterator[str]:
+    declared = sorted(name for name in findings.declared if "." not in name)
+    if declared:
+        yield f"Anything that shifts what was declared as known: {', '.join(declared)}."
+    texts = {one.name: assumed_text(one) for one in findings.assumed if one.name not in declared}
+    if texts:
+        yield (
+            f"Nor what the presets {findings.wire} and {findings.load} give: {', '.join(texts[name] for name in sorted(texts))}. A fitted value is "
+            "right as far as these are; a heat capacity, a loss or a latent heat scales with density and resistivity."
+        )

@@ -1,0 +1,42 @@
+"""Residual diagnostics in words, and what stays unexplained."""
+
+from __future__ import annotations
+
+from smajax.attribution.findings import Findings, ResidualDiagnostics, Verdict
+from smajax.core.wording import times_noise
+from smajax.report.narrative.caveats import held_out_warnings
+
+MENTIONED = 0.2  # size of a correlation from which it is worth a sentence
+
+
+def residual_sentences(found: ResidualDiagnostics) -> tuple[str, ...]:
+    """Its size and autocorrelation; where it is no noise, the phase with most of it and what it is correlated with."""
+    memory = "is white" if found.white else "is autocorrelated"
+    if found.filter_coefficient > 0.0 and not found.white:
+        memory = (
+            f"is first-order autoregressive noise with coefficient {found.filter_coefficient:.2f}, and nothing beyond"
+        )
+    sentences = [f"The residual is {times_noise(found.ratio, 'the measurement noise')} and {memory}."]
+    if found.white or found.filter_coefficient > 0.0:
+        return tuple(sentences)
+    phases = found.by_phase
+    worst = max(phases, key=lambda name: phases[name]["share_of_squared_error"])
+    samples = sum(entry["samples"] for entry in phases.values())
+    sentences.append(
+        f"{phases[worst]['share_of_squared_error']:.0%} of its square falls into the phase “{worst}” "
+        f"({phases[worst]['samples'] / samples:.0%} of the samples)."
+    )
+    strongest = max(found.correlation, key=lambda name: abs(found.correlation[name]))
+    if abs(found.correlation[strongest]) > MENTIONED:
+        sentences.append(
+            f"It is correlated most with {strongest.replace('_', ' ')} (correlation {found.correlation[strongest]:+.2f})."
+        )
+    return tuple(sentences)
+
+
+def unexplained(findings: Findings) -> tuple[str, ...]:
+    """What the final model leaves."""
+    warned = held_out_warnings(findings)
+    if findings.verdict in (Verdict.ADEQUATE, Verdict.EXPLAINED):
+        return ("Nothing beyond noise on the fit runs.", *warned)
+    return (*residual_sentences(findings.residual_after), *warned)

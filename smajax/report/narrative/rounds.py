@@ -1,0 +1,71 @@
+"""Why a round of the search ended so."""
+
+from __future__ import annotations
+
+from smajax.attribution.findings import (
+    Comparison,
+    HeldOutWorse,
+    NoiseWithoutRun,
+    NoLongerNeeded,
+    NothingSignificant,
+    PredictsTooLittle,
+    Reason,
+    ResidualIsNoise,
+    Round,
+    RoundLimit,
+    Scored,
+    UnknownTermBetter,
+)
+from smajax.report.narrative.values import value_text
+
+
+def chosen_text(entry: Round) -> str:
+    """`latent_heat + radiation`, `without creep`, or nothing."""
+    return f"without {entry.chosen}" if entry.removed else entry.chosen
+
+
+def comparison_text(found: Comparison, unit: str, quantity: str) -> str:
+    """`error on left-out runs 1.8 mm -> 0.2 mm (+99% of its mean square, 8.1 standard errors)`."""
+    runs = "left-out runs" if found.left_out else "the one fit run itself"
+    without, with_it = (value_text(one, unit, quantity) for one in (found.rmse_without, found.rmse_with))
+    return (
+        f"error on {runs} {without} -> {with_it} "
+        f"({found.gain:+.0%} of its mean square, {found.standard_errors:.1f} standard errors)"
+    )
+
+
+def reason_text(reason: Reason, unit: str, quantity: str) -> str:
+    """`unit` (SI) and `quantity` of the output."""
+
+    def error(value: float) -> str:
+        return value_text(value, unit, quantity)
+
+    match reason:
+        case ResidualIsNoise():
+            return "what is left of the fit runs is measurement noise"
+        case NothingSignificant(candidates, gain):
+            return (
+                f"no candidate stands out in the score test: none of {candidates} promises more than {gain:.1%} of "
+                "the mean square"
+            )
+        case Scored(comparison, step_dependent):
+            parts = [
+                f"{one.effects} keeps {max(one.gain_kept, 0.0):.0%} of its gain at half the step and is not accepted"
+                for one in step_dependent
+            ]
+            return "; ".join([*parts, *([comparison_text(comparison, unit, quantity)] if comparison else [])])
+        case RoundLimit(rounds):
+            return f"the search ends after {rounds} rounds, whatever more there may be"
+        case NoLongerNeeded(comparison):
+            return f"removed again: {comparison_text(comparison, unit, quantity)} with it is not enough"
+        case PredictsTooLittle(share, least):
+            return (
+                f"set aside: with it the model explains {share:.0%} of the motion in runs left out, and under {least:.0%} "
+                "an effect means nothing"
+            )
+        case NoiseWithoutRun(run):
+            return f"set aside: without {run} what the base model leaves is noise"
+        case UnknownTermBetter(title, effects, term):
+            return f"set aside: {title} alone predicts left-out runs better than all of them, {error(effects)} -> {error(term)}"
+        case HeldOutWorse(without, with_it):
+            return f"set aside: error on the held-out runs {error(without)} without and {error(with_it)} with it"

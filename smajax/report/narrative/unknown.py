@@ -1,0 +1,77 @@
+"""Unknown terms in words: an equation is named only where left-out runs distinguish it from the others."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from smajax.attribution.findings import Findings, UnknownTerm
+from smajax.core.display_units import label
+from smajax.report.narrative.rounds import comparison_text
+from smajax.report.narrative.values import error_text
+
+
+def comparison_sentence(findings: Findings, term: UnknownTerm) -> str:
+    """How the best term compares with none; nothing for the others."""
+    if term.comparison is None:
+        return ""
+    text = comparison_text(term.comparison, findings.output_unit, findings.output_name)
+    before, after = term.held_out_before, term.held_out_after
+    if before is not None and after is not None and after >= before:
+        text += f"; but on the held-out runs {error_text(findings, before)} -> {error_text(findings, after)}"
+    return text
+
+
+def unknown_sentences(findings: Findings) -> tuple[str, ...]:
+    """Sentences for the summary; none where no term was sought."""
+    if not findings.unknown:
+        return ()
+    best = findings.unknown[0]
+    if not best.named:
+        return (_none_named(findings, best),)
+    brought = (
+        f"error on runs left out {error_text(findings, best.left_out_before)} before, "
+        f"{error_text(findings, best.left_out_after)} with it"
+    )
+    if best.held_out_before is not None and best.held_out_after is not None:
+        held_out = (error_text(findings, one) for one in (best.held_out_before, best.held_out_after))
+        brought += f"; on those held out {' and '.join(held_out)}"
+    others = [term for term in findings.unknown if term.name in best.indistinguishable]
+    elsewhere = list(dict.fromkeys(term.equation for term in others if term.equation != best.equation))
+    if elsewhere:
+        equations = " or ".join(f"the {label(one)} equation" for one in (best.equation, *elsewhere))
+        return (
+            f"What is missing is not in the library, and runs left out do not determine whether it is in {equations}: "
+            f"of smooth unknown functions put into one equation in turn, {_or_listed([best, *others])} do equally well. "
+            f"Best is the first ({brought}).",
+        )
+    text = (
+        f"What is missing is not in the library; it is in the {label(best.equation)} equation, as an unknown function put "
+        f"there shows: {best.title}"
+    )
+    if others:
+        text += f", or {_or_listed(others)}, which runs left out do not distinguish from it"
+    text += f" ({brought})."
+    if not best.formulas:
+        return (text,)
+    return (text, f"The simplest formula for it: f = {best.formulas[0].text} ({units(best)}).")
+
+
+def _none_named(findings: Findings, best: UnknownTerm) -> str:
+    tried = (
+        "Nor do these runs determine in which equation it is missing: of the smooth unknown functions of one state that were "
+        "put into each in turn"
+    )
+    why = comparison_sentence(findings, best)
+    if best.held_out_before is not None:
+        return f"{tried} {best.title} predicts runs left out best, and is not validated on the held-out runs: {why}."
+    return f"{tried} none is better beyond chance. The nearest is {best.title}: {why}."
+
+
+def _or_listed(terms: Sequence[UnknownTerm]) -> str:
+    return " or ".join(term.title for term in terms)
+
+
+def units(term: UnknownTerm) -> str:
+    """`f in W/m, T - T_inf in K`."""
+    named = ((name, unit) for name, unit in (("f", term.unit), (term.symbol, term.state_unit)))
+    return ", ".join(f"{name} in {unit}" if unit != "-" else f"{name} a plain number" for name, unit in named)

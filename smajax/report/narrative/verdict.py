@@ -1,0 +1,164 @@
+"""The verdict and what it rests on, in sentences."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from smajax.attribution.findings import Findings, OutlierRun, Role, Verdict, pooled_rmse
+from smajax.core.wording import and_listed
+from smajax.model.effects.library import LIBRARY
+from smajax.report.narrative import caveats
+from smajax.report.narrative.unknown import unknown_sentences
+from smajax.report.narrative.values import error_text
+
+
+def summary(findings: Findings) -> tuple[str, ...]:
+    """The answer first, then what is to be minded, the errors, and what each effect means."""
+    outliers = [] if _in_one_run(findings) else caveats.of_an_outlier(findings)
+    sentences = [
+        _opening(findings),
+        *outliers,
+        *caveats.of_the_noise(findings),
+        *caveats.of_a_faint_trace(findings),
+        *caveats.of_the_step(findings),
+    ]
+    if findings.rejected is not None:
+        sentences.insert(0, _rejected(findings))
+    sentences += _errors(findings)
+    sentences += caveats.of_bounds(findings)
+    sentences += caveats.of_confounders(findings)
+    for effect in findings.added:
+        meaning = caveats.of_the_preset(findings, effect) or LIBRARY[effect.name].sentence
+        sentences += [meaning, *caveats.of_a_size(findings, effect)]
+    sentences += caveats.held_out_warnings(findings)
+    sentences += caveats.of_the_test(findings)
+    first, *rest = sentences
+    return (first, *unknown_sentences(findings), *rest)
+
+
+def _opening(findings: Findings) -> str:
+    match findings.verdict:
+        case Verdict.ADEQUATE:
+            return (
+                "Nothing is missing whose trace is larger than the noise: what the base model leaves of the fit runs cannot be "
+                "distinguished from measurement noise."
+            )
+        case Verdict.EXPLAINED:
+            return _explained(findings)
+        case Verdict.PARTLY_EXPLAINED:
+            return _partly(findings)
+        case Verdict.NOT_IN_LIBRARY:
+            return _not_in_library(findings)
+
+
+def _assessed_on(findings: Findings) -> str:
+    return "on runs left out as well as on the fit" if findings.fit_runs > 1 else "on the one fit run itself"
+
+
+def _in_one_run(findings: Findings) -> list[OutlierRun]:
+    """Runs without any one of which the base model leaves noise, where nothing was added."""
+    alone = [one for one in findings.outlier_runs if one.residual_is_noise and not one.effects]
+    return [] if findings.added else alone
+
+
+def _not_in_library(findings: Findings) -> str:
+    """What stands in the way of a name, the strongest reason first."""
+    tried = len(findings.effects)
+    alone = _in_one_run(findings)
+    if alone:
+        return _of_one_run(findings, alone)
+    if findings.rejected is not None:
+        return (
+            f"Something is missing: none of the {tried} candidate effects that were tried accounts for it in the fit runs and "
+            "is validated on those that were held out."
+        )
+    if not findings.unknown and not findings.explained_variance > findings.config.least_explained_variance:
+        return (
+            f"The model predicts hardly anything of these runs (explained variance {max(findings.explained_variance, 0.0):.0%} in runs left out), "
+            f"and with none of the {tried} candidate effects that were tried enough for it to mean anything: none is named. Do "
+            "inputs and outputs belong together, and are the samples in order?"
+        )
+    if findings.superseded:
+        titles = and_listed([effect.title for effect in findings.effects if effect.name in findings.superseded])
+        return (
+            f"Something is missing, and none of the {tried} candidate effects that were tried accounts for it: {titles} "
+            "comes nearest, and one unknown function in one equation predicts left-out runs better than that."
+        )
+    if not tried:
+        return "Something is missing, and no candidate effect was to be tried: the experiment file leaves none."
+    return (
+        f"Something is missing, and none of the {tried} candidate effects that were tried accounts "
+        f"for it: none lowers the error enough, {_assessed_on(findings)}."
+    )
+
+
+def _of_one_run(findings: Findings, alone: list[OutlierRun]) -> str:
+    """The opening where without one run the base model is complete."""
+    first = alone[0]
+    return (
+        f"Something is missing or wrong, and in one run alone: without {' or without '.join(one.run for one in alone)} what the base "
+        f"model leaves of the other {findings.fit_runs - 1} fit runs is noise, and fitted to these it predicts {first.run} with an error of "
+        f"{error_text(findings, first.predicted_rmse)}, {first.predicted_rmse / findings.noise_sigma:.1f} times the noise. {caveats.look_at(first)}"
+    )
+
+
+def _partly(findings: Findings) -> str:
+    """The strongest effect by name with what it does alone; the others as what they may be, stand-ins."""
+    if not findings.added:
+        return ""
+    first, *others = findings.added
+    alone = first.evidence.get("alone_rmse_fit", float("nan"))
+    text = f"The base model lacks: {first.title}"
+    if np.isfinite(alone) and others:
+        before = error_text(findings, pooled_rmse(findings.runs, "fit", "before"))
+        text += f"; alone it takes the fit runs from {before} to {error_text(findings, alone)}"
+    if not others:
+        return f"{text}. That explains part of the misfit: what is left is more than noise."
+    return (
+        f"{text}. The error on {'runs left out' if findings.fit_runs > 1 else 'the one fit run'} is lowered further by "
+        f"{and_listed([effect.title for effect in others])}. More than noise is still left: "
+        "something that the library does not hold may be missing too, and "
+        f"{'these' if len(others) > 1 else 'this'} may in part stand in for it."
+    )
+
+
+def _explained(findings: Findings) -> str:
+    """As sure as the runs allow: one fit run and none held out confirm nothing, and a held-out run that is off says the contrary."""
+    listed = and_listed([effect.title for effect in findings.added])
+    if findings.fit_runs > 1 or any(run.role == "held-out" for run in findings.runs):
+        off = caveats.held_out_off(findings)
+        but = f", but not on {and_listed([run.name for run in off])}, held out: more may be missing" if off else ""
+        return f"The base model lacks: {listed}. With it, what is left on the fit runs is measurement noise{but}."
+    return (
+        f"The base model may lack: {listed}. With it, what is left on the one fit run is measurement noise. No run was "
+        "left out or held out, so nothing confirms it."
+    )
+
+
+def _rejected(findings: Findings) -> str:
+    assert findings.rejected is not None
+    named = and_listed([effect.title for effect in findings.effects if effect.name in findings.rejected.effects])
+    without, with_it = (
+        error_text(findings, one) for one in (findings.rejected.rmse_without, findings.rejected.rmse_with)
+    )
+    text = (
+        f"{named} would lower the error {_assessed_on(findings)}, but not on the runs that were held out ({without} without, "
+        f"{with_it} with): it is not confirmed, and not named."
+    )
+    return text[0].upper() + text[1:]
+
+
+def _errors(findings: Findings) -> list[str]:
+    """Of fit runs and held-out runs, before and after; and the noise."""
+    roles: tuple[Role, ...] = ("fit", "held-out")
+    sentences = []
+    for role in roles:
+        before, after = (pooled_rmse(findings.runs, role, which) for which in ("before", "after"))
+        if np.isfinite(before):
+            decided = role != "fit" and findings.rejected is not None
+            sentences.append(
+                f"Error on the {role} runs: {error_text(findings, before)}"
+                + (f" before, {error_text(findings, after)} after" if findings.added else "")
+                + (" (no fit saw them, but they decided what is not named)." if decided else ".")
+            )
+    return [*sentences, f"Measurement noise: {error_text(findings, findings.noise_sigma)} ({findings.noise_how})."]

@@ -1,0 +1,306 @@
+"""The sentences of a report: which are said of which findings, and a few whole ones."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import pytest
+
+from smajax.attribution.findings import (
+    AssumedParameter,
+    CoefficientFinding,
+    Comparison,
+    Confounder,
+    Findings,
+    HeldOutWorse,
+    NoiseWithoutRun,
+    NoLongerNeeded,
+    NothingSignificant,
+    OutlierRun,
+    ParameterFinding,
+    PredictsTooLittle,
+    Reason,
+    Rejected,
+    ResidualIsNoise,
+    Round,
+    RoundLimit,
+    Scored,
+    StepDependent,
+    UnknownTerm,
+    UnknownTermBetter,
+    Verdict,
+    pooled_rmse,
+)
+from smajax.attribution.unknown.terms import UNKNOWN
+from smajax.core.progress import Event, Message, Result, Stage
+from smajax.report.narrative import narrate, narrated
+from smajax.report.narrative.rounds import reason_text
+from tests.helpers.made_findings import made_effect, made_findings, made_residual
+
+BETTER = Comparison(1.8e-3, 0.2e-3, 0.988, 8.14, True)
+
+
+def _summary(**changed: Any) -> str:
+    return " ".join(narrate(dataclasses.replace(made_findings(), **changed)).summary)
+
+
+def test_the_summary_of_an_effect_that_was_found() -> None:
+    """A snapshot: the verdict, the errors, the noise, what the effect means."""
+    assert narrate(made_findings()).summary == (
+        "The base model lacks: latent heat of transformation. With it, what is left on the fit runs is measurement noise.",
+        "Mind: radiation to the surroundings leaves a trace in the score test (p = 4e-12 after 2 candidates) that would take 0.4% of the residual's square: smaller than what is looked into, so it was not fitted.",
+        "Error on the fit runs: 1.13 mm before, 0.0198 mm after.",
+        "Error on the held-out runs: 1.18 mm before, 0.0202 mm after.",
+        "Measurement noise: 0.02 mm (estimated from the flat part of the runs).",
+        "While it transforms the wire absorbs heat without getting warmer, and gives it back on cooling: both strokes are slower than the heat balance alone says, and the same at rest.",
+    )
+
+
+def test_what_depends_on_the_step_or_hides_in_the_noise_is_said_at_the_top() -> None:
+    findings = made_findings()
+    level = max(pooled_rmse(findings.runs, "fit", "after"), findings.noise_sigma)
+    faint = made_effect("creep", "creep", "constitutive", 1e-9, added=False)
+
+    def said(verdict: Verdict, p_value: float, change: float, ratio: float = 1.0, gain: float = 0.03) -> str:
+        evidence = {**faint.evidence, "score_p_value_at_the_end": p_value, "score_gain_at_the_end": gain}
+        after = dataclasses.replace(made_residual(2e-5, ratio == 1.0), ratio=ratio)
+        effects = (dataclasses.replace(faint, evidence=evidence),)
+        return _summary(verdict=verdict, effects=effects, residual_after=after, step_size_error=change)
+
+    adequate, missing = Verdict.ADEQUATE, Verdict.NOT_IN_LIBRARY
+    assert "halving the step" in said(adequate, 0.5, 2.0 * level)
+    assert "halving the step" not in said(adequate, 0.5, 0.1 * level)
+    assert "creep leaves a trace in the score test (p = 1e-9 after 1 candidates)" in said(adequate, 1e-9, 0.0)
+    assert "leaves a trace" not in said(adequate, 0.5, 0.0) + said(missing, 1e-9, 0.0)
+    assert "but runs left out are not predicted better" in said(adequate, 1e-9, 0.0, gain=0.3)
+    assert "autocorrelated, looks the same" in said(missing, 0.5, 0.0, 1.3)
+    assert "looks the same" not in said(missing, 0.5, 0.0, 3.0) + said(adequate, 0.5, 0.0)
+
+
+def test_an_expansion_that_takes_back_the_presets_says_so_and_nothing_of_the_wire() -> None:
+    """As found of two benches whose wires have none, with the preset's theta_T of 0.55 MPa/K left as it is."""
+    preset = (0.55e6 / 28e9, 0.55e6 / 75e9)
+
+    def said(martensite: float, austenite: float, expansion: tuple[float, float] | None) -> str:
+        found = {"martensite": martensite, "austenite": austenite}
+        effect = dataclasses.replace(
+            made_effect("thermal_expansion", "thermal expansion of each phase", "constitutive", 1e-4, added=True),
+            coefficients={phase: CoefficientFinding(value, 2e-7, "1/K") for phase, value in found.items()},
+        )
+        return _summary(effects=(effect,), preset_expansion=expansion)
+
+    assert "takes back the one that the base model has by its preset's thermal_modulus" in said(1.88e-5, 7.4e-6, preset)
+    assert "takes back" not in said(-1.88e-5, 7.4e-6, preset)
+    assert "takes back" not in said(1.88e-5, 2.0e-5, preset)
+    assert "takes back" not in said(1.88e-5, 7.4e-6, None)
+
+
+def test_a_load_far_off_may_be_a_size_of_the_bench_that_was_never_given() -> None:
+    """A bench that gives them all, or a share that is small, has the one reading."""
+
+    def said(share: float, given: bool) -> str:
+        wrong = dataclasses.replace(
+            made_effect("wrong_load", "wrong load", "mechanics", 1e-4, added=True),
+            coefficients={"share": CoefficientFinding(share, 0.01, "-")},
+        )
+        assumed = (
+            AssumedParameter("wire_length", "m", 0.9, not given),
+            AssumedParameter("wire_diameter", "m", 3.7e-4, not given),
+            AssumedParameter("damping", "N s/m", 1.0, False),
+        )
+        return _summary(effects=(wrong,), assumed=assumed)
+
+    assert (
+        "off by -79% may as well be a size of the bench that the experiment file never gives: wire_length 900 mm and "
+        "wire_diameter 0.37 mm are"
+    ) in said(-0.79, False)
+    assert "a size of the bench" not in said(-0.1, False)
+    assert "a size of the bench" not in said(-0.79, True)
+
+
+def test_each_cluster_of_correlated_parameters_has_one_line_with_advice() -> None:
+    def found(name: str, remark: str) -> ParameterFinding:
+        return ParameterFinding(name, "-", 0.5, 0.1, 0.0, 1.0, 0.5, remark)
+
+    after = (
+        found("specific_heat", "correlated with convection_coefficient"),
+        found("convection_coefficient", "correlated with specific_heat"),
+        found("damping", "known from its prior; the runs add next to nothing"),
+        found("density", "only a combination of it with load_mass is identifiable"),
+    )
+    findings = dataclasses.replace(
+        made_findings(),
+        source="experiment.toml",
+        after=after,
+        correlated=(("specific_heat", "convection_coefficient"),),
+    )
+    limits = narrate(findings).cannot_know
+    (advice,) = [one for one in limits if "correlated" in one]
+    assert advice.startswith(
+        "specific_heat and convection_coefficient are correlated in these runs: what one has too much"
+    )
+    assert "add a fit run that separates them" in advice
+    (advice,) = [one for one in limits if one.startswith("Of density these runs determine combinations alone.")]
+    assert "`smajax identify experiment.toml --design`" in advice
+    assert any(one.startswith("damping: known from its prior") for one in limits)
+
+
+def test_a_parameter_at_a_bound_is_said_at_the_top() -> None:
+    one = ParameterFinding("recoverable_strain", "-", 0.02, None, 0.01, 0.02, 0.015, "at its upper bound")
+    coefficient = ParameterFinding("latent_heat.enthalpy", "J/kg", 1e5, None, 0.0, 1e5, 1e4, "at its upper bound")
+    said = _summary(after=(one, coefficient))
+    assert "Mind: recoverable_strain ends at its upper bound of 2 %. The truth may lie beyond" in said
+    assert "Mind: latent_heat.enthalpy ends at a bound. The runs ask for more of the effect than is likely" in said
+
+
+def test_runs_that_cannot_be_left_out_or_were_not_held_out_are_named() -> None:
+    first = made_findings().runs[0]
+    said = _summary(runs=(first,))
+    assert "No run was left out or held out, so nothing confirms it." in said
+    assert "no run could be left out" in said
+    assert "No run was held out" in said
+
+
+def test_confounders_are_named_by_their_weight() -> None:
+    def findings(weight: float, run: str = "") -> Findings:
+        one = Confounder("latent_heat", "radiation", 0.81, weight, 1e-4, run, 4.2)
+        return dataclasses.replace(made_findings(), confounders=(one,))
+
+    assert any("weight of 0.30" in one for one in narrate(findings(0.3)).cannot_know)
+    assert any(
+        "A run with a ramp would separate them by 4.2 times" in one
+        for one in narrate(findings(0.3, "a ramp")).cannot_know
+    )
+    assert not any("radiation" in one for one in narrate(findings(0.01)).cannot_know)
+    preferred = (
+        "Mind: runs left out prefer radiation to the surroundings to latent heat of transformation (weight 0.60)."
+    )
+    assert preferred in narrate(findings(0.6)).summary
+    assert preferred not in narrate(findings(0.4)).summary
+
+
+def _nothing_added() -> Findings:
+    findings = made_findings()
+    effects = tuple(dataclasses.replace(effect, added=False) for effect in findings.effects)
+    residual = made_residual(1.1e-3, False)
+    return dataclasses.replace(findings, verdict=Verdict.NOT_IN_LIBRARY, effects=effects, residual_after=residual)
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({}, "none lowers the error enough, on runs left out as well as on the fit."),
+        ({"effects": ()}, "no candidate effect was to be tried"),
+        ({"explained_variance": 0.1}, "(explained variance 10% in runs left out)"),
+        ({"superseded": ("radiation",)}, "radiation to the surroundings comes nearest, and one unknown function"),
+        ({"rejected": Rejected(("radiation",), 1e-3, 2e-3)}, "Radiation to the surroundings would lower the error"),
+        ({"outlier_runs": (OutlierRun("step 6 V", (), True, 1e-3, 2e-5, 3e-3),)}, "in one run alone: without step 6 V"),
+    ],
+)
+def test_nothing_is_named_for_a_reason(changed: dict[str, Any], said: str) -> None:
+    assert said in narrate(dataclasses.replace(_nothing_added(), **changed)).summary[0]
+
+
+def test_an_outlier_beside_what_was_added_is_to_be_minded() -> None:
+    one = OutlierRun("step 6 V", ("latent_heat",), False, 1e-3, 2e-4, 3e-3)
+    assert (
+        "Mind: step 6 V does not agree with the others. Fitted without it, the error of the extended model"
+        in _summary(outlier_runs=(one,))
+    )
+
+
+@pytest.mark.parametrize(
+    ("reason", "text"),
+    [
+        (ResidualIsNoise(), "what is left of the fit runs is measurement noise"),
+        (
+            NothingSignificant(7, 0.0042),
+            "no candidate stands out in the score test: none of 7 promises more than 0.4% of the mean square",
+        ),
+        (
+            Scored(BETTER),
+            "error on left-out runs 1.8 mm -> 0.2 mm (+99% of its mean square, 8.1 standard errors)",
+        ),
+        (
+            Scored(None, (StepDependent("drag", -0.2),)),
+            "drag keeps 0% of its gain at half the step and is not accepted",
+        ),
+        (RoundLimit(6), "the search ends after 6 rounds, whatever more there may be"),
+        (
+            NoLongerNeeded(dataclasses.replace(BETTER, left_out=False)),
+            "removed again: error on the one fit run itself 1.8 mm -> 0.2 mm (+99% of its mean square, 8.1 standard errors) "
+            "with it is not enough",
+        ),
+        (
+            PredictsTooLittle(0.2, 0.5),
+            "set aside: with it the model explains 20% of the motion in runs left out, and under 50% an effect means nothing",
+        ),
+        (NoiseWithoutRun("a"), "set aside: without a what the base model leaves is noise"),
+        (
+            UnknownTermBetter("a loss", 1e-3, 2e-4),
+            "set aside: a loss alone predicts left-out runs better than all of them, 1 mm -> 0.2 mm",
+        ),
+        (HeldOutWorse(1e-3, 2e-3), "set aside: error on the held-out runs 1 mm without and 2 mm with it"),
+    ],
+)
+def test_why_a_round_ended(reason: Reason, text: str) -> None:
+    assert reason_text(reason, "m", "position") == text
+
+
+def test_a_round_is_a_message_while_the_search_runs() -> None:
+    events: list[Event] = []
+    progress = narrated(events.append, "m", "position")
+    progress(Stage("fitting", 0.5))
+    progress(Result(Round(2, (), "creep", ResidualIsNoise(), removed=True)))
+    assert events == [
+        Stage("fitting", 0.5),
+        Message("round 2: without creep; what is left of the fit runs is measurement noise"),
+    ]
+
+
+def _with_terms(named: bool, *others: str, held_out: tuple[float, float] | None = None) -> tuple[str, ...]:
+    empty = np.zeros(0)
+
+    def term(name: str, first: bool) -> UnknownTerm:
+        kind = UNKNOWN[name]
+        return UnknownTerm(
+            name,
+            kind.title,
+            kind.equation,
+            kind.symbol,
+            kind.state,
+            kind.state_unit,
+            kind.unit,
+            named and first,
+            others if first else (),
+            BETTER if first else None,
+            0.5,
+            2.0,
+            1.0,
+            held_out[0] if held_out and first else None,
+            held_out[1] if held_out and first else None,
+            empty,
+            empty,
+            empty,
+            empty,
+            empty,
+            empty,
+            (),
+        )
+
+    names = ("unknown_loss_of_temperature", "unknown_heat_of_fraction", "unknown_reading_of_time")
+    terms = tuple(term(name, k == 0) for k, name in enumerate(names))
+    return narrate(dataclasses.replace(_nothing_added(), unknown=terms)).summary
+
+
+def test_an_equation_is_named_only_where_no_other_does_as_well() -> None:
+    assert "it is in the heat equation" in _with_terms(True)[1]
+    assert "it is in the heat equation" in _with_terms(True, "unknown_heat_of_fraction")[1]
+    assert "or a stored heat" in _with_terms(True, "unknown_heat_of_fraction")[1]
+    undecided = _with_terms(True, "unknown_reading_of_time")[1]
+    assert "do not determine whether it is in the heat equation or the sensor equation" in undecided
+    assert "Nor do these runs determine in which equation" in _with_terms(False)[1]
+    assert "on those held out" in _with_terms(True, held_out=(2.0, 1.0))[1]
+    assert "is not validated on the held-out runs" in _with_terms(False, held_out=(1.0, 2.0))[1]
