@@ -43,7 +43,7 @@ _PERCENT = Display("%", 100.0)
 def display(unit: str, quantity: str = "") -> Display:
     """How to show a value given in `unit`; a unit that has no entry is shown as it is.
 
-    A strain is the one plain number that is read in per cent: `quantity`, its name, tells it from the others. A run's own
+    A strain is the one plain number that is read in per cent: `quantity`, its name, distinguishes it from the others. A run's own
     parameter is named `recoverable_strain[run]`.
     """
     if unit in ("-", "1", "") and quantity.split("[")[0].endswith("strain"):

@@ -44,7 +44,7 @@ def _what_to_do(found: Identified) -> str:
         return ""
     where = "such runs are ranked below" if found.suggestions else "<code>--design</code> ranks such runs"
     return (
-        "<p>Of what moves together measure one by itself and give it under <code>[model.parameters]</code> in the place of "
+        "<p>Of correlated parameters measure one by itself and give it under <code>[model.parameters]</code> in the place of "
         f"<code>[unknown]</code>, or add a run that separates them (another load, a slower or a hotter one): {where}.</p>"
     )
 
@@ -89,7 +89,7 @@ def page(found: Identified) -> str:
         bullets(conclusions(found)),
         "<h2>Parameters</h2>",
         table(head, rows, [k for k, title in enumerate(head) if title not in ("parameter", "unit", "remark")]),
-        "<h2>What the runs tell apart</h2>",
+        "<h2>Which combinations are identifiable</h2>",
         bullets(found.weak) or f"<p>{KNOWN if found.all_took_part else KNOWN_OF_THE_REST}</p>",
         _what_to_do(found),
         _correlations(found),
@@ -124,7 +124,7 @@ def page(found: Identified) -> str:
         ]
         parts += [
             "<h2>What to measure next</h2><p class=quiet>Courses of the input within what was applied already, ranked by "
-            "what one such run would tell (D-optimal, at the fit).</p>",
+            "what one such run would determine (D-optimal, at the fit).</p>",
             table(["rank", "run", "information, nats", "standard errors become"], rows, (0, 2)),
             picture(draw.suggested_inputs(found), "suggested inputs"),
         ]

@@ -84,7 +84,7 @@ def record(found: Identified) -> dict[str, Any]:
 
 
 def _posterior_record(drawn: Posterior) -> dict[str, Any]:
-    told = {
+    parameters = {
         name: {
             "mean": float(draws.mean()),
             "standard_deviation": float(draws.std()),
@@ -94,4 +94,9 @@ def _posterior_record(drawn: Posterior) -> dict[str, Any]:
         }
         for name, draws, r_hat, effective in zip(drawn.names, drawn.flat.T, drawn.r_hat, drawn.effective, strict=True)
     }
-    return {"parameters": told, "converged": drawn.converged, "accepted": drawn.accepted, "inflation": drawn.inflation}
+    return {
+        "parameters": parameters,
+        "converged": drawn.converged,
+        "accepted": drawn.accepted,
+        "inflation": drawn.inflation,
+    }

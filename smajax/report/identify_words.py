@@ -20,58 +20,64 @@ OFF = 1.25  # ratio of residual to noise that is worth a sentence
 
 def conclusions(found: Identified) -> list[str]:
     """What was found, in sentences that say no more than the numbers."""
-    told = [found.stopped, *(_error(found, k) for k in range(len(found.outputs)))]
+    sentences = [found.stopped, *(_error(found, k) for k in range(len(found.outputs)))]
     given = [one.noise_before is None for one in found.outputs]
     if not all(np.isfinite(one.ratio) for one in found.outputs):
-        told.append("What the model leaves of these runs is no number: nothing can be said of it, nor of the values.")
+        sentences.append("The residual of these runs is NaN or infinite: neither it nor the values mean anything.")
     elif found.whiteness_p < WHITE:
-        told.append(
-            f"The residual is {_times(found)} and has a memory ({p_value(found.whiteness_p)}; one "
+        sentences.append(
+            f"The residual is {_times(found)} and is autocorrelated ({p_value(found.whiteness_p)}; one "
             f"sample in {found.independent:.0f} is independent): the model lacks something, and the standard errors allow "
-            "for the memory but not for what that does to the values. `smajax close-loop` looks for what it is."
+            "for the autocorrelation but not for what that does to the values. `smajax close-loop` looks for what it is."
         )
     else:
-        told.append(
-            f"The residual is {_times(found)}, and no memory was found in it "
+        sentences.append(
+            f"The residual is {_times(found)} and is white "
             f"({p_value(found.whiteness_p)}): nothing in these runs speaks against the model."
         )
         wrong = [
-            one for one, told_ in zip(found.outputs, given, strict=True) if told_ and not 1.0 / OFF < one.ratio < OFF
+            one
+            for one, was_given in zip(found.outputs, given, strict=True)
+            if was_given and not 1.0 / OFF < one.ratio < OFF
         ]
         if wrong and len(found.outputs) == 1:
-            told.append("The noise is not what was declared: errors were taken from the residual.")
+            sentences.append("The noise is not what was declared: errors were taken from the residual.")
         elif wrong:
-            told.append(
+            sentences.append(
                 f"The noise of {and_listed([one.name for one in wrong])} is not what was declared, so the outputs do not "
                 "have the weights they deserve: write noise = 'estimate' for it."
             )
     larger = [one for one in found.outputs if one.noise_before and one.noise_sigma > OFF * one.noise_before]
     if larger:
-        told.append(
-            f"What the fit leaves of {and_listed([one.name for one in larger])} is more than the noise that the signal "
+        sentences.append(
+            f"The residual of {and_listed([one.name for one in larger])} is larger than the noise that the signal "
             "itself shows: part of it is what the model lacks, and was given the weight of noise."
         )
     if found.normality_p < WHITE and not found.robust:
-        told.append(
+        sentences.append(
             f"It is not normally distributed ({p_value(found.normality_p)}): if single samples are far off, fit by Huber's "
             "loss (`--robust`)."
         )
-    told += [said for one in found.estimates if (said := _contradicted(one))]
+    sentences += [said for one in found.estimates if (said := _contradicted(one))]
     edge = [one.name for one in found.estimates if "bound" in one.remark and one.standard_error is None]
-    silent = [one.name for one in found.estimates if one.standard_error is None and one.name not in edge]
+    not_identifiable = [one.name for one in found.estimates if one.standard_error is None and one.name not in edge]
     if edge:
-        told.append(
-            f"Held by a bound, which the truth may lie beyond: {', '.join(edge)}; the others are told with it held."
+        sentences.append(
+            f"Held by a bound, which the truth may lie beyond: {', '.join(edge)}; the others are estimated with it held."
         )
-    if silent:
-        told.append(f"The runs do not tell {', '.join(silent)}: see the remarks.")
+    if not_identifiable:
+        sentences.append(
+            f"{', '.join(not_identifiable)} {'is' if len(not_identifiable) == 1 else 'are'} not identifiable from these runs: see the remarks."
+        )
     if better := [one.name for one in found.profiles if one.better]:
-        told.append(f"The profile of {', '.join(better)} found a better fit than this one: ask for more `--starts`.")
+        sentences.append(
+            f"The profile of {', '.join(better)} found a better fit than this one: ask for more `--starts`."
+        )
     if found.posterior is not None:
-        told.append(_chains(found.posterior))
+        sentences.append(_chains(found.posterior))
     if found.robust:
-        told.append("Huber's loss: samples far off count less, and errors are those of that estimate.")
-    return told
+        sentences.append("Huber's loss: samples far off count less, and errors are those of that estimate.")
+    return sentences
 
 
 def _times(found: Identified) -> str:

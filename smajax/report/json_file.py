@@ -207,6 +207,8 @@ def with_current_keys(record: Mapping[str, Any]) -> dict[str, Any]:
 
     found = dict(renamed("", record))
     if old:
-        told = ", ".join(f"{key} ({now} now)" for key, now in old.items())
-        warnings.warn(f"keys of an older report.json, read until version 0.3: {told}", DeprecationWarning, stacklevel=2)
+        listed = ", ".join(f"{key} ({now} now)" for key, now in old.items())
+        warnings.warn(
+            f"keys of an older report.json, read until version 0.3: {listed}", DeprecationWarning, stacklevel=2
+        )
     return found

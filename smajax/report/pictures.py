@@ -227,7 +227,7 @@ def _left_out(effect: EffectFinding, which: str = "leave_one_out_rmse") -> float
 
 
 def ranked(effects: Sequence[EffectFinding]) -> list[EffectFinding]:
-    """The added effects first, then by error on runs left out, then by the gain foretold; those not reached last."""
+    """The added effects first, then by error on runs left out, then by the gain predicted by the score test; those not reached last."""
 
     def key(effect: EffectFinding) -> tuple[bool, float, float]:
         error, gain = _left_out(effect), effect.evidence.get("score_gain", float("nan"))

@@ -53,8 +53,8 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequence[
 
 def bullets(sentences: Sequence[str]) -> str:
     """A list, with what stands between backticks as code; nothing for none."""
-    told = [re.sub(r"`([^`]+)`", r"<code>\1</code>", html.escape(one)) for one in sentences]
-    return f"<ul>{''.join(f'<li>{one}</li>' for one in told)}</ul>" if told else ""
+    items = [re.sub(r"`([^`]+)`", r"<code>\1</code>", html.escape(one)) for one in sentences]
+    return f"<ul>{''.join(f'<li>{one}</li>' for one in items)}</ul>" if items else ""
 
 
 def whole(title: str, parts: Sequence[str]) -> str:

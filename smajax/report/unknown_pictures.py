@@ -13,9 +13,9 @@ def function_learnt(term: UnknownTerm) -> bytes:
     """f over its state with the 95 % band, the formulas, and below them the share of samples in each cell."""
     figure = new_figure(3.9, NARROW)
     rows = figure.subplots(2, 1, sharex=True, height_ratios=[3.0, 0.9])
-    state, own = display(term.state_unit, term.state), display(term.unit)
-    at, values = state.of(term.at), own.of(term.values)
-    band, held = 2.0 * own.of(term.error), 2.0 * own.of(term.error_held)
+    state, unit = display(term.state_unit, term.state), display(term.unit)
+    at, values = state.of(term.at), unit.of(term.values)
+    band, held = 2.0 * unit.of(term.error), 2.0 * unit.of(term.error_held)
     middle = float(np.max(np.abs(values))) or 1.0
     rows[0].fill_between(at, values - band, values + band, color=NOISE, label="± 2 standard errors")
     rows[0].fill_between(
@@ -25,7 +25,7 @@ def function_learnt(term: UnknownTerm) -> bytes:
     for formula, style in zip(term.formulas, ("--", ":", "-."), strict=False):
         rows[0].plot(
             state.of(np.linspace(term.at[0], term.at[-1], len(formula.curve))),
-            own.of(formula.curve),
+            unit.of(formula.curve),
             style,
             color="#1d1d1f",
             linewidth=1.0,
@@ -35,7 +35,7 @@ def function_learnt(term: UnknownTerm) -> bytes:
     # A band that the runs leave open must not flatten the curve.
     reach = 1.15 * max(middle, min(float(np.max(np.abs(values) + band)), 3.0 * middle))
     rows[0].set_ylim(-reach, reach)
-    rows[0].set_ylabel(axis_label("f", own), fontsize=9)
+    rows[0].set_ylabel(axis_label("f", unit), fontsize=9)
     whole = max(float(np.sum(term.samples)), 1.0)
     edges = state.of(term.cells)
     rows[1].bar(edges[:-1], 100.0 * term.samples / whole, np.diff(edges), align="edge", color=QUIET)
