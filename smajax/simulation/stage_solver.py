@@ -27,6 +27,7 @@ import jax.numpy as jnp
 from jax import lax
 from jaxtyping import Array, Bool
 
+from smajax.core.traced_once import traced_once
 from smajax.model.friction import bent, rubbing, unbent
 from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.system import System
@@ -107,6 +108,7 @@ def solved_linear(rows: Sequence[Sequence[Entry]], *rights: Sequence[Entry]) -> 
     return [[jnp.zeros_like(some) if entry is None else entry for entry in one] for one in right]
 
 
+@traced_once
 def _linearised(system: System, stage: Stage, inputs: Inputs, z: Unknowns) -> tuple[list[Scalar], list[list[Entry]]]:
     """(what `equations` says, its derivatives by the four unknowns)."""
     columns = []
@@ -144,6 +146,7 @@ def _nearly(miss: Callable[[Scalar], Scalar], start: Scalar, low: Scalar, high: 
     return here
 
 
+@traced_once
 def solve(system: System, stage: Stage, inputs: Inputs) -> Solution:
     """The end of a stage. Not to be differentiated: its equations are (`stage_equations`)."""
     law, effects, old = system.wire.kinetics, system.effects, stage.old.wire

@@ -27,6 +27,7 @@ import jax.numpy as jnp
 from jax import lax
 
 from smajax.core.checkpointed_scan import recomputed, solved
+from smajax.core.traced_once import traced_once
 from smajax.model.friction import in_use, rubbing
 from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.load.coupon import Coupon, StrainCoupon
@@ -95,6 +96,7 @@ def _solved_jvp(primals, tangents):  # type: ignore[no-untyped-def]  # the signa
     return eqx.filter_jvp(_differentiable, primals, tangents)
 
 
+@traced_once
 def _differentiable(given: tuple[System, Stage, Inputs]) -> Solution:
     """The same, and one linear correction: its derivatives, the second too, are then those of the equations' root.
 
@@ -163,6 +165,7 @@ def _stage(system: System, stage: Stage, inputs: Inputs) -> tuple[State, Scalar,
     return new, heating, velocity, acceleration
 
 
+@traced_once
 def _moving_step(
     system: System, state: State, inputs: Inputs, dt: Scalar, scheme: Scheme, once: bool = False
 ) -> tuple[State, tuple[Scalar, Scalar, Scalar]]:
@@ -196,6 +199,7 @@ def _moving_step(
     return State(end.stage.time, old.wire, old.motion, old.reading, old.sensor), (heat, position, velocity)
 
 
+@traced_once
 def _coupon_step(system: System, state: State, inputs: Inputs, dt: Scalar) -> State:
     """Temperature and stress at the end of the step are prescribed: the fraction follows in closed form."""
     wire, effects, old = system.wire, system.effects, over(state.wire, dt)
@@ -208,6 +212,7 @@ def _coupon_step(system: System, state: State, inputs: Inputs, dt: Scalar) -> St
     return State(state.time + dt, new, state.motion, state.reading, state.sensor)
 
 
+@traced_once
 def _strain_coupon_step(system: System, state: State, inputs: Inputs, dt: Scalar) -> State:
     """Temperature and strain at the end of the step are prescribed: the fraction is the root of one equation.
 
