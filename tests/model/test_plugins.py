@@ -119,13 +119,13 @@ def _asked(code: str, environment: dict[str, str], cwd: Path) -> subprocess.Comp
 
 
 def test_an_effect_and_a_load_of_another_package(tmp_path: Path) -> None:
-    points = "[smajax.model.effects]\nbreeze = airflow:Breeze\n[smajax.loads]\nbucket = airflow:bucket\n"
+    points = "[smajax.effects]\nbreeze = airflow:Breeze\n[smajax.loads]\nbucket = airflow:bucket\n"
     told = _asked(LOOK, _installed(tmp_path, points), tmp_path)
     assert told.returncode == 0, told.stderr
     last, mass, (still, moving), versions = json.loads(told.stdout)
     assert (last, mass) == ("breeze", 1.0)
     assert moving < still - 1.0
-    assert versions == ["smajax.model.effects breeze airflow 1.2", "smajax.loads bucket airflow 1.2"]
+    assert versions == ["smajax.effects breeze airflow 1.2", "smajax.loads bucket airflow 1.2"]
 
 
 @pytest.mark.parametrize(
@@ -143,7 +143,7 @@ def test_an_effect_and_a_load_of_another_package(tmp_path: Path) -> None:
 def test_what_cannot_be_used_is_refused_by_name(
     point: str, told: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    _installed(tmp_path, f"[smajax.model.effects]\n{point}\n")
+    _installed(tmp_path, f"[smajax.effects]\n{point}\n")
     monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(PluginError, match=re.escape(told)):
         brought(EFFECTS, _OWN, _wrong)
@@ -153,11 +153,11 @@ def test_what_cannot_be_used_is_refused_by_name(
     ("points", "told"),
     [
         (
-            "[smajax.model.effects]\ngale = airflow:Gale\n",
+            "[smajax.effects]\ngale = airflow:Gale\n",
             "the effect 'gale', which must change nothing at its base value",
         ),
-        ("[smajax.model.effects]\ndraft = airflow:Breeze\n", "calls itself 'breeze'"),
-        ("[smajax.model.effects]\nbreeze = nowhere:Breeze\n", "cannot be loaded (ModuleNotFoundError"),
+        ("[smajax.effects]\ndraft = airflow:Breeze\n", "calls itself 'breeze'"),
+        ("[smajax.effects]\nbreeze = nowhere:Breeze\n", "cannot be loaded (ModuleNotFoundError"),
         ("[smajax.loads]\nbucket = nowhere:bucket\n", "cannot be loaded (ModuleNotFoundError"),
         ("[smajax.loads]\nweight = airflow:DeadWeight\n", "is the class DeadWeight, which cannot be called without"),
         ("[smajax.loads]\nheap = airflow:heap\n", "returns 3.0; expected a function without arguments"),
@@ -177,13 +177,13 @@ def test_the_doctor_says_what_is_wrong_with_a_plug_in_and_blames_nothing_else(
 def test_the_loop_refuses_an_effect_that_is_not_neutral_and_says_by_how_much(tmp_path: Path) -> None:
     demo = Path(__file__).parents[2] / "smajax" / "data" / "demo" / "latent" / "experiment.toml"
     code = f"import sys; sys.argv = ['smajax', 'close-loop', {str(demo)!r}]; from smajax.cli.main import main; main()"
-    ended = _asked(code, _installed(tmp_path, "[smajax.model.effects]\ngale = airflow:Gale\n"), tmp_path)
+    ended = _asked(code, _installed(tmp_path, "[smajax.effects]\ngale = airflow:Gale\n"), tmp_path)
     assert ended.returncode == 2, ended.stderr
     assert re.search(r"changes the position by up to [0-9.]+ mm, the temperature by up to [0-9.]+ °C", ended.stderr)
     assert "Traceback" not in ended.stderr
     neutral = "from smajax.core.runtime import prepare; prepare(); from smajax.attribution.neutral import check_neutral; check_neutral()"
     (tmp_path / "airflow-1.2.dist-info" / "entry_points.txt").write_text(
-        "[smajax.model.effects]\nbreeze = airflow:Breeze\n"
+        "[smajax.effects]\nbreeze = airflow:Breeze\n"
     )
     ended = _asked(neutral, _with(tmp_path), tmp_path)
     assert ended.returncode == 0, ended.stderr
@@ -199,7 +199,7 @@ def test_a_load_that_is_no_preset_is_refused_without_a_traceback(tmp_path: Path)
 
 
 def test_the_command_line_says_it_without_a_traceback(tmp_path: Path) -> None:
-    environment = _installed(tmp_path, "[smajax.model.effects]\nlatent_heat = airflow:Breeze\n")
+    environment = _installed(tmp_path, "[smajax.effects]\nlatent_heat = airflow:Breeze\n")
     code = "import sys; sys.argv = ['smajax', 'effects']; from smajax.cli.main import main; main()"
     ended = _asked(code, environment, tmp_path)
     assert ended.returncode == 2, ended.stderr
