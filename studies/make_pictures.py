@@ -9,7 +9,7 @@ from pathlib import Path
 from rich.console import Console
 
 from smajax.attribution.close_loop import close_loop
-from smajax.cli.progress_display import shown
+from smajax.cli.progress_display import displayed
 from smajax.core.runtime import prepare
 from smajax.data.experiment.load import load_experiment
 from smajax.data.model_catalogue import CATALOGUE
@@ -23,7 +23,7 @@ def main() -> None:
     """Closes the loop on the demo's wire with a latent heat, and draws a run that no fit saw."""
     with resources.as_file(resources.files("smajax") / "data" / "demo" / "latent") as folder:
         experiment = load_experiment(folder / "experiment.toml", CATALOGUE)
-    with tempfile.TemporaryDirectory() as kept, shown(Console(stderr=True)) as progress:
+    with tempfile.TemporaryDirectory() as kept, displayed(Console(stderr=True)) as progress:
         findings = close_loop(experiment, memory=Path(kept), progress=progress)
     run = next(one for one in findings.runs if one.name == RUN)
     PICTURE.write_bytes(run_over_time(findings, run))

@@ -24,10 +24,10 @@ COMPILING = "compiling, the first time only"
 
 
 @contextmanager
-def shown(console: Console, told_how: bool = False) -> Iterator[Progress]:
+def displayed(console: Console, hint: bool = False) -> Iterator[Progress]:
     """Yields `progress(event)`, see `smajax.core.progress`; a warning is written wherever stderr goes.
 
-    told_how: where nothing is drawn, say once how to get progress; for long work whose result is words for a person.
+    hint: where nothing is drawn, write once how to get progress; for long work whose result is read by a person.
     """
     if sys.stderr.isatty():
         with _bars(console) as progress:
@@ -36,7 +36,7 @@ def shown(console: Console, told_how: bool = False) -> Iterator[Progress]:
         with _lines(console) as progress:
             yield progress
     else:
-        if told_how and VARIABLE not in os.environ:
+        if hint and VARIABLE not in os.environ:
             console.print(HOW, markup=False, highlight=False, soft_wrap=True)
         yield _warnings(console)
 

@@ -21,7 +21,7 @@ from typer.testing import CliRunner
 from smajax.cli import renamed
 from smajax.cli.main import app, main
 from smajax.cli.options import console, numbers, pairs, texts, understood
-from smajax.cli.progress_display import VARIABLE, _TimeLeft, shown
+from smajax.cli.progress_display import VARIABLE, _TimeLeft, displayed
 from smajax.control.compose import compose, with_values
 from smajax.control.mismatch import MISMATCHES, variation_of
 from smajax.control.tune.terms import TERMS
@@ -212,7 +212,7 @@ def test_progress_is_silent_where_nobody_looks(
 ) -> None:
     for setting, told in (("", ""), ("lines", "fitting")):
         monkeypatch.setenv(VARIABLE, setting)
-        with shown(console()) as progress:
+        with displayed(console()) as progress:
             progress(Stage("fitting", 0.0))
             progress(Message("one more thing"))
         said = capsys.readouterr().err
@@ -225,8 +225,8 @@ def test_how_to_see_progress_is_said_once_to_a_person_without_a_terminal(
 ) -> None:
     monkeypatch.delenv(VARIABLE, raising=False)
 
-    def said(told_how: bool) -> str:
-        with shown(console(), told_how) as progress:
+    def said(hint: bool) -> str:
+        with displayed(console(), hint) as progress:
             for share in (0.0, 1.0):
                 progress(Stage("fitting", share))
         return capsys.readouterr().err
@@ -264,7 +264,7 @@ def test_a_stage_that_waits_for_a_compilation_says_so(
     monkeypatch.setenv(VARIABLE, "lines")
     monkeypatch.setattr("smajax.core.compiling.threading.Timer", _AtOnce)
     monkeypatch.setattr("smajax.engine.cache.folder", lambda: None)
-    with shown(console()) as progress:
+    with displayed(console()) as progress:
         progress(Stage("fitting", 0.0))
         for power in (2, 3):  # programs that no other test has
             jax.jit(lambda x, power=power: jnp.sinc(x) ** power)(np.ones(7))
@@ -294,7 +294,7 @@ def test_a_warning_is_said_wherever_stderr_leads(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv(VARIABLE, "")
-    with shown(console()) as progress:
+    with displayed(console()) as progress:
         progress(Stage("fitting", 0.0))
         progress(WarningMessage("check: is it in mm?"))
     assert capsys.readouterr().err == "warning: check: is it in mm?\n"

@@ -29,13 +29,13 @@ FINISHED_FITS = "Finished fits are kept: the same command goes on from there."
 OWN = ("report.html", "report.json", "parameters.csv", "runs.csv", FITS)
 
 
-def _loop(experiment: Path, out: Path, command: str, overwrite: bool, told_how: bool) -> tuple[Findings, Path]:
+def _loop(experiment: Path, out: Path, command: str, overwrite: bool, hint: bool) -> tuple[Findings, Path]:
     # Imported here so that `--help` does not wait for JAX; x64 is the caller's choice, and this is the caller.
     from smajax.core.runtime import prepare
 
     prepare()
     from smajax.attribution.close_loop import close_loop
-    from smajax.cli.progress_display import shown
+    from smajax.cli.progress_display import displayed
     from smajax.cli.result_folder import check_path, claimed
     from smajax.data.experiment.fingerprint import asked_of
     from smajax.data.experiment.load import load_experiment
@@ -48,7 +48,7 @@ def _loop(experiment: Path, out: Path, command: str, overwrite: bool, told_how: 
     with (
         resumable(FINISHED_FITS, out, FITS),
         claimed(out, "close-loop", asked_of(loaded), OWN, overwrite),
-        shown(console(), told_how) as progress,
+        displayed(console(), hint) as progress,
     ):
         in_words = narrated(progress, loaded.output_unit, loaded.output_name)
         findings = close_loop(loaded, memory=out / "fits", progress=in_words, command=command)

@@ -42,7 +42,7 @@ def figures(
     from smajax.core.runtime import prepare
 
     prepare()
-    from smajax.cli.progress_display import shown
+    from smajax.cli.progress_display import displayed
     from smajax.cli.result_folder import claimed
     from smajax.cli.source_figures import load
 
@@ -56,7 +56,7 @@ def figures(
     with (
         resumable(resume, out, "[MC]*.json"),
         claimed(out, "figures", setting, OWN, overwrite),
-        shown(console(), told_how=not json_out) as progress,
+        displayed(console(), hint=not json_out) as progress,
     ):
         drawn = write.draw(list(dict.fromkeys(requested)), out, fast, progress)
         page = write.write_pages(out)

@@ -54,7 +54,7 @@ def identify_command(
     from smajax.core.runtime import prepare
 
     prepare()
-    from smajax.cli.progress_display import shown
+    from smajax.cli.progress_display import displayed
     from smajax.cli.result_folder import FolderTaken, check_path, claimed
     from smajax.core.files import json_text
     from smajax.core.progress import Message
@@ -82,7 +82,7 @@ def identify_command(
         with (
             resumable(kept, out, FITS),
             claimed(out, "identify", asked, OWN, overwrite, _goes_on),
-            shown(console(), told_how=not json_out) as progress,
+            displayed(console(), hint=not json_out) as progress,
         ):
             if any((out / "fits").glob("*.npz")):
                 progress(Message(f"Fits kept in {out / 'fits'} are gone on with where they are of the same work."))

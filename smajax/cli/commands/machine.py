@@ -103,10 +103,10 @@ def bench(
     prepare(cores=True)
     from smajax.cli.benchmark import bench as timed
     from smajax.cli.benchmark import in_words
-    from smajax.cli.progress_display import shown
+    from smajax.cli.progress_display import displayed
     from smajax.core.files import json_text, replace
 
-    with resumable(), shown(console()) as progress:
+    with resumable(), displayed(console()) as progress:
         found = timed(count, min(peers, count), progress)
     if out is not None:
         replace(out, json_text(found))

@@ -139,7 +139,7 @@ def simulate(
     from smajax.core.runtime import prepare
 
     prepare()
-    from smajax.cli.progress_display import shown
+    from smajax.cli.progress_display import displayed
     from smajax.cli.result_folder import check_path, claimed
     from smajax.control.gains_file import GainsFileError
     from smajax.control.run_request import Asked, AskedError, AskedLoop, channels, run_closed, run_open
@@ -183,7 +183,7 @@ def simulate(
             stepped = next(iter(required))
             asked = Asked(**{**vars(asked), "inputs": {**series, stepped: step}})
             options[f"inputs.{stepped}"] = "--step"
-        with resumable(), shown(console()) as progress:
+        with resumable(), displayed(console()) as progress:
             progress(Stage("simulating the run", 0.0))
             loop: AskedLoop | None = None
             if closed:
@@ -218,7 +218,7 @@ def simulate(
         **(vars(loop) if loop is not None else {}),
         "gains": None if gains is None else gains.read_text(),
     }
-    with resumable(), claimed(out, "simulate", told, OWN, overwrite), shown(console()) as progress:
+    with resumable(), claimed(out, "simulate", told, OWN, overwrite), displayed(console()) as progress:
         page = write_run(ran, out, title, command, gif, progress)
     for note in ran.notes:
         console().print(note, soft_wrap=True, markup=False, highlight=False)

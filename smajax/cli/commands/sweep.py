@@ -95,7 +95,7 @@ def sweep(
     from smajax.core.runtime import prepare
 
     prepare(cores=True)
-    from smajax.cli.progress_display import shown
+    from smajax.cli.progress_display import displayed
     from smajax.cli.result_folder import FolderTaken, claimed
     from smajax.control.gains_file import GainsFileError, read_gains
     from smajax.control.mismatch import short_name
@@ -151,7 +151,7 @@ def sweep(
         with (
             resumable(kept, out, "finished/*.npz"),
             claimed(out, "sweep", record, own, overwrite, goes_on),
-            shown(console(), told_how=not json_out) as progress,
+            displayed(console(), hint=not json_out) as progress,
         ):
             rows = run_sweep(arm(), settings, out, progress, command_line())
     except FolderTaken:

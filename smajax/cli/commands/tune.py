@@ -117,7 +117,7 @@ def tune(
     from smajax.core.runtime import prepare
 
     prepare(cores=True)
-    from smajax.cli.progress_display import shown
+    from smajax.cli.progress_display import displayed
     from smajax.cli.result_folder import FolderTaken, claimed
     from smajax.control.gains_file import GainsFileError, read_gains
     from smajax.control.mismatch import variation_of
@@ -171,7 +171,7 @@ def tune(
         with (
             resumable(kept, out, STATE),
             claimed(out, "tune", asked, sorted(OURS), overwrite),
-            shown(console(), told_how=not json_out) as progress,
+            displayed(console(), hint=not json_out) as progress,
         ):
             told = ended(arm(), settings, out)
             if told is None:
