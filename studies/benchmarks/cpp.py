@@ -56,6 +56,7 @@ def build(folder: Path, flags: tuple[str, ...] = ()) -> Path | None:
     return program
 
 
+# More than eight parameters: each is one option of the C++ program.
 def run(
     program: Path,
     system: System,

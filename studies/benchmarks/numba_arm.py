@@ -154,6 +154,7 @@ def members_of(p: Constants, dt: float, voltage: np.ndarray, payload_mass: np.nd
     )
 
 
+# One function of 440 lines: numba inlines what is written within it, in the precision that it closes over.
 def build(real: Any, lanes: int, tools: Tools = PLAIN) -> Callable[..., Any]:
     """`simulate(rig, members, steps, every, record, result)` in the precision `real` (numpy's), `lanes` members to a block.
 

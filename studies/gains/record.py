@@ -31,6 +31,7 @@ def or_never(time: Scalar, seconds: float) -> Scalar:
     return jnp.where(jnp.isfinite(time), time, 2.0 * seconds)
 
 
+# More than eight parameters: each is one line of the record, and of the scripts that are read beside it.
 def searched(
     controller: AbstractController,
     box: Mapping[str, tuple[float, float]],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import equinox as eqx
@@ -26,6 +27,9 @@ VOLTS, ON, SECONDS, PERIOD = 8.0, 3.0, 6.0, 0.01
 GUESS_GONE = 0.1  # s: the printed first guess of the stress is 23 MPa off
 AROUND = 0.25  # s on either side of the instant at which the arm turns round
 NOISE = 1e-3  # rad, of the second set of readings
+# Filter -> its set of readings: the printed one on exact readings, as in the source's simulation; the model's has only noise
+# to deal with.
+READINGS = {"printed": 0, "model": 1}
 
 # Field -> (factor to the unit shown, unit, share of its range within which an estimate counts as following).
 SHOWN: dict[str, tuple[float, str, float]] = {
@@ -46,6 +50,62 @@ def _area(across: Any, up: Any) -> float:
     return float(abs(np.sum(up * (np.roll(across, -1) - np.roll(across, 1)))) / 2.0)
 
 
+def _rms(error: np.ndarray, when: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(error[when] ** 2)))
+
+
+def _numbers(
+    peaks: dict[tuple[str, str], tuple[float, float]],
+    rms: dict[tuple[str, str, int], float],
+    loops: dict[tuple[str, int], float],
+    landing: dict[str, float],
+) -> dict[str, float]:
+    """Errors by filter and quantity, each with its unit in the name."""
+    units = {"position": "deg", "velocity": "rad_s", "stress": "MPa", "temperature": "C"}
+    numbers: dict[str, float] = {}
+    for (name, shown), (turn, other) in peaks.items():
+        numbers[f"{name}_{shown}_rms_{units[shown]}"] = rms[name, shown, READINGS[name]]
+        numbers[f"{name}_{shown}_peak_turning_{units[shown]}"] = turn
+        numbers[f"{name}_{shown}_peak_elsewhere_{units[shown]}"] = other
+    numbers |= {f"printed_{shown}_rms_noisy_{units[shown]}": rms["printed", shown, 1] for shown in SHOWN}
+    numbers |= {
+        f"{name}_martensite_fraction_loop_{'noisy' if lane else 'exact'}": area for (name, lane), area in loops.items()
+    }
+    return numbers | {f"printed_{shown}_peak_landing_{units[shown]}": value for shown, value in landing.items()}
+
+
+def _draw(
+    figure: Figure, true: Recorded, estimates: dict[str, Recorded], stress_errors: dict[str, np.ndarray], turns: float
+) -> None:
+    """Both filters' estimates beside the true states, the error of the stress, and the hysteresis loop."""
+    time = true.time
+    axes = panels(figure, 2, 3)
+    colours = {"printed": RED, "model": BLUE}
+    titles = ("arm angle (°)", "rate (rad/s)", "stress (MPa)", "temperature (°C)")
+    for one, (shown, (factor, _, _)), title in zip(axes, SHOWN.items(), titles, strict=False):
+        one.plot(time, factor * getattr(true, shown), color=BLACK, linewidth=2.4, alpha=0.35, label="true")
+        for name, states in estimates.items():
+            one.plot(
+                time,
+                factor * getattr(states, shown)[0],
+                color=colours[name],
+                linewidth=1.0,
+                label=f"{name} filter{' (noise)' if READINGS[name] else ''}",
+            )
+        one.axvspan(turns - AROUND, turns + AROUND, color="#f3e9d8", zorder=0)
+        named(one, "time (s)", title)
+    axes[2].set_ylim(0.0, 1.2 * float(true.stress.max()) / 1e6)
+    keyed(axes[1])
+    for name, error in stress_errors.items():
+        axes[4].semilogy(time, np.maximum(error, 1e-4), color=colours[name], linewidth=1.0)
+    axes[4].axvspan(turns - AROUND, turns + AROUND, color="#f3e9d8", zorder=0)
+    named(axes[4], "time (s)", "error of the stress (MPa)")
+    axes[5].plot(true.temperature, np.degrees(true.position), color=BLACK, linewidth=2.4, alpha=0.35)
+    for name, states in estimates.items():
+        axes[5].plot(states.temperature[0], np.degrees(states.position[0]), color=colours[name], linewidth=1.0)
+    named(axes[5], "temperature (°C)", "arm angle (°)", "hysteresis loop")
+
+
 def work(fast: bool) -> Result:
     """One run of the arm; both filters over its angle, exact and with noise."""
     # The plant always in finer steps than the filter's: on its own transition, without noise, the model's is exact.
@@ -56,7 +116,7 @@ def work(fast: bool) -> Result:
     true = jax.tree.map(lambda series: series[::every], simulated(system, {"voltage": volts}, dt))
     drawn = np.random.default_rng(0).standard_normal(true.position.size)
     readings = jnp.asarray(np.stack([true.position, true.position + NOISE * drawn]))
-    told: dict[str, Recorded] = {
+    estimates: dict[str, Recorded] = {
         name: recorded(_estimates(one, readings, volts[::every]))
         for name, one in (("printed", printed_filter(system)), ("model", model_filter(system)))
     }
@@ -67,22 +127,22 @@ def work(fast: bool) -> Result:
     lands = float(time[np.flatnonzero(low & (time > ON))[0]]) - PERIOD
     turning = np.abs(time - turns) <= AROUND
     moving = (time > GUESS_GONE) & (time < lands)
-    # The printed filter on exact readings, as in the source's simulation; the model's has only noise to deal with.
-    lanes = {"printed": 0, "model": 1}
     errors = {
-        (name, shown): factor * np.abs(getattr(told[name], shown)[lane] - getattr(true, shown))
-        for name, lane in lanes.items()
+        (name, shown): factor * np.abs(getattr(estimates[name], shown)[lane] - getattr(true, shown))
+        for name, lane in READINGS.items()
         for shown, (factor, _, _) in SHOWN.items()
     }
     elsewhere = moving & ~turning
 
-    def rms(name: str, shown: str, lane: int) -> float:
-        off = getattr(told[name], shown)[lane] - getattr(true, shown)
-        return float(np.sqrt(np.mean((off * SHOWN[shown][0])[elsewhere] ** 2)))
-
+    rms = {
+        (name, shown, lane): _rms((getattr(states, shown)[lane] - getattr(true, shown)) * factor, elsewhere)
+        for name, states in estimates.items()
+        for lane in (0, 1)
+        for shown, (factor, _, _) in SHOWN.items()
+    }
     spans = {shown: factor * float(np.ptp(getattr(true, shown))) for shown, (factor, _, _) in SHOWN.items()}
     follows = all(
-        rms(name, shown, lane) < SHOWN[shown][2] * spans[shown] for name, lane in lanes.items() for shown in SHOWN
+        rms[name, shown, lane] < SHOWN[shown][2] * spans[shown] for name, lane in READINGS.items() for shown in SHOWN
     )
     peaks = {key: (float(error[turning].max()), float(error[elsewhere].max())) for key, error in errors.items()}
     mechanical = ("position", "velocity", "stress")
@@ -90,55 +150,15 @@ def work(fast: bool) -> Result:
     loops = {
         (name, lane): _area(one.temperature[lane], one.martensite_fraction[lane])
         / _area(true.temperature, true.martensite_fraction)
-        for name, one in told.items()
+        for name, one in estimates.items()
         for lane in (0, 1)
     }
     landing = {shown: float(errors["printed", shown][time >= lands].max()) for shown in mechanical}
+    stress_errors = {name: errors[name, "stress"] for name in estimates}
     at_rest = float(errors["printed", "stress"][-1])
 
-    def draw(figure: Figure) -> None:
-        axes = panels(figure, 2, 3)
-        colours = {"printed": RED, "model": BLUE}
-        titles = ("arm angle (°)", "rate (rad/s)", "stress (MPa)", "temperature (°C)")
-        for one, (shown, (factor, _, _)), title in zip(axes, SHOWN.items(), titles, strict=False):
-            one.plot(time, factor * getattr(true, shown), color=BLACK, linewidth=2.4, alpha=0.35, label="true")
-            for name, estimates in told.items():
-                one.plot(
-                    time,
-                    factor * getattr(estimates, shown)[0],
-                    color=colours[name],
-                    linewidth=1.0,
-                    label=f"{name} filter{' (noise)' if lanes[name] else ''}",
-                )
-            one.axvspan(turns - AROUND, turns + AROUND, color="#f3e9d8", zorder=0)
-            named(one, "time (s)", title)
-        axes[2].set_ylim(0.0, 1.2 * float(true.stress.max()) / 1e6)
-        keyed(axes[1])
-        for name in told:
-            axes[4].semilogy(time, np.maximum(errors[name, "stress"], 1e-4), color=colours[name], linewidth=1.0)
-        axes[4].axvspan(turns - AROUND, turns + AROUND, color="#f3e9d8", zorder=0)
-        named(axes[4], "time (s)", "error of the stress (MPa)")
-        axes[5].plot(true.temperature, np.degrees(true.position), color=BLACK, linewidth=2.4, alpha=0.35)
-        for name, estimates in told.items():
-            axes[5].plot(
-                estimates.temperature[0], np.degrees(estimates.position[0]), color=colours[name], linewidth=1.0
-            )
-        named(axes[5], "temperature (°C)", "arm angle (°)", "hysteresis loop")
-
-    units = {"position": "deg", "velocity": "rad_s", "stress": "MPa", "temperature": "C"}
-    numbers: dict[str, float] = {"turns_s": turns, "lands_s": lands, "printed_stress_error_on_the_stop_MPa": at_rest}
-    for (name, shown), (turn, other) in peaks.items():
-        numbers[f"{name}_{shown}_rms_{units[shown]}"] = rms(name, shown, lanes[name])
-        numbers[f"{name}_{shown}_peak_turning_{units[shown]}"] = turn
-        numbers[f"{name}_{shown}_peak_elsewhere_{units[shown]}"] = other
-    numbers |= {f"printed_{shown}_rms_noisy_{units[shown]}": rms("printed", shown, 1) for shown in SHOWN}
-    numbers |= {
-        f"{name}_martensite_fraction_loop_{'noisy' if lane else 'exact'}": area for (name, lane), area in loops.items()
-    }
-    numbers |= {f"printed_{shown}_peak_landing_{units[shown]}": value for shown, value in landing.items()}
-
     def listed(name: str) -> str:
-        return ", ".join(f"{rms(name, shown, lanes[name]):.2g} {unit}" for shown, (_, unit, _) in SHOWN.items())
+        return ", ".join(f"{rms[name, shown, READINGS[name]]:.2g} {unit}" for shown, (_, unit, _) in SHOWN.items())
 
     return Result(
         holds=follows and largest and abs(loops["printed", 0] - 1.0) < 0.05,
@@ -149,14 +169,15 @@ def work(fast: bool) -> Result:
         f"{peaks['printed', 'velocity'][1]:.1f} rad/s and {peaks['printed', 'stress'][1]:.0f} MPa; its loop of the "
         f"fraction over temperature has {100 * loops['printed', 0]:.0f} % of the true area on exact readings and "
         f"{100 * loops['printed', 1]:.0f} % with {NOISE:g} rad of noise; the filter over the simulator's step is off by {listed('model')} on readings with {NOISE:g} rad of noise",
-        numbers=numbers,
-        draw=draw,
+        numbers={"turns_s": turns, "lands_s": lands, "printed_stress_error_on_the_stop_MPa": at_rest}
+        | _numbers(peaks, rms, loops, landing),
+        draw=partial(_draw, true=true, estimates=estimates, stress_errors=stress_errors, turns=turns),
         caveat="R is not printed; here it equals Q. The temperature, which no reading corrects in the printed filter, is "
         f"off most while the wire heats, {max(peaks['printed', 'temperature']):.2f} °C (Euler's step), not where the arm "
         "turns. After the fall this arm meets its lower stop, which the printed equations lack: the impact puts the "
         f"rate off by {landing['velocity']:.1f} rad/s and the stress by {landing['stress']:.0f} MPa, more than the turn, and "
         f"at rest there the stress stays {at_rest:.0f} MPa too high, which is what the stop carries. With {NOISE:g} rad of "
-        f"noise the printed filter's stress is off by {rms('printed', 'stress', 1):.1f} MPa, from differences of "
+        f"noise the printed filter's stress is off by {rms['printed', 'stress', 1]:.1f} MPa, from differences of "
         f"differences: the claim is judged on exact readings, as in the source's simulation, and the loop by its fraction, for the "
         "angle is read.",
     )

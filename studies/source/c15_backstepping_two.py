@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from matplotlib.figure import Figure
 
@@ -9,16 +11,41 @@ from smajax.control.controllers.inverse_wire import strain_at_angle
 from smajax.control.presets import backstepping_two, printed_filter
 from smajax.core.parameters import set_parameters
 from smajax.model.rigs import arm
+from smajax.model.system import System
 from smajax.model.wire.constitutive import young_modulus
 from smajax.report.drawing import BLACK, BLUE, GREY, RED, keyed, named, panels
 
 from .backstepping_runs import ON_ITS_PLANT, SECONDS, degrees, plant, runs
-from .rigs import austenite_range, martensite_range
+from .rigs import Recorded, austenite_range, martensite_range
 from .row import Result, Row
 
 SHOWN = 40.0  # degrees
 FILTERED, NOISE = 20.0, 1e-3  # degrees, rad: the runs on estimated states
 LOW_GAIN = 1.0  # 1/s, K with which the overshoot is plain
+
+
+def _draw(figure: Figure, system: System, loops: Recorded, shown: int, tight: int) -> None:
+    """Angle, stress, fraction and voltage, temperature of the loops `shown` (a small K) and `tight` (K searched)."""
+    time, angle, volts = loops.run.time[0], degrees(loops), loops.voltage
+    motion, stress, fraction, heat = panels(figure, 2, 2)
+    for k, name, colour in ((shown, f"K = {LOW_GAIN:g} 1/s", BLUE), (tight, "K searched", RED)):
+        motion.plot(time, angle[k], color=colour, label=name)
+        stress.plot(time, loops.run.stress[k] / 1e6, color=colour)
+        fraction.plot(time, loops.run.martensite_fraction[k], color=colour)
+    motion.axhline(SHOWN, color=GREY, linewidth=0.8, linestyle="--")
+    drive = fraction.twinx()
+    drive.step(time, volts[shown], where="post", color=BLACK, linewidth=0.7)
+    drive.set_ylabel("voltage (V), black", fontsize=9)
+    heat.plot(time, loops.run.temperature[shown], color=BLUE, label="wire")
+    ranges = (*austenite_range(system, loops.run.stress[shown]), *martensite_range(system, loops.run.stress[shown]))
+    for line, style, name in zip(ranges, ("--", "-.", ":", (0, (1, 3))), ("A_s'", "A_f'", "M_s'", "M_f'"), strict=True):
+        heat.plot(time, line, color=GREY, linestyle=style, linewidth=1.0, label=name)
+    keyed(motion)
+    keyed(heat)
+    named(motion, "time (s)", "arm angle (°)")
+    named(stress, "time (s)", "stress (MPa)")
+    named(fraction, "time (s)", "martensite fraction")
+    named(heat, "time (s)", "temperature (°C)", f"K = {LOW_GAIN:g} 1/s")
 
 
 def work(fast: bool) -> Result:
@@ -50,29 +77,6 @@ def work(fast: bool) -> Result:
     first, after, last = float(volts[shown][:top].max()), float(volts[shown][top]), float(volts[shown][-2])
     elsewhere = degrees(other)[:, time > 16.0]
 
-    def draw(figure: Figure) -> None:
-        motion, stress, fraction, heat = panels(figure, 2, 2)
-        for k, name, colour in ((shown, f"K = {LOW_GAIN:g} 1/s", BLUE), (tight, "K searched", RED)):
-            motion.plot(time, angle[k], color=colour, label=name)
-            stress.plot(time, loops.run.stress[k] / 1e6, color=colour)
-            fraction.plot(time, loops.run.martensite_fraction[k], color=colour)
-        motion.axhline(SHOWN, color=GREY, linewidth=0.8, linestyle="--")
-        drive = fraction.twinx()
-        drive.step(time, volts[shown], where="post", color=BLACK, linewidth=0.7)
-        drive.set_ylabel("voltage (V), black", fontsize=9)
-        heat.plot(time, loops.run.temperature[shown], color=BLUE, label="wire")
-        ranges = (*austenite_range(system, loops.run.stress[shown]), *martensite_range(system, loops.run.stress[shown]))
-        for line, style, name in zip(
-            ranges, ("--", "-.", ":", (0, (1, 3))), ("A_s'", "A_f'", "M_s'", "M_f'"), strict=True
-        ):
-            heat.plot(time, line, color=GREY, linestyle=style, linewidth=1.0, label=name)
-        keyed(motion)
-        keyed(heat)
-        named(motion, "time (s)", "arm angle (°)")
-        named(stress, "time (s)", "stress (MPa)")
-        named(fraction, "time (s)", "martensite fraction")
-        named(heat, "time (s)", "temperature (°C)", f"K = {LOW_GAIN:g} 1/s")
-
     return Result(
         holds=bool(np.isfinite(settling).all() and overshoot.min() > 0.1 and overshoot[shown] > 5.0)
         and after < 0.2 * first
@@ -100,7 +104,7 @@ def work(fast: bool) -> Result:
             "rate_form_last_seconds_high_deg": float(elsewhere[0].max()),
             "rate_form_no_thermal_term_end_deg": float(elsewhere[1, -1]),
         },
-        draw=draw,
+        draw=partial(_draw, system=system, loops=loops, shown=shown, tight=tight),
         caveat=f"{ON_ITS_PLANT}. On the states of the printed filter, with exact readings, the arm with the searched gains {settles[0]} at {FILTERED:.0f}° with {over[0]:.1f}° of overshoot "
         f"and {error[0]:.2f}° of steady error; with {NOISE:g} rad of noise the arm {settles[1]}, is {error[1]:.1f}° off on average over the last fifth, and ends at {ends[1]:.0f}°. On the plant of chapter 3 (rate form, theta_T = 0.55 MPa/K), whose stress is up to {apart[0]:.0f} MPa off eq. 4.51, "
         f"the same controller swings between {elsewhere[0].min():.0f}° and {elsewhere[0].max():.0f}° at a set point of {SHOWN:.0f}°; without the "

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from functools import partial
 
 import jax
 import jax.numpy as jnp
@@ -15,14 +16,44 @@ from smajax.model.system import System
 from smajax.model.wire.conditions import AbstractConditions, Brinson, BrinsonAsPrinted
 from smajax.report.drawing import LAW_COLOURS, keyed, named, panels
 
-from .rigs import batch
+from .rigs import Recorded, batch
 from .row import Result, Row
+
+Pairs = dict[str, tuple[Recorded, Recorded]]  # kind of path -> the runs of the two conditions that are compared
 
 
 def _wandering(rng: np.random.Generator, low: float, high: float, samples: int) -> np.ndarray:
     """A path through eight random levels, so that there are reversals inside the range."""
     levels = np.concatenate([[low], rng.uniform(low, high, 8), [low]])
     return np.interp(np.linspace(0.0, 9.0, samples), np.arange(10.0), levels)
+
+
+def _draw(figure: Figure, shown: Pairs, stress: np.ndarray, temperature: np.ndarray) -> None:
+    """The trial of each kind with the most transformation to and fro."""
+    busiest = {
+        key: int(np.abs(np.diff(pair[0].martensite_fraction)).sum(axis=1).argmax()) for key, pair in shown.items()
+    }
+    left, right = panels(figure, 1, 2)
+    for axes, key, law, across in (
+        (left, "isobaric", "liang", lambda run: run.temperature),
+        (right, "isothermal", "brinson", lambda run: run.stress / 1e6),
+    ):
+        ours, theirs = (jax.tree.map(lambda a: a[busiest[key]], run) for run in shown[key])  # noqa: B023
+        axes.plot(across(theirs), theirs.martensite_fraction, color=LAW_COLOURS[law], linewidth=3, label=law)
+        axes.plot(across(ours), ours.martensite_fraction, color=LAW_COLOURS["enhanced"], linewidth=1, label="enhanced")
+        keyed(axes)
+    named(
+        left,
+        "temperature (°C)",
+        "martensite fraction",
+        f"constant stress {stress[busiest['isobaric']] / 1e6:.0f} MPa",
+    )
+    named(
+        right,
+        "stress (MPa)",
+        "martensite fraction",
+        f"constant temperature {temperature[busiest['isothermal']]:.0f} °C",
+    )
 
 
 def work(fast: bool) -> Result:
@@ -66,36 +97,6 @@ def work(fast: bool) -> Result:
             ("printed", with_conditions(BrinsonAsPrinted())),
         )
     }
-    # The trial with the most transformation to and fro is the one to look at.
-    busiest = {
-        key: int(np.abs(np.diff(pair[0].martensite_fraction)).sum(axis=1).argmax()) for key, pair in shown.items()
-    }
-
-    def draw(figure: Figure) -> None:
-        left, right = panels(figure, 1, 2)
-        for axes, key, law, across in (
-            (left, "isobaric", "liang", lambda run: run.temperature),
-            (right, "isothermal", "brinson", lambda run: run.stress / 1e6),
-        ):
-            ours, theirs = (jax.tree.map(lambda a: a[busiest[key]], run) for run in shown[key])  # noqa: B023
-            axes.plot(across(theirs), theirs.martensite_fraction, color=LAW_COLOURS[law], linewidth=3, label=law)
-            axes.plot(
-                across(ours), ours.martensite_fraction, color=LAW_COLOURS["enhanced"], linewidth=1, label="enhanced"
-            )
-            keyed(axes)
-        named(
-            left,
-            "temperature (°C)",
-            "martensite fraction",
-            f"constant stress {stress[busiest['isobaric']] / 1e6:.0f} MPa",
-        )
-        named(
-            right,
-            "stress (MPa)",
-            "martensite fraction",
-            f"constant temperature {temperature[busiest['isothermal']]:.0f} °C",
-        )
-
     return Result(
         holds=isobaric == isothermal == printed == 0.0,
         found=f"largest difference in xi over {trials} random paths each: {isobaric:g} at constant stress (Liang), "
@@ -106,7 +107,7 @@ def work(fast: bool) -> Result:
             "printed_difference": printed,
             **{f"unloaded_cooled_martensite_{name}": value for name, value in cooled.items()},
         },
-        draw=draw,
+        draw=partial(_draw, shown=shown, stress=stress, temperature=temperature),
         caveat="at constant temperature for martensite that loading had formed. The source contradicts itself here: of "
         "martensite formed by cooling it says (below eq. 3.12, and M7 c) that Brinson's conditions transform nothing on "
         f"unloading. Unloaded at 75 °C such martensite ends at xi = {cooled['enhanced']:.2f} (enhanced, and Brinson as Table 3.3 "
