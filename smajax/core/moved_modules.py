@@ -42,6 +42,7 @@ MODULES = {
     "attribution.rivals": "attribution.confounders",
     "attribution.screen": "attribution.score_test",
     "attribution.steady": "attribution.step_size_check",
+    "attribution.unknown_words": "report.narrative.unknown",
     "batch.engine": "simulation.batch.chunks",
     "batch.member": "simulation.batch.single_run",
     "batch.provenance": "core.provenance",

@@ -190,7 +190,7 @@ class Actuator:
         return self.full_rates(t, s, hold=True)[0][0] - self.share * stress_rate / self.wire.stress_slope_austenite
 
     def may(self, branch: Branch) -> bool:
-        """Whether the conditions let a branch transform, its own progress aside."""
+        """Whether the conditions let a branch transform, apart from its own progress."""
         return self.share == 1.0 or self.gate == branch.sign
 
     def _leave(self, s: Vector) -> None:
@@ -218,7 +218,7 @@ class Actuator:
             z = b.progress(*driver)[0]
             if self.share != 1.0 and self.may(b) and z > b.contact + GAP and b.left(self.xi) > 0:
                 share = b.curve.at(z)[0]
-                if share > 0:  # passed while the conditions kept it off: on from the present state
+                if share > 0:  # passed while the conditions held it off: on from the present state
                     b.amplitude, b.contact = b.left(self.xi) / share, z
             if abs(z - b.contact) > 2 * GAP:
                 continue

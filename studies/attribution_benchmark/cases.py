@@ -91,7 +91,7 @@ class Truth:
 
 
 def cases(drawn: int = 0) -> list[Case]:
-    """All cases, in a fixed order. drawn: 1, 2, ... for the same ones with other wires, strengths and noise, which nobody has looked at."""
+    """All cases, in a fixed order. drawn: 1, 2, ... for the same ones with other wires, strengths and noise, not seen in development."""
     found = [Case(rig, (), 0.0, i) for rig in RIGS for i in range(NULLS)]
     for name in EFFECTS:
         for rig in (rig for rig in RIGS if applies(name, rig)):

@@ -1,4 +1,4 @@
-"""Noise with a memory that nobody declared: coupons that lack nothing, and coupons that lack an effect.
+"""Autocorrelated noise that was not declared: coupons that lack nothing, and coupons that lack an effect.
 
     python -m studies.attribution_benchmark.coloured --out OUT [--seeds 3] [--every 4]
 
@@ -54,7 +54,7 @@ def filtered(folder: Path, name: str, seed: int, memory: float, every: int) -> E
 
 
 def estimated(experiment: Experiment) -> Experiment:
-    """The same where nobody gave the noise."""
+    """The same without a declared noise."""
     from smajax.data.readers.noise import estimate_noise
 
     sigma = float(np.median([estimate_noise(run.output, 0.0) for run in experiment.runs if run.role == "fit"]))

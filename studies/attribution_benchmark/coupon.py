@@ -1,4 +1,4 @@
-"""Coupon at constant stress on a prescribed temperature: xi in closed form, its memory by the branches.
+"""Coupon at constant stress on a prescribed temperature: xi in closed form, its history by the branches.
 
 The rate form (eq. 3.2) at constant stress is strain' = (-theta_T/E(xi) + alpha) T' + eps_L xi'. xi is exact at every
 point of the path; the thermal term is summed over SUBSTEPS points between two samples.

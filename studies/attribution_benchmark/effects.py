@@ -104,7 +104,7 @@ _COUPON = (
     "quadratic_strain",
 )
 # A bias spring and a single mass say nothing of how widths, slopes and strains go with stress; only the arm's stress
-# changes fast enough beside its temperature to tell shares of the stress rate apart.
+# changes fast enough beside its temperature to identify shares of the stress rate.
 _NOT_HERE = {("stress_rate_share", "dead_weight"), ("stress_rate_share", "bias_spring"), ("pwm", "bias_spring")}
 # Other values of the unknowns, or of a run's zero, give exactly the same readings: a gain of the voltage is one of h_c
 # and c_p (eq. 3.1), a loss to the ends one of h_c, a lead one of both where the resistance is constant.

@@ -32,7 +32,7 @@ CALLED: dict[str, tuple[str, ...]] = {
 }
 EQUATIONS = ("heat", "electrical", "kinetics", "constitutive", "mechanics", "sensor", "input")
 NOTHING, OUTSIDE = "nothing", "not in the library"
-CONFUSABLE = 0.05  # weight from which on a rival counts as named
+CONFUSABLE = 0.05  # weight from which on a confounder counts as named
 
 
 @dataclass(frozen=True)

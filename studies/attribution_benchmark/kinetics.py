@@ -1,4 +1,4 @@
-"""Transformation curves, branches and their memory (Elahinia 2004, eq. 3.3, 3.5, 3.17, 3.18, 3.26 corrected).
+"""Transformation curves, branches and their history (Elahinia 2004, eq. 3.3, 3.5, 3.17, 3.18, 3.26 corrected).
 
 A branch (+1 heating, -1 cooling) has a progress z, 0 at the start of its range and 1 at its end. What it has yet to
 transform, xi when heating and 1 - xi when cooling, is amplitude * share(z). The amplitude is renewed only by the other

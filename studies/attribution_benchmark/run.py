@@ -37,7 +37,7 @@ def chosen(only: str, strengths: Sequence[float], nulls: int, part: tuple[int, i
 
 
 def closed(case: Case, out: Path) -> Judged:
-    """One case written, closed and judged."""
+    """One case written, run through the loop and scored."""
     from smajax.attribution.close_loop import close_loop
     from smajax.core.files import replace
     from smajax.data.experiment.load import load_experiment
@@ -82,7 +82,7 @@ def main() -> None:
             continue
         try:
             one = closed(case, asked.out)
-        except Exception:  # one case must not take the others with it; it is told and has no judgement
+        except Exception:  # one case must not stop the others; it is reported and has no score
             print(f"[{number}/{len(todo)}] {case.name}: failed\n{traceback.format_exc()}", flush=True)
             continue
         save(one, path)

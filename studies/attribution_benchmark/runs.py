@@ -47,7 +47,7 @@ class Clock:
         return (self.count - 1) * self.step
 
     def levels(self, *pairs: tuple[float, float]) -> Vector:
-        """(share of the run, value) in turn, the last one kept to the end."""
+        """(share of the run, value) in turn, the last one held to the end."""
         ends = np.round(np.cumsum([share for share, _ in pairs]) * self.count)
         at = np.searchsorted(ends, np.arange(self.count), side="right")
         return np.array([value for _, value in pairs])[np.minimum(at, len(pairs) - 1)]

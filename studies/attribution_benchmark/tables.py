@@ -1,4 +1,4 @@
-"""The judged cases as tables and one picture."""
+"""The scored cases as tables and one picture."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def precision(cases: Sequence[Judged]) -> str:
 
 
 def confusion(cases: Sequence[Judged]) -> tuple[list[str], list[str], np.ndarray]:
-    """(true, told, counts) by equation, cases with one effect or none."""
+    """(true, named, counts) by equation, cases with one effect or none."""
     rows = [*EQUATIONS, NOTHING]
     columns = [*EQUATIONS, OUTSIDE, NOTHING]
     counts = np.zeros((len(rows), len(columns)), int)

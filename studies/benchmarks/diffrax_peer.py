@@ -63,7 +63,7 @@ def _one(given: Given, solver: str, adaptive: bool, kept: bool) -> Solve:
             (voltage, payload),
             saveat=saved,
             stepsize_controller=control,
-            adjoint=diffrax.ForwardMode(),  # the plain loop: nothing is kept for a gradient
+            adjoint=diffrax.ForwardMode(),  # the plain loop: nothing is stored for a gradient
             max_steps=MOST_STEPS,
             throw=False,
         )
@@ -126,7 +126,7 @@ def _tried(given: Given, solver: str, adaptive: bool, cores: int) -> dict[str, A
         found = {**named, **_accurate(given, solver, adaptive)}
         if "setting" not in found:
             return found
-        # One block a core tells which are the fastest; those are timed in full.
+        # The fastest are found with one block per core; those are timed in full.
         return {**found, **_timed(given, found, FIRST_BLOCK, cores, 0, kept=False)}
     except Exception as error:  # one that a version cannot compile is no reason to lose the others
         return {**named, "reason": f"{type(error).__name__}: {error}".splitlines()[0]}

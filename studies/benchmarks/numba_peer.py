@@ -104,7 +104,7 @@ def run(given: Given, count: int, dt: float) -> dict[str, Any]:
         "cores": numba.get_num_threads(),
     }
     for name, real in PRECISIONS.items():
-        # A part of the members tells which number is the fastest; that one is timed in full.
+        # The fastest number is found on a part of the runs; that one is timed in full.
         tried = [_timed(given, real, lanes, max(count // 8, lanes), dt) for lanes in LANES]
         best = min(tried, key=lambda one: float(one["ms_per_trajectory"]))
         told[name] = _timed(given, real, best["lanes"], count, dt)

@@ -113,7 +113,7 @@ def _solved(p: dict[str, float], voltage: float, payload_mass: float) -> tuple[n
 
 
 def given(solved: int, count: int, folder: Path) -> tuple[Path, Given]:
-    """`count` members, the first `solved` of them integrated by scipy from event to event; and the file they are kept in.
+    """`count` members, the first `solved` of them integrated by scipy from event to event; and the file that stores them.
 
     About a third of a second a member that is solved, unless the file is there already.
     """

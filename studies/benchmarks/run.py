@@ -30,7 +30,7 @@ SOLVED = 64
 Part = dict[str, Any]
 
 
-# What is thrown at it, and how much: `studies.benchmarks.load`.
+# Sizes of the load tests: `studies.benchmarks.load`.
 LOADS = {
     "text": (1000, 5000),
     "samples": (10**5, 10**6, 10**7),
@@ -54,7 +54,7 @@ class Plan:
         self.loads = FEW_LOADS if fast else LOADS
 
     def file(self) -> Path:
-        """The problem, solved once and kept beside the results."""
+        """The problem, solved once and stored beside the results."""
         from studies.benchmarks.problem import given
 
         return given(8 if self.fast else SOLVED, self.members, RESULTS / "problems")[0]

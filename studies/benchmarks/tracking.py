@@ -109,7 +109,7 @@ def _solved(constants: Mapping[str, float], voltage: np.ndarray) -> tuple[np.nda
 
 
 def tracking(constants: Mapping[str, float], solved: int, count: int, folder: Path) -> tuple[Path, Tracking]:
-    """`count` members with `constants` (`problem.constants`), exact slopes of `solved` of them; and the file they are kept in."""
+    """`count` members with `constants` (`problem.constants`), exact slopes of `solved` of them; and the file that stores them."""
     own = {**constants, "payload_mass": PAYLOAD * constants["payload_mass"]}
     said, voltage = json.dumps(own), np.linspace(*VOLTAGES, count)
     file = folder / f"tracking_{solved}_of_{count}.npz"

@@ -40,7 +40,7 @@ def repeated(rig: Rig, count: int, most: int = MAX_STEPS) -> tuple[list[Fit], np
 
 
 def errors(rig: Rig, solutions: list[Fit], outputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(estimate - truth, standard error), each (count, parameters); the errors are those that `identify` tells."""
+    """(estimate - truth, standard error), each (count, parameters); the errors are those that `identify` reports."""
     problem = rig.problem
     off, spread = [], []
     for one, output in zip(solutions, outputs, strict=True):

@@ -119,7 +119,7 @@ class LawModes(ABC):
         return t_rate, stress_rate, own, weight * xi_rate + drawn * stress_rate, xi_rate
 
     def may(self, branch: Branch) -> bool:
-        """Whether the law's condition lets a branch transform, its own y' aside."""
+        """Whether the law's condition lets a branch transform, apart from its own y'."""
         warming, pulling = self.senses
         if self.law.conditions == "brinson":
             by_stress = pulling < 0 and self.loaded if branch.sign > 0 else pulling > 0

@@ -20,7 +20,7 @@ MOST_STRESS = 1e10
 
 
 class Point:
-    """Material point: state and memory."""
+    """Material point: state and history."""
 
     def __init__(self, wire: WireParameters, temperature: float, stress: float) -> None:
         self.wire, self.law = wire, LAWS[wire.law or wire.conditions]

@@ -178,14 +178,14 @@ class Modes:
         return s
 
     def may(self, branch: int) -> bool:
-        """Whether the conditions let a branch (+1 heating, -1 cooling) transform, its own y' aside.
+        """Whether the conditions let a branch (+1 heating, -1 cooling) transform, apart from its own y'.
 
         Liang's T' is taken without the latent heat: with it the branch would switch itself off and on without end.
         """
         return not self.liang or self.sense == branch
 
     def _jump(self, s: Vector, phase: int) -> Vector:
-        """xi moves at once onto a curve already passed (Liang's switched-off branch, a hot start); strain is kept."""
+        """xi moves at once onto a curve already passed (Liang's switched-off branch, a hot start); the strain is held."""
         w, xi0 = self.wire, self.xi
 
         def moved(xi: float) -> Vector:

@@ -1,4 +1,4 @@
-"""Tight event-aware integration of a shape-memory wire on an arm or under a dead weight, to judge simulators by.
+"""Tight event-aware integration of a shape-memory wire on an arm or under a dead weight, the reference for simulators.
 
 Written from the equations alone (Elahinia 2004, chapter 3, with its sign and renewal corrections); shares no code with
 the simulator it judges. Each call takes seconds, so tests can run it live. SI units, degrees Celsius, radians.

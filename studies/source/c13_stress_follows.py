@@ -18,7 +18,7 @@ AFTER = 2.5  # s: the arm has arrived
 
 
 def work(fast: bool) -> Result:
-    """One run; the stress wanted is worked out again from what the controller was told. Beside it, one on the filter."""
+    """One run; the stress wanted is computed again from the controller's inputs. Beside it, one on the filter."""
     system = arm()
     tuned = quick_stress_sliding(system)
     one, judged = at_set_points(tuned, fast, [TARGET])[TARGET]

@@ -18,7 +18,7 @@ TARGET = 20.0
 
 
 def work(fast: bool) -> Result:
-    """One batch over the inertia believed in; its effect is judged beside that of as wrong a damping."""
+    """One batch over the inertia believed in; its effect is compared with that of a damping with the same error."""
     system = plant()
     tuned = backstepping_two(system)
     swept = [set_parameters(tuned, {"inertia_ratio": ratio}) for ratio in RATIOS]

@@ -20,7 +20,7 @@ from .row import Result, Row
 TARGET = 20.0  # degrees
 SECONDS = 60.0  # the slowest decay that has to be seen, at K = 18 1/s, has a time constant of 18 s
 FROM = 1.0  # s: what the start has of kinetic energy has died by then, also in an arm that goes nowhere
-LAST = 2.0  # s, in which a run is judged
+LAST = 2.0  # s, over which a run is evaluated
 NEAR = np.radians(1.0)
 # Within eq. 4.82 and 4.84 as printed, and V grows there.
 BEYOND = (-0.2, -0.9)  # (K in 1/s, epsilon)

@@ -84,7 +84,7 @@ def work(fast: bool) -> Result:
         float(np.abs(one.martensite_fraction - other.martensite_fraction).max())
         for one, other in (shown["isobaric"], (ours, theirs), (ours, table))
     )
-    # The same conditions on martensite that cooling had formed: there Brinson's, as the source tells them, do nothing.
+    # The same conditions on martensite that cooling had formed: there Brinson's, as the source describes them, do nothing.
     formed = {
         "temperature": jnp.full((1, 401), 75.0),
         "stress": jnp.asarray(np.interp(np.arange(401), [0, 200, 400], [200e6, 0, 200e6]))[None],

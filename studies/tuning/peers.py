@@ -62,7 +62,7 @@ class Spent(Exception):
 
 
 class Counted:
-    """The judged cost of points of the cube, with the closed loops so far and the best after each."""
+    """The validated cost of points of the cube, with the closed loops so far and the best after each."""
 
     def __init__(self, rig: Rig, goal: Goal, members: Members, budget: int) -> None:
         self.rig, self.goal, self.members, self.budget = rig, goal, members, budget

@@ -1,4 +1,4 @@
-"""Where the study's numbers are kept: one JSON file, a part of it at a time."""
+"""Where the study's numbers are stored: one JSON file, a part of it at a time."""
 
 from __future__ import annotations
 

@@ -31,13 +31,13 @@ MARGIN = 0.95  # of the limits, to which gains are tuned: between the set points
 ADDED, APART = 6, 3.0  # set points that a pass adds, and degrees between them
 HOPELESS = 5.0  # a limit exceeded by so many times itself is not tried again
 VARIATION = {"inertia": 0.2, "damping": 0.2, "convection": 0.2}
-FINER = 1e-3  # s: a step at which the worst loops are judged again
+FINER = 1e-3  # s: a step at which the worst loops are evaluated again
 SEED = 20261122  # of the loops that are drawn
 
 
 @dataclass(frozen=True)
 class Plan:
-    """How much is tried, and how finely it is judged."""
+    """How much is tried, and with which step it is evaluated."""
 
     set_points: tuple[float, ...] = (-40.0, -20.0, 0.0, 20.0, 40.0, 60.0, 85.0)
     every: float = 1.0  # degrees, of the loops by which set points are added; those that judge lie between
@@ -46,7 +46,7 @@ class Plan:
     rounds: int = 30
     finish: int = 60  # generations without slopes of the first pass; twice as many of the others
     drawn: int = 4096  # plants with a set point each
-    worst: int = 256  # loops that are judged again at a finer step
+    worst: int = 256  # loops that are evaluated again with a finer step
     passes: int = 4
     seconds: float = 10.0
 

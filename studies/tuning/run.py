@@ -43,7 +43,7 @@ def compare(
     seeds_of: Mapping[str, tuple[int, ...]] = WAYS,
     progress: Progress = say,
 ) -> None:
-    """Every way on every problem, kept one by one."""
+    """Every way on every problem, stored one by one."""
     for problem in problems:
         members = len(problem.set_points) * (9 if problem.varied else 1)
         for way, seeds in seeds_of.items():

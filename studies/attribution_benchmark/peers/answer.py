@@ -1,4 +1,4 @@
-"""What a peer says of a case, kept whole or not at all; and the same held against what is true, as the loop's is."""
+"""A peer's answer to a case, stored whole or not at all, and its comparison with the truth, made as for the loop."""
 
 from __future__ import annotations
 

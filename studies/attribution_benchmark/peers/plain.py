@@ -27,7 +27,7 @@ def refitted(bench: Bench, case: str) -> Answer:
 
 
 def fit_of(bench: Bench, base: Answer) -> Fit:
-    """The fit that `refitted` told of."""
+    """The fit that `refitted` reports."""
     known = base.values or {}
     cost = base.fit_error**2 * float(np.asarray(bench.fits.problem.batch.mask).sum())
     return Fit(np.asarray([known[name] for name in bench.fits.problem.names]), cost, True, "", 0)

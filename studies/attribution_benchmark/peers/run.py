@@ -1,4 +1,4 @@
-"""Every peer on the cases that the loop has been judged on, one after the other, and the table of all of them.
+"""Every peer on the cases that the loop was scored on, one after the other, and the table of all of them.
 
     python -m studies.attribution_benchmark.peers.run --out OUT [--peer greedy] [--only TEXT]
 
@@ -31,7 +31,7 @@ PEERS: dict[str, Callable[[Bench, Answer], Answer]] = {
 
 
 def asked(peer: str, case: str, out: Path) -> Answer:
-    """What `peer` says of one case, kept where it is an answer; the refitted base model, which all need, likewise."""
+    """What `peer` says of one case, stored where it is an answer; the refitted base model, which all need, likewise."""
     bench = opened(out / "cases" / case)
     path = out / "peers" / "plain" / f"{case}.json"
     if not path.exists():
@@ -59,7 +59,7 @@ def main() -> None:
             where = f"{peer} [{number}/{len(cases)}] {case}"
             try:
                 one = asked(peer, case, given.out)
-            except Exception:  # one case must not take the others with it; it is told and has no answer
+            except Exception:  # one case must not stop the others; it is reported and has no answer
                 print(f"{where}: failed\n{traceback.format_exc()}", flush=True)
                 continue
             if one.reason:

@@ -31,7 +31,7 @@ MISSING = "–"
 
 
 def gathered(out: Path) -> dict[str, dict[str, Judged]]:
-    """Method -> case -> what it said beside the truth, of all cases that the loop was judged on and the peer answered."""
+    """Method -> case -> what it said beside the truth, of all cases that the loop was scored on and the peer answered."""
     found: dict[str, dict[str, Judged]] = {LOOP: {}}
     for path in sorted((out / "judged").glob("*.json")):
         found[LOOP][path.stem] = load_judged(path)
