@@ -1,4 +1,4 @@
-"""How often a 95 % interval holds the truth, and what a fit costs: `python -m studies.coverage.run [--fast]`.
+"""How often a 95 % interval contains the true value, and what a fit costs: `python -m studies.coverage.run [--fast]`.
 
 Data: a hung weight in three runs by scipy's tight integration, which shares no code with the package, with white noise
 drawn again for each repeated experiment. Six parameters, each starting 30 % off. All repeated experiments are one batch
@@ -140,16 +140,16 @@ def page(found: dict[str, Any]) -> str:
     worst = max(scipy["cost_over_ours"]), min(scipy["cost_over_ours"])
     return "\n".join(
         [
-            "# How often an interval of one fit holds the truth, with white noise",
+            "# How often the interval of a fit contains the true value, with white noise",
             "",
             f"{found['experiments']} repeated experiments of a hung weight in three runs of 12 s (switched, ramped, pulsed; "
             f"{found['samples']} samples, {1e3 * found['noise_m']:g} mm of noise), integrated by scipy from event to event; six "
             f"parameters fitted at a step of {1e3 * found['step_s']:g} ms from one start each, 30 % off (a temperature: by its "
-            f"distance from the air). {found['converged']} of the fits came to their end. Of all intervals {100 * found['coverage_of_all']:.1f} % hold the truth; by chance a row "
+            f"distance from the air). {found['converged']} of the fits converged. Of all intervals {100 * found['coverage_of_all']:.1f} % contain the true value; by chance a row "
             f"may be off by {100 * np.sqrt(0.05 * 0.95 / found['experiments']):.1f} points, a bias by "
             f"{1.0 / np.sqrt(found['experiments']):.2f}.",
             "",
-            "| parameter | standard error | intervals that hold the truth | bias, in standard errors | spread over standard error "
+            "| parameter | standard error | intervals that contain the true value | bias, in standard errors | spread over standard error "
             f"| error without noise, at {1e3 * found['step_without_noise_s']:g} ms |",
             "|---|---|---|---|---|---|",
             *rows,
@@ -160,10 +160,10 @@ def page(found: dict[str, Any]) -> str:
             f"{worst[0]:.7f} times the cost. Much of that is the batch: one fit at a time, and by machine code for both, it is some four times as "
             "long, and 1.3 to 1.4 times where scipy is given our derivatives.",
             "",
-            "A bias beyond chance (martensite_start, specific_heat) is of the model, which is not linear over an error bar: with "
-            "another seed it came out alike, and 93.3 % of all intervals held the truth, 90.5 % of martensite_start's. Profiles and "
-            "Huber's loss are not in here, nor noise with a memory, of which few samples are independent: intervals by standard errors "
-            "were too short there (72 to 87 % held the truth at an AR(1) of 0.8, before they were widened; on a coupon of 2 x 241 samples they hold 87 to 97 % at an AR(1) of 0.8 and 0.95 since, where it was 37 to 77 %), see `tests/fit/test_uncertainty.py`.",
+            "A bias beyond chance (martensite_start, specific_heat) comes from the model, which is not linear over an error bar: with "
+            "another seed it was similar, and 93.3 % of all intervals contained the true value, 90.5 % of martensite_start's. Profiles and "
+            "Huber's loss are not included, nor autocorrelated noise, of which few samples are independent: intervals by standard errors "
+            "were too short there (72 to 87 % contained the true value at an AR(1) of 0.8, before they were widened; on a coupon of 2 x 241 samples 87 to 97 % contain it at an AR(1) of 0.8 and 0.95 since, where it was 37 to 77 %), see `tests/fit/test_uncertainty.py`.",
             "",
             "Made by `python -m studies.coverage.run`.",
             "",

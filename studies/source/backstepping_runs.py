@@ -36,7 +36,7 @@ Tree = TypeVar("Tree")
 PERIOD, SECONDS = 0.01, 20.0
 ON_ITS_PLANT = (
     "plant: the integrated law without a thermal term, which is what the section prints (eq. 4.51) and the controller "
-    "inverts; the controller is told the true state"
+    "inverts; the controller gets the true state"
 )
 
 
@@ -104,7 +104,7 @@ def runs(
 ) -> tuple[Recorded, Recorded]:
     """A batch and its figures of merit, one system, controller and set point (degrees) a run; `initial` likewise.
 
-    Without an `estimator`, one for all, the controllers are told the true state; `noise`, rad, is that of each run's
+    Without an `estimator`, one for all, the controllers get the true state; `noise`, rad, is that of each run's
     reading of the position.
     """
     dt = PERIOD if fast else DEFAULT_STEP

@@ -178,7 +178,7 @@ def work(fast: bool) -> Result:
         f"rate off by {landing['velocity']:.1f} rad/s and the stress by {landing['stress']:.0f} MPa, more than the turn, and "
         f"at rest there the stress stays {at_rest:.0f} MPa too high, which is what the stop carries. With {NOISE:g} rad of "
         f"noise the printed filter's stress is off by {rms['printed', 'stress', 1]:.1f} MPa, from differences of "
-        f"differences: the claim is judged on exact readings, as in the source's simulation, and the loop by its fraction, for the "
+        f"differences: the claim is checked on exact readings, as in the source's simulation, and the loop by its fraction, for the "
         "angle is read.",
     )
 

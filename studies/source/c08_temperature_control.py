@@ -58,7 +58,7 @@ def work(fast: bool) -> Result:
         holds=all(parts.values()),
         found=f"at {SET_POINTS[0]:g} to {SET_POINTS[-1]:g}° the overshoot falls from {_span(map(overshoot, old.values()))}° under VSC to "
         f"{max(map(overshoot, new.values())):.1f}° at most under NVSC; but the arm first arrives {_span(later.values(), 2)} s later than under VSC, and settles "
-        f"later at {_list(late)} (by up to {max(slower.values()):.1f} s); the steady error is {_span(map(steady, new.values()))}° in the place of "
+        f"later at {_list(late)} (by up to {max(slower.values()):.1f} s); the steady error is {_span(map(steady, new.values()))}° instead of "
         f"{_span(map(steady, old.values()))}°"
         + (f", not the same at {_list(apart)}, by {_span((farther[angle] for angle in apart), 1)}°" if apart else ""),
         numbers=numbers,

@@ -39,7 +39,7 @@ def work(fast: bool) -> Result:
         f"under NVSC it stays {-numbers['nvsc_above_finish_C']:.1f} °C below and the arm overshoots by {numbers['nvsc_overshoot_deg']:.1f}°",
         numbers=numbers,
         draw=lambda figure: _draw(figure, old, new),
-        caveat="both are told the true state. The first half is by choice: the VSC's gains, not printed, are those with which it does so. "
+        caveat="both get the true state. The first half is by choice: the VSC's gains, not printed, are those with which it does so. "
         f"With the gains of C4 its wire stays {-numbers['vsc_of_C4_above_finish_C']:.1f} °C below A_f'. "
         f"NVSC without its temperature control (K_p = 0: the command falls with the speed) stays "
         f"{-numbers['nvsc_without_temperature_above_finish_C']:.1f} °C below as well.",

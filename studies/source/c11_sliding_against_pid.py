@@ -58,7 +58,7 @@ def work(fast: bool) -> Result:
         },
         draw=draw,
         caveat="gains of both by search, the source prints none. The PID is the one without anti-windup of Fig. 4.3; one with anti-windup, "
-        f"tuned at several set points at once (beside the claim), misses by {worst_best:.1f}° at most. The sliding controller is told the true stress.",
+        f"tuned at several set points at once (beside the claim), misses by {worst_best:.1f}° at most. The sliding controller gets the true stress.",
     )
 
 

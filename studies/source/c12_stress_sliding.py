@@ -74,7 +74,7 @@ def work(fast: bool) -> Result:
         ),
         found=f"every set point is reached in {reach.min():.1f} to {reach.max():.1f} s; with the searched gains the largest overshoot is "
         f"{largest:.2f}°; with a slacker stress controller ({reach_slack.max():.1f} s at most) the overshoot stays within {loose[~beyond].max():.1f}° up to "
-        f"the angle of greatest stress ({summit:.0f}°) and grows beyond it to {loose[-1]:.1f}° at 60°; on the printed filter's stress in the place of the true one every set point is "
+        f"the angle of greatest stress ({summit:.0f}°) and grows beyond it to {loose[-1]:.1f}° at 60°; on the printed filter's stress instead of the true one every set point is "
         f"reached in {reach_filtered:.1f} s at most and held within {error_filtered:.2f}°",
         numbers={
             "slowest_reach_s": float(reach.max()),

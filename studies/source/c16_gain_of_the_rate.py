@@ -37,7 +37,7 @@ def work(fast: bool) -> Result:
         ),
         found=f"overshoot {', '.join(f'{o:.1f}°' for o in overshoot[:4])} at K = {', '.join(f'{k:g}' for k in GAINS[:4])} 1/s, none "
         f"above; K = 0 is marginal: the arm still swings by {swing:.0f}° after 12 s; K = {GAINS[4]:g} takes {reach[4]:.1f} s to come within a "
-        f"degree in the place of {reach[3]:.1f} s, and K = {GAINS[5]:g} is {-slow:.0f}° short after 20 s",
+        f"degree instead of {reach[3]:.1f} s, and K = {GAINS[5]:g} is {-slow:.0f}° short after 20 s",
         numbers={
             **{f"overshoot_K_{k:g}_deg": float(o) for k, o in zip(GAINS, overshoot, strict=True)},
             "swing_at_K_0_deg": swing,

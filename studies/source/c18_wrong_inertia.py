@@ -59,7 +59,7 @@ def work(fast: bool) -> Result:
         draw=lambda figure: draw_sweep(figure, shown, names, TARGET, draw_voltages(shown, names)),
         caveat=f"{ON_ITS_PLANT}. With half the inertia the time to stay within a degree grows to {settling.max():.1f} s all the same: after an "
         "overshoot the wire has to cool through its hysteresis, and the settling time jumps where the overshoot passes the degree that counts as there. "
-        f"Little is judged as less than {100 * LITTLE:.0f} % of what the damping does; a run that never settles counts with its {SECONDS:.0f} s. The source prints no values of inertia.",
+        f"Little means less than {100 * LITTLE:.0f} % of what the damping does; a run that never settles counts with its {SECONDS:.0f} s. The source prints no values of inertia.",
     )
 
 

@@ -55,7 +55,7 @@ def work(fast: bool) -> Result:
             "undamped_when_too_low": float(undamped_when_low),
         },
         draw=lambda figure: draw_sweep(figure, shown, names, TARGET, draw_voltages(shown, names)),
-        caveat=f"{ON_ITS_PLANT}. The direction contradicts the source, and follows from its own equations: with c_b in the place of c, "
+        caveat=f"{ON_ITS_PLANT}. The direction contradicts the source, and follows from its own equations: with c_b instead of c, "
         f"eq. 4.70 in eq. 4.55 gives x_1'' + [K + (c - c_b)/I] x_1' + x_1 = 0, so too small a c_b damps more. Here c/I = {damping / inertia:.0f} 1/s: "
         f"10 % are worth {shift:.1f} 1/s of K. Of {len(PAIRS)} pairs of K from "
         f"{PAIRS[0][0]:g} to {PAIRS[-1][0]:g} and K_1 from {PAIRS[0][1]:g} to {PAIRS[-1][1]:g} 1/s {len(turned)} overshoot more with 0.9 c than with 1.1 c, and {sooner} arrive sooner"

@@ -36,7 +36,7 @@ def work(fast: bool) -> Result:
         ),
         found=f"at a set point of {TARGET:.0f}° the arm ends at {', '.join(f'{e:.1f}°' for e in end)} where the controller has "
         f"{', '.join(f'{r:g}' for r in RATIOS)} of the true h_c; "
-        f"at its hottest the wire is {hottest[5]:.1f} °C above A_s' in the place of {hottest[3]:.1f} °C",
+        f"at its hottest the wire is {hottest[5]:.1f} °C above A_s' instead of {hottest[3]:.1f} °C",
         numbers={
             **{f"end_{r:g}_hc_deg": float(e) for r, e in zip(RATIOS, end, strict=True)},
             **{f"overshoot_{r:g}_hc_deg": float(o) for r, o in zip(RATIOS, overshoot, strict=True)},

@@ -45,8 +45,8 @@ def work(fast: bool) -> Result:
             and abs(end[2] - TARGET) < 0.5
             and abs(end[-1] - end[0]) < 0.2 * abs(end[0] - TARGET)
         ),
-        found=f"the controller believes in {BELIEVED:.0f} °C; in air of {', '.join(f'{air:g}' for air in AIR)} °C the arm ends at "
-        f"{', '.join(f'{e:.1f}°' for e in end[:-1])} (set point {TARGET:.0f}°); an h_c believed {100.0 * (1.0 - ratio):.1f} % too low, which "
+        found=f"the controller assumes {BELIEVED:.0f} °C; in air of {', '.join(f'{air:g}' for air in AIR)} °C the arm ends at "
+        f"{', '.join(f'{e:.1f}°' for e in end[:-1])} (set point {TARGET:.0f}°); an h_c assumed {100.0 * (1.0 - ratio):.1f} % too low, which "
         f"misjudges the loss as much as air of {AIR[0]:g} °C does, ends at {end[-1]:.1f}°",
         numbers={
             **{f"end_air_{air:g}_C_deg": float(e) for air, e in zip(AIR, end[:-1], strict=True)},
@@ -60,7 +60,7 @@ def work(fast: bool) -> Result:
 ROW = Row(
     "C21",
     "sec. 4.8.4",
-    "arm, approach II, ambient temperature other than believed",
+    "arm, approach II, ambient temperature other than assumed",
     "the same kind of effect as a wrong h_c",
     work,
 )

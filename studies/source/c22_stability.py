@@ -126,8 +126,8 @@ def work(fast: bool) -> Result:
         caveat=f"{ON_ITS_PLANT}. The matrix of eq. 4.83 has -K eps where -eps belongs, and a factor 1/2 too many. The determinant of "
         "eq. 4.84 is worked out rightly from that matrix; as it stands the condition allows even K < 0, such as K = "
         f"{BEYOND[0]:g}, eps = {BEYOND[1]:g}, where V grows (least eigenvalue of -dV/dt {beyond:.2f}). A run converges when it ends within a degree, or below the decay by the "
-        "slower root of the equation of motion plus a degree, judged from 1 s on; at K = 0 that decay does not fall. The loop adds what the analysis leaves out: "
-        f"eq. 4.76 puts the wanted acceleration in the place of the true one, so that above K = c/I = {damping_rate:.0f} 1/s an arm at rest asks "
+        "slower root of the equation of motion plus a degree, evaluated from 1 s on; at K = 0 that decay does not fall. The loop adds what the analysis leaves out: "
+        f"eq. 4.76 uses the wanted acceleration instead of the true one, so that above K = c/I = {damping_rate:.0f} 1/s an arm at rest asks "
         "for the wrong curve, and stays.",
     )
 

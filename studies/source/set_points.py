@@ -69,7 +69,7 @@ def at_set_points(
 ) -> Runs:
     """(run, figures of merit) at each set point; the controller is called every 0.01 s, `fast` steps the arm as seldom.
 
-    Without an `estimator` it is told the true state.
+    Without an `estimator` it gets the true state.
     """
     targets = jnp.radians(jnp.asarray(degrees, dtype=float))
     none = jnp.zeros((len(degrees), 0))
