@@ -146,7 +146,7 @@ def page(found: dict[str, Any]) -> str:
             f"{found['samples']} samples, {1e3 * found['noise_m']:g} mm of noise), integrated by scipy from event to event; six "
             f"parameters fitted at a step of {1e3 * found['step_s']:g} ms from one start each, 30 % off (a temperature: by its "
             f"distance from the air). {found['converged']} of the fits converged. Of all intervals {100 * found['coverage_of_all']:.1f} % contain the true value; by chance a row "
-            f"may be off by {100 * np.sqrt(0.05 * 0.95 / found['experiments']):.1f} points, a bias by "
+            f"may differ by {100 * np.sqrt(0.05 * 0.95 / found['experiments']):.1f} points, a bias by "
             f"{1.0 / np.sqrt(found['experiments']):.2f}.",
             "",
             "| parameter | standard error | intervals that contain the true value | bias, in standard errors | spread over standard error "
