@@ -165,9 +165,9 @@ def test_a_linear_program_finds_the_least_of_the_largest() -> None:
     at = list(TERMS).index("settling_time")
     terms[:, at], slopes[:, at, 0] = (1.0, 1.2), (2.0, -1.0)
     centre = np.asarray([0.5])
-    point, promise = trust.step(Goal("worst"), terms, slopes, members, centre, 0.3)
+    point, predicted = trust.step(Goal("worst"), terms, slopes, members, centre, 0.3)
     assert point[0] - 0.5 == pytest.approx(0.2 / 3.0)
-    assert promise == pytest.approx(1.0 + 0.4 / 3.0)
+    assert predicted == pytest.approx(1.0 + 0.4 / 3.0)
     point, _ = trust.step(Goal("worst", limits={"settling_time": 1.1}), terms, slopes, members, centre, 0.3)
     assert 0.05 - 1e-9 <= point[0] - 0.5 <= 0.1 + 1e-9
     point, _ = trust.step(Goal("worst"), terms, slopes, members, centre, 0.01)

@@ -1,15 +1,19 @@
-r"""Steps by linear programming in a trust region, of a start each (after Madsen 1975, minimax by linear programs).
+r"""Sequential linear programming in a trust region, one for each start (after Madsen 1975, minimax by linear programs).
 
-Every term of every loop is known with its slope at the centre, so the next point minimises, over the steps
-$|d_k| \le \Delta$, the objective of the loops as they would be if they were straight lines held above zero,
+Every term q of every loop is known with its gradient at the centre, so the next point minimises, over the steps
+$|d_k| \le \Delta$, the objective of the linearised loops, each term bounded below by zero,
 
     worst   min t + MU v:   sum_j w_j q_mj <= t,   q_mj >= q_mj(0) + grad q_mj . d,   q_mj >= 0,
                             q_mj(0) + grad q_mj . d <= l_j (1 + v),   v >= 0,
 
-or their mean in the place of t. It becomes the centre when it is better; otherwise Delta shrinks. That looks ahead to
-loops that become the worst on the way, which a slope of the largest cost does not. A loop whose slopes are wild (a
-limit cycle multiplies a difference in every swing) stands still in the model; where the model promises nothing the next
-point is drawn from the trust region.
+or their mean in the place of t. It becomes the centre when it is better; otherwise Delta shrinks. Linear programs take
+into account loops that become the worst on the way, which the gradient of the largest cost does not. A loop with an
+unusable gradient (a limit cycle multiplies a difference in every swing) is constant in the model; where the model
+predicts no improvement the next point is drawn from the trust region.
+
+No `AbstractSearch` of optimistix: its trust regions predict the reduction from a gradient and a Hessian (`FunctionInfo`),
+and this objective has neither; the prediction is the optimum of the linear program, known only with the step. optimistix
+has no linear programming, so both halves would only wrap `linprog`.
 """
 
 from __future__ import annotations
@@ -23,30 +27,30 @@ from smajax.control.tune.objective import SPREAD, Goal
 from smajax.control.tune.scenarios import Members
 
 FIRST, WIDEST, NARROWEST = 0.15, 0.3, 2e-3  # Delta, share of the box by logarithm; below the last a start has ended
-GOOD, WIDER, NARROWER = 0.5, 2.0, 0.4  # share of the promise from which Delta grows, and by how much
-LEAST = 1e-3  # a promise of less is none
+GOOD, WIDER, NARROWER = 0.5, 2.0, 0.4  # share of the predicted reduction from which Delta grows, and by how much
+MIN_REDUCTION = 1e-3  # a smaller predicted one is none
 PENALTY = 30.0  # MU, cost of a limit exceeded by its own size
 Memory = dict[str, np.ndarray]
 
 
 def begin(points: np.ndarray) -> Memory:
-    """Nothing known yet: arrays by start."""
+    """State before the first evaluation: arrays by start."""
     count = len(points)
     return {
         "centre": points.copy(),
         "value": np.full(count, np.inf),
-        "promise": np.full(count, -np.inf),
+        "predicted": np.full(count, -np.inf),
         "radius": np.full(count, FIRST),
     }
 
 
 def value(goal: Goal, terms: np.ndarray, members: Members) -> np.ndarray:
-    """The objective of terms (C, M, terms) and what its limits cost, (C,)."""
+    """The objective of terms (C, M, terms) and the penalty of its limits, (C,)."""
     return goal.cost(terms, members) + PENALTY * goal.excess(terms)
 
 
 def _shares(goal: Goal, costs: np.ndarray, counted: np.ndarray) -> np.ndarray:
-    """How much each loop counts in a mean, (M,); none less than nothing."""
+    """Weight of each loop in a mean, (M,), not negative."""
     shares = counted / counted.sum()
     if goal.objective == "mean-variance":
         inside = costs[counted]
@@ -57,7 +61,7 @@ def _shares(goal: Goal, costs: np.ndarray, counted: np.ndarray) -> np.ndarray:
 def step(
     goal: Goal, terms: np.ndarray, slopes: np.ndarray, members: Members, centre: np.ndarray, radius: float
 ) -> tuple[np.ndarray, float]:
-    """(next point, the value promised there) from terms (M, terms) and slopes (M, terms, gains) at the centre."""
+    """(next point, the predicted value there) from terms (M, terms) and slopes (M, terms, gains) at the centre."""
     count, gains = len(terms), len(centre)
     used, counted = np.flatnonzero(goal.weighed), goal.members(members)
     weights, pieces = goal.weighed[used], np.flatnonzero(counted)
@@ -91,16 +95,16 @@ def step(
         least.append(1.0 - terms[:, k] / bound)
     box = [(max(-radius, -here), min(radius, 1.0 - here)) for here in centre]
     ends = [*box, (None, None) if worst else (0.0, 0.0), (0.0, None), *[(0.0, None)] * lines]
-    found = linprog(cost, A_ub=sparse.vstack(rows, format="csr"), b_ub=np.concatenate(least), bounds=ends)
-    if found.x is None:  # a matrix that the solver refuses: nothing is promised
+    solution = linprog(cost, A_ub=sparse.vstack(rows, format="csr"), b_ub=np.concatenate(least), bounds=ends)
+    if solution.x is None:  # a matrix that the solver rejects: no reduction is predicted
         return centre, np.inf
-    return np.clip(centre + found.x[:gains], 0.0, 1.0), float(found.fun)
+    return np.clip(centre + solution.x[:gains], 0.0, 1.0), float(solution.fun)
 
 
 def move(
     goal: Goal, seen: Seen, members: Members, points: np.ndarray, memory: Memory, draw: np.random.Generator
 ) -> tuple[np.ndarray, Memory, np.ndarray]:
-    """(next points, memory, which starts have ended) after `points` (C, gains) were seen."""
+    """(next points, memory, which starts have ended) after `points` (C, gains) were evaluated."""
     new = {name: array.copy() for name, array in memory.items()}
     values = value(goal, seen.terms, members)
     calm = ~(seen.failed | seen.wild(goal.used))
@@ -111,8 +115,8 @@ def move(
         before = new["value"][k]
         first = not np.isfinite(before)
         if first or values[k] < before:
-            kept = before - values[k] > GOOD * (before - new["promise"][k])
-            new["radius"][k] *= WIDER if not first and kept else 1.0
+            good = before - values[k] > GOOD * (before - new["predicted"][k])
+            new["radius"][k] *= WIDER if not first and good else 1.0
             new["centre"][k], new["value"][k] = points[k], values[k]
             terms[k] = np.nan_to_num(seen.terms[k])
             slopes[k] = np.where(calm[k][:, None, None], seen.slopes[k], 0.0)
@@ -120,7 +124,8 @@ def move(
             new["radius"][k] *= NARROWER
         radius = new["radius"][k] = min(new["radius"][k], WIDEST)
         centre = new["centre"][k]
-        asked, new["promise"][k] = step(goal, terms[k], slopes[k], members, centre, float(radius))
+        proposal, new["predicted"][k] = step(goal, terms[k], slopes[k], members, centre, float(radius))
         drawn = np.clip(centre + radius * draw.uniform(-1.0, 1.0, len(centre)), 0.0, 1.0)
-        following[k] = asked if new["promise"][k] < new["value"][k] - LEAST else drawn
+        improves = new["predicted"][k] < new["value"][k] - MIN_REDUCTION
+        following[k] = proposal if improves else drawn
     return following, new, new["radius"] < NARROWEST
