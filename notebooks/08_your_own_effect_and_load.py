@@ -1,7 +1,7 @@
 # %% [markdown]
 # # Your own effect and your own load
 #
-# An effect is a class that overrides the one method of the equation it changes. A load is one equation of motion. Neither needs registering to be used.
+# An effect is a class that inherits from the contract of the equation it changes and overrides one of its methods. A load is one equation of motion. Neither needs registering to be used.
 
 # %%
 import dataclasses
@@ -16,11 +16,13 @@ import numpy as np  # noqa: E402
 
 from smajax.core.parameters import get_parameters, parameter, parameters, set_parameters  # noqa: E402
 from smajax.model.effects.base import AbstractEffect  # noqa: E402
+from smajax.model.effects.candidate import Candidate  # noqa: E402
 from smajax.model.load.base import AbstractMovingLoad  # noqa: E402
 from smajax.model.presets import flexinol_table_3_2, flexinol_voltage  # noqa: E402
 from smajax.model.system import System  # noqa: E402
 from smajax.model.types import Scalar  # noqa: E402
-from smajax.model.wire.constitutive import IntegratedForm  # noqa: E402
+from smajax.model.wire.form import IntegratedForm  # noqa: E402
+from smajax.model.wire.heat import HeatTerm  # noqa: E402
 from smajax.simulation.compiled import simulate_compiled  # noqa: E402
 
 # %% [markdown]
@@ -28,23 +30,21 @@ from smajax.simulation.compiled import simulate_compiled  # noqa: E402
 
 
 # %%
-class FanComingOn(AbstractEffect):
+class FanComingOn(AbstractEffect, HeatTerm):
     """The air cools by `drop` with the time constant `delay`."""
 
-    drop: Scalar = parameter("K", 0.0, 50.0, "by how much the air gets colder in the end")
-    delay: Scalar = parameter("s", 0.1, 1e3, "time constant of the fan")
+    drop: Scalar = parameter("K", 0.0, 50.0, "by how much the air gets colder in the end", default=0.0)
+    delay: Scalar = parameter("s", 0.1, 1e3, "time constant of the fan", default=10.0)
 
     effect_name = "fan_coming_on"
-    title = "a fan that comes on"
-    equation = "heat"
-    formula = "T_inf -> T_inf - drop (1 - exp(-t/delay))"
-    sentence = "The same voltage lifts less and less."
-    switches = ("drop",)
-    starts = {"drop": 5.0, "delay": 10.0}  # noqa: RUF012
-
-    @classmethod
-    def base(cls):
-        return cls(drop=0.0, delay=10.0)
+    candidate = Candidate(
+        title="a fan that comes on",
+        equation="heat",
+        formula="T_inf -> T_inf - drop (1 - exp(-t/delay))",
+        sentence="The same voltage lifts less and less.",
+        switches=("drop",),
+        initial_guess={"drop": 5.0, "delay": 10.0},
+    )
 
     def ambient_shift(self, time):
         return -self.drop * (1.0 - jnp.exp(-time / self.delay))

@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import smajax
-from smajax.model.effects.library import EQUATIONS, LIBRARY, of_others
+from smajax.model.effects.candidate import EQUATIONS
+from smajax.model.effects.library import LIBRARY, of_others
 
 FOLDER = Path(__file__).parents[1] / "docs" / "reference"
 NAMES = "names.md"
@@ -118,19 +119,22 @@ def effects() -> str:
         "",
         MADE,
         "",
-        f"What the base model may lack: {len(own)} effects, one class each, with one method per equation. To add your own:",
+        f"What the base model may lack: {len(own)} effects, one class each, in the contract of the equation that it changes. To add your own:",
         "[how to add an effect](../how-to/add-an-effect.md).",
     ]
     for equation in EQUATIONS:
         lines += ["", f"## {equation.capitalize()}", "", "| effect | what it is | what it changes |", "|---|---|---|"]
         for name, effect in own.items():
-            if effect.equation == equation:
-                lines.append(f"| [`{name}`](#{effect.__module__}) | {effect.title} | {_cell(effect.formula)} |")
+            if effect.candidate.equation == equation:
+                lines.append(
+                    f"| [`{name}`](#{effect.__module__}) | {effect.candidate.title} | {_cell(effect.candidate.formula)} |"
+                )
     modules = dict.fromkeys(
-        effect.__module__ for equation in EQUATIONS for effect in own.values() if effect.equation == equation
+        effect.__module__ for equation in EQUATIONS for effect in own.values() if effect.candidate.equation == equation
     )
     lines += ["", "## Their classes"]
-    for module in ("smajax.model.effects.base", "smajax.model.effects.library", "smajax.model.extended", *modules):
+    first = [f"smajax.model.effects.{name}" for name in ("base", "candidate", "grouping", "library")]
+    for module in (*first, "smajax.model.extended", *modules):
         lines += ["", f"::: {module}"]
     return "\n".join(lines) + "\n"
 

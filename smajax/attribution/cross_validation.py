@@ -32,7 +32,7 @@ from smajax.fit.problem import Problem
 from smajax.fit.sensitivity import sensitivity
 from smajax.fit.starts import multistart, perturbed_restarts
 from smajax.fit.uncertainty import at_bound
-from smajax.model.effects.base import Extent
+from smajax.model.effects.candidate import Extent
 from smajax.model.effects.library import LIBRARY
 
 DEFAULT = AttributionConfig()
@@ -379,6 +379,6 @@ def nudged(setting: Search, values: np.ndarray, effects: Sequence[str]) -> np.nd
     for effect in effects:
         for name in switches(effect):
             found[setting.problem.names.index(name)] += (
-                setting.config.nudge * LIBRARY[effect].starts[name.removeprefix(f"{effect}.")]
+                setting.config.nudge * LIBRARY[effect].candidate.initial_guess[name.removeprefix(f"{effect}.")]
             )
     return found

@@ -81,9 +81,9 @@ def effects_found(
         findings.append(
             EffectFinding(
                 name,
-                effect.title,
-                effect.equation,
-                effect.formula,
+                effect.candidate.title,
+                effect.candidate.equation,
+                effect.candidate.formula,
                 name in final.effects,
                 coefficients,
                 evidence,

@@ -46,11 +46,11 @@ def job_of(experiment: Experiment) -> Job:
         return Problem.build(model, batch, experiment.noise_sigma, experiment.offset)
 
     extent = extent_of(problem_with(declared))
-    names = tuple(name for name in names if LIBRARY[name].shows(extent))
+    names = tuple(name for name in names if LIBRARY[name].candidate.observable(extent))
     problem = problem_with((*declared, *names))
     full = problem.system
     bounds = {entry.name: (entry.low, entry.high) for entry in parameters(full).values()}
-    bounds |= {f"{name}.{own}": one for name in names for own, one in LIBRARY[name].spans(extent).items()}
+    bounds |= {f"{name}.{own}": one for name in names for own, one in LIBRARY[name].candidate.bounds(extent).items()}
     bounds |= {unknown.name: (unknown.low, unknown.high) for unknown in experiment.unknowns}
     others = tuple(run for run in experiment.runs if run.role != "fit")
     held_out = pack(others, experiment.step, parameter_values(full)) if others else None

@@ -44,7 +44,7 @@ def _rigs() -> Iterator[tuple[System, dict[str, Series]]]:
 def shift(effect: type[AbstractEffect]) -> str:
     """What `effect` at its base value changes, in words; nothing if it changes nothing, or applies to none of our loads."""
     for system, inputs in _rigs():
-        if not effect.applies(system) or ("temperature" in inputs and effect.equation in HEATED):
+        if not effect.candidate.applies(system) or ("temperature" in inputs and effect.candidate.equation in HEATED):
             continue
         with_it = dataclasses.replace(system, effects=(effect.base(),))
         plain, changed = simulate_compiled(system, inputs, DT), simulate_compiled(with_it, inputs, DT)

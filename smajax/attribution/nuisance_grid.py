@@ -38,7 +38,7 @@ def scanned(setting: Search, values: np.ndarray, effects: Sequence[str], fitted:
     options = [
         (effect, {f"{effect}.{name}": one for name, one in place.items()})
         for effect in effects
-        for place in LIBRARY[effect].places(setting.extent)
+        for place in LIBRARY[effect].candidate.grid(setting.extent)
     ]
     if not options:
         return Scanned(at)

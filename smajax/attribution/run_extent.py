@@ -6,7 +6,7 @@ import numpy as np
 
 from smajax.data.readers.resolution_levels import likeliest_increment
 from smajax.fit.problem import Problem
-from smajax.model.effects.base import Extent
+from smajax.model.effects.candidate import Extent
 
 
 def extent_of(problem: Problem) -> Extent:

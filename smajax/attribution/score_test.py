@@ -39,7 +39,7 @@ class Score:
 
 def switches(effect: str) -> tuple[str, ...]:
     """Parameter names of the coefficients that switch `effect` on."""
-    return tuple(f"{effect}.{name}" for name in EVERY[effect].switches)
+    return tuple(f"{effect}.{name}" for name in EVERY[effect].candidate.switches)
 
 
 def score_of(

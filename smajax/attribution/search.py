@@ -41,7 +41,7 @@ def start_values(
     """
     values = np.array(model_values)
     for effect in score.effects:
-        for name, start in LIBRARY[effect].starts.items():
+        for name, start in LIBRARY[effect].candidate.initial_guess.items():
             full = f"{effect}.{name}"
             size = score.place.get(full, start)
             asked = float(np.copysign(size, score.coefficients.get(full, 0.0) or size))
@@ -64,7 +64,7 @@ def all_starts(
     found = [first]
     for effect in score.effects:
         sizes = {name.removeprefix(f"{effect}."): one for name, one in score.coefficients.items()}
-        ranges = LIBRARY[effect].begins(sizes)
+        ranges = LIBRARY[effect].candidate.start_ranges(sizes)
         if not ranges:
             continue
         low, high = np.log(np.asarray(list(ranges.values()))).T

@@ -24,7 +24,7 @@ def gain_kept_at_half_step(setting: Search, new: Model, old: Model) -> float:
     The gain is of `new` on `old`, or on `old` with the partner that was added beside it: a partner's gain is not its own.
     1 where nothing that was added can jump.
     """
-    jumping = {effect for effect in new.effects if effect not in old.effects and LIBRARY[effect].jumps}
+    jumping = {effect for effect in new.effects if effect not in old.effects and LIBRARY[effect].candidate.stick_slip}
     if not jumping:
         return 1.0
     without = old.cost

@@ -79,7 +79,7 @@ def _best_of_each(scores: Sequence[Score], count: int) -> list[Score]:
     """The best of each equation first, then the others by gain; `count` of them that promise anything."""
     firsts: dict[str, Score] = {}
     for score in scores:
-        firsts.setdefault(UNKNOWN[score.effects[0]].equation, score)
+        firsts.setdefault(UNKNOWN[score.effects[0]].candidate.equation, score)
     leading = list(firsts.values())
     rest = [score for score in scores if score not in leading]
     return [score for score in [*leading, *rest][:count] if score.gain > 0.0]
@@ -227,8 +227,8 @@ def _learnt(
     state_unit, unit = (reading if one == "reading" else one for one in (term.state_unit, term.unit))
     return UnknownTerm(
         name=term.effect_name,
-        title=term.title,
-        equation=term.equation,
+        title=term.candidate.title,
+        equation=term.candidate.equation,
         symbol=term.symbol,
         state=term.state,
         state_unit=state_unit,

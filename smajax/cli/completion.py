@@ -39,7 +39,7 @@ def presets(incomplete: str) -> list[str]:
 def effects(incomplete: str) -> list[str]:
     from smajax.model.effects.library import LIBRARY
 
-    equations = dict.fromkeys(effect.equation for effect in LIBRARY.values())
+    equations = dict.fromkeys(effect.candidate.equation for effect in LIBRARY.values())
     return _offered([*equations, *LIBRARY], incomplete)
 
 

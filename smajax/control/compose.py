@@ -77,7 +77,7 @@ def _changed(before: System, own: str, told: str, unit: str) -> float:
     """The value that a change is a share of. ValueError where there is none, or zero."""
     value = parameter_values(before).get(own)
     effect, _, coefficient = own.partition(".")
-    started = LIBRARY[effect].starts.get(coefficient) if effect in LIBRARY else None
+    started = LIBRARY[effect].candidate.initial_guess.get(coefficient) if effect in LIBRARY else None
     like = "a value" + (f" in {unit}" if unit != "-" else "") + (f", such as '{started:g} {unit}'" if started else "")
     like = like.replace(" -'", "'")  # of a number without unit
     if value is None:

@@ -140,7 +140,7 @@ class Judge(AbstractWatch):
         extreme = jnp.where(fresh, now.command, seen.extreme)
         turned = rising * (extreme - now.command) > LIVELY
         system = self.system
-        ohms = resistance_per_metre(system.wire, system.effects, now.temperature, now.fraction)
+        ohms = resistance_per_metre(system.wire, system.terms.resistance, now.temperature, now.fraction)
         power = heating_power(system, ohms, system.drive.from_voltage(now.command))
         return _Seen(
             number=seen.number + 1,

@@ -26,7 +26,7 @@ from smajax.model.load.arm import Arm
 from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.system import System
 from smajax.model.types import Scalar
-from smajax.model.wire.constitutive import IntegratedForm
+from smajax.model.wire.form import IntegratedForm
 from smajax.model.wire.heat import cross_section
 
 

@@ -82,7 +82,7 @@ MODULES = {
     "fit.kept": "core.result_cache",
     "fit.progress": "core.progress",
     "fit.shown": "fit.predicted",
-    "friction": "model.friction",
+    "friction": "model.load.friction",
     "gain_search": "control.gain_search",
     "gains_file": "control.gains_file",
     "identified": "fit.identify_result",

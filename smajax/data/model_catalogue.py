@@ -100,9 +100,9 @@ def candidates(
     return tuple(
         name
         for name, effect in LIBRARY.items()
-        if effect.equation not in useless
-        and effect.applies(system)
-        and (clocked or not effect.needs_time or only is not None)
+        if effect.candidate.equation not in useless
+        and effect.candidate.applies(system)
+        and (clocked or not effect.candidate.needs_time or only is not None)
         and name not in excluded
         and (only is None or name in only)
     )

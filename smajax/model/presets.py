@@ -28,12 +28,8 @@ from smajax.model.load.coupon import AbstractCoupon, Coupon, StrainCoupon
 from smajax.model.load.dead_weight import DeadWeight
 from smajax.model.system import System
 from smajax.model.wire.conditions import Enhanced
-from smajax.model.wire.constitutive import Constitutive
-from smajax.model.wire.heat import Heat
-from smajax.model.wire.kinetics import Kinetics
 from smajax.model.wire.laws import under_law
-from smajax.model.wire.resistance import Resistance
-from smajax.model.wire.wire import Wire
+from smajax.model.wire.wire import Constitutive, Heat, Kinetics, Resistance, Wire
 
 
 def niti_table_3_1() -> Wire:

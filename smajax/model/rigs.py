@@ -9,7 +9,7 @@ import dataclasses
 
 from smajax.model.presets import build
 from smajax.model.system import System
-from smajax.model.wire.constitutive import AbstractForm, IntegratedForm, RateForm
+from smajax.model.wire.form import AbstractForm, IntegratedForm, RateForm
 
 
 def arm(law: str = "enhanced", form: AbstractForm | None = None) -> System:

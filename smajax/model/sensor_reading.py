@@ -2,18 +2,43 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import abc
+from typing import ClassVar, NamedTuple
 
-from smajax.model.effects.base import AbstractEffect
 from smajax.model.types import Scalar, State
 
 FOLLOWED = "followed"  # entry of `State.sensor`: the late value, where the sensor shows another one
 
 
-def time_constant(effects: Sequence[AbstractEffect]) -> Scalar | float | None:
+class SensorLagTerm(abc.ABC):
+    """A sensor that follows the true value."""
+
+    @abc.abstractmethod
+    def sensor_time_constant(self) -> Scalar | float:
+        """Time constant of a first-order sensor, s."""
+
+
+class SensorTerm(abc.ABC):
+    """A sensor that shows another value."""
+
+    effect_name: ClassVar[str]  # its entry of `State.sensor`
+    recalls: ClassVar[bool] = False  # whether `sensed` needs its own last reading
+
+    @abc.abstractmethod
+    def sensed(self, reading: Scalar, time: Scalar, last: Scalar) -> Scalar:
+        """What the sensor shows where it would show `reading`, the lag included; `last`: what this gave before."""
+
+
+class SensorTerms(NamedTuple):
+    """All that effects change in the reading of the sensor."""
+
+    lags: tuple[SensorLagTerm, ...] = ()
+    readings: tuple[SensorTerm, ...] = ()
+
+
+def time_constant(terms: SensorTerms) -> Scalar | float | None:
     """Of the sensor, s; None where no effect gives it one."""
-    lag = sum(effect.sensor_time_constant() for effect in effects)
-    return None if isinstance(lag, (int, float)) and lag == 0 else lag
+    return sum(term.sensor_time_constant() for term in terms.lags) if terms.lags else None
 
 
 def followed(state: State) -> Scalar:
@@ -21,28 +46,23 @@ def followed(state: State) -> Scalar:
     return state.sensor.get(FOLLOWED, state.reading)
 
 
-def first_reading(effects: Sequence[AbstractEffect], shown: Scalar, time: Scalar) -> tuple[Scalar, dict[str, Scalar]]:
-    """(reading, what the sensor remembers) at rest at `shown`."""
-    names = [effect.effect_name for effect in effects if effect.recalls]
-    late = [FOLLOWED] if time_constant(effects) is not None and any(effect.senses() for effect in effects) else []
-    return reading_of(effects, shown, time, dict.fromkeys([*late, *names], shown), at_start=True)
+def first_reading(terms: SensorTerms, value: Scalar, time: Scalar) -> tuple[Scalar, dict[str, Scalar]]:
+    """(reading, history of the sensor) at rest at `value`."""
+    names = [term.effect_name for term in terms.readings if term.recalls]
+    late = [FOLLOWED] if terms.lags and terms.readings else []
+    return reading_of(terms, value, time, dict.fromkeys([*late, *names], value), at_start=True)
 
 
 def reading_of(
-    effects: Sequence[AbstractEffect],
-    late: Scalar,
-    time: Scalar,
-    before: dict[str, Scalar],
-    at_start: bool = False,
+    terms: SensorTerms, late: Scalar, time: Scalar, before: dict[str, Scalar], at_start: bool = False
 ) -> tuple[Scalar, dict[str, Scalar]]:
-    """(reading, what the sensor remembers) where the late value is `late` (s), from what it remembered `before`."""
+    """(reading, history of the sensor) at `time` (s) where the late value is `late`; `before`: the history so far."""
     reading = late
-    now = {FOLLOWED: late} if FOLLOWED in before else {}
-    for effect in effects:
-        name = effect.effect_name
-        # At rest it has shown for ever what it is given.
-        last = reading if at_start else before.get(name, reading)
-        reading = effect.sensed(reading, time, last)
-        if effect.recalls:
-            now[name] = reading
-    return reading, now
+    history = {FOLLOWED: late} if FOLLOWED in before else {}
+    for term in terms.readings:
+        # At rest: its last reading is this one.
+        last = reading if at_start else before.get(term.effect_name, reading)
+        reading = term.sensed(reading, time, last)
+        if term.recalls:
+            history[term.effect_name] = reading
+    return reading, history

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 
 import equinox as eqx
@@ -25,7 +26,13 @@ class WireState(eqx.Module):
     cooling_missed: Scalar  # the same of its cooling curve; both else 0
     detwinned_fraction: Scalar  # xi_s: the part of the martensite that gives strain, all of it without Brinson's split
     formed_by_loading: Scalar  # 1 where loading, not cooling, formed the martensite last; else 0
-    kept: dict[str, Scalar] = eqx.field(default_factory=dict)  # what effects remember (`wire/kept.py`); mostly nothing
+    history: dict[str, Scalar] = eqx.field(default_factory=dict)  # of effects (`wire/history.py`); mostly empty
+
+    @property
+    def kept(self) -> dict[str, Scalar]:
+        """`history`, as version 0.1 called it; until version 0.3."""
+        warnings.warn("WireState.kept is WireState.history now", DeprecationWarning, stacklevel=2)
+        return self.history
 
 
 class Motion(eqx.Module):
@@ -44,9 +51,7 @@ class State(eqx.Module):
     wire: WireState
     motion: Motion
     reading: Scalar  # what the sensor shows: m, rad, or - (strain)
-    sensor: dict[str, Scalar] = eqx.field(
-        default_factory=dict
-    )  # what a sensor remembers (`reading.py`); mostly nothing
+    sensor: dict[str, Scalar] = eqx.field(default_factory=dict)  # its history (`sensor_reading.py`); mostly empty
 
 
 class Trajectory(eqx.Module):

@@ -21,7 +21,7 @@ from smajax.model.load.arm import Arm
 from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.system import System
 from smajax.model.types import Series, Trajectory
-from smajax.model.wire.kinetics import Kinetics
+from smajax.model.wire.wire import Kinetics
 from smajax.report.pictures import MEASURED, QUIET, tidy
 from smajax.simulation.compiled import simulate_compiled
 from smajax.simulation.simulate import DEFAULT_STEP

@@ -8,16 +8,15 @@ import jax
 import jax.numpy as jnp
 from jax import lax
 
-from smajax.model.effects.base import having
 from smajax.model.system import System, recorded_apart
 from smajax.model.types import Scalar, Series
 
 
 def refuse_lag(system: System, what: str) -> None:
     """ValueError where an effect shifts the input in time, of which `what` knows no series."""
-    for effect in having(system.effects, "input_lag"):
+    for term in system.terms.input_lag:
         raise ValueError(
-            f"`{effect.effect_name}` shifts a recorded input in time, but {what} makes its input as it goes: leave "
+            f"`{term.effect_name}` shifts a recorded input in time, but {what} makes its input as it goes: leave "
             "the effect out, and give a closed loop its `delay`."
         )
 
@@ -28,7 +27,7 @@ def acting_inputs(system: System, series: Mapping[str, Series], dt: Scalar | flo
     A lag of a part of a step gives the mean over the step of a command that holds between samples, and of what was
     measured at them the straight line between two. Beyond its ends a series is as at them.
     """
-    late, acting = having(system.effects, "input_lag"), dict(series)
+    late, acting = system.terms.input_lag, dict(series)
     channels = sorted(recorded_apart(system) & set(series))
     if not late or not channels:
         return acting

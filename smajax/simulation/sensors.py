@@ -39,7 +39,9 @@ def shown_by(system: System, run: Trajectory, name: str) -> Series:
         return run.stress * cross_section(system.wire)
     if name == "resistance":
         ohms = jax.vmap(
-            lambda temperature, fraction: resistance_per_metre(system.wire, system.effects, temperature, fraction)
+            lambda temperature, fraction: resistance_per_metre(
+                system.wire, system.terms.resistance, temperature, fraction
+            )
         )
         return ohms(run.temperature, run.martensite_fraction) * system.wire.wire_length
     return getattr(run, name)

@@ -113,7 +113,7 @@ def first_state(system: System, series: Mapping[str, Series], initial: State | N
     if initial is None:
         return rest
     for part, theirs, ours in (
-        ("wire", initial.wire.kept, rest.wire.kept),
+        ("wire", initial.wire.history, rest.wire.history),
         ("load", initial.motion.friction, rest.motion.friction),
         ("sensor", initial.sensor, rest.sensor),
     ):

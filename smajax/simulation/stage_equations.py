@@ -7,13 +7,12 @@ from typing import NamedTuple
 import equinox as eqx
 import jax.numpy as jnp
 
-from smajax.model.effects.base import having
-from smajax.model.friction import in_use, rubbing
 from smajax.model.load.base import AbstractMovingLoad
+from smajax.model.load.friction import in_use, rubbing
 from smajax.model.system import System, ambient_temperature, heating_power, load_resistance
 from smajax.model.types import Inputs, Scalar, State
 from smajax.model.wire.constitutive import stress_at
-from smajax.model.wire.heat import cross_section, heat_rate, stored_heat
+from smajax.model.wire.heat import HeatState, cross_section, heat_rate, stored_heat
 from smajax.model.wire.resistance import resistance_per_metre
 
 
@@ -40,11 +39,13 @@ class Stage(eqx.Module):
 
 
 def _heating(system: System, stage: Stage, inputs: Inputs, temperature: Scalar, fraction: Scalar) -> Scalar:
-    wire, effects = system.wire, system.effects
-    ohms = resistance_per_metre(wire, effects, temperature, fraction)
-    power = heating_power(system, ohms, inputs, stage.old.wire)
+    wire, terms, old = system.wire, system.terms, stage.old
+    ohms = resistance_per_metre(wire, terms.resistance, temperature, fraction)
+    power = heating_power(system, ohms, inputs, old.wire)
     ambient = ambient_temperature(system, stage.time, inputs)
-    return heat_rate(wire, effects, temperature, ambient, power, stage.time)
+    # What changes over a stage counts from the state before it: a later stage of a step is longer than its own base.
+    at = HeatState(temperature, ambient, fraction, stage.time, old.wire, stage.time - old.time)
+    return heat_rate(wire, terms.heat, at, power)
 
 
 def motion_rates(stage: Stage, position: Scalar) -> tuple[Scalar, Scalar]:
@@ -61,7 +62,8 @@ def _free_position(system: System, stage: Stage, inputs: Inputs, z: Unknowns) ->
     inertia = load.inertia(inputs)
     before = stage.old.motion
     friction = sum(
-        one.limit * in_use(one, before, z.position) for one in rubbing(system, before, stage.velocity, inputs)
+        one.limit * in_use(one, before, z.position)
+        for one in rubbing(load, system.terms.friction, before, stage.velocity, inputs)
     )
     pull = load.lever() * cross_section(system.wire) * z.stress
     resisting = load_resistance(system, stage.time, z.position, velocity, inputs) + friction
@@ -82,16 +84,11 @@ class Missed(NamedTuple):
 
 def equations(system: System, stage: Stage, inputs: Inputs, z: Unknowns) -> Missed:
     """Heat, motion and stress of a stage, zero at the solution."""
-    wire, effects, load, old = system.wire, system.effects, system.load, stage.old.wire
+    wire, terms, load, old = system.wire, system.terms, system.load, stage.old.wire
     assert isinstance(load, AbstractMovingLoad)
     heating = _heating(system, stage, inputs, z.temperature, z.fraction)
     capacity = stored_heat(wire, (), jnp.ones_like(z.temperature), z.fraction)
-    heat = stored_heat(wire, effects, z.temperature, z.fraction) - stage.heat - stage.step * heating
-    taking = having(effects, "heat_of_change")
-    if taking:
-        taken = sum(effect.heat_of_change(wire, old, z.temperature, z.fraction) for effect in taking)
-        # As a rate over the stage, like all else that heats: a later stage of a step is longer than its own base.
-        heat = heat + taken * stage.step / (stage.time - stage.old.time)
+    heat = stored_heat(wire, terms.heat, z.temperature, z.fraction) - stage.heat - stage.step * heating
     heat = heat / capacity
 
     # Projected on the range between the end stops: at a stop the equation reads "position = stop".
@@ -100,5 +97,5 @@ def equations(system: System, stage: Stage, inputs: Inputs, z: Unknowns) -> Miss
     motion = z.position - jnp.where(free < lower, lower, jnp.where(free > upper, upper, free))
 
     strain = -load.contraction(wire) * (z.position - load.start())
-    asked = stress_at(wire, effects, old, strain, z.temperature, z.stress, z.fraction)
+    asked = stress_at(wire, terms.constitutive, old, strain, z.temperature, z.stress, z.fraction)
     return Missed(heat, motion, z.stress - asked, free)

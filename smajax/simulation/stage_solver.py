@@ -28,8 +28,8 @@ from jax import lax
 from jaxtyping import Array, Bool
 
 from smajax.core.traced_once import traced_once
-from smajax.model.friction import bent, rubbing, unbent
 from smajax.model.load.base import AbstractMovingLoad
+from smajax.model.load.friction import bent, rubbing, unbent
 from smajax.model.system import System
 from smajax.model.types import Inputs, Scalar
 from smajax.model.wire.constitutive import young_modulus
@@ -130,7 +130,7 @@ def _moves(system: System, change: Sequence[Scalar], tolerance: float) -> Bool[A
     load = system.load
     assert isinstance(load, AbstractMovingLoad)
     phases = (jnp.full_like(change[0], phase) for phase in (0.0, 1.0))
-    softer = jnp.minimum(*(young_modulus(system.wire, phase, system.effects) for phase in phases))
+    softer = jnp.minimum(*(young_modulus(system.wire, phase, system.terms.constitutive) for phase in phases))
     scales: list[Scalar | float] = [1.0, 0.01 / load.contraction(system.wire), 1e-4 * softer, 1.0]
     # What is no number does not move: it stays none, and must not keep the others.
     return reduce(operator.or_, [jnp.abs(one) > tolerance * scale for one, scale in zip(change, scales, strict=True)])
@@ -149,11 +149,12 @@ def _nearly(miss: Callable[[Scalar], Scalar], start: Scalar, low: Scalar, high: 
 @traced_once
 def solve(system: System, stage: Stage, inputs: Inputs) -> Solution:
     """The end of a stage. Not to be differentiated: its equations are (`stage_equations`)."""
-    law, effects, old = system.wire.kinetics, system.effects, stage.old.wire
+    law, terms, load, old = system.wire.kinetics, system.terms.kinetics, system.load, stage.old.wire
+    assert isinstance(load, AbstractMovingLoad)
     xi = old.martensite_fraction
-    open_at_start = open_branches(law, effects, old)
+    open_at_start = open_branches(law, terms, old)
     before = stage.old.motion
-    slips = rubbing(system, before, stage.velocity, inputs)
+    slips = rubbing(load, system.terms.friction, before, stage.velocity, inputs)
     tolerance = max(stage.enough, ROUNDINGS * float(jnp.finfo(xi.dtype).eps))
 
     def iterate(at: _Iterate, number: int | None) -> _Iterate:
@@ -169,10 +170,10 @@ def solve(system: System, stage: Stage, inputs: Inputs) -> Solution:
             return z.temperature + base[0] + slope[0] * moved, z.stress + base[2] + slope[2] * moved
 
         tried = along(xi)
-        asked = choose_branch(law, effects, old, open_at_start, *tried)
+        asked = choose_branch(law, terms, old, open_at_start, *tried)
 
         def miss(fraction: Scalar) -> Scalar:
-            return fraction - curve_on(law, effects, old, asked, *along(fraction))
+            return fraction - curve_on(law, terms, old, asked, *along(fraction))
 
         low, high = jnp.where(asked.heating, 0.0, xi), jnp.where(asked.cooling, 1.0, xi)
         start = z.fraction

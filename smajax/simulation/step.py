@@ -28,17 +28,17 @@ from jax import lax
 
 from smajax.core.checkpointed_scan import recomputed, solved
 from smajax.core.traced_once import traced_once
-from smajax.model.friction import in_use, rubbing
 from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.load.coupon import Coupon, StrainCoupon
+from smajax.model.load.friction import in_use, rubbing
 from smajax.model.sensor_reading import followed, reading_of, time_constant
-from smajax.model.system import System, supplied
+from smajax.model.system import System, with_supply_history
 from smajax.model.types import Inputs, Motion, Scalar, State, WireState
-from smajax.model.wire.constitutive import strain_at, stress_at
+from smajax.model.wire.constitutive import reached, stress_at
 from smajax.model.wire.heat import stored_heat
 from smajax.model.wire.history import over
 from smajax.model.wire.root import root
-from smajax.model.wire.two_populations import choose_branch, curve_on, open_branches, remembered, settled
+from smajax.model.wire.two_populations import choose_branch, curve_on, open_branches, settled, with_amplitudes
 from smajax.simulation.stage_equations import Stage, Unknowns, equations, motion_rates
 from smajax.simulation.stage_solver import Solution, solve, solved_linear
 
@@ -105,12 +105,12 @@ def _differentiable(given: tuple[System, Stage, Inputs]) -> Solution:
     forward over reverse mode takes the root for a constant. Derivatives of the first order alone do without.
     """
     system, stage, inputs = given
-    wire, effects, old = system.wire, system.effects, stage.old.wire
+    wire, terms, old = system.wire, system.terms.kinetics, stage.old.wire
     found = solved(solve(_held(system), _held(stage), _held(dict(inputs))))
 
     def all_four(z: Unknowns) -> Unknowns:
         missed = equations(system, stage, inputs, z)
-        asked = curve_on(wire.kinetics, effects, old, found.branch, z.temperature, z.stress)
+        asked = curve_on(wire.kinetics, terms, old, found.branch, z.temperature, z.stress)
         return Unknowns(missed.heat, missed.motion, missed.stress, z.fraction - asked)
 
     def linear(g: Callable[[Unknowns], Unknowns], asked: Unknowns) -> Unknowns:
@@ -132,22 +132,22 @@ def _differentiable(given: tuple[System, Stage, Inputs]) -> Solution:
 
 def _ended(system: System, stage: Stage, inputs: Inputs) -> tuple[WireState, Scalar, Scalar]:
     """Solve one stage: (the wire at its end, the position, the position without end stops)."""
-    wire, effects, old = system.wire, system.effects, stage.old.wire
+    wire, terms, old = system.wire, system.terms, stage.old.wire
     z, branch, free = _solved((system, stage, dict(inputs)))
     at = z.temperature, jnp.maximum(z.stress, 0.0)
-    fractions = settled(wire.kinetics, effects, old, branch, z.temperature, z.stress, z.fraction)
-    strain = strain_at(wire, effects, old, *at, fractions[0])
-    return remembered(wire.kinetics, effects, old, branch, *at, strain, fractions), z.position, free
+    xi, parts = settled(wire.kinetics, terms.kinetics, old, branch, z.temperature, z.stress, z.fraction)
+    new = reached(wire, terms.constitutive, old, *at, xi)
+    return with_amplitudes(wire.kinetics, terms.kinetics, old, branch, new, parts), z.position, free
 
 
 def _stage(system: System, stage: Stage, inputs: Inputs) -> tuple[State, Scalar, Scalar, Scalar]:
     """One stage of a moving load: (state at its end, dH/dt, v, a)."""
     load = system.load
     assert isinstance(load, AbstractMovingLoad)
-    begun = over(stage.old.wire, stage.time - stage.old.time)
-    stage = dataclasses.replace(stage, old=dataclasses.replace(stage.old, wire=begun))
+    terms, old = system.terms, over(stage.old.wire, stage.time - stage.old.time)
+    stage = dataclasses.replace(stage, old=dataclasses.replace(stage.old, wire=old))
     wire, position, free = _ended(system, stage, inputs)
-    wire = supplied(system, inputs, begun, wire)
+    wire = with_supply_history(system, inputs, old, wire)
     lower, upper = load.limits()
     below, above = free < lower, free > upper
     velocity, acceleration = motion_rates(stage, position)
@@ -156,10 +156,10 @@ def _stage(system: System, stage: Stage, inputs: Inputs) -> tuple[State, Scalar,
     acceleration = jnp.where(below | above, 0.0, acceleration)
     # What the heat equation says where it is solved, at the cost of a difference.
     heating = (
-        stored_heat(system.wire, system.effects, wire.temperature, wire.martensite_fraction) - stage.heat
+        stored_heat(system.wire, terms.heat, wire.temperature, wire.martensite_fraction) - stage.heat
     ) / stage.step
     before = stage.old.motion
-    rubs = rubbing(system, before, stage.velocity, inputs)
+    rubs = rubbing(load, terms.friction, before, stage.velocity, inputs)
     friction = {one.name: in_use(one, before, position) for one in rubs}
     new = State(stage.time, wire, Motion(position, velocity, friction), stage.old.reading, stage.old.sensor)
     return new, heating, velocity, acceleration
@@ -174,7 +174,7 @@ def _moving_step(
     A stage starts from a base that those before it have moved on.
     """
     start = (
-        stored_heat(system.wire, system.effects, state.wire.temperature, state.wire.martensite_fraction),
+        stored_heat(system.wire, system.terms.heat, state.wire.temperature, state.wire.martensite_fraction),
         state.motion.position,
         state.motion.velocity,
     )
@@ -202,13 +202,12 @@ def _moving_step(
 @traced_once
 def _coupon_step(system: System, state: State, inputs: Inputs, dt: Scalar) -> State:
     """Temperature and stress at the end of the step are prescribed: the fraction follows in closed form."""
-    wire, effects, old = system.wire, system.effects, over(state.wire, dt)
+    wire, terms, old = system.wire, system.terms, over(state.wire, dt)
     temperature, stress = inputs["temperature"], jnp.maximum(inputs["stress"], 0.0)
-    law, at = wire.kinetics, (temperature, stress)
-    branch = choose_branch(law, effects, old, open_branches(law, effects, old), *at)
-    fractions = settled(law, effects, old, branch, *at, curve_on(law, effects, old, branch, *at))
-    strain = strain_at(wire, effects, old, *at, fractions[0])
-    new = remembered(law, effects, old, branch, *at, strain, fractions)
+    law, changed, at = wire.kinetics, terms.kinetics, (temperature, stress)
+    branch = choose_branch(law, changed, old, open_branches(law, changed, old), *at)
+    xi, parts = settled(law, changed, old, branch, *at, curve_on(law, changed, old, branch, *at))
+    new = with_amplitudes(law, changed, old, branch, reached(wire, terms.constitutive, old, *at, xi), parts)
     return State(state.time + dt, new, state.motion, state.reading, state.sensor)
 
 
@@ -219,26 +218,25 @@ def _strain_coupon_step(system: System, state: State, inputs: Inputs, dt: Scalar
     For any fraction the strain gives the stress, and with it the curve; fraction less curve rises with the fraction,
     so the root lies between the present fraction and the end of the branch: Newton's method held in that bracket.
     """
-    wire, effects, old = system.wire, system.effects, over(state.wire, dt)
+    wire, terms, old = system.wire, system.terms, over(state.wire, dt)
     temperature, strain = inputs["temperature"], inputs["strain"]
-    law, before = wire.kinetics, old.martensite_fraction
+    law, changed, before = wire.kinetics, terms.kinetics, old.martensite_fraction
 
     def stress_of(xi: Scalar) -> Scalar:
-        return stress_at(wire, effects, old, strain, temperature, old.stress, xi)
+        return stress_at(wire, terms.constitutive, old, strain, temperature, old.stress, xi)
 
     frozen = stress_of(before)
-    branch = choose_branch(law, effects, old, open_branches(law, effects, old), temperature, frozen)
+    branch = choose_branch(law, changed, old, open_branches(law, changed, old), temperature, frozen)
 
     def miss(xi: Scalar) -> Scalar:
-        return xi - curve_on(law, effects, old, branch, temperature, stress_of(xi))
+        return xi - curve_on(law, changed, old, branch, temperature, stress_of(xi))
 
     low = jnp.where(branch.heating, 0.0, before)
     high = jnp.where(branch.cooling, 1.0, before)
     xi = root(miss, before, low, high)
-    fractions = settled(law, effects, old, branch, temperature, stress_of(xi), xi)
-    stress = stress_of(fractions[0])
-    own = strain_at(wire, effects, old, temperature, stress, fractions[0])
-    new = remembered(law, effects, old, branch, temperature, stress, own, fractions)
+    xi, parts = settled(law, changed, old, branch, temperature, stress_of(xi), xi)
+    new = reached(wire, terms.constitutive, old, temperature, stress_of(xi), xi)
+    new = with_amplitudes(law, changed, old, branch, new, parts)
     still = jnp.zeros_like(strain)
     return State(state.time + dt, new, Motion(-strain, still), state.reading, state.sensor)
 
@@ -268,7 +266,7 @@ def step_and_error(
     new, (heat, position, velocity) = _moving_step(system, state, inputs, dt, ORDER_THREE)
     capacity = stored_heat(system.wire, (), jnp.ones_like(heat), new.wire.martensite_fraction)
     # Exact where the load moves evenly over the step, which here may be many times as long as the sensor's lag.
-    lag = time_constant(system.effects)
+    lag = time_constant(system.terms.sensor)
     if lag is None:
         late = new.motion.position
     else:
@@ -282,9 +280,9 @@ def _read(system: System, old: State, new: State, shown: Scalar, dt: Scalar) -> 
 
     Backward Euler in the reading: unlike exp(-dt/tau) it has a slope at tau = 0, which a score test needs.
     """
-    lag = time_constant(system.effects)
+    lag = time_constant(system.terms.sensor)
     return _with_reading(system, old, new, shown if lag is None else (lag * followed(old) + dt * shown) / (lag + dt))
 
 
 def _with_reading(system: System, old: State, new: State, late: Scalar) -> State:
-    return State(new.time, new.wire, new.motion, *reading_of(system.effects, late, new.time, old.sensor))
+    return State(new.time, new.wire, new.motion, *reading_of(system.terms.sensor, late, new.time, old.sensor))

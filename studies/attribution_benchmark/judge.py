@@ -143,7 +143,7 @@ def judge(truth: Mapping[str, Any], report: Mapping[str, Any], seconds: float) -
         verdict=report["verdict"],
         added=added,
         named=tuple(dict.fromkeys([*added, *confounders, *alike])),
-        where=tuple(dict.fromkeys([*(LIBRARY[name].equation for name in added), *unknown])),
+        where=tuple(dict.fromkeys([*(LIBRARY[name].candidate.equation for name in added), *unknown])),
         fit_before=_error(report["runs"], "fit", "before", noise),
         fit_after=_error(report["runs"], "fit", "after", noise),
         held_out_before=_error(report["runs"], "held-out", "before", noise),

@@ -26,7 +26,7 @@ from smajax.model.rigs import arm
 from smajax.model.system import System, initial_state
 from smajax.model.types import Motion, Scalar, State
 from smajax.model.wire.heat import cross_section
-from smajax.model.wire.wire import start
+from smajax.model.wire.start import start
 from smajax.report.drawing import GREY, keyed, named, panels
 from smajax.simulation.simulate import DEFAULT_STEP
 
@@ -56,7 +56,7 @@ def on_heating_curve(system: System, position: Scalar, velocity: Scalar) -> Stat
     edge = jnp.asarray(1e-9)
     temperature = temperature_for(system.wire.kinetics, fraction, stress, one > 0.0, one, zero, edge)
     strain = -load.contraction(system.wire) * (position - load.start())
-    wire = start(system.wire, (), temperature, stress, strain, fraction)
+    wire = start(system.wire, temperature, stress, strain, fraction)
     return State(rest.time, wire, Motion(position, velocity), position)
 
 

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from smajax.model.rigs import dead_weight
 from smajax.model.types import Trajectory
-from smajax.model.wire.constitutive import RateForm
+from smajax.model.wire.form import RateForm
 from smajax.report.drawing import BLUE, keyed, named, panels
 from smajax.simulation.simulate import DEFAULT_STEP, simulate
 

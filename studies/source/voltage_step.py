@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from smajax.model.rigs import arm
-from smajax.model.wire.constitutive import AbstractForm
+from smajax.model.wire.form import AbstractForm
 from smajax.report.drawing import BLUE, GREY, RED, keyed, named, panels
 from smajax.simulation.simulate import DEFAULT_STEP
 

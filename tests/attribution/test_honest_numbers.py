@@ -27,8 +27,8 @@ from smajax.data.experiment.record import Experiment
 from smajax.data.model_catalogue import CATALOGUE
 from smajax.model.extended import extended
 from smajax.model.presets import build
-from smajax.model.system import System, heating_power
-from smajax.model.wire.heat import heat_rate, mass_per_metre, stored_heat
+from smajax.model.system import System, heating_power, initial_state
+from smajax.model.wire.heat import HeatState, heat_rate, mass_per_metre, stored_heat
 from smajax.model.wire.order import ORDER
 from smajax.model.wire.resistance import resistance_per_metre
 from smajax.report.narrative import narrate
@@ -146,15 +146,16 @@ def test_the_heat_balance_closes(rig: str, effects: bool, shares: list[float], l
     )
     count, dt = 8000, constant_of_time / 4000.0
     inputs = {channel: top * level * jnp.where(jnp.arange(count + 1) < 0.6 * count, 1.0, 0.3)}
-    run = RUN(system, inputs, dt)
+    run, rest = RUN(system, inputs, dt), initial_state(system, {channel: inputs[channel][0]}).wire
     t, temperature, fraction = run.time, run.temperature, run.martensite_fraction
 
     def flows(
         level: jax.Array, temperature: jax.Array, fraction: jax.Array, time: jax.Array
     ) -> tuple[jax.Array, jax.Array]:
-        ohms = resistance_per_metre(wire, system.effects, temperature, fraction)
+        ohms = resistance_per_metre(wire, system.terms.resistance, temperature, fraction)
         power = heating_power(system, ohms, {channel: level})
-        return power, heat_rate(wire, system.effects, temperature, heat.ambient_temperature, power, time)
+        at = HeatState(temperature, heat.ambient_temperature, fraction, time, rest, jnp.asarray(dt))
+        return power, heat_rate(wire, system.terms.heat, at, power)
 
     held = inputs[channel][:-1]
     begin = jax.vmap(flows)(held, temperature[:-1], fraction[:-1], t[:-1])
@@ -162,7 +163,7 @@ def test_the_heat_balance_closes(rig: str, effects: bool, shares: list[float], l
     came_in, stayed = (
         float(np.sum(0.5 * dt * (np.asarray(a) + np.asarray(b)))) for a, b in zip(begin, end, strict=True)
     )
-    stored = jax.vmap(lambda T, xi: stored_heat(wire, system.effects, T, xi))(
+    stored = jax.vmap(lambda T, xi: stored_heat(wire, system.terms.heat, T, xi))(
         temperature[jnp.array([0, -1])], fraction[jnp.array([0, -1])]
     )
     assert came_in > 0.0

@@ -38,7 +38,7 @@ def _coefficients(findings: Findings) -> dict[str, float]:
 def _knowing(experiment: Experiment, effect: str) -> Experiment:
     """The same where the base model has one of the effects, of unknown size: the loop is left to find the other."""
     full = parameters(extended(base_model(experiment), (effect,), {}))
-    entries = [(full[f"{effect}.{name}"], start) for name, start in LIBRARY[effect].starts.items()]
+    entries = [(full[f"{effect}.{name}"], start) for name, start in LIBRARY[effect].candidate.initial_guess.items()]
     own = [Unknown(entry.name, entry.unit, entry.low, entry.high, start) for entry, start in entries]
     return dataclasses.replace(experiment, unknowns=(*experiment.unknowns, *own))
 

@@ -77,7 +77,7 @@ def test_a_refit_starts_on_the_side_that_the_score_points_to(score: float, expec
 
 def test_a_refit_never_starts_out_of_bounds() -> None:
     found = start_values(np.zeros(4), NAMES, Score(EFFECTS[:1], 0.5, 9.0, 0.0, {NAMES[1]: -6e-8}), BOUNDS)
-    assert found[1] == LIBRARY["latent_heat"].starts["enthalpy"]
+    assert found[1] == LIBRARY["latent_heat"].candidate.initial_guess["enthalpy"]
 
 
 @pytest.mark.parametrize("score", [0.05, 0.0])
@@ -106,7 +106,7 @@ def test_a_refit_of_a_play_begins_beyond_what_its_score_says() -> None:
     names, small = ("sensor_backlash.half_width",), {"sensor_backlash.half_width": (0.0, 5e-5)}
     told = Score(("sensor_backlash",), 0.1, 9.0, 0.0, {names[0]: 0.01})
     places = np.asarray(all_starts(np.zeros(1), names, told, {names[0]: (0.0, 1.0)}))[:, 0]
-    assert places[0] == LIBRARY["sensor_backlash"].starts["half_width"]
+    assert places[0] == LIBRARY["sensor_backlash"].candidate.initial_guess["half_width"]
     assert len(places) == POINTS + 1
     assert 0.01 <= places[1:].min() < 0.012 < 0.12 < places.max() <= 0.16
     silent = Score(("sensor_backlash",), 0.1, 9.0, 0.0, {names[0]: 0.0})

@@ -27,8 +27,11 @@ from smajax.fit.problem import Problem
 from smajax.fit.sensitivity import sensitivity
 from smajax.model.effects.base import AbstractEffect
 from smajax.model.presets import build
+from smajax.model.sensor_reading import SensorTerm
 from smajax.model.system import System
-from smajax.model.types import Scalar
+from smajax.model.types import Scalar, WireState
+from smajax.model.wire.constitutive import ConstitutiveTerm
+from smajax.model.wire.heat import HeatState, HeatTerm
 from smajax.model.wire.wire import Wire
 
 DT, SAMPLES, NOISE = 0.05, 180, 1e-4
@@ -41,46 +44,29 @@ LEVELS = (
 )
 
 
-class _JumpingLoss(AbstractEffect):
+class _JumpingLoss(AbstractEffect, HeatTerm):
     """Convection that sets in above a temperature."""
 
     effect_name: ClassVar[str] = "jumping_loss"
-    equation: ClassVar[str] = "heat"
 
-    @classmethod
-    def base(cls) -> _JumpingLoss:
-        return cls()
-
-    def heat_loss(self, wire: Wire, temperature: Scalar, ambient: Scalar) -> Scalar | float:
+    def heat_loss(self, wire: Wire, at: HeatState) -> Scalar | float:
         surface = jnp.pi * wire.wire_diameter
-        return 60.0 * surface * (temperature - ambient) * jax.nn.sigmoid((temperature - 75.0) / 4.0)
+        return 60.0 * surface * (at.temperature - at.ambient) * jax.nn.sigmoid((at.temperature - 75.0) / 4.0)
 
 
-class _WavyStrain(AbstractEffect):
+class _WavyStrain(AbstractEffect, ConstitutiveTerm):
     """A strain that no line in the fraction describes."""
 
     effect_name: ClassVar[str] = "wavy_strain"
-    equation: ClassVar[str] = "constitutive"
 
-    @classmethod
-    def base(cls) -> _WavyStrain:
-        return cls()
-
-    def strain(
-        self, wire: Wire, temperature: Scalar, stress: Scalar, fraction: Scalar, detwinned: Scalar
-    ) -> Scalar | float:
-        return 2e-3 * jnp.sin(2.0 * jnp.pi * fraction)
+    def strain(self, wire: Wire, at: WireState) -> Scalar | float:
+        return 2e-3 * jnp.sin(2.0 * jnp.pi * at.martensite_fraction)
 
 
-class _BentScale(AbstractEffect):
+class _BentScale(AbstractEffect, SensorTerm):
     """A sensor whose scale is bent."""
 
     effect_name: ClassVar[str] = "bent_scale"
-    equation: ClassVar[str] = "sensor"
-
-    @classmethod
-    def base(cls) -> _BentScale:
-        return cls()
 
     def sensed(self, reading: Scalar, time: Scalar, last: Scalar) -> Scalar:
         return reading + 8e-4 * jnp.sin(reading / 4e-3)

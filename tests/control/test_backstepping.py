@@ -31,6 +31,7 @@ from smajax.core.parameters import get_parameters, set_parameters
 from smajax.model.load.arm import Arm
 from smajax.model.presets import dead_weight
 from smajax.model.wire.kinetics import austenite_left, martensite_left
+from smajax.model.wire.kinetics_terms import NO_TERMS
 from studies.source.backstepping_runs import on_heating_curve, plant, stacked
 
 PLANT = plant()
@@ -170,8 +171,8 @@ def _there_and_back(fraction: Any, stress: Any, share: Any, heating: Any) -> Any
         return temperature_for(LAW, fraction, stress, heating, xi_M, xi_A, edge)
 
     at = temperature(fraction)
-    hot = xi_M * martensite_left(LAW, (), at, stress)
-    cold = 1.0 - (1.0 - xi_A) * austenite_left(LAW, (), at, stress)
+    hot = xi_M * martensite_left(LAW, NO_TERMS, at, stress)
+    cold = 1.0 - (1.0 - xi_A) * austenite_left(LAW, NO_TERMS, at, stress)
     small = 1e-6
     central = (temperature(fraction + small) - temperature(fraction - small)) / (2.0 * small)
     return jnp.where(heating, hot, cold), jax.jvp(temperature, (fraction,), (1.0,))[1], central

@@ -32,7 +32,9 @@ def both(rig: str, effects: tuple[str, ...], tolerance: float | None) -> tuple[A
     system, channel, top = RIGS[rig]
     full = extended(system, effects)
     table = parameters(full)
-    starts = {f"{name}.{key}": value for name in effects for key, value in LIBRARY[name].starts.items()}
+    starts = {
+        f"{name}.{key}": value for name in effects for key, value in LIBRARY[name].candidate.initial_guess.items()
+    }
     full = set_parameters(full, {name: value for name, value in starts.items() if name in table})
     command = top * np.concatenate([np.ones(SAMPLES // 2), np.full(SAMPLES // 4, 0.6), np.zeros(SAMPLES // 4)])
     middle = float(get_parameters(full, ["convection_coefficient"])[0])
@@ -44,7 +46,9 @@ def both(rig: str, effects: tuple[str, ...], tolerance: float | None) -> tuple[A
     )
 
 
-HERE = [name for name in sorted(LIBRARY) if any(LIBRARY[name].applies(system) for system, *_ in RIGS.values())]
+HERE = [
+    name for name in sorted(LIBRARY) if any(LIBRARY[name].candidate.applies(system) for system, *_ in RIGS.values())
+]
 
 
 @pytest.mark.parametrize("effect", HERE)

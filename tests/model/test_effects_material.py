@@ -81,8 +81,11 @@ RIGS = {
 
 def _starts(name: str, share: float = 1.0) -> dict[str, float]:
     """Coefficients by name, of the switches this share."""
-    switches = LIBRARY[name].switches
-    return {f"{name}.{key}": size * (share if key in switches else 1.0) for key, size in LIBRARY[name].starts.items()}
+    switches = LIBRARY[name].candidate.switches
+    return {
+        f"{name}.{key}": size * (share if key in switches else 1.0)
+        for key, size in LIBRARY[name].candidate.initial_guess.items()
+    }
 
 
 def _gap(one: Trajectory, other: Trajectory, name: str) -> float:
@@ -145,7 +148,7 @@ def test_derivatives_are_the_differences_and_the_score_test_sees_every_switch(ri
         for share in (NUDGE, 1.0):
             at = {**base, **_starts(name, share)}
             for key in _starts(name):
-                nudged = share == NUDGE and key.split(".")[1] in LIBRARY[name].switches
+                nudged = share == NUDGE and key.split(".")[1] in LIBRARY[name].candidate.switches
                 # So small a coefficient is to be moved far enough to rise above rounding.
                 cases.append((key, at, abs(at[key]) or 1.0, 3e-2 if nudged else 1e-5))
     members = {key: np.repeat([at[key] for _, at, _, _ in cases], 3) for key in base}
@@ -160,7 +163,7 @@ def test_derivatives_are_the_differences_and_the_score_test_sees_every_switch(ri
         slope, difference = slopes[3 * number + 1], (high - low) / (2.0 * step)
         noise = 1e-13 * np.abs(here).max() / step
         assert np.abs(slope - difference).max() <= 1e-4 * np.abs(difference).max() + noise, (key, at[key])
-        if key.split(".")[1] in LIBRARY[key.split(".")[0]].switches:
+        if key.split(".")[1] in LIBRARY[key.split(".")[0]].candidate.switches:
             assert np.abs(slope).max() > 1e-6 * np.abs(here).max() * step, f"the score test does not see {key}"
 
 
@@ -191,8 +194,8 @@ def test_a_share_of_one_is_the_other_law_and_one_of_zero_is_the_models_own():
                 for which in ("temperature", "stress", "strain", "martensite_fraction", "reading"):
                     assert _gap(run, expected, which) < 1e-9, (name, share, which)
             other = next(one for _, one, _ in ways if one != name)
-            assert LIBRARY[name].applies(model)
-            assert not LIBRARY[other].applies(model)
+            assert LIBRARY[name].candidate.applies(model)
+            assert not LIBRARY[other].candidate.applies(model)
     half = {"enhanced_conditions.share": 0.4}
     # A coupon's temperature and stress are prescribed: the fraction in between is the mean.
     between = simulate_compiled(extended(_under(COUPON, "liang"), ("enhanced_conditions",), half), cooler, DT)

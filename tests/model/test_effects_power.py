@@ -14,10 +14,10 @@ from smajax.control.closed_loop import simulate_closed_loop
 from smajax.control.presets import CONTROLLERS
 from smajax.core.parameters import set_parameters
 from smajax.data.model_catalogue import candidates
-from smajax.model.effects.base import PRESLIDING
 from smajax.model.effects.end_conduction import DEPTH, EndConduction
 from smajax.model.effects.library import LIBRARY
 from smajax.model.extended import extended
+from smajax.model.load.friction import PRESLIDING
 from smajax.model.presets import build
 from smajax.model.rigs import arm
 from smajax.model.system import System, initial_state
@@ -217,7 +217,7 @@ def test_a_load_that_slides_goes_on_sliding_whatever_the_step(speed: float, bend
 def test_a_loose_wire_leaves_the_arm_on_its_stop_until_it_has_taken_up_its_length() -> None:
     """The temperature at which it leaves is that of the strain s/l_0; from there on both run in parallel."""
     system, length = build("niti_table_3_1", "arm", "amplified_voltage"), 6e-3
-    assert LIBRARY["loose_start"].applies(system)
+    assert LIBRARY["loose_start"].candidate.applies(system)
     voltage = {"voltage": jnp.concatenate([jnp.full(600, 7.5), jnp.zeros(900)])}
     plain, loose = (
         simulate_compiled(one, voltage, 0.01)
@@ -279,7 +279,7 @@ def test_a_current_knows_no_leads_and_a_power_none_of_a_sag() -> None:
         assert "input_level" in candidates(system, None, ())
         inputs = {drive: jnp.where(jnp.arange(200) < 120, value, 0.0)}
         plain = simulate_compiled(system, inputs, DT)
-        starts = {f"{without}.{name}": size for name, size in LIBRARY[without].starts.items()}
+        starts = {f"{without}.{name}": size for name, size in LIBRARY[without].candidate.initial_guess.items()}
         same = simulate_compiled(extended(system, (without,), starts), inputs, DT)
         np.testing.assert_allclose(same.temperature, plain.temperature, rtol=1e-12)
         assert np.ptp(plain.temperature) > 20.0

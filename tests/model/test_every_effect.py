@@ -14,7 +14,7 @@ from smajax.attribution.config import AttributionConfig
 from smajax.core.parameters import get_parameters, parameters, set_parameters, set_vector
 from smajax.core.units import convert
 from smajax.engine import program
-from smajax.model.effects.base import Extent
+from smajax.model.effects.candidate import Extent
 from smajax.model.effects.library import LIBRARY
 from smajax.model.extended import extended
 from smajax.model.presets import build
@@ -43,7 +43,7 @@ Shown = tuple[Array, Array]  # reading and temperature, (members, samples) each
 
 
 def _rig(effect: str) -> str:
-    return next(name for name, (system, _, _) in RIGS.items() if LIBRARY[effect].applies(system))
+    return next(name for name, (system, _, _) in RIGS.items() if LIBRARY[effect].candidate.applies(system))
 
 
 def _along(asked: Any, own: dict[str, jax.Array]) -> tuple[Any, Any]:
@@ -96,7 +96,7 @@ class _Told(NamedTuple):
 
 @cache
 def _told(effect: str) -> _Told:
-    rig, starts_of = _rig(effect), LIBRARY[effect].starts
+    rig, starts_of = _rig(effect), LIBRARY[effect].candidate.initial_guess
     everything = tuple(name for name in HERE if _rig(name) == rig)
     full = extended(RIGS[rig][0], everything)
     table = parameters(full)
@@ -104,7 +104,7 @@ def _told(effect: str) -> _Told:
     names = [name for name in all_of_it if name.startswith(f"{effect}.")]
     base = np.asarray(get_parameters(full, names))
     starts = np.asarray([starts_of[_short(name)] for name in names])
-    switch = np.asarray([_short(name) in LIBRARY[effect].switches for name in names])
+    switch = np.asarray([_short(name) in LIBRARY[effect].candidate.switches for name in names])
     shares = {NUDGE: np.where(switch, NUDGE * starts, starts), 1.0: starts}
     points, ways, steps = [base, starts], [np.zeros_like(base)] * 2, {}
     for share, at in shares.items():
@@ -139,15 +139,20 @@ def test_an_experiment_file_can_say_its_coefficients(effect: str) -> None:
     for name, entry in table.items():
         assert convert(1.0, entry.unit, entry.unit) == 1.0
         low, high = entry.low, entry.high
-        assert low <= LIBRARY[effect].starts[_short(name)] <= high
-    assert {f"{effect}.{name}" for name in LIBRARY[effect].switches} <= set(table)
+        assert low <= LIBRARY[effect].candidate.initial_guess[_short(name)] <= high
+    assert {f"{effect}.{name}" for name in LIBRARY[effect].candidate.switches} <= set(table)
 
 
-@pytest.mark.parametrize("effect", sorted(name for name, one in LIBRARY.items() if one.spans(Extent(1.0, 1.0, 0.0))))
+@pytest.mark.parametrize(
+    "effect", sorted(name for name, one in LIBRARY.items() if one.candidate.bounds(Extent(1.0, 1.0, 0.0)))
+)
 def test_what_is_in_the_unit_of_the_reading_is_bounded_by_the_runs(effect: str) -> None:
     """An arm turns by radians where a slider moves by millimetres: a bound in metres is none in radians."""
     table = {_short(name): entry for name, entry in parameters(LIBRARY[effect].base()).items()}
-    arm, slider = LIBRARY[effect].spans(Extent(20.0, 2.0, 0.0)), LIBRARY[effect].spans(Extent(20.0, 2e-3, 0.0))
+    arm, slider = (
+        LIBRARY[effect].candidate.bounds(Extent(20.0, 2.0, 0.0)),
+        LIBRARY[effect].candidate.bounds(Extent(20.0, 2e-3, 0.0)),
+    )
     assert arm.keys() == slider.keys() <= table.keys()
     for name, (low, high) in arm.items():
         assert table[name].low <= low <= 0.0 < high <= table[name].high
@@ -187,7 +192,7 @@ def test_its_derivatives_are_the_differences(effect: str, share: float) -> None:
         if name in STAIRS:
             continue
         forward, difference = told.forward[share][k], told.difference[share][k]
-        if _short(name) in LIBRARY[effect].switches:
+        if _short(name) in LIBRARY[effect].candidate.switches:
             assert np.abs(forward).max() > 0.0, f"{name} cannot be told"
         error = np.abs(forward - difference).max()
         assert error <= 1e-4 * np.abs(difference).max() + told.rounding[share][k], (

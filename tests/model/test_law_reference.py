@@ -17,7 +17,7 @@ from smajax.core.parameters import set_parameters
 from smajax.model.presets import build
 from smajax.model.system import System, initial_state
 from smajax.model.wire.branch_amplitude import AsPrinted
-from smajax.model.wire.constitutive import IntegratedForm
+from smajax.model.wire.form import IntegratedForm
 from smajax.model.wire.laws import LAWS, under_law
 from smajax.model.wire.stiffness import Constant
 from smajax.simulation.simulate import DEFAULT_STEP, simulate

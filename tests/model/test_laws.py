@@ -17,8 +17,9 @@ from smajax.model.presets import build
 from smajax.model.system import System
 from smajax.model.wire.branch_amplitude import AsPrinted, Corrected
 from smajax.model.wire.conditions import BrinsonAsPrinted
-from smajax.model.wire.constitutive import IntegratedForm, RateForm
+from smajax.model.wire.form import IntegratedForm, RateForm
 from smajax.model.wire.kinetics import austenite_left, martensite_left
+from smajax.model.wire.kinetics_terms import NO_TERMS
 from smajax.model.wire.laws import LAWS, under_law
 from smajax.model.wire.stiffness import Constant, Mixed, MixedConstantOmega
 from smajax.simulation.simulate import simulate
@@ -106,8 +107,8 @@ def test_minor_loops_stay_inside_the_major_one_and_close(law: str, inner: list[f
     run = _driven(system, path, [100e6] * len(path))
     xi = np.asarray(run.martensite_fraction)
     at = run.temperature, jnp.asarray(100e6)
-    upper = np.asarray(martensite_left(system.wire.kinetics, (), *at))
-    lower = 1.0 - np.asarray(austenite_left(system.wire.kinetics, (), *at))
+    upper = np.asarray(martensite_left(system.wire.kinetics, NO_TERMS, *at))
+    lower = 1.0 - np.asarray(austenite_left(system.wire.kinetics, NO_TERMS, *at))
     n = EACH
     assert np.all(xi <= upper + 1e-9)
     assert np.all(xi >= lower - 1e-9)

@@ -16,7 +16,7 @@ from smajax.data.model_catalogue import CATALOGUE, candidates
 from smajax.model.extended import extended
 from smajax.model.presets import build
 from smajax.model.system import System
-from smajax.model.wire.constitutive import AbstractForm, IntegratedForm, RateForm
+from smajax.model.wire.form import AbstractForm, IntegratedForm, RateForm
 from smajax.model.wire.stiffness import Constant
 from smajax.simulation.compiled import simulate_compiled
 from studies.attribution_benchmark.cases import cases

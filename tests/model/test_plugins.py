@@ -15,31 +15,34 @@ from smajax.core.plugins import EFFECTS, PluginError, brought
 from smajax.model.effects.library import _OWN, _wrong
 
 PACKAGE = """
+from dataclasses import replace
 from typing import ClassVar
 
 from smajax import AbstractEffect, parameter
+from smajax.model.effects.candidate import Candidate
 from smajax.model.load.dead_weight import DeadWeight
+from smajax.model.wire.heat import HeatTerm
+
+WIND = Candidate(
+    title="breeze",
+    equation="heat",
+    formula="P' = k (T - T_inf)",
+    sentence="Moving air takes more heat away.",
+    switches=("strength",),
+    initial_guess={"strength": 0.1},
+)
 
 
-class Still(AbstractEffect):
-    title: ClassVar[str] = "breeze"
-    equation: ClassVar[str] = "heat"
-    formula: ClassVar[str] = "P' = k (T - T_inf)"
-    sentence: ClassVar[str] = "Moving air takes more heat away."
-    switches: ClassVar[tuple[str, ...]] = ("strength",)
-    starts: ClassVar[dict[str, float]] = {"strength": 0.1}
+class Still(AbstractEffect, HeatTerm):
+    candidate: ClassVar[Candidate] = WIND
     strength: object = parameter("W/(m K)", 0.0, 10.0, "k", default=0.0)
-
-    @classmethod
-    def base(cls):
-        return cls()
 
 
 class Breeze(Still):
     effect_name: ClassVar[str] = "breeze"
 
-    def heat_loss(self, wire, temperature, ambient):
-        return self.strength * (temperature - ambient)
+    def heat_loss(self, wire, at):
+        return self.strength * (at.temperature - at.ambient)
 
 
 def bucket():
@@ -53,28 +56,77 @@ def heap():
 class Gale(Breeze):
     effect_name: ClassVar[str] = "gale"
 
-    def heat_loss(self, wire, temperature, ambient):
-        return self.strength * (temperature - ambient) + 1.0
+    def heat_loss(self, wire, at):
+        return self.strength * (at.temperature - at.ambient) + 1.0
 
 
 class Misspelt(Still):
     effect_name: ClassVar[str] = "misspelt"
 
-    def heat_los(self, wire, temperature, ambient):
-        return self.strength * (temperature - ambient)
+    def heat_los(self, wire, at):
+        return self.strength * (at.temperature - at.ambient)
+
+
+class Outside(AbstractEffect):
+    effect_name: ClassVar[str] = "outside"
+    candidate: ClassVar[Candidate] = WIND
+    strength: object = parameter("W/(m K)", 0.0, 10.0, "k", default=0.0)
+
+
+class Untitled(AbstractEffect, HeatTerm):
+    effect_name: ClassVar[str] = "untitled"
 
 
 class Switched(Breeze):
     effect_name: ClassVar[str] = "switched"
-    switches: ClassVar[tuple[str, ...]] = ("strenght",)
+    candidate: ClassVar[Candidate] = replace(WIND, switches=("strenght",))
 
 
 class Started(Breeze):
     effect_name: ClassVar[str] = "started"
-    starts: ClassVar[dict[str, float]] = {"x": 0.1}
+    candidate: ClassVar[Candidate] = replace(WIND, initial_guess={"x": 0.1})
 
 
 nothing = 3
+"""
+# As effects were written for version 0.1: one class with a method for every equation, and what the search needs in it.
+OLD = """
+from typing import ClassVar
+
+from smajax import AbstractEffect, parameter
+
+
+class Old(AbstractEffect):
+    title: ClassVar[str] = "breeze"
+    equation: ClassVar[str] = "heat"
+    formula: ClassVar[str] = "P' = k (T - T_inf)"
+    sentence: ClassVar[str] = "Moving air takes more heat away."
+    switches: ClassVar[tuple[str, ...]] = ("strength",)
+    starts: ClassVar[dict[str, float]] = {"strength": 0.1}
+    effect_name: ClassVar[str] = "breeze"
+    strength: object = parameter("W/(m K)", 0.0, 10.0, "k")
+
+    @classmethod
+    def base(cls):
+        return cls(strength=0.0)
+
+    @classmethod
+    def places(cls, extent):
+        return ({"strength": extent.seconds},)
+
+    def heat_loss(self, wire, temperature, ambient):
+        return self.strength * (temperature - ambient)
+
+
+class Breeze(Old):
+    def heat_loss(self, wire, temperature, ambient):
+        return self.strength * (temperature - ambient)
+
+
+def bucket():
+    from smajax.model.load.dead_weight import DeadWeight
+
+    return DeadWeight(load_mass=1.0, damping=20.0)
 """
 LOOK = """
 import json
@@ -91,9 +143,9 @@ print(json.dumps([list(LIBRARY)[-1], float(system.load.load_mass), ends, version
 """
 
 
-def _installed(folder: Path, points: str) -> dict[str, str]:
+def _installed(folder: Path, points: str, package: str = PACKAGE) -> dict[str, str]:
     """A package as an installer leaves it, and the environment in which it is found."""
-    (folder / "airflow.py").write_text(PACKAGE)
+    (folder / "airflow.py").write_text(package)
     info = folder / "airflow-1.2.dist-info"
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: airflow\nVersion: 1.2\n")
@@ -118,10 +170,15 @@ def _asked(code: str, environment: dict[str, str], cwd: Path) -> subprocess.Comp
     )
 
 
-def test_an_effect_and_a_load_of_another_package(tmp_path: Path) -> None:
+@pytest.mark.parametrize("package", [PACKAGE, OLD], ids=["of today", "of version 0.1"])
+def test_an_effect_and_a_load_of_another_package(package: str, tmp_path: Path) -> None:
+    """One of the form of version 0.1 does the same, with a warning that says what to inherit from."""
     points = "[smajax.effects]\nbreeze = airflow:Breeze\n[smajax.loads]\nbucket = airflow:bucket\n"
-    told = _asked(LOOK, _installed(tmp_path, points), tmp_path)
+    environment = {**_installed(tmp_path, points, package), "PYTHONWARNINGS": "default"}
+    told = _asked(LOOK, environment, tmp_path)
     assert told.returncode == 0, told.stderr
+    warned = "airflow.Breeze is an effect of the old form, which goes in version 0.3: let it inherit from HeatTerm too"
+    assert (warned in told.stderr) == (package == OLD), told.stderr
     last, mass, (still, moving), versions = json.loads(told.stdout)
     assert (last, mass) == ("breeze", 1.0)
     assert moving < still - 1.0
@@ -136,8 +193,10 @@ def test_an_effect_and_a_load_of_another_package(tmp_path: Path) -> None:
         ("breeze = airflow:nothing", "expected a class of `smajax.AbstractEffect`"),
         ("breeze = airflow:missing", "cannot be loaded"),
         ("misspelt = airflow:Misspelt", "changes no equation: it has none of the methods stored_heat"),
-        ("switched = airflow:Switched", "has switches that are none of its parameters: strenght; these are strength"),
-        ("started = airflow:Started", "has starts that are none of its parameters: x; these are strength"),
+        ("outside = airflow:Outside", "changes no equation: it inherits from none of HeatTerm, ResistanceTerm"),
+        ("untitled = airflow:Untitled", "lacks candidate, which every effect says of itself"),
+        ("switched = airflow:Switched", "has switches of what is none of its parameters: strenght; these are strength"),
+        ("started = airflow:Started", "has an initial guess of what is none of its parameters: x; these are strength"),
     ],
 )
 def test_what_cannot_be_used_is_refused_by_name(

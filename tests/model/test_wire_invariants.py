@@ -16,6 +16,7 @@ from smajax.model.extended import extended
 from smajax.model.presets import build
 from smajax.model.wire.constitutive import young_modulus
 from smajax.model.wire.kinetics import martensite_left
+from smajax.model.wire.kinetics_terms import NO_TERMS
 from smajax.simulation.compiled import simulate_compiled
 from smajax.simulation.simulate import simulate
 
@@ -165,7 +166,7 @@ def test_at_an_end_stop_the_fraction_is_that_of_the_stressed_wire() -> None:
     assert stopped.sum() > 100
     assert np.abs(run.velocity[stopped]).max() == 0.0
     law = system.wire.kinetics
-    on_curve = martensite_left(law, (), run.temperature, run.stress)
+    on_curve = martensite_left(law, NO_TERMS, run.temperature, run.stress)
     heating = stopped & (np.gradient(np.asarray(run.temperature)) > 1e-3)
     assert heating.sum() > 50
     np.testing.assert_allclose(run.martensite_fraction[heating], on_curve[heating], atol=1e-9)

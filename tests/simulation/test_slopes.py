@@ -160,13 +160,14 @@ def test_they_are_those_of_xla() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "effect", [name for name in sorted(LIBRARY) if any(LIBRARY[name].applies(rig[0]) for rig in RIGS.values())]
+    "effect",
+    [name for name in sorted(LIBRARY) if any(LIBRARY[name].candidate.applies(rig[0]) for rig in RIGS.values())],
 )
 def test_with_each_effect_backwards_is_what_it_is_forwards(effect: str) -> None:
     system, channel, top = RIGS[_rig(effect)]
     full = extended(system, (effect,))
     table = parameters(full)
-    starts = {f"{effect}.{key}": value for key, value in LIBRARY[effect].starts.items()}
+    starts = {f"{effect}.{key}": value for key, value in LIBRARY[effect].candidate.initial_guess.items()}
     full = set_parameters(full, {name: value for name, value in starts.items() if name in table})
     command = top * np.concatenate([np.ones(60), np.full(30, 0.6), np.zeros(30)])
     middle = float(get_parameters(full, ["convection_coefficient"])[0])

@@ -41,7 +41,7 @@ def _states(system: System, batch: RunBatch) -> dict[str, np.ndarray]:
     air = own.get("ambient_temperature", np.full(batch.runs, float(system.wire.heat.ambient_temperature)))
     ambient = channels.get("ambient_temperature", air[:, None])
     time = np.asarray(run.time) + ambient * 0.0
-    ambient = ambient + np.asarray([[float(sum(e.ambient_shift(t) for e in system.effects)) for t in time[0]]])
+    ambient = ambient + np.asarray([[float(sum(e.ambient_shift(t) for e in system.terms.heat)) for t in time[0]]])
     fraction = np.asarray(run.martensite_fraction)
     found = {
         "unknown_loss_of_temperature": run.temperature - ambient,
@@ -99,10 +99,12 @@ def sought(system: System, batch: RunBatch) -> Sought:
     scale = _largest(system, states)
     terms = []
     for name, term in UNKNOWN.items():
-        if term.equation in useless or name not in states or scale[name] <= 0.0:
+        if term.candidate.equation in useless or name not in states or scale[name] <= 0.0:
             continue
         low, high = (float(one) for one in np.quantile(states[name], (SPARED, 1.0 - SPARED)))
-        if term.equation == "kinetics":  # whatever part of a branch the wire is on, the share left is counted from 1
+        if (
+            term.candidate.equation == "kinetics"
+        ):  # whatever part of a branch the wire is on, the share left is counted from 1
             low, high = 0.0, 1.0
         width = high - low
         if width <= SAME * max(abs(low), abs(high)) or width == 0.0:

@@ -6,7 +6,7 @@ what it looks like, not what it is. With all coefficients zero each leaves the b
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -14,13 +14,31 @@ import jax.numpy as jnp
 from smajax.attribution.unknown.spline import spline
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.types import Scalar
-
-if TYPE_CHECKING:
-    from smajax.model.load.base import AbstractMovingLoad
-    from smajax.model.wire.wire import Wire
+from smajax.model.effects.candidate import Candidate, Equation
+from smajax.model.load.base import AbstractMovingLoad
+from smajax.model.load.force import EndMotion, ForceTerm
+from smajax.model.sensor_reading import SensorTerm
+from smajax.model.types import Scalar, WireState
+from smajax.model.wire.constitutive import ConstitutiveTerm
+from smajax.model.wire.heat import HeatState, HeatTerm
+from smajax.model.wire.kinetics_terms import ShapeTerm
+from smajax.model.wire.resistance import ResistanceTerm
+from smajax.model.wire.wire import Wire
 
 FORMULA = "f: seven cubic B-splines, each coefficient a share of the largest f that is sought"
+COEFFICIENTS = ("c1", "c2", "c3", "c4", "c5", "c6", "c7")
+
+
+def _candidate(title: str, equation: Equation) -> Candidate:
+    sentence, guess = "Something that the library does not hold.", dict.fromkeys(COEFFICIENTS, 0.0)
+    return Candidate(
+        title=title,
+        equation=equation,
+        formula=FORMULA,
+        sentence=sentence,
+        switches=COEFFICIENTS,
+        initial_guess=guess,
+    )
 
 
 class AbstractUnknown(AbstractEffect):
@@ -42,14 +60,6 @@ class AbstractUnknown(AbstractEffect):
     state_unit: ClassVar[str]
     unit: ClassVar[str]  # of the function
     only_changes: ClassVar[bool] = False  # whether a constant f is none: drawn about its mean over the samples then
-    formula: ClassVar[str] = FORMULA
-    sentence: ClassVar[str] = "Something that the library does not hold."
-    switches: ClassVar[tuple[str, ...]] = ("c1", "c2", "c3", "c4", "c5", "c6", "c7")
-    starts: ClassVar[dict[str, float]] = dict.fromkeys(("c1", "c2", "c3", "c4", "c5", "c6", "c7"), 0.0)
-
-    @classmethod
-    def base(cls) -> AbstractUnknown:
-        return cls()
 
     def value(self, x: Scalar) -> Scalar:
         """f(x)."""
@@ -57,27 +67,25 @@ class AbstractUnknown(AbstractEffect):
         return self.scale * spline(coefficients, (x - self.low) / self.width)
 
 
-class LossOfTemperature(AbstractUnknown):
+class LossOfTemperature(AbstractUnknown, HeatTerm):
     """A heat loss beside the convection's."""
 
     effect_name: ClassVar[str] = "unknown_loss_of_temperature"
-    title: ClassVar[str] = "a heat loss depending on the temperature over the air's"
-    equation: ClassVar[str] = "heat"
+    candidate: ClassVar[Candidate] = _candidate("a heat loss depending on the temperature over the air's", "heat")
     symbol: ClassVar[str] = "T - T_inf"
     state: ClassVar[str] = "temperature over ambient"
     state_unit: ClassVar[str] = "K"
     unit: ClassVar[str] = "W/m"
 
-    def heat_loss(self, wire: Wire, temperature: Scalar, ambient: Scalar) -> Scalar | float:
-        return self.value(temperature - ambient)
+    def heat_loss(self, wire: Wire, at: HeatState) -> Scalar | float:
+        return self.value(at.temperature - at.ambient)
 
 
-class HeatOfFraction(AbstractUnknown):
+class HeatOfFraction(AbstractUnknown, HeatTerm):
     """Heat stored in the phases."""
 
     effect_name: ClassVar[str] = "unknown_heat_of_fraction"
-    title: ClassVar[str] = "a stored heat depending on the martensite fraction"
-    equation: ClassVar[str] = "heat"
+    candidate: ClassVar[Candidate] = _candidate("a stored heat depending on the martensite fraction", "heat")
     symbol: ClassVar[str] = "xi"
     state: ClassVar[str] = "martensite fraction"
     state_unit: ClassVar[str] = "-"
@@ -88,12 +96,11 @@ class HeatOfFraction(AbstractUnknown):
         return self.value(fraction)
 
 
-class ResistanceOfTemperature(AbstractUnknown):
+class ResistanceOfTemperature(AbstractUnknown, ResistanceTerm):
     """A relative change of the resistance."""
 
     effect_name: ClassVar[str] = "unknown_resistance_of_temperature"
-    title: ClassVar[str] = "a change of resistance depending on the temperature"
-    equation: ClassVar[str] = "electrical"
+    candidate: ClassVar[Candidate] = _candidate("a change of resistance depending on the temperature", "electrical")
     symbol: ClassVar[str] = "T"
     state: ClassVar[str] = "temperature"
     state_unit: ClassVar[str] = "degC"
@@ -103,12 +110,13 @@ class ResistanceOfTemperature(AbstractUnknown):
         return self.value(temperature)
 
 
-class ResistanceOfFraction(AbstractUnknown):
+class ResistanceOfFraction(AbstractUnknown, ResistanceTerm):
     """The same by phase."""
 
     effect_name: ClassVar[str] = "unknown_resistance_of_fraction"
-    title: ClassVar[str] = "a change of resistance depending on the martensite fraction"
-    equation: ClassVar[str] = "electrical"
+    candidate: ClassVar[Candidate] = _candidate(
+        "a change of resistance depending on the martensite fraction", "electrical"
+    )
     symbol: ClassVar[str] = "xi"
     state: ClassVar[str] = "martensite fraction"
     state_unit: ClassVar[str] = "-"
@@ -123,12 +131,11 @@ def _bent(share: Scalar, by: Scalar) -> Scalar:
     return share + share * (1.0 - share) * by
 
 
-class HeatingCurve(AbstractUnknown):
+class HeatingCurve(AbstractUnknown, ShapeTerm):
     """Another shape of the martensite-to-austenite curve: h -> h + h (1 - h) f(h)."""
 
     effect_name: ClassVar[str] = "unknown_heating_curve"
-    title: ClassVar[str] = "another course of the transformation on heating"
-    equation: ClassVar[str] = "kinetics"
+    candidate: ClassVar[Candidate] = _candidate("another course of the transformation on heating", "kinetics")
     symbol: ClassVar[str] = "h"
     state: ClassVar[str] = "share of martensite left on the heating curve"
     state_unit: ClassVar[str] = "-"
@@ -138,12 +145,11 @@ class HeatingCurve(AbstractUnknown):
         return _bent(remaining, self.value(remaining))
 
 
-class CoolingCurve(AbstractUnknown):
+class CoolingCurve(AbstractUnknown, ShapeTerm):
     """The same of the austenite-to-martensite curve."""
 
     effect_name: ClassVar[str] = "unknown_cooling_curve"
-    title: ClassVar[str] = "another course of the transformation on cooling"
-    equation: ClassVar[str] = "kinetics"
+    candidate: ClassVar[Candidate] = _candidate("another course of the transformation on cooling", "kinetics")
     symbol: ClassVar[str] = "k"
     state: ClassVar[str] = "share of austenite left on the cooling curve"
     state_unit: ClassVar[str] = "-"
@@ -153,12 +159,11 @@ class CoolingCurve(AbstractUnknown):
         return _bent(remaining, self.value(remaining))
 
 
-class BothCurves(AbstractUnknown):
+class BothCurves(AbstractUnknown, ShapeTerm):
     """The same of both curves, by what each has left: a material whose range is not traversed evenly either way."""
 
     effect_name: ClassVar[str] = "unknown_both_curves"
-    title: ClassVar[str] = "another course of the transformation on either way"
-    equation: ClassVar[str] = "kinetics"
+    candidate: ClassVar[Candidate] = _candidate("another course of the transformation on either way", "kinetics")
     symbol: ClassVar[str] = "h"
     state: ClassVar[str] = "share left on the heating or the cooling curve"
     state_unit: ClassVar[str] = "-"
@@ -171,96 +176,84 @@ class BothCurves(AbstractUnknown):
         return _bent(remaining, self.value(remaining))
 
 
-class StrainOfTemperature(AbstractUnknown):
+class StrainOfTemperature(AbstractUnknown, ConstitutiveTerm):
     """A strain beside eps_L xi_s and the elastic part."""
 
     effect_name: ClassVar[str] = "unknown_strain_of_temperature"
-    title: ClassVar[str] = "a strain depending on the temperature"
-    equation: ClassVar[str] = "constitutive"
+    candidate: ClassVar[Candidate] = _candidate("a strain depending on the temperature", "constitutive")
     symbol: ClassVar[str] = "T"
     state: ClassVar[str] = "temperature"
     state_unit: ClassVar[str] = "degC"
     unit: ClassVar[str] = "-"
     only_changes: ClassVar[bool] = True
 
-    def strain(
-        self, wire: Wire, temperature: Scalar, stress: Scalar, fraction: Scalar, detwinned: Scalar
-    ) -> Scalar | float:
-        return self.value(temperature)
+    def strain(self, wire: Wire, at: WireState) -> Scalar | float:
+        return self.value(at.temperature)
 
 
-class StrainOfStress(AbstractUnknown):
+class StrainOfStress(AbstractUnknown, ConstitutiveTerm):
     """The same of the stress."""
 
     effect_name: ClassVar[str] = "unknown_strain_of_stress"
-    title: ClassVar[str] = "a strain depending on the stress"
-    equation: ClassVar[str] = "constitutive"
+    candidate: ClassVar[Candidate] = _candidate("a strain depending on the stress", "constitutive")
     symbol: ClassVar[str] = "sigma"
     state: ClassVar[str] = "stress"
     state_unit: ClassVar[str] = "Pa"
     unit: ClassVar[str] = "-"
     only_changes: ClassVar[bool] = True
 
-    def strain(
-        self, wire: Wire, temperature: Scalar, stress: Scalar, fraction: Scalar, detwinned: Scalar
-    ) -> Scalar | float:
-        return self.value(stress)
+    def strain(self, wire: Wire, at: WireState) -> Scalar | float:
+        return self.value(at.stress)
 
 
-class StrainOfFraction(AbstractUnknown):
+class StrainOfFraction(AbstractUnknown, ConstitutiveTerm):
     """The same of the martensite fraction."""
 
     effect_name: ClassVar[str] = "unknown_strain_of_fraction"
-    title: ClassVar[str] = "a strain depending on the martensite fraction"
-    equation: ClassVar[str] = "constitutive"
+    candidate: ClassVar[Candidate] = _candidate("a strain depending on the martensite fraction", "constitutive")
     symbol: ClassVar[str] = "xi"
     state: ClassVar[str] = "martensite fraction"
     state_unit: ClassVar[str] = "-"
     unit: ClassVar[str] = "-"
     only_changes: ClassVar[bool] = True
 
-    def strain(
-        self, wire: Wire, temperature: Scalar, stress: Scalar, fraction: Scalar, detwinned: Scalar
-    ) -> Scalar | float:
-        return self.value(fraction)
+    def strain(self, wire: Wire, at: WireState) -> Scalar | float:
+        return self.value(at.martensite_fraction)
 
 
-class ForceOfDisplacement(AbstractUnknown):
+class ForceOfDisplacement(AbstractUnknown, ForceTerm):
     """A force against contraction beside the load's."""
 
     effect_name: ClassVar[str] = "unknown_force_of_displacement"
-    title: ClassVar[str] = "a force depending on the displacement"
-    equation: ClassVar[str] = "mechanics"
+    candidate: ClassVar[Candidate] = _candidate("a force depending on the displacement", "mechanics")
     symbol: ClassVar[str] = "x"
     state: ClassVar[str] = "displacement of the wire's end"
     state_unit: ClassVar[str] = "m"
     unit: ClassVar[str] = "N"
 
-    def resisting_force(self, load: AbstractMovingLoad, displacement: Scalar, speed: Scalar) -> Scalar | float:
-        return self.value(displacement)
+    def resisting_force(self, load: AbstractMovingLoad, at: EndMotion) -> Scalar | float:
+        return self.value(at.displacement)
 
 
-class ForceOfSpeed(AbstractUnknown):
+class ForceOfSpeed(AbstractUnknown, ForceTerm):
     """The same of the speed."""
 
     effect_name: ClassVar[str] = "unknown_force_of_speed"
-    title: ClassVar[str] = "a force depending on the speed"
-    equation: ClassVar[str] = "mechanics"
+    candidate: ClassVar[Candidate] = _candidate("a force depending on the speed", "mechanics")
     symbol: ClassVar[str] = "v"
     state: ClassVar[str] = "speed of the wire's end"
     state_unit: ClassVar[str] = "m/s"
     unit: ClassVar[str] = "N"
 
-    def resisting_force(self, load: AbstractMovingLoad, displacement: Scalar, speed: Scalar) -> Scalar | float:
-        return self.value(speed)
+    def resisting_force(self, load: AbstractMovingLoad, at: EndMotion) -> Scalar | float:
+        return self.value(at.speed)
 
 
-class ReadingOfValue(AbstractUnknown):
+class ReadingOfValue(AbstractUnknown, SensorTerm):
     """An error of the sensor's reading, in the sensor's unit."""
 
     effect_name: ClassVar[str] = "unknown_reading_of_value"
-    title: ClassVar[str] = "an error of the sensor depending on what it shows"
-    equation: ClassVar[str] = "sensor"
+    candidate: ClassVar[Candidate] = _candidate("an error of the sensor depending on what it shows", "sensor")
     symbol: ClassVar[str] = "y"
     state: ClassVar[str] = "what an ideal sensor shows"
     state_unit: ClassVar[str] = "reading"
@@ -270,12 +263,11 @@ class ReadingOfValue(AbstractUnknown):
         return reading + self.value(reading)
 
 
-class ReadingOfTime(AbstractUnknown):
+class ReadingOfTime(AbstractUnknown, SensorTerm):
     """The same of the time since the run's start."""
 
     effect_name: ClassVar[str] = "unknown_reading_of_time"
-    title: ClassVar[str] = "an error of the sensor depending on the time in the run"
-    equation: ClassVar[str] = "sensor"
+    candidate: ClassVar[Candidate] = _candidate("an error of the sensor depending on the time in the run", "sensor")
     symbol: ClassVar[str] = "t"
     state: ClassVar[str] = "time"
     state_unit: ClassVar[str] = "s"

@@ -34,19 +34,19 @@ def effects(
 
     told = {
         name: {
-            "title": effect.title,
-            "equation": effect.equation,
-            "formula": effect.formula,
-            "meaning": effect.sentence,
+            "title": effect.candidate.title,
+            "equation": effect.candidate.equation,
+            "formula": effect.candidate.formula,
+            "meaning": effect.candidate.sentence,
             "parameters": {
                 entry.name: {"unit": entry.unit, "bounds": [entry.low, entry.high]}
                 for entry in parameters(effect.base()).values()
             },
         }
         for name, effect in LIBRARY.items()
-        if not names or name in names or effect.equation in names
+        if not names or name in names or effect.candidate.equation in names
     }
-    known = {*LIBRARY, *(effect.equation for effect in LIBRARY.values())}
+    known = {*LIBRARY, *(effect.candidate.equation for effect in LIBRARY.values())}
     for name in names or ():
         if name not in known:
             raise typer.BadParameter(

@@ -13,9 +13,9 @@ from smajax.core.limited import limited
 from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.system import System
 from smajax.model.types import Scalar
-from smajax.model.wire.heat import cross_section, heat_rate, mass_per_metre
-from smajax.model.wire.kinetics import Kinetics
+from smajax.model.wire.heat import convection, cross_section, mass_per_metre
 from smajax.model.wire.resistance import resistance_per_metre
+from smajax.model.wire.wire import Kinetics
 
 # An amplitude of less than this is none: what is left of a branch is then taken as all of it.
 NONE_LEFT = 1e-9
@@ -106,8 +106,7 @@ def temperature_for(
 def power_for(believed: System, temperature: Scalar, rate: Scalar) -> Scalar:
     r"""$U = m c_p \dot T + h_c A_c (T - T_\infty)$, W/m (eq. 4.68, 4.80)."""
     wire = believed.wire
-    nothing = jnp.zeros_like(temperature)
-    loss = -heat_rate(wire, (), temperature, wire.heat.ambient_temperature, nothing, nothing)
+    loss = convection(wire, temperature, wire.heat.ambient_temperature)
     return mass_per_metre(wire) * wire.heat.specific_heat * rate + loss
 
 

@@ -11,8 +11,8 @@ from smajax.core.limited import limited
 from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.system import System
 from smajax.model.types import Motion, Scalar, State
-from smajax.model.wire.constitutive import strain_at, stress_at
-from smajax.model.wire.history import kept_after, over
+from smajax.model.wire.constitutive import reached, stress_at
+from smajax.model.wire.history import over
 from smajax.model.wire.two_populations import corrected, moved
 from smajax.simulation.input_delay import refuse_lag
 from smajax.simulation.step import step
@@ -33,29 +33,20 @@ def with_vector(system: System, state: State, vector: Corrected) -> State:
     Strain follows from the position and stress from the constitutive law, which counts from `state`. The curves of the
     kinetics stay: on a branch the fraction belongs to the temperature, which is how a reading of the position tells it.
     """
-    load, wire, effects, old = system.load, system.wire, system.effects, over(state.wire, 0.0)
+    load, wire, terms, old = system.load, system.wire, system.terms, over(state.wire, 0.0)
     assert isinstance(load, AbstractMovingLoad)
     position = limited(vector[0], *load.limits())
     velocity, temperature, fraction = vector[1], vector[2], limited(vector[3], 0.0, 1.0)
     strain = -load.contraction(wire) * (position - load.start())
-    stress = stress_at(wire, effects, old, strain, temperature, old.stress, fraction)
-    new = dataclasses.replace(
-        old,
-        kept=kept_after(effects, old, temperature, stress, fraction),
-        temperature=temperature,
-        stress=stress,
-        strain=strain_at(wire, effects, old, temperature, stress, fraction),
-        martensite_fraction=fraction,
-        detwinned_fraction=wire.kinetics.variants.detwinned(old, stress, fraction),
-    )
-    new = moved(effects, old, new)
+    stress = stress_at(wire, terms.constitutive, old, strain, temperature, old.stress, fraction)
+    new = moved(terms.kinetics, old, reached(wire, terms.constitutive, old, temperature, stress, fraction))
     return State(state.time, new, Motion(position, velocity, state.motion.friction), state.reading, state.sensor)
 
 
 def with_correction(system: System, state: State, vector: Corrected, transforming: Bool[Array, ""]) -> State:
     """`with_vector`, and the curves laid so that the corrected fraction does not jump in the next step."""
     new = with_vector(system, state, vector)
-    wire = corrected(system.wire.kinetics, system.effects, state.wire, new.wire, transforming)
+    wire = corrected(system.wire.kinetics, system.terms.kinetics, state.wire, new.wire, transforming)
     return dataclasses.replace(new, wire=wire)
 
 

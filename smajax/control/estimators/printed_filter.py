@@ -31,7 +31,7 @@ from smajax.model.load.arm import Arm
 from smajax.model.load.coupon import Coupon
 from smajax.model.system import System, ambient_temperature, heating_power, initial_state
 from smajax.model.types import Scalar, State
-from smajax.model.wire.heat import cross_section, heat_rate, mass_per_metre
+from smajax.model.wire.heat import HeatState, cross_section, heat_rate, mass_per_metre
 from smajax.model.wire.resistance import resistance_per_metre
 from smajax.simulation.input_delay import refuse_lag
 from smajax.simulation.step import step
@@ -119,17 +119,19 @@ class PrintedFilter(AbstractEstimator):
     def transition(self, vector: Vector, coupon: State, voltage: Scalar, period: Scalar) -> Vector:
         """f of eq. 4.24-4.28, and the sample that was the last."""
         refuse_lag(self.system, "a filter")
-        load, wire, effects = self.system.load, self.system.wire, self.system.effects
+        load, wire, terms = self.system.load, self.system.wire, self.system.terms
         assert isinstance(load, Arm)
         angle, rate, _, temperature, earlier_angle, earlier_rate = vector
         next_angle, next_rate = angle + period * rate, (angle - earlier_angle) / period
         acceleration = (rate - earlier_rate) / period
         torque = load.inertia({}) * acceleration + load.resistance(next_angle, next_rate, {})
         stress = torque / (load.lever() * cross_section(wire))
-        ohms = resistance_per_metre(wire, effects, temperature, coupon.wire.martensite_fraction)
+        fraction = coupon.wire.martensite_fraction
+        ohms = resistance_per_metre(wire, terms.resistance, temperature, fraction)
         power = heating_power(self.system, ohms, self.system.drive.from_voltage(voltage))
         ambient = ambient_temperature(self.system, coupon.time, {})
-        warming = heat_rate(wire, effects, temperature, ambient, power, coupon.time)
+        at = HeatState(temperature, ambient, fraction, coupon.time, coupon.wire, period)
+        warming = heat_rate(wire, terms.heat, at, power)
         warming = warming / (mass_per_metre(wire) * wire.heat.specific_heat)
         return jnp.stack([next_angle, next_rate, stress / MEGA, temperature + period * warming, angle, rate])
 

@@ -26,8 +26,8 @@ class Voltage(AbstractDrive):
 
     def _put(self, inputs: Inputs) -> Scalar:
         """Voltage at the amplifier's terminals, V."""
-        asked = jnp.abs(self.amplifier_gain * inputs["voltage"])
-        return jnp.where(asked >= self.amplifier_limit, self.amplifier_limit, asked)
+        request = jnp.abs(self.amplifier_gain * inputs["voltage"])
+        return jnp.where(request >= self.amplifier_limit, self.amplifier_limit, request)
 
     def power(self, resistance: Scalar, length: Scalar, inputs: Inputs) -> Scalar:
         return (self._put(inputs) / length) ** 2 / resistance

@@ -6,7 +6,9 @@ from typing import ClassVar
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
+from smajax.model.effects.candidate import Candidate
 from smajax.model.types import Scalar
+from smajax.model.wire.kinetics_terms import ShapeTerm
 
 
 def _skewed(share: Scalar, skew: Scalar) -> Scalar:
@@ -15,28 +17,26 @@ def _skewed(share: Scalar, skew: Scalar) -> Scalar:
     return share + skew * share * (1.0 - share)
 
 
-class AsymmetricTransformation(AbstractEffect):
+class AsymmetricTransformation(AbstractEffect, ShapeTerm):
     r"""$h \to h + a h (1 - h)$, its own a for heating and for cooling; a > 0 transforms late."""
 
     heating: Scalar = parameter(
-        "-", -0.95, 0.95, "a of the martensite-to-austenite curve; > 0: martensite lasts longer"
+        "-", -0.95, 0.95, "a of the martensite-to-austenite curve; > 0: martensite lasts longer", default=0.0
     )
-    cooling: Scalar = parameter("-", -0.95, 0.95, "a of the austenite-to-martensite curve; > 0: austenite lasts longer")
+    cooling: Scalar = parameter(
+        "-", -0.95, 0.95, "a of the austenite-to-martensite curve; > 0: austenite lasts longer", default=0.0
+    )
 
     effect_name: ClassVar[str] = "asymmetric_transformation"
-    title: ClassVar[str] = "asymmetric transformation"
-    equation: ClassVar[str] = "kinetics"
-    formula: ClassVar[str] = "h -> h + a h (1 - h) in eq. 3.3 and 3.5, a by branch"
-    sentence: ClassVar[str] = (
-        "The transformation does not run evenly through its range: it starts sharply and ends slowly, or the "
-        "reverse, and differently on heating and on cooling."
+    candidate: ClassVar[Candidate] = Candidate(
+        title="asymmetric transformation",
+        equation="kinetics",
+        formula="h -> h + a h (1 - h) in eq. 3.3 and 3.5, a by branch",
+        sentence="The transformation does not run evenly through its range: it starts sharply and ends slowly, or the "
+        "reverse, and differently on heating and on cooling.",
+        switches=("heating", "cooling"),
+        initial_guess={"heating": 0.2, "cooling": 0.2},
     )
-    switches: ClassVar[tuple[str, ...]] = ("heating", "cooling")
-    starts: ClassVar[dict[str, float]] = {"heating": 0.2, "cooling": 0.2}
-
-    @classmethod
-    def base(cls) -> AsymmetricTransformation:
-        return cls(heating=0.0, cooling=0.0)
 
     def heating_shape(self, z: Scalar, remaining: Scalar) -> Scalar:
         return _skewed(remaining, self.heating)

@@ -2,46 +2,42 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import jax.numpy as jnp
 
 from smajax.core.parameters import parameter
+from smajax.model.drive.inputs import CommandTerm
 from smajax.model.effects.base import AbstractEffect
+from smajax.model.effects.candidate import Actuator, Candidate
 from smajax.model.types import Scalar
 
-if TYPE_CHECKING:
-    from smajax.model.system import System
+
+def _applies(system: Actuator) -> bool:
+    return bool(system.drive.inputs_required)
 
 
-class DeadZone(AbstractEffect):
+class DeadZone(AbstractEffect, CommandTerm):
     r"""$u \to u - \delta\,u/(|u| + \delta)$: next to nothing below the threshold, $u - \delta$ far above it.
 
     Smooth, so that the threshold can be found by gradients: at the threshold itself half of the command comes through.
     """
 
     threshold: Scalar = parameter(
-        "-", 0.0, 2.0, "delta: command that is lost, a number of V, A, W or duty as the drive's channel is"
+        "-", 0.0, 2.0, "delta: command that is lost, a number of V, A, W or duty as the drive's channel is", default=0.0
     )
 
     effect_name: ClassVar[str] = "dead_zone"
-    title: ClassVar[str] = "dead zone of the drive"
-    equation: ClassVar[str] = "electrical"
-    formula: ClassVar[str] = "u -> u - delta u/(|u| + delta) (a dead zone, smoothed)"
-    sentence: ClassVar[str] = (
-        "The amplifier passes nothing until its command is beyond a threshold (a diode, a switch that opens late), and "
-        "that much less from there on."
+    candidate: ClassVar[Candidate] = Candidate(
+        title="dead zone of the drive",
+        equation="electrical",
+        formula="u -> u - delta u/(|u| + delta) (a dead zone, smoothed)",
+        sentence="The amplifier passes nothing until its command is beyond a threshold (a diode, a switch that opens late), and "
+        "that much less from there on.",
+        switches=("threshold",),
+        initial_guess={"threshold": 0.02},
+        applies=_applies,
     )
-    switches: ClassVar[tuple[str, ...]] = ("threshold",)
-    starts: ClassVar[dict[str, float]] = {"threshold": 0.02}
-
-    @classmethod
-    def base(cls) -> DeadZone:
-        return cls(threshold=0.0)
-
-    @classmethod
-    def applies(cls, system: System) -> bool:
-        return bool(system.drive.inputs_required)
 
     def command(self, channel: str, value: Scalar) -> Scalar:
         size = jnp.abs(value)

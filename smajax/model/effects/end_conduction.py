@@ -8,7 +8,9 @@ from typing import ClassVar
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
+from smajax.model.effects.candidate import Candidate
 from smajax.model.types import Scalar
+from smajax.model.wire.kinetics_terms import ShapeTerm
 from smajax.model.wire.shape import Cosine
 
 # Pieces of a zone: (1 - f) at the middle of each, of DEPTH lengths 1/mu in all.
@@ -16,7 +18,7 @@ DEPTH, PIECES = 3.0, 4
 MISSING = tuple(math.exp(-DEPTH * (k + 0.5) / PIECES) for k in range(PIECES))
 
 
-class EndConduction(AbstractEffect):
+class EndConduction(AbstractEffect, ShapeTerm):
     r"""$h \to (1 - w) h + \frac{w}{n} \sum_i S(z - (1 - f_i)(z + q))$: n pieces of the two end zones, share w of the wire.
 
     A fin between clamps at the temperature of the air has $T - T_\infty$ less by $1 - \cosh(\mu s)/\cosh(\mu l_0/2)$, s from
@@ -28,27 +30,25 @@ class EndConduction(AbstractEffect):
     $T - T_\infty$ and counts as convection, and that zones of other temperature have another resistance.
     """
 
-    share: Scalar = parameter("-", 0.0, 0.5, "w: share of the wire that lies in the two end zones")
-    above_air_heating: Scalar = parameter("-", 0.5, 50.0, "q on heating: (A_s + sigma/C_A - T_inf)/(A_f - A_s), about")
-    above_air_cooling: Scalar = parameter("-", 0.5, 50.0, "q on cooling: (M_f + sigma/C_M - T_inf)/(M_s - M_f), about")
+    share: Scalar = parameter("-", 0.0, 0.5, "w: share of the wire that lies in the two end zones", default=0.0)
+    above_air_heating: Scalar = parameter(
+        "-", 0.5, 50.0, "q on heating: (A_s + sigma/C_A - T_inf)/(A_f - A_s), about", default=5.0
+    )
+    above_air_cooling: Scalar = parameter(
+        "-", 0.5, 50.0, "q on cooling: (M_f + sigma/C_M - T_inf)/(M_s - M_f), about", default=3.0
+    )
 
     effect_name: ClassVar[str] = "end_conduction"
-    title: ClassVar[str] = "cool ends (conduction into the clamps)"
-    equation: ClassVar[str] = "heat"
-    formula: ClassVar[str] = (
-        "T(s) = T_inf + (T - T_inf)[1 - cosh(mu s)/cosh(mu l_0/2)], mu^2 = 4 h_c/(k d) (fin equation, any heat-transfer "
-        "handbook): h of eq. 3.3 and 3.5 is its mean over the wire"
+    candidate: ClassVar[Candidate] = Candidate(
+        title="cool ends (conduction into the clamps)",
+        equation="heat",
+        formula="T(s) = T_inf + (T - T_inf)[1 - cosh(mu s)/cosh(mu l_0/2)], mu^2 = 4 h_c/(k d) (fin equation, any heat-transfer "
+        "handbook): h of eq. 3.3 and 3.5 is its mean over the wire",
+        sentence="The clamps keep the ends of the wire cool: the last part of the stroke needs a wire far hotter than the rest "
+        "does, and the ends turn back first.",
+        switches=("share",),
+        initial_guess={"share": 0.05, "above_air_heating": 5.0, "above_air_cooling": 3.0},
     )
-    sentence: ClassVar[str] = (
-        "The clamps keep the ends of the wire cool: the last part of the stroke needs a wire far hotter than the rest "
-        "does, and the ends turn back first."
-    )
-    switches: ClassVar[tuple[str, ...]] = ("share",)
-    starts: ClassVar[dict[str, float]] = {"share": 0.05, "above_air_heating": 5.0, "above_air_cooling": 3.0}
-
-    @classmethod
-    def base(cls) -> EndConduction:
-        return cls(share=0.0, above_air_heating=5.0, above_air_cooling=3.0)
 
     def _mixed(self, z: Scalar, remaining: Scalar, distance: Scalar, left: Callable[[Scalar], Scalar]) -> Scalar:
         ends = sum(left(z - missing * (z + distance)) for missing in MISSING)

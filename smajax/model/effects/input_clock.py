@@ -2,43 +2,41 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from smajax.core.parameters import parameter
+from smajax.model.drive.inputs import InputLagTerm
 from smajax.model.effects.base import AbstractEffect
+from smajax.model.effects.candidate import Actuator, Candidate
 from smajax.model.load.coupon import AbstractCoupon
 from smajax.model.types import Scalar
 
-if TYPE_CHECKING:
-    from smajax.model.system import System
+
+def _applies(system: Actuator) -> bool:
+    return bool(system.drive.inputs_required) or isinstance(system.load, AbstractCoupon)
 
 
-class InputClock(AbstractEffect):
+class InputClock(AbstractEffect, InputLagTerm):
     r"""$u(t) = u_{rec}(t (1 - r))$: the log of the input falls behind that of the sensor by r seconds a second.
 
     On a whole recorded series (`simulate`, a batch or a fit); a closed loop refuses it.
     """
 
-    rate: Scalar = parameter("-", -0.05, 0.05, "r: by how much what acts falls behind the log, per second of the run")
+    rate: Scalar = parameter(
+        "-", -0.05, 0.05, "r: by how much what acts falls behind the log, per second of the run", default=0.0
+    )
 
     effect_name: ClassVar[str] = "input_clock"
-    title: ClassVar[str] = "wrong clock of the recorded input"
-    equation: ClassVar[str] = "input"
-    formula: ClassVar[str] = "u(t) = u_recorded(t (1 - r))"
-    sentence: ClassVar[str] = (
-        "Two recorders with two clocks: input and motion fit at the start of a run and drift apart towards its end."
+    candidate: ClassVar[Candidate] = Candidate(
+        title="wrong clock of the recorded input",
+        equation="input",
+        formula="u(t) = u_recorded(t (1 - r))",
+        sentence="Two recorders with two clocks: input and motion fit at the start of a run and drift apart towards its end.",
+        switches=("rate",),
+        initial_guess={"rate": 0.005},
+        needs_time=True,
+        applies=_applies,
     )
-    switches: ClassVar[tuple[str, ...]] = ("rate",)
-    needs_time: ClassVar[bool] = True
-    starts: ClassVar[dict[str, float]] = {"rate": 0.005}
-
-    @classmethod
-    def base(cls) -> InputClock:
-        return cls(rate=0.0)
-
-    @classmethod
-    def applies(cls, system: System) -> bool:
-        return bool(system.drive.inputs_required) or isinstance(system.load, AbstractCoupon)
 
     def input_lag(self, time: Scalar) -> Scalar | float:
         return self.rate * time

@@ -2,43 +2,39 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from smajax.core.parameters import parameter
+from smajax.model.drive.inputs import InputLagTerm
 from smajax.model.effects.base import AbstractEffect
+from smajax.model.effects.candidate import Actuator, Candidate
 from smajax.model.load.coupon import AbstractCoupon
 from smajax.model.types import Scalar
 
-if TYPE_CHECKING:
-    from smajax.model.system import System
+
+def _applies(system: Actuator) -> bool:
+    return bool(system.drive.inputs_required) or isinstance(system.load, AbstractCoupon)
 
 
-class InputDelay(AbstractEffect):
+class InputDelay(AbstractEffect, InputLagTerm):
     r"""$u(t) = u_{rec}(t - \tau)$; between samples the mean over a step of the held input, a straight line in $\tau$.
 
     On a whole recorded series (`simulate`, a batch or a fit); a closed loop has a delay of its own.
     """
 
-    delay: Scalar = parameter("s", -0.5, 2.0, "tau; < 0: the log is late")
+    delay: Scalar = parameter("s", -0.5, 2.0, "tau; < 0: the log is late", default=0.0)
 
     effect_name: ClassVar[str] = "input_delay"
-    title: ClassVar[str] = "delay of the recorded input"
-    equation: ClassVar[str] = "input"
-    formula: ClassVar[str] = "u(t) = u_recorded(t - tau)"
-    sentence: ClassVar[str] = (
-        "The input and the sensor were not logged on the same clock: what the log shows acted a little later (or earlier)."
+    candidate: ClassVar[Candidate] = Candidate(
+        title="delay of the recorded input",
+        equation="input",
+        formula="u(t) = u_recorded(t - tau)",
+        sentence="The input and the sensor were not logged on the same clock: what the log shows acted a little later (or earlier).",
+        switches=("delay",),
+        initial_guess={"delay": 0.03},
+        needs_time=True,
+        applies=_applies,
     )
-    switches: ClassVar[tuple[str, ...]] = ("delay",)
-    needs_time: ClassVar[bool] = True
-    starts: ClassVar[dict[str, float]] = {"delay": 0.03}
-
-    @classmethod
-    def base(cls) -> InputDelay:
-        return cls(delay=0.0)
-
-    @classmethod
-    def applies(cls, system: System) -> bool:
-        return bool(system.drive.inputs_required) or isinstance(system.load, AbstractCoupon)
 
     def input_lag(self, time: Scalar) -> Scalar | float:
         return self.delay

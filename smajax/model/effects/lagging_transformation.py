@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import jax.numpy as jnp
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
+from smajax.model.effects.candidate import Candidate
 from smajax.model.types import Scalar, WireState
-from smajax.model.wire.history import DURATION, following
+from smajax.model.wire.history import DURATION, HistoryTerm, following
 from smajax.model.wire.kinetics import cooling_width, heating_width
-
-if TYPE_CHECKING:
-    from smajax.model.wire.kinetics import Kinetics
-
+from smajax.model.wire.kinetics_terms import RangeTerm
+from smajax.model.wire.wire import Kinetics
 
 LAGGING = "lagging_temperature"
 LAGGING_STRESS = "lagging_stress"
 
 
-class LaggingTransformation(AbstractEffect):
+class LaggingTransformation(AbstractEffect, HistoryTerm, RangeTerm):
     r"""$\tau \dot T_k + T_k = T$ and $\tau \dot\sigma_k + \sigma_k = \sigma$, with T_k and sigma_k in both curves.
 
     The phases follow what drives them, $y = T - \sigma/C$, a time constant late. At a steady rate the ranges are shifted by
@@ -28,28 +27,22 @@ class LaggingTransformation(AbstractEffect):
     everything else.
     """
 
-    time_constant: Scalar = parameter("s", 0.0, 20.0, "tau")
+    time_constant: Scalar = parameter("s", 0.0, 20.0, "tau", default=0.0)
 
     effect_name: ClassVar[str] = "lagging_transformation"
-    title: ClassVar[str] = "transformation that depends on the rate"
-    equation: ClassVar[str] = "kinetics"
-    formula: ClassVar[str] = (
-        "tau dT_k/dt + T_k = T, likewise sigma_k, in the place of T and sigma in eq. 3.3 and 3.5 (a lag of first order)"
+    candidate: ClassVar[Candidate] = Candidate(
+        title="transformation that depends on the rate",
+        equation="kinetics",
+        formula="tau dT_k/dt + T_k = T, likewise sigma_k, in the place of T and sigma in eq. 3.3 and 3.5 (a lag of first order)",
+        sentence="The phases take time to change: when heated or cooled quickly the wire transforms at a higher (lower) "
+        "temperature, and goes on for a moment when the temperature stands still.",
+        switches=("time_constant",),
+        initial_guess={"time_constant": 0.1},
+        needs_time=True,
     )
-    sentence: ClassVar[str] = (
-        "The phases take time to change: when heated or cooled quickly the wire transforms at a higher (lower) "
-        "temperature, and goes on for a moment when the temperature stands still."
-    )
-    switches: ClassVar[tuple[str, ...]] = ("time_constant",)
-    needs_time: ClassVar[bool] = True
-    starts: ClassVar[dict[str, float]] = {"time_constant": 0.1}
 
-    @classmethod
-    def base(cls) -> LaggingTransformation:
-        return cls(time_constant=0.0)
-
-    def kept_at_start(self, temperature: Scalar, stress: Scalar, fraction: Scalar) -> dict[str, Scalar]:
-        return {LAGGING: temperature, LAGGING_STRESS: stress, DURATION: jnp.zeros_like(temperature)}
+    def history_at_start(self, at: WireState) -> dict[str, Scalar]:
+        return {LAGGING: at.temperature, LAGGING_STRESS: at.stress, DURATION: jnp.zeros_like(at.temperature)}
 
     def _late(self, temperature: Scalar, stress: Scalar, old: WireState) -> tuple[Scalar, Scalar]:
         """Both late values at the end of a step from `old`."""
@@ -58,8 +51,8 @@ class LaggingTransformation(AbstractEffect):
             following(old, LAGGING_STRESS, old.stress, stress, self.time_constant),
         )
 
-    def kept_after(self, old: WireState, temperature: Scalar, stress: Scalar, fraction: Scalar) -> dict[str, Scalar]:
-        late_temperature, late_stress = self._late(temperature, stress, old)
+    def history_after(self, old: WireState, new: WireState) -> dict[str, Scalar]:
+        late_temperature, late_stress = self._late(new.temperature, new.stress, old)
         return {LAGGING: late_temperature, LAGGING_STRESS: late_stress}
 
     def _behind(self, slope: Scalar, temperature: Scalar, stress: Scalar, old: WireState) -> Scalar:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from types import FunctionType
 from typing import Any
 
 from smajax.core.names import instead
@@ -12,6 +11,8 @@ from smajax.core.plugins import EFFECTS, brought
 from smajax.model.effects.ambient_drift import AmbientDrift
 from smajax.model.effects.asymmetric_transformation import AsymmetricTransformation
 from smajax.model.effects.base import AbstractEffect
+from smajax.model.effects.candidate import EQUATIONS
+from smajax.model.effects.contracts import CONTRACTS, methods
 from smajax.model.effects.coulomb_friction import CoulombFriction
 from smajax.model.effects.creep import Creep
 from smajax.model.effects.dead_zone import DeadZone
@@ -30,6 +31,7 @@ from smajax.model.effects.load_shift import LoadShift
 from smajax.model.effects.loose_start import LooseStart
 from smajax.model.effects.minor_loops import MinorLoops
 from smajax.model.effects.nonlinear_spring import NonlinearSpring
+from smajax.model.effects.old_contract import adopt
 from smajax.model.effects.phase_modulus import PhaseModulus
 from smajax.model.effects.phase_resistance import PhaseResistance
 from smajax.model.effects.phase_specific_heat import PhaseSpecificHeat
@@ -62,8 +64,6 @@ from smajax.model.effects.two_way_memory import TwoWayMemory
 from smajax.model.effects.unequal_stress_slopes import UnequalStressSlopes
 from smajax.model.effects.viscous_friction import ViscousFriction
 from smajax.model.effects.wrong_load import WrongLoad
-
-EQUATIONS = ("heat", "electrical", "kinetics", "constitutive", "mechanics", "sensor", "input")
 
 _OWN: dict[str, type[AbstractEffect]] = {
     effect.effect_name: effect
@@ -129,21 +129,29 @@ def _wrong(name: str, effect: Any) -> str:
     """What keeps a class of another package from being an effect of that name."""
     if not (isinstance(effect, type) and issubclass(effect, AbstractEffect)):
         return f"is {effect!r}; expected a class of `smajax.AbstractEffect`"
-    lacking = [one for one in AbstractEffect.__annotations__ if not hasattr(effect, one)]
-    if lacking:
-        return f"lacks {', '.join(lacking)}, which every effect says of itself"
+    adopt(effect)
+    missing = [one for one in AbstractEffect.__annotations__ if not hasattr(effect, one)]
+    if missing:
+        return f"lacks {', '.join(missing)}, which every effect says of itself"
+    candidate = effect.candidate
     if effect.effect_name != name:
         return f"calls itself {effect.effect_name!r}: give the entry point and the effect the same name"
-    if effect.equation not in EQUATIONS:
-        return f"is in the equation {effect.equation!r}; expected one of {', '.join(EQUATIONS)}"
+    if candidate.equation not in EQUATIONS:
+        return f"is in the equation {candidate.equation!r}; expected one of {', '.join(EQUATIONS)}"
     fields = [field.name for field in dataclasses.fields(effect)]
-    for which, named in (("switches", effect.switches), ("starts", tuple(effect.starts))):
+    for which, named in (("switches", candidate.switches), ("an initial guess", tuple(candidate.initial_guess))):
         strange = [one for one in named if one not in fields]
         if strange:
-            return f"has {which} that are none of its parameters: {', '.join(strange)}; these are {', '.join(fields)}"
-    terms = [one for one, what in vars(AbstractEffect).items() if isinstance(what, FunctionType) and one[0] != "_"]
-    if all(getattr(effect, one) is getattr(AbstractEffect, one) for one in terms):
+            return f"has {which} of what is none of its parameters: {', '.join(strange)}; these are {', '.join(fields)}"
+    accepted = [contract for contract in CONTRACTS if issubclass(effect, contract)]
+    if not accepted:
+        return f"changes no equation: it inherits from none of {', '.join(one.__name__ for one in CONTRACTS)}"
+    terms = [one for contract in accepted for one in methods(contract)]
+    if all(getattr(effect, one) is getattr(contract, one) for contract in accepted for one in methods(contract)):
         return f"changes no equation: it has none of the methods {', '.join(terms)}; is one misspelt?"
+    abstract: frozenset[str] = getattr(effect, "__abstractmethods__", frozenset())
+    if abstract:
+        return f"lacks the methods {', '.join(sorted(abstract))} of its contract"
     return ""
 
 

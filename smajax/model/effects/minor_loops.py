@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import jax.numpy as jnp
 
 from smajax.core.parameters import parameter
-from smajax.model.effects.base import AbstractEffect, Extent
+from smajax.model.effects.base import AbstractEffect
+from smajax.model.effects.candidate import Candidate, Extent
 from smajax.model.types import Scalar, WireState
-
-if TYPE_CHECKING:
-    from smajax.model.wire.kinetics import Kinetics
+from smajax.model.wire.kinetics_terms import RangeTerm
+from smajax.model.wire.wire import Kinetics
 
 
 def _missing(amplitude: Scalar) -> Scalar:
     return jnp.where(amplitude > 1.0, 0.0, jnp.where(amplitude < 0.0, 1.0, 1.0 - amplitude))
 
 
-class MinorLoops(AbstractEffect):
+def _grid(extent: Extent) -> tuple[dict[str, float], ...]:
+    # A little inside: at its bound a shape has one side only.
+    return tuple({"small": small, "pinned": pinned} for small in (0.05, 0.95) for pinned in (0.05, 0.95))
+
+
+class MinorLoops(AbstractEffect, RangeTerm):
     r"""$z_A \to z_A + e (1 - k z_A) / (1 + k e)$ with $e = a\,m (1 - r\,m)$, $m = 1 - \xi_M$; $1 - z_M$ alike with b and $m = \xi_A$.
 
     The way back of a smaller loop starts earlier, by e of the range. With k = 0 its end comes earlier too, with k = 1 the
@@ -28,35 +33,31 @@ class MinorLoops(AbstractEffect):
     printed model begins every way back at A_s' or M_s', however little of the wire had transformed.
     """
 
-    heating: Scalar = parameter("-", -0.8, 4.0, "a: earlier start of heating in a small loop, in transformation ranges")
-    cooling: Scalar = parameter("-", -0.8, 4.0, "b: earlier start of cooling in a small loop, in transformation ranges")
-    small: Scalar = parameter(
-        "-", 0.0, 1.0, "r: how much less the smallest loops are shifted than those of half a stroke"
+    heating: Scalar = parameter(
+        "-", -0.8, 4.0, "a: earlier start of heating in a small loop, in transformation ranges", default=0.0
     )
-    pinned: Scalar = parameter("-", 0.0, 1.0, "k: 1 where the end of the way back stays, 0 where it is shifted alike")
+    cooling: Scalar = parameter(
+        "-", -0.8, 4.0, "b: earlier start of cooling in a small loop, in transformation ranges", default=0.0
+    )
+    small: Scalar = parameter(
+        "-", 0.0, 1.0, "r: how much less the smallest loops are shifted than those of half a stroke", default=0.0
+    )
+    pinned: Scalar = parameter(
+        "-", 0.0, 1.0, "k: 1 where the end of the way back stays, 0 where it is shifted alike", default=0.0
+    )
 
     effect_name: ClassVar[str] = "minor_loops"
-    title: ClassVar[str] = "way back in minor loops"
-    equation: ClassVar[str] = "kinetics"
-    formula: ClassVar[str] = (
-        "z_A + e (1 - k z_A)/(1 + k e) in eq. 3.3, e = a m (1 - r m), m = 1 - xi_M; 1 - z_M of eq. 3.5 likewise with b and "
-        "m = xi_A (a form chosen here; loops of a usual shape lie within the full one)"
+    candidate: ClassVar[Candidate] = Candidate(
+        title="way back in minor loops",
+        equation="kinetics",
+        formula="z_A + e (1 - k z_A)/(1 + k e) in eq. 3.3, e = a m (1 - r m), m = 1 - xi_M; 1 - z_M of eq. 3.5 likewise with b and "
+        "m = xi_A (a form chosen here; loops of a usual shape lie within the full one)",
+        sentence="When a stroke is broken off and turned round, the wire answers sooner than after a full stroke: its small loops "
+        "are narrower than the large one.",
+        switches=("heating", "cooling"),
+        initial_guess={"heating": 0.1, "cooling": 0.1, "small": 0.0, "pinned": 0.0},
+        grid=_grid,
     )
-    sentence: ClassVar[str] = (
-        "When a stroke is broken off and turned round, the wire answers sooner than after a full stroke: its small loops "
-        "are narrower than the large one."
-    )
-    switches: ClassVar[tuple[str, ...]] = ("heating", "cooling")
-    starts: ClassVar[dict[str, float]] = {"heating": 0.1, "cooling": 0.1, "small": 0.0, "pinned": 0.0}
-
-    @classmethod
-    def base(cls) -> MinorLoops:
-        return cls(heating=0.0, cooling=0.0, small=0.0, pinned=0.0)
-
-    @classmethod
-    def places(cls, extent: Extent) -> tuple[dict[str, float], ...]:
-        # A little inside: at its bound a shape has one side only.
-        return tuple({"small": small, "pinned": pinned} for small in (0.05, 0.95) for pinned in (0.05, 0.95))
 
     def _earlier(self, size: Scalar, z: Scalar, amplitude: Scalar) -> Scalar:
         """z, from 0 at the start of a range to 1 at its end, in a loop that is `amplitude` of a full one."""

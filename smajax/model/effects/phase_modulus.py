@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import jax.numpy as jnp
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
+from smajax.model.effects.candidate import Actuator, Candidate
 from smajax.model.load.coupon import Coupon
 from smajax.model.types import Scalar
-from smajax.model.wire.constitutive import RateForm
-
-if TYPE_CHECKING:
-    from smajax.model.system import System
-    from smajax.model.wire.wire import Wire
+from smajax.model.wire.constitutive import ConstitutiveTerm
+from smajax.model.wire.form import RateForm
+from smajax.model.wire.wire import Wire
 
 
-class PhaseModulus(AbstractEffect):
+def _applies(system: Actuator) -> bool:
+    if isinstance(system.load, Coupon) and isinstance(system.wire.constitutive.form, RateForm):
+        return False
+    hot, cold = (float(_own(system.wire, jnp.asarray(phase, float))) for phase in (0.0, 1.0))
+    return abs(hot - cold) < 1e-6 * cold
+
+
+class PhaseModulus(AbstractEffect, ConstitutiveTerm):
     r"""$E = E_M [1 + a (1 - \xi)]$: eq. 3.15 with $E_A = (1 + a) E_M$.
 
     A candidate of wires whose base model has one modulus (`wire.stiffness.Constant`, as sec. 3.3 takes it, or $E_A = E_M$);
@@ -29,28 +35,18 @@ class PhaseModulus(AbstractEffect):
     stress is given has no such candidate in rate form; `stress_dependent_strain` shows what depends on stress there.
     """
 
-    contrast: Scalar = parameter("-", -0.5, 5.0, "a: relative change of E from martensite to austenite")
+    contrast: Scalar = parameter("-", -0.5, 5.0, "a: relative change of E from martensite to austenite", default=0.0)
 
     effect_name: ClassVar[str] = "phase_modulus"
-    title: ClassVar[str] = "Young's modulus depending on the phase"
-    equation: ClassVar[str] = "constitutive"
-    formula: ClassVar[str] = "E = E_M [1 + a (1 - xi)] in eq. 3.2 (Elahinia 2004, eq. 3.15, E_A = (1 + a) E_M)"
-    sentence: ClassVar[str] = (
-        "Austenite is stiffer than martensite: a hot wire stretches less than a cold one when its load changes."
+    candidate: ClassVar[Candidate] = Candidate(
+        title="Young's modulus depending on the phase",
+        equation="constitutive",
+        formula="E = E_M [1 + a (1 - xi)] in eq. 3.2 (Elahinia 2004, eq. 3.15, E_A = (1 + a) E_M)",
+        sentence="Austenite is stiffer than martensite: a hot wire stretches less than a cold one when its load changes.",
+        switches=("contrast",),
+        initial_guess={"contrast": 0.5},
+        applies=_applies,
     )
-    switches: ClassVar[tuple[str, ...]] = ("contrast",)
-    starts: ClassVar[dict[str, float]] = {"contrast": 0.5}
-
-    @classmethod
-    def base(cls) -> PhaseModulus:
-        return cls(contrast=0.0)
-
-    @classmethod
-    def applies(cls, system: System) -> bool:
-        if isinstance(system.load, Coupon) and isinstance(system.wire.constitutive.form, RateForm):
-            return False
-        hot, cold = (float(_own(system.wire, jnp.asarray(phase, float))) for phase in (0.0, 1.0))
-        return abs(hot - cold) < 1e-6 * cold
 
     def modulus_change(self, wire: Wire, fraction: Scalar) -> Scalar | float:
         return self.contrast * (1.0 - fraction) * _own(wire, jnp.ones_like(fraction))

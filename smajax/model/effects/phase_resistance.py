@@ -6,28 +6,26 @@ from typing import ClassVar
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
+from smajax.model.effects.candidate import Candidate
 from smajax.model.types import Scalar
+from smajax.model.wire.resistance import ResistanceTerm
 
 
-class PhaseResistance(AbstractEffect):
+class PhaseResistance(AbstractEffect, ResistanceTerm):
     r"""$R = R_{base} [1 + a (1 - \xi)]$: eq. 3.15 with a phase contrast of its own."""
 
-    contrast: Scalar = parameter("-", -0.5, 0.5, "a: relative change of R from martensite to austenite")
+    contrast: Scalar = parameter("-", -0.5, 0.5, "a: relative change of R from martensite to austenite", default=0.0)
 
     effect_name: ClassVar[str] = "phase_resistance"
-    title: ClassVar[str] = "resistance depending on the phase"
-    equation: ClassVar[str] = "electrical"
-    formula: ClassVar[str] = "R = R_base [1 + a (1 - xi)] (Elahinia 2004, eq. 3.15)"
-    sentence: ClassVar[str] = (
-        "Austenite and martensite conduct differently: at a given voltage the heating power changes as the wire "
-        "transforms."
+    candidate: ClassVar[Candidate] = Candidate(
+        title="resistance depending on the phase",
+        equation="electrical",
+        formula="R = R_base [1 + a (1 - xi)] (Elahinia 2004, eq. 3.15)",
+        sentence="Austenite and martensite conduct differently: at a given voltage the heating power changes as the wire "
+        "transforms.",
+        switches=("contrast",),
+        initial_guess={"contrast": -0.1},
     )
-    switches: ClassVar[tuple[str, ...]] = ("contrast",)
-    starts: ClassVar[dict[str, float]] = {"contrast": -0.1}
-
-    @classmethod
-    def base(cls) -> PhaseResistance:
-        return cls(contrast=0.0)
 
     def resistance_factor(self, temperature: Scalar, fraction: Scalar) -> Scalar | float:
         return self.contrast * (1.0 - fraction)

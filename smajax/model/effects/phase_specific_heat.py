@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from smajax.core.parameters import parameter
-from smajax.model.effects.base import AbstractEffect, Extent
-from smajax.model.types import Scalar, WireState
-from smajax.model.wire.heat import mass_per_metre
+from smajax.model.effects.base import AbstractEffect
+from smajax.model.effects.candidate import Candidate, Extent
+from smajax.model.types import Scalar
+from smajax.model.wire.heat import HeatState, HeatTerm, mass_per_metre
+from smajax.model.wire.wire import Wire
 
-if TYPE_CHECKING:
-    from smajax.model.wire.wire import Wire
+
+def _grid(extent: Extent) -> tuple[dict[str, float], ...]:
+    return ({"kirchhoff": 0.05},)  # a little inside: at its bound it has one side only
 
 
-class PhaseSpecificHeat(AbstractEffect):
+class PhaseSpecificHeat(AbstractEffect, HeatTerm):
     r"""$c_p = c_p^M [1 + a (1 - \xi)]$; the heat of transformation follows by Kirchhoff's law, or by a share k of it.
 
     With k = 1 heat is a function of the state, $m c_p^M a (1 - \xi)(T - T_0)$ beside the base model's, and the heat of
@@ -23,30 +26,23 @@ class PhaseSpecificHeat(AbstractEffect):
     """
 
     # Beyond this the change of the latent heat alone, far from T_0, would turn a transformation into a jump.
-    contrast: Scalar = parameter("-", -0.3, 0.3, "a: relative change of c_p from martensite to austenite")
-    kirchhoff: Scalar = parameter("-", 0.0, 1.0, "k: share of Kirchhoff's change of the heat of transformation")
+    contrast: Scalar = parameter("-", -0.3, 0.3, "a: relative change of c_p from martensite to austenite", default=0.0)
+    kirchhoff: Scalar = parameter(
+        "-", 0.0, 1.0, "k: share of Kirchhoff's change of the heat of transformation", default=1.0
+    )
 
     effect_name: ClassVar[str] = "phase_specific_heat"
-    title: ClassVar[str] = "specific heat depending on the phase"
-    equation: ClassVar[str] = "heat"
-    formula: ClassVar[str] = (
-        "m c_p {[1 + a (1 - xi)] dT/dt - k a (T - T_0) dxi/dt} in eq. 3.1, T_0 = (M_s + A_f)/2 (Kirchhoff; T_0 after Tong and "
-        "Wayman 1974)"
+    candidate: ClassVar[Candidate] = Candidate(
+        title="specific heat depending on the phase",
+        equation="heat",
+        formula="m c_p {[1 + a (1 - xi)] dT/dt - k a (T - T_0) dxi/dt} in eq. 3.1, T_0 = (M_s + A_f)/2 (Kirchhoff; T_0 after Tong and "
+        "Wayman 1974)",
+        sentence="A hot wire takes more (or less) heat a degree than a cold one: it warms up and cools down at another pace "
+        "after its transformation than before, and rests at the same temperature.",
+        switches=("contrast",),
+        initial_guess={"contrast": 0.05, "kirchhoff": 0.95},
+        grid=_grid,
     )
-    sentence: ClassVar[str] = (
-        "A hot wire takes more (or less) heat a degree than a cold one: it warms up and cools down at another pace "
-        "after its transformation than before, and rests at the same temperature."
-    )
-    switches: ClassVar[tuple[str, ...]] = ("contrast",)
-    starts: ClassVar[dict[str, float]] = {"contrast": 0.05, "kirchhoff": 0.95}
-
-    @classmethod
-    def base(cls) -> PhaseSpecificHeat:
-        return cls(contrast=0.0, kirchhoff=1.0)
-
-    @classmethod
-    def places(cls, extent: Extent) -> tuple[dict[str, float], ...]:
-        return ({"kirchhoff": 0.05},)  # a little inside: at its bound it has one side only
 
     def _more(self, wire: Wire, temperature: Scalar) -> Scalar:
         """Heat of austenite over martensite's, J/m, that the difference of c_p makes."""
@@ -57,6 +53,6 @@ class PhaseSpecificHeat(AbstractEffect):
     def stored_heat(self, wire: Wire, temperature: Scalar, fraction: Scalar) -> Scalar | float:
         return self._more(wire, temperature) * (1.0 - fraction)
 
-    def heat_of_change(self, wire: Wire, old: WireState, temperature: Scalar, fraction: Scalar) -> Scalar | float:
-        there = self._more(wire, 0.5 * (old.temperature + temperature))
-        return (1.0 - self.kirchhoff) * there * (fraction - old.martensite_fraction)
+    def heat_loss(self, wire: Wire, at: HeatState) -> Scalar | float:
+        there = self._more(wire, 0.5 * (at.old.temperature + at.temperature))
+        return (1.0 - self.kirchhoff) * there * (at.fraction - at.old.martensite_fraction) / at.duration

@@ -6,28 +6,26 @@ from typing import ClassVar
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
+from smajax.model.effects.candidate import Candidate
+from smajax.model.sensor_reading import SensorLagTerm
 from smajax.model.types import Scalar
 
 
-class SensorLag(AbstractEffect):
+class SensorLag(AbstractEffect, SensorLagTerm):
     r"""$\tau \dot y + y = x$: the reading y follows the true value x."""
 
-    time_constant: Scalar = parameter("s", 0.0, 10.0, "tau")
+    time_constant: Scalar = parameter("s", 0.0, 10.0, "tau", default=0.0)
 
     effect_name: ClassVar[str] = "sensor_lag"
-    title: ClassVar[str] = "sensor lag"
-    equation: ClassVar[str] = "sensor"
-    formula: ClassVar[str] = "tau dy/dt + y = x between the true value x and the reading y"
-    sentence: ClassVar[str] = (
-        "The sensor (or its filter) shows the value with a delay: the motion is right, the reading is late."
+    candidate: ClassVar[Candidate] = Candidate(
+        title="sensor lag",
+        equation="sensor",
+        formula="tau dy/dt + y = x between the true value x and the reading y",
+        sentence="The sensor (or its filter) shows the value with a delay: the motion is right, the reading is late.",
+        switches=("time_constant",),
+        initial_guess={"time_constant": 0.1},
+        needs_time=True,
     )
-    switches: ClassVar[tuple[str, ...]] = ("time_constant",)
-    needs_time: ClassVar[bool] = True
-    starts: ClassVar[dict[str, float]] = {"time_constant": 0.1}
-
-    @classmethod
-    def base(cls) -> SensorLag:
-        return cls(time_constant=0.0)
 
     def sensor_time_constant(self) -> Scalar | float:
         return self.time_constant

@@ -7,44 +7,48 @@ from typing import ClassVar
 import jax.numpy as jnp
 
 from smajax.core.parameters import parameter
-from smajax.model.effects.base import AbstractEffect, Extent
+from smajax.model.effects.base import AbstractEffect
+from smajax.model.effects.candidate import Candidate, Extent
+from smajax.model.sensor_reading import SensorTerm
 from smajax.model.types import Scalar
 
 PHASES = 12
 
 
-class SensorResolution(AbstractEffect):
+def _observable(extent: Extent) -> bool:
+    return extent.increment > 0.0
+
+
+def _grid(extent: Extent) -> tuple[dict[str, float], ...]:
+    # The increment is read off the log; where the levels lie on the model's scale, which has another zero, is not.
+    step = extent.increment
+    return tuple({"increment": step, "zero": step * phase / PHASES} for phase in range(PHASES))
+
+
+class SensorResolution(AbstractEffect, SensorTerm):
     r"""$y = (1 - s)\,x + s\,\{z + q\,\mathrm{round}[(x - z)/q]\}$; a share s of one is the staircase itself.
 
     By the increment q and the zero z the derivative is that at fixed steps of the stair: of each level, not of which
     sample is on which.
     """
 
-    share: Scalar = parameter("-", 0.0, 1.0, "s: share of the staircase in the reading")
-    increment: Scalar = parameter("m", 1e-7, 0.5, "q: from one reading to the next (rad on an arm, - for a strain)")
-    zero: Scalar = parameter("m", -0.5, 0.5, "z: one of the readings (rad on an arm, - for a strain)")
+    share: Scalar = parameter("-", 0.0, 1.0, "s: share of the staircase in the reading", default=0.0)
+    increment: Scalar = parameter(
+        "m", 1e-7, 0.5, "q: from one reading to the next (rad on an arm, - for a strain)", default=0.001
+    )
+    zero: Scalar = parameter("m", -0.5, 0.5, "z: one of the readings (rad on an arm, - for a strain)", default=0.0)
 
     effect_name: ClassVar[str] = "sensor_resolution"
-    title: ClassVar[str] = "resolution of the sensor"
-    equation: ClassVar[str] = "sensor"
-    formula: ClassVar[str] = "y = (1 - s) x + s {z + q round[(x - z)/q]} (quantisation)"
-    sentence: ClassVar[str] = "The sensor shows steps: between two of its readings it does not see the motion."
-    switches: ClassVar[tuple[str, ...]] = ("share",)
-    starts: ClassVar[dict[str, float]] = {"share": 0.9, "increment": 1e-3, "zero": 0.0}
-
-    @classmethod
-    def base(cls) -> SensorResolution:
-        return cls(share=0.0, increment=1e-3, zero=0.0)
-
-    @classmethod
-    def shows(cls, extent: Extent) -> bool:
-        return extent.increment > 0.0
-
-    @classmethod
-    def places(cls, extent: Extent) -> tuple[dict[str, float], ...]:
-        # The increment is read off the log; where the levels lie on the model's scale, which has another zero, is not.
-        step = extent.increment
-        return tuple({"increment": step, "zero": step * phase / PHASES} for phase in range(PHASES))
+    candidate: ClassVar[Candidate] = Candidate(
+        title="resolution of the sensor",
+        equation="sensor",
+        formula="y = (1 - s) x + s {z + q round[(x - z)/q]} (quantisation)",
+        sentence="The sensor shows steps: between two of its readings it does not see the motion.",
+        switches=("share",),
+        initial_guess={"share": 0.9, "increment": 1e-3, "zero": 0.0},
+        observable=_observable,
+        grid=_grid,
+    )
 
     def sensed(self, reading: Scalar, time: Scalar, last: Scalar) -> Scalar:
         steps = jnp.floor((reading - self.zero) / self.increment + 0.5)

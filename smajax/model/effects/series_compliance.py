@@ -2,41 +2,37 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.types import Scalar
+from smajax.model.effects.candidate import Candidate
+from smajax.model.types import Scalar, WireState
+from smajax.model.wire.constitutive import ConstitutiveTerm
 from smajax.model.wire.heat import cross_section
-
-if TYPE_CHECKING:
-    from smajax.model.wire.wire import Wire
+from smajax.model.wire.wire import Wire
 
 
-class SeriesCompliance(AbstractEffect):
+class SeriesCompliance(AbstractEffect, ConstitutiveTerm):
     r"""$x_{load} = x_{wire} - c F$ with $F = A_w \sigma$, as strain of the path: $\varepsilon \mathrel{+}= c A_w \sigma/l_0$ (Hooke).
 
     The strain that the model shows is then that of the whole path, wire and spring.
     """
 
-    compliance: Scalar = parameter("m/N", 0.0, 1e-2, "c: one over the stiffness of what lies between wire and load")
+    compliance: Scalar = parameter(
+        "m/N", 0.0, 1e-2, "c: one over the stiffness of what lies between wire and load", default=0.0
+    )
 
     effect_name: ClassVar[str] = "series_compliance"
-    title: ClassVar[str] = "compliance in series with the wire"
-    equation: ClassVar[str] = "mechanics"
-    formula: ClassVar[str] = "strain += c A_w sigma/l_0 in eq. 3.7, 3.14: x_load = x_wire - c F (Hooke)"
-    sentence: ClassVar[str] = (
-        "Clamps, rope or frame give way under force: the load moves by less than the wire contracts when the force "
-        "rises on the way, and sags when it is loaded."
+    candidate: ClassVar[Candidate] = Candidate(
+        title="compliance in series with the wire",
+        equation="mechanics",
+        formula="strain += c A_w sigma/l_0 in eq. 3.7, 3.14: x_load = x_wire - c F (Hooke)",
+        sentence="Clamps, rope or frame give way under force: the load moves by less than the wire contracts when the force "
+        "rises on the way, and sags when it is loaded.",
+        switches=("compliance",),
+        initial_guess={"compliance": 1e-4},
     )
-    switches: ClassVar[tuple[str, ...]] = ("compliance",)
-    starts: ClassVar[dict[str, float]] = {"compliance": 1e-4}
 
-    @classmethod
-    def base(cls) -> SeriesCompliance:
-        return cls(compliance=0.0)
-
-    def strain(
-        self, wire: Wire, temperature: Scalar, stress: Scalar, fraction: Scalar, detwinned: Scalar
-    ) -> Scalar | float:
-        return self.compliance * cross_section(wire) * stress / wire.wire_length
+    def strain(self, wire: Wire, at: WireState) -> Scalar | float:
+        return self.compliance * cross_section(wire) * at.stress / wire.wire_length

@@ -2,42 +2,36 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
+from smajax.model.effects.candidate import Candidate
 from smajax.model.types import Scalar, WireState
+from smajax.model.wire.kinetics_terms import RangeTerm
+from smajax.model.wire.wire import Kinetics
 
-if TYPE_CHECKING:
-    from smajax.model.wire.kinetics import Kinetics
 
-
-class StressDependentWidth(AbstractEffect):
+class StressDependentWidth(AbstractEffect, RangeTerm):
     r"""$A_f' - A_s' = (A_f - A_s)(1 + a \sigma)$ and $M_s' - M_f' = (M_s - M_f)(1 + b \sigma)$; the starts stay at $\sigma/C$.
 
     The same as slopes of their own for A_f and M_f.
     """
 
     # With -5e-10 the range is half as wide at 1 GPa, which no wire stands.
-    heating: Scalar = parameter("1/Pa", -5e-10, 5e-8, "a: relative widening of A_f' - A_s' per stress")
-    cooling: Scalar = parameter("1/Pa", -5e-10, 5e-8, "b: relative widening of M_s' - M_f' per stress")
+    heating: Scalar = parameter("1/Pa", -5e-10, 5e-8, "a: relative widening of A_f' - A_s' per stress", default=0.0)
+    cooling: Scalar = parameter("1/Pa", -5e-10, 5e-8, "b: relative widening of M_s' - M_f' per stress", default=0.0)
 
     effect_name: ClassVar[str] = "stress_dependent_width"
-    title: ClassVar[str] = "transformation range depending on stress"
-    equation: ClassVar[str] = "kinetics"
-    formula: ClassVar[str] = (
-        "A_f' = A_s' + (A_f - A_s)(1 + a sigma), M_f' = M_s' - (M_s - M_f)(1 + b sigma) in eq. 3.3 and 3.5 (usual form: "
-        "a stress slope for each of the four temperatures)"
+    candidate: ClassVar[Candidate] = Candidate(
+        title="transformation range depending on stress",
+        equation="kinetics",
+        formula="A_f' = A_s' + (A_f - A_s)(1 + a sigma), M_f' = M_s' - (M_s - M_f)(1 + b sigma) in eq. 3.3 and 3.5 (usual form: "
+        "a stress slope for each of the four temperatures)",
+        sentence="Under a heavier load the transformation is spread over more degrees: it starts where it should and ends late.",
+        switches=("heating", "cooling"),
+        initial_guess={"heating": 1e-9, "cooling": 1e-9},
     )
-    sentence: ClassVar[str] = (
-        "Under a heavier load the transformation is spread over more degrees: it starts where it should and ends late."
-    )
-    switches: ClassVar[tuple[str, ...]] = ("heating", "cooling")
-    starts: ClassVar[dict[str, float]] = {"heating": 1e-9, "cooling": 1e-9}
-
-    @classmethod
-    def base(cls) -> StressDependentWidth:
-        return cls(heating=0.0, cooling=0.0)
 
     def heating_distance(self, law: Kinetics, z: Scalar, temperature: Scalar, stress: Scalar, old: WireState) -> Scalar:
         return z / (1.0 + self.heating * stress)

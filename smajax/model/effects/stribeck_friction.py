@@ -8,11 +8,13 @@ from typing import ClassVar
 import jax.numpy as jnp
 
 from smajax.core.parameters import parameter
-from smajax.model.effects.base import PRESLIDING, AbstractEffect
+from smajax.model.effects.base import AbstractEffect
+from smajax.model.effects.candidate import Candidate
 from smajax.model.effects.coulomb_friction import presliding_parameter
+from smajax.model.load.friction import PRESLIDING, FrictionTerm
 from smajax.model.types import Scalar
 
-# A load that sticks and jumps has a valley of the misfit for every row of jumps, so refits begin all over these.
+# A load that sticks and jumps has a local minimum of the misfit for every row of jumps, so refits begin all over these.
 # Friction at rest is larger than what the score test says, which knows no jumps: over that, r, v_s (m/s) and delta (m).
 MORE, SLIDING, SPEED, BENT = (1.5, 4.0), (0.2, 0.8), (1e-4, 1e-2), (1e-5, 2e-4)
 
@@ -22,52 +24,47 @@ def falling(speed: Scalar, sliding: Scalar, scale: Scalar) -> Scalar:
     return sliding + (1.0 - sliding) * jnp.exp(-((speed / scale) ** 2))
 
 
-def all_over(told: Mapping[str, float], size: str) -> dict[str, tuple[float, float]]:
-    """`AbstractEffect.begins` of an effect whose switch is `size`, with a curve of `sliding` and `speed`, and `bend`."""
-    at = told.get(size, 0.0)
+def all_over(switches: Mapping[str, float], size: str) -> dict[str, tuple[float, float]]:
+    """`Candidate.start_ranges` of an effect whose switch is `size`, with a curve of `sliding` and `speed`, and `bend`."""
+    at = switches.get(size, 0.0)
     if at <= 0.0:
         return {}
     return {size: (MORE[0] * at, MORE[1] * at), "sliding": SLIDING, "speed": SPEED, "bend": BENT}
 
 
-class StribeckFriction(AbstractEffect):
+def _start_ranges(switches: Mapping[str, float]) -> dict[str, tuple[float, float]]:
+    return all_over(switches, "limit")
+
+
+class StribeckFriction(AbstractEffect, FrictionTerm):
     r"""$F_s\,[r + (1 - r)\,e^{-(v/v_s)^2}]\,\mathrm{sign}(v)$: $F_s$ at rest, $F_c = r F_s$ in motion (Stribeck curve, Gaussian form).
 
     Built up over a presliding displacement, LuGre's bristle (Canudas de Wit et al. 1995). With r = 1, and where no run
     moves faster than v_s, it is `CoulombFriction`. How wide the loop of a slow run is tells F_s, that of a fast one r; v_s takes runs of several speeds.
     """
 
-    limit: Scalar = parameter("N", 0.0, 20.0, "F_s: friction at rest, to break away (N m on an arm)")
-    sliding: Scalar = parameter("-", 0.01, 1.0, "r = F_c/F_s: friction in motion over that at rest")
+    limit: Scalar = parameter("N", 0.0, 20.0, "F_s: friction at rest, to break away (N m on an arm)", default=0.0)
+    sliding: Scalar = parameter("-", 0.01, 1.0, "r = F_c/F_s: friction in motion over that at rest", default=0.5)
     speed: Scalar = parameter(
-        "m/s", 1e-5, 1.0, "v_s: speed of the wire's moving end about which it falls from F_s to F_c"
+        "m/s", 1e-5, 1.0, "v_s: speed of the wire's moving end about which it falls from F_s to F_c", default=0.005
     )
     bend: Scalar = presliding_parameter()
 
     effect_name: ClassVar[str] = "stribeck_friction"
-    title: ClassVar[str] = "Stribeck friction"
-    equation: ClassVar[str] = "mechanics"
-    formula: ClassVar[str] = (
-        "inertia a + resistance + [F_c + (F_s - F_c) exp(-(v/v_s)^2)] sign(v) = lever A_w sigma, F_c = r F_s "
-        "(eq. 3.8, 3.13; Stribeck curve in its usual Gaussian form, presliding as in LuGre, Canudas de Wit 1995)"
+    candidate: ClassVar[Candidate] = Candidate(
+        title="Stribeck friction",
+        equation="mechanics",
+        formula="inertia a + resistance + [F_c + (F_s - F_c) exp(-(v/v_s)^2)] sign(v) = lever A_w sigma, F_c = r F_s "
+        "(eq. 3.8, 3.13; Stribeck curve in its usual Gaussian form, presliding as in LuGre, Canudas de Wit 1995)",
+        sentence="The guide rubs, and breaking away takes more force than keeping in motion: the load sticks at every change of "
+        "direction, jumps when it starts, and may go on in jerks.",
+        switches=("limit",),
+        initial_guess={"limit": 0.1, "sliding": 0.5, "speed": 5e-3, "bend": PRESLIDING},
+        stick_slip=True,
+        start_ranges=_start_ranges,
     )
-    sentence: ClassVar[str] = (
-        "The guide rubs, and breaking away takes more force than keeping in motion: the load sticks at every change of "
-        "direction, jumps when it starts, and may go on in jerks."
-    )
-    switches: ClassVar[tuple[str, ...]] = ("limit",)
-    jumps: ClassVar[bool] = True
-    starts: ClassVar[dict[str, float]] = {"limit": 0.1, "sliding": 0.5, "speed": 5e-3, "bend": PRESLIDING}
 
-    @classmethod
-    def base(cls) -> StribeckFriction:
-        return cls(limit=0.0, sliding=0.5, speed=5e-3, bend=PRESLIDING)
-
-    @classmethod
-    def begins(cls, told: Mapping[str, float]) -> dict[str, tuple[float, float]]:
-        return all_over(told, "limit")
-
-    def friction_limit(self) -> Scalar | float:
+    def friction_limit(self, load_at_rest: Scalar) -> Scalar:
         return self.limit
 
     def friction_level(self, speed: Scalar) -> Scalar | float:

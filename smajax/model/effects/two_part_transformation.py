@@ -7,7 +7,8 @@ from typing import ClassVar
 import jax
 
 from smajax.core.parameters import parameter
-from smajax.model.effects.second_range import AbstractSecondRange
+from smajax.model.effects.candidate import Candidate
+from smajax.model.effects.second_range import SWITCHES, AbstractSecondRange
 from smajax.model.types import Scalar
 
 
@@ -17,28 +18,26 @@ class TwoPartTransformation(AbstractSecondRange):
     A transformation in two steps too, whose second never quite ends.
     """
 
-    width: Scalar = parameter("-", 0.15, 4.0, "b: width of the tails, in transformation ranges")
+    width: Scalar = parameter("-", 0.15, 4.0, "b: width of the tails, in transformation ranges", default=0.8)
 
     effect_name: ClassVar[str] = "two_part_transformation"
-    title: ClassVar[str] = "two-part transformation (sharp core, long tails)"
-    formula: ClassVar[str] = (
-        "h = (1 - w) h_cos(z) + w / (1 + exp[(z - 1/2 - s)/b]) in eq. 3.3 and 3.5, w and s by branch"
+    candidate: ClassVar[Candidate] = Candidate(
+        title="two-part transformation (sharp core, long tails)",
+        equation="kinetics",
+        formula=("h = (1 - w) h_cos(z) + w / (1 + exp[(z - 1/2 - s)/b]) in eq. 3.3 and 3.5, w and s by branch"),
+        sentence=(
+            "Most of the wire transforms in a narrow range while a part of it (its ends, its grips, grains of another "
+            "orientation) follows over a much wider one."
+        ),
+        switches=SWITCHES,
+        initial_guess={
+            "heating_weight": 0.15,
+            "cooling_weight": 0.15,
+            "heating_shift": 0.0,
+            "cooling_shift": 0.0,
+            "width": 0.8,
+        },
     )
-    sentence: ClassVar[str] = (
-        "Most of the wire transforms in a narrow range while a part of it (its ends, its grips, grains of another "
-        "orientation) follows over a much wider one."
-    )
-    starts: ClassVar[dict[str, float]] = {
-        "heating_weight": 0.15,
-        "cooling_weight": 0.15,
-        "heating_shift": 0.0,
-        "cooling_shift": 0.0,
-        "width": 0.8,
-    }
-
-    @classmethod
-    def base(cls) -> TwoPartTransformation:
-        return cls(heating_weight=0.0, cooling_weight=0.0, heating_shift=0.0, cooling_shift=0.0, width=0.8)
 
     def second(self, beyond: Scalar) -> Scalar:
         return jax.nn.sigmoid(-beyond)

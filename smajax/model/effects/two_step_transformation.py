@@ -5,12 +5,18 @@ from __future__ import annotations
 from typing import ClassVar
 
 from smajax.core.parameters import parameter
-from smajax.model.effects.base import Extent
-from smajax.model.effects.second_range import AbstractSecondRange
+from smajax.model.effects.candidate import Candidate, Extent
+from smajax.model.effects.second_range import SWITCHES, AbstractSecondRange
 from smajax.model.types import Scalar
 from smajax.model.wire.shape import Cosine
 
 WIDE = 5.0  # ranges: where a search begins
+
+
+def _grid(extent: Extent) -> tuple[dict[str, float], ...]:
+    # A second step of its own, before or after the other on either way.
+    sides = [(heating, cooling) for heating in (-1.0, 1.0) for cooling in (-1.0, 1.0)]
+    return tuple({"heating_shift": one, "cooling_shift": other, "width": 1.0} for one, other in sides)
 
 
 class TwoStepTransformation(AbstractSecondRange):
@@ -20,32 +26,27 @@ class TwoStepTransformation(AbstractSecondRange):
     as `two_part_transformation` has it, every warming transforms something, and the wire forgets where its cooling stopped.
     """
 
-    width: Scalar = parameter("-", 0.3, 25.0, "b: width of the second range, in transformation ranges")
+    width: Scalar = parameter("-", 0.3, 25.0, "b: width of the second range, in transformation ranges", default=WIDE)
 
     effect_name: ClassVar[str] = "two_step_transformation"
-    title: ClassVar[str] = "transformation in two steps"
-    formula: ClassVar[str] = "h = (1 - w) h(z) + w h_cos((z - 1/2 - s)/b + 1/2) in eq. 3.3 and 3.5, w and s by branch"
-    sentence: ClassVar[str] = (
-        "A part of the wire transforms in a range of its own, before or after the rest: an intermediate phase, or grains and "
-        "grips under another stress."
+    candidate: ClassVar[Candidate] = Candidate(
+        title="transformation in two steps",
+        equation="kinetics",
+        formula="h = (1 - w) h(z) + w h_cos((z - 1/2 - s)/b + 1/2) in eq. 3.3 and 3.5, w and s by branch",
+        sentence=(
+            "A part of the wire transforms in a range of its own, before or after the rest: an intermediate phase, or grains and "
+            "grips under another stress."
+        ),
+        switches=SWITCHES,
+        initial_guess={
+            "heating_weight": 0.15,
+            "cooling_weight": 0.15,
+            "heating_shift": 0.0,
+            "cooling_shift": 0.0,
+            "width": WIDE,
+        },
+        grid=_grid,
     )
-    starts: ClassVar[dict[str, float]] = {
-        "heating_weight": 0.15,
-        "cooling_weight": 0.15,
-        "heating_shift": 0.0,
-        "cooling_shift": 0.0,
-        "width": WIDE,
-    }
-
-    @classmethod
-    def base(cls) -> TwoStepTransformation:
-        return cls(heating_weight=0.0, cooling_weight=0.0, heating_shift=0.0, cooling_shift=0.0, width=WIDE)
-
-    @classmethod
-    def places(cls, extent: Extent) -> tuple[dict[str, float], ...]:
-        # A second step of its own, before or after the other on either way.
-        sides = [(heating, cooling) for heating in (-1.0, 1.0) for cooling in (-1.0, 1.0)]
-        return tuple({"heating_shift": one, "cooling_shift": other, "width": 1.0} for one, other in sides)
 
     def second(self, beyond: Scalar) -> Scalar:
         return Cosine().martensite_left(beyond + 0.5)

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.types import Scalar
+from smajax.model.effects.candidate import Candidate
+from smajax.model.types import Scalar, WireState
+from smajax.model.wire.constitutive import ConstitutiveTerm
+from smajax.model.wire.wire import Wire
 
-if TYPE_CHECKING:
-    from smajax.model.wire.wire import Wire
 
-
-class TwoWayMemory(AbstractEffect):
+class TwoWayMemory(AbstractEffect, ConstitutiveTerm):
     r"""$\varepsilon \mathrel{+}= a\,\varepsilon_L (\xi - \xi_s)$: the twinned part of the martensite strains as well.
 
     For Brinson's split, in which martensite formed without stress gives no strain. Under the laws without a split all
@@ -21,21 +21,17 @@ class TwoWayMemory(AbstractEffect):
     """
 
     # Below one: a stress that detwins must not shorten the wire.
-    share: Scalar = parameter("-", 0.0, 0.9, "a: two-way strain over eps_L")
+    share: Scalar = parameter("-", 0.0, 0.9, "a: two-way strain over eps_L", default=0.0)
 
     effect_name: ClassVar[str] = "two_way_memory"
-    title: ClassVar[str] = "two-way memory strain"
-    equation: ClassVar[str] = "constitutive"
-    formula: ClassVar[str] = "strain += a eps_L (xi - xi_s) (eq. 2.16; usual form of the trained two-way strain)"
-    sentence: ClassVar[str] = "The wire is trained: it lengthens on cooling even where hardly any load pulls on it."
-    switches: ClassVar[tuple[str, ...]] = ("share",)
-    starts: ClassVar[dict[str, float]] = {"share": 0.1}
+    candidate: ClassVar[Candidate] = Candidate(
+        title="two-way memory strain",
+        equation="constitutive",
+        formula="strain += a eps_L (xi - xi_s) (eq. 2.16; usual form of the trained two-way strain)",
+        sentence="The wire is trained: it lengthens on cooling even where hardly any load pulls on it.",
+        switches=("share",),
+        initial_guess={"share": 0.1},
+    )
 
-    @classmethod
-    def base(cls) -> TwoWayMemory:
-        return cls(share=0.0)
-
-    def strain(
-        self, wire: Wire, temperature: Scalar, stress: Scalar, fraction: Scalar, detwinned: Scalar
-    ) -> Scalar | float:
-        return self.share * wire.constitutive.recoverable_strain * (fraction - detwinned)
+    def strain(self, wire: Wire, at: WireState) -> Scalar | float:
+        return self.share * wire.constitutive.recoverable_strain * (at.martensite_fraction - at.detwinned_fraction)

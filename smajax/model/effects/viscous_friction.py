@@ -2,34 +2,30 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
+from smajax.model.effects.candidate import Candidate
+from smajax.model.load.base import AbstractMovingLoad
+from smajax.model.load.force import EndMotion, ForceTerm
 from smajax.model.types import Scalar
 
-if TYPE_CHECKING:
-    from smajax.model.load.base import AbstractMovingLoad
 
-
-class ViscousFriction(AbstractEffect):
+class ViscousFriction(AbstractEffect, ForceTerm):
     r"""$F = b\,v$ along the wire, v the speed of its moving end, beside the load's own damping."""
 
-    coefficient: Scalar = parameter("N s/m", 0.0, 200.0, "b: force per speed of the wire's moving end")
+    coefficient: Scalar = parameter("N s/m", 0.0, 200.0, "b: force per speed of the wire's moving end", default=0.0)
 
     effect_name: ClassVar[str] = "viscous_friction"
-    title: ClassVar[str] = "viscous friction"
-    equation: ClassVar[str] = "mechanics"
-    formula: ClassVar[str] = "A_w sigma += b v in eq. 3.13 (3.8: times the lever), beside the damping there is"
-    sentence: ClassVar[str] = (
-        "The guide (grease, a damper, air) resists in proportion to speed by more than the model has it."
+    candidate: ClassVar[Candidate] = Candidate(
+        title="viscous friction",
+        equation="mechanics",
+        formula="A_w sigma += b v in eq. 3.13 (3.8: times the lever), beside the damping there is",
+        sentence="The guide (grease, a damper, air) resists in proportion to speed by more than the model has it.",
+        switches=("coefficient",),
+        initial_guess={"coefficient": 2.0},
     )
-    switches: ClassVar[tuple[str, ...]] = ("coefficient",)
-    starts: ClassVar[dict[str, float]] = {"coefficient": 2.0}
 
-    @classmethod
-    def base(cls) -> ViscousFriction:
-        return cls(coefficient=0.0)
-
-    def resisting_force(self, load: AbstractMovingLoad, displacement: Scalar, speed: Scalar) -> Scalar | float:
-        return self.coefficient * speed
+    def resisting_force(self, load: AbstractMovingLoad, at: EndMotion) -> Scalar | float:
+        return self.coefficient * at.speed

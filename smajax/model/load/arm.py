@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from smajax.core.parameters import parameter
 from smajax.model.load.base import GRAVITY, AbstractMovingLoad
 from smajax.model.types import Inputs, Scalar
 from smajax.model.wire.cosine import cosine
-
-if TYPE_CHECKING:
-    from smajax.model.wire.wire import Wire
+from smajax.model.wire.wire import Wire
 
 
 class Arm(AbstractMovingLoad):

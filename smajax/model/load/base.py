@@ -9,14 +9,12 @@ and stress or strain are prescribed, has no equation of motion (`load/coupon.py`
 from __future__ import annotations
 
 import abc
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import equinox as eqx
 
 from smajax.model.types import Inputs, Scalar
-
-if TYPE_CHECKING:
-    from smajax.model.wire.wire import Wire
+from smajax.model.wire.wire import Wire
 
 GRAVITY = 9.81  # m/s^2
 

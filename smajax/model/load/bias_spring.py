@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import jax.numpy as jnp
 
 from smajax.core.parameters import parameter
 from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.types import Inputs, Scalar
-
-if TYPE_CHECKING:
-    from smajax.model.wire.wire import Wire
+from smajax.model.wire.wire import Wire
 
 
 class BiasSpring(AbstractMovingLoad):

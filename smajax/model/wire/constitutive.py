@@ -4,93 +4,44 @@ from __future__ import annotations
 
 import abc
 import dataclasses
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import NamedTuple
 
-import equinox as eqx
 import jax.numpy as jnp
 
-from smajax.core.parameters import parameter
-from smajax.model.effects.base import AbstractEffect, having
 from smajax.model.types import Scalar, WireState
-from smajax.model.wire.history import kept_after
+from smajax.model.wire.form import Elasticity
+from smajax.model.wire.history import HistoryTerm, history_after
 from smajax.model.wire.root import root
-from smajax.model.wire.stiffness import AbstractStiffness, Mixed
-
-if TYPE_CHECKING:
-    from smajax.model.wire.wire import Wire
+from smajax.model.wire.wire import Wire
 
 
-class AbstractForm(eqx.Module):
-    """How eq. 3.2 is carried from one state to the next."""
+class ConstitutiveTerm(abc.ABC):  # noqa: B024  # each method by itself is enough
+    """What an effect may change in eq. 3.2 (4.51)."""
 
-    @abc.abstractmethod
-    def elastic_line(
-        self, wire: Wire, effects: Sequence[AbstractEffect], old: WireState, new: WireState
-    ) -> tuple[Scalar, Scalar, Scalar]:
-        """(strain, stress at it, modulus): a point of the straight line of stress over strain at `new`, and its slope.
+    def strain(self, wire: Wire, at: WireState) -> Scalar | float:
+        """Strain beside eps_L xi_s and the elastic part, a function of the state `at`, its history included, -."""
+        return 0.0
 
-        The stress and strain of `new` itself are guesses.
-        """
-
-
-class RateForm(AbstractForm):
-    r"""Eq. 3.2, $\dot\sigma = E \dot\varepsilon + \theta_T \dot T + \Omega \dot\xi_s$, over one step with E at the middle fraction.
-
-    With E(xi) this is not the derivative of any sigma(strain, T, xi): a cycle that transforms at one stress and returns
-    at another does not close. With a constant E it is, and agrees with the integrated form.
-    """
-
-    def elastic_line(
-        self, wire: Wire, effects: Sequence[AbstractEffect], old: WireState, new: WireState
-    ) -> tuple[Scalar, Scalar, Scalar]:
-        law = wire.constitutive
-        middle = 0.5 * (old.martensite_fraction + new.martensite_fraction)
-        grown = transformation_strain(wire, middle) * (new.detwinned_fraction - old.detwinned_fraction)
-        grown = grown + effect_strain(wire, effects, new) - effect_strain(wire, effects, old)
-        thermal = law.thermal_modulus * (new.temperature - old.temperature)
-        return old.strain + grown, old.stress + thermal, young_modulus(wire, middle, effects)
+    def modulus_change(self, wire: Wire, fraction: Scalar) -> Scalar | float:
+        """Added to Young's modulus of the base model, Pa; the sum must stay above zero."""
+        return 0.0
 
 
-class IntegratedForm(AbstractForm):
-    r"""Eq. 4.51 with eq. 3.2's thermal term: $\sigma = E(\xi)(\varepsilon - \varepsilon_L \xi_s) + \theta_T (T - T_\infty)$.
+class ConstitutiveTerms(NamedTuple):
+    """All that effects change in the constitutive law of one wire."""
 
-    A function of state: every closed cycle closes. The strain counts from the wire's start, as everywhere.
-    """
-
-    def elastic_line(
-        self, wire: Wire, effects: Sequence[AbstractEffect], old: WireState, new: WireState
-    ) -> tuple[Scalar, Scalar, Scalar]:
-        def thermal(at: WireState) -> Scalar:
-            return wire.constitutive.thermal_modulus * (at.temperature - wire.heat.ambient_temperature)
-
-        def own(at: WireState) -> Scalar:
-            grown = transformation_strain(wire, at.martensite_fraction) * at.detwinned_fraction
-            return grown + effect_strain(wire, effects, at)
-
-        elastic = (old.stress - thermal(old)) / young_modulus(wire, old.martensite_fraction, effects)
-        strain = old.strain - elastic + own(new) - own(old)
-        return strain, thermal(new), young_modulus(wire, new.martensite_fraction, effects)
+    changes: tuple[ConstitutiveTerm, ...] = ()
+    history: tuple[HistoryTerm, ...] = ()  # which the strain may depend on
 
 
-class Constitutive(eqx.Module):
-    """Constants of eq. 3.2, which of them depend on the fraction, and the form in which it is integrated."""
-
-    young_modulus_austenite: Scalar = parameter("Pa", 1e9, 2e11, "E_A")
-    young_modulus_martensite: Scalar = parameter("Pa", 1e9, 2e11, "E_M")
-    recoverable_strain: Scalar = parameter("-", 0.0, 0.12, "eps_L: strain between all martensite and all austenite")
-    thermal_modulus: Scalar = parameter(
-        "Pa/K", -5e6, 5e6, "theta_T = -E alpha; the source prints +0.55 MPa/C, which is a wire that shrinks when heated"
-    )
-    stiffness: AbstractStiffness = Mixed()
-    form: AbstractForm = RateForm()
+NO_TERMS = ConstitutiveTerms()
 
 
-def young_modulus(wire: Wire, fraction: Scalar, effects: Sequence[AbstractEffect] = ()) -> Scalar:
+def young_modulus(wire: Wire, fraction: Scalar, terms: ConstitutiveTerms = NO_TERMS) -> Scalar:
     r"""$E = E_A + \xi (E_M - E_A)$, Pa (Elahinia 2004, eq. 3.15), or what the law's stiffness says instead, and the effects' share."""
     law = wire.constitutive
-    own = law.stiffness.young_modulus(law.young_modulus_austenite, law.young_modulus_martensite, fraction)
-    return own + sum(effect.modulus_change(wire, fraction) for effect in having(effects, "modulus_change"))
+    base = law.stiffness.young_modulus(law.young_modulus_austenite, law.young_modulus_martensite, fraction)
+    return base + sum(term.modulus_change(wire, fraction) for term in terms.changes)
 
 
 def transformation_strain(wire: Wire, fraction: Scalar) -> Scalar:
@@ -101,30 +52,41 @@ def transformation_strain(wire: Wire, fraction: Scalar) -> Scalar:
     )
 
 
-def effect_strain(wire: Wire, effects: Sequence[AbstractEffect], at: WireState) -> Scalar | float:
+def effect_strain(wire: Wire, terms: ConstitutiveTerms, at: WireState) -> Scalar | float:
     """Strain that the effects add to eps_L xi_s and the elastic part, a function of state, -."""
-    state = at.temperature, at.stress, at.martensite_fraction, at.detwinned_fraction
-    return sum(effect.strain(wire, *state) + effect.kept_strain(at) for effect in effects)
+    return sum(term.strain(wire, at) for term in terms.changes)
 
 
-def _tried(
-    wire: Wire, effects: Sequence[AbstractEffect], old: WireState, temperature: Scalar, stress: Scalar, xi: Scalar
+def _elastic_line(
+    wire: Wire, terms: ConstitutiveTerms, old: WireState, new: WireState
+) -> tuple[Scalar, Scalar, Scalar]:
+    law = Elasticity(
+        modulus=lambda fraction: young_modulus(wire, fraction, terms),
+        transformation_strain=lambda fraction: transformation_strain(wire, fraction),
+        effect_strain=lambda at: effect_strain(wire, terms, at),
+        thermal_modulus=wire.constitutive.thermal_modulus,
+        ambient_temperature=wire.heat.ambient_temperature,
+    )
+    return wire.constitutive.form.elastic_line(law, old, new)
+
+
+def _trial(
+    wire: Wire, terms: ConstitutiveTerms, old: WireState, temperature: Scalar, stress: Scalar, xi: Scalar
 ) -> WireState:
-    """`old` with the unknowns of a step put in, and the detwinned part and the memory that belong to them."""
-    detwinned = wire.kinetics.variants.detwinned(old, stress, xi)
-    changed = {
-        "temperature": temperature,
-        "stress": stress,
-        "martensite_fraction": xi,
-        "detwinned_fraction": detwinned,
-        "kept": kept_after(effects, old, temperature, stress, xi),
-    }
-    return dataclasses.replace(old, **changed)
+    """`old` with the unknowns of a step put in, and the detwinned part and the history that belong to them."""
+    new = dataclasses.replace(
+        old,
+        temperature=temperature,
+        stress=stress,
+        martensite_fraction=xi,
+        detwinned_fraction=wire.kinetics.variants.detwinned(old, stress, xi),
+    )
+    return dataclasses.replace(new, history=history_after(terms.history, old, new))
 
 
 def stress_at(
     wire: Wire,
-    effects: Sequence[AbstractEffect],
+    terms: ConstitutiveTerms,
     old: WireState,
     strain: Scalar,
     temperature: Scalar,
@@ -137,25 +99,29 @@ def stress_at(
     leaves a strain error for good.
     """
 
-    def asked(guess: Scalar) -> Scalar:
-        new = _tried(wire, effects, old, temperature, guess, xi)
-        at, stress_there, modulus = wire.constitutive.form.elastic_line(wire, effects, old, new)
-        pulled = stress_there + modulus * (strain - at)
-        return jnp.where(pulled < 0.0, 0.0, pulled)
+    def pulled(guess: Scalar) -> Scalar:
+        new = _trial(wire, terms, old, temperature, guess, xi)
+        at, stress_there, modulus = _elastic_line(wire, terms, old, new)
+        tension = stress_there + modulus * (strain - at)
+        return jnp.where(tension < 0.0, 0.0, tension)
 
     if not wire.kinetics.variants.detwins:
-        return asked(stress)
-    # Detwinning answers a stress with far more strain than elasticity does, and `asked` falls as its guess rises: the
-    # stress that asks for itself lies between zero and `asked(0)`.
+        return pulled(stress)
+    # Detwinning answers a stress with far more strain than elasticity does, and `pulled` falls as its guess rises: the
+    # stress that gives itself lies between zero and `pulled(0)`.
     zero = jnp.zeros_like(stress)
-    high = asked(zero)
-    return root(lambda guess: guess - asked(guess), high, zero, high, young_modulus(wire, xi, effects))
+    high = pulled(zero)
+    return root(lambda guess: guess - pulled(guess), high, zero, high, young_modulus(wire, xi, terms))
 
 
-def strain_at(
-    wire: Wire, effects: Sequence[AbstractEffect], old: WireState, temperature: Scalar, stress: Scalar, xi: Scalar
-) -> Scalar:
-    """The wire's own strain at a given stress, -: the same law read the other way round."""
-    new = _tried(wire, effects, old, temperature, stress, xi)
-    at, stress_there, modulus = wire.constitutive.form.elastic_line(wire, effects, old, new)
-    return at + (stress - stress_there) / modulus
+def reached(
+    wire: Wire, terms: ConstitutiveTerms, old: WireState, temperature: Scalar, stress: Scalar, xi: Scalar
+) -> WireState:
+    """The wire after a step from `old` to (`temperature`, `stress`, `xi`): the same law read the other way round.
+
+    Its strain, detwinned part and history are those of the end; the amplitudes of its branches are still those of `old`
+    (`two_populations.with_amplitudes`).
+    """
+    new = _trial(wire, terms, old, temperature, stress, xi)
+    at, stress_there, modulus = _elastic_line(wire, terms, old, new)
+    return dataclasses.replace(new, strain=at + (stress - stress_there) / modulus)

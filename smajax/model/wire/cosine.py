@@ -55,8 +55,8 @@ def quarter_cosine(z: Scalar) -> Scalar:
 
 
 @quarter_cosine.defjvp
-def _quarter_cosine_jvp(given: tuple[Scalar], along: tuple[Scalar]) -> tuple[Scalar, Scalar]:
-    (z,), (moved,) = given, along
+def _quarter_cosine_jvp(primals: tuple[Scalar], tangents: tuple[Scalar]) -> tuple[Scalar, Scalar]:
+    (z,), (moved,) = primals, tangents
     return quarter_cosine(z), z * _polynomial(SLOPE_COEFFICIENTS, z * z) * moved
 
 

@@ -2,27 +2,45 @@
 
 from __future__ import annotations
 
+import abc
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import NamedTuple
 
-import equinox as eqx
 import jax.numpy as jnp
 
-from smajax.core.parameters import parameter
-from smajax.model.effects.base import AbstractEffect, having
-from smajax.model.types import Scalar
-
-if TYPE_CHECKING:
-    from smajax.model.wire.wire import Wire
+from smajax.model.types import Scalar, WireState
+from smajax.model.wire.wire import Wire
 
 
-class Heat(eqx.Module):
-    """Constants of eq. 3.1."""
+class HeatState(NamedTuple):
+    """Where the heat balance is taken, at the end of a step (or of a stage of one)."""
 
-    density: Scalar = parameter("kg/m^3", 1e3, 2e4, "density of the wire")
-    specific_heat: Scalar = parameter("J/(kg K)", 50.0, 5e3, "specific heat of the wire")
-    convection_coefficient: Scalar = parameter("W/(m^2 K)", 1.0, 5e3, "heat lost per surface and degree")
-    ambient_temperature: Scalar = parameter("degC", -100.0, 150.0, "temperature of the air around the wire")
+    temperature: Scalar  # C
+    ambient: Scalar  # of the air, with what effects shift it by, C
+    fraction: Scalar  # martensite, -
+    time: Scalar  # from the start of the run, s
+    old: WireState  # the wire before the step
+    duration: Scalar  # of the step, s
+
+
+class HeatTerm(abc.ABC):  # noqa: B024  # each method by itself is enough
+    """What an effect may change in eq. 3.1.
+
+    A change of the convection is a loss in proportion to the convection's; heat that a change takes and that is no
+    function of the state (of temperature and fraction) is a loss too: so much over the duration of the step.
+    """
+
+    def stored_heat(self, wire: Wire, temperature: Scalar, fraction: Scalar) -> Scalar | float:
+        """Heat stored per metre beside m c_p T, a function of state, J/m."""
+        return 0.0
+
+    def heat_loss(self, wire: Wire, at: HeatState) -> Scalar | float:
+        """Heat lost per metre beside h_c A_c (T - T_inf), W/m."""
+        return 0.0
+
+    def ambient_shift(self, time: Scalar) -> Scalar | float:
+        """Added to the ambient temperature, C."""
+        return 0.0
 
 
 def mass_per_metre(wire: Wire) -> Scalar:
@@ -35,27 +53,21 @@ def cross_section(wire: Wire) -> Scalar:
     return 0.25 * jnp.pi * wire.wire_diameter**2
 
 
-def stored_heat(wire: Wire, effects: Sequence[AbstractEffect], temperature: Scalar, fraction: Scalar) -> Scalar:
+def stored_heat(wire: Wire, terms: Sequence[HeatTerm], temperature: Scalar, fraction: Scalar) -> Scalar:
     """m c_p T, J/m: the quantity whose rate eq. 3.1 gives. An effect may store heat in the phases as well."""
     base = mass_per_metre(wire) * wire.heat.specific_heat * temperature
-    return base + sum(effect.stored_heat(wire, temperature, fraction) for effect in effects)
+    return base + sum(term.stored_heat(wire, temperature, fraction) for term in terms)
 
 
-def heat_rate(
-    wire: Wire,
-    effects: Sequence[AbstractEffect],
-    temperature: Scalar,
-    ambient: Scalar,
-    power: Scalar,
-    time: Scalar,
-) -> Scalar:
+def convection(wire: Wire, temperature: Scalar, ambient: Scalar) -> Scalar:
+    """h_c A_c (T - T_inf), W/m: what the wire loses to the air."""
+    surface = jnp.pi * wire.wire_diameter
+    return wire.heat.convection_coefficient * surface * (temperature - ambient)
+
+
+def heat_rate(wire: Wire, terms: Sequence[HeatTerm], at: HeatState, power: Scalar) -> Scalar:
     r"""$m c_p \dot T = I^2 R - h_c A_c (T - T_\infty)$, the right-hand side, W/m (Elahinia 2004, eq. 3.1).
 
     `power` is the electrical power per metre; R, m and A_c of Table 3.1 are per metre too, which it does not say.
     """
-    surface = jnp.pi * wire.wire_diameter
-    loss = wire.heat.convection_coefficient * surface * (temperature - ambient)
-    changing = having(effects, "convection_change")
-    if changing:
-        loss = loss * (1.0 + sum(effect.convection_change(time) for effect in changing))
-    return power - loss - sum(effect.heat_loss(wire, temperature, ambient) for effect in effects)
+    return power - convection(wire, at.temperature, at.ambient) - sum(term.heat_loss(wire, at) for term in terms)

@@ -1,42 +1,61 @@
-"""What effects remember of a wire from step to step: entries of `WireState.kept`, there only if an effect asks for them."""
+"""What effects carry of a wire from step to step: entries of `WireState.history`, there only if an effect asks for them."""
 
 from __future__ import annotations
 
+import abc
 import dataclasses
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import jax.numpy as jnp
 
 from smajax.model.types import Scalar, WireState
 
-if TYPE_CHECKING:
-    from smajax.model.effects.base import AbstractEffect
-
 DURATION = "duration"  # s, of the step that is being made
 TRANSFORMED = "transformed"  # -, sum of all |d xi| so far; 2 a full cycle
 
 
-def kept_after(
-    effects: Sequence[AbstractEffect], old: WireState, temperature: Scalar, stress: Scalar, fraction: Scalar
-) -> dict[str, Scalar]:
-    """The memory after a step from `old`, known before the step is solved: stress and strain belong to it exactly."""
-    kept = dict(old.kept)
-    for effect in effects:
-        kept.update(effect.kept_after(old, temperature, stress, fraction))
-    return kept
+class HistoryTerm(abc.ABC):
+    """An effect that depends on the path: a strain that creeps, temperatures that drift with cycles, a supply that tires.
+
+    The one mechanism for it: whatever equation the effect changes reads its entries from `WireState.history`. They are
+    part of what a step solves, so stress and strain belong to them exactly.
+    """
+
+    @abc.abstractmethod
+    def history_at_start(self, at: WireState) -> dict[str, Scalar]:
+        """Its entries by name, of the wire `at` rest."""
+
+    def history_after(self, old: WireState, new: WireState) -> dict[str, Scalar]:
+        """The same entries after a step from `old` to `new`, whose strain and own history are not known yet."""
+        return {}
+
+
+def history_at_start(terms: Sequence[HistoryTerm], at: WireState) -> dict[str, Scalar]:
+    """All entries of the wire `at` rest."""
+    history: dict[str, Scalar] = {}
+    for term in terms:
+        history |= term.history_at_start(at)
+    return history
+
+
+def history_after(terms: Sequence[HistoryTerm], old: WireState, new: WireState) -> dict[str, Scalar]:
+    """All entries after a step from `old` to the temperature, stress and fraction of `new`."""
+    history = dict(old.history)
+    for term in terms:
+        history |= term.history_after(old, new)
+    return history
 
 
 def over(old: WireState, duration: Scalar | float) -> WireState:
     """`old` as the beginning of a step of `duration` seconds; 0: as it is."""
-    if DURATION not in old.kept:
+    if DURATION not in old.history:
         return old
-    return dataclasses.replace(old, kept={**old.kept, DURATION: duration + jnp.zeros_like(old.stress)})
+    return dataclasses.replace(old, history={**old.history, DURATION: duration + jnp.zeros_like(old.stress)})
 
 
-def transformed(old: WireState, fraction: Scalar) -> dict[str, Scalar]:
+def transformed(old: WireState, new: WireState) -> dict[str, Scalar]:
     """The entry `TRANSFORMED` after a step."""
-    return {TRANSFORMED: old.kept[TRANSFORMED] + jnp.abs(fraction - old.martensite_fraction)}
+    return {TRANSFORMED: old.history[TRANSFORMED] + jnp.abs(new.martensite_fraction - old.martensite_fraction)}
 
 
 def forgotten(steps: Scalar) -> Scalar:
@@ -53,6 +72,6 @@ def following(old: WireState, name: str, before: Scalar, now: Scalar, time_const
     a lag of a few steps, or of less than one, is as good as a long one. `now` itself at 0 s.
     """
     # A time constant of a femtosecond is none, and has a derivative that zero has not.
-    steps = jnp.maximum(old.kept[DURATION], 1e-12) / (time_constant + 1e-15)
+    steps = jnp.maximum(old.history[DURATION], 1e-12) / (time_constant + 1e-15)
     gone = forgotten(steps)
-    return now + (old.kept[name] - before) * (1.0 - gone) - (now - before) * gone / steps
+    return now + (old.history[name] - before) * (1.0 - gone) - (now - before) * gone / steps

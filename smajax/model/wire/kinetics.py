@@ -12,38 +12,20 @@ so no step leaves [0, 1] and no stress has used a rate that a clipped fraction t
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import dataclasses
 
 import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Bool
 
-from smajax.core.parameters import parameter
-from smajax.model.effects.base import AbstractEffect
 from smajax.model.types import Scalar, WireState
-from smajax.model.wire.branch_amplitude import FINISHED, AbstractRenewal, Corrected, beyond
-from smajax.model.wire.conditions import AbstractConditions
-from smajax.model.wire.history import kept_after, over
-from smajax.model.wire.shape import AbstractShape, Cosine
-from smajax.model.wire.variants import AbstractVariants, Single
+from smajax.model.wire.branch_amplitude import FINISHED, beyond
+from smajax.model.wire.history import over
+from smajax.model.wire.kinetics_terms import KineticsTerms
+from smajax.model.wire.wire import Kinetics
 
 # A transformation range narrower than this is a jump that no step can follow.
 NARROWEST_RANGE = 0.05  # C
-
-
-class Kinetics(eqx.Module):
-    """Transformation temperatures at zero stress, their slopes, and the four parts of a law."""
-
-    austenite_start: Scalar = parameter("degC", -100.0, 400.0, "A_s at zero stress")
-    austenite_finish: Scalar = parameter("degC", -100.0, 400.0, "A_f at zero stress")
-    martensite_start: Scalar = parameter("degC", -150.0, 400.0, "M_s at zero stress")
-    martensite_finish: Scalar = parameter("degC", -150.0, 400.0, "M_f at zero stress")
-    stress_slope_austenite: Scalar = parameter("Pa/K", 1e6, 1e8, "C_A: stress per degree of A_s and A_f")
-    stress_slope_martensite: Scalar = parameter("Pa/K", 1e6, 1e8, "C_M: stress per degree of M_s and M_f")
-    conditions: AbstractConditions
-    shape: AbstractShape = Cosine()
-    renewal: AbstractRenewal = Corrected()
-    variants: AbstractVariants = Single()
 
 
 def heating_temperature(law: Kinetics, temperature: Scalar, stress: Scalar) -> Scalar:
@@ -67,24 +49,24 @@ def cooling_width(law: Kinetics) -> Scalar:
 
 
 def heating_distance(
-    law: Kinetics, effects: Sequence[AbstractEffect], temperature: Scalar, stress: Scalar, old: WireState | None
+    law: Kinetics, terms: KineticsTerms, temperature: Scalar, stress: Scalar, old: WireState | None
 ) -> Scalar:
     """z = (y_A - A_s)/(A_f - A_s) of a step from `old`, which only effects look at."""
     z = (heating_temperature(law, temperature, stress) - law.austenite_start) / heating_width(law)
-    for effect in effects:
-        assert old is not None, "what has effects is given the wire before the step"
-        z = effect.heating_distance(law, z, temperature, stress, old)
+    for term in terms.ranges:
+        assert old is not None, "a range that an effect moves depends on the wire before the step"
+        z = term.heating_distance(law, z, temperature, stress, old)
     return z
 
 
 def cooling_distance(
-    law: Kinetics, effects: Sequence[AbstractEffect], temperature: Scalar, stress: Scalar, old: WireState | None
+    law: Kinetics, terms: KineticsTerms, temperature: Scalar, stress: Scalar, old: WireState | None
 ) -> Scalar:
     """z = (y_M - M_f)/(M_s - M_f), likewise."""
     z = (cooling_temperature(law, temperature, stress) - law.martensite_finish) / cooling_width(law)
-    for effect in effects:
-        assert old is not None, "what has effects is given the wire before the step"
-        z = effect.cooling_distance(law, z, temperature, stress, old)
+    for term in terms.ranges:
+        assert old is not None, "a range that an effect moves depends on the wire before the step"
+        z = term.cooling_distance(law, z, temperature, stress, old)
     return z
 
 
@@ -94,31 +76,31 @@ def _or_none(share: Scalar) -> Scalar:
 
 def martensite_left(
     law: Kinetics,
-    effects: Sequence[AbstractEffect],
+    terms: KineticsTerms,
     temperature: Scalar,
     stress: Scalar,
     old: WireState | None = None,
 ) -> Scalar:
     r"""h((y_A - A_s)/(A_f - A_s)) of the law's shape and the effects: 1 below the range (Elahinia 2004, eq. 3.10)."""
-    z = heating_distance(law, effects, temperature, stress, old)
+    z = heating_distance(law, terms, temperature, stress, old)
     share = law.shape.martensite_left(z)
-    for effect in effects:
-        share = effect.heating_shape(z, share)
+    for term in terms.shapes:
+        share = term.heating_shape(z, share)
     return _or_none(share)
 
 
 def austenite_left(
     law: Kinetics,
-    effects: Sequence[AbstractEffect],
+    terms: KineticsTerms,
     temperature: Scalar,
     stress: Scalar,
     old: WireState | None = None,
 ) -> Scalar:
     r"""k((y_M - M_f)/(M_s - M_f)) of the law's shape and the effects: 1 above the range (Elahinia 2004, eq. 3.5)."""
-    z = cooling_distance(law, effects, temperature, stress, old)
+    z = cooling_distance(law, terms, temperature, stress, old)
     share = law.shape.austenite_left(z)
-    for effect in effects:
-        share = effect.cooling_shape(z, share)
+    for term in terms.shapes:
+        share = term.cooling_shape(z, share)
     return _or_none(share)
 
 
@@ -133,54 +115,54 @@ class Branch(eqx.Module):
 
     heating: Bool[Array, ""]
     cooling: Bool[Array, ""]
-    parts: tuple[Branch, Branch] | None = None  # of a wire in two parts (`mixture.py`)
+    parts: tuple[Branch, Branch] | None = None  # of a wire in two populations (`two_populations.py`)
 
 
-def _shares(law: Kinetics, effects: Sequence[AbstractEffect], state: WireState) -> tuple[Scalar, Scalar]:
+def _shares(law: Kinetics, terms: KineticsTerms, state: WireState) -> tuple[Scalar, Scalar]:
     """(h, k) at a state."""
     at = state.temperature, state.stress, over(state, 0.0)
-    return martensite_left(law, effects, *at), austenite_left(law, effects, *at)
+    return martensite_left(law, terms, *at), austenite_left(law, terms, *at)
 
 
 def curves(
-    law: Kinetics, effects: Sequence[AbstractEffect], state: WireState, temperature: Scalar, stress: Scalar
+    law: Kinetics, terms: KineticsTerms, state: WireState, temperature: Scalar, stress: Scalar
 ) -> tuple[Scalar, Scalar]:
     """xi on the heating curve (eq. 3.3) and on the cooling curve (eq. 3.5) that belong to `state`."""
     at = temperature, stress, state
-    h, k = martensite_left(law, effects, *at), austenite_left(law, effects, *at)
-    return law.renewal.curves(state, *_shares(law, effects, state), h, k)
+    h, k = martensite_left(law, terms, *at), austenite_left(law, terms, *at)
+    return law.renewal.curves(state, *_shares(law, terms, state), h, k)
 
 
 def curve_on(
     law: Kinetics,
-    effects: Sequence[AbstractEffect],
+    terms: KineticsTerms,
     state: WireState,
     branch: Branch,
     temperature: Scalar,
     stress: Scalar,
 ) -> Scalar:
     """`fraction_on` of `curves`, with the one shape of the branch computed, where no effect shapes the two apart."""
-    if any(effect.shapes() for effect in effects):
-        return fraction_on(state, branch, *curves(law, effects, state, temperature, stress))
+    if terms.shapes:
+        return fraction_on(state, branch, *curves(law, terms, state, temperature, stress))
     at = temperature, stress, state
-    mirrored = 1.0 - cooling_distance(law, effects, *at)
-    z = jnp.where(branch.cooling, mirrored, heating_distance(law, effects, *at))
+    mirrored = 1.0 - cooling_distance(law, terms, *at)
+    z = jnp.where(branch.cooling, mirrored, heating_distance(law, terms, *at))
     share = _or_none(law.shape.martensite_left(z))
-    return fraction_on(state, branch, *law.renewal.curves(state, *_shares(law, effects, state), share, share))
+    return fraction_on(state, branch, *law.renewal.curves(state, *_shares(law, terms, state), share, share))
 
 
-def open_branches(law: Kinetics, effects: Sequence[AbstractEffect], state: WireState) -> Branch:
+def open_branches(law: Kinetics, terms: KineticsTerms, state: WireState) -> Branch:
     """Branches whose range the wire is in (or before) at `state`: one that is behind it transforms nothing any more."""
-    if any(effect.shapes() for effect in effects):
-        h, k = _shares(law, effects, state)
+    if terms.shapes:
+        h, k = _shares(law, terms, state)
         return Branch(h > 0.0, k > 0.0)
     at = state.temperature, state.stress, over(state, 0.0)
     left = law.shape.anything_left
-    return Branch(left(heating_distance(law, effects, *at)), left(1.0 - cooling_distance(law, effects, *at)))
+    return Branch(left(heating_distance(law, terms, *at)), left(1.0 - cooling_distance(law, terms, *at)))
 
 
 def _tightening(
-    law: Kinetics, effects: Sequence[AbstractEffect], state: WireState, temperature: Scalar, stress: Scalar
+    law: Kinetics, terms: KineticsTerms, state: WireState, temperature: Scalar, stress: Scalar
 ) -> tuple[Scalar, Scalar]:
     """Change of stress of a step as the directions of heating and of cooling see it, Pa.
 
@@ -188,18 +170,18 @@ def _tightening(
     wire goes through the range, not why.
     """
     tighter = stress - state.stress
-    if not any(effect.displaces() for effect in effects):
+    if not terms.ranges:
         return tighter, tighter
     warmer = temperature - state.temperature
     new, old = (temperature, stress, state), (state.temperature, state.stress, over(state, 0.0))
-    heated = heating_width(law) * (heating_distance(law, effects, *new) - heating_distance(law, effects, *old))
-    cooled = cooling_width(law) * (cooling_distance(law, effects, *new) - cooling_distance(law, effects, *old))
+    heated = heating_width(law) * (heating_distance(law, terms, *new) - heating_distance(law, terms, *old))
+    cooled = cooling_width(law) * (cooling_distance(law, terms, *new) - cooling_distance(law, terms, *old))
     return (warmer - heated) * law.stress_slope_austenite, (warmer - cooled) * law.stress_slope_martensite
 
 
 def choose_branch(
     law: Kinetics,
-    effects: Sequence[AbstractEffect],
+    terms: KineticsTerms,
     state: WireState,
     open_at_start: Branch,
     temperature: Scalar,
@@ -213,7 +195,7 @@ def choose_branch(
     (eq. 3.18 prints A_s in the place of M_s, twice; Table 3.3 and eq. 3.6 have M_s).
     """
     warmer = temperature - state.temperature
-    tighter, tighter_cooling = _tightening(law, effects, state, temperature, stress)
+    tighter, tighter_cooling = _tightening(law, terms, state, temperature, stress)
     loss, gain = state.martensite_fraction - heated, cooled - state.martensite_fraction
     loaded = state.formed_by_loading > 0.5
     may_heat = law.conditions.heats(warmer, tighter, law.stress_slope_austenite, loaded) & open_at_start.heating
@@ -231,33 +213,17 @@ def fraction_on(state: WireState, branch: Branch, heated: Scalar, cooled: Scalar
     return jnp.where(branch.heating, heated, jnp.where(branch.cooling, cooled, state.martensite_fraction))
 
 
-def remembered(
-    law: Kinetics,
-    effects: Sequence[AbstractEffect],
-    old: WireState,
-    branch: Branch,
-    temperature: Scalar,
-    stress: Scalar,
-    strain: Scalar,
-    xi: Scalar,
-) -> WireState:
-    """The wire after a step that ended at (`temperature`, `stress`, `strain`, `xi`), its memory brought up to date."""
-    at = temperature, stress, old
-    h, k = martensite_left(law, effects, *at), austenite_left(law, effects, *at)
-    kept = law.renewal.renewed(old, branch.heating, branch.cooling, h, k, xi)
-    by_loading = (stress - old.stress) / law.stress_slope_martensite > old.temperature - temperature
-    formed_by_loading = jnp.where(branch.cooling, 1.0 * by_loading, old.formed_by_loading)
-    detwinned = law.variants.detwinned(old, stress, xi)
-    return WireState(
-        temperature,
-        stress,
-        strain,
-        xi,
-        kept.xi_M,
-        kept.xi_A,
-        kept.heating_missed,
-        kept.cooling_missed,
-        detwinned,
-        formed_by_loading,
-        kept_after(effects, old, temperature, stress, xi),
+def with_amplitudes(law: Kinetics, terms: KineticsTerms, old: WireState, branch: Branch, new: WireState) -> WireState:
+    """`new`, the end of a step from `old` on `branch`, with the amplitudes of its branches brought up to date."""
+    at = new.temperature, new.stress, old
+    h, k = martensite_left(law, terms, *at), austenite_left(law, terms, *at)
+    amplitudes = law.renewal.renewed(old, branch.heating, branch.cooling, h, k, new.martensite_fraction)
+    by_loading = (new.stress - old.stress) / law.stress_slope_martensite > old.temperature - new.temperature
+    return dataclasses.replace(
+        new,
+        xi_M=amplitudes.xi_M,
+        xi_A=amplitudes.xi_A,
+        heating_missed=amplitudes.heating_missed,
+        cooling_missed=amplitudes.cooling_missed,
+        formed_by_loading=jnp.where(branch.cooling, 1.0 * by_loading, old.formed_by_loading),
     )

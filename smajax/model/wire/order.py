@@ -35,6 +35,6 @@ def disorder(model: eqx.Module) -> tuple[str, str, str] | None:
 
 def check_order(model: eqx.Module) -> None:
     """ValueError where a transformation would finish before it starts, or a load ends before it begins."""
-    found = disorder(model)
-    if found is not None:
-        raise ValueError(f"{found[2]}.")
+    pair = disorder(model)
+    if pair is not None:
+        raise ValueError(f"{pair[2]}.")

@@ -60,7 +60,7 @@ def root(
     """
     tolerance = ROUNDINGS * jnp.finfo(jnp.result_type(start)).eps * jnp.asarray(scale)
     held = lax.stop_gradient
-    found = held(bracketed(miss, held(start), held(low), held(high), tolerance))
-    slope = held(jax.grad(miss)(found))
-    exact = lax.custom_root(miss, found, lambda f, here: here - f(here) / slope, lambda g, asked: asked / g(1.0))
+    rough = held(bracketed(miss, held(start), held(low), held(high), tolerance))
+    slope = held(jax.grad(miss)(rough))
+    exact = lax.custom_root(miss, rough, lambda f, here: here - f(here) / slope, lambda g, right: right / g(1.0))
     return jnp.where(exact > high, high, jnp.where(exact < low, low, exact))

@@ -49,7 +49,11 @@ def narrate(findings: Findings) -> Narrative:
             reason_text(entry.reason, findings.output_unit, findings.output_name) for entry in findings.rounds
         ),
         unknown=tuple(comparison_sentence(findings, term) for term in findings.unknown),
-        effects={effect.name: LIBRARY[effect.name].sentence for effect in findings.effects if effect.name in LIBRARY},
+        effects={
+            effect.name: LIBRARY[effect.name].candidate.sentence
+            for effect in findings.effects
+            if effect.name in LIBRARY
+        },
     )
 
 

@@ -28,7 +28,7 @@ def summary(findings: Findings) -> tuple[str, ...]:
     sentences += caveats.of_bounds(findings)
     sentences += caveats.of_confounders(findings)
     for effect in findings.added:
-        meaning = caveats.of_the_preset(findings, effect) or LIBRARY[effect.name].sentence
+        meaning = caveats.of_the_preset(findings, effect) or LIBRARY[effect.name].candidate.sentence
         sentences += [meaning, *caveats.of_a_size(findings, effect)]
     sentences += caveats.held_out_warnings(findings)
     sentences += caveats.of_the_test(findings)

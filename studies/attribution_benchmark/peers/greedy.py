@@ -45,7 +45,7 @@ def starts_of(bench: Bench, model: Model, effect: str) -> list[Start]:
     fits, found = bench.fits, []
     for side in (1.0, -1.0):
         values = fits.inside(model)
-        for name, size in LIBRARY[effect].starts.items():
+        for name, size in LIBRARY[effect].candidate.initial_guess.items():
             full = f"{effect}.{name}"
             low, high = fits.bounds[full]
             begun = side * size if full in switches(effect) else size
@@ -92,7 +92,7 @@ def chosen(bench: Bench, base: Answer) -> Answer:
         "greedy",
         base.case,
         found.effects,
-        tuple(dict.fromkeys(LIBRARY[name].equation for name in found.effects)),
+        tuple(dict.fromkeys(LIBRARY[name].candidate.equation for name in found.effects)),
         not found.effects,
         found.fit_error,
         found.held_out_error,

@@ -10,14 +10,34 @@ with the presliding displacement delta and h the level at a speed over that at r
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import abc
+from collections.abc import Sequence
+from typing import ClassVar, NamedTuple
 
 import jax.numpy as jnp
 
-from smajax.model.effects.base import having
 from smajax.model.load.base import AbstractMovingLoad
-from smajax.model.system import System
 from smajax.model.types import Inputs, Motion, Scalar
+
+PRESLIDING = 5e-5  # m, where nothing is known of it: asperities bend by micrometres before they slip (Dahl 1968)
+
+
+class FrictionTerm(abc.ABC):
+    """Friction of one effect, with a bristle of its own."""
+
+    effect_name: ClassVar[str]  # its entry of `Motion.friction`
+
+    @abc.abstractmethod
+    def friction_limit(self, load_at_rest: Scalar) -> Scalar:
+        """Largest friction of the load at rest, N (N m for an arm), where the load itself pulls by `load_at_rest` at its start."""
+
+    def friction_level(self, speed: Scalar) -> Scalar | float:
+        """Friction while it slips over that at rest, -, at a speed of the wire's moving end, m/s."""
+        return 1.0
+
+    def presliding(self) -> Scalar | float:
+        """Motion of the wire's moving end over which the friction builds up, m."""
+        return PRESLIDING
 
 
 class Rubbing(NamedTuple):
@@ -29,23 +49,26 @@ class Rubbing(NamedTuple):
     presliding: Scalar | float  # delta, m (rad)
 
 
-def rubbing(system: System, before: Motion, velocity: Scalar, inputs: Inputs) -> list[Rubbing]:
+def rubbing(
+    load: AbstractMovingLoad, terms: Sequence[FrictionTerm], before: Motion, velocity: Scalar, inputs: Inputs
+) -> list[Rubbing]:
     """All friction of a load on its way from `before`; empty where no effect has any.
 
-    `velocity`: what a stage foretells of its end before it is solved, m/s (rad/s). At that or at the speed before, if that
+    `velocity`: what a stage predicts of its end before it is solved, m/s (rad/s). At that or at the speed before, if that
     is larger: friction that falls with the speed it is solved for has several answers, or none that Newton's method finds.
     """
-    load = system.load
-    assert isinstance(load, AbstractMovingLoad)
+    if not terms:
+        return []
     speed = load.lever() * jnp.maximum(jnp.abs(before.velocity), jnp.abs(velocity))
-    limits = [(effect, jnp.asarray(effect.friction_limit())) for effect in having(system.effects, "friction_limit")]
-    bearing = having(system.effects, "friction_share")
-    if bearing:
-        at_rest = jnp.abs(load.resistance(load.start(), jnp.zeros_like(velocity), inputs))
-        limits += [(effect, effect.friction_share() * at_rest) for effect in bearing]
+    at_rest = jnp.abs(load.resistance(load.start(), jnp.zeros_like(velocity), inputs))
     return [
-        Rubbing(effect.effect_name, limit, effect.friction_level(speed), effect.presliding() / load.lever())
-        for effect, limit in limits
+        Rubbing(
+            term.effect_name,
+            term.friction_limit(at_rest),
+            term.friction_level(speed),
+            term.presliding() / load.lever(),
+        )
+        for term in terms
     ]
 
 

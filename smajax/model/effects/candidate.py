@@ -1,0 +1,82 @@
+"""What the search for missing effects (`smajax.attribution`) knows of an effect; no equation reads it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Literal, NamedTuple, Protocol, get_args
+
+from smajax.model.drive.base import AbstractDrive
+from smajax.model.load.base import AbstractMovingLoad
+from smajax.model.load.coupon import AbstractCoupon
+from smajax.model.wire.wire import Wire
+
+Equation = Literal["heat", "electrical", "kinetics", "constitutive", "mechanics", "sensor", "input"]
+EQUATIONS: tuple[str, ...] = get_args(Equation)
+
+
+class Extent(NamedTuple):
+    """How far the runs of an experiment go."""
+
+    seconds: float  # length of one
+    stroke: float  # between the smallest and the largest reading of all, SI
+    increment: float  # from one level to the next where the readings lie on levels, SI; 0 where they do not
+
+
+class Actuator(Protocol):
+    """A wire, its load and its drive, as a `System` has them."""
+
+    @property
+    def wire(self) -> Wire: ...
+    @property
+    def load(self) -> AbstractMovingLoad | AbstractCoupon: ...
+    @property
+    def drive(self) -> AbstractDrive: ...
+
+
+def _always(_: object) -> bool:
+    return True
+
+
+def _no_grid(_: Extent) -> tuple[dict[str, float], ...]:
+    return ()
+
+
+def _no_bounds(_: Extent) -> dict[str, tuple[float, float]]:
+    return {}
+
+
+def _no_ranges(_: Mapping[str, float]) -> dict[str, tuple[float, float]]:
+    return {}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Candidate:
+    """How an effect is described, looked for and fitted."""
+
+    title: str  # "latent heat of transformation"
+    equation: Equation  # where its physics belongs, whatever contract it is written with
+    formula: str  # plain text, with its source
+    sentence: str  # for an engineer: what its presence means
+    # Coefficients that switch the effect on: their base value is zero and the score test looks at them. The others
+    # (a width, a scale) mean nothing until a switch is off zero and keep their default until then.
+    switches: tuple[str, ...]
+    # Where a refit begins, per coefficient: off the base value, because a coefficient that starts on its bound at
+    # zero stays there.
+    initial_guess: Mapping[str, float]
+    # Whether it is a matter of seconds: it means nothing where the samples of a log have no times.
+    needs_time: bool = False
+    # Whether the load may stick and jump with it: then what a fit gains by it may be the integration's
+    # (`attribution.step_size_check`).
+    stick_slip: bool = False
+    # Whether it can change anything of this wire, load and drive: a candidate that cannot is not looked at.
+    applies: Callable[[Actuator], bool] = _always
+    # Whether runs of that extent could show it: a candidate that they cannot is not looked at.
+    observable: Callable[[Extent], bool] = _always
+    # Values of the coefficients that are no switches at which the score test looks too, beside `initial_guess`.
+    grid: Callable[[Extent], tuple[dict[str, float], ...]] = _no_grid
+    # Bounds of coefficients in the unit of the reading, by the runs: what is wide in metres is narrow in radians.
+    bounds: Callable[[Extent], dict[str, tuple[float, float]]] = _no_bounds
+    # Ranges of coefficients, positive, from all over which a refit begins where the misfit has many local minima; of
+    # the switches as the score test has them.
+    start_ranges: Callable[[Mapping[str, float]], dict[str, tuple[float, float]]] = _no_ranges

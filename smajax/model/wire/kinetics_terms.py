@@ -1,0 +1,53 @@
+"""What an effect may change in the phase kinetics (eq. 3.3, 3.5, 3.17, 3.18): shape, range or conditions of the branches."""
+
+from __future__ import annotations
+
+import abc
+from typing import NamedTuple
+
+from smajax.model.types import Scalar, WireState
+from smajax.model.wire.conditions import AbstractConditions
+from smajax.model.wire.wire import Kinetics
+
+
+class ShapeTerm(abc.ABC):  # noqa: B024  # each method by itself is enough
+    """Another shape of a branch. The two are then no mirror images of each other, and each is computed by itself."""
+
+    def heating_shape(self, z: Scalar, remaining: Scalar) -> Scalar:
+        """Share of martensite left at the reduced distance z = (y_A - A_s)/(A_f - A_s); 1 far below, 0 far above."""
+        return remaining
+
+    def cooling_shape(self, z: Scalar, remaining: Scalar) -> Scalar:
+        """Share of austenite left at the reduced distance z = (y_M - M_f)/(M_s - M_f); 0 far below, 1 far above."""
+        return remaining
+
+
+class RangeTerm(abc.ABC):  # noqa: B024  # each method by itself is enough
+    """A range that is elsewhere. The direction of a step is then that of the moved distance."""
+
+    def heating_distance(self, law: Kinetics, z: Scalar, temperature: Scalar, stress: Scalar, old: WireState) -> Scalar:
+        """The reduced distance itself, from what the law has; `old` is the wire before the step."""
+        return z
+
+    def cooling_distance(self, law: Kinetics, z: Scalar, temperature: Scalar, stress: Scalar, old: WireState) -> Scalar:
+        """Likewise on cooling."""
+        return z
+
+
+class PopulationTerm(abc.ABC):
+    """A share of the wire that follows other branch conditions than the law's (`two_populations.py`)."""
+
+    @abc.abstractmethod
+    def second_conditions(self) -> tuple[AbstractConditions, Scalar]:
+        """(the conditions, the share, -)."""
+
+
+class KineticsTerms(NamedTuple):
+    """All that effects change in the kinetics of one wire."""
+
+    shapes: tuple[ShapeTerm, ...] = ()
+    ranges: tuple[RangeTerm, ...] = ()
+    populations: tuple[PopulationTerm, ...] = ()
+
+
+NO_TERMS = KineticsTerms()
