@@ -15,6 +15,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 
 from smajax.attribution.config import AttributionConfig
+from smajax.fit.uncertainty import Remark
 
 Role = Literal["fit", "held-out"]
 
@@ -48,7 +49,7 @@ class RunFinding:
 
 @dataclass(frozen=True)
 class ParameterFinding:
-    """One fitted number. `standard_error` is None when the runs do not determine it (then `remark` says so)."""
+    """One fitted number. `standard_error` is None when the runs do not determine it (then `remark` says why)."""
 
     name: str
     unit: str
@@ -57,12 +58,12 @@ class ParameterFinding:
     lower: float
     upper: float
     start: float
-    remark: str = ""  # of `smajax.fit.uncertainty`: "at its lower bound", ...
+    remark: Remark = field(default_factory=Remark)
 
     @property
     def limited(self) -> bool:
         """Whether it ends at a bound that it might lie beyond: a share of all or of nothing is not."""
-        return self.remark.startswith("at its") and (self.unit, self.lower, self.upper) != ("-", 0.0, 1.0)
+        return self.remark.at_bound and (self.unit, self.lower, self.upper) != ("-", 0.0, 1.0)
 
 
 @dataclass(frozen=True)

@@ -39,7 +39,7 @@ def parameters_found(job: Job, setting: Search, model: Model, start: np.ndarray)
                 known.standard_error[name],
                 *job.bounds[name],
                 float(start[index(name)]),
-                known.remark[name],
+                known.remarks[name],
             )
             for name in names
         ),

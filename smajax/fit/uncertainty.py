@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 
 import numpy as np
 from scipy.sparse.csgraph import connected_components
@@ -27,19 +28,66 @@ BARELY = 0.95
 FEW = 50  # independent samples that determine a parameter
 
 
+class RemarkKind(StrEnum):
+    """What is to be said of an estimate beside its standard error."""
+
+    NONE = ""
+    LOWER_BOUND = "at its lower bound"
+    UPPER_BOUND = "at its upper bound"
+    NO_EFFECT = "no effect on these runs"
+    COMBINATION = "combination"  # the runs determine one of it with others
+    NOT_IDENTIFIABLE = "not identifiable"
+    PRIOR = "determined by its prior; the runs add next to nothing"
+    NOT_FINITE = "its variance is not finite"
+    RANGE_OPEN = "the runs leave its whole range undetermined"
+    CORRELATED = "correlated"
+
+
+@dataclass(frozen=True)
+class Remark:
+    """A kind and, of a combination and of correlated ones, the other parameters."""
+
+    kind: RemarkKind = RemarkKind.NONE
+    others: tuple[str, ...] = ()
+
+    def __bool__(self) -> bool:
+        return self.kind is not RemarkKind.NONE
+
+    @property
+    def at_bound(self) -> bool:
+        return self.kind in (RemarkKind.LOWER_BOUND, RemarkKind.UPPER_BOUND)
+
+    @property
+    def text(self) -> str:
+        """Of a large correlated group the first other member is named, by which it can be found."""
+        if self.kind is RemarkKind.COMBINATION:
+            return f"only a combination of it with {', '.join(self.others)} is identifiable"
+        if self.kind is RemarkKind.CORRELATED:
+            many = len(self.others) > 2
+            return f"correlated with {and_listed([self.others[0], f'{len(self.others) - 1} others'] if many else self.others)}"
+        return self.kind.value
+
+
 @dataclass(frozen=True)
 class Uncertainty:
     """Standard errors (SI; None: not identifiable) and remarks, by parameter name; and groups of correlated ones."""
 
     standard_error: dict[str, float | None]
-    remark: dict[str, str]
+    remarks: dict[str, Remark]
     correlated_groups: tuple[tuple[str, ...], ...] = ()
 
+    @property
+    def remark(self) -> dict[str, str]:
+        """The remarks in words."""
+        return {name: remark.text for name, remark in self.remarks.items()}
 
-def at_bound(value: float, low: float, high: float, edge: float = AT_BOUND) -> str:
-    """`"at its lower bound"`, `"at its upper bound"`, or nothing."""
+
+def at_bound(value: float, low: float, high: float, edge: float = AT_BOUND) -> Remark:
+    """At its lower bound, at its upper bound, or nothing (false)."""
     span = edge * (high - low)
-    return "at its lower bound" if value - low < span else "at its upper bound" if high - value < span else ""
+    if value - low < span:
+        return Remark(RemarkKind.LOWER_BOUND)
+    return Remark(RemarkKind.UPPER_BOUND) if high - value < span else Remark()
 
 
 def _covariance(
@@ -113,13 +161,6 @@ def _clusters(covariance: np.ndarray) -> list[list[int]]:
     return [cluster for cluster in clusters if len(cluster) > 1]
 
 
-def _correlated_remark(name: str, group: Sequence[str]) -> str:
-    """The remark of one of a group. Of a large one its first other member is named, by which it can be found."""
-    others = [other for other in group if other != name]
-    listed = others if len(others) < 3 else [others[0], f"{len(others) - 1} others"]
-    return f"correlated with {and_listed(listed)}"
-
-
 def uncertainty(
     at: Sensitivity,
     names: Sequence[str],
@@ -155,25 +196,24 @@ def uncertainty(
             float(error[index] / scale[index]) if finite and not without_effect and not unidentifiable else None
         )
         if without_effect:
-            remark[name] = "no effect on these runs"
+            remark[name] = Remark(RemarkKind.NO_EFFECT)
         elif unidentifiable:
             farther = (np.abs(extents[along]) > MOVED * error / scale).any(axis=0)
-            others = [free[k] for k in np.flatnonzero(farther) if k != index]
-            remark[name] = (
-                f"only a combination of it with {', '.join(others)} is identifiable" if others else "not identifiable"
-            )
+            others = tuple(free[k] for k in np.flatnonzero(farther) if k != index)
+            remark[name] = Remark(RemarkKind.COMBINATION if others else RemarkKind.NOT_IDENTIFIABLE, others)
         elif priors[:, index].any() and error[index] / scale[index] > BARELY / np.linalg.norm(priors[:, index]):
-            remark[name] = "determined by its prior; the runs add next to nothing"
+            remark[name] = Remark(RemarkKind.PRIOR)
         elif not finite:
-            remark[name] = "its variance is not finite"
+            remark[name] = Remark(RemarkKind.NOT_FINITE)
     clear = [index for index, name in enumerate(free) if not remark[name]]
     for index, name in enumerate(free):
         if not remark[name] and error[index] / scale[index] > ranges[index]:
-            errors[name], remark[name] = None, "the runs leave its whole range undetermined"
+            errors[name], remark[name] = None, Remark(RemarkKind.RANGE_OPEN)
     groups = [tuple(free[clear[index]] for index in cluster) for cluster in _clusters(covariance[np.ix_(clear, clear)])]
     for members in groups:
         for name in members:
-            remark[name] = remark[name] or _correlated_remark(name, members)
+            others = tuple(other for other in members if other != name)
+            remark[name] = remark[name] or Remark(RemarkKind.CORRELATED, others)
     return Uncertainty(errors, remark, tuple(groups))
 
 

@@ -14,6 +14,7 @@ from markupsafe import Markup
 
 from smajax.attribution.findings import Findings, ParameterFinding, Verdict
 from smajax.core.display_units import chance, correlation, digits, display, label, p_value, share, with_error
+from smajax.fit.uncertainty import RemarkKind
 from smajax.report import pictures
 from smajax.report.narrative import Narrative, narrate
 from smajax.report.narrative.rounds import chosen_text
@@ -102,7 +103,7 @@ def _parameter_rows(findings: Findings) -> list[dict[str, Any]]:
                 "after": _fitted(after.get(name)),
                 "bounds": f"{shown(any_.lower, any_.unit, name).text} … {shown(any_.upper, any_.unit, name).text}",
                 "remark": _remarks(before.get(name), after.get(name)),
-                "entangled": name in correlated or "combination" in any_.remark,
+                "entangled": name in correlated or any_.remark.kind is RemarkKind.COMBINATION,
             }
         )
     return rows
@@ -115,7 +116,7 @@ def _fitted(found: ParameterFinding | None) -> Shown:
 
 
 def _remarks(before: ParameterFinding | None, after: ParameterFinding | None) -> str:
-    first, second = before.remark if before else "", after.remark if after else ""
+    first, second = before.remark.text if before else "", after.remark.text if after else ""
     if first == second or not first or not before or not after:
         return second or first
     return f"before: {first}" + (f"; after: {second}" if second else "")

@@ -84,7 +84,7 @@ def _parameter(found: ParameterFinding) -> dict[str, Any]:
         "lower": found.lower,
         "upper": found.upper,
         "start": found.start,
-        "remark": found.remark,
+        "remark": found.remark.text,
     }
 
 

@@ -17,6 +17,7 @@ from smajax.attribution.findings import (
     Scored,
     Verdict,
 )
+from smajax.fit.uncertainty import Remark, RemarkKind
 
 NOISE = 2.0e-5  # m
 NAN = float("nan")
@@ -129,15 +130,17 @@ def made_findings() -> Findings:
         noise_how="estimated from the flat part of the runs",
         runs=runs,
         before=(
-            ParameterFinding("convection_coefficient", "W/(m^2 K)", 131.45678, 0.812, 1.0, 5e3, 150.0, ""),
-            ParameterFinding("recoverable_strain", "-", 0.0461, 1.2e-5, 0.0, 0.12, 0.04, ""),
-            ParameterFinding("stress_slope_austenite", "Pa/K", 1e6, None, 1e6, 1e8, 6.89e6, "at its lower bound"),
+            ParameterFinding("convection_coefficient", "W/(m^2 K)", 131.45678, 0.812, 1.0, 5e3, 150.0),
+            ParameterFinding("recoverable_strain", "-", 0.0461, 1.2e-5, 0.0, 0.12, 0.04),
+            ParameterFinding(
+                "stress_slope_austenite", "Pa/K", 1e6, None, 1e6, 1e8, 6.89e6, Remark(RemarkKind.LOWER_BOUND)
+            ),
         ),
         after=(
-            ParameterFinding("convection_coefficient", "W/(m^2 K)", 149.98765, 0.301, 1.0, 5e3, 150.0, ""),
-            ParameterFinding("recoverable_strain", "-", 0.0460, 1.1e-5, 0.0, 0.12, 0.04, ""),
-            ParameterFinding("stress_slope_austenite", "Pa/K", 6.9e6, 4e4, 1e6, 1e8, 6.89e6, ""),
-            ParameterFinding("latent_heat.enthalpy", "J/kg", 24187.3, 210.6, 0.0, 1e5, 1e4, ""),
+            ParameterFinding("convection_coefficient", "W/(m^2 K)", 149.98765, 0.301, 1.0, 5e3, 150.0),
+            ParameterFinding("recoverable_strain", "-", 0.0460, 1.1e-5, 0.0, 0.12, 0.04),
+            ParameterFinding("stress_slope_austenite", "Pa/K", 6.9e6, 4e4, 1e6, 1e8, 6.89e6),
+            ParameterFinding("latent_heat.enthalpy", "J/kg", 24187.3, 210.6, 0.0, 1e5, 1e4),
         ),
         effects=(
             made_effect("radiation", "radiation to the surroundings", "heat", 1.02e-3),

@@ -35,6 +35,7 @@ from smajax.attribution.findings import (
 )
 from smajax.attribution.unknown.terms import UNKNOWN
 from smajax.core.progress import Event, Message, Result, Stage
+from smajax.fit.uncertainty import Remark, RemarkKind
 from smajax.report.narrative import narrate, narrated
 from smajax.report.narrative.rounds import reason_text
 from tests.helpers.made_findings import made_effect, made_findings, made_residual
@@ -121,14 +122,14 @@ def test_a_load_far_off_may_be_a_size_of_the_bench_that_was_never_given() -> Non
 
 
 def test_each_cluster_of_correlated_parameters_has_one_line_with_advice() -> None:
-    def found(name: str, remark: str) -> ParameterFinding:
-        return ParameterFinding(name, "-", 0.5, 0.1, 0.0, 1.0, 0.5, remark)
+    def found(name: str, kind: RemarkKind, *others: str) -> ParameterFinding:
+        return ParameterFinding(name, "-", 0.5, 0.1, 0.0, 1.0, 0.5, Remark(kind, others))
 
     after = (
-        found("specific_heat", "correlated with convection_coefficient"),
-        found("convection_coefficient", "correlated with specific_heat"),
-        found("damping", "known from its prior; the runs add next to nothing"),
-        found("density", "only a combination of it with load_mass is identifiable"),
+        found("specific_heat", RemarkKind.CORRELATED, "convection_coefficient"),
+        found("convection_coefficient", RemarkKind.CORRELATED, "specific_heat"),
+        found("damping", RemarkKind.PRIOR),
+        found("density", RemarkKind.COMBINATION, "load_mass"),
     )
     findings = dataclasses.replace(
         made_findings(),
@@ -144,12 +145,14 @@ def test_each_cluster_of_correlated_parameters_has_one_line_with_advice() -> Non
     assert "add a fit run that separates them" in advice
     (advice,) = [one for one in limits if one.startswith("Of density these runs determine combinations alone.")]
     assert "`smajax identify experiment.toml --design`" in advice
-    assert any(one.startswith("damping: known from its prior") for one in limits)
+    assert any(one.startswith("damping: determined by its prior") for one in limits)
 
 
 def test_a_parameter_at_a_bound_is_said_at_the_top() -> None:
-    one = ParameterFinding("recoverable_strain", "-", 0.02, None, 0.01, 0.02, 0.015, "at its upper bound")
-    coefficient = ParameterFinding("latent_heat.enthalpy", "J/kg", 1e5, None, 0.0, 1e5, 1e4, "at its upper bound")
+    one = ParameterFinding("recoverable_strain", "-", 0.02, None, 0.01, 0.02, 0.015, Remark(RemarkKind.UPPER_BOUND))
+    coefficient = ParameterFinding(
+        "latent_heat.enthalpy", "J/kg", 1e5, None, 0.0, 1e5, 1e4, Remark(RemarkKind.UPPER_BOUND)
+    )
     said = _summary(after=(one, coefficient))
     assert "Mind: recoverable_strain ends at its upper bound of 2 %. The truth may lie beyond" in said
     assert "Mind: latent_heat.enthalpy ends at a bound. The runs ask for more of the effect than is likely" in said

@@ -18,12 +18,15 @@ from PIL import Image
 from smajax.attribution.findings import Comparison, Findings, Formula, UnknownTerm
 from smajax.core.display_units import correlation, digits, display, p_value, share, with_error
 from smajax.data.readers.read import read_table
+from smajax.fit.uncertainty import Remark, RemarkKind
 from smajax.report import pictures
 from smajax.report.html import findings_to_html
 from smajax.report.json_file import RENAMED, findings_to_json, with_current_keys
 from smajax.report.narrative import narrate
 from smajax.report.write import write_report
 from tests.helpers.made_findings import NAN, NOISE, made_effect, made_findings
+
+NO_REMARK = Remark()
 
 
 @pytest.fixture(scope="module")
@@ -390,15 +393,15 @@ def test_unknown_terms_are_told_drawn_and_recorded(findings, page):
 
 
 def test_correlated_parameters_lead_to_what_can_be_done(findings: Findings) -> None:
-    def section(remark: str = "", correlated: tuple[tuple[str, ...], ...] = ()) -> str:
+    def section(remark: Remark = NO_REMARK, correlated: tuple[tuple[str, ...], ...] = ()) -> str:
         first, *rest = findings.after
         after = (dataclasses.replace(first, remark=remark), *rest)
         page = findings_to_html(dataclasses.replace(findings, after=after, correlated=correlated))
         return page[page.index('<section id="parameters"') : page.index('<section id="residual"')]
 
     assert 'href="#cannot-know"' in section(correlated=((findings.after[0].name, findings.after[1].name),))
-    assert 'href="#cannot-know"' in section("only a combination of it with specific_heat is identifiable")
-    assert 'href="#cannot-know"' not in section("at its lower bound")
+    assert 'href="#cannot-know"' in section(Remark(RemarkKind.COMBINATION, ("specific_heat",)))
+    assert 'href="#cannot-know"' not in section(Remark(RemarkKind.LOWER_BOUND))
 
 
 def test_a_record_with_the_keys_of_before_is_read(findings: Findings) -> None:

@@ -103,7 +103,9 @@ def of_bounds(findings: Findings) -> Iterator[str]:
         )
     own = [one for one in limited if not one.name.startswith(added)]
     if own:
-        ends = [f"{one.name} ends {one.remark} of {value_text(one.value, one.unit, one.name).strip()}" for one in own]
+        ends = [
+            f"{one.name} ends {one.remark.text} of {value_text(one.value, one.unit, one.name).strip()}" for one in own
+        ]
         its = "its bounds" if len(own) == 1 else "their bounds"
         yield (
             f"Mind: {and_listed(ends)}. The truth may lie beyond, and what was fitted beside it makes up for that: widen "

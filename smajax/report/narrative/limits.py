@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from smajax.attribution.findings import Findings
 from smajax.core.wording import and_listed
+from smajax.fit.uncertainty import RemarkKind
 from smajax.report.narrative.values import assumed_text, error_text
 
 
@@ -75,10 +76,10 @@ def _remarks(findings: Findings) -> Iterator[str]:
     for one in findings.after:
         if one.remark and one.name not in known:
             measured = one.standard_error is not None
-            yield f"{one.name}: {one.remark}" + (
+            yield f"{one.name}: {one.remark.text}" + (
                 ": known less well than alone." if measured else "; its value is not measured by these runs."
             )
-    blended = [one.name for one in findings.after if "combination" in one.remark]
+    blended = [one.name for one in findings.after if one.remark.kind is RemarkKind.COMBINATION]
     if blended:
         yield (
             f"Of {and_listed(blended)} these runs determine combinations alone. {separated(findings)} Where the equations have their "
