@@ -8,20 +8,28 @@ READY := $(VENV)/.ready
 # The demo's pages are opened where a person looks, not in a build.
 OPEN = $$(test -t 2 && test -z "$$CI" && echo --open)
 
-.PHONY: demo test test-all coverage audit docs lint format package clean
+.PHONY: demo test test-studies test-all coverage audit docs lint format package clean
 
 demo: $(READY)
 	SMAJAX_PROGRESS=lines $(BIN)/smajax demo --out demo-report $(OPEN)
 
+# A file goes to one worker, in which its tests share compiled programs; the longest begin first (tests/conftest.py).
+PYTEST = $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
+STUDIES = tests/studies tests/documentation/test_notebooks.py
+
 test: lint
-	$(BIN)/python -m pytest -n 2 --dist worksteal
+	$(PYTEST) $(STUDIES:%=--ignore=%)
+
+# What was found with the package rather than the package: the source's figures, the studies' records, the notebooks.
+test-studies: $(READY)
+	$(PYTEST) $(STUDIES)
 
 test-all: lint
-	$(BIN)/python -m pytest -n 2 --dist worksteal -m "slow or not slow"
+	$(PYTEST) -m "slow or not slow"
 
 # Lines and branches that no test runs, after the tests; a file that is run whole is left out.
 coverage: $(READY)
-	$(BIN)/python -m pytest -n 2 --dist worksteal --cov=smajax --cov-branch --cov-report=term-missing:skip-covered
+	$(PYTEST) --cov=smajax --cov-branch --cov-report=term-missing:skip-covered
 
 # Known faults of what is installed here, asked of the public list: the one target that needs a network beyond packages.
 audit: $(READY)

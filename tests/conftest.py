@@ -1,8 +1,12 @@
-"""Shared by all tests: float64, and where the measured data are."""
+"""Shared by all tests: float64, compiled programs shared by the workers of a run, and where the measured data are."""
 
 from __future__ import annotations
 
+import atexit
+import gc
 import os
+import shutil
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -12,7 +16,41 @@ import pytest
 from smajax.core.runtime import prepare
 from tests.helpers.in_browser import FLAGS, NONE, chromium
 
+CACHE = "JAX_COMPILATION_CACHE_DIR"
+
+# A compiled program is shared by the workers and the commands of one run, and by no other run. Set the variable to keep them.
+if CACHE not in os.environ:
+    os.environ[CACHE] = tempfile.mkdtemp(prefix="smajax-tests-")
+    atexit.register(shutil.rmtree, os.environ[CACHE], ignore_errors=True)
+
 prepare()
+
+# Tracing makes millions of small objects that live: the collector looked at them again and again, a tenth of the time.
+gc.set_threshold(100_000, 20, 50)
+
+# Files that take longest, longest first (CPU time of a run without cached programs). A worker takes a whole file, in which the
+# tests of a rig share traced and compiled programs; a long one begun last would keep one worker busy alone.
+LONGEST = (
+    "attribution/test_close_loop",
+    "model/test_law_gradients",
+    "attribution/test_coloured_noise",
+    "attribution/test_honest_numbers",
+    "attribution/test_search",
+    "studies/test_figures",
+    "documentation/test_notebooks",
+    "simulation/test_compiled",
+    "model/test_laws",
+    "control/test_estimators",
+    "simulation/test_batch",
+    "control/test_controllers",
+    "model/test_every_effect",
+    "control/test_tune",
+    "control/test_closed_loop",
+    "engine/test_engine_facade",
+    "fit/",
+    "cli/",
+    "simulation/",
+)
 
 
 @pytest.fixture(scope="session")
@@ -40,5 +78,5 @@ def browser() -> Iterator[Any]:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """The whole loops first: begun last, one of them would keep a single worker busy when all else is done."""
-    items.sort(key=lambda item: "test_close_loop" not in item.nodeid)
+    """The longest files first."""
+    items.sort(key=lambda item: next((n for n, name in enumerate(LONGEST) if name in item.nodeid), len(LONGEST)))
