@@ -57,4 +57,4 @@ plane.set(xlabel="temperature (°C)", ylabel="stress (MPa)")
 # %%
 heavier = set_parameters(arm, {"payload_mass": 0.065})  # kg
 run = simulate_compiled(heavier, {"voltage": np.full(time.size, 7.3)}, dt)
-print(f"with 65 g in the place of 57 g it ends at {np.degrees(run.position[-1]):.1f} degrees")
+print(f"with 65 g instead of 57 g it ends at {np.degrees(run.position[-1]):.1f} degrees")
