@@ -19,8 +19,9 @@ import matplotlib.pyplot as plt  # noqa: E402
 import numpy as np  # noqa: E402
 
 from smajax.control.tune.settings import TuneSettings  # noqa: E402
+from smajax.control.tune.tuning_folder import tune_in_folder  # noqa: E402
 from smajax.model.rigs import arm  # noqa: E402
-from smajax.report.tune_folder import tune_into  # noqa: E402
+from smajax.report.tune_folder import write_tuning  # noqa: E402
 
 fast = bool(os.environ.get("SMAJAX_FAST"))
 settings = TuneSettings(
@@ -35,8 +36,8 @@ settings = TuneSettings(
     seconds=3.0,
     unseen=2 if fast else 32,
 )
-print(settings.plants_in_words())
-print(settings.goal_in_words())
+print(settings.plants_sentence())
+print(settings.goal_sentence())
 
 # %% [markdown]
 # Every loop also returns the derivatives of every term in every gain. A step minimises the largest of all loops' linear models within a trust region.
@@ -45,7 +46,8 @@ print(settings.goal_in_words())
 
 # %%
 out = Path(tempfile.mkdtemp()) / "tuned"
-result = tune_into(arm(), settings, out)
+result = tune_in_folder(arm(), settings, out)
+write_tuning(result, out)
 for name, before in result.before.items():
     print(f"{name:16s} {before:8.3g} -> {result.after.values[name]:8.3g} {result.units[name]}")
 print(f"worst cost {result.costs[0]:.2f} -> {result.costs[1]:.2f}")

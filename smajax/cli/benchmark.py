@@ -44,7 +44,7 @@ def _lsoda(p: dict[str, float], voltage: float, payload: float, at: np.ndarray) 
     return np.degrees(found.y[2])
 
 
-def bench(count: int = 8192, peers: int = 16, progress: Progress = quiet) -> dict[str, Any]:
+def benchmark(count: int = 8192, peers: int = 16, progress: Progress = quiet) -> dict[str, Any]:
     """Milliseconds a trajectory of both, their ratio, and by how many degrees they differ on the `peers` first members."""
     system = arm()
     p = parameter_values(system)
@@ -84,17 +84,3 @@ def bench(count: int = 8192, peers: int = 16, progress: Progress = quiet) -> dic
         "largest_difference_degrees": apart,
         "agree": apart < AGREE,
     }
-
-
-def in_words(found: dict[str, Any]) -> list[str]:
-    """The result for a terminal."""
-    here = found["machine"]
-    return [
-        f"{here['processor']}, {here['cores']} cores, {here['system']}, load {here['load at the start']}; "
-        f"smajax {here['versions']['smajax']}, jax {here['versions']['jax']}, scipy {here['versions']['scipy']}",
-        f"smajax:      {found['smajax_ms']:.4f} ms a trajectory ({found['trajectories']['smajax']:,} of "
-        f"{found['trajectories']['seconds']:g} s, {found['smajax_cores']} cores; first call {found['smajax_first_call_s']:.1f} s)",
-        f"scipy LSODA: {found['scipy_ms']:.2f} ms a trajectory ({found['trajectories']['scipy']} of them, one core)",
-        f"smajax is {found['ratio']:.0f} times as fast, {found['ratio_per_core']:.0f} times a core; the angles differ by "
-        f"{found['largest_difference_degrees']:.3f} degrees at most.",
-    ]

@@ -104,14 +104,14 @@ def _before(ctx: typer.Context) -> list[str]:
 def values(ctx: typer.Context, incomplete: str) -> list[str]:
     """Parameters of the model that the words before name, short names first."""
     from smajax.control.mismatch import MISMATCHES
-    from smajax.control.run_request import Asked
+    from smajax.control.run_request import RunRequest
     from smajax.core.parameters import parameters
     from smajax.model.presets import DRIVES, LOADS, WIRES
 
     kinds = {"wire": WIRES, "load": LOADS, "drive": DRIVES}
     # The last one named: what is typed comes behind the defaults.
     named = {kind: word for kind, there in kinds.items() for word in _before(ctx) if word in there}
-    model = dataclasses.replace(Asked(), **named).system()  # type: ignore[arg-type]
+    model = dataclasses.replace(RunRequest(), **named).system()  # type: ignore[arg-type]
     there = parameters(model)
     short = [name for name, own in MISMATCHES.items() if own in there]
     return _after_commas(dict.fromkeys([*short, *there]), incomplete, "=")

@@ -94,7 +94,7 @@ def _plugin_faults() -> list[str]:
     return faults
 
 
-def examined(engine: bool = True) -> dict[str, Any]:
+def examine(engine: bool = True) -> dict[str, Any]:
     """Versions, machine, devices, cache and memory. `engine`: also compile and run a small model."""
     import jax
 

@@ -10,27 +10,30 @@ from typing import Annotated
 
 import typer
 
-from smajax.cli.commands.close_loop import close_loop_command, demo
+from smajax.cli.commands.bench import bench
+from smajax.cli.commands.close_loop import close_loop_command
+from smajax.cli.commands.demo import demo
+from smajax.cli.commands.doctor import doctor
+from smajax.cli.commands.effects import effects
 from smajax.cli.commands.figures import figures
 from smajax.cli.commands.identify import identify_command
-from smajax.cli.commands.listing import effects, presets
-from smajax.cli.commands.machine import bench, doctor
 from smajax.cli.commands.new_experiment import new_experiment
+from smajax.cli.commands.presets import presets
 from smajax.cli.commands.simulate import simulate
 from smajax.cli.commands.sweep import sweep
 from smajax.cli.commands.tune import tune
-from smajax.cli.options import console, insistent
 from smajax.cli.positional import Command
-from smajax.cli.renamed import as_now
+from smajax.cli.renamed import with_new_names
+from smajax.cli.terminal import answer_interrupts, console
 
 EXIT_CODES = """\
-Exit codes: 0 done; 1 a defect of smajax (a traceback says where); 2 input or options that cannot be used, with what to do;
-3 done, and what was asked of the result is not met (a limit of tune, a claim of figures); 130 interrupted by Ctrl-C, after
-which the same command goes on from what is kept.
+Exit codes: 0 success; 1 a defect of smajax, with a traceback; 2 wrong input or options, with a message; 3 success, but the
+result does not meet a requirement (a limit of tune, a claim of figures); 130 interrupted by Ctrl-C, after which the same
+command resumes from cached results.
 
-A folder that holds another result is refused; --overwrite deletes that result, and nothing else that lies there. Progress
-is drawn in a terminal only; SMAJAX_PROGRESS=lines writes a line a stage to stderr elsewhere. SMAJAX_ENGINE=xla has XLA run
-every program in the place of smajax's own compiler.
+A folder that holds another result is refused; --overwrite deletes that result and no other file. Progress is drawn in a
+terminal only; SMAJAX_PROGRESS=lines writes one line a stage to stderr elsewhere. SMAJAX_ENGINE=xla runs every program by
+XLA, not by smajax's own compiler.
 """
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)  # no room on the disk, in the quota, in a file
@@ -42,12 +45,12 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     add_completion=True,
-    rich_markup_mode=None,  # the plain help is there at once
+    rich_markup_mode=None,  # plain help is quick
 )
 
 
-def _version(asked: bool) -> None:
-    if asked:
+def _version(requested: bool) -> None:
+    if requested:
         from smajax import __version__
 
         typer.echo(f"smajax {__version__}")
@@ -56,7 +59,9 @@ def _version(asked: bool) -> None:
 
 @app.callback()
 def _all(
-    version: Annotated[bool, typer.Option("--version", is_eager=True, callback=_version, help="print it")] = False,
+    version: Annotated[
+        bool, typer.Option("--version", is_eager=True, callback=_version, help="print the version")
+    ] = False,
 ) -> None:
     pass
 
@@ -87,25 +92,25 @@ def _no_memory(error: Exception) -> bool:
 
 
 def _warned(message: Warning | str, *_: object, **__: object) -> None:
-    """Of a warning what it says: the line of code that gave it means nothing to who typed a command."""
+    """Print the message of a warning alone: its line of code says nothing to a user of the command line."""
     sys.stderr.write(f"warning: {message}\n")
 
 
 def main() -> None:
-    """Entry point: errors that a user can mend are said in one paragraph with exit code 2, without a traceback."""
+    """Entry point. Errors that a user can correct are one paragraph with exit code 2, without a traceback."""
     warnings.showwarning = _warned
-    typed, told = as_now(sys.argv[1:])
-    for sentence in told:
-        sys.stderr.write(f"deprecated: {sentence}\n")
+    words, messages = with_new_names(sys.argv[1:])
+    for message in messages:
+        sys.stderr.write(f"deprecated: {message}\n")
     try:
-        with insistent():  # from here on: what a command imports calls back too
-            app(typed)
+        with answer_interrupts():  # from here on, since imports of a command call back too
+            app(words)
     except Exception as error:
         if _no_memory(error):
-            # Written plainly: what colours a message would have to be loaded, and there is no memory left for it.
+            # Plain text: a library for colours would need memory that is not left.
             sys.stderr.write(
                 f"Error: not enough memory ({error or 'none left'}); take a longer step or shorter runs, or allow more. "
-                "What was finished is kept.\n"
+                "Finished results are cached.\n"
             )
             raise SystemExit(2) from None
         # Imported when there is an error: `--help` does not wait for them.
@@ -119,8 +124,8 @@ def main() -> None:
 
         if isinstance(error, OSError) and error.errno in FULL:
             error = OSError(
-                f"{error.filename or 'the disk'}: {error.strerror}: free some space and give the same command again. What was "
-                "finished is kept."
+                f"{error.filename or 'the disk'}: {error.strerror}: free some space and give the same command again. Finished "
+                "results are cached."
             )
         elif not isinstance(
             error,

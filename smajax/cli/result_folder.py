@@ -1,7 +1,7 @@
-"""The folder that a command writes: one result in it, never two mixed, and none left behind by a command that was refused.
+"""The folder that a command writes: one result in it, never two mixed, and none left by a command that was refused.
 
-A hidden file in the folder says which command began it and what was asked. The same command goes on there; another one, or
-the same one asked otherwise, is refused, unless it is to overwrite.
+A hidden file in the folder records the command and its request. The same command resumes there; another one, or the same one
+with another request, is refused, unless it is to overwrite.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from smajax.cli.options import INSIDE
 from smajax.core.files import json_text, replace, sweep_up
 
 MARK = ".smajax.json"
-# By the file that each command writes last another one refuses a folder without the mark, which may be the user's own.
+# The last file of each command: a folder that has one but no hidden file is refused, since it may be the user's own.
 LAST = {
     "report.html": "close-loop",
     "identify.html": "identify",
@@ -27,8 +27,8 @@ LAST = {
     "sweep.json": "sweep",
     ".made-by": "figures",
 }
-MOST_TOLD, LONGEST = 4, 60  # differences in a message, characters of a value in it
-Asked = Mapping[str, Any]
+MOST_LISTED, LONGEST = 4, 60  # differences in a message, characters of a value in it
+Request = Mapping[str, Any]
 
 
 class FolderTaken(ValueError):
@@ -39,19 +39,19 @@ class FolderUnusable(OSError):
     """The output folder cannot be written to."""
 
 
-def _same(before: Asked, asked: Asked) -> bool:
-    return dict(before) == dict(asked)
+def _same(before: Request, request: Request) -> bool:
+    return dict(before) == dict(request)
 
 
-def _unlike(before: Asked, asked: Asked) -> Iterator[str]:
-    """Each entry that differs, in words; of a table in the place of a value, its entries."""
-    for name in sorted(before.keys() | asked.keys()):
-        old, new = before.get(name), asked.get(name)
+def _changes(before: Request, request: Request) -> Iterator[str]:
+    """Each entry that differs, in words; of a table, its entries."""
+    for name in sorted(before.keys() | request.keys()):
+        old, new = before.get(name), request.get(name)
         if isinstance(old, Mapping) and isinstance(new, Mapping):
-            yield from (f"changed in the {name}, {one}" for one in _unlike(old, new))
+            yield from (f"changed in the {name}, {one}" for one in _changes(old, new))
         elif old != new:
             there = f"{_short(old)} there" if name in before else "not there"
-            yield f"{name}: {there}, {_short(new) if name in asked else 'not'} asked"
+            yield f"{name}: {there}, {_short(new) if name in request else 'not'} requested"
 
 
 def _short(value: Any) -> str:
@@ -59,52 +59,58 @@ def _short(value: Any) -> str:
     return text if len(text) <= LONGEST else f"{text[:LONGEST]}..."
 
 
-def _differences(before: Asked, asked: Asked) -> str:
-    differ = list(_unlike(before, asked))
-    more = len(differ) - MOST_TOLD
-    return "; ".join([*differ[:MOST_TOLD], *([f"and {more} more"] if more > 0 else [])])
+def _differences(before: Request, request: Request) -> str:
+    differ = list(_changes(before, request))
+    more = len(differ) - MOST_LISTED
+    return "; ".join([*differ[:MOST_LISTED], *([f"and {more} more"] if more > 0 else [])])
 
 
 def _read(out: Path) -> dict[str, Any] | None:
     try:
-        held = json.loads((out / MARK).read_text(encoding="utf-8"))
+        record = json.loads((out / MARK).read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
-    return held if isinstance(held, dict) and {"command", "asked"} <= held.keys() else None
+    if isinstance(record, dict) and "asked" in record:  # the key of version 0.1
+        record["request"] = record.pop("asked")
+    return record if isinstance(record, dict) and {"command", "request"} <= record.keys() else None
 
 
-def _other(out: Path, command: str, asked: Asked, own: Sequence[str], goes_on: Callable[[Asked, Asked], bool]) -> str:
-    """What else `out` holds, in words; empty where it may be written to."""
-    held = _read(out)
-    if held is None:
-        there = sorted(str(one.relative_to(out)) for pattern in own for one in out.glob(pattern))
+def _other_result(
+    out: Path, command: str, request: Request, patterns: Sequence[str], may_resume: Callable[[Request, Request], bool]
+) -> str:
+    """The other result that `out` holds, in words; "" where the command may write there."""
+    record = _read(out)
+    if record is None:
+        there = sorted(str(one.relative_to(out)) for pattern in patterns for one in out.glob(pattern))
         if there:
             return f"what this command would write over ({', '.join(there[:3])})"
         whose = {LAST[name]: name for name in LAST if (out / name).exists()}
-        told = " and ".join(f"`smajax {one}` ({name})" for one, name in whose.items())
-        return f"what may be a result of {told}" if told else ""
-    if held["command"] != command:
-        return f"a result of `smajax {held['command']}`"
-    if goes_on(held["asked"], asked):
+        commands = " and ".join(f"`smajax {one}` ({name})" for one, name in whose.items())
+        return f"what may be a result of {commands}" if commands else ""
+    if record["command"] != command:
+        return f"a result of `smajax {record['command']}`"
+    if may_resume(record["request"], request):
         return ""
-    return f"another result of `smajax {command}` ({_differences(held['asked'], asked)})"
+    return f"another result of `smajax {command}` ({_differences(record['request'], request)})"
 
 
 def _names_files(pattern: Any) -> bool:
-    """Whether a pattern of the mark, a file like any other, names files of smajax: not everything, in no other folder."""
+    """Whether a pattern of the hidden file names files of smajax: not everything, and in no other folder."""
     if not isinstance(pattern, str):
         return False
     folder, _, names = pattern.rpartition("/")
     return INSIDE.get(folder) == names if folder else ".." not in pattern and bool(pattern.strip("*?."))
 
 
-def _clear(out: Path, own: Sequence[str]) -> None:
+def _clear(out: Path, patterns: Sequence[str]) -> None:
     """Delete what smajax wrote there; what else is there stays."""
-    held = _read(out) or {}
+    record = _read(out) or {}
     ours: set[Path] = set()
-    for pattern in {*own, *filter(_names_files, held.get("files", ())), MARK}:
+    for pattern in {*patterns, *filter(_names_files, record.get("files", ())), MARK}:
         for one in out.glob(pattern):
-            if one.is_dir() and not one.is_symlink():  # a mark of an earlier version names the folder as a whole
+            if (
+                one.is_dir() and not one.is_symlink()
+            ):  # the hidden file of an earlier version names the folder as a whole
                 ours.update(one.glob(INSIDE[one.name]) if one.name in INSIDE else ())
             elif one.parent == out or not one.parent.is_symlink():
                 ours.add(one)
@@ -115,7 +121,7 @@ def _clear(out: Path, own: Sequence[str]) -> None:
             folder.rmdir()
 
 
-def _made(out: Path) -> list[Path]:
+def _create(out: Path) -> list[Path]:
     """Create the folder; those that were not there before, the innermost first."""
     new = [part for part in (out, *out.parents) if not part.exists()]
     out.mkdir(parents=True, exist_ok=True)
@@ -123,7 +129,7 @@ def _made(out: Path) -> list[Path]:
 
 
 def _abandon(out: Path, new: Sequence[Path]) -> None:
-    """Take back what was created, where nothing has been written into it."""
+    """Remove the created folders, where nothing was written into them."""
     if any(one.is_file() and one.name != MARK for one in out.rglob("*")):
         return
     if not new:
@@ -137,7 +143,7 @@ def _abandon(out: Path, new: Sequence[Path]) -> None:
 
 
 def check_path(out: Path) -> None:
-    """NotADirectoryError where a file is in the way: told before the work, not after it."""
+    """NotADirectoryError where a file is in the way: before the work, not after it."""
     for part in (out, *out.parents):
         if part.exists() and not part.is_dir():
             raise NotADirectoryError(f"--out: {part} is a file; give the name of a folder.")
@@ -147,33 +153,33 @@ def check_path(out: Path) -> None:
 def claimed(
     out: Path,
     command: str,
-    asked: Asked,
-    own: Sequence[str],
+    request: Request,
+    patterns: Sequence[str],
     overwrite: bool = False,
-    goes_on: Callable[[Asked, Asked], bool] = _same,
+    may_resume: Callable[[Request, Request], bool] = _same,
 ) -> Iterator[Path]:
-    """`out`, made and marked as `command`'s; within it the work is done.
+    """`out`, created and marked as `command`'s while the command works in it.
 
-    asked: what tells this result from another, JSON values. own: names (globs) that the command writes there, all that
-    `overwrite` deletes. goes_on(before, asked): whether a result begun as `before` may be gone on with as `asked`.
+    request: what distinguishes this result from another, JSON values. patterns: names (globs) of the files that the command
+    writes there, which `overwrite` deletes. may_resume(before, request): whether `request` may resume a result of `before`.
     Raises NotADirectoryError where a file is in the way, FolderTaken for a folder that holds another result.
     """
     check_path(out)
-    asked = json.loads(json.dumps(dict(asked)))
+    request = json.loads(json.dumps(dict(request)))
     there = out.is_dir()
     try:
-        new = _made(out)
+        new = _create(out)
     except OSError as error:
         raise FolderUnusable(
-            f"--out {out} cannot be made ({error.strerror}); give the name of another folder"
+            f"--out {out} cannot be created ({error.strerror}); give the name of another folder"
         ) from None
-    with _alone(out):
-        yield from _marked(out, command, asked, own, overwrite, goes_on, there, new)
+    with _locked(out):
+        yield from _marked(out, command, request, patterns, overwrite, may_resume, there, new)
 
 
 @contextmanager
-def _alone(out: Path) -> Iterator[None]:
-    """While it is held no other smajax writes into `out`. A program that ends, however it does, lets go of it."""
+def _locked(out: Path) -> Iterator[None]:
+    """A lock: no other smajax writes into `out` meanwhile. It is released when the program ends, in any way."""
     handle = os.open(out, os.O_RDONLY)
     try:
         try:
@@ -192,26 +198,26 @@ def _alone(out: Path) -> Iterator[None]:
 def _marked(
     out: Path,
     command: str,
-    asked: Asked,
-    own: Sequence[str],
+    request: Request,
+    patterns: Sequence[str],
     overwrite: bool,
-    goes_on: Callable[[Asked, Asked], bool],
+    may_resume: Callable[[Request, Request], bool],
     there: bool,
     new: Sequence[Path],
 ) -> Iterator[Path]:
-    """What `claimed` does in a folder that is there and nobody else's."""
+    """`claimed` in an existing folder that is locked."""
     if there:
-        other = _other(out, command, asked, own, goes_on)
+        other = _other_result(out, command, request, patterns, may_resume)
         if other and not overwrite:
             raise FolderTaken(
                 f"--out {out} holds {other}: give the name of another folder, or --overwrite to delete that."
             )
         if overwrite:
-            _clear(out, own)
+            _clear(out, patterns)
     marked = (out / MARK).exists()
     sweep_up(out)
     try:
-        replace(out / MARK, json_text({"command": command, "asked": asked, "files": list(own)}))
+        replace(out / MARK, json_text({"command": command, "request": request, "files": list(patterns)}))
     except OSError as error:
         if new:
             _abandon(out, new)

@@ -1,4 +1,4 @@
-"""One run from what a person asks for: model by name, inputs as text -> data set, figures of merit, remarks."""
+"""One run from a request in names and text: presets, values, inputs -> data set, figures of merit, notes."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ from smajax.simulation.simulate import DEFAULT_STEP
 MOST_RESTS = 50  # set points; more are a ramp or a sine of a file
 
 
-class AskedError(ValueError):
-    """A part of what was asked cannot be used. part: the field of `Asked` or `AskedLoop`; of an input `inputs.` and its name."""
+class RequestError(ValueError):
+    """A part of a request cannot be used. part: the field of `RunRequest` or `LoopRequest`; of an input `inputs.` and its name."""
 
     def __init__(self, part: str, why: str) -> None:
         super().__init__(why)
@@ -49,16 +49,16 @@ class AskedError(ValueError):
 
 @contextmanager
 def _part(name: str) -> Iterator[None]:
-    """What is wrong in here is wrong of this part."""
+    """A ValueError in this context becomes a RequestError of this part."""
     try:
         yield
     except ValueError as error:
-        raise AskedError(name, str(error)) from error
+        raise RequestError(name, str(error)) from error
 
 
 @dataclass(frozen=True)
-class Asked:
-    """A run: presets by name, values that differ, inputs as text (`levels.given`), and the step, s."""
+class RunRequest:
+    """A run: presets by name, values that differ, inputs as text (`text_input.parse_input`), and the step, s."""
 
     wire: str = "niti_table_3_1"
     load: str = "arm"
@@ -72,20 +72,20 @@ class Asked:
     tolerance: float | None = None
 
     def system(self) -> System:
-        """The model. Raises KeyError and ValueError as `compose`, AskedError of `values`."""
+        """The model. Raises KeyError and ValueError as `compose`, RequestError of `values`."""
         bare = compose(self.wire, self.load, self.drive, law=self.law)
         with _part("values"):
             return with_values(bare, self.values)
 
 
 @dataclass(frozen=True)
-class AskedLoop:
-    """A closed loop around it; angles in rad, the rest as in a sweep."""
+class LoopRequest:
+    """A closed loop around the model of a `RunRequest`."""
 
     controller: str
     set_points: str  # levels: `40deg:5s,10deg:5s`
     gains: Path | None = None
-    # Values of the plant that the controller does not know, or changes of what it believes: `+20%`.
+    # Values of the plant that the controller does not assume, or changes of what it assumes: `+20%`.
     mismatch: Mapping[str, str] = field(default_factory=dict)
     estimator: str = ""
     noise: float = 0.0  # degrees
@@ -96,28 +96,28 @@ class AskedLoop:
 
 @dataclass(frozen=True)
 class Mismatch:
-    """A parameter that the plant has otherwise than the controller believes, in the program's own unit."""
+    """A parameter in which the plant differs from the controller's model, in the program's own unit."""
 
     name: str
     unit: str
-    believed: float | None  # None: its effect is no part of the model that the controller believes
+    assumed: float | None  # None: its effect is not in the controller's model
     true: float
 
     @property
     def ratio(self) -> float | None:
-        """Plant over belief; None where nothing is believed, or zero."""
-        return self.true / self.believed if self.believed else None
+        """Plant over the assumed value; None where there is none, or where it is zero."""
+        return self.true / self.assumed if self.assumed else None
 
 
 @dataclass(frozen=True)
-class Ran:
-    """What came out: `found` over time, figures of merit of a closed loop (SI), what should be known of it."""
+class RunResult:
+    """A run over time, figures of merit of a closed loop (SI), and notes on what may be wrong."""
 
-    found: xr.Dataset
+    data: xr.Dataset
     system: System
     merit: Mapping[str, float]
     notes: tuple[str, ...]
-    rests: tuple[Rest, ...] = ()  # figures of merit by set point, where there are several
+    by_set_point: tuple[Rest, ...] = ()  # figures of merit by set point, where there are several
     mismatches: tuple[Mismatch, ...] = ()
 
 
@@ -131,50 +131,53 @@ def _unit(name: str) -> str:
     return "N m" if name == "load_torque" else INPUT_UNITS[name]
 
 
-def _notes(found: xr.Dataset) -> list[str]:
-    wrong = [str(name) for name in found.data_vars if not np.isfinite(found[name].to_numpy()).all()]
-    told = [f"Numbers that are none in {', '.join(wrong)}: is the heat or the step too large?"] if wrong else []
-    hottest = float(found["temperature"].max())
+def _notes(data: xr.Dataset) -> list[str]:
+    wrong = [str(name) for name in data.data_vars if not np.isfinite(data[name].to_numpy()).all()]
+    notes = [f"Values that are not finite in {', '.join(wrong)}: is the heat or the step too large?"] if wrong else []
+    hottest = float(data["temperature"].max())
     if hottest > MELTS:
-        told.append(f"The wire reaches {hottest:.4g} degC, and it melts at {MELTS:g} degC: is the input's unit right?")
-    return told
+        notes.append(f"The wire reaches {hottest:.4g} degC, and it melts at {MELTS:g} degC: is the input's unit right?")
+    return notes
 
 
-def run_open(asked: Asked) -> Ran:
-    """The run. Raises KeyError and ValueError for what cannot be used, AskedError where the part is known that it is in."""
-    system = asked.system()
-    required, optional = channels(system)
-    for name in asked.inputs:
+def _check_inputs(request: RunRequest, required: frozenset[str], optional: frozenset[str]) -> None:
+    """RequestError for an input that the model does not take, ValueError for one that is missing."""
+    for name in request.inputs:
         if name not in required | optional:
-            raise AskedError(
-                f"inputs.{name}", f"no input {name!r}{instead(name, sorted(required | optional), 'this model takes')}"
-            )
-    missing = sorted(required - asked.inputs.keys())
+            known = sorted(required | optional)
+            raise RequestError(f"inputs.{name}", f"no input {name!r}{instead(name, known, 'this model takes')}")
+    missing = sorted(required - request.inputs.keys())
     if missing:
-        alone = "--step LEVEL:TIME,LEVEL:TIME or " if len(required) == 1 else ""
-        asks = [f"--input {name}={'6V' if name == 'voltage' else 'LEVEL'}:10s" for name in missing]
+        step = "--step LEVEL:TIME,LEVEL:TIME or " if len(required) == 1 else ""
+        options = [f"--input {name}={'6V' if name == 'voltage' else 'LEVEL'}:10s" for name in missing]
         named = and_listed([repr(name) for name in missing])
         raise ValueError(
-            f"the model needs the input{'s' * (len(missing) > 1)} {named}: give {alone}{' '.join(asks)} (a file: {missing[0]}=log.csv:COLUMN)"
+            f"the model needs the input{'s' * (len(missing) > 1)} {named}: give {step}{' '.join(options)} (a file: {missing[0]}=log.csv:COLUMN)"
         )
+
+
+def run_open(request: RunRequest) -> RunResult:
+    """The run. Raises KeyError and ValueError for a request that cannot be used, RequestError where its wrong part is known."""
+    system = request.system()
+    _check_inputs(request, *channels(system))
     several = {}
-    for name, text in asked.inputs.items():
+    for name, text in request.inputs.items():
         with _part(f"inputs.{name}"):
-            several[name] = given(text, _unit(name), asked.time, bare=_unit(name))
-    clock = clock_of(list(several.values()), asked.seconds, asked.dt)
+            several[name] = given(text, _unit(name), request.time, bare=_unit(name))
+    clock = clock_of(list(several.values()), request.seconds, request.dt)
     measured = system.load.inputs_required if isinstance(system.load, AbstractCoupon) else frozenset()
     series: Any = {
-        name: one.on(clock, asked.dt, squared=name in system.drive.inputs_squared, sampled=name in measured)
+        name: one.on(clock, request.dt, squared=name in system.drive.inputs_squared, sampled=name in measured)
         for name, one in several.items()
     }
-    found = simulate_dataset(system, series, asked.dt, asked.tolerance)
-    found = found.assign_coords(time=found["time"].copy(data=clock))  # a sum of steps is off by its rounding
-    return Ran(found, system, {}, tuple(_notes(found)))
+    data = simulate_dataset(system, series, request.dt, request.tolerance)
+    data = data.assign_coords(time=data["time"].copy(data=clock))  # a sum of steps has rounding errors
+    return RunResult(data, system, {}, tuple(_notes(data)))
 
 
-def mismatches(believed: System, plant: System) -> tuple[Mismatch, ...]:
+def mismatches(assumed: System, plant: System) -> tuple[Mismatch, ...]:
     """Every parameter in which they differ by more than a unit's rounding."""
-    before, units = parameter_values(believed), parameters(plant)
+    before, units = parameter_values(assumed), parameters(plant)
     return tuple(
         Mismatch(name, units[name].unit, before.get(name), value)
         for name, value in parameter_values(plant).items()
@@ -182,70 +185,80 @@ def mismatches(believed: System, plant: System) -> tuple[Mismatch, ...]:
     )
 
 
-def _beyond(system: System, position: np.ndarray) -> list[str]:
-    """That a set point lies where the load cannot go."""
+def _set_point_notes(system: System, position: np.ndarray) -> list[str]:
+    """A note on a set point beyond the stops of the load."""
     try:
         check_set_points(system, np.degrees(np.unique([position.min(), position.max()])).tolist())
     except ValueError as error:
-        return [f"Asked for what cannot be reached: {error}"]
+        return [f"A set point cannot be reached: {error}"]
     return []
 
 
-def run_closed(asked: Asked, loop: AskedLoop) -> Ran:
-    """The closed loop. Raises as `run_open`, and GainsFileError."""
-    believed = asked.system()
-    if not isinstance(believed.load, AbstractMovingLoad) or believed.load.reading[1] != "rad":
-        raise ValueError(f"controllers are those of the arm: give the load `arm`, not `{asked.load}`.")
-    gains = Gains(loop.controller, {}) if loop.gains is None else read_gains(loop.gains, believed)
+def _gains(request: RunRequest, loop: LoopRequest) -> tuple[System, Gains]:
+    """(the system that the controller assumes, its gains)."""
+    system = request.system()
+    if not isinstance(system.load, AbstractMovingLoad) or system.load.reading[1] != "rad":
+        raise ValueError(f"controllers are those of the arm: give the load `arm`, not `{request.load}`.")
+    gains = Gains(loop.controller, {}) if loop.gains is None else read_gains(loop.gains, system)
     if gains.controller not in CONTROLLERS:
         raise ValueError(f"no controller {gains.controller!r}{instead(gains.controller, CONTROLLERS, 'there are')}")
-    preset = CONTROLLERS[gains.controller]
-    believed = preset.plant(believed)
-    with _part("mismatch"):
-        plant = with_values(believed, loop.mismatch)  # of what this controller believes
-    check_interface(loop.estimator, loop.noise, loop.period, asked.dt)
-    between = interface_of(believed, loop.estimator, loop.noise, loop.period, asked.dt, loop.delay)
+    return CONTROLLERS[gains.controller].plant(system), gains
+
+
+def _set_points(request: RunRequest, loop: LoopRequest, every: int) -> tuple[np.ndarray, np.ndarray]:
+    """(time, position) of a whole number of control periods, (n,), s and rad."""
     with _part("set_points"):
-        wanted = given(loop.set_points, "rad", asked.time, bare="deg")
-    clock = clock_of([wanted], asked.seconds, asked.dt)
-    periods = (clock.size - 1) // between.every
+        levels = given(loop.set_points, "rad", request.time, bare="deg")
+    clock = clock_of([levels], request.seconds, request.dt)
+    periods = (clock.size - 1) // every
     if periods < 1:
         raise ValueError(f"the run is shorter than one control period of {loop.period:g} s.")
-    clock = clock[: periods * between.every + 1]
+    clock = clock[: periods * every + 1]
     # A set point holds from its instant on: a mean over the step before it would come early.
-    position = wanted.at(clock)
-    ran, merits = judged_loop_compiled(
+    return clock, levels.at(clock)
+
+
+def run_closed(request: RunRequest, loop: LoopRequest) -> RunResult:
+    """The closed loop. Raises as `run_open`, and GainsFileError."""
+    assumed, gains = _gains(request, loop)
+    with _part("mismatch"):
+        plant = with_values(assumed, loop.mismatch)
+    check_interface(loop.estimator, loop.noise, loop.period, request.dt)
+    interface = interface_of(assumed, loop.estimator, loop.noise, loop.period, request.dt, loop.delay)
+    clock, position = _set_points(request, loop, interface.every)
+    controller = gains.put(assumed)
+    run, merits = judged_loop_compiled(
         plant,
-        gains.put(believed),
+        controller,
         resting(jnp.asarray(position)),
-        asked.dt,
-        between.every,
-        estimator=between.estimator,
-        sensor=between.sensor,
-        key=None if between.sensor is None else jax.random.key(loop.seed),
-        delay=between.delay,
+        request.dt,
+        interface.every,
+        estimator=interface.estimator,
+        sensor=interface.sensor,
+        key=None if interface.sensor is None else jax.random.key(loop.seed),
+        delay=interface.delay,
     )
     # As in `run_open`.
-    ran = eqx.tree_at(lambda one: one.run.time, ran, jnp.asarray(clock))
-    told = between_in_words(loop.estimator, loop.noise, loop.period, loop.delay)
-    found = labelled_loop(
-        plant, ran, dt=asked.dt, controller=gains.controller, gains=parameter_values(gains.put(believed)), between=told
+    run = eqx.tree_at(lambda one: one.run.time, run, jnp.asarray(clock))
+    between = between_in_words(loop.estimator, loop.noise, loop.period, loop.delay)
+    data = labelled_loop(
+        plant, run, dt=request.dt, controller=gains.controller, gains=parameter_values(controller), between=between
     )
-    notes = _notes(found)
+    notes = _notes(data)
     try:
-        check_answers(ran)
+        check_answers(run)
     except ValueError as error:
         notes.append(str(error))
-    notes += _beyond(believed, position)
-    count = len(rests(position))
-    judged = {name: float(value) for name, value in vars(merits).items()}
-    several: tuple[Rest, ...] = ()
+    notes += _set_point_notes(assumed, position)
+    figures = {name: float(value) for name, value in vars(merits).items()}
+    by_set_point: tuple[Rest, ...] = ()
     if np.ptp(position) > 0.0:
-        judged = {}  # they look at one set point from the start of the run
+        figures = {}  # they are those of one set point from the start of the run
+        count = len(rests(position))
         if count <= MOST_RESTS:
-            several = merit_by_set_point(ran, plant)
+            by_set_point = merit_by_set_point(run, plant)
         else:
             notes.append(
-                f"Figures of merit are those of set points that rest, {MOST_RESTS} at most: this one has {count}."
+                f"Figures of merit are for constant set points, {MOST_RESTS} at most: this reference has {count}."
             )
-    return Ran(found, plant, judged, tuple(notes), several, mismatches(believed, plant))
+    return RunResult(data, plant, figures, tuple(notes), by_set_point, mismatches(assumed, plant))

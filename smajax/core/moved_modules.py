@@ -129,7 +129,7 @@ MODULES = {
     "stage_equations": "simulation.stage_equations",
     "stage_solver": "simulation.stage_solver",
     "step": "simulation.step",
-    "sweep": "control.sweep",
+    "sweep": "control.sweep.grid",
     "sweep_dataset": "report.sweep_dataset",
     "sweep_report": "report.sweep_page",
     "sweep_run": "report.sweep_folder",

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 
 from smajax.control.figures_of_merit import MERIT_UNITS, STEADY, Rest
 from smajax.control.mismatch import in_words
-from smajax.control.run_request import Ran
+from smajax.control.run_request import RunResult
 from smajax.core.display_units import axis_label, digits, display, label
 from smajax.core.files import as_netcdf, csv_text, heading, json_text, replace
 from smajax.core.parameters import parameter_values, parameters
@@ -27,35 +27,42 @@ from smajax.report.html import picture
 from smajax.report.plain_page import bullets, table, whole
 
 AT_STOP = 1e-3  # of the way moved: nearer is at a stop
-STILL = 1e-3  # change of the martensite fraction that is none
-ROUNDING = 1e-9  # of the way moved: nearer to zero is what arithmetic leaves
+STILL = 1e-3  # a smaller change of the martensite fraction is no transformation
+ROUNDING = 1e-9  # of the way moved: nearer to zero is a rounding error
 PLAIN = ("temperature", "martensite_fraction", "stress")
 
 
-def as_csv(found: xr.Dataset) -> str:
+def as_csv(data: xr.Dataset) -> str:
     """One row a sample, SI, units in the heading: `time [s],voltage [V],...`; smajax reads it back."""
-    columns = {"time": found["time"], **found.data_vars}
+    columns = {"time": data["time"], **data.data_vars}
     head = [heading(str(name), one.attrs["units"]) for name, one in columns.items()]
     return csv_text(head, np.stack([one.to_numpy() for one in columns.values()], axis=1).tolist())
 
 
-def record(ran: Ran, command: str, series: bool = True) -> dict[str, Any]:
+def record(result: RunResult, command: str, series: bool = True) -> dict[str, Any]:
     """Everything in SI: the model, least, greatest and last of each variable, figures of merit, and the series."""
-    found = ran.found
+    data = result.data
     return {
         "command": command,
-        "provenance": {name: _plain(name, told) for name, told in found.attrs.items() if name != "parameters (SI)"},
-        "parameters": parameter_values(ran.system),
+        "provenance": {name: _plain(name, text) for name, text in data.attrs.items() if name != "parameters (SI)"},
+        "parameters": parameter_values(result.system),
         "mismatch": {
-            one.name: {"believed": one.believed, "true": one.true, "unit": one.unit, "ratio": one.ratio}
-            for one in ran.mismatches
+            # `believed` is the old name of `assumed`, until version 0.3.
+            one.name: {
+                "assumed": one.assumed,
+                "believed": one.assumed,
+                "true": one.true,
+                "unit": one.unit,
+                "ratio": one.ratio,
+            }
+            for one in result.mismatches
         },
-        "notes": list(ran.notes),
-        "conclusions": conclusions(ran),
-        "merit": _merit(ran.merit),
+        "notes": list(result.notes),
+        "conclusions": conclusions(result),
+        "merit": _merit(result.merit),
         "merit_by_set_point": [
             {"begin_s": one.begin, "end_s": one.end, "set_point_rad": one.set_point, "merit": _merit(_figures(one))}
-            for one in ran.rests
+            for one in result.by_set_point
         ],
         "summary": {
             str(name): {
@@ -64,18 +71,18 @@ def record(ran: Ran, command: str, series: bool = True) -> dict[str, Any]:
                 "greatest": float(one.max()),
                 "last": float(one[-1]),
             }
-            for name, one in found.data_vars.items()
+            for name, one in data.data_vars.items()
         },
-        "series": {str(name): found[name].to_numpy().tolist() for name in ("time", *found.data_vars)} if series else {},
+        "series": {str(name): data[name].to_numpy().tolist() for name in ("time", *data.data_vars)} if series else {},
     }
 
 
-def _plain(name: str, told: str) -> Any:
+def _plain(name: str, text: str) -> Any:
     """An attribute as it was before it became text: `dt` a number, `gains` numbers by name; a version stays text."""
     try:
-        return told if name.startswith(("version of ", "git")) else json.loads(told)
+        return text if name.startswith(("version of ", "git")) else json.loads(text)
     except ValueError:
-        return told
+        return text
 
 
 def _merit(figures: Mapping[str, float]) -> dict[str, Any]:
@@ -86,37 +93,37 @@ def _figures(one: Rest) -> dict[str, float]:
     return {name: float(value) for name, value in vars(one.merit).items()}
 
 
-def _inputs(found: xr.Dataset) -> list[str]:
-    """The variables that are no state of the model."""
-    names = [str(name) for name in found.data_vars]
+def _inputs(data: xr.Dataset) -> list[str]:
+    """The variables that are inputs of the model."""
+    names = [str(name) for name in data.data_vars]
     return [name for name in names[: names.index("temperature")] if name != "wanted"]
 
 
-def _moves(found: xr.Dataset) -> bool:
+def _moves(data: xr.Dataset) -> bool:
     """Whether the load has a position; a coupon's has no unit, and is zero as its velocity is."""
-    return bool(found["position"].attrs["units"] != "-")
+    return bool(data["position"].attrs["units"] != "-")
 
 
-def drawn(found: xr.Dataset, form: str = "png", upright: bool = False) -> bytes:
+def picture_of(data: xr.Dataset, form: str = "png", upright: bool = False) -> bytes:
     """Input, position, temperature, fraction and stress over time, and the hysteresis of the position; `form`: png or svg.
 
     Of a coupon the strain stands in the place of the position. upright: one below the other, for a telephone.
     """
-    inputs = _inputs(found)
-    path = "position" if _moves(found) else "strain"
+    inputs = _inputs(data)
+    path = "position" if _moves(data) else "strain"
     shown = [*inputs[:1], path, *PLAIN]
     figure = Figure(figsize=(UPRIGHT if upright else 10.0, 8.2))
     axes = panels(figure, 3, 2)
-    time = found["time"].to_numpy()
+    time = data["time"].to_numpy()
 
     def values(name: str) -> tuple[Any, str]:
-        unit = display(found[name].attrs["units"], name)
-        return unit.of(found[name].to_numpy()), axis_label(name, unit)
+        unit = display(data[name].attrs["units"], name)
+        return unit.of(data[name].to_numpy()), axis_label(name, unit)
 
     for one, name in zip(axes, shown, strict=False):
         what, said = values(name)
         one.plot(time, what, color=RED if name in inputs else BLUE, linewidth=1.3)
-        if name == "position" and "wanted" in found:
+        if name == "position" and "wanted" in data:
             one.plot(time, values("wanted")[0], color=GREY, linewidth=1.0, linestyle="--")
         named(one, "time (s)", said)
     last = axes[len(shown)]
@@ -131,29 +138,29 @@ def drawn(found: xr.Dataset, form: str = "png", upright: bool = False) -> bytes:
     return image.getvalue()
 
 
-def _said_already(found: xr.Dataset) -> set[str]:
-    """Variables that tell nothing: where a coupon is, and what a sensor reads where that is what is there."""
-    moves = _moves(found)
+def _redundant(data: xr.Dataset) -> set[str]:
+    """Variables to leave out: the position of a coupon, and a sensor reading that equals the true value."""
+    moves = _moves(data)
     true = ("position",) if moves else ("strain", "stress")
-    again = any(np.array_equal(found["reading"], found[name], equal_nan=True) for name in true)
+    again = any(np.array_equal(data["reading"], data[name], equal_nan=True) for name in true)
     return {*(() if moves else ("position", "velocity")), *(("reading",) if again else ())}
 
 
-def summary_rows(found: xr.Dataset) -> list[list[str]]:
+def summary_rows(data: xr.Dataset) -> list[list[str]]:
     """A row a variable: least, greatest, last, in the units that a reader sees; the reading where it is not the true value."""
     rows = []
-    for name, one in found.drop_vars(_said_already(found)).data_vars.items():
+    for name, one in data.drop_vars(_redundant(data)).data_vars.items():
         unit, values = display(one.attrs["units"], str(name)), one.to_numpy()
         least, greatest, last = float(values.min()), float(values.max()), float(values[-1])
-        # What rounding leaves of a zero is no number to show.
-        nothing = 1e-12 * max(abs(least), abs(greatest))
-        cells = [digits(unit.of(0.0 if abs(value) < nothing else value)) for value in (least, greatest, last)]
+        # A zero with rounding errors.
+        rounding = 1e-12 * max(abs(least), abs(greatest))
+        cells = [digits(unit.of(0.0 if abs(value) < rounding else value)) for value in (least, greatest, last)]
         rows.append([label(str(name)), *cells, unit.unit])
     return rows
 
 
-def merit_rows(ran: Ran) -> list[list[str]]:
-    """A row a figure of merit; of the steady ones over what they are means, for a short run may still be moving."""
+def merit_rows(result: RunResult) -> list[list[str]]:
+    """A row a figure of merit; the steady ones with the time over which they are means, since a short run may still be moving."""
     steady = f" (last {STEADY:.0%} of the run)"
     return [
         [
@@ -161,7 +168,7 @@ def merit_rows(ran: Ran) -> list[list[str]]:
             _cell(name, value),
             "" if np.isinf(value) else display(MERIT_UNITS[name], name).unit,
         ]
-        for name, value in ran.merit.items()
+        for name, value in result.merit.items()
     ]
 
 
@@ -169,8 +176,8 @@ def _cell(name: str, value: float) -> str:
     return "never" if np.isinf(value) else digits(display(MERIT_UNITS[name], name).of(value), 3)
 
 
-def rest_rows(ran: Ran) -> tuple[list[str], list[list[str]]]:
-    """(head, rows): a row a set point, from when it is asked to the next one."""
+def set_point_rows(result: RunResult) -> tuple[list[str], list[list[str]]]:
+    """(head, rows): a row a set point, from its start to the next one."""
     of = display("rad")
     head = [
         f"set point ({of.unit})",
@@ -185,155 +192,160 @@ def rest_rows(ran: Ran) -> tuple[list[str], list[list[str]]]:
             digits(one.end),
             *(_cell(name, value) for name, value in _figures(one).items()),
         ]
-        for one in ran.rests
+        for one in result.by_set_point
     ]
     return head, rows
 
 
-MISMATCH = ("parameter", "the controller believes", "the plant has", "unit", "difference")
+MISMATCH_HEAD = ("parameter", "the controller assumes", "the plant has", "unit", "difference")
 
 
-def mismatch_rows(ran: Ran) -> list[list[str]]:
-    """A row a parameter, as `MISMATCH`, in SI as the parameters are."""
+def mismatch_rows(result: RunResult) -> list[list[str]]:
+    """A row a parameter, as `MISMATCH_HEAD`, in SI as the parameters are."""
     return [
         [
             one.name,
-            "not in its model" if one.believed is None else digits(one.believed, 6),
+            "not in its model" if one.assumed is None else digits(one.assumed, 6),
             digits(one.true, 6),
             one.unit,
-            in_words(one.believed, one.true, one.unit),
+            in_words(one.assumed, one.true, one.unit),
         ]
-        for one in ran.mismatches
+        for one in result.mismatches
     ]
 
 
-def conclusions(ran: Ran) -> list[str]:
-    """What happened, in sentences: how hot, what transformed, what moved; whether a closed loop arrived."""
-    found = ran.found
-    if ran.notes and not np.isfinite(found["temperature"]).all():
+def conclusions(result: RunResult) -> list[str]:
+    """The run in sentences: temperature, transformation, stroke, and whether a closed loop settles."""
+    data = result.data
+    if result.notes and not np.isfinite(data["temperature"]).all():
         return []
 
     def at(name: str, value: float) -> str:
-        unit = display(found[name].attrs["units"], name)
+        unit = display(data[name].attrs["units"], name)
         return f"{digits(unit.of(float(value)), 3)} {unit.unit}".strip()
 
-    degrees, reading = found["temperature"].to_numpy(), found["reading"].to_numpy()
+    degrees, reading = data["temperature"].to_numpy(), data["reading"].to_numpy()
     hottest = int(degrees.argmax())
-    told = [
-        f"The wire is at most {at('temperature', degrees[hottest])}, {at('time', found['time'].to_numpy()[hottest])} in."
+    sentences = [
+        f"The wire is at most {at('temperature', degrees[hottest])}, {at('time', data['time'].to_numpy()[hottest])} in."
     ]
-    fraction = found["martensite_fraction"]
+    fraction = data["martensite_fraction"]
     least, greatest, last = float(fraction.min()), float(fraction.max()), float(fraction[-1])
     if greatest - least < STILL:
-        told.append(f"It does not transform: the martensite fraction stays at {digits(last, 3)}.")
+        sentences.append(f"It does not transform: the martensite fraction stays at {digits(last, 3)}.")
     else:
-        told.append(
+        sentences.append(
             f"It transforms: the martensite fraction lies between {least:.2f} and {greatest:.2f}, at the end {last:.2f}."
         )
-    name = ran.system.load.reading[0]
-    unit = display(found["reading"].attrs["units"], name)
+    name = result.system.load.reading[0]
+    unit = display(data["reading"].attrs["units"], name)
     stroke = float(np.ptp(reading))
 
     def read(value: float) -> str:
         shown = 0.0 if abs(value) < ROUNDING * stroke else unit.of(float(value))
         return f"{digits(shown, 3)} {unit.unit}".strip()
 
-    told.append(
+    sentences.append(
         f"The {label(name)} starts at {read(reading[0])}, lies between {read(reading.min())} and "
         f"{read(reading.max())}, and ends at {read(reading[-1])}."
     )
-    told += _at_ends(ran)
-    if ran.merit:
-        settles = ran.merit["settling_time"]
-        told.append(
+    sentences += _at_ends(result)
+    if result.merit:
+        settles = result.merit["settling_time"]
+        sentences.append(
             f"The loop settles after {digits(settles, 3)} s." if np.isfinite(settles) else "The loop never settles."
         )
-    if ran.rests:
-        of, after = display("rad"), [float(one.merit.settling_time) for one in ran.rests]
+    if result.by_set_point:
+        of, after = display("rad"), [float(one.merit.settling_time) for one in result.by_set_point]
         each = [
             f"{digits(of.of(one.set_point))} {of.unit} "
             + (f"after {digits(late, 3)} s" if np.isfinite(late) else "never")
-            for one, late in zip(ran.rests, after, strict=True)
+            for one, late in zip(result.by_set_point, after, strict=True)
         ]
-        told.append(
+        sentences.append(
             f"The loop settles at {int(np.isfinite(after).sum())} of {len(each)} set points: {', '.join(each)}."
         )
-    return told
+    return sentences
 
 
-def _at_ends(ran: Ran) -> list[str]:
-    """That the load reaches a stop on its way, and that its wire goes slack."""
-    load, time = ran.system.load, ran.found["time"].to_numpy()
+def _at_ends(result: RunResult) -> list[str]:
+    """Whether the load reaches a stop, and whether its wire goes slack."""
+    load, time = result.system.load, result.data["time"].to_numpy()
     if not isinstance(load, AbstractMovingLoad):
         return []
-    reading, stress = ran.found["reading"].to_numpy(), ran.found["stress"].to_numpy()
+    reading, stress = result.data["reading"].to_numpy(), result.data["stress"].to_numpy()
     room = AT_STOP * max(float(np.ptp(reading)), 1e-12)
-    told = []
+    sentences = []
     for word, stop, sign in zip(("lower", "upper"), load.limits(), (-1.0, 1.0), strict=True):
         there = sign * (reading - float(stop)) > -room
         if np.isfinite(float(stop)) and there.any() and not there[0]:
             first = time[int(there.argmax())]
-            told.append(
+            sentences.append(
                 f"It runs into its {word} stop, first {first:.3g} s in, and is there for {there.mean() * time[-1]:.3g} s."
             )
     slack = stress <= 0.0
     if slack[1:].any():
         first = time[1 + int(slack[1:].argmax())]
-        told.append(f"The wire goes slack, first {first:.3g} s in, for {slack.mean() * time[-1]:.3g} s in all.")
-    return told
+        sentences.append(f"The wire goes slack, first {first:.3g} s in, for {slack.mean() * time[-1]:.3g} s in all.")
+    return sentences
 
 
-def page(ran: Ran, image: bytes, title: str, command: str, films: Sequence[bytes] = ()) -> str:
-    """The whole page, pictures inside. films: the animation as wide and as upright as a window, if there is one."""
-    table_of = parameters(ran.system)
+def page(result: RunResult, image: bytes, title: str, command: str, animations: Sequence[bytes] = ()) -> str:
+    """The whole page, pictures inside. animations: the animation as wide and as upright as a window, if there is one."""
+    table_of = parameters(result.system)
     values = [
         [name, digits(value, 6), table_of[name].unit, table_of[name].about]
-        for name, value in parameter_values(ran.system).items()
+        for name, value in parameter_values(result.system).items()
     ]
-    parts = [f"<h1>{html.escape(title)}</h1>", bullets([*ran.notes, *conclusions(ran)])]
-    if ran.mismatches:
-        parts.append(table(MISMATCH, mismatch_rows(ran), (1, 2)))
-    if ran.merit:
-        parts.append(table(["figure of merit", "value", "unit"], merit_rows(ran), (1,)))
-    if ran.rests:
-        head, rows = rest_rows(ran)
+    parts = [f"<h1>{html.escape(title)}</h1>", bullets([*result.notes, *conclusions(result)])]
+    if result.mismatches:
+        parts.append(table(MISMATCH_HEAD, mismatch_rows(result), (1, 2)))
+    if result.merit:
+        parts.append(table(["figure of merit", "value", "unit"], merit_rows(result), (1,)))
+    if result.by_set_point:
+        head, rows = set_point_rows(result)
         parts.append(table(head, rows, range(len(head))))
-        parts.append("<p class=quiet>Each from when it is asked to the next one; times count from there.</p>")
-    film, upright = films or (None, None)
+        parts.append("<p class=quiet>Each from its start to the next one; times count from its start.</p>")
+    animation, upright = animations or (None, None)
     parts += [
-        str(picture(image, "the run over time", "panels", drawn(ran.found, upright=True))),
-        str(picture(film, "the load moving, beside the wire's path through its phase diagram", "panels", upright)),
-        table(["variable", "least", "greatest", "last", "unit"], summary_rows(ran.found), (1, 2, 3)),
+        str(picture(image, "the run over time", "panels", picture_of(result.data, upright=True))),
+        str(picture(animation, "the load moving, beside the wire's path through its phase diagram", "panels", upright)),
+        table(["variable", "least", "greatest", "last", "unit"], summary_rows(result.data), (1, 2, 3)),
         "<h2>Parameters (SI, temperatures in °C, angles in rad)</h2>",
         table(["parameter", "value", "unit", "what it is"], values, (1,)),
         "<h2>Provenance</h2>",
         table(
             ["", ""],
-            [["command", command], *([k, str(v)] for k, v in ran.found.attrs.items() if v and k != "parameters (SI)")],
+            [
+                ["command", command],
+                *([k, str(v)] for k, v in result.data.attrs.items() if v and k != "parameters (SI)"),
+            ],
         ),
         "<p class=quiet>The same numbers: simulate.csv, simulate.nc, simulate.json.</p>",
     ]
     return whole(title, parts)
 
 
-OWN: Sequence[str] = tuple(f"simulate.{kind}" for kind in ("csv", "nc", "json", "png", "svg", "gif", "html"))
+FILES: Sequence[str] = tuple(f"simulate.{kind}" for kind in ("csv", "nc", "json", "png", "svg", "gif", "html"))
 
 
 def write_run(
-    ran: Ran, folder: Path, title: str, command: str, animated: bool = False, progress: Progress = quiet
+    result: RunResult, folder: Path, title: str, command: str, animated: bool = False, progress: Progress = quiet
 ) -> Path:
-    """All files of a run into `folder`, each in one step; the path of the page. animated: a film too (no coupon)."""
+    """All files of a run into `folder`, each in one step; the path of the page. animated: an animation too (no coupon)."""
     progress(Stage("pictures", 0.0))
-    image = drawn(ran.found)
-    replace(folder / "simulate.csv", as_csv(ran.found))
-    replace(folder / "simulate.nc", as_netcdf(ran.found))
-    replace(folder / "simulate.json", json_text(record(ran, command)))
+    image = picture_of(result.data)
+    replace(folder / "simulate.csv", as_csv(result.data))
+    replace(folder / "simulate.nc", as_netcdf(result.data))
+    replace(folder / "simulate.json", json_text(record(result, command)))
     replace(folder / "simulate.png", image)
-    replace(folder / "simulate.svg", drawn(ran.found, "svg"))
+    replace(folder / "simulate.svg", picture_of(result.data, "svg"))
     progress(Stage("pictures", 1.0))
-    films = (
-        [moving(ran.system, ran.found, upright=each, progress=progress) for each in (False, True)] if animated else []
+    animations = (
+        [moving(result.system, result.data, upright=each, progress=progress) for each in (False, True)]
+        if animated
+        else []
     )
-    if films:
-        replace(folder / "simulate.gif", films[0])
-    return replace(folder / "simulate.html", page(ran, image, title, command, films))
+    if animations:
+        replace(folder / "simulate.gif", animations[0])
+    return replace(folder / "simulate.html", page(result, image, title, command, animations))

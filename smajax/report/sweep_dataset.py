@@ -8,36 +8,36 @@ import numpy as np
 import xarray as xr
 
 from smajax.control.figures_of_merit import MERIT_UNITS
-from smajax.control.sweep import Grid
+from smajax.control.sweep.run_sweep import SweepResults
 from smajax.core.provenance import made_with
-from smajax.report.sweep_page import Swept
 
 
-def as_dataset(grid: Grid, swept: Sequence[Swept], between: str, command: str) -> xr.Dataset:
-    """Figures of merit of every closed loop, SI, (controller, each mismatch, set point, share of the gain).
+def as_dataset(results: SweepResults, command: str) -> xr.Dataset:
+    """Figures of merit of every closed loop, SI, (controller, each mismatch, set point, ratio of the main gain).
 
-    Times are infinite where a run never gets there; `failed_at` is NaN where none failed.
+    Times are infinite where a run never arrives or settles; `failed_at` is NaN where no loop failed.
     """
+    sweeps, grid = results.sweeps, results.settings.grid
     ratios = [f"{name}_ratio" for name in grid.mismatches]
     dims = ("controller", *ratios, "set_point", "gain_ratio")
-    shape = (len(swept), *(len(grid.ratios) for _ in ratios), *grid.shape[2:])
+    shape = (len(sweeps), *(len(grid.ratios) for _ in ratios), *grid.shape[2:])
 
-    def all_of(several: Sequence[np.ndarray]) -> np.ndarray:
+    def stacked(several: Sequence[np.ndarray]) -> np.ndarray:
         return np.stack(several).reshape(shape)
 
-    found = {
-        name: (dims, all_of([np.asarray(getattr(one.merits, name)) for one in swept]), {"units": unit})
+    variables = {
+        name: (dims, stacked([np.asarray(getattr(one.merits, name)) for one in sweeps]), {"units": unit})
         for name, unit in MERIT_UNITS.items()
     }
-    failed = all_of([one.failed_at for one in swept])
-    found["failed_at"] = (dims, np.where(np.isfinite(failed), failed, np.nan), {"units": "s"})
-    believed = {"units": "1", "long_name": "plant over what the controller believes"}
+    failed = stacked([one.failed_at for one in sweeps])
+    variables["failed_at"] = (dims, np.where(np.isfinite(failed), failed, np.nan), {"units": "s"})
+    assumed = {"units": "1", "long_name": "plant over the value that the controller assumes"}
     axes = {
-        "controller": [one.name for one in swept],
-        **{name: (name, grid.ratios, believed) for name in ratios},
+        "controller": [one.name for one in sweeps],
+        **{name: (name, grid.ratios, assumed) for name in ratios},
         "set_point": ("set_point", grid.targets, {"units": "rad"}),
-        "gain_ratio": ("gain_ratio", grid.gains, {"units": "1", "long_name": "share of the controller's main gain"}),
+        "gain_ratio": ("gain_ratio", grid.gains, {"units": "1", "long_name": "ratio to the controller's main gain"}),
     }
-    gains = "; ".join(f"{one.name}: {one.main_gain}" for one in swept)
-    told = {"command": command, "between": between, "main gains": gains, **made_with()}
-    return xr.Dataset(found, axes, {name: str(value) for name, value in told.items()})
+    gains = "; ".join(f"{one.name}: {one.main_gain}" for one in sweeps)
+    attributes = {"command": command, "between": results.settings.between, "main gains": gains, **made_with()}
+    return xr.Dataset(variables, axes, {name: str(value) for name, value in attributes.items()})

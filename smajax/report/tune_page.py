@@ -13,7 +13,7 @@ from smajax.control.mismatch import MISMATCHES
 from smajax.control.tune.moves import Moves
 from smajax.control.tune.scenarios import BEYOND
 from smajax.control.tune.terms import TERMS
-from smajax.control.tune.tuning import Check, Tuned
+from smajax.control.tune.tuning import Check, TuningResult
 from smajax.core.display_units import digits
 from smajax.core.files import csv_text, heading
 from smajax.core.provenance import made_with
@@ -28,17 +28,17 @@ LEAST_PRICE = 0.1  # J, V/s, 1/s: what is less is nothing, however it grew
 UNITS = {"°": "deg", "°C": "degC"}  # as a file has them
 
 
-def checked_on(found: Tuned, name: str) -> str:
+def checked_on(found: TuningResult, name: str) -> str:
     """The plants and set points of a check, in words; a share of the air's temperature in kelvins."""
     if name == "tuned on":
         return name
     if name == "inside":
-        return f"never seen: {found.settings.unseen_in_words()}"
+        return f"never seen: {found.settings.held_out_sentence()}"
     air = "" if "ambient" in found.settings.variation else f" (the air by {BEYOND * abs(found.air):.3g} K)"
     return f"never seen: another parameter wrong by {100 * BEYOND:g} %{air}, set points tuned"
 
 
-def gains_of(found: Tuned) -> dict[str, dict[str, Any]]:
+def gains_of(found: TuningResult) -> dict[str, dict[str, Any]]:
     """Of each gain its value before and after, unit, and box, as the record has them."""
     return {
         name: {
@@ -61,26 +61,26 @@ def at_the_edge(gains: Mapping[str, Mapping[str, Any]]) -> list[str]:
     return edge
 
 
-def broken(found: Tuned, check: Check) -> list[str]:
+def broken(found: TuningResult, check: Check) -> list[str]:
     """Which limits the tuned gains do not meet: by how much, where, in how many loops."""
     told = []
     for name, limit in found.settings.limits.items():
-        term, values = TERMS[name], check.seen.judged[1, :, list(TERMS).index(name)]
+        term, values = TERMS[name], check.seen.exact[1, :, list(TERMS).index(name)]
         over = values > limit
         if over.any():
             at = int(np.argmax(values))
             never = name == "settling_time" and values[at] >= 2.0 * found.settings.seconds
             worst = "never reached" if never else f"{digits(float(values[at]), 3)} {term.unit}"
             told.append(
-                f"{term.label} {worst} at {np.degrees(check.members.targets[at]):.3g}° where {limit:g} {term.unit} are "
+                f"{term.label} {worst} at {np.degrees(check.scenarios.targets[at]):.3g}° where {limit:g} {term.unit} are "
                 f"asked ({int(over.sum())} of {len(values)} loops)"
             )
     return told
 
 
-def met(found: Tuned, check: Check, where: str) -> str:
+def met(found: TuningResult, check: Check, where: str) -> str:
     """That every limit is met, and where that says little: a loop that stays short of its set point overshoots nothing."""
-    told = f"Every limit is met in all {check.members.size} closed loops {where}"
+    told = f"Every limit is met in all {check.scenarios.size} closed loops {where}"
     settled = np.isfinite(np.asarray(check.seen.merits.settling_time)).sum(axis=1)
     if "settling_time" in found.settings.limits or (settled[1] >= settled[0] and settled[1] > 0):
         return f"{told}."
@@ -95,11 +95,11 @@ def met(found: Tuned, check: Check, where: str) -> str:
     )
 
 
-def price(found: Tuned) -> list[str]:
+def price(found: TuningResult) -> list[str]:
     """What the tuned gains cost: energy, chatter or switching whose median or worst, as the table has them, grew by over half."""
     seen = found.checks["tuned on"].seen
     figures = [
-        (TERMS[name].label, TERMS[name].unit, seen.judged[..., list(TERMS).index(name)])
+        (TERMS[name].label, TERMS[name].unit, seen.exact[..., list(TERMS).index(name)])
         for name in ("energy", "chatter")
     ]
     figures.append(("switches of the command", "a second", np.asarray(seen.merits.switches_per_second)))
@@ -113,7 +113,7 @@ def price(found: Tuned) -> list[str]:
     return [f"The tuned gains have their price, where they were tuned: {'; '.join(grown)}."] if grown else []
 
 
-def in_moves(found: Tuned) -> list[str]:
+def in_moves(found: TuningResult) -> list[str]:
     """How every loop begins, and what the gains do from one set point to another, which nothing was tuned on."""
     cold = "Each of these loops is one step from the start, cold and at rest"
     if found.moves is None:
@@ -142,7 +142,7 @@ def in_moves(found: Tuned) -> list[str]:
     ]
 
 
-def conclusions(found: Tuned) -> list[str]:
+def conclusions(found: TuningResult) -> list[str]:
     """What came out, in sentences that say no more than the numbers."""
     before, after = found.costs
     tuned, inside = found.checks["tuned on"], found.checks["inside"]
@@ -156,9 +156,9 @@ def conclusions(found: Tuned) -> list[str]:
         told.append(f"Not every limit is met: {'; '.join(missed)}." if missed else met(found, tuned, "tuned on"))
         missed = broken(found, inside)
         told.append(
-            f"Of what was never seen ({found.settings.unseen_in_words()}): {'; '.join(missed)}."
+            f"Of what was never seen ({found.settings.held_out_sentence()}): {'; '.join(missed)}."
             if missed
-            else met(found, inside, f"that were never seen ({found.settings.unseen_in_words()})")
+            else met(found, inside, f"that were never seen ({found.settings.held_out_sentence()})")
         )
         if "beyond" in found.checks and (missed := broken(found, found.checks["beyond"])):
             told.append(f"With a parameter wrong that was not varied: {'; '.join(missed)}.")
@@ -183,11 +183,11 @@ def conclusions(found: Tuned) -> list[str]:
         f"It took {counted(found.simulations, 'closed loop')} in {counted(descent.round, 'round')} by slopes"
         + (f" and {counted(evolution.generations, 'generation')} without" if evolution.generations else "")
         + (
-            f"; {descent.wild:,} loops had slopes of no use (a limit cycle multiplies every difference)"
-            if descent.wild
+            f"; {descent.unusable:,} loops had slopes of no use (a limit cycle multiplies every difference)"
+            if descent.unusable
             else ""
         )
-        + (f"; {descent.left_out:,} gave numbers that are none" if descent.left_out else "")
+        + (f"; {descent.non_finite:,} gave numbers that are none" if descent.non_finite else "")
         + "."
     )
     return told
@@ -213,13 +213,13 @@ def gain_rows(gains: Mapping[str, Mapping[str, Any]]) -> list[list[str]]:
     ]
 
 
-def _figures(found: Tuned, check: Check) -> list[list[str]]:
+def _figures(found: TuningResult, check: Check) -> list[list[str]]:
     """A row a term: median and worst before and after, and the limits where there are some."""
     rows = []
     for column, (name, term) in enumerate(TERMS.items()):
         cells = []
         for which in (0, 1):
-            values = check.seen.judged[which, :, column]
+            values = check.seen.exact[which, :, column]
             never = 2.0 * found.settings.seconds if name == "settling_time" else np.inf
             for value in (float(np.median(values)), float(np.max(values))):
                 cells.append("never" if value >= never else digits(0.0 if abs(value) < 1e-6 else value, 3))
@@ -230,7 +230,7 @@ def _figures(found: Tuned, check: Check) -> list[list[str]]:
     return rows
 
 
-def page(found: Tuned, pictures: Mapping[str, bytes], command: str) -> str:
+def page(found: TuningResult, pictures: Mapping[str, bytes], command: str) -> str:
     """The whole page, pictures inside."""
     say, settings = html.escape, found.settings
     head = ["figure", "median before", "worst before", "median after", "worst after"]
@@ -238,7 +238,7 @@ def page(found: Tuned, pictures: Mapping[str, bytes], command: str) -> str:
     parts = [
         f"<h1>Gains of {say(settings.controller)}, tuned</h1>",
         bullets(conclusions(found)),
-        f"<p>Tuned on {say(settings.plants_in_words(found.air))}. {say(settings.goal_in_words())}.</p>",
+        f"<p>TuningResult on {say(settings.plants_sentence(found.air))}. {say(settings.goal_sentence())}.</p>",
         picture(
             pictures["before_after.png"],
             "angles and figures of merit before and after",
@@ -254,7 +254,7 @@ def page(found: Tuned, pictures: Mapping[str, bytes], command: str) -> str:
         what = checked_on(found, name)
         parts += [
             f"<h2>{say(what[0].upper() + what[1:])}</h2><p class=quiet>"
-            f"{counted(check.members.size, 'closed loop')} of {settings.seconds:g} s.</p>",
+            f"{counted(check.scenarios.size, 'closed loop')} of {settings.seconds:g} s.</p>",
             table(head, _figures(found, check), range(1, len(head))),
         ]
     parts += [
@@ -268,19 +268,19 @@ def page(found: Tuned, pictures: Mapping[str, bytes], command: str) -> str:
     return whole(f"Gains of {settings.controller}", [str(part) for part in parts])
 
 
-def loops(found: Tuned) -> str:
+def loops(found: TuningResult) -> str:
     """CSV, a row a closed loop: which check, whose gains, plant over what is believed, set point, figures (none: never)."""
     rows = []
     for name, check in found.checks.items():
         for which, when in enumerate(("before", "after")):
-            for plant, figures in zip(check.members.rows.tolist(), check.seen.judged[which], strict=True):
+            for plant, figures in zip(check.scenarios.rows.tolist(), check.seen.exact[which], strict=True):
                 told = [_plain(found, term, value) for term, value in zip(TERMS, figures, strict=True)]
                 rows.append([name, when, *plant[:-1], float(np.degrees(plant[-1])), *told])
     terms = [heading(name, UNITS.get(term.unit, term.unit)) for name, term in TERMS.items()]
     return csv_text(["check", "gains", *(f"{name} ratio" for name in MISMATCHES), "set point [deg]", *terms], rows)
 
 
-def record(found: Tuned, command: str) -> dict[str, Any]:
+def record(found: TuningResult, command: str) -> dict[str, Any]:
     """Everything but the lines; a settling time that is never is null."""
     descent = found.descent
     return {
@@ -294,14 +294,14 @@ def record(found: Tuned, command: str) -> dict[str, Any]:
         "checks": {
             name: {
                 "what": checked_on(found, name),
-                "loops": one.members.size,
+                "loops": one.scenarios.size,
                 "limit_exceeded_by_share": {"before": found.excesses[name][0], "after": found.excesses[name][1]},
                 **{
                     when: {
                         term: {
                             "unit": TERMS[term].unit,
-                            "median": _plain(found, term, np.median(one.seen.judged[which, :, column])),
-                            "worst": _plain(found, term, np.max(one.seen.judged[which, :, column])),
+                            "median": _plain(found, term, np.median(one.seen.exact[which, :, column])),
+                            "worst": _plain(found, term, np.max(one.seen.exact[which, :, column])),
                         }
                         for column, term in enumerate(TERMS)
                     }
@@ -314,8 +314,8 @@ def record(found: Tuned, command: str) -> dict[str, Any]:
         "search": {
             "closed_loops": found.simulations,
             "rounds": descent.round,
-            "slopes_of_no_use": descent.wild,
-            "no_numbers": descent.left_out,
+            "slopes_of_no_use": descent.unusable,
+            "no_numbers": descent.non_finite,
             "best_cost_within_limits_by_round": _best_so_far(
                 descent.costs[: descent.round], descent.excesses[: descent.round]
             ),
@@ -351,6 +351,6 @@ def _best_so_far(costs: np.ndarray, excesses: np.ndarray) -> list[float]:
     return np.minimum.accumulate(np.nanmin(np.where(excesses <= 0.0, costs, np.inf), axis=1)).tolist()
 
 
-def _plain(found: Tuned, term: str, value: float) -> float | None:
+def _plain(found: TuningResult, term: str, value: float) -> float | None:
     never = term == "settling_time" and value >= 2.0 * found.settings.seconds
     return None if never else float(value)

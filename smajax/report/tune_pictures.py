@@ -8,14 +8,14 @@ from matplotlib.ticker import FuncFormatter
 
 from smajax.control.tune.objective import rank
 from smajax.control.tune.terms import TERMS
-from smajax.control.tune.tuning import Tuned
+from smajax.control.tune.tuning import TuningResult
 from smajax.report.pictures import AFTER, BEFORE, MEASURED, QUIET, as_png, new_figure, tidy
 
 WIDE = 9.6  # inches
 COLUMNS = list(TERMS)
 
 
-def before_after(found: Tuned, upright: bool = False) -> bytes:
+def before_after(found: TuningResult, upright: bool = False) -> bytes:
     """Angles over time with the preset's gains and with the tuned ones, and what was asked for over the set point.
 
     upright: one below the other, for a telephone.
@@ -61,7 +61,7 @@ def before_after(found: Tuned, upright: bool = False) -> bytes:
     return as_png(figure)
 
 
-def _over_set_points(axes: Axes, found: Tuned, name: str) -> None:
+def _over_set_points(axes: Axes, found: TuningResult, name: str) -> None:
     """A figure of merit, from its least to its largest over the plants at each set point; never settled at the top."""
     term, column = TERMS[name], COLUMNS.index(name)
     never = 2.0 * found.settings.seconds if name == "settling_time" else np.inf
@@ -69,8 +69,8 @@ def _over_set_points(axes: Axes, found: Tuned, name: str) -> None:
     for which, (colour, told, shift) in enumerate(((BEFORE, "before", -0.7), (AFTER, "after", 0.7))):
         for check, marker in shown:
             one = found.checks[check]
-            for target in np.unique(one.members.targets):
-                values = one.seen.judged[which, one.members.targets == target, column]
+            for target in np.unique(one.scenarios.targets):
+                values = one.seen.exact[which, one.scenarios.targets == target, column]
                 at = np.degrees(target) + shift
                 ends = np.where(values >= never, 1.08 * found.settings.seconds, values)
                 axes.plot([at, at], [ends.min(), ends.max()], color=colour, linewidth=1.4)
@@ -85,7 +85,7 @@ def _over_set_points(axes: Axes, found: Tuned, name: str) -> None:
                     markerfacecolor=filled,
                 )
         axes.plot([], [], "s-", color=colour, markersize=3.5, label=told)
-    if any((found.checks[check].seen.judged[..., column] >= never).any() for check, _ in shown):
+    if any((found.checks[check].seen.exact[..., column] >= never).any() for check, _ in shown):
         at_top = 1.08 * found.settings.seconds
         axes.annotate("never", (0.01, at_top), xycoords=("axes fraction", "data"), fontsize=8, va="bottom")
     if name in found.settings.limits:
@@ -99,7 +99,7 @@ def _over_set_points(axes: Axes, found: Tuned, name: str) -> None:
     tidy(axes)
 
 
-def costs_over_loops(found: Tuned) -> bytes:
+def costs_over_loops(found: TuningResult) -> bytes:
     """What each round of each start and the best of each generation cost, over the closed loops run so far; the best as a line."""
     descent, evolution = found.descent, found.evolution
     figure = new_figure(3.2)

@@ -15,7 +15,7 @@ import numpy as np
 
 from smajax.control.controllers.base import AbstractController
 from smajax.control.figures_of_merit import Merit
-from smajax.control.gain_search import merits_of, search_gains
+from smajax.control.gain_search import SearchSettings, merits_of, search_gains
 from smajax.model.rigs import arm
 from smajax.model.system import System
 from smajax.model.types import Scalar
@@ -52,12 +52,8 @@ def searched(
         controller,
         box,
         targets,
-        seconds=seconds,
-        candidates=candidates,
-        rounds=rounds,
-        seed=seed,
+        SearchSettings(seconds, STEP, 1, candidates, rounds, seed),
         cost=cost,
-        dt=STEP,
     )
     gains = {name: float(f"{value:.3g}") for name, value in found.gains.items()}
     # What is recorded is what the preset does: the rounded gains, at a finer step than the search's.
@@ -67,9 +63,7 @@ def searched(
         tuple(gains),
         jnp.asarray([list(gains.values())]),
         jnp.asarray(targets),
-        seconds,
-        STEP / 2,
-        2,
+        SearchSettings(seconds, STEP / 2, 2),
     )
     one = jax.tree.map(operator.itemgetter(0), judged)
     costs = np.asarray(jax.vmap(lambda each: cost(each, seconds))(one))

@@ -1,4 +1,4 @@
-"""The gradient beside Nelder-Mead (scipy), CMA-ES (cmaes) and a grid: the same members, cost, box and count of closed loops.
+"""The gradient beside Nelder-Mead (scipy), CMA-ES (cmaes) and a grid: the same scenarios, cost, box and count of closed loops.
 
 Every search sees the cost as it is judged (the settling time itself, the worst loop itself). All but the grid begin from
 the same points of the box, tried on the plant as believed and counted; the presets' gains are given to none.
@@ -18,10 +18,10 @@ from cmaes import CMA
 from scipy.optimize import minimize
 
 from smajax.control.presets import CONTROLLERS
-from smajax.control.tune.evaluate import LOOPS, STEP, Rig
-from smajax.control.tune.multistart import Effort, begin, one_round
+from smajax.control.tune.evaluate import LOOPS, STEP, TuningProblem
+from smajax.control.tune.multistart import Effort, begin, next_round
 from smajax.control.tune.objective import Goal
-from smajax.control.tune.scenarios import Members, tuned_on
+from smajax.control.tune.scenarios import Scenarios, tuned_on
 from smajax.model.system import System
 
 VARIATION = {"inertia": 0.2, "damping": 0.2, "convection": 0.2}
@@ -64,28 +64,28 @@ class Spent(Exception):
 class Counted:
     """The validated cost of points of the cube, with the closed loops so far and the best after each."""
 
-    def __init__(self, rig: Rig, goal: Goal, members: Members, budget: int) -> None:
-        self.rig, self.goal, self.members, self.budget = rig, goal, members, budget
+    def __init__(self, rig: TuningProblem, goal: Goal, scenarios: Scenarios, budget: int) -> None:
+        self.rig, self.goal, self.scenarios, self.budget = rig, goal, scenarios, budget
         self.course: list[tuple[int, float]] = []
 
     def costs(self, points: np.ndarray) -> np.ndarray:
         """Costs (C,) of points (C, gains); raises Spent when none of the budget is left."""
-        left = (self.budget - self.rig.simulations) // self.members.size
+        left = (self.budget - self.rig.simulations) // self.scenarios.size
         if left < 1:
             raise Spent
         before = self.rig.simulations
         some = np.clip(points[:left], 0.0, 1.0)
-        found = self.goal.cost(self.rig.judged(some, self.members, STEP).judged, self.members)
+        found = self.goal.cost(self.rig.evaluate(some, self.scenarios, STEP).exact, self.scenarios)
         for k, cost in enumerate(found):
             best = min(float(cost), self.course[-1][1] if self.course else np.inf)
-            self.course.append((before + (k + 1) * self.members.size, best))
+            self.course.append((before + (k + 1) * self.scenarios.size, best))
         if left < len(points):
             raise Spent
         return found
 
 
 def _by_gradient(
-    problem: Problem, rig: Rig, goal: Goal, members: Members, budget: int, seed: int, rule: str
+    problem: Problem, rig: TuningProblem, goal: Goal, scenarios: Scenarios, budget: int, seed: int, rule: str
 ) -> list[tuple[int, float]]:
     course: list[tuple[int, float]] = []
     best = np.inf
@@ -93,9 +93,9 @@ def _by_gradient(
     # One start after the other, each the best of other points, until nothing is left.
     while rig.simulations < budget:
         effort = Effort(problem.tried, 1, 40, seed + 100 * part, rule)
-        now = begin(rig, goal, members, effort, None)
-        while not now.ended and rig.simulations + members.size * int(now.alive.sum()) <= budget:
-            now = one_round(rig, goal, members, effort, now)
+        now = begin(rig, goal, scenarios, effort, None)
+        while not now.ended and rig.simulations + scenarios.size * int(now.alive.sum()) <= budget:
+            now = next_round(rig, goal, scenarios, effort, now)
             best = min(best, float(np.nanmin(now.costs[now.round - 1])))
             course.append((rig.simulations, best))
         if not now.ended:
@@ -139,7 +139,7 @@ def _cma_es(counted: Counted, start: np.ndarray, seed: int) -> None:
 
 
 def _grid(counted: Counted, gains: int) -> None:
-    most = counted.budget // counted.members.size
+    most = counted.budget // counted.scenarios.size
     side = int(np.floor(most ** (1.0 / gains) + 1e-9))
     ends = np.linspace(0.0, 1.0, max(side, 2) + 2)[1:-1]
     points = np.asarray(list(itertools.product(ends, repeat=gains)))
@@ -152,19 +152,19 @@ def _grid(counted: Counted, gains: int) -> None:
 def searched(system: System, problem: Problem, way: str, budget: int, seed: int) -> dict[str, Any]:
     """The course of one search: [closed loops, best cost] after each of its evaluations, and the seconds it took."""
     goal = Goal(problem.objective)
-    members = tuned_on(problem.set_points, VARIATION if problem.varied else {}, 0)
-    loops = int(np.clip(1 << (members.size - 1).bit_length(), 16, LOOPS))
-    rig = Rig(CONTROLLERS[problem.controller], system, seconds=problem.seconds, loops=loops)
+    scenarios = tuned_on(problem.set_points, VARIATION if problem.varied else {}, 0)
+    loops = int(np.clip(1 << (scenarios.size - 1).bit_length(), 16, LOOPS))
+    rig = TuningProblem(CONTROLLERS[problem.controller], system, seconds=problem.seconds, loops=loops)
     began = clock.monotonic()
     if way in ("trust-region", "adam"):
-        course = _by_gradient(problem, rig, goal, members, budget, seed, way)
+        course = _by_gradient(problem, rig, goal, scenarios, budget, seed, way)
     else:
-        counted = Counted(rig, goal, members, budget)
+        counted = Counted(rig, goal, scenarios, budget)
         run: Callable[[], None]
         if way == "grid":
             run = lambda: _grid(counted, len(rig.names))  # noqa: E731
         else:
-            start = begin(rig, goal, members, Effort(problem.tried, 1, 1, seed), None).points[0]
+            start = begin(rig, goal, scenarios, Effort(problem.tried, 1, 1, seed), None).points[0]
             own = _nelder_mead if way == "nelder-mead" else _cma_es
             run = lambda: own(counted, start, seed)  # noqa: E731
         with contextlib.suppress(Spent):

@@ -16,12 +16,12 @@ from scipy.stats import qmc
 
 from smajax.control.gains_file import write_gains
 from smajax.control.mismatch import MISMATCHES
-from smajax.control.tune.evaluate import Rig
+from smajax.control.tune.evaluate import TuningProblem
 from smajax.control.tune.objective import Goal
-from smajax.control.tune.scenarios import Members, tuned_on
+from smajax.control.tune.scenarios import Scenarios, tuned_on
 from smajax.control.tune.settings import TuneSettings
 from smajax.control.tune.terms import TERMS
-from smajax.control.tune.tuning import Tuned, rig_of, tune
+from smajax.control.tune.tuning import TuningResult, problem_of, tune
 from smajax.core.progress import Message, Progress
 from smajax.model.system import System
 from studies.tuning.record import HERE
@@ -51,13 +51,13 @@ class Plan:
     seconds: float = 10.0
 
 
-def asked_by(plan: Plan) -> Members:
+def asked_by(plan: Plan) -> Scenarios:
     """The plant as believed and every corner of the variation, every so many degrees: where a pass looks what to add."""
     low, high = min(plan.set_points), max(plan.set_points)
     return tuned_on(list(np.arange(low, high + 1e-9, plan.every)), VARIATION, 0)
 
 
-def judged_on(plan: Plan) -> tuple[Members, np.ndarray]:
+def judged_on(plan: Plan) -> tuple[Scenarios, np.ndarray]:
     """Loops that nothing before has touched, and which of them are drawn at random (M,).
 
     The plant as believed and the corners midway between the set points of `asked_by`; then plants within the variation, each
@@ -71,7 +71,7 @@ def judged_on(plan: Plan) -> tuple[Members, np.ndarray]:
     for k, name in enumerate(names):
         rows[:, _column(name)] = 1.0 + (2.0 * shares[:, k] - 1.0) * VARIATION[name]
     rows[:, -1] = np.radians(low + shares[:, -1] * (high - low))
-    whole = Members(np.concatenate([corners.rows, rows]), np.append(corners.nominal, np.zeros(plan.drawn, bool)))
+    whole = Scenarios(np.concatenate([corners.rows, rows]), np.append(corners.nominal, np.zeros(plan.drawn, bool)))
     return whole, np.arange(whole.size) >= corners.size
 
 
@@ -80,8 +80,8 @@ def _column(name: str) -> int:
     return list(MISMATCHES).index(name)
 
 
-def _some(members: Members, which: np.ndarray) -> Members:
-    return Members(members.rows[which], members.nominal[which])
+def _some(scenarios: Scenarios, which: np.ndarray) -> Scenarios:
+    return Scenarios(scenarios.rows[which], scenarios.nominal[which])
 
 
 def _over(goal: Goal, judged: np.ndarray) -> np.ndarray:
@@ -89,7 +89,7 @@ def _over(goal: Goal, judged: np.ndarray) -> np.ndarray:
     return np.max(judged[:, goal.limited] / goal.bounds - 1.0, axis=1)
 
 
-def _told(judged: np.ndarray, members: Members, seconds: float) -> dict[str, Any]:
+def _told(judged: np.ndarray, scenarios: Scenarios, seconds: float) -> dict[str, Any]:
     """The worst of each limited term over loops (M, terms), where, and how many loops meet its limit."""
     told: dict[str, Any] = {}
     for name, limit in LIMITS.items():
@@ -98,7 +98,7 @@ def _told(judged: np.ndarray, members: Members, seconds: float) -> dict[str, Any
         never = name == "settling_time" and values[at] >= 2.0 * seconds
         told[name] = {
             "worst": None if never else float(f"{values[at]:.4g}"),
-            "at_deg": round(float(np.degrees(members.targets[at])), 1),
+            "at_deg": round(float(np.degrees(scenarios.targets[at])), 1),
             "loops_within": int((values <= limit).sum()),
         }
     met = _over(Goal(limits=LIMITS), judged) <= 0.0
@@ -106,20 +106,20 @@ def _told(judged: np.ndarray, members: Members, seconds: float) -> dict[str, Any
     return told
 
 
-def _worst_plant(over: np.ndarray, members: Members) -> dict[str, Any]:
+def _worst_plant(over: np.ndarray, scenarios: Scenarios) -> dict[str, Any]:
     """The plant of the corners that fails at most set points."""
-    plants, which = np.unique(members.rows[:, :-1].round(6), axis=0, return_inverse=True)
+    plants, which = np.unique(scenarios.rows[:, :-1].round(6), axis=0, return_inverse=True)
     failed = np.bincount(which.ravel(), weights=over > 0.0, minlength=len(plants))
     worst = int(np.argmax(failed))
     ratios = {name: float(plants[worst, _column(name)]) for name in VARIATION}
     return {"ratios": ratios, "fails": int(failed[worst]), "of": int((which.ravel() == worst).sum())}
 
 
-def _added(over: np.ndarray, members: Members) -> list[float]:
+def _added(over: np.ndarray, scenarios: Scenarios) -> list[float]:
     """Set points (deg) of the worst loops, no two near to each other."""
     found: list[float] = []
     for k in np.argsort(-over, kind="stable"):
-        angle = round(float(np.degrees(members.targets[k])), 6)
+        angle = round(float(np.degrees(scenarios.targets[k])), 6)
         if over[k] <= 0.0 or len(found) == ADDED:
             break
         if all(abs(angle - one) >= APART for one in found):
@@ -127,7 +127,7 @@ def _added(over: np.ndarray, members: Members) -> list[float]:
     return found
 
 
-def _passes(system: System, controller: str, plan: Plan, progress: Progress) -> tuple[Tuned, Counter[str]]:
+def _passes(system: System, controller: str, plan: Plan, progress: Progress) -> tuple[TuningResult, Counter[str]]:
     """The pass that exceeds the limits least where set points are added, and what all of them took."""
     margin = Goal(limits={name: MARGIN * limit for name, limit in LIMITS.items()})
     settings = TuneSettings(
@@ -146,15 +146,15 @@ def _passes(system: System, controller: str, plan: Plan, progress: Progress) -> 
     best, least = None, np.inf
     for number in range(plan.passes):
         found = tune(system, settings, progress=progress)
-        rig = rig_of(system, settings)
-        over = _over(margin, rig.judged(rig.point(found.after.values)[None], asked).judged[0])
+        rig = problem_of(system, settings)
+        over = _over(margin, rig.evaluate(rig.point(found.after.values)[None], asked).exact[0])
         worst = float(np.max(np.nan_to_num(over, nan=np.inf)))
         took.update(
             passes=1,
             closed_loops=found.simulations,
             rounds=found.descent.round,
             generations_without_slopes=found.evolution.generations,
-            slopes_of_no_use=found.descent.wild,
+            slopes_of_no_use=found.descent.unusable,
         )
         progress(Message(f"{controller}: pass {number + 1} exceeds the margin by {worst:.3f}"))
         if best is None or worst < least:
@@ -174,11 +174,13 @@ def _passes(system: System, controller: str, plan: Plan, progress: Progress) -> 
     return best, took
 
 
-def _again(rig: Rig, goal: Goal, point: np.ndarray, members: Members, over: np.ndarray, count: int) -> dict[str, Any]:
+def _again(
+    rig: TuningProblem, goal: Goal, point: np.ndarray, scenarios: Scenarios, over: np.ndarray, count: int
+) -> dict[str, Any]:
     """The worst loops at a finer step: how many fail, beside how many did, and by how much the worst exceeds a limit."""
     worst = np.sort(np.argsort(-over, kind="stable")[:count])
-    some = _some(members, worst)
-    fine = _over(goal, rig.judged(point[None], some, FINER).judged[0])
+    some = _some(scenarios, worst)
+    fine = _over(goal, rig.evaluate(point[None], some, FINER).exact[0])
     return {
         "step_s": FINER,
         "loops": some.size,
@@ -194,13 +196,13 @@ def requirement(system: System, controller: str, plan: Plan, progress: Progress,
     if keep:
         (HERE / "gains").mkdir(exist_ok=True)
         write_gains(HERE / "gains" / f"{controller}.json", found.after, found.units, {"tuned": found.settings.record()})
-    goal, (members, drawn) = Goal(limits=LIMITS), judged_on(plan)
-    rig = rig_of(system, found.settings)
+    goal, (scenarios, drawn) = Goal(limits=LIMITS), judged_on(plan)
+    rig = problem_of(system, found.settings)
     point = rig.point(found.after.values)
-    before, after = rig.judged(np.stack([rig.before, point]), members).judged
+    before, after = rig.evaluate(np.stack([rig.before, point]), scenarios).exact
     over = np.nan_to_num(_over(goal, after), nan=np.inf)
-    again = _again(rig, goal, point, members, over, plan.worst)
-    corners, nominal = ~drawn, members.nominal
+    again = _again(rig, goal, point, scenarios, over, plan.worst)
+    corners, nominal = ~drawn, scenarios.nominal
     return {
         "gains": dict(found.after.values),
         "met": bool(over.max() <= 0.0 and again["fail"] == 0),
@@ -208,12 +210,12 @@ def requirement(system: System, controller: str, plan: Plan, progress: Progress,
             "before": float(np.max(np.nan_to_num(_over(goal, before), nan=np.inf))),
             "after": float(over.max()),
         },
-        "before": _told(before, members, plan.seconds),
-        "after": _told(after, members, plan.seconds),
-        "after_at_the_corners": _told(after[corners], _some(members, corners), plan.seconds),
-        "after_on_plants_drawn": _told(after[drawn], _some(members, drawn), plan.seconds),
-        "after_on_the_plant_as_believed": _told(after[nominal], _some(members, nominal), plan.seconds),
-        "worst_plant": _worst_plant(over[corners], _some(members, corners)),
+        "before": _told(before, scenarios, plan.seconds),
+        "after": _told(after, scenarios, plan.seconds),
+        "after_at_the_corners": _told(after[corners], _some(scenarios, corners), plan.seconds),
+        "after_on_plants_drawn": _told(after[drawn], _some(scenarios, drawn), plan.seconds),
+        "after_on_the_plant_as_believed": _told(after[nominal], _some(scenarios, nominal), plan.seconds),
+        "worst_plant": _worst_plant(over[corners], _some(scenarios, corners)),
         "again_at_a_finer_step": again,
         "set_points_tuned_deg": list(found.settings.set_points),
         **took,

@@ -44,8 +44,8 @@ SIMULATE = {
     ),
     "a time column without a file": (
         [*WIRE, "--step", "5V:1s", "--time", "10s"],
-        "for --time: names the time column of a file, and nothing is read from one: leave `10s` out (how long a run is says "
-        "--seconds)",
+        "for --time: names the time column of a file, and no input is from a file: leave `10s` out (the length of "
+        "the run is --seconds)",
     ),
     "a length in the place of a time column": (
         [*WIRE, "--input", "voltage={log}:U:V", "--time", "10s"],
@@ -215,8 +215,8 @@ LONG = {
     "sweep --set-points a": "finite numbers with commas between them, not `a`",
     "sweep --set-points nan": "finite numbers with commas between them, not `nan`",
     "sweep --set-points 400": "set points are angles between the arm's stops, -45 to 95 degrees",
-    "sweep --gain-shares 1,inf": "finite numbers with commas between them, not `1,inf`",
-    "sweep --gain-shares=-1": "gains are shares of the preset's, above 0",
+    "sweep --gain-ratios 1,inf": "finite numbers with commas between them, not `1,inf`",
+    "sweep --gain-ratios=-1": "ratios of the main gain are numbers above 0",
     "sweep --points 1": "'--points': 2 or more, not `1`",
     "sweep --seconds inf": "'--seconds': got 'inf', expected a number and a unit like '1.5 s'",
     "sweep --seconds 10ms": "'--seconds': 0.1 to 86400 s, not `10ms`",
@@ -283,7 +283,7 @@ def test_a_new_experiment_of_a_strange_log_is_begun_and_says_what_is_wrong(tmp_p
     path.write_text("t,U,x\n" + "".join(f"{cell if cell == '0' else k},{cell},{k}\n" for k in range(30)))
     ended = smajax("new-experiment", path, "--out", tmp_path / "experiment.toml")
     assert ended.code == 3
-    assert "It does not load yet: " in ended.out
+    assert "It cannot be loaded yet: " in ended.out
     assert "Warning" not in ended.said
 
 

@@ -20,8 +20,9 @@ from typer.testing import CliRunner
 
 from smajax.cli import renamed
 from smajax.cli.main import app, main
-from smajax.cli.options import console, numbers, pairs, texts, understood
+from smajax.cli.options import numbers, pairs, texts, understood
 from smajax.cli.progress_display import VARIABLE, _TimeLeft, displayed
+from smajax.cli.terminal import console
 from smajax.control.compose import compose, with_values
 from smajax.control.mismatch import MISMATCHES, variation_of
 from smajax.control.tune.terms import TERMS
@@ -323,7 +324,7 @@ def test_every_option_that_takes_a_quantity_says_its_unit(command: str) -> None:
     told = " ".join(CliRunner().invoke(app, [command, "--help"]).output.split())
     assert re.findall(r"--([\w-]+) (?:<float>|FLOAT)", told) == ["tolerance"] * (command == "simulate")
     timed = {"simulate": 3, "sweep": 2, "tune": 2}.get(command, 0)
-    assert len(re.findall(r"<s> (?:(?!--).)*in s where it says no unit", told.replace("--dt;", "dt;"))) == timed
+    assert len(re.findall(r"<s> (?:(?!--).)*without a unit in s", told.replace("--dt;", "dt;"))) == timed
 
 
 @pytest.mark.parametrize("command", ["close-loop", "identify", "demo", "figures", "tune", "sweep", "simulate"])
@@ -345,7 +346,7 @@ def test_lists_and_pairs_of_numbers_take_units() -> None:
     np.testing.assert_allclose(
         numbers("--set-points", "-20,0.5 rad 10deg, 85", "deg"), [-20.0, np.degrees(0.5), 10.0, 85.0]
     )
-    assert numbers("--gain-shares", "50%,1") == (0.5, 1.0)
+    assert numbers("--gain-ratios", "50%,1") == (0.5, 1.0)
     limits = pairs(
         "--limits",
         ["settling_time=4000 ms,overshoot=2", "energy=0.02kJ peak_temperature=363.15K"],
@@ -372,20 +373,20 @@ def test_a_comma_that_may_be_meant_for_a_point_is_told(typed: str, unit: str, to
     assert understood("Set points", typed, numbers("--set-points", typed, unit or "1"), unit) == told
 
 
-MAY_BE_WRONG = "What may be wrong of a plant: " + ", ".join(
+MAY_BE_WRONG = "What can differ between the plant and the controller's model: " + ", ".join(
     short if short == own else f"{short} ({own}{', in degC' if short == 'ambient' else ''})"
     for short, own in MISMATCHES.items()
 )
 
 
-def test_what_may_be_wrong_has_the_same_words_in_every_command() -> None:
+def test_mismatches_have_the_same_words_in_every_command() -> None:
     found = set()
     for command in ("simulate", "sweep", "tune"):
         page = " ".join(CliRunner().invoke(app, [command, "--help"]).output.split())
         assert f"{MAY_BE_WRONG}. +20%" in page
         found.add(re.split(r" Example:| Options:", page[page.index(MAY_BE_WRONG) :])[0])
     assert len(found) == 1, found
-    assert "more than the controller believes (of 20 degC: 24 degC)" in found.pop()
+    assert "1.2 times the value that the controller assumes (of 20 degC: 24 degC)" in found.pop()
     believed = compose("niti_table_3_1", "arm", "amplified_voltage", values={"ambient_temperature": "20 degC"})
     assert parameter_values(with_values(believed, {"ambient": "+20%"}))["ambient_temperature"] == pytest.approx(24.0)
 
@@ -466,14 +467,15 @@ OLD = {("sweep", "--targets"): ("--set-points", "0.3"), ("", "robustness"): ("sw
     ],
 )
 def test_an_old_name_is_taken_for_the_new_one_and_told(typed: str, now: str, told: list[str]) -> None:
-    found, said = renamed.as_now(typed.split(), OLD)
+    found, said = renamed.with_new_names(typed.split(), OLD)
     assert found == now.split()
     assert [part in one for part, one in zip(told, said, strict=True)] == [True] * len(told)
 
 
 def test_an_old_command_works_and_warns(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setattr(
-        "smajax.cli.main.as_now", lambda typed: renamed.as_now(typed, {("", "wires"): ("presets", "0.3")})
+        "smajax.cli.main.with_new_names",
+        lambda typed: renamed.with_new_names(typed, {("", "wires"): ("presets", "0.3")}),
     )
     monkeypatch.setattr("sys.argv", ["smajax", "wires"])
     with pytest.raises(SystemExit) as ended:

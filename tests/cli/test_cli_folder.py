@@ -29,7 +29,7 @@ def test_the_same_work_goes_on_and_another_is_refused(tmp_path: Path) -> None:
     out = tmp_path / "out"
     _done(out)
     _done(out)
-    with pytest.raises(FolderTaken, match=r"another result of `smajax simulate` \(asked: 1 there, 2 asked\)"):
+    with pytest.raises(FolderTaken, match=r"another result of `smajax simulate` \(asked: 1 there, 2 requested\)"):
         _done(out, asked=2)
     with pytest.raises(FolderTaken, match="a result of `smajax simulate`: give the name of another folder"):
         _done(out, "sweep")
@@ -44,10 +44,10 @@ def test_what_differs_is_said_and_no_more_of_it_than_a_reader_needs(tmp_path: Pa
     with pytest.raises(FolderTaken) as refused, claimed(tmp_path, "identify", asked, []):
         pass
     said = str(refused.value)
-    assert "(changed in the experiment file, key4: 4 there, 5 asked; " in said
+    assert "(changed in the experiment file, key4: 4 there, 5 requested; " in said
     assert said.endswith("and 3 more): give the name of another folder, or --overwrite to delete that.")
     del asked["experiment file"]
-    words = r"gone: 1 there, not asked; new: not there, \[0, 0.*\.\.\. asked"
+    words = r"gone: 1 there, not requested; new: not there, \[0, 0.*\.\.\. requested"
     with pytest.raises(FolderTaken, match=words), claimed(tmp_path, "identify", asked, []):
         pass
 
@@ -98,7 +98,7 @@ def test_an_experiment_that_was_edited_and_other_data_are_refused(tmp_path: Path
     path.write_text("# a remark\n" + path.read_text())
     assert smajax(*words(path)).code == 0  # the same experiment: its fits serve again
     assert sorted((tmp_path / "out" / "fits").iterdir()) == fits
-    assert "--robust: False there, True asked" in smajax(*words(path, "--robust")).said
+    assert "--robust: False there, True requested" in smajax(*words(path, "--robust")).said
     page = (tmp_path / "out" / "identify.json").read_bytes()
     bench(tmp_path / "bench", ('start = "100', 'start = "90'))
     edited = smajax(*words(path))

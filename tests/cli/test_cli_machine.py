@@ -18,11 +18,12 @@ import xarray as xr
 from typer.testing import CliRunner
 
 from smajax.cli import installation as doctor
-from smajax.cli.benchmark import bench, in_words
+from smajax.cli.benchmark import benchmark
+from smajax.cli.commands.bench import as_lines
 from smajax.cli.main import app
 from smajax.core.parameters import parameter_values
 from smajax.data.experiment.column_guess import columns_of
-from smajax.data.experiment.draft import begun
+from smajax.data.experiment.draft import draft
 from smajax.data.experiment.errors import ExperimentError
 from smajax.data.experiment.load import load_experiment
 from smajax.data.model_catalogue import CATALOGUE
@@ -37,7 +38,7 @@ DEMO = Path(__file__).parents[2] / "smajax" / "data" / "demo" / "latent"
 
 
 def test_the_doctor_finds_what_is_missing() -> None:
-    found = doctor.examined()
+    found = doctor.examine()
     assert found["float64"]
     assert found["engine"] == {"runs": "native", "why": "", "vector_bits": found["engine"]["vector_bits"]}
     assert found["engine"]["vector_bits"] in (128, 256, 512)
@@ -60,7 +61,7 @@ def test_the_doctor_asks_nobody_for_the_tools_of_developers(monkeypatch: pytest.
     ]
     lines += ["mkdocs<2; extra == 'docs'", 'no-such-tool>=9.0; python_version > "3" and extra == "dev"']
     monkeypatch.setattr("importlib.metadata.requires", lambda package: lines)
-    found = doctor.examined(engine=False)
+    found = doctor.examine(engine=False)
     assert set(found["packages"]) == {"jax"}
     assert set(found["packages of extras"]) == {"h5py"}
 
@@ -91,11 +92,11 @@ def test_only_compiled_programs_are_cleared(tmp_path: Path, monkeypatch: pytest.
 
 
 def test_the_bench_compares_the_same_trajectories() -> None:
-    found = bench(count=64, peers=2)
+    found = benchmark(count=64, peers=2)
     assert found["agree"]
     assert 0.0 < found["largest_difference_degrees"] < 0.1
     assert found["ratio"] == pytest.approx(found["scipy_ms"] / found["smajax_ms"])
-    assert found["machine"]["processor"] in in_words(found)[0]
+    assert found["machine"]["processor"] in as_lines(found)[0]
 
 
 def test_a_template_loads_as_it_is(tmp_path: Path) -> None:
@@ -120,8 +121,8 @@ def test_a_template_lists_what_a_bench_should_tell(tmp_path: Path, heading: str,
     rows = [[k / 10, 5.0 * (k % 20 > 9), *[3.0 + np.sin(k / 9)] * (len(headings) - 2)] for k in range(200)]
     log = "\n".join([",".join(headings), *(",".join(map(str, row)) for row in rows)])
     (tmp_path / "log.csv").write_text(log)
-    guessed = begun([tmp_path / "log.csv"], tmp_path / "e.toml")
-    assert any("the bench: the preset's wire_length" in line for line in guessed.told)
+    guessed = draft([tmp_path / "log.csv"], tmp_path / "e.toml")
+    assert any("the bench: the preset's wire_length" in line for line in guessed.messages)
     head, _, rest = guessed.text.partition("[model.parameters]")
     known, _, tail = rest.partition("[unknown]")
     said = head + "[model.parameters]" + known.replace("\n# ", "\n")
@@ -137,7 +138,7 @@ def test_a_template_lists_what_a_bench_should_tell(tmp_path: Path, heading: str,
 
 def test_a_template_sends_nobody_to_a_file_that_is_not_installed(tmp_path: Path) -> None:
     log = _bench_log(tmp_path / "log.csv", "Zeit/ms;U/V;Weg/mm", lambda k: str(100 * k))
-    text = begun([log], tmp_path / "e.toml").text
+    text = draft([log], tmp_path / "e.toml").text
     (page,) = re.findall("the page '(.*)'", text)
     assert f"- {page}: studies/parameters.md" in (Path(__file__).parents[2] / "mkdocs.yml").read_text(encoding="utf-8")
     assert not re.search(r"[\w/]+\.(md|html)\b", text)
@@ -187,7 +188,7 @@ def test_the_boxes_are_those_of_the_wire_that_is_asked_for(tmp_path: Path) -> No
     chosen = ["--wire", "flexinol_table_3_2", "--drive", "amplified_voltage"]
     told = run.invoke(app, ["new-experiment", log, *chosen, "--out", str(out)])
     assert told.exit_code == 0, told.output
-    assert "as asked for: wire and drive; the rest is a guess" in told.output
+    assert "as requested: wire and drive; the rest is a guess" in told.output
     loaded = load_experiment(out, CATALOGUE)
     assert (loaded.wire, loaded.load, loaded.drive) == ("flexinol_table_3_2", "arm", "amplified_voltage")
     boxes = {one.name: one for one in loaded.unknowns}
@@ -197,7 +198,7 @@ def test_the_boxes_are_those_of_the_wire_that_is_asked_for(tmp_path: Path) -> No
 
 def test_boxes_that_stay_when_the_wire_is_changed_are_told(tmp_path: Path) -> None:
     """With the value, the box and the command that writes others."""
-    text = begun([_angle_log(tmp_path / "log.csv")], tmp_path / "e.toml").text
+    text = draft([_angle_log(tmp_path / "log.csv")], tmp_path / "e.toml").text
     (tmp_path / "e.toml").write_text(text.replace("niti_table_3_1", "flexinol_table_3_2"))
     (told,) = [one for one in load_experiment(tmp_path / "e.toml", CATALOGUE).warnings if "box" in one]
     assert "outside the box of specific_heat = 322 J/(kg K) (box: 418 to 2510)" in told
@@ -281,7 +282,7 @@ def test_files_of_a_run_may_have_a_time_column_of_one_name(tmp_path: Path) -> No
         text = "\n".join(f"{row[0]},{row[place]}" for row in rows)
         (tmp_path / f"{name[0]}.csv").write_text(f"time [s],{name}\n{text}\n")
     logs = [tmp_path / "U.csv", tmp_path / "D.csv"]
-    text = begun(logs, tmp_path / "e.toml").text
+    text = draft(logs, tmp_path / "e.toml").text
     assert 'files = { voltage = "U.csv", position = "D.csv" }' in text
     (tmp_path / "e.toml").write_text(text)
     (one,) = load_experiment(tmp_path / "e.toml", CATALOGUE).runs
@@ -290,7 +291,7 @@ def test_files_of_a_run_may_have_a_time_column_of_one_name(tmp_path: Path) -> No
     with pytest.raises(
         MeasuredDataError, match=r"its time is 'Time \[ms\]' in ms, that of U\.csv is 'time \[s\]' in s"
     ):
-        begun(logs, tmp_path / "e.toml")
+        draft(logs, tmp_path / "e.toml")
 
 
 @pytest.mark.parametrize(
@@ -348,7 +349,7 @@ def _bench_log(path: Path, head: str, clock: Callable[[int], str], end: str = ""
 def test_times_and_units_as_german_loggers_write_them(
     tmp_path: Path, head: str, clock: Callable[[int], str], unit: str
 ) -> None:
-    guessed = begun([_bench_log(tmp_path / "log.csv", head, clock)], tmp_path / "e.toml")
+    guessed = draft([_bench_log(tmp_path / "log.csv", head, clock)], tmp_path / "e.toml")
     (tmp_path / "e.toml").write_text(guessed.text, encoding="utf-8")
     experiment = load_experiment(tmp_path / "e.toml", CATALOGUE)
     assert f'unit = "{unit}"' in guessed.text
@@ -372,13 +373,13 @@ def test_a_time_that_cannot_be_read_is_said_first(tmp_path: Path, end: str) -> N
     assert why in first
     assert told.exit_code == 3  # and it is not sent on with a clock of counted samples
     assert "Next" not in last
-    assert "It does not load yet" in told.output
+    assert "It cannot be loaded yet" in told.output
     assert why in " ".join(told.output.splitlines()[1:])
 
 
 def test_a_unit_that_there_is_none_of_is_said_of_its_column(tmp_path: Path) -> None:
     log = _bench_log(tmp_path / "log.csv", "t/s;U/V;disp [furlonx]", lambda k: str(k / 10))
-    told = begun([log], tmp_path / "e.toml").told
+    told = draft([log], tmp_path / "e.toml").messages
     assert any(
         "named like a position, and its unit 'furlonx' is none of that: expected one like 'm'" in line for line in told
     )
@@ -389,7 +390,7 @@ def test_every_column_that_is_left_out_is_listed_with_its_line(tmp_path: Path) -
     lines = log.read_text().splitlines()
     more = ["F/N;note", *("oops;warm" if k == 50 else f"{k};warm" for k in range(1, 81))]
     log.write_text("\n".join(f"{a};{b}" for a, b in zip(lines, more, strict=True)))
-    told = begun([log], tmp_path / "e.toml").told
+    told = draft([log], tmp_path / "e.toml").messages
     assert any("F/N: left out (line 51, column 'F/N': 'oops' is not a number" in line for line in told)
     assert any("note: left out (line 2, column 'note': 'warm' is not a number" in line for line in told)
 
@@ -398,7 +399,7 @@ def test_files_that_began_at_different_clock_times_are_laid_side_by_side(tmp_pat
     for name, late in (("U [V]", 0), ("x [mm]", 20)):
         rows = [f"10:00:{(k + late) // 10:02}.{(k + late) % 10};{np.sin((k + late) / 9):.3f}" for k in range(60)]
         (tmp_path / f"{name[0]}.csv").write_text("\n".join([f"time;{name}", *rows]))
-    (tmp_path / "e.toml").write_text(begun([tmp_path / "U.csv", tmp_path / "x.csv"], tmp_path / "e.toml").text)
+    (tmp_path / "e.toml").write_text(draft([tmp_path / "U.csv", tmp_path / "x.csv"], tmp_path / "e.toml").text)
     (one,) = load_experiment(tmp_path / "e.toml", CATALOGUE).runs
     assert (one.time[0], one.time[-1]) == pytest.approx((2.0, 5.9))
     np.testing.assert_allclose(one.inputs["voltage"], 1e3 * one.output)
@@ -410,8 +411,8 @@ def test_files_that_began_at_different_clock_times_are_laid_side_by_side(tmp_pat
 
 def test_what_the_model_needs_and_no_column_gives_is_said(tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text("time,displacement\n" + "\n".join(f"{k / 10},{np.sin(k / 9)}" for k in range(60)))
-    guessed = begun([tmp_path / "log.csv"], tmp_path / "e.toml")
-    assert any("voltage: MISSING" in line for line in guessed.told)
+    guessed = draft([tmp_path / "log.csv"], tmp_path / "e.toml")
+    assert any("voltage: MISSING" in line for line in guessed.messages)
     told = run.invoke(app, ["new-experiment", str(tmp_path / "log.csv"), "--out", str(tmp_path / "e.toml")])
     assert told.exit_code == 3
     assert "needs the input 'voltage'" in told.stdout.replace("\n", " ")

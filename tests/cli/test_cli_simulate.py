@@ -18,8 +18,8 @@ from smajax.cli.main import app
 from smajax.cli.result_folder import FolderTaken
 from smajax.control.compose import compose
 from smajax.control.mismatch import MISMATCHES
-from smajax.control.run_request import Asked, AskedLoop, run_closed, run_open
-from smajax.control.sweep import mismatched
+from smajax.control.perturbed_plant import perturbed_plant
+from smajax.control.run_request import LoopRequest, RunRequest, run_closed, run_open
 from smajax.core.parameters import parameter_values, set_parameters
 from smajax.core.units import UnitError
 from smajax.data.text_input import clock_of, given, levels
@@ -69,11 +69,11 @@ def test_the_run_is_that_of_the_model(folder: Path) -> None:
 
 
 def test_what_happened_is_told_in_words() -> None:
-    told = " ".join(conclusions(run_closed(Asked(dt=0.01), AskedLoop("pid", "30deg:6s"))))
+    told = " ".join(conclusions(run_closed(RunRequest(dt=0.01), LoopRequest("pid", "30deg:6s"))))
     assert "It transforms: the martensite fraction lies between 0.42 and 1.00, at the end 0.42." in told
     assert "The angle starts at -45 deg, lies between -45 deg and 30 deg, and ends at 30 deg." in told
     assert "The loop settles after 2.17 s." in told
-    assert "The loop never settles." in conclusions(run_closed(Asked(dt=0.01), AskedLoop("pid", "30deg:2s")))
+    assert "The loop never settles." in conclusions(run_closed(RunRequest(dt=0.01), LoopRequest("pid", "30deg:2s")))
 
 
 def test_each_set_point_has_its_own_figures_of_merit(tmp_path: Path) -> None:
@@ -125,13 +125,19 @@ def test_what_the_controller_believes_stands_beside_what_the_plant_has(tmp_path:
     told = run.invoke(app, [*words, "--out", str(tmp_path / "loop")])
     assert told.exit_code == 0, told.output
     said = " ".join(told.output.split())
-    assert said.count("convection_coefficient believed 150 -> true 80 W/(m^2 K), 0.5333 times (-46.67 %)") == 1
-    assert said.count("ambient_temperature believed 20 -> true 22 degC, +2 K") == 1
+    assert said.count("convection_coefficient assumed 150 -> true 80 W/(m^2 K), 0.5333 times (-46.67 %)") == 1
+    assert said.count("ambient_temperature assumed 20 -> true 22 degC, +2 K") == 1
     record = json.loads((tmp_path / "loop" / "simulate.json").read_text(encoding="utf-8"))
     assert record["mismatch"] == {
-        "convection_coefficient": {"believed": 150.0, "true": 80.0, "unit": "W/(m^2 K)", "ratio": 80.0 / 150.0},
-        "ambient_temperature": {"believed": 20.0, "true": 22.0, "unit": "degC", "ratio": 1.1},
-        "latent_heat.enthalpy": {"believed": None, "true": 20_000.0, "unit": "J/kg", "ratio": None},
+        "convection_coefficient": {
+            "assumed": 150.0,
+            "believed": 150.0,
+            "true": 80.0,
+            "unit": "W/(m^2 K)",
+            "ratio": 80.0 / 150.0,
+        },
+        "ambient_temperature": {"assumed": 20.0, "believed": 20.0, "true": 22.0, "unit": "degC", "ratio": 1.1},
+        "latent_heat.enthalpy": {"assumed": None, "believed": None, "true": 20_000.0, "unit": "J/kg", "ratio": None},
     }
     page = (tmp_path / "loop" / "simulate.html").read_text(encoding="utf-8")
     assert "<td>convection_<wbr>coefficient</td><td class=n>150</td><td class=n>80</td>" in page
@@ -141,21 +147,23 @@ def test_what_the_controller_believes_stands_beside_what_the_plant_has(tmp_path:
 def test_a_change_is_one_of_what_the_controller_believes() -> None:
     """Of the preset's value or the one put in its place, of an effect that is believed, of the law that a controller is for."""
     changes = {"convection": "+20%", "latent_heat.enthalpy": "-50%", "ambient_temperature": "+10 %", "inertia": "1.5"}
-    asked = Asked(dt=0.01, values={"convection_coefficient": "80", "latent_heat.enthalpy": "20 J/g"})
-    found = run_closed(asked, AskedLoop("pid", "10deg:0.1s", mismatch=changes)).mismatches
-    assert {one.name: (one.believed, one.true, one.ratio) for one in found} == {
+    asked = RunRequest(dt=0.01, values={"convection_coefficient": "80", "latent_heat.enthalpy": "20 J/g"})
+    found = run_closed(asked, LoopRequest("pid", "10deg:0.1s", mismatch=changes)).mismatches
+    assert {one.name: (one.assumed, one.true, one.ratio) for one in found} == {
         "convection_coefficient": pytest.approx((80.0, 96.0, 1.2)),
         "latent_heat.enthalpy": pytest.approx((20_000.0, 10_000.0, 0.5)),
         "ambient_temperature": pytest.approx((20.0, 22.0, 1.1)),  # in degC, as a sweep takes it
         "inertia_ratio": pytest.approx((1.0, 1.5, 1.5)),
     }
     with pytest.raises(ValueError, match="which is 0"):  # the law of section 4.8 has no thermal term
-        run_closed(Asked(dt=0.01), AskedLoop("backstepping1", "10deg:0.1s", mismatch={"thermal_modulus": "+20%"}))
+        run_closed(
+            RunRequest(dt=0.01), LoopRequest("backstepping1", "10deg:0.1s", mismatch={"thermal_modulus": "+20%"})
+        )
 
 
 def test_a_sweep_and_a_run_mean_the_same_plant_by_a_mismatch() -> None:
     believed = build("niti_table_3_1", "arm", "amplified_voltage")
-    swept = mismatched(believed, dict.fromkeys(MISMATCHES, jnp.asarray(0.8)))
+    swept = perturbed_plant(believed, dict.fromkeys(MISMATCHES, jnp.asarray(0.8)))
     asked = compose("niti_table_3_1", "arm", "amplified_voltage", values=dict.fromkeys(MISMATCHES, "-20%"))
     assert parameter_values(asked) == pytest.approx(parameter_values(swept), rel=1e-12)
     assert parameter_values(asked)["damping"] == pytest.approx(0.8 * parameter_values(believed)["damping"])
@@ -164,9 +172,9 @@ def test_a_sweep_and_a_run_mean_the_same_plant_by_a_mismatch() -> None:
 def test_a_set_point_that_moves_all_the_time_has_no_figures_of_merit(tmp_path: Path) -> None:
     rows = "\n".join(f"{k / 50},{0.2 * np.sin(k / 10)}" for k in range(101))
     (tmp_path / "sine.csv").write_text(f"time (s),angle (rad)\n{rows}\n")
-    found = run_closed(Asked(dt=0.01), AskedLoop("pid", f"{tmp_path / 'sine.csv'}:angle (rad)"))
-    assert (found.merit, found.rests) == ({}, ())
-    assert any("50 at most: this one has 100." in note for note in found.notes)
+    found = run_closed(RunRequest(dt=0.01), LoopRequest("pid", f"{tmp_path / 'sine.csv'}:angle (rad)"))
+    assert (found.merit, found.by_set_point) == ({}, ())
+    assert any("50 at most: this reference has 100." in note for note in found.notes)
 
 
 def test_what_was_written_is_an_input_again(folder: Path, tmp_path: Path) -> None:
@@ -192,7 +200,7 @@ def test_the_same_run_may_be_shown_again_and_another_goes_elsewhere(folder: Path
     assert again.exit_code == 0, again.output
     other = run.invoke(app, [*words, "--set", "wire.heat.convection_coefficient=90"])
     assert isinstance(other.exception, FolderTaken)
-    assert "wire.heat.convection_coefficient: 80 there, 90 asked" in str(other.exception)
+    assert "wire.heat.convection_coefficient: 80 there, 90 requested" in str(other.exception)
 
 
 def test_a_gains_file_closes_the_loop(tmp_path: Path) -> None:
@@ -330,14 +338,14 @@ def test_a_coupon_has_no_position_on_its_page_and_each_number_once(
         "temperature": "30degC:1s,99degC:1s",
         **({"stress": "100MPa"} if load == "coupon" else {"strain": "0.01"}),
     }
-    ran = run_open(Asked("flexinol_isobaric", load, "none", values=values, dt=0.1, inputs=inputs))
-    rows = [row[0] for row in summary_rows(ran.found)]
+    ran = run_open(RunRequest("flexinol_isobaric", load, "none", values=values, dt=0.1, inputs=inputs))
+    rows = [row[0] for row in summary_rows(ran.data)]
     assert sorted(rows) == sorted(
         ["temperature", "stress", "strain", "martensite fraction", "detwinned fraction", "force", "resistance", *beside]
     )
     # No data is lost.
     assert {"position [1]", "velocity [1/s]", "reading [" + ("1]" if load == "coupon" else "Pa]")} <= set(
-        as_csv(ran.found).splitlines()[0].split(",")
+        as_csv(ran.data).splitlines()[0].split(",")
     )
     svg = write_run(ran, tmp_path, "A coupon", "").with_suffix(".svg").read_text(encoding="utf-8")
     assert svg.count("<!-- strain (%) -->") == 2
@@ -348,16 +356,16 @@ def test_a_coupon_has_no_position_on_its_page_and_each_number_once(
 def test_a_moving_load_has_its_position_on_its_page_and_a_reading_that_differs(
     values: dict[str, str], beside: set[str]
 ) -> None:
-    found = run_open(Asked(dt=0.01, values=values, inputs={"voltage": "5V:1s"})).found
+    found = run_open(RunRequest(dt=0.01, values=values, inputs={"voltage": "5V:1s"})).data
     rows = {row[0] for row in summary_rows(found)}
     assert {"position", "velocity", "strain"} <= rows
     assert {"reading"} & rows == beside
 
 
 def test_a_stop_and_a_slack_wire_are_told() -> None:
-    told = " ".join(conclusions(run_open(Asked(dt=0.01, inputs={"voltage": "9V:5s,0V:5s"}))))
+    told = " ".join(conclusions(run_open(RunRequest(dt=0.01, inputs={"voltage": "9V:5s,0V:5s"}))))
     assert "It runs into its upper stop, first 1.8" in told
     assert "The wire goes slack, first 1.8" in told
-    told = " ".join(conclusions(run_open(Asked(dt=0.01, inputs={"voltage": "5V:5s"}))))
+    told = " ".join(conclusions(run_open(RunRequest(dt=0.01, inputs={"voltage": "5V:5s"}))))
     assert "stop" not in told
     assert "slack" not in told

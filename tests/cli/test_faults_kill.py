@@ -38,7 +38,7 @@ COMMANDS = {
     "identify": "identify {bench} --starts 2",
     "close-loop": "close-loop {bench}",
     "figures": "figures M9 M18 --fast --no-open",
-    "sweep": "sweep --controllers pid,vsc2 --points 2 --set-points 20 --gain-shares 1 --seconds 1 --no-open",
+    "sweep": "sweep --controllers pid,vsc2 --points 2 --set-points 20 --gain-ratios 1 --seconds 1 --no-open",
     "tune": "tune pid --fast --set-points 20 --starts 1 --rounds 2 --seconds 1 --no-open",
 }
 BRIEF = ("identify", "figures")  # in the fast setting; the three others take too long for it

@@ -1,4 +1,4 @@
-"""The search without slopes: it comes to the least of the largest, keeps limits, and goes on without running anything again."""
+"""CMA-ES without gradients: it comes to the least of the largest, keeps limits, and goes on without running anything again."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from smajax.control.tune import cma_es as module
-from smajax.control.tune.cma_es import POPULATION, Evolution, evolve, load
+from smajax.control.tune.cma_es import POPULATION, CmaEsState, SearchTask, evolve, load
 from smajax.control.tune.objective import Goal
-from smajax.control.tune.scenarios import Members, tuned_on
+from smajax.control.tune.scenarios import Scenarios, tuned_on
 from smajax.control.tune.terms import TERMS
 
 COLUMNS = list(TERMS)
-MEMBERS = tuned_on([0.0, 30.0], {}, 0)
+SCENARIOS = tuned_on([0.0, 30.0], {}, 0)
 START = np.asarray([0.9, 0.2])
 
 
@@ -26,28 +26,28 @@ class Kinks:
     def __init__(self) -> None:
         self.simulations = 0
 
-    def held(self, points: np.ndarray) -> np.ndarray:
+    def rounded(self, points: np.ndarray) -> np.ndarray:
         return points.round(6)
 
-    def judged(self, points: np.ndarray, members: Members) -> Any:
+    def evaluate(self, points: np.ndarray, scenarios: Scenarios) -> Any:
         x, y = points.T
-        self.simulations += len(points) * members.size
+        self.simulations += len(points) * scenarios.size
         seen = np.zeros((len(points), 2, len(COLUMNS)))
         bowl = 1.0 + 3.0 * (y - 0.6) ** 2
         seen[:, :, COLUMNS.index("settling_time")] = np.stack([bowl + 20 * (x - 0.4), bowl - 5 * (x - 0.4)], axis=1)
         seen[:, :, COLUMNS.index("overshoot")] = 2.0 * y[:, None]
-        return SimpleNamespace(judged=seen)
+        return SimpleNamespace(exact=seen)
 
 
-def searched(goal: Goal, generations: int = 30, **given: Any) -> tuple[Evolution, Kinks]:
+def searched(goal: Goal, generations: int = 30, **given: Any) -> tuple[CmaEsState, Kinks]:
     rig: Any = Kinks()
-    return evolve(rig, goal, MEMBERS, START, generations=generations, seed=3, **given), rig
+    return evolve(SearchTask(rig, goal, SCENARIOS), START, generations=generations, seed=3, **given), rig
 
 
 def test_the_least_of_the_largest_is_found_where_slopes_jump() -> None:
     found, rig = searched(Goal(weights={"settling_time": 1.0}))
     np.testing.assert_allclose(found.best, [0.4, 0.6], atol=0.01)
-    assert rig.simulations == found.ran[-1] == 30 * POPULATION * MEMBERS.size
+    assert rig.simulations == found.ran[-1] == 30 * POPULATION * SCENARIOS.size
 
 
 def test_a_limit_comes_before_the_cost() -> None:
@@ -61,16 +61,16 @@ def test_what_was_seen_is_not_run_again_and_the_end_is_the_same(tmp_path: Path) 
     whole, _ = searched(goal)
     searched(goal, 12)[0].save(tmp_path / "finish.npz")
     kept: list[int] = []
-    found, rig = searched(goal, known=load(tmp_path / "finish.npz"), keep=lambda state: kept.append(state.generations))
+    found, rig = searched(goal, known=load(tmp_path / "finish.npz"), save=lambda state: kept.append(state.generations))
     np.testing.assert_array_equal(found.points, whole.points)
     np.testing.assert_array_equal(found.ran, whole.ran)
     assert kept == list(range(13, 31))
-    assert rig.simulations == 30 * POPULATION * MEMBERS.size
+    assert rig.simulations == 30 * POPULATION * SCENARIOS.size
 
 
 def test_what_was_seen_from_another_start_is_of_no_use() -> None:
     goal = Goal(weights={"settling_time": 1.0})
-    other = Evolution.none(START + 0.01).after(
+    other = CmaEsState.none(START + 0.01).after(
         np.full((POPULATION, 2), 0.4), np.zeros(POPULATION), np.zeros(POPULATION), 7
     )
     np.testing.assert_array_equal(searched(goal, 3, known=other)[0].points, searched(goal, 3)[0].points)
@@ -96,14 +96,14 @@ def test_a_search_at_rest_begins_anew_around_the_best(monkeypatch: pytest.Monkey
 
 
 def test_loops_whose_numbers_are_none_come_last(monkeypatch: pytest.MonkeyPatch) -> None:
-    judged = Kinks.judged
+    evaluate = Kinks.evaluate
 
-    def lost(self: Kinks, points: np.ndarray, members: Members) -> Any:
-        seen = judged(self, points, members)
-        seen.judged[points[:, 0] > 0.8] = np.nan
+    def lost(self: Kinks, points: np.ndarray, scenarios: Scenarios) -> Any:
+        seen = evaluate(self, points, scenarios)
+        seen.exact[points[:, 0] > 0.8] = np.nan
         return seen
 
-    monkeypatch.setattr(Kinks, "judged", lost)
+    monkeypatch.setattr(Kinks, "evaluate", lost)
     found, _ = searched(Goal(weights={"settling_time": 1.0}))
     np.testing.assert_allclose(found.best, [0.4, 0.6], atol=0.01)
 

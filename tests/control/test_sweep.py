@@ -1,4 +1,4 @@
-"""The sweep: its lanes are single closed loops, its folder is whole, and what is finished is not computed again."""
+"""The sweep: its runs are single closed loops, its folder is whole, and what is finished is not computed again."""
 
 from __future__ import annotations
 
@@ -21,25 +21,31 @@ from smajax.control.interface import Interface
 from smajax.control.measured_state import Sensor
 from smajax.control.presets import CONTROLLERS
 from smajax.control.reference import clock, constant
-from smajax.control.sweep import Grid, closed_loops, lanes, ratios
+from smajax.control.sweep.batched_loops import LoopSetup, closed_loops
+from smajax.control.sweep.grid import Grid, loop_rows, sweep_ratios
+from smajax.control.sweep.run_sweep import SweepSettings, may_resume, sweep_controllers
 from smajax.core.parameters import get_parameters, set_parameters
-from smajax.core.progress import quiet
 from smajax.model.rigs import arm
-from smajax.report.sweep_folder import SweepSettings, goes_on, run_sweep
+from smajax.model.system import System
+from smajax.report.sweep_folder import write_sweep
 from tests.helpers.in_browser import HOSTILE, faults
 
 RATIOS = ("payload_ratio", "supply_ratio")
 SETTINGS = SweepSettings(("vsc3",), "payload", "supply", 2, (0.0, 30.0), (1.0,), seconds=3.0)
 
 
+def run_sweep(system: System, settings: SweepSettings, out: Path, command: str = "") -> None:
+    write_sweep(system, settings, sweep_controllers(system, settings, out), out, command=command)
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("sweep")
-    run_sweep(arm(), SETTINGS, out, quiet, f"smajax sweep --out {HOSTILE}")
+    run_sweep(arm(), SETTINGS, out, f"smajax sweep --out {HOSTILE}")
     return out
 
 
-def test_a_lane_is_the_single_loop_of_that_plant(folder: Path) -> None:
+def test_a_run_is_the_single_loop_of_that_plant(folder: Path) -> None:
     with (folder / "vsc3.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == 2 * 2 * 2
@@ -61,7 +67,7 @@ def test_the_folder_is_whole(folder: Path) -> None:
     page = (folder / "index.html").read_text(encoding="utf-8")
     assert page.count('src="data:image/png;base64,') == page.count('srcset="data:image/png;base64,') == 3
     assert 'href="vsc3.csv"' in page
-    assert "Ambient: 0.5 to 2 times the 20 °C believed is air that is -10 to +20 K off." in page
+    assert "Ambient: 0.5 to 2 times the assumed 20 °C is an error of -10 to +20 K." in page
     for name in ("comparison.png", "vsc3_maps.png", "vsc3_lines.png", "vsc3.csv"):
         assert (folder / name).stat().st_size > 300
     record = json.loads((folder / "sweep.json").read_text(encoding="utf-8"))
@@ -88,7 +94,7 @@ def test_the_data_set_holds_every_row(folder: Path) -> None:
 def test_one_mismatch_alone_is_swept_as_a_curve(tmp_path: Path, folder: Path, browser: Any) -> None:
     """Its loops are those of the map where the other mismatch is 1."""
     alone = dataclasses.replace(SETTINGS, second="", points=3)
-    run_sweep(arm(), alone, tmp_path, quiet, f"smajax sweep {HOSTILE}")
+    run_sweep(arm(), alone, tmp_path, f"smajax sweep {HOSTILE}")
     with (tmp_path / "vsc3.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert [(row["payload_ratio"], row["set_point_deg"]) for row in rows] == [
@@ -116,38 +122,38 @@ def test_the_page_in_a_browser(folder: Path, browser: Any) -> None:
     assert faults(browser, folder / "index.html") == []
 
 
-def test_what_is_finished_is_kept(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_finished_is_cached(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     before = (folder / "vsc3.csv").read_bytes()
 
     def never(*_: object, **__: object) -> None:
         raise AssertionError("computed again")
 
-    monkeypatch.setattr("smajax.report.sweep_folder.closed_loops", never)
-    run_sweep(arm(), SETTINGS, folder, quiet)
+    monkeypatch.setattr("smajax.control.sweep.run_sweep.closed_loops", never)
+    run_sweep(arm(), SETTINGS, folder)
     assert (folder / "vsc3.csv").read_bytes() == before
     other = SweepSettings(("vsc3",), "payload", "supply", 2, (0.0, 31.0), (1.0,), seconds=3.0)
     with pytest.raises(AssertionError, match="computed again"):
-        run_sweep(arm(), other, folder, quiet)
+        run_sweep(arm(), other, folder)
     # Another law is another plant, though every parameter is the same.
     with pytest.raises(AssertionError, match="computed again"):
-        run_sweep(arm("liang"), SETTINGS, folder, quiet)
+        run_sweep(arm("liang"), SETTINGS, folder)
 
 
-def test_unknown_names_are_answered_with_those_there_are(tmp_path: Path) -> None:
+def test_unknown_names_list_close_matches(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="backstepping2"):
-        run_sweep(arm(), SweepSettings(("vsc4",)), tmp_path, quiet)
+        run_sweep(arm(), SweepSettings(("vsc4",)), tmp_path)
     with pytest.raises(ValueError, match="printed"):
-        run_sweep(arm(), dataclasses.replace(SETTINGS, filtered="kalman"), tmp_path, quiet)
+        run_sweep(arm(), dataclasses.replace(SETTINGS, estimator="kalman"), tmp_path)
     for pair in (("payload", "wind"), ("payload", "payload"), ("", ""), ("wind", "")):
         with pytest.raises(ValueError, match="convection"):
-            Grid(*pair, ratios(3), np.zeros(1), np.ones(1))
+            Grid(*pair, sweep_ratios(3), np.zeros(1), np.ones(1))
     with pytest.raises(ValueError, match="convection"):
-        lanes({"wind": 1.2}, 0.0)
+        loop_rows({"wind": 1.2}, 0.0)
 
 
-def test_an_odd_grid_has_the_plant_as_believed_in_it() -> None:
-    assert np.min(np.abs(ratios(15) - 1.0)) < 1e-12
-    assert ratios(15)[[0, -1]] == pytest.approx([0.5, 2.0])
+def test_an_odd_grid_has_the_unperturbed_plant_in_it() -> None:
+    assert np.min(np.abs(sweep_ratios(15) - 1.0)) < 1e-12
+    assert sweep_ratios(15)[[0, -1]] == pytest.approx([0.5, 2.0])
 
 
 @pytest.mark.parametrize("name", sorted(CONTROLLERS))
@@ -157,13 +163,14 @@ def test_every_controller_has_its_main_gain(name: str) -> None:
 
 
 def test_noise_sample_time_and_delay_reach_the_loop() -> None:
-    """A lane with all three is the single loop with them; a period that is no whole number of steps is answered."""
+    """A run with all three is the single loop with them; a period that is no whole number of steps is answered."""
     system, every = arm(), 2
     controller, gain = CONTROLLERS["vsc3"].make(system), CONTROLLERS["vsc3"].main_gain
-    rows, sensor = lanes({}, 0.3), Sensor(noise_sigma=0.01)
+    rows, sensor = loop_rows({}, 0.3), Sensor(noise_sigma=0.01)
     between = Interface(None, sensor, every, 3)
-    found = closed_loops(system, controller, gain, rows, seconds=2.0, interface=between, seed=5).merits
-    plain = closed_loops(system, controller, gain, rows, seconds=2.0).merits
+    setup = LoopSetup(system, controller, gain, seconds=2.0)
+    found = closed_loops(dataclasses.replace(setup, interface=between, seed=5), rows).merits
+    plain = closed_loops(setup, rows).merits
     key = jax.random.fold_in(jax.random.key(5), 0)
     wanted = constant(clock(2.0, 0.01), 0.3)
     loop = eqx.filter_jit(simulate_closed_loop)(
@@ -180,14 +187,14 @@ def test_noise_sample_time_and_delay_reach_the_loop() -> None:
 
 def test_a_period_between_two_steps_is_answered(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="whole number"):
-        run_sweep(arm(), dataclasses.replace(SETTINGS, period=0.015), tmp_path, quiet)
+        run_sweep(arm(), dataclasses.replace(SETTINGS, period=0.015), tmp_path)
 
 
 def test_only_controllers_may_be_added_to_a_folder() -> None:
     before = SETTINGS.record()
     assert json.loads(json.dumps(before)) == before
-    assert goes_on(before, dataclasses.replace(SETTINGS, controllers=("pid", "vsc3")).record())
-    assert not goes_on(before, dataclasses.replace(SETTINGS, controllers=("pid",)).record())
-    assert not goes_on(before, dataclasses.replace(SETTINGS, seconds=4.0).record())
+    assert may_resume(before, dataclasses.replace(SETTINGS, controllers=("pid", "vsc3")).record())
+    assert not may_resume(before, dataclasses.replace(SETTINGS, controllers=("pid",)).record())
+    assert not may_resume(before, dataclasses.replace(SETTINGS, seconds=4.0).record())
     tuned = (Gains("vsc3", {"boundary": 0.1}),)
-    assert not goes_on(before, dataclasses.replace(SETTINGS, tuned=tuned).record())
+    assert not may_resume(before, dataclasses.replace(SETTINGS, tuned=tuned).record())

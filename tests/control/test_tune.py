@@ -26,27 +26,32 @@ from smajax.control.gain_search import regulation_cost
 from smajax.control.gains_file import GainsFileError, read_gains
 from smajax.control.presets import CONTROLLERS
 from smajax.control.reference import resting
-from smajax.control.sweep import closed_loops, lanes
+from smajax.control.sweep.batched_loops import LoopSetup, closed_loops
+from smajax.control.sweep.grid import loop_rows
+from smajax.control.sweep.run_sweep import SweepSettings, sweep_controllers
 from smajax.control.tune import trust
-from smajax.control.tune.cma_es import Evolution
-from smajax.control.tune.evaluate import STEP, Rig
+from smajax.control.tune.cma_es import CmaEsState
+from smajax.control.tune.evaluate import STEP, TuningProblem
 from smajax.control.tune.moves import walk
-from smajax.control.tune.multistart import Descent, Effort, begin, load, one_round
-from smajax.control.tune.objective import Goal, rank, value_and_slope
-from smajax.control.tune.scenarios import between, never_seen, tuned_on
+from smajax.control.tune.multistart import Effort, MultistartState, begin, load, next_round
+from smajax.control.tune.objective import Goal, rank, value_and_gradient
+from smajax.control.tune.scenarios import between, held_out, tuned_on
 from smajax.control.tune.settings import TuneSettings
 from smajax.control.tune.terms import TERMS
+from smajax.control.tune.tuning_folder import FILES, tune_in_folder
 from smajax.core.display_units import digits
 from smajax.core.parameters import get_parameters, parameters
 from smajax.core.progress import Event
 from smajax.model.rigs import arm
-from smajax.report.sweep_folder import SweepSettings, run_sweep
-from smajax.report.tune_folder import OURS, ended, tune_into
+from smajax.model.system import System
+from smajax.report.sweep_folder import write_sweep
+from smajax.report.tune_folder import finished as ended
+from smajax.report.tune_folder import write_tuning
 from smajax.report.tune_page import met, price
 from tests.helpers.in_browser import HOSTILE, faults
 
 SECONDS, ROWS = 3.0, 10  # as the sweep of test_sweep.py: programs are compiled once
-MEMBERS = tuned_on([0.0, 30.0], {"damping": 0.2}, 0)
+SCENARIOS = tuned_on([0.0, 30.0], {"damping": 0.2}, 0)
 # The preset's loops swing on for a while, and a swing multiplies differences.
 CALM = {"high_voltage": 9.0, "low_voltage": 3.0, "surface_slope": 3.0, "boundary": 1.0}
 COMMAND = f"smajax tune --out {HOSTILE}"  # what somebody typed
@@ -64,13 +69,17 @@ SETTINGS = TuneSettings(
 )
 
 
+def tune_into(system: System, settings: TuneSettings, out: Path, command: str = "") -> None:
+    write_tuning(tune_in_folder(system, settings, out), out, command)
+
+
 def silent(event: Event) -> None:
     """Progress that is shown to no one."""
 
 
 @pytest.fixture(scope="module")
-def surface() -> Rig:
-    return Rig(CONTROLLERS["vsc3"], arm(), seconds=SECONDS, loops=16)
+def surface() -> TuningProblem:
+    return TuningProblem(CONTROLLERS["vsc3"], arm(), seconds=SECONDS, loops=16)
 
 
 @pytest.fixture(scope="module")
@@ -80,45 +89,45 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-def slopes_are_those_of_differences(rig: Rig, point: np.ndarray) -> None:
+def slopes_are_those_of_differences(rig: TuningProblem, point: np.ndarray) -> None:
     step = 1e-6
-    exact = rig.sloped(point[None], MEMBERS, 0.2)
+    exact = rig.evaluate_gradients(point[None], SCENARIOS, 0.2)
     moved = np.concatenate([point + step * np.eye(len(point)), point - step * np.eye(len(point))])
-    terms = rig.sloped(moved, MEMBERS, 0.2).terms
+    terms = rig.evaluate_gradients(moved, SCENARIOS, 0.2).terms
     ahead, behind = np.split(terms, 2)
     differences = np.moveaxis((ahead - behind) / (2.0 * step), 0, -1)
     scale = np.abs(differences).max(axis=(0, 2), keepdims=True) + 1e-3
     assert np.abs(differences).max() > 1.0
-    np.testing.assert_allclose(exact.slopes[0] / scale, differences / scale, atol=2e-3)
+    np.testing.assert_allclose(exact.gradients[0] / scale, differences / scale, atol=2e-3)
 
 
-def test_slopes_of_every_term_are_those_of_differences(surface: Rig) -> None:
+def test_slopes_of_every_term_are_those_of_differences(surface: TuningProblem) -> None:
     slopes_are_those_of_differences(surface, surface.point(CALM))
 
 
 @pytest.mark.slow
 def test_slopes_of_a_controller_with_an_integral_are_those_of_differences() -> None:
-    rig = Rig(CONTROLLERS["pid"], arm(), seconds=SECONDS, loops=8 * 6)
+    rig = TuningProblem(CONTROLLERS["pid"], arm(), seconds=SECONDS, loops=8 * 6)
     slopes_are_those_of_differences(rig, rig.before - 0.03)
 
 
-def test_the_judged_terms_are_the_figures_of_merit(surface: Rig) -> None:
+def test_the_judged_terms_are_the_figures_of_merit(surface: TuningProblem) -> None:
     """The cost that is judged is the one of the searches in studies/gains, on the loops that a sweep runs."""
-    seen = surface.judged(surface.before[None], MEMBERS, STEP)
-    rows = np.column_stack([MEMBERS.rows, np.ones(MEMBERS.size)])
-    rows = rows[np.minimum(np.arange(ROWS), MEMBERS.size - 1)]
-    swept = closed_loops(surface.system, surface.controller, surface.preset.main_gain, rows, seconds=SECONDS).merits
+    seen = surface.evaluate(surface.before[None], SCENARIOS, STEP)
+    rows = np.column_stack([SCENARIOS.rows, np.ones(SCENARIOS.size)])
+    rows = rows[np.minimum(np.arange(ROWS), SCENARIOS.size - 1)]
+    swept = closed_loops(LoopSetup(surface.system, surface.controller, surface.preset.main_gain, SECONDS), rows).merits
     for field in dataclasses.fields(swept):
         np.testing.assert_allclose(
             np.asarray(getattr(seen.merits, field.name))[0],
-            getattr(swept, field.name)[: MEMBERS.size],
+            getattr(swept, field.name)[: SCENARIOS.size],
             rtol=1e-6,
             atol=1e-7,
         )
-    expected = np.asarray([float(regulation_cost(_one(swept, k), SECONDS)) for k in range(MEMBERS.size)])
-    assert Goal("worst").cost(seen.judged, MEMBERS)[0] == pytest.approx(expected.max(), rel=1e-6)
-    believed = expected[MEMBERS.nominal].mean()
-    assert Goal("nominal").cost(seen.judged, MEMBERS)[0] == pytest.approx(believed, rel=1e-6)
+    expected = np.asarray([float(regulation_cost(_one(swept, k), SECONDS)) for k in range(SCENARIOS.size)])
+    assert Goal("worst").cost(seen.exact, SCENARIOS)[0] == pytest.approx(expected.max(), rel=1e-6)
+    believed = expected[SCENARIOS.nominal].mean()
+    assert Goal("nominal").cost(seen.exact, SCENARIOS)[0] == pytest.approx(believed, rel=1e-6)
 
 
 def _one(merits: Merit, k: int) -> Merit:
@@ -129,33 +138,35 @@ def _one(merits: Merit, k: int) -> Merit:
 
 
 @pytest.mark.parametrize("objective", ["nominal", "worst", "mean-variance"])
-def test_the_slope_of_the_objective_is_that_of_differences(surface: Rig, objective: str) -> None:
+def test_the_slope_of_the_objective_is_that_of_differences(surface: TuningProblem, objective: str) -> None:
     """Through the augmented Lagrangian too: a limit with a multiplier."""
     goal = Goal(objective, limits={"overshoot": 0.5})
-    seen = surface.sloped(surface.point(CALM)[None], MEMBERS, 0.2)
-    given = (np.asarray([0.3]), np.full((1, MEMBERS.size, 1), 0.7), np.asarray([4.0]))
-    _, slope = value_and_slope(goal, seen, MEMBERS, *given)
+    seen = surface.evaluate_gradients(surface.point(CALM)[None], SCENARIOS, 0.2)
+    given = (np.asarray([0.3]), np.full((1, SCENARIOS.size, 1), 0.7), np.asarray([4.0]))
+    _, slope = value_and_gradient(goal, seen, SCENARIOS, *given)
     step = 1e-6
     for k in range(len(surface.names)):
         ends = [
-            value_and_slope(goal, seen._replace(terms=seen.terms + sign * step * seen.slopes[..., k]), MEMBERS, *given)
+            value_and_gradient(
+                goal, seen._replace(terms=seen.terms + sign * step * seen.gradients[..., k]), SCENARIOS, *given
+            )
             for sign in (1.0, -1.0)
         ]
         assert slope[0, k] == pytest.approx(float(ends[0][0][0] - ends[1][0][0]) / (2 * step), rel=1e-4, abs=1e-6)
 
 
 @pytest.mark.parametrize("by", ["trust-region", "adam"])
-def test_a_bad_start_is_improved(surface: Rig, by: str) -> None:
+def test_a_bad_start_is_improved(surface: TuningProblem, by: str) -> None:
     goal, effort = Goal("worst"), Effort(0, 1, 6, by=by)
     bad = surface.point({"high_voltage": 9.0, "low_voltage": 1.0, "surface_slope": 1.5, "boundary": 1.0})
-    now = begin(surface, goal, MEMBERS, effort, bad)
+    now = begin(surface, goal, SCENARIOS, effort, bad)
     while not now.ended:
-        now = one_round(surface, goal, MEMBERS, effort, now)
+        now = next_round(surface, goal, SCENARIOS, effort, now)
     first = now.costs[0, 0]
     assert now.best_rank[0] < 0.8 * first
     # What is kept is what is judged.
-    again = surface.judged(now.best, MEMBERS, STEP).judged
-    assert rank(goal.cost(again, MEMBERS), goal.excess(again))[0] == pytest.approx(now.best_rank[0], rel=1e-6)
+    again = surface.evaluate(now.best, SCENARIOS, STEP).exact
+    assert rank(goal.cost(again, SCENARIOS), goal.excess(again))[0] == pytest.approx(now.best_rank[0], rel=1e-6)
 
 
 def test_a_linear_program_finds_the_least_of_the_largest() -> None:
@@ -210,7 +221,7 @@ def test_the_folder_is_whole(folder: Path) -> None:
 
 
 def test_a_share_of_the_airs_temperature_is_told_in_kelvins() -> None:
-    told = TuneSettings("vsc3", (0.0,), {"damping": 0.2, "ambient": 0.2}).plants_in_words(20.0)
+    told = TuneSettings("vsc3", (0.0,), {"damping": 0.2, "ambient": 0.2}).plants_sentence(20.0)
     assert "damping ±20 %, ambient ±4 K at once" in told
 
 
@@ -222,7 +233,7 @@ def test_moves_from_one_set_point_to_another_are_tried_and_told(folder: Path) ->
     assert moves["set_points_deg"] == [0.0, 30.0]
     assert [len(moves[when]["overshoot_deg"]) for when in ("before", "after")] == [1, 1]
     # The same walk as `simulate` would run it.
-    rig = Rig(CONTROLLERS["vsc3"], arm(), seconds=SECONDS, loops=16)
+    rig = TuningProblem(CONTROLLERS["vsc3"], arm(), seconds=SECONDS, loops=16)
     gains = read_gains(folder / "gains.json", arm()).put(rig.system)
     wanted = resting(jnp.asarray(np.radians(np.repeat([0.0, 30.0], [600, 601]))))
     loop = simulate_closed_loop(rig.system, gains, wanted, 0.005, every=2)
@@ -236,9 +247,9 @@ def test_moves_from_one_set_point_to_another_are_tried_and_told(folder: Path) ->
 
 def test_a_tuning_at_one_set_point_is_checked_at_another() -> None:
     for angle, other in ((20.0, 15.0), (-40.0, -35.0), (85.0, 80.0)):
-        checks = never_seen([angle], {}, 4, 0)
+        checks = held_out([angle], {}, 4, 0)
         assert np.degrees(checks["inside"].targets) == pytest.approx([other])
-        told = dataclasses.replace(SETTINGS, set_points=(angle,), variation={}).unseen_in_words()
+        told = dataclasses.replace(SETTINGS, set_points=(angle,), variation={}).held_out_sentence()
         assert told == "a set point 5° beside, the plant as believed"
 
 
@@ -252,7 +263,7 @@ def test_what_the_gains_cost_is_said_with_both_numbers() -> None:
 
     def tuned(after: int) -> Any:
         seen = SimpleNamespace(
-            judged=judged[[0, after]], merits=SimpleNamespace(switches_per_second=switches[[0, after]])
+            exact=judged[[0, after]], merits=SimpleNamespace(switches_per_second=switches[[0, after]])
         )
         return SimpleNamespace(checks={"tuned on": SimpleNamespace(seen=seen)})
 
@@ -288,7 +299,8 @@ def test_the_page_in_a_browser(folder: Path, browser: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    ("state", "count", "finished"), [(Descent, "round", 0), (Descent, "round", 2), (Evolution, "generations", 2)]
+    ("state", "count", "finished"),
+    [(MultistartState, "round", 0), (MultistartState, "round", 2), (CmaEsState, "generations", 2)],
 )
 def test_a_tuning_goes_on_to_the_same_end(
     folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, state: Any, count: str, finished: int
@@ -326,13 +338,13 @@ def test_a_sweep_reads_the_gains(folder: Path, tmp_path: Path) -> None:
     np.testing.assert_array_equal(get_parameters(tuned, names), [written[name]["value"] for name in names])
     assert {name: written[name]["unit"] for name in names} == {name: parameters(tuned)[name].unit for name in names}
     settings = SweepSettings(("vsc3",), "payload", "supply", 2, (0.0, 30.0), (1.0,), seconds=SECONDS, tuned=(gains,))
-    run_sweep(arm(), settings, tmp_path, silent)
+    write_sweep(arm(), settings, sweep_controllers(arm(), settings, progress=silent), tmp_path)
     record = json.loads((tmp_path / "sweep.json").read_text(encoding="utf-8"))
     assert "gains from a file" in record["between"]
-    rows = lanes({}, np.radians([0.0, 30.0] * (ROWS // 2)))
+    rows = loop_rows({}, np.radians([0.0, 30.0] * (ROWS // 2)))
     energy = record["controllers"]["vsc3"]["energy"]
     for controller, same in ((tuned, True), (CONTROLLERS["vsc3"].make(arm()), False)):
-        own = closed_loops(arm(), controller, "surface_slope", rows, seconds=SECONDS).merits.energy[:2]
+        own = closed_loops(LoopSetup(arm(), controller, "surface_slope", SECONDS), rows).merits.energy[:2]
         assert (energy == pytest.approx(np.asarray(own).tolist(), rel=1e-6)) is same
 
 
@@ -372,7 +384,7 @@ def test_a_wrong_gains_file_is_answered(text: str, told: str, tmp_path: Path) ->
         ({"by": "adma"}, "did you mean 'adam'"),
         ({"finish": -1}, "none or more"),
         ({"period": 0.015}, "whole number"),
-        ({"filtered": "kalman"}, "printed"),
+        ({"estimator": "kalman"}, "printed"),
         ({"start": {"boundary": 1.0}}, "surface_slope"),
         ({"seconds": 4.005}, "whole number of control periods"),
     ],
@@ -388,7 +400,7 @@ def test_a_folder_that_holds_something_else_is_refused(folder: Path, tmp_path: P
     with pytest.raises(ValueError, match=r"something else \(thesis.tex\)"):
         tune_into(arm(), SETTINGS, tmp_path)
     assert [one.name for one in tmp_path.iterdir()] == ["thesis.tex"]
-    with pytest.raises(ValueError, match=r"seconds: 3.0 there, 5.0 asked"):
+    with pytest.raises(ValueError, match=r"seconds: 3.0 there, 5.0 requested"):
         tune_into(arm(), dataclasses.replace(SETTINGS, seconds=5.0), folder)
 
 
@@ -397,7 +409,7 @@ def test_a_tuning_that_is_finished_is_told_again_without_a_loop(
 ) -> None:
     out = tmp_path / "again"
     shutil.copytree(folder, out)
-    mark = {"command": "tune", "asked": {"tuning": "vsc3"}, "files": sorted(OURS)}
+    mark = {"command": "tune", "asked": {"tuning": "vsc3"}, "files": sorted(FILES)}
     (out / MARK).write_text(json.dumps(mark))
     before = {one.name: one.read_bytes() for one in out.iterdir()}
     told = json.loads(before["tune.json"])
@@ -405,8 +417,8 @@ def test_a_tuning_that_is_finished_is_told_again_without_a_loop(
     def never(*_: object, **__: object) -> None:
         raise AssertionError("computed again")
 
-    monkeypatch.setattr("smajax.control.tune.settings.TuneSettings", lambda *_: SETTINGS)
-    monkeypatch.setattr("smajax.report.tune_folder.tune", never)
+    monkeypatch.setattr("smajax.control.tune.settings.TuneSettings", lambda *_, **__: SETTINGS)
+    monkeypatch.setattr("smajax.control.tune.tuning_folder.tune", never)
     monkeypatch.setattr("smajax.core.runtime.prepare", lambda **_: None)  # JAX has begun already
     again = CliRunner().invoke(app, ["tune", "vsc3", "--out", str(out)])
     assert again.exit_code == (0 if told["limits_met"] else UNMET), again.output
@@ -436,7 +448,7 @@ def test_a_tuning_of_which_something_is_lost_or_edited_is_worked_out_again(
     else:
         (out / name).unlink()
     assert ended(arm(), SETTINGS, out) is None
-    with pytest.raises(ValueError, match=r"seconds: 3.0 there, 5.0 asked"):
+    with pytest.raises(ValueError, match=r"seconds: 3.0 there, 5.0 requested"):
         ended(arm(), dataclasses.replace(SETTINGS, seconds=5.0), out)
 
 
@@ -453,7 +465,7 @@ def test_what_is_checked_was_not_tuned_on() -> None:
     tuned = tuned_on([0.0, 30.0, 50.0], varied, 0)
     assert tuned.size == 3 * (1 + 4)
     assert int(tuned.nominal.sum()) == 3
-    checks = never_seen([0.0, 30.0, 50.0], varied, 8, 0)
+    checks = held_out([0.0, 30.0, 50.0], varied, 8, 0)
     seen = {tuple(row) for row in tuned.rows}
     for check in checks.values():
         assert not seen & {tuple(row) for row in check.rows}

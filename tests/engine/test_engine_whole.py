@@ -10,7 +10,7 @@ import pytest
 
 from smajax.control.presets import CONTROLLERS
 from smajax.control.tune import evaluate
-from smajax.control.tune.evaluate import STEP, Rig
+from smajax.control.tune.evaluate import STEP, TuningProblem
 from smajax.control.tune.scenarios import tuned_on
 from smajax.core.parameters import get_parameters, parameters, set_parameters
 from smajax.model.effects.library import LIBRARY
@@ -23,7 +23,7 @@ from tests.engine.test_engine import same_batch
 from tests.model.test_every_effect import RIGS, _rig
 
 pytestmark = pytest.mark.slow
-MEMBERS, SAMPLES, DT = 37, 120, 0.05  # members fill no vector and no group of vectors
+SCENARIOS, SAMPLES, DT = 37, 120, 0.05  # members fill no vector and no group of vectors
 KEEP = ("reading", "temperature", "martensite_fraction", "stress")
 
 
@@ -38,7 +38,7 @@ def both(rig: str, effects: tuple[str, ...], tolerance: float | None) -> tuple[A
     full = set_parameters(full, {name: value for name, value in starts.items() if name in table})
     command = top * np.concatenate([np.ones(SAMPLES // 2), np.full(SAMPLES // 4, 0.6), np.zeros(SAMPLES // 4)])
     middle = float(get_parameters(full, ["convection_coefficient"])[0])
-    axes = sampled(MEMBERS, convection_coefficient=(0.7 * middle, 1.3 * middle), seed=3)
+    axes = sampled(SCENARIOS, convection_coefficient=(0.7 * middle, 1.3 * middle), seed=3)
     inputs = {channel: jnp.asarray(command)}
     return (
         run_batch(full, inputs, axes, dt=DT, keep=KEEP, tolerance=tolerance, engine="native"),
@@ -64,17 +64,17 @@ def test_steps_of_their_own_are_those_of_xla(rig: str) -> None:
 @pytest.mark.parametrize("controller", sorted(CONTROLLERS))
 def test_every_controller_in_its_loop_is_that_of_xla(controller: str, monkeypatch: pytest.MonkeyPatch) -> None:
     members = tuned_on([0.0, 30.0], {"damping": 0.2, "convection": 0.1}, 0)
-    rig = Rig(CONTROLLERS[controller], arm(), seconds=2.0, loops=16)
+    rig = TuningProblem(CONTROLLERS[controller], arm(), seconds=2.0, loops=16)
     points = rig.before + np.asarray([[0.0], [-0.02], [0.03]])
-    ours = rig.judged(np.clip(points, 0.0, 1.0), members, STEP)
+    ours = rig.evaluate(np.clip(points, 0.0, 1.0), members, STEP)
 
     def by_xla(function: Any, model: Any, axes: Any, size: int, wanted: Any) -> Any:
         return chunks(function, model, axes, size, wanted, engine="xla")
 
     monkeypatch.setattr(evaluate, "chunks", by_xla)
-    theirs = rig.judged(np.clip(points, 0.0, 1.0), members, STEP)
-    scale = np.abs(theirs.judged).max(axis=(0, 1)) + 1e-3
+    theirs = rig.evaluate(np.clip(points, 0.0, 1.0), members, STEP)
+    scale = np.abs(theirs.exact).max(axis=(0, 1)) + 1e-3
     # A loop that switches multiplies roundings: most agree to the last digits, and none is another loop.
-    off = np.abs(ours.judged - theirs.judged) / scale
+    off = np.abs(ours.exact - theirs.exact) / scale
     assert np.median(off) < 1e-9
     assert off.max() < 1e-2

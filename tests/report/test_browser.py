@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from smajax.control.run_request import Asked, AskedLoop, run_closed
+from smajax.control.run_request import LoopRequest, RunRequest, run_closed
 from smajax.core.progress import quiet
 from smajax.report.plain_page import table, whole
 from smajax.report.simulate_page import write_run
@@ -32,8 +32,8 @@ def test_the_report_of_a_closed_loop(browser: Any, tmp_path: Path) -> None:
 
 
 def test_the_page_of_a_run(browser: Any, tmp_path: Path) -> None:
-    several = AskedLoop("pid", "30deg:3s,10deg:3s", mismatch={"convection_coefficient": "120"})
-    ran = run_closed(Asked(dt=0.01), several)
+    several = LoopRequest("pid", "30deg:3s,10deg:3s", mismatch={"convection_coefficient": "120"})
+    ran = run_closed(RunRequest(dt=0.01), several)
     assert faults(browser, write_run(ran, tmp_path, HOSTILE, f"smajax simulate --out {HOSTILE}", animated=True)) == []
 
 
@@ -61,10 +61,10 @@ def test_the_page_of_figures(browser: Any, tmp_path: Path) -> None:
 
 def test_a_table_that_moves_sideways_shows_it(browser: Any, tmp_path: Path) -> None:
     """A grey edge on the side where there is more, of tables that are wider than a telephone; none at their ends."""
-    loop = AskedLoop("pid", "30deg:1s,10deg:1s")
+    loop = LoopRequest("pid", "30deg:1s,10deg:1s")
     shown = browser.new_page(viewport={"width": 400, "height": 900})
     for page in (
-        write_run(run_closed(Asked(dt=0.01), loop), tmp_path, "A run", ""),
+        write_run(run_closed(RunRequest(dt=0.01), loop), tmp_path, "A run", ""),
         write_report(made_findings(), tmp_path),
     ):
         shown.goto(page.as_uri())

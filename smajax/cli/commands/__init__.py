@@ -1,1 +1,1 @@
-"""The commands, one a file: options, words and exit codes. What a command computes lies elsewhere and is imported late."""
+"""The commands, one a file: options, what is printed, exit codes. Computation is in the other rooms, imported when needed."""

@@ -9,7 +9,8 @@ from typing import Annotated
 import typer
 
 from smajax.cli import completion
-from smajax.cli.options import UNMET, Json, Open, Overwrite, browse, console, resumable
+from smajax.cli.options import UNMET, Json, Open, Overwrite
+from smajax.cli.terminal import browse, console, resumable
 
 OWN = (".made-by", "index.html", "README.md", "figures.csv", "[MC][0-9].*", "[MC][0-9][0-9].*")
 

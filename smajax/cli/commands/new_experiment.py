@@ -1,4 +1,4 @@
-"""`smajax new-experiment`: an experiment file begun from logs."""
+"""`smajax new-experiment`: a draft of an experiment file from logs."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from smajax.cli import completion
 from smajax.cli.options import UNMET, Json
 
 
+# More than 8 parameters: typer reads the options from them.
 def new_experiment(
     files: Annotated[
         list[Path],
@@ -26,23 +27,22 @@ def new_experiment(
         ),
     ] = "",
     wire: Annotated[
-        str, typer.Option(help="of `smajax presets`; the bounds are around its values", autocompletion=completion.wires)
+        str,
+        typer.Option(help="of `smajax presets`; the bounds are around its parameters", autocompletion=completion.wires),
     ] = "",
     drive: Annotated[
         str,
-        typer.Option(
-            help="of `smajax presets`; takes the input channels that it needs", autocompletion=completion.drives
-        ),
+        typer.Option(help="of `smajax presets`; determines the input channels", autocompletion=completion.drives),
     ] = "",
     decimal: Annotated[
-        str, typer.Option(help="`,` or `.`: what stands before decimals, of logs that do not tell (`1,234`)")
+        str, typer.Option(help="`,` or `.`: the decimal mark, for logs that do not determine it (`1,234`)")
     ] = "",
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="write over a file that is there")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="replace an existing file")] = False,
     json_out: Json = False,
 ) -> None:
-    """Begin an experiment file from measured logs: guess columns, units and sampling, and say how sure each guess is.
+    """Draft an experiment file from measured logs: guess columns, units and sampling, with the certainty of each guess.
 
-    From three logs on the last one is held out. Exit code 3 when the file does not load yet; what is missing is said.
+    With three logs or more the last one is held out. Exit code 3 when the file cannot be loaded yet, with what is missing.
 
     Example:  smajax new-experiment logs/step1.csv logs/step2.csv logs/ramp.csv --out experiment.toml
     """
@@ -56,31 +56,36 @@ def new_experiment(
 
     prepare()
     from smajax.core.files import replace
-    from smajax.data.experiment.draft import begun
+    from smajax.data.experiment.draft import draft
+    from smajax.data.experiment.draft_model import ModelChoice
     from smajax.data.experiment.errors import ExperimentError
     from smajax.data.experiment.load import load_experiment
     from smajax.data.model_catalogue import CATALOGUE
 
-    guessed = begun(files, out, title, load, wire, drive, decimal)
-    replace(out, guessed.text)
+    result = draft(files, out, title, ModelChoice(load, wire, drive), decimal)
+    replace(out, result.text)
     try:
-        warnings, why = list(load_experiment(out, CATALOGUE).warnings), ""
+        warnings, reason = list(load_experiment(out, CATALOGUE).warnings), ""
     except ExperimentError as error:
-        warnings, why = [], str(error)
+        warnings, reason = [], str(error)
     if json_out:
-        typer.echo(
-            json.dumps({"file": str(out), "guessed": guessed.told, "loads": not why, "why": why, "warnings": warnings})
-        )
+        record = {
+            "file": str(out),
+            "guessed": result.messages,
+            "loads": not reason,
+            "why": reason,
+            "warnings": warnings,
+        }
+        typer.echo(json.dumps(record))
     else:
-        for line in guessed.told:
+        for line in result.messages:
             typer.echo(f"  {line}")
         for line in warnings:
             typer.echo(f"  warning: {line}")
-        if why:
-            typer.echo(f"It does not load yet: {why}")
-        typer.echo(
-            f"Written: {out.resolve()}"
-            + ("" if why else f"\nNext: look at it, then `smajax close-loop {out} --out report`")
-        )
-    if why:
+        if reason:
+            typer.echo(f"It cannot be loaded yet: {reason}")
+        typer.echo(f"Written: {out.resolve()}")
+        if not reason:
+            typer.echo(f"Next: check it, then `smajax close-loop {out} --out report`")
+    if reason:
         raise typer.Exit(UNMET)

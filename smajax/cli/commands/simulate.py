@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from smajax.cli import completion
-from smajax.cli.options import (
-    Json,
-    Open,
-    Overwrite,
-    browse,
-    command_line,
-    console,
-    quantity,
-    resumable,
-    texts,
-    within,
-)
+from smajax.cli.options import Json, Open, Overwrite, quantity, texts, within
+from smajax.cli.terminal import browse, command_line, console, resumable
+
+if TYPE_CHECKING:
+    from smajax.control.run_request import LoopRequest, RunRequest, RunResult
 
 SHOWN = 7  # columns of a table of set points on a terminal
 OPTIONS = {"values": "--set", "mismatch": "--mismatch", "set_points": "--set-point"}  # part of a run -> its option
@@ -28,16 +22,124 @@ VALUES = "damping=+20%,wire_length='1 m'"
 
 
 def _inputs(option: str, several: Sequence[str] | None) -> dict[str, str]:
-    """`NAME=TEXT`, given once or more; a text may hold commas."""
-    found: dict[str, str] = {}
+    """`NAME=TEXT`, once or more; a text may hold commas."""
+    result: dict[str, str] = {}
     for part in several or ():
         name, sign, text = part.partition("=")
-        if not sign or not name.strip() or name.strip() in found:
+        if not sign or not name.strip() or name.strip() in result:
             raise typer.BadParameter(f"each name once, as in `name=text`, not `{part}`", param_hint=option)
-        found[name.strip()] = text.strip()
-    return found
+        result[name.strip()] = text.strip()
+    return result
 
 
+@dataclass(frozen=True)
+class _Options:
+    """Options that decide together which run it is."""
+
+    step: str | None
+    inputs: Mapping[str, str]
+    tolerance: float | None
+    gains: Path | None
+    controller: str
+    set_point: str | None
+    mismatch: Mapping[str, str]
+    time: str
+    animated: bool
+
+    @property
+    def closed(self) -> bool:
+        return self.gains is not None or bool(self.controller)
+
+    def check(self, load: str) -> None:
+        """Raise typer.BadParameter for options that do not go together."""
+        from smajax.data.text_input import reads_file
+
+        if self.gains is not None and self.controller:
+            raise typer.BadParameter("--gains names its controller; leave --controller out.")
+        if self.closed != (self.set_point is not None):
+            lacking = "--set-point" if self.closed else "--gains or --controller beside --set-point"
+            raise typer.BadParameter(f"a closed loop needs {lacking}.")
+        if self.closed and (self.inputs or self.step or self.tolerance is not None):
+            raise typer.BadParameter(
+                "in a closed loop the controller gives the voltage: leave --step, --input and --tolerance out."
+            )
+        texts = [*self.inputs.values(), *([self.set_point] if self.set_point is not None else [])]
+        if self.time and not any(map(reads_file, texts)):
+            raise typer.BadParameter(
+                f"names the time column of a file, and no input is from a file: leave `{self.time}` out (the length of the "
+                "run is --seconds).",
+                param_hint="--time",
+            )
+        if self.animated and load == "coupon":
+            raise typer.BadParameter("a coupon moves nothing that could be drawn.", param_hint="--gif")
+        if not self.closed and self.mismatch:
+            raise typer.BadParameter("--mismatch is for closed loops; use --set.")
+
+    def stepped(self, request: RunRequest) -> RunRequest:
+        """The request with --step as the one required input. Raises ValueError for a model with none or several."""
+        if self.step is None:
+            return request
+        from smajax.control.run_request import channels
+
+        required, _ = channels(request.system())
+        if len(required) != 1 or required & self.inputs.keys():
+            needs = ", ".join(sorted(required)) or "none"
+            raise ValueError(
+                f"--step is for a model with one required input; this one has {needs}: use --input NAME=..."
+            )
+        return replace(request, inputs={**self.inputs, next(iter(required)): self.step})
+
+    def option_of(self, part: str) -> str:
+        """The option that gives this part of a request."""
+        known = {**OPTIONS, **{f"inputs.{name}": f"--input {name}" for name in self.inputs}}
+        # Of a file the column of the times may be wrong.
+        timed = bool(self.time) and part.startswith(("inputs.", "set_points"))
+        return known.get(part, "--step") + " or --time" * timed
+
+
+def _run(options: _Options, request: RunRequest, loop: LoopRequest) -> tuple[RunRequest, RunResult]:
+    """The run, with --step among its inputs. Raises typer.BadParameter."""
+    from smajax.cli.progress_display import displayed
+    from smajax.control.gains_file import GainsFileError
+    from smajax.control.run_request import RequestError, run_closed, run_open
+    from smajax.core.progress import Stage
+
+    try:
+        request = options.stepped(request)
+        with resumable(), displayed(console()) as progress:
+            progress(Stage("simulating the run", 0.0))
+            result = run_closed(request, loop) if options.closed else run_open(request)
+            progress(Stage("simulating the run", 1.0))
+    except KeyError as error:
+        raise typer.BadParameter(error.args[0]) from None
+    except RequestError as error:
+        raise typer.BadParameter(str(error), param_hint=options.option_of(error.part)) from None
+    except (ValueError, GainsFileError) as error:
+        raise typer.BadParameter(str(error)) from None
+    return request, result
+
+
+def _print(result: RunResult, title: str) -> None:
+    """The run for a terminal."""
+    from smajax.core.wording import aligned
+    from smajax.report.simulate_page import merit_rows, mismatch_rows, set_point_rows, summary_rows
+
+    typer.echo(title)
+    for row in summary_rows(result.data):
+        typer.echo(f"  {row[0]:<28} {row[1]:>11} … {row[2]:<11} last {row[3]:<11} {row[4]}")
+    for row in mismatch_rows(result):
+        unit, ratio = f" {row[3]}" * (row[3] != "-"), f", {row[4]}" * bool(row[4])
+        typer.echo(f"  {row[0]:<28} assumed {row[1]} -> true {row[2]}{unit}{ratio}")
+    for row in merit_rows(result):
+        typer.echo(f"  {row[0]:<36} {row[1]} {row[2]}")
+    head, rows = set_point_rows(result)
+    if rows:
+        # The first columns; the page has all.
+        for line in aligned([row[:SHOWN] for row in (head, *rows)], right=True):
+            typer.echo(f"  {line}")
+
+
+# More than 8 parameters and 80 lines: typer reads the options from them.
 def simulate(
     wire: Annotated[
         str, typer.Argument(help="a wire of `smajax presets`", autocompletion=completion.wires)
@@ -50,7 +152,7 @@ def simulate(
     step: Annotated[
         str | None,
         typer.Option(
-            help="levels of the drive's input, each with its time: 6V:5s,0V:10s; in V, A, W or a share, and s, where they say no unit"
+            help="levels of the drive's input, each with its duration: 6V:5s,0V:10s; without units in V, A, W or a ratio, and s"
         ),
     ] = None,
     inputs: Annotated[
@@ -58,7 +160,7 @@ def simulate(
         typer.Option(
             "--input",
             help="NAME=levels, NAME=a constant (ambient_temperature=25degC), or a column of a file, NAME=log.csv:U:mV; levels in SI or "
-            "degC where they say no unit; repeat",
+            "degC without units; may be repeated",
         ),
     ] = None,
     time: Annotated[
@@ -69,8 +171,8 @@ def simulate(
         typer.Option(
             "--set",
             help="parameters: wire.heat.convection_coefficient=80, convection_coefficient='80 W/m^2/K' or "
-            "latent_heat.enthalpy='20 J/g', which adds that effect; in SI, degC or rad where it says no unit; payload=+20% is "
-            "that much more than the preset has; may be repeated",
+            "latent_heat.enthalpy='20 J/g', which adds that effect; without a unit in SI, degC or rad; payload=+20% is "
+            "relative to the preset's value; may be repeated",
             autocompletion=completion.values,
         ),
     ] = None,
@@ -82,7 +184,7 @@ def simulate(
     ] = None,
     dt: Annotated[float, quantity("time between samples", "s", above=0.0, like="5ms")] = 0.005,
     tolerance: Annotated[
-        float | None, typer.Option(help="steps of its own between samples, to this error (1e-4 is good); moving loads")
+        float | None, typer.Option(help="adaptive steps between samples, to this error (1e-4 is good); moving loads")
     ] = None,
     gains: Annotated[
         Path | None, typer.Option(help="gains.json of `smajax tune`: a closed loop of the arm by that controller")
@@ -93,22 +195,20 @@ def simulate(
     set_point: Annotated[
         str | None,
         typer.Option(
-            help="what the loop is to reach: 40deg:5s,10deg:5s, in deg and s where they say no unit, or a file"
+            help="set points of the loop, each with its duration: 40deg:5s,10deg:5s, without units in deg and s, or a file"
         ),
     ] = None,
     mismatch: Annotated[
         list[str] | None,
         typer.Option(
-            help="how the plant is wrong: damping=+20%,payload=-50% of what the controller believes, or any parameter's value as "
+            help="how the plant differs from the controller's model: damping=+20%,payload=-50%, or any parameter's value as "
             "--set; may be repeated",
             autocompletion=completion.values,
         ),
     ] = None,
     estimator: Annotated[
         str,
-        typer.Option(
-            help="`printed` or `model` filter; none: told the true state", autocompletion=completion.estimators
-        ),
+        typer.Option(help="`printed` or `model` filter; default: the true state", autocompletion=completion.estimators),
     ] = "",
     noise: Annotated[float, quantity("noise of the angle's readings (1 sigma)", "deg", 0.0, 360.0)] = 0.0,
     period: Annotated[float, quantity("sample time of the controller, a multiple of --dt", "s")] = 0.01,
@@ -124,13 +224,14 @@ def simulate(
     json_out: Json = False,
     open_page: Open = False,
 ) -> None:
-    """Run a model once: wire x load x drive under given inputs, or the arm under a controller.
+    """Simulate a model once: a wire, a load and a drive with given inputs, or the arm under a controller.
 
-    By default the model is the source's arm. Angles are given in deg; what is written is SI with degC and rad.
+    By default the model is the rotary arm of the source. Angles are given in deg; files are in SI with degC and rad.
 
-    What may be wrong of a plant: inertia (inertia_ratio), damping, convection (convection_coefficient), ambient
-    (ambient_temperature, in degC), payload (payload_mass), supply (amplifier_gain). +20% is that much more than the
-    controller believes (of 20 degC: 24 degC), -50% half of it, and 20% of a variation both ways.
+    What can differ between the plant and the controller's model: inertia (inertia_ratio), damping, convection
+    (convection_coefficient), ambient (ambient_temperature, in degC), payload (payload_mass), supply (amplifier_gain).
+    +20% is 1.2 times the value that the controller assumes (of 20 degC: 24 degC), -50% half of it, and 20% of a variation
+    is both ways.
 
     Example:  smajax simulate flexinol_table_3_2 dead_weight flexinol_voltage --step 5V:8s,0V:8s --set convection_coefficient=80
 
@@ -141,103 +242,33 @@ def simulate(
     prepare()
     from smajax.cli.progress_display import displayed
     from smajax.cli.result_folder import check_path, claimed
-    from smajax.control.gains_file import GainsFileError
-    from smajax.control.run_request import Asked, AskedError, AskedLoop, channels, run_closed, run_open
+    from smajax.control.run_request import LoopRequest, RunRequest
     from smajax.core.files import json_text
-    from smajax.core.progress import Stage
-    from smajax.core.wording import aligned
-    from smajax.data.text_input import reads_file
-    from smajax.report.simulate_page import OWN, merit_rows, mismatch_rows, record, rest_rows, summary_rows, write_run
+    from smajax.report.simulate_page import FILES, record, write_run
 
     check_path(out)
-    series, closed = _inputs("--input", inputs), gains is not None or bool(controller)
-    if gains is not None and controller:
-        raise typer.BadParameter("--gains names its controller; leave --controller out.")
-    if closed != (set_point is not None):
-        lacking = "--set-point" if closed else "--gains or --controller beside --set-point"
-        raise typer.BadParameter(f"a closed loop needs {lacking}.")
-    if closed and (series or step or tolerance is not None):
-        raise typer.BadParameter(
-            "in a closed loop the controller gives the voltage: leave --step, --input and --tolerance out."
-        )
-    texts_given = [*series.values(), *([set_point] if set_point is not None else [])]
-    if time and not any(map(reads_file, texts_given)):
-        raise typer.BadParameter(
-            f"names the time column of a file, and nothing is read from one: leave `{time}` out (how long a run is says --seconds).",
-            param_hint="--time",
-        )
-    if gif and load == "coupon":
-        raise typer.BadParameter("a coupon moves nothing that could be drawn.", param_hint="--gif")
-    if not closed and mismatch:
-        raise typer.BadParameter("--mismatch is for closed loops; use --set.")
-    options = {**OPTIONS, **{f"inputs.{name}": f"--input {name}" for name in series}}
-    try:
-        asked = Asked(wire, load, drive, law, texts("--set", values, VALUES), series, time, seconds, dt, tolerance)
-        if step is not None:
-            required, _ = channels(asked.system())
-            if len(required) != 1 or required & series.keys():
-                needs = ", ".join(sorted(required)) or "none"
-                raise ValueError(
-                    f"--step is for a model with one required input; this one has {needs}: use --input NAME=..."
-                )
-            stepped = next(iter(required))
-            asked = Asked(**{**vars(asked), "inputs": {**series, stepped: step}})
-            options[f"inputs.{stepped}"] = "--step"
-        with resumable(), displayed(console()) as progress:
-            progress(Stage("simulating the run", 0.0))
-            loop: AskedLoop | None = None
-            if closed:
-                loop = AskedLoop(
-                    controller,
-                    set_point or "",
-                    gains,
-                    texts("--mismatch", mismatch, VALUES),
-                    estimator,
-                    noise,
-                    period,
-                    delay,
-                    seed,
-                )
-                ran = run_closed(asked, loop)
-            else:
-                ran = run_open(asked)
-            progress(Stage("simulating the run", 1.0))
-    except KeyError as error:
-        raise typer.BadParameter(error.args[0]) from None
-    except AskedError as error:
-        # Of a file it may be the column of the times that cannot be read.
-        timed = bool(time) and error.part.startswith(("inputs.", "set_points"))
-        raise typer.BadParameter(str(error), param_hint=options[error.part] + " or --time" * timed) from None
-    except (ValueError, GainsFileError) as error:
-        raise typer.BadParameter(str(error)) from None
+    perturbed = texts("--mismatch", mismatch, VALUES)
+    series = _inputs("--input", inputs)
+    options = _Options(step, series, tolerance, gains, controller, set_point, perturbed, time, gif)
+    options.check(load)
+    request = RunRequest(wire, load, drive, law, texts("--set", values, VALUES), series, time, seconds, dt, tolerance)
+    loop = LoopRequest(controller, set_point or "", gains, perturbed, estimator, noise, period, delay, seed)
+    request, result = _run(options, request, loop)
     command = command_line()
-    title = f"{wire}, {load}, {drive}" + (f", {ran.found.attrs['controller']}" if closed else "")
-    # What was asked of the model, not how it is shown.
-    told = {
-        **vars(asked),
-        **(vars(loop) if loop is not None else {}),
+    title = f"{wire}, {load}, {drive}" + (f", {result.data.attrs['controller']}" if options.closed else "")
+    settings = {
+        **vars(request),
+        **(vars(loop) if options.closed else {}),
         "gains": None if gains is None else gains.read_text(),
     }
-    with resumable(), claimed(out, "simulate", told, OWN, overwrite), displayed(console()) as progress:
-        page = write_run(ran, out, title, command, gif, progress)
-    for note in ran.notes:
+    with resumable(), claimed(out, "simulate", settings, FILES, overwrite), displayed(console()) as progress:
+        page = write_run(result, out, title, command, gif, progress)
+    for note in result.notes:
         console().print(note, soft_wrap=True, markup=False, highlight=False)
     if json_out:
-        typer.echo(json_text(record(ran, command)), nl=False)
+        typer.echo(json_text(record(result, command)), nl=False)
     else:
-        typer.echo(title)
-        for row in summary_rows(ran.found):
-            typer.echo(f"  {row[0]:<28} {row[1]:>11} … {row[2]:<11} last {row[3]:<11} {row[4]}")
-        for row in mismatch_rows(ran):
-            unit, ratio = f" {row[3]}" * (row[3] != "-"), f", {row[4]}" * bool(row[4])
-            typer.echo(f"  {row[0]:<28} believed {row[1]} -> true {row[2]}{unit}{ratio}")
-        for row in merit_rows(ran):
-            typer.echo(f"  {row[0]:<36} {row[1]} {row[2]}")
-        head, rows = rest_rows(ran)
-        if rows:
-            # The first few; the page has all.
-            for line in aligned([row[:SHOWN] for row in (head, *rows)], right=True):
-                typer.echo(f"  {line}")
+        _print(result, title)
         typer.echo(f"Page: {page.resolve()}")
     if open_page:
         browse(page)

@@ -2,33 +2,102 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from smajax.cli import completion
-from smajax.cli.options import (
-    UNMET,
-    Json,
-    Open,
-    Overwrite,
-    alone,
-    browse,
-    command_line,
-    console,
-    numbers,
-    pairs,
-    quantity,
-    resumable,
-    texts,
-    understood,
-    within,
-)
+from smajax.cli.options import UNMET, Json, Open, Overwrite, alone, numbers, pairs, quantity, texts, understood, within
+from smajax.cli.terminal import browse, command_line, console, resumable
+
+if TYPE_CHECKING:
+    from smajax.control.gains_file import Gains
+    from smajax.control.tune.settings import TuneSettings
 
 TUNED_AT = "-40,-20,0,20,40,60,85"
 
 
+@dataclass(frozen=True)
+class _Search:
+    """How much is tried: options of `tune` as typed, and what --fast makes of those that are not."""
+
+    starts: int | None
+    rounds: int | None
+    finish: int | None
+    fast: bool
+
+    def effort(self) -> dict[str, int]:
+        """By the fields of `TuneSettings`."""
+        fast = self.fast
+        return {
+            "tried": 8 if fast else 32,
+            "starts": self.starts or (3 if fast else 6),
+            "rounds": self.rounds or (10 if fast else 30),
+            "finish": (10 if fast else 60) if self.finish is None else self.finish,
+            "unseen": 4 if fast else 32,
+        }
+
+
+def _initial_gains(start: Path | None, controller: str) -> Gains | None:
+    """Raises typer.BadParameter."""
+    from smajax.control.gains_file import GainsFileError, read_gains
+    from smajax.model.rigs import arm
+
+    if start is None:
+        return None
+    try:
+        gains = read_gains(start, arm())
+        if gains.controller != controller:
+            raise GainsFileError(f"gains file {start} is of {gains.controller}, not of {controller}.")
+    except GainsFileError as error:
+        raise typer.BadParameter(str(error), param_hint="--start") from None
+    return gains
+
+
+def _variation(several: Sequence[str] | None) -> dict[str, float]:
+    """Raises typer.BadParameter."""
+    from smajax.control.mismatch import variation_of
+    from smajax.control.tune.scenarios import check_variation
+
+    try:
+        variation = variation_of(texts("--variation", several, "damping=20%,payload=50%"))
+        check_variation(variation)
+    except ValueError as error:
+        raise typer.BadParameter(str(error), param_hint="--variation") from None
+    return variation
+
+
+def _run(settings: TuneSettings, out: Path, overwrite: bool, json_out: bool) -> Mapping[str, Any]:
+    """The record of the tuning, from the folder where it is finished there. Raises typer.BadParameter."""
+    from smajax.cli.progress_display import displayed
+    from smajax.cli.result_folder import FolderTaken, claimed
+    from smajax.control.tune.tuning_folder import FILES, STATE, tune_in_folder
+    from smajax.model.rigs import arm
+    from smajax.report.tune_folder import finished, write_tuning
+
+    resume = "Finished rounds are cached: the same command resumes."
+    request = {"tuning": settings.controller}  # the other settings are in a file of the tuning itself, which it checks
+    try:
+        settings.check(arm())
+        with (
+            resumable(resume, out, STATE),
+            claimed(out, "tune", request, sorted(FILES), overwrite),
+            displayed(console(), hint=not json_out) as progress,
+        ):
+            record = finished(arm(), settings, out)
+            if record is None:
+                record = write_tuning(tune_in_folder(arm(), settings, out, progress), out, command_line())
+    except FolderTaken:
+        raise
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from None
+    return record
+
+
+# More than 8 parameters and 80 lines: typer reads the options from them.
 def tune(
     controller: Annotated[
         str,
@@ -43,7 +112,7 @@ def tune(
     variation: Annotated[
         list[str] | None,
         typer.Option(
-            help="how wrong the plant may be: damping=20%,payload=50% (or 0.2, 0.5) of what the controller believes, both ways; "
+            help="how far the plant may differ: damping=20%,payload=50% (or 0.2, 0.5) of the assumed values, both ways; "
             "may be repeated",
             autocompletion=completion.shares_of_mismatches,
         ),
@@ -62,36 +131,34 @@ def tune(
     limits: Annotated[
         list[str] | None,
         typer.Option(
-            help="of the same, met in every loop: settling_time=4,overshoot=2deg; in s, deg, J, V/s or degC where it says no unit",
+            help="of the same, met in every loop: settling_time=4,overshoot=2deg; without units in s, deg, J, V/s or degC",
             autocompletion=completion.terms,
         ),
     ] = None,
     by: Annotated[str, typer.Option(help="trust-region or adam", autocompletion=completion.rules)] = "trust-region",
     start: Annotated[
-        Path | None, typer.Option(help="gains.json to begin from, in the place of the preset's gains")
+        Path | None, typer.Option(help="gains.json with the initial gains, in place of the preset's")
     ] = None,
     starts: Annotated[
-        int | None, typer.Option(callback=within(1), help="points that gains are moved from; default 6")
+        int | None, typer.Option(callback=within(1), help="starting points of the search; default 6")
     ] = None,
-    rounds: Annotated[int | None, typer.Option(callback=within(1), help="steps, at most; default 30")] = None,
+    rounds: Annotated[int | None, typer.Option(callback=within(1), help="iterations, at most; default 30")] = None,
     finish: Annotated[
         int | None,
         typer.Option(
             callback=within(0),
-            help="generations of a search without slopes (CMA-ES) after that, 24 candidates each; default 60, 0 for none",
+            help="generations of CMA-ES, without gradients, after that, 24 candidates each; default 60, 0 for none",
         ),
     ] = None,
     seconds: Annotated[float, quantity("length of each closed loop", "s", 0.1, 86_400.0)] = 10.0,
     estimator: Annotated[
         str,
-        typer.Option(
-            help="`printed` or `model` filter; none: told the true state", autocompletion=completion.estimators
-        ),
+        typer.Option(help="`printed` or `model` filter; default: the true state", autocompletion=completion.estimators),
     ] = "",
     noise: Annotated[float, quantity("noise of the angle's readings (1 sigma)", "deg", 0.0, 360.0)] = 0.0,
     period: Annotated[float, quantity("sample time of the controller, a multiple of 10 ms", "s")] = 0.01,
     delay: Annotated[int, typer.Option(callback=within(0), help="control periods until a command arrives")] = 0,
-    seed: Annotated[int, typer.Option(callback=within(0), help="of starts, plants and noise")] = 0,
+    seed: Annotated[int, typer.Option(callback=within(0), help="of starting points, plants and noise")] = 0,
     out: Annotated[Path, typer.Option(help="folder for gains.json, the page, the pictures and the numbers")] = Path(
         "tune"
     ),
@@ -102,98 +169,64 @@ def tune(
     json_out: Json = False,
     open_page: Open = False,
 ) -> None:
-    """Tune the gains of a controller of the arm, on many set points and plants at once: by gradient, then without slopes.
+    """Tune the gains of a controller of the arm on many set points and plants at once: by gradient, then by CMA-ES.
 
-    Each loop is one step from the start, cold and at rest; moves between the set points are tried in the end and told.
-    The gains are checked on plants and set points that tuning never saw. `smajax sweep --gains tune/gains.json` reads them.
-    Exit code 3 when a limit is not met. Ctrl-C loses the round or generation under way alone: the same command goes on.
+    Each closed loop is one step from the start, cold and at rest. Moves between the set points are simulated at the end. The
+    gains are validated on held-out plants and set points. `smajax sweep --gains tune/gains.json` reads them. Exit code 3 when
+    a limit is not met. After Ctrl-C the same command resumes; it repeats the unfinished round or generation only.
 
-    What may be wrong of a plant: inertia (inertia_ratio), damping, convection (convection_coefficient), ambient
-    (ambient_temperature, in degC), payload (payload_mass), supply (amplifier_gain). +20% is that much more than the
-    controller believes (of 20 degC: 24 degC), -50% half of it, and 20% of a variation both ways.
+    What can differ between the plant and the controller's model: inertia (inertia_ratio), damping, convection
+    (convection_coefficient), ambient (ambient_temperature, in degC), payload (payload_mass), supply (amplifier_gain).
+    +20% is 1.2 times the value that the controller assumes (of 20 degC: 24 degC), -50% half of it, and 20% of a variation
+    is both ways.
 
     Example:  smajax tune sld --variation inertia=20%,damping=20%,convection=20% --limits settling_time=4,overshoot=2
     """
     from smajax.core.runtime import prepare
 
     prepare(cores=True)
-    from smajax.cli.progress_display import displayed
-    from smajax.cli.result_folder import FolderTaken, claimed
-    from smajax.control.gains_file import GainsFileError, read_gains
-    from smajax.control.mismatch import variation_of
     from smajax.control.tune.objective import REGULATION
-    from smajax.control.tune.scenarios import check_variation
     from smajax.control.tune.settings import TuneSettings
     from smajax.control.tune.terms import TERMS
-    from smajax.model.rigs import arm
-    from smajax.report.tune_folder import OURS, STATE, ended, tune_into
-    from smajax.report.tune_page import gain_rows, record
+    from smajax.report.tune_page import gain_rows
 
-    try:
-        begun = read_gains(start, arm()) if start is not None else None
-        if begun is not None and begun.controller != controller:
-            raise GainsFileError(f"gains file {start} is of {begun.controller}, not of {controller}.")
-    except GainsFileError as error:
-        raise typer.BadParameter(str(error), param_hint="--start") from None
-    try:
-        varied = variation_of(texts("--variation", variation, "damping=20%,payload=50%"))
-        check_variation(varied)
-    except ValueError as error:
-        raise typer.BadParameter(str(error), param_hint="--variation") from None
+    initial = _initial_gains(start, controller)
+    units = {name: term.unit for name, term in TERMS.items()}
     settings = TuneSettings(
         controller,
         numbers("--set-points", set_points if set_points is not None else "-20,20,60" if fast else TUNED_AT, "deg"),
-        varied,
+        _variation(variation),
         objective,
         pairs("--weights", weights, {}, "settling_time=1,overshoot=1") or dict(REGULATION),
-        pairs("--limits", limits, {name: term.unit for name, term in TERMS.items()}, "settling_time=4,overshoot=2deg"),
-        8 if fast else 32,
-        starts or (3 if fast else 6),
-        rounds or (10 if fast else 30),
-        by,
-        (10 if fast else 60) if finish is None else finish,
-        seconds,
-        estimator,
-        noise,
-        period,
-        delay,
-        seed,
-        4 if fast else 32,
-        {} if begun is None else begun.values,
+        pairs("--limits", limits, units, "settling_time=4,overshoot=2deg"),
+        by=by,
+        seconds=seconds,
+        estimator=estimator,
+        noise=noise,
+        period=period,
+        delay=delay,
+        seed=seed,
+        start={} if initial is None else initial.values,
+        **_Search(starts, rounds, finish, fast).effort(),
     )
-    understood_as = understood("Set points", set_points, settings.set_points, "deg")
-    if understood_as and not json_out:
-        typer.echo(understood_as, err=True)
-    kept = "Finished rounds are kept: the same command goes on."
-    asked = {"tuning": controller}  # what else was asked lies in a file of the tuning's own, which it checks
-    try:
-        settings.check(arm())
-        with (
-            resumable(kept, out, STATE),
-            claimed(out, "tune", asked, sorted(OURS), overwrite),
-            displayed(console(), hint=not json_out) as progress,
-        ):
-            told = ended(arm(), settings, out)
-            if told is None:
-                told = record(tune_into(arm(), settings, out, command_line(), progress), command_line())
-    except FolderTaken:
-        raise
-    except ValueError as error:
-        raise typer.BadParameter(str(error)) from None
+    sentence = understood("Set points", set_points, settings.set_points, "deg")
+    if sentence and not json_out:
+        typer.echo(sentence, err=True)
+    record = _run(settings, out, overwrite, json_out)
     page = out / "tune.html"
-    for sentence in told["price"]:
+    for sentence in record["price"]:
         typer.echo(sentence, err=True)
     if json_out:
         typer.echo((out / "tune.json").read_text(encoding="utf-8"), nl=False)
     else:
-        for sentence in told["conclusions"]:
-            if sentence not in told["price"]:  # said already
+        for sentence in record["conclusions"]:
+            if sentence not in record["price"]:  # on stderr already
                 typer.echo(sentence)
-        for row in gain_rows(told["gains"]):
+        for row in gain_rows(record["gains"]):
             typer.echo(f"  {row[0]:<24} {row[1]:>10} -> {row[2]:<10} {row[3]}" + (f"  ({row[5]})" if row[5] else ""))
         typer.echo(f"Gains: {(out / 'gains.json').resolve()}")
         typer.echo(f"Page: {page.resolve()}")
     if open_page:
         browse(page)
-    if settings.limits and not told["limits_met"]:
+    if settings.limits and not record["limits_met"]:
         raise typer.Exit(UNMET)

@@ -1,4 +1,4 @@
-"""Candidates on members in one batch: terms, their slopes in the gains, and figures of merit.
+"""Candidates on scenarios in one batch: terms, their gradients in the gains, and figures of merit.
 
 Slopes are forward: gains are few and loops many. A candidate is a point of the unit cube, the box of the gains by
 logarithm.
@@ -20,42 +20,43 @@ from smajax.control.controllers.base import AbstractController
 from smajax.control.figures_of_merit import Merit, judge_of
 from smajax.control.interface import Interface
 from smajax.control.mismatch import MISMATCHES
+from smajax.control.perturbed_plant import perturbed_plant
 from smajax.control.presets import Box, ControllerPreset
 from smajax.control.reference import clock, constant
-from smajax.control.sweep import NUMBER, TARGET, mismatched
-from smajax.control.tune.scenarios import Members
-from smajax.control.tune.terms import TERMS, Terms, as_judged, as_shown, watch_of
+from smajax.control.sweep.batched_loops import NUMBER, TARGET
+from smajax.control.tune.scenarios import Scenarios
+from smajax.control.tune.terms import TERMS, Terms, exact_vector, term_vector, watch_of
 from smajax.core.parameters import check_bounds, get_parameters, set_parameters, set_vector
 from smajax.model.system import System
 from smajax.model.types import Scalar, Series
 from smajax.simulation.batch.axes import zipped
 from smajax.simulation.batch.chunks import Function, chunks
 
-LOOPS = 256  # most closed loops of a batch: between two of them a run can be interrupted
+LOOPS = 256  # at most, in a batch: between two batches a run can be interrupted
 STEP = 0.01  # s, of the simulation while tuning
-FINE = 0.005  # s, of the simulation that judges
-WILD = 1e4  # units of a term per box: a slope beyond it says nothing of the next point
+FINE = 0.005  # s, of the simulation whose figures of merit are reported
+LARGEST_GRADIENT = 1e4  # units of a term per box: a larger gradient predicts nothing
 
 
-class Seen(NamedTuple):
-    """What came of candidates: arrays of shape (candidates, members, ...)."""
+class Evaluation(NamedTuple):
+    """Results of candidates: arrays of shape (candidates, scenarios, ...)."""
 
     terms: np.ndarray  # (C, M, terms), with derivatives; units of `TERMS`
-    slopes: np.ndarray  # (C, M, terms, gains), by the unit cube; of no length where they were not asked for
-    judged: np.ndarray  # (C, M, terms), the settling time itself
+    gradients: np.ndarray  # (C, M, terms, gains), by the unit cube; of no length where they were not requested
+    exact: np.ndarray  # (C, M, terms), the settling time itself
     merits: Merit
 
     @property
     def failed(self) -> np.ndarray:
-        """(C, M): some number is none."""
-        return ~(np.isfinite(self.judged) & np.isfinite(self.terms)).all(axis=2)
+        """(C, M): some value is not finite."""
+        return ~(np.isfinite(self.exact) & np.isfinite(self.terms)).all(axis=2)
 
-    def wild(self, used: np.ndarray | list[int]) -> np.ndarray:
-        """(C, M): the slopes of the terms `used` are none, or as large as only a loop without order has them."""
-        return ~(np.abs(self.slopes[:, :, used]) < WILD).all(axis=(2, 3))  # nan is not
+    def unusable(self, used: np.ndarray | list[int]) -> np.ndarray:
+        """(C, M): the gradients of the terms `used` are not finite, or so large that they predict nothing."""
+        return ~(np.abs(self.gradients[:, :, used]) < LARGEST_GRADIENT).all(axis=(2, 3))  # nan is not
 
 
-class _Rig(eqx.Module):
+class _Problem(eqx.Module):
     system: System
     controller: AbstractController
     low: Series  # logarithm of the gains at the cube's corner
@@ -68,43 +69,43 @@ class _Rig(eqx.Module):
     smoothed: Callable[[AbstractController, Scalar], AbstractController] | None = eqx.field(static=True)
 
 
-def _point(rig: _Rig, values: dict[str, Scalar]) -> Scalar:
-    return jnp.stack([values[f"at {name}"] for name in rig.names])
+def _point(problem: _Problem, values: dict[str, Scalar]) -> Scalar:
+    return jnp.stack([values[f"at {name}"] for name in problem.names])
 
 
-def _loop(rig: _Rig, values: dict[str, Scalar], point: Scalar) -> tuple[Terms, Merit]:
-    plant, wanted = mismatched(rig.system, values), constant(rig.time, values[TARGET])
-    controller = set_vector(rig.controller, rig.names, jnp.exp(rig.low + point * rig.width))
-    if rig.smoothed is not None:
-        controller = rig.smoothed(controller, rig.softness)
-    watch = watch_of(judge_of(plant, wanted), rig.softness)
-    dt = rig.time[1] - rig.time[0]
+def _loop(problem: _Problem, values: dict[str, Scalar], point: Scalar) -> tuple[Terms, Merit]:
+    plant, wanted = perturbed_plant(problem.system, values), constant(problem.time, values[TARGET])
+    controller = set_vector(problem.controller, problem.names, jnp.exp(problem.low + point * problem.width))
+    if problem.smoothed is not None:
+        controller = problem.smoothed(controller, problem.softness)
+    watch = watch_of(judge_of(plant, wanted), problem.softness)
+    dt = problem.time[1] - problem.time[0]
     found, _ = watch_closed_loop(
-        watch, plant, controller, wanted, **rig.interface.settings(dt, rig.key, values[NUMBER])
+        watch, plant, controller, wanted, **problem.interface.settings(dt, problem.key, values[NUMBER])
     )
     return found
 
 
-def _valued(rig: _Rig, values: dict[str, Scalar]) -> dict[str, Any]:
-    terms, merit = _loop(rig, values, _point(rig, values))
-    judged = as_judged(terms, merit, rig.time[-1])
-    return {"terms": as_shown(terms), "judged": judged, "merits": merit}
+def _valued(problem: _Problem, values: dict[str, Scalar]) -> dict[str, Any]:
+    terms, merit = _loop(problem, values, _point(problem, values))
+    exact = exact_vector(terms, merit, problem.time[-1])
+    return {"terms": term_vector(terms), "exact": exact, "merits": merit}
 
 
-def _sloped(rig: _Rig, values: dict[str, Scalar]) -> dict[str, Any]:
+def _sloped(problem: _Problem, values: dict[str, Scalar]) -> dict[str, Any]:
     def terms_of(point: Scalar) -> tuple[Scalar, tuple[Terms, Merit]]:
-        terms, merit = _loop(rig, values, point)
-        return as_shown(terms), (terms, merit)
+        terms, merit = _loop(problem, values, point)
+        return term_vector(terms), (terms, merit)
 
-    slopes, (terms, merit) = jax.jacfwd(terms_of, has_aux=True)(_point(rig, values))
-    judged = as_judged(terms, merit, rig.time[-1])
-    return {"terms": as_shown(terms), "slopes": slopes, "judged": judged, "merits": merit}
+    gradients, (terms, merit) = jax.jacfwd(terms_of, has_aux=True)(_point(problem, values))
+    exact = exact_vector(terms, merit, problem.time[-1])
+    return {"terms": term_vector(terms), "gradients": gradients, "exact": exact, "merits": merit}
 
 
-class Rig:
-    """A controller on its plant, ready to be tried with other gains. `simulations` counts the closed loops so far.
+class TuningProblem:
+    """A controller on its plant with a box of gains. `simulations` counts the closed loops so far.
 
-    Raises ValueError for gains that are not the controller's, and bounds that are not positive and rising.
+    Raises ValueError for gains that the controller does not have, and bounds that are not positive and rising.
     """
 
     def __init__(
@@ -139,7 +140,7 @@ class Rig:
         return self.point(dict(zip(self.names, np.asarray(get_parameters(self.controller, self.names)), strict=True)))
 
     def gains(self, point: np.ndarray) -> dict[str, float]:
-        """The gains at a point, to six digits: what is judged is what a file holds."""
+        """The gains at a point, to six digits: the values that are evaluated are those of the file."""
         values = np.exp(self._low + point * self._width)
         return {name: float(f"{value:.6g}") for name, value in zip(self.names, values, strict=True)}
 
@@ -148,24 +149,24 @@ class Rig:
         values = np.asarray([gains[name] for name in self.names])
         return np.clip((np.log(values) - self._low) / self._width, 0.0, 1.0)
 
-    def held(self, points: np.ndarray) -> np.ndarray:
-        """Points (C, gains) as a file holds their gains."""
+    def rounded(self, points: np.ndarray) -> np.ndarray:
+        """Points (C, gains) with gains to six digits, as a file has them."""
         return np.stack([self.point(self.gains(one)) for one in points])
 
-    def sloped(self, points: np.ndarray, members: Members, softness: float) -> Seen:
-        """Terms with slopes of every point (C, gains); one that switches is smoothed by `softness`."""
-        return self._seen(_sloped, points, members, STEP, softness, True)
+    def evaluate_gradients(self, points: np.ndarray, scenarios: Scenarios, softness: float) -> Evaluation:
+        """Terms with gradients of every point (C, gains); a switching controller is smoothed by `softness`."""
+        return self._evaluated(_sloped, points, scenarios, STEP, softness, True)
 
-    def judged(self, points: np.ndarray, members: Members, dt: float = FINE) -> Seen:
-        """The same loops as they are, without slopes."""
-        return self._seen(_valued, points, members, dt, 0.1, False)
+    def evaluate(self, points: np.ndarray, scenarios: Scenarios, dt: float = FINE) -> Evaluation:
+        """The same loops without gradients and without smoothing."""
+        return self._evaluated(_valued, points, scenarios, dt, 0.1, False)
 
-    def _seen(
-        self, function: Function, points: np.ndarray, members: Members, dt: float, softness: float, smooth: bool
-    ) -> Seen:
+    def _evaluated(
+        self, function: Function, points: np.ndarray, scenarios: Scenarios, dt: float, softness: float, smooth: bool
+    ) -> Evaluation:
         inside = round(STEP / dt)
         interface = dataclasses.replace(self.interface, every=self.interface.every * inside)
-        rig = _Rig(
+        problem = _Problem(
             self.system,
             self.controller,
             jnp.asarray(self._low),
@@ -177,17 +178,17 @@ class Rig:
             self.names,
             self.preset.smoothed if smooth else None,
         )
-        count, size = len(points), members.size
+        count, size = len(points), scenarios.size
         columns = {f"at {name}": np.repeat(points[:, k], size) for k, name in enumerate(self.names)}
-        columns |= dict(zip((*MISMATCHES, TARGET), np.tile(members.rows, (count, 1)).T, strict=True))
+        columns |= dict(zip((*MISMATCHES, TARGET), np.tile(scenarios.rows, (count, 1)).T, strict=True))
         columns[NUMBER] = np.tile(np.arange(size, dtype=float), count)
         found = []
         for start in range(0, count * size, self.loops):
             # Batches of one size, the last one filled up: one program serves however many starts are left.
             some = np.minimum(np.arange(start, start + self.loops), count * size - 1)
             axes = zipped({name: values[some] for name, values in columns.items()})
-            found += [answer for _, answer in chunks(function, rig, axes, self.loops, [0])]
+            found += [answer for _, answer in chunks(function, problem, axes, self.loops, [0])]
         whole = jax.tree.map(lambda *leaves: np.concatenate(leaves)[: count * size], *found)
         self.simulations += count * size
         by_candidate = jax.tree.map(lambda leaf: leaf.reshape(count, size, *leaf.shape[1:]), whole)
-        return Seen(**{"slopes": np.zeros((count, size, len(TERMS), 0)), **by_candidate})
+        return Evaluation(**{"gradients": np.zeros((count, size, len(TERMS), 0)), **by_candidate})

@@ -13,7 +13,7 @@ from smajax.control.compiled_loop import judged_loop_compiled
 from smajax.control.controllers.base import AbstractController
 from smajax.control.figures_of_merit import Rest, merit_by_set_point
 from smajax.control.reference import clock, resting
-from smajax.control.tune.evaluate import FINE, STEP, Rig
+from smajax.control.tune.evaluate import FINE, STEP, TuningProblem
 
 MOST = 12  # set points of a walk
 
@@ -44,7 +44,7 @@ def walk(set_points: Sequence[float]) -> list[float]:
     return found
 
 
-def moved(rig: Rig, pair: Sequence[AbstractController], set_points: Sequence[float]) -> Moves | None:
+def moved(rig: TuningProblem, pair: Sequence[AbstractController], set_points: Sequence[float]) -> Moves | None:
     """`pair`: controllers with the gains before and after. None of a single set point: there is no move."""
     asked = walk(set_points)
     if len(asked) < 2:

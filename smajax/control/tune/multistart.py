@@ -1,7 +1,7 @@
-"""From many starts at once, each round a batch; starts that have ended, and the worse ones, are dropped on the way.
+"""Gradient descent from many starting points at once, each round a batch; converged and worse starts are dropped.
 
-What a round leaves is ordered by the figures of merit themselves: the smooth terms lead, and do not judge. The state
-after a round is a whole: a tuning that is interrupted goes on from it to the same end.
+Candidates are compared by the exact figures of merit; the smooth terms give the steps only. The state after a round is
+complete: an interrupted tuning resumes from it to the same end.
 """
 
 from __future__ import annotations
@@ -15,25 +15,25 @@ import numpy as np
 from scipy.stats import qmc
 
 from smajax.control.tune import adam, trust
-from smajax.control.tune.evaluate import Rig
+from smajax.control.tune.evaluate import TuningProblem
 from smajax.control.tune.objective import Goal, rank
-from smajax.control.tune.scenarios import Members
+from smajax.control.tune.scenarios import Scenarios
 from smajax.core.files import writing
 from smajax.core.names import instead
 from smajax.core.result_cache import arrays
 
 RULES = ("trust-region", "adam")
-EDGE = 0.03  # share of the box, by logarithm, that starts keep from its bounds
-SOFTNESS = 0.1  # of the settling time, share of the band; and the layer of what switches, rad, as it ends
-WIDE = 3.0  # times as wide a layer what switches begins with
-DROPPED = (0.3, 0.6)  # shares of the rounds after which the worse half of the starts is dropped
+EDGE = 0.03  # fraction of the box, by logarithm: distance of starts from its bounds
+SOFTNESS = 0.1  # of the settling time, fraction of the band; final layer of a switching controller, rad
+WIDE = 3.0  # times that width: the initial layer
+DROPPED = (0.3, 0.6)  # fractions of the rounds after which the worse half of the starts is dropped
 
 
 @dataclass(frozen=True)
 class Effort:
-    """How much is tried, and how. Raises ValueError for a rule there is not."""
+    """The size of the search and its rule. Raises ValueError for an unknown rule."""
 
-    tried: int = 32  # points of the box of which the best begin, on plants as believed
+    tried: int = 32  # points of the box, on unperturbed plants; the best are starting points
     starts: int = 6
     rounds: int = 30  # at most
     seed: int = 0
@@ -47,8 +47,8 @@ class Effort:
 
 
 @dataclass(frozen=True)
-class Descent:
-    """Where a tuning stands after a round: arrays by start (S)."""
+class MultistartState:
+    """The state of a tuning after a round: arrays by start (S)."""
 
     round: int
     points: np.ndarray  # (S, gains), of the next round
@@ -56,12 +56,12 @@ class Descent:
     memory: dict[str, np.ndarray]  # the rule's own, (S, ...)
     best: np.ndarray  # (S, gains)
     best_rank: np.ndarray  # (S,)
-    costs: np.ndarray  # (rounds, S) judged cost of each round; nan where not run
+    costs: np.ndarray  # (rounds, S) exact cost of each round; NaN where not run
     excesses: np.ndarray  # (rounds, S)
-    ran: np.ndarray  # (rounds,) closed loops up to the end of each round
-    begun: int  # closed loops until there were starts
-    left_out: int  # loops whose numbers were none
-    wild: int  # loops whose slopes were of no use
+    ran: np.ndarray  # (rounds,) number of closed loops up to the end of each round
+    initial_loops: int  # number of closed loops that chose the starts
+    non_finite: int  # number of loops with values that are not finite
+    unusable: int  # number of loops with unusable gradients
 
     def save(self, path: Path) -> None:
         """Whole or not at all."""
@@ -72,42 +72,44 @@ class Descent:
 
     @property
     def ended(self) -> bool:
-        """Nothing is left to do."""
+        """Every start has converged, or no rounds are left."""
         return self.round >= len(self.ran) or not self.alive.any()
 
     @property
     def simulations(self) -> int:
         """Closed loops so far."""
-        return int(self.ran.max(initial=self.begun))
+        return int(self.ran.max(initial=self.initial_loops))
 
 
-def load(path: Path) -> Descent | None:
-    """What `Descent.save` wrote; None where there is nothing, or it is damaged."""
+def load(path: Path) -> MultistartState | None:
+    """The file of `MultistartState.save`; None where it does not exist or is damaged."""
     whole: dict[str, Any] | None = arrays(path)
-    own = {field.name for field in dataclasses.fields(Descent)} - {"memory"}
+    own = {field.name for field in dataclasses.fields(MultistartState)} - {"memory"}
     if whole is None or not own <= whole.keys():
         return None
     memory = {name.removeprefix("memory "): whole.pop(name) for name in list(whole) if name.startswith("memory ")}
-    whole |= {name: int(whole[name]) for name in ("round", "begun", "left_out", "wild")}
-    return Descent(**whole, memory=memory)
+    whole |= {name: int(whole[name]) for name in ("round", "initial_loops", "non_finite", "unusable")}
+    return MultistartState(**whole, memory=memory)
 
 
-def begin(rig: Rig, goal: Goal, members: Members, effort: Effort, given: np.ndarray | None) -> Descent:
-    """The starts: `given` (a point of the cube), and the best of the points tried."""
-    gains, wanted = len(rig.names), effort.starts - (given is not None)
+def begin(
+    problem: TuningProblem, goal: Goal, scenarios: Scenarios, effort: Effort, first: np.ndarray | None
+) -> MultistartState:
+    """The starts: `first` (a point of the cube), and the best of the points tried."""
+    gains, wanted = len(problem.names), effort.starts - (first is not None)
     count = max(effort.tried, wanted, 1)
     drawn = qmc.Sobol(gains, rng=effort.seed).random_base2(int(np.ceil(np.log2(count))))[:count]
     drawn = EDGE + (1.0 - 2.0 * EDGE) * drawn
     if 0 < wanted < len(drawn):
-        some = Members(members.rows[members.nominal], members.nominal[members.nominal])
-        seen = rig.judged(drawn, some)
-        drawn = drawn[np.argsort(rank(goal.cost(seen.judged, some), goal.excess(seen.judged)), kind="stable")]
-    points = np.concatenate([np.zeros((0, gains)) if given is None else given[None], drawn[:wanted]])
+        some = Scenarios(scenarios.rows[scenarios.nominal], scenarios.nominal[scenarios.nominal])
+        seen = problem.evaluate(drawn, some)
+        drawn = drawn[np.argsort(rank(goal.cost(seen.exact, some), goal.excess(seen.exact)), kind="stable")]
+    points = np.concatenate([np.zeros((0, gains)) if first is None else first[None], drawn[:wanted]])
     count = len(points)
     limits = len(goal.limited)
-    memory = adam.begin(points, members, limits) if effort.by == "adam" else trust.begin(points)
+    memory = adam.begin(points, scenarios, limits) if effort.by == "adam" else trust.begin(points)
     empty = np.full((effort.rounds, count), np.nan)
-    return Descent(
+    return MultistartState(
         0,
         points,
         np.ones(count, bool),
@@ -117,31 +119,33 @@ def begin(rig: Rig, goal: Goal, members: Members, effort: Effort, given: np.ndar
         empty,
         empty.copy(),
         np.zeros(effort.rounds, int),
-        rig.simulations,
+        problem.simulations,
         0,
         0,
     )
 
 
-def one_round(rig: Rig, goal: Goal, members: Members, effort: Effort, now: Descent) -> Descent:
-    """Every start that is left one step on."""
+def next_round(
+    problem: TuningProblem, goal: Goal, scenarios: Scenarios, effort: Effort, now: MultistartState
+) -> MultistartState:
+    """One step of every remaining start."""
     number, who = now.round, np.flatnonzero(now.alive)
-    wide = WIDE ** (1.0 - min(1.0, 1.5 * number / effort.rounds)) if rig.preset.smoothed else 1.0
-    seen = rig.sloped(now.points[who], members, wide * SOFTNESS)
-    # What was smoothed to have slopes is judged as it is, in loops of its own.
-    judged = seen.judged if rig.preset.smoothed is None else rig.judged(now.points[who], members).judged
-    cost, excess = goal.cost(judged, members), goal.excess(judged)
+    wide = WIDE ** (1.0 - min(1.0, 1.5 * number / effort.rounds)) if problem.preset.smoothed else 1.0
+    seen = problem.evaluate_gradients(now.points[who], scenarios, wide * SOFTNESS)
+    # A controller that was smoothed for its gradients is compared without smoothing, in loops of its own.
+    judged = seen.exact if problem.preset.smoothed is None else problem.evaluate(now.points[who], scenarios).exact
+    cost, excess = goal.cost(judged, scenarios), goal.excess(judged)
     order = rank(cost, excess)
     best, best_rank = now.best.copy(), now.best_rank.copy()
     better = order < best_rank[who]
     best[who[better]], best_rank[who[better]] = now.points[who[better]], order[better]
     costs, excesses, ran = now.costs.copy(), now.excesses.copy(), now.ran.copy()
-    costs[number, who], excesses[number, who], ran[number] = cost, excess, rig.simulations
+    costs[number, who], excesses[number, who], ran[number] = cost, excess, problem.simulations
 
     rule = adam.move if effort.by == "adam" else trust.move
     own = {name: array[who] for name, array in now.memory.items()}
     following, own, ended = rule(
-        goal, seen, members, now.points[who], own, np.random.default_rng([effort.seed, number])
+        goal, seen, scenarios, now.points[who], own, np.random.default_rng([effort.seed, number])
     )
     points = now.points.copy()
     points[who] = following
@@ -153,6 +157,19 @@ def one_round(rig: Rig, goal: Goal, members: Members, effort: Effort, now: Desce
     alive[who[ended]] = False
     if number + 1 in {max(1, round(share * effort.rounds)) for share in DROPPED} and len(who) > 1:
         alive[who[np.argsort(best_rank[who], kind="stable")[-(-len(who) // 2) :]]] = False
-    left_out = now.left_out + int(seen.failed.sum())
-    wild = now.wild + int(seen.wild(goal.used).sum())
-    return Descent(number + 1, points, alive, memory, best, best_rank, costs, excesses, ran, now.begun, left_out, wild)
+    non_finite = now.non_finite + int(seen.failed.sum())
+    unusable = now.unusable + int(seen.unusable(goal.used).sum())
+    return MultistartState(
+        number + 1,
+        points,
+        alive,
+        memory,
+        best,
+        best_rank,
+        costs,
+        excesses,
+        ran,
+        now.initial_loops,
+        non_finite,
+        unusable,
+    )

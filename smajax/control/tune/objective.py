@@ -1,4 +1,4 @@
-r"""One number from the terms of many closed loops, and its slope in the gains.
+r"""One number from the terms of many closed loops, and its gradient in the gains.
 
 A loop costs $c_m = \sum_j w_j q_{mj}$. Over the loops of one candidate
 
@@ -21,8 +21,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from smajax.control.tune.evaluate import Seen
-from smajax.control.tune.scenarios import Members
+from smajax.control.tune.evaluate import Evaluation
+from smajax.control.tune.scenarios import Scenarios
 from smajax.control.tune.terms import TERMS
 from smajax.core.names import instead
 from smajax.model.types import Scalar
@@ -55,7 +55,7 @@ class Goal:
             raise ValueError(f"limits are more than 0; not {dict(self.limits)}.")
 
     @property
-    def weighed(self) -> np.ndarray:
+    def weight_vector(self) -> np.ndarray:
         """(terms,)"""
         return np.asarray([self.weights.get(name, 0.0) for name in TERMS])
 
@@ -67,21 +67,21 @@ class Goal:
     @property
     def used(self) -> np.ndarray:
         """Which terms have a weight or a limit."""
-        return np.union1d(np.flatnonzero(self.weighed), np.asarray(self.limited, int))
+        return np.union1d(np.flatnonzero(self.weight_vector), np.asarray(self.limited, int))
 
     @property
     def bounds(self) -> np.ndarray:
         """Their limits."""
         return np.asarray([self.limits[name] for name in TERMS if name in self.limits])
 
-    def members(self, members: Members) -> np.ndarray:
+    def scenarios(self, scenarios: Scenarios) -> np.ndarray:
         """(M,) bool: whose cost counts."""
-        return members.nominal if self.objective == "nominal" else np.ones(members.size, bool)
+        return scenarios.nominal if self.objective == "nominal" else np.ones(scenarios.size, bool)
 
-    def cost(self, judged: np.ndarray, members: Members) -> np.ndarray:
+    def cost(self, judged: np.ndarray, scenarios: Scenarios) -> np.ndarray:
         """Cost of every candidate (C,) by what was asked for: the settling time itself, and the worst loop itself."""
-        each = judged @ self.weighed
-        counted = each[..., self.members(members)]
+        each = judged @ self.weight_vector
+        counted = each[..., self.scenarios(scenarios)]
         if self.objective == "worst":
             whole = counted.max(axis=-1)
         else:
@@ -108,7 +108,7 @@ def rank(cost: np.ndarray, excess: np.ndarray) -> np.ndarray:
 def _smooth(
     terms: Scalar, good: Scalar, nominal: Scalar, goal: Goal, temperature: Scalar, multipliers: Scalar, rho: Scalar
 ) -> Scalar:
-    each = terms @ jnp.asarray(goal.weighed)
+    each = terms @ jnp.asarray(goal.weight_vector)
     counted = good & (nominal if goal.objective == "nominal" else True)
     count = jnp.maximum(jnp.sum(counted), 1)
     mean = jnp.sum(jnp.where(counted, each, 0.0)) / count
@@ -126,20 +126,25 @@ def _smooth(
     return whole
 
 
-def value_and_slope(
-    goal: Goal, seen: Seen, members: Members, temperature: np.ndarray, multipliers: np.ndarray, rho: np.ndarray
+def value_and_gradient(
+    goal: Goal,
+    seen: Evaluation,
+    scenarios: Scenarios,
+    temperature: np.ndarray,
+    multipliers: np.ndarray,
+    rho: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(objective of every candidate (C,), its slope in the unit cube (C, gains)).
+    """(objective of every candidate (C,), its gradient in the unit cube (C, gains)).
 
-    Loops whose numbers are none, and those whose slopes are wild, are left out of both.
+    Loops whose numbers are none, and those whose gradients are unusable, are left out of both.
     """
-    good = ~(seen.failed | seen.wild(goal.used))
+    good = ~(seen.failed | seen.unusable(goal.used))
     terms = jnp.asarray(np.where(good[..., None], np.nan_to_num(seen.terms), 0.0))
-    slopes = np.where(good[..., None, None], np.nan_to_num(seen.slopes), 0.0)
+    gradients = np.where(good[..., None, None], np.nan_to_num(seen.gradients), 0.0)
     one = jax.value_and_grad(_smooth)
     given = [jnp.asarray(array) for array in (terms, good, temperature, multipliers, rho)]
-    values, by_terms = jax.vmap(lambda t, g, s, m, r: one(t, g, jnp.asarray(members.nominal), goal, s, m, r))(*given)
-    return np.asarray(values), np.einsum("cmt,cmtp->cp", np.asarray(by_terms), slopes)
+    values, by_terms = jax.vmap(lambda t, g, s, m, r: one(t, g, jnp.asarray(scenarios.nominal), goal, s, m, r))(*given)
+    return np.asarray(values), np.einsum("cmt,cmtp->cp", np.asarray(by_terms), gradients)
 
 
 def multiplied(goal: Goal, terms: np.ndarray, multipliers: np.ndarray, rho: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""On what gains are tuned, and on what they are checked: set points x plants, a row each (`sweep.lanes`)."""
+"""On what gains are tuned, and on what they are checked: set points x plants, a row each (`sweep.grid.loop_rows`)."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from scipy.stats import qmc
 
 from smajax.control.mismatch import MISMATCHES
-from smajax.control.sweep import lanes
+from smajax.control.sweep.grid import loop_rows
 from smajax.core.names import instead
 
 CORNERS = 3  # mismatches of which every corner is taken
@@ -21,7 +21,7 @@ BEYOND = 0.2  # how wrong each other parameter is in the check
 
 
 @dataclass(frozen=True)
-class Members:
+class Scenarios:
     """Closed loops of one candidate."""
 
     rows: np.ndarray  # (M, mismatches + 1): ratios in the order of `MISMATCHES`, then the set point, rad
@@ -37,13 +37,13 @@ class Members:
         return self.rows[:, -1]
 
 
-def _crossed(plants: np.ndarray, targets: Sequence[float]) -> Members:
+def _crossed(plants: np.ndarray, targets: Sequence[float]) -> Scenarios:
     """Every plant (P, mismatches) at every set point (rad)."""
     where = np.radians(np.asarray(targets, dtype=float))
     ratios = np.repeat(plants, len(where), axis=0)
     named = dict(zip(MISMATCHES, ratios.T, strict=True))
-    rows = lanes(named, np.tile(where, len(plants)))[:, :-1]
-    return Members(rows, np.all(rows[:, :-1] == 1.0, axis=1))
+    rows = loop_rows(named, np.tile(where, len(plants)))[:, :-1]
+    return Scenarios(rows, np.all(rows[:, :-1] == 1.0, axis=1))
 
 
 def _plants(changes: Sequence[Mapping[str, float]]) -> np.ndarray:
@@ -63,7 +63,7 @@ def check_variation(variation: Mapping[str, float]) -> None:
             )
 
 
-def tuned_on(targets: Sequence[float], variation: Mapping[str, float], seed: int) -> Members:
+def tuned_on(targets: Sequence[float], variation: Mapping[str, float], seed: int) -> Scenarios:
     """The plant as believed and the corners of the variation (from four mismatches on, plants drawn in it) at `targets` (deg).
 
     Raises ValueError as `check_variation` does.
@@ -93,7 +93,7 @@ def between(targets: Sequence[float]) -> list[float]:
     return [0.5 * (low + high) for low, high in itertools.pairwise(ordered)] or beside
 
 
-def never_seen(targets: Sequence[float], variation: Mapping[str, float], count: int, seed: int) -> dict[str, Members]:
+def held_out(targets: Sequence[float], variation: Mapping[str, float], count: int, seed: int) -> dict[str, Scenarios]:
     """What tuning never saw, by name: `inside`, set points that were not tuned, on plants drawn within the variation; and `beyond`.
 
     Beyond: at the set points tuned, each mismatch that was not varied wrong by 20 % alone.

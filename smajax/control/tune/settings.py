@@ -32,9 +32,9 @@ class TuneSettings:
     starts: int = 6
     rounds: int = 30
     by: str = "trust-region"
-    finish: int = 60  # generations of the search without slopes that follows
+    finish: int = 60  # generations of the search without gradients that follows
     seconds: float = 10.0
-    filtered: str = ""
+    estimator: str = ""
     noise: float = 0.0  # degrees
     period: float = STEP  # s
     delay: int = 0
@@ -58,7 +58,7 @@ class TuneSettings:
         if len(set(self.set_points)) < len(self.set_points):
             raise ValueError(f"every set point once, not {', '.join(f'{angle:g}' for angle in self.set_points)}.")
         check_variation(self.variation)
-        check_interface(self.filtered, self.noise, self.period, STEP)
+        check_interface(self.estimator, self.noise, self.period, STEP)
         steps = self.seconds / self.period
         if steps < 1.0 or abs(steps - round(steps)) > 1e-6:
             raise ValueError(
@@ -68,19 +68,19 @@ class TuneSettings:
         if self.start and set(self.start) != set(box):
             raise ValueError(f"gains to begin from are {', '.join(box)}, all of them; not {', '.join(self.start)}.")
         if self.finish < 0:
-            raise ValueError(f"generations without slopes are none or more, not {self.finish}.")
+            raise ValueError(f"generations without gradients are none or more, not {self.finish}.")
         if self.unseen < 1:
             raise ValueError(f"the check needs at least one plant, not {self.unseen}.")
         _ = self.goal, self.effort  # they check themselves
 
     def check_packages(self) -> None:
-        """MissingExtraError without a package that these settings need: before the work, and not in the middle of it."""
+        """MissingExtraError without a package that these settings need, before the work."""
         if self.by == "adam":
             adam.rule()
         if self.finish:
             cma_es.package()
 
-    def plants_in_words(self, air: float = 20.0) -> str:
+    def plants_sentence(self, air: float = 20.0) -> str:
         """On which plants gains are tuned. `air`: degC as believed, of which a share is told in kelvins."""
         sizes = {name: f"{100 * share:g} %" for name, share in self.variation.items()}
         if "ambient" in sizes:
@@ -89,12 +89,12 @@ class TuneSettings:
         told = f"the plant as believed and with {', '.join(wrong)} at once" if wrong else "the plant as believed"
         return f"{told}; set points {', '.join(f'{angle:g}°' for angle in self.set_points)}"
 
-    def unseen_in_words(self) -> str:
+    def held_out_sentence(self) -> str:
         """On what the gains are checked that tuning never saw."""
         where = "set points between those tuned" if len(self.set_points) > 1 else f"a set point {BESIDE:g}° beside"
         return f"plants within the variation, {where}" if self.variation else f"{where}, the plant as believed"
 
-    def goal_in_words(self) -> str:
+    def goal_sentence(self) -> str:
         """What is made small, and what is kept below a limit."""
         parts = [
             f"{weight:g} x {TERMS[name].label} ({TERMS[name].unit})" for name, weight in self.weights.items() if weight
@@ -109,7 +109,7 @@ class TuneSettings:
 
     def between_in_words(self) -> str:
         """What lies between plant and controller."""
-        return between_in_words(self.filtered, self.noise, self.period, self.delay)
+        return between_in_words(self.estimator, self.noise, self.period, self.delay)
 
     def record(self) -> dict[str, Any]:
         """For JSON."""
@@ -126,7 +126,7 @@ class TuneSettings:
             "by": self.by,
             "generations_without_slopes": self.finish,
             "seconds": self.seconds,
-            "filter": self.filtered,
+            "filter": self.estimator,
             "noise_deg": self.noise,
             "period_s": self.period,
             "delay_periods": self.delay,

@@ -110,15 +110,15 @@ class TermWatch(AbstractWatch):
         return terms, merit
 
 
-def as_shown(terms: Terms) -> Scalar:
+def term_vector(terms: Terms) -> Scalar:
     """The terms as a vector in the units of `TERMS`, shape (terms,)."""
     return jnp.stack(terms) * jnp.asarray(FACTORS)
 
 
-def as_judged(terms: Terms, merit: Merit, seconds: Scalar | float) -> Scalar:
+def exact_vector(terms: Terms, merit: Merit, seconds: Scalar | float) -> Scalar:
     """The same with the settling time itself, and twice the run where there is none: what a user asked for."""
     settling = jnp.where(jnp.isfinite(merit.settling_time), merit.settling_time, 2.0 * seconds)
-    return as_shown(terms._replace(settling_time=settling))
+    return term_vector(terms._replace(settling_time=settling))
 
 
 def watch_of(judge: Judge, softness: Scalar) -> TermWatch:

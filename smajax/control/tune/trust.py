@@ -22,9 +22,9 @@ import numpy as np
 from scipy import sparse
 from scipy.optimize import linprog
 
-from smajax.control.tune.evaluate import Seen
+from smajax.control.tune.evaluate import Evaluation
 from smajax.control.tune.objective import SPREAD, Goal
-from smajax.control.tune.scenarios import Members
+from smajax.control.tune.scenarios import Scenarios
 
 FIRST, WIDEST, NARROWEST = 0.15, 0.3, 2e-3  # Delta, share of the box by logarithm; below the last a start has ended
 GOOD, WIDER, NARROWER = 0.5, 2.0, 0.4  # share of the predicted reduction from which Delta grows, and by how much
@@ -44,9 +44,9 @@ def begin(points: np.ndarray) -> Memory:
     }
 
 
-def value(goal: Goal, terms: np.ndarray, members: Members) -> np.ndarray:
+def value(goal: Goal, terms: np.ndarray, scenarios: Scenarios) -> np.ndarray:
     """The objective of terms (C, M, terms) and the penalty of its limits, (C,)."""
-    return goal.cost(terms, members) + PENALTY * goal.excess(terms)
+    return goal.cost(terms, scenarios) + PENALTY * goal.excess(terms)
 
 
 def _shares(goal: Goal, costs: np.ndarray, counted: np.ndarray) -> np.ndarray:
@@ -59,20 +59,20 @@ def _shares(goal: Goal, costs: np.ndarray, counted: np.ndarray) -> np.ndarray:
 
 
 def step(
-    goal: Goal, terms: np.ndarray, slopes: np.ndarray, members: Members, centre: np.ndarray, radius: float
+    goal: Goal, terms: np.ndarray, gradients: np.ndarray, scenarios: Scenarios, centre: np.ndarray, radius: float
 ) -> tuple[np.ndarray, float]:
-    """(next point, the predicted value there) from terms (M, terms) and slopes (M, terms, gains) at the centre."""
+    """(next point, the predicted value there) from terms (M, terms) and gradients (M, terms, gains) at the centre."""
     count, gains = len(terms), len(centre)
-    used, counted = np.flatnonzero(goal.weighed), goal.members(members)
-    weights, pieces = goal.weighed[used], np.flatnonzero(counted)
+    used, counted = np.flatnonzero(goal.weight_vector), goal.scenarios(scenarios)
+    weights, pieces = goal.weight_vector[used], np.flatnonzero(counted)
     # Unknowns: d (gains), t, v, q (loops that count x terms used).
     worst, lines = goal.objective == "worst", len(pieces) * len(used)
     cost = np.zeros(gains + 2 + lines)
     cost[gains], cost[gains + 1] = float(worst), PENALTY
     if not worst:
-        shares = _shares(goal, terms @ goal.weighed, counted)[pieces]
+        shares = _shares(goal, terms @ goal.weight_vector, counted)[pieces]
         cost[gains + 2 :] = np.outer(shares, weights).ravel()
-    steep = slopes[pieces][:, used].reshape(lines, gains)
+    steep = gradients[pieces][:, used].reshape(lines, gains)
     rows = [sparse.hstack([sparse.csr_matrix(steep), sparse.csr_matrix((lines, 2)), -sparse.identity(lines)])]
     least = [-terms[pieces][:, used].ravel()]
     if worst:
@@ -85,7 +85,7 @@ def step(
         rows.append(
             sparse.hstack(
                 [
-                    sparse.csr_matrix(slopes[:, k] / bound),
+                    sparse.csr_matrix(gradients[:, k] / bound),
                     sparse.csr_matrix((count, 1)),
                     sparse.csr_matrix(-np.ones((count, 1))),
                     sparse.csr_matrix((count, lines)),
@@ -102,14 +102,14 @@ def step(
 
 
 def move(
-    goal: Goal, seen: Seen, members: Members, points: np.ndarray, memory: Memory, draw: np.random.Generator
+    goal: Goal, seen: Evaluation, scenarios: Scenarios, points: np.ndarray, memory: Memory, draw: np.random.Generator
 ) -> tuple[np.ndarray, Memory, np.ndarray]:
     """(next points, memory, which starts have ended) after `points` (C, gains) were evaluated."""
     new = {name: array.copy() for name, array in memory.items()}
-    values = value(goal, seen.terms, members)
-    calm = ~(seen.failed | seen.wild(goal.used))
-    shape = (len(points), *seen.slopes.shape[1:])
-    terms, slopes = new.setdefault("terms", np.zeros(shape[:3])), new.setdefault("slopes", np.zeros(shape))
+    values = value(goal, seen.terms, scenarios)
+    calm = ~(seen.failed | seen.unusable(goal.used))
+    shape = (len(points), *seen.gradients.shape[1:])
+    terms, gradients = new.setdefault("terms", np.zeros(shape[:3])), new.setdefault("gradients", np.zeros(shape))
     following = points.copy()
     for k in range(len(points)):
         before = new["value"][k]
@@ -119,12 +119,12 @@ def move(
             new["radius"][k] *= WIDER if not first and good else 1.0
             new["centre"][k], new["value"][k] = points[k], values[k]
             terms[k] = np.nan_to_num(seen.terms[k])
-            slopes[k] = np.where(calm[k][:, None, None], seen.slopes[k], 0.0)
+            gradients[k] = np.where(calm[k][:, None, None], seen.gradients[k], 0.0)
         else:
             new["radius"][k] *= NARROWER
         radius = new["radius"][k] = min(new["radius"][k], WIDEST)
         centre = new["centre"][k]
-        proposal, new["predicted"][k] = step(goal, terms[k], slopes[k], members, centre, float(radius))
+        proposal, new["predicted"][k] = step(goal, terms[k], gradients[k], scenarios, centre, float(radius))
         drawn = np.clip(centre + radius * draw.uniform(-1.0, 1.0, len(centre)), 0.0, 1.0)
         improves = new["predicted"][k] < new["value"][k] - MIN_REDUCTION
         following[k] = proposal if improves else drawn

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -11,13 +12,13 @@ from smajax.control.gains_file import Gains
 from smajax.control.interface import interface_of
 from smajax.control.mismatch import MISMATCHES
 from smajax.control.presets import CONTROLLERS
-from smajax.control.sweep import positions
-from smajax.control.tune.cma_es import Evolution, evolve
-from smajax.control.tune.evaluate import LOOPS, STEP, Rig, Seen
+from smajax.control.sweep.batched_loops import LoopSetup, positions
+from smajax.control.tune.cma_es import CmaEsState, SearchTask, evolve
+from smajax.control.tune.evaluate import LOOPS, STEP, Evaluation, TuningProblem
 from smajax.control.tune.moves import Moves, moved
-from smajax.control.tune.multistart import Descent, begin, one_round
-from smajax.control.tune.objective import Goal, rank
-from smajax.control.tune.scenarios import Members, never_seen, tuned_on
+from smajax.control.tune.multistart import MultistartState, begin, next_round
+from smajax.control.tune.objective import rank
+from smajax.control.tune.scenarios import Scenarios, held_out, tuned_on
 from smajax.control.tune.settings import TuneSettings
 from smajax.core.parameters import get_parameters, parameters
 from smajax.core.progress import Progress, Stage, quiet
@@ -31,8 +32,8 @@ DRAWN = 8  # plants never seen that are drawn over time
 class Check:
     """Figures before and after on some closed loops: `seen` has two candidates, the preset's gains and the tuned ones."""
 
-    members: Members
-    seen: Seen
+    scenarios: Scenarios
+    seen: Evaluation
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ class Lines:
 
 
 @dataclass(frozen=True)
-class Tuned:
+class TuningResult:
     """What came of a tuning."""
 
     settings: TuneSettings
@@ -56,8 +57,8 @@ class Tuned:
     checks: Mapping[str, Check]  # `tuned on`, `inside`, `beyond`
     costs: tuple[float, float]  # before and after, on what was tuned on
     excesses: Mapping[str, tuple[float, float]]  # by which a limit is exceeded, of each check
-    descent: Descent
-    evolution: Evolution
+    descent: MultistartState
+    evolution: CmaEsState
     simulations: int  # closed loops of the search
     lines: Lines
     moves: Moves | None
@@ -69,16 +70,16 @@ class Tuned:
         return self.excesses["tuned on"][1] <= 0.0 and self.excesses["inside"][1] <= 0.0
 
 
-def rig_of(system: System, settings: TuneSettings) -> Rig:
+def problem_of(system: System, settings: TuneSettings) -> TuningProblem:
     """The controller on its plant; batches no larger than a round needs."""
     preset = CONTROLLERS[settings.controller]
     plant = preset.plant(system)
     size = settings.starts * tuned_on(settings.set_points, settings.variation, settings.seed).size
-    return Rig(
+    return TuningProblem(
         preset,
         system,
         seconds=settings.seconds,
-        interface=interface_of(plant, settings.filtered, settings.noise, settings.period, STEP, settings.delay),
+        interface=interface_of(plant, settings.estimator, settings.noise, settings.period, STEP, settings.delay),
         seed=settings.seed,
         loops=int(np.clip(1 << (size - 1).bit_length(), LEAST_LOOPS, LOOPS)),
     )
@@ -88,116 +89,137 @@ def tune(
     system: System,
     settings: TuneSettings,
     *,
-    after: Descent | None = None,
-    known: Evolution | None = None,
-    keep: Callable[[Descent | Evolution], object] = lambda state: None,
+    after: MultistartState | None = None,
+    known: CmaEsState | None = None,
+    save: Callable[[MultistartState | CmaEsState], object] = lambda state: None,
     progress: Progress = quiet,
-) -> Tuned:
-    """Tune, from the preset's gains and the best of points of the box; `keep` gets the starts and every round's end.
+) -> TuningResult:
+    """Tune from the preset's gains and the best of points of the box; `save` gets the state after every round.
 
-    after, known: where an interrupted tuning stood, by slopes and without; it goes on from there to the same end.
+    after, known: states of an interrupted tuning, of the gradient search and of CMA-ES; it resumes to the same end.
 
     Raises ValueError for settings that make no sense, MissingExtraError without a package that they need.
     """
     settings.check(system)
-    settings.check_packages()
-    rig, goal, effort = rig_of(system, settings), settings.goal, settings.effort
-    members = tuned_on(settings.set_points, settings.variation, settings.seed)
-    what = f"tuning {settings.controller}"
-    if after is None:
-        progress(Stage(f"{what}: {settings.tried} points of the box", 0.0))
-        now = begin(rig, goal, members, effort, rig.point(settings.start) if settings.start else rig.before)
-        keep(now)
-        progress(Stage(f"{what}: {settings.tried} points of the box", 1.0))
-    else:
-        now, rig.simulations = after, after.simulations
-    while not now.ended:
-        progress(Stage(what, now.round / effort.rounds))
-        now = one_round(rig, goal, members, effort, now)
-        keep(now)
-    progress(Stage(what, 1.0))
-    progress(Stage("judging", 0.0))
-    # Rounds judge at the step of tuning; of what they leave the best at a finer one is taken. The preset and what was begun
-    # from are among them.
-    begun = (rig.point(settings.start),) if settings.start else ()
-    best = _best_of(rig, goal, members, (rig.before, *begun, *now.best))
-    progress(Stage("judging", 1.0))
+    scenarios = tuned_on(settings.set_points, settings.variation, settings.seed)
+    task = SearchTask(problem_of(system, settings), settings.goal, scenarios)
+    problem, name = task.problem, f"tuning {settings.controller}"
+    descent = _by_gradient(task, settings, after, save, progress)
+    progress(Stage("evaluating", 0.0))
+    # Rounds evaluate at a coarse time step; of their results the best at a finer one is taken. The preset's gains and the
+    # initial ones are among them.
+    initial = (problem.point(settings.start),) if settings.start else ()
+    best = _best_of(task, (problem.before, *initial, *descent.best))
+    progress(Stage("evaluating", 1.0))
     evolution = evolve(
-        rig,
-        goal,
-        members,
-        rig.point(best),
+        task,
+        problem.point(best),
         generations=settings.finish,
         seed=settings.seed,
         known=known,
-        keep=keep,
+        save=save,
         progress=progress,
-        what=f"{what}, without slopes",
+        what=f"{name}, CMA-ES",
     )
-    progress(Stage("judging", 0.0))
-    best = _best_of(rig, goal, members, (rig.point(best), evolution.best))
-    searched = rig.simulations
-    pair = np.stack([rig.before, rig.point(best)])
-    checks = {
-        "tuned on": members,
-        **never_seen(settings.set_points, settings.variation, settings.unseen, settings.seed),
-    }
-    judged = {}
-    for k, (name, some) in enumerate(checks.items()):
-        judged[name] = Check(some, rig.judged(pair, some))
-        progress(Stage("judging", (k + 1) / (len(checks) + 1)))
-    here = judged["tuned on"]
-    cost = goal.cost(here.seen.judged, members)
-    excesses = {name: goal.excess(one.seen.judged) for name, one in judged.items()}
-    table = parameters(rig.controller)
+    progress(Stage("evaluating", 0.0))
+    best = _best_of(task, (problem.point(best), evolution.best))
+    return _validated(task, settings, best, descent, evolution, progress)
+
+
+def _by_gradient(
+    task: SearchTask,
+    settings: TuneSettings,
+    after: MultistartState | None,
+    save: Callable[[MultistartState], object],
+    progress: Progress,
+) -> MultistartState:
+    """The end of the gradient search."""
+    problem, effort, name = task.problem, settings.effort, f"tuning {settings.controller}"
+    if after is None:
+        progress(Stage(f"{name}: {settings.tried} points of the box", 0.0))
+        first = problem.point(settings.start) if settings.start else problem.before
+        state = begin(problem, task.goal, task.scenarios, effort, first)
+        save(state)
+        progress(Stage(f"{name}: {settings.tried} points of the box", 1.0))
+    else:
+        state, problem.simulations = after, after.simulations
+    while not state.ended:
+        progress(Stage(name, state.round / effort.rounds))
+        state = next_round(problem, task.goal, task.scenarios, effort, state)
+        save(state)
+    progress(Stage(name, 1.0))
+    return state
+
+
+def _validated(
+    task: SearchTask,
+    settings: TuneSettings,
+    best: Mapping[str, float],
+    descent: MultistartState,
+    evolution: CmaEsState,
+    progress: Progress,
+) -> TuningResult:
+    """The result: both gains on the tuned and the held-out loops, over time, and in moves between set points."""
+    problem, goal = task.problem, task.goal
+    searched = problem.simulations
+    pair = np.stack([problem.before, problem.point(best)])
+    held = held_out(settings.set_points, settings.variation, settings.unseen, settings.seed)
+    checks: dict[str, Check] = {}
+    for name, scenarios in {"tuned on": task.scenarios, **held}.items():
+        checks[name] = Check(scenarios, problem.evaluate(pair, scenarios))
+        progress(Stage("evaluating", len(checks) / (len(held) + 2)))
+    cost = goal.cost(checks["tuned on"].seen.exact, task.scenarios)
+    excesses = {name: goal.excess(one.seen.exact) for name, one in checks.items()}
+    table = parameters(problem.controller)
     tuned = Gains(settings.controller, best)
-    lines = _lines(rig, settings, tuned, checks["inside"])
-    moves = moved(rig, (rig.controller, tuned.put(rig.system)), settings.set_points)
-    progress(Stage("judging", 1.0))
-    return Tuned(
+    lines = _lines(problem, settings, tuned, held["inside"])
+    moves = moved(problem, (problem.controller, tuned.put(problem.system)), settings.set_points)
+    progress(Stage("evaluating", 1.0))
+    preset = np.asarray(get_parameters(problem.controller, problem.names)).tolist()
+    return TuningResult(
         settings,
-        dict(zip(rig.names, np.asarray(get_parameters(rig.controller, rig.names)).tolist(), strict=True)),
+        dict(zip(problem.names, preset, strict=True)),
         tuned,
-        rig.box,
-        {name: table[name].unit for name in rig.names},
-        judged,
+        problem.box,
+        {name: table[name].unit for name in problem.names},
+        checks,
         (float(cost[0]), float(cost[1])),
         {name: (float(one[0]), float(one[1])) for name, one in excesses.items()},
-        now,
+        descent,
         evolution,
         searched,
         lines,
         moves,
-        float(get_parameters(rig.system, [MISMATCHES["ambient"]])[0]),
+        float(get_parameters(problem.system, [MISMATCHES["ambient"]])[0]),
     )
 
 
-def _best_of(rig: Rig, goal: Goal, members: Members, points: Sequence[np.ndarray]) -> dict[str, float]:
-    """The gains of the best of points of the cube, as a file would hold them."""
-    ends = rig.held(np.stack(points))
-    judged = rig.judged(ends, members).judged
-    return rig.gains(ends[int(np.argmin(rank(goal.cost(judged, members), goal.excess(judged))))])
+def _best_of(task: SearchTask, points: Sequence[np.ndarray]) -> dict[str, float]:
+    """The gains of the best of points of the unit cube, rounded as a file holds them."""
+    problem = task.problem
+    ends = problem.rounded(np.stack(points))
+    return problem.gains(ends[int(np.argmin(rank(*task.score(ends))))])
 
 
-def _lines(rig: Rig, settings: TuneSettings, tuned: Gains, inside: Members) -> Lines:
+def _lines(problem: TuningProblem, settings: TuneSettings, tuned: Gains, inside: Scenarios) -> Lines:
     """The plant as believed and some of the plants never seen, at the set points tuned."""
     targets = np.radians(settings.set_points)
     plants = np.unique(inside.rows[:, :-1], axis=0)[:DRAWN]
     plants = np.concatenate([np.ones((1, plants.shape[1])), plants])
     rows = np.column_stack([np.repeat(plants, len(targets), axis=0), np.tile(targets, len(plants))])
     rows = np.column_stack([rows, np.ones(len(rows))])
+    setup = LoopSetup(
+        problem.system,
+        problem.controller,
+        problem.preset.main_gain,
+        settings.seconds,
+        STEP,
+        problem.interface,
+        settings.seed,
+    )
     angles = [
-        positions(
-            rig.system,
-            controller,
-            rig.preset.main_gain,
-            rows,
-            seconds=settings.seconds,
-            dt=STEP,
-            interface=rig.interface,
-            seed=settings.seed,
-        )
-        for controller in (rig.controller, tuned.put(rig.system))
+        positions(dataclasses.replace(setup, controller=controller), rows)
+        for controller in (problem.controller, tuned.put(problem.system))
     ]
     time = np.arange(angles[0].shape[1]) * STEP
     return Lines(time, np.stack(angles), rows[:, -2])

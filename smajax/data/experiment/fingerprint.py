@@ -1,4 +1,4 @@
-"""What tells one experiment from another: every key of its file, and its data by their content."""
+"""What distinguishes one experiment from another: every key of its file, and its data by their content."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from smajax.data.experiment.record import Experiment
 
 
 def _entries(place: str, value: Any) -> Iterator[tuple[str, str]]:
-    """(key path, value as text) of all that a table of the file holds; a run goes by its name."""
+    """(key path, value as text) of all entries of a table; a run is named by its `name`."""
     if isinstance(value, Mapping):
         for key, one in value.items():
             yield from _entries(f"{place}.{key}" if place else key, one)
@@ -21,8 +21,8 @@ def _entries(place: str, value: Any) -> Iterator[tuple[str, str]]:
         yield place, repr(value)
 
 
-def asked_of(experiment: Experiment) -> dict[str, Any]:
-    """Its name, what its file says (comments and layout apart), and the digest of each run's files."""
+def fingerprint(experiment: Experiment) -> dict[str, Any]:
+    """Its name, the content of its file without comments and layout, and the digest of each run's files."""
     content = tomllib.loads(experiment.path.read_text(encoding="utf-8-sig"))
     return {
         "experiment": experiment.name,

@@ -6,13 +6,15 @@ import codecs
 import csv
 import re
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from smajax.core.units import is_unit
-from smajax.data.readers.clock_times import NANO, moment, past_midnight
+from smajax.data.readers.clock_times import moment
+from smajax.data.readers.csv_columns import CsvColumn, is_datum, is_number
 from smajax.data.readers.table import Array, MeasuredDataError, Table
 
 COMMENT_MARKS = ("#", "%")
@@ -25,7 +27,6 @@ PREAMBLE = 100  # lines above a header
 BLOCK = 20_000  # lines
 CHUNK = 1 << 20  # bytes
 LONGEST_LINE = 1 << 20  # characters
-MISSING = ("", "na", "n/a")  # cells without a sample, where the experiment file allows them; nan is a number to Python
 
 
 def _encoding(path: Path) -> str:
@@ -97,14 +98,14 @@ def _blank_separated(line: str) -> bool:
     if [cell.strip() for cell in line.split("\t")] == cells:
         return False  # one tab between any two: so they may be between the words of a header
     numbers = sum(DECIMAL_COMMA.fullmatch(cell) is not None for cell in cells)
-    return len(cells) > 1 and numbers > 0 and all(DECIMAL_COMMA.fullmatch(cell) or _is_datum(cell) for cell in cells)
+    return len(cells) > 1 and numbers > 0 and all(DECIMAL_COMMA.fullmatch(cell) or is_datum(cell) for cell in cells)
 
 
 def _has_decimal_commas(rows: list[tuple[int, list[str]]]) -> bool:
     """Whether the commas in cells are decimal: in a file that has no decimal points and where they cannot be thousands."""
     cells = [cell for _, row in rows for cell in row]
     commas = [cell for cell in cells if DECIMAL_COMMA.fullmatch(cell)]
-    points = any("." in cell and _is_number(cell) for cell in cells)
+    points = any("." in cell and is_number(cell) for cell in cells)
     return bool(commas) and not points and not all(THOUSANDS.fullmatch(cell) for cell in commas)
 
 
@@ -112,7 +113,7 @@ def _check_points(path: Path, rows: Sequence[tuple[int, list[str]]]) -> None:
     """Raises MeasuredDataError for a number with a point in a file whose decimals stand behind commas: 1.234 may be a thousand."""
     for number, row in rows:
         for cell in row:
-            if "." in cell and _is_number(cell):
+            if "." in cell and is_number(cell):
                 raise MeasuredDataError(
                     f"{path}: line {number} has {cell!r}, and [data] decimal = ',' says that decimals stand behind a comma; take that "
                     "key out, or write one mark in all cells"
@@ -141,19 +142,6 @@ def _rows(path: Path, lines: list[tuple[int, str]], separator: str | None) -> li
     return rows
 
 
-def _is_number(cell: str) -> bool:
-    try:
-        float(cell)
-    except ValueError:
-        return False
-    return "_" not in cell
-
-
-def _is_datum(cell: str) -> bool:
-    """Whether a cell holds a number or a clock time."""
-    return _is_number(cell) or moment(cell) is not None
-
-
 def _cells(count: int) -> str:
     return f"{count} cell" if count == 1 else f"{count} cells"
 
@@ -174,7 +162,7 @@ def _without_preamble(rows: list[tuple[int, list[str]]]) -> list[tuple[int, list
     width = _usual_width(rows, None)
     begins = next((place for place, (_, cells) in enumerate(rows[:PREAMBLE]) if len(cells) == width), 0)
     header = rows[begins][1]
-    return rows[begins:] if width > 1 and not any(map(_is_datum, header)) and all(header) else rows
+    return rows[begins:] if width > 1 and not any(map(is_datum, header)) and all(header) else rows
 
 
 def _is_units(rows: Sequence[tuple[int, list[str]]]) -> bool:
@@ -183,7 +171,7 @@ def _is_units(rows: Sequence[tuple[int, list[str]]]) -> bool:
         return False
     first, second = rows[0][1], rows[1][1]
     words = [cell for cell in first if cell not in ("", "-", "1")]
-    return bool(words) and not any(map(_is_datum, words)) and any(map(_is_number, second))
+    return bool(words) and not any(map(is_datum, words)) and any(map(is_number, second))
 
 
 def _units(names: Sequence[str], cells: Sequence[str]) -> dict[str, str] | None:
@@ -192,67 +180,6 @@ def _units(names: Sequence[str], cells: Sequence[str]) -> dict[str, str] | None:
     if not all(not unit or is_unit(unit) for unit in bare):
         return None
     return {name: unit for name, unit in zip(names, bare, strict=True) if unit}
-
-
-def _why_unusable(
-    name: str, place: int, rows: Sequence[tuple[int, list[str]]], reads: Callable[[str], bool], what: str
-) -> str | None:
-    """What keeps the column at that place from being a signal, or None. reads: whether a cell is `what` it should hold."""
-    wrong = next(((number, row[place]) for number, row in rows if not reads(row[place])), None)
-    if wrong is None:
-        return None
-    number, cell = wrong
-    got = f"line {number}, column {name!r}: " + (f"{cell[:40]!r} is not a {what}" if cell else "the cell is empty")
-    hint = ""
-    if "," in cell:
-        hint = (
-            "; its comma may be decimal or set thousands apart: write a decimal point, or decimal = ',' under [data] "
-        )
-        hint += "(`smajax new-experiment --decimal ,`)"
-    return f"{got}{hint}; expected a {what} in every line"
-
-
-class _Column:
-    """One column as it is read: its numbers or clock times a block at a time, and what keeps it from being either."""
-
-    def __init__(self, name: str, place: int, clock: bool) -> None:
-        self.name, self.place = name, place
-        self.clock = clock  # whether it holds clock times
-        self.parts: list[Array] = []
-        self.first: int | None = None  # clock time, ns, since when seconds are counted
-        self.reason: str | None = None
-        self.gappy = True  # whether a missing sample is all that keeps it from being numbers
-        self.beyond_first = 0  # cells that are no numbers, but for the first line's
-
-    def reads(self, cell: str) -> bool:
-        return moment(cell) is not None if self.clock else _is_number(cell)
-
-    def add_numbers(self, values: Array) -> None:
-        self.parts.append(np.ascontiguousarray(values))
-
-    def add(self, rows: Sequence[tuple[int, list[str]]], first: bool) -> None:
-        """first: these rows begin the file."""
-        reason = _why_unusable(self.name, self.place, rows, self.reads, "clock time" if self.clock else "number")
-        self.reason = self.reason or reason
-        cells = [row[self.place] for _, row in rows]
-        if reason is not None:
-            self.beyond_first += sum(not self.reads(cell) for cell in cells[1 if first else 0 :])
-            self.gappy = self.gappy and all(cell.lower() in MISSING or self.reads(cell) for cell in cells)
-        if not self.gappy:
-            self.parts.clear()
-        elif self.clock:
-            moments = [moment(cell) for cell in cells]
-            if self.first is None:
-                self.first = moments[0] or 0  # a column is a clock by its first cell
-            origin = self.first
-            self.parts.append(np.array([np.nan if one is None else (one - origin) / NANO for one in moments]))
-        else:
-            self.parts.append(np.array([float(cell) if _is_number(cell) else np.nan for cell in cells]))
-
-    @property
-    def values(self) -> Array:
-        values = np.concatenate(self.parts) if self.parts else np.zeros(0)
-        return values if self.first is None else past_midnight(values, self.first)
 
 
 def _numbers(lines: list[tuple[int, str]], separator: str | None, width: int) -> Array | None:
@@ -291,86 +218,121 @@ def _check_width(path: Path, rows: Sequence[tuple[int, list[str]]], width: int) 
             )
 
 
-def read_csv(path: Path, wanted: Collection[str | int] | None = None, decimal: str | None = None) -> Table:
-    """Reads a text table. The first line is a header when one of its cells is neither a number nor a clock time.
+@dataclass(frozen=True)
+class _Format:
+    """How a text table is written, by its first lines."""
 
-    Columns are named by the header, or "1", "2", ... without one. A line of units under the header gives them theirs. Clock
-    times are read as seconds from the first one. A column with a cell that is not a number is
-    an error only when it is asked for. wanted: the names and numbers (from 1) of the columns to keep; None: all.
-    decimal: "," or "."; None: as the first lines tell.
-    The file goes by in blocks of lines, of which the first tells how it is written; what is kept is 8 bytes a number.
-    Raises MeasuredDataError.
-    """
-    blocks = _blocks(path)
-    lines = next(blocks, [])
-    if not lines:
-        raise MeasuredDataError(f"{path}: holds no data line")
+    path: Path
+    separator: str | None  # None: whitespace
+    decimal: str | None  # as requested
+    commas: bool  # decimal commas
+    names: tuple[str, ...]
+    units: Mapping[str, str]  # of a line of units below the header
+    unknown_units: bool  # the line below the header looks like units, and some are unknown
+
+    def numbers(self, lines: list[tuple[int, str]]) -> Array | None:
+        """The cells of a block, (lines, columns), without a check of each; None where they are not plain numbers."""
+        return None if self.commas else _numbers(lines, self.separator, len(self.names))
+
+    def rows(self, lines: list[tuple[int, str]]) -> list[tuple[int, list[str]]]:
+        """(line number, cells) of each line of a block. Raises MeasuredDataError."""
+        rows = _rows(self.path, lines, self.separator)
+        if self.decimal == ",":
+            _check_points(self.path, rows)
+        rows = _with_points(rows) if self.commas else rows
+        _check_width(self.path, rows, len(self.names))
+        return rows
+
+
+def _format(
+    path: Path, lines: list[tuple[int, str]], decimal: str | None
+) -> tuple[_Format, list[tuple[int, list[str]]]]:
+    """(format, rows of data among the first lines). Raises MeasuredDataError."""
     separator = _separator(path, [line for _, line in lines], decimal)
     written = _rows(path, lines, separator)
     commas = decimal == "," if decimal is not None else _has_decimal_commas(written)
-    rows = _with_points(written) if commas else written
-    rows = _without_preamble(rows)
+    rows = _without_preamble(_with_points(written) if commas else written)
     header: list[str] | None = None
-    if not all(_is_datum(cell) for cell in rows[0][1] if cell):
+    if not all(is_datum(cell) for cell in rows[0][1] if cell):
         header, rows = rows[0][1], rows[1:]
         if not rows:
             raise MeasuredDataError(f"{path}: holds a header and no data line")
     width = _usual_width(rows, header)
     names = _checked_names(path, header, rows, width)
     _check_width(path, rows, width)
-    units = header is not None and _is_units(rows)
-    stated = _units(names, rows[0][1]) if units else None
-    if stated is not None:
-        units, rows = False, rows[1:]
+    has_units = header is not None and _is_units(rows)
+    units = _units(names, rows[0][1]) if has_units else None
+    if units is not None:
+        rows = rows[1:]
     if decimal == ",":
         _check_points(path, [row for row in written if row[0] >= rows[0][0]])
-    first_line = rows[0][0]
-    kept = [
-        _Column(name, place, moment(rows[0][1][place]) is not None)
-        for place, name in enumerate(names)
+    unknown = has_units and units is None
+    return _Format(path, separator, decimal, commas, tuple(names), units or {}, unknown), rows
+
+
+def read_csv(path: Path, wanted: Collection[str | int] | None = None, decimal: str | None = None) -> Table:
+    """Reads a text table. The first line is a header when one of its cells is neither a number nor a clock time.
+
+    Columns are named by the header, or "1", "2", ... without one. A line of units under the header gives them theirs. Clock
+    times are read as seconds from the first one. A column with a cell that is not a number is
+    an error only when it is requested. wanted: the names and numbers (from 1) of the columns to keep; None: all.
+    decimal: "," or "."; None: as the first lines show.
+    The file is read in blocks of lines, of which the first determines the format; 8 bytes a number stay in memory.
+    Raises MeasuredDataError.
+    """
+    blocks = _blocks(path)
+    lines = next(blocks, [])
+    if not lines:
+        raise MeasuredDataError(f"{path}: holds no data line")
+    form, rows = _format(path, lines, decimal)
+    columns = [
+        CsvColumn(name, place, moment(rows[0][1][place]) is not None)
+        for place, name in enumerate(form.names)
         if wanted is None or name in wanted or place + 1 in wanted
     ]
-    for column in kept:
+    for column in columns:
         column.add(rows, first=True)
     numbers = [np.array([number for number, _ in rows])]
+    clocks = any(column.clock for column in columns)
     for lines in blocks:
-        whole = None if commas or any(column.clock for column in kept) else _numbers(lines, separator, width)
-        if whole is None:
-            rows = _rows(path, lines, separator)
-            if decimal == ",":
-                _check_points(path, rows)
-            rows = _with_points(rows) if commas else rows
-            _check_width(path, rows, width)
-        for column in kept:
-            if whole is None:
-                column.add(rows, first=False)
+        values = None if clocks else form.numbers(lines)
+        cells = form.rows(lines) if values is None else []
+        for column in columns:
+            if values is None:
+                column.add(cells, first=False)
             elif column.gappy:
-                column.add_numbers(whole[:, column.place])
+                column.add_numbers(values[:, column.place])
         numbers.append(np.array([number for number, _ in lines]))
+    return _table(form, columns, rows[0][0], numbers, wanted is None)
 
-    columns: dict[str, Array] = {}
+
+def _table(
+    form: _Format, columns: Sequence[CsvColumn], first_line: int, numbers: list[np.ndarray], all_columns: bool
+) -> Table:
+    """The table of the columns that were read. Raises MeasuredDataError where all were wanted and none has numbers."""
+    signals: dict[str, Array] = {}
     unusable: dict[str, str] = {}
     gappy: dict[str, Array] = {}
-    for column in kept:
+    for column in columns:
         if column.reason is None:
-            columns[column.name] = column.values
+            signals[column.name] = column.values
             continue
         unusable[column.name] = column.reason
-        if units and not column.beyond_first:
+        if form.unknown_units and not column.beyond_first:
             got = column.reason.split("; expected")[0]
             unusable[column.name] = f"{got}; line {first_line} looks like units: delete it"
         if column.gappy:
             gappy[column.name] = column.values
-    if not columns and wanted is None:
-        raise MeasuredDataError(f"{path}: no column of numbers; {unusable[names[0]]}")
-    moments = {column.name: column.first for column in kept if column.first is not None and column.name in columns}
+    if not signals and all_columns:
+        raise MeasuredDataError(f"{form.path}: no column of numbers; {unusable[form.names[0]]}")
+    moments = {column.name: column.first for column in columns if column.first is not None and column.name in signals}
     return Table(
-        path=path,
-        columns=columns,
+        path=form.path,
+        columns=signals,
         unusable=unusable,
         gappy=gappy,
-        order=tuple(names),
-        units={**(stated or {}), **dict.fromkeys(moments, "s")},
+        order=form.names,
+        units={**form.units, **dict.fromkeys(moments, "s")},
         moments=moments,
         lines=_line_numbers(numbers),
     )

@@ -1,4 +1,4 @@
-"""`smajax effects` and `smajax presets`: what there is."""
+"""`smajax presets`: wires, loads, drives and controllers by name, and their parameters."""
 
 from __future__ import annotations
 
@@ -9,57 +9,9 @@ from typing import Annotated, Any
 import typer
 
 from smajax.cli import completion
-from smajax.cli.options import Json, until_nobody_reads
+from smajax.cli.options import Json
+from smajax.cli.terminal import until_pipe_closes
 from smajax.core.wording import aligned
-
-
-def effects(
-    names: Annotated[
-        list[str] | None,
-        typer.Argument(help="effects, or equations whose effects to list", autocompletion=completion.effects),
-    ] = None,
-    json_out: Json = False,
-) -> None:
-    """List the effects that `close-loop` may add: equation, formula, and what each means for a wire.
-
-    With names: these alone; the name of an equation (heat, kinetics, sensor, ...) stands for all of its effects.
-
-    Example:  smajax effects --json
-
-    Example:  smajax effects latent_heat sensor
-    """
-    from smajax.core.names import instead
-    from smajax.core.parameters import parameters
-    from smajax.model.effects.library import LIBRARY
-
-    told = {
-        name: {
-            "title": effect.candidate.title,
-            "equation": effect.candidate.equation,
-            "formula": effect.candidate.formula,
-            "meaning": effect.candidate.sentence,
-            "parameters": {
-                entry.name: {"unit": entry.unit, "bounds": [entry.low, entry.high]}
-                for entry in parameters(effect.base()).values()
-            },
-        }
-        for name, effect in LIBRARY.items()
-        if not names or name in names or effect.candidate.equation in names
-    }
-    known = {*LIBRARY, *(effect.candidate.equation for effect in LIBRARY.values())}
-    for name in names or ():
-        if name not in known:
-            raise typer.BadParameter(
-                f"no effect or equation `{name}`{instead(name, sorted(known), 'there are')}", param_hint="NAMES"
-            )
-    if json_out:
-        typer.echo(json.dumps(told))
-        return
-    with until_nobody_reads():
-        for name, one in told.items():
-            typer.echo(f"{name}  [{one['equation']}]\n  {one['title']}: {one['formula']}\n  {one['meaning']}")
-            for full, entry in one["parameters"].items():  # type: ignore[attr-defined]
-                typer.echo(f"    {full}: {entry['bounds'][0]:g} to {entry['bounds'][1]:g} {entry['unit']}")
 
 
 def _parts(names: Sequence[str]) -> dict[str, dict[str, dict[str, Any]]]:
@@ -78,18 +30,18 @@ def _parts(names: Sequence[str]) -> dict[str, dict[str, dict[str, Any]]]:
     for name in names:
         if name not in made:
             raise typer.BadParameter(f"no preset `{name}`{instead(name, made, 'there are')}", param_hint="NAMES")
-    found = {name: _told(made[name](name), ()) for name in names}
+    found = {name: _entries(made[name](name), ()) for name in names}
     if [next((kind for kind in (WIRES, LOADS, DRIVES) if name in kind), None) for name in names] == [
         WIRES,
         LOADS,
         DRIVES,
     ]:
         whole = build(*names)
-        found["model"] = _told(whole, {one for part in found.values() for one in part})
+        found["model"] = _entries(whole, {one for part in found.values() for one in part})
     return found
 
 
-def _told(part: Any, without: Collection[str]) -> dict[str, dict[str, Any]]:
+def _entries(part: Any, without: Collection[str]) -> dict[str, dict[str, Any]]:
     from smajax.core.parameters import get_parameters, parameters
 
     return {
@@ -113,7 +65,7 @@ def presets(
 ) -> None:
     """List the wires with their sizes, the loads and drives that an experiment file may name, and the controllers of the arm.
 
-    With names: every parameter of these, with its value, unit, bounds and meaning.
+    With names: the parameters of these presets, with value, unit, bounds and meaning.
 
     Example:  smajax presets
 
@@ -127,17 +79,17 @@ def presets(
         if json_out:
             typer.echo(json.dumps(parts))
             return
-        with until_nobody_reads():
+        with until_pipe_closes():
             for name, entries in parts.items():
                 typer.echo(name if entries else f"{name}  (no parameters)")
                 rows = [
                     [
                         f"  {one}",
-                        f"{told['value']:.5g} {told['unit']}".removesuffix(" -"),
-                        f"{told['bounds'][0]:g} to {told['bounds'][1]:g}",
-                        told["meaning"],
+                        f"{entry['value']:.5g} {entry['unit']}".removesuffix(" -"),
+                        f"{entry['bounds'][0]:g} to {entry['bounds'][1]:g}",
+                        entry["meaning"],
                     ]
-                    for one, told in entries.items()
+                    for one, entry in entries.items()
                 ]
                 for line in aligned(rows) if rows else ():
                     typer.echo(line.rstrip())
@@ -152,7 +104,7 @@ def presets(
         wire = make()
         units, values = parameters(wire), parameter_values(wire)
         sizes[name] = {one: {"value": values[one], "unit": units[one].unit} for one in ("wire_diameter", "wire_length")}
-    told = {
+    entry = {
         "wires": list(WIRES),
         "loads": list(LOADS),
         "drives": list(DRIVES),
@@ -160,9 +112,9 @@ def presets(
         "laws": list(LAWS),
     }
     if json_out:
-        typer.echo(json.dumps({**told, "wire_sizes": sizes}))
+        typer.echo(json.dumps({**entry, "wire_sizes": sizes}))
         return
-    for kind, names in told.items():
+    for kind, names in entry.items():
         typer.echo(f"{kind}: {', '.join(names)}")
         if kind == "wires":
             for name, size in sizes.items():

@@ -1,41 +1,40 @@
-"""`smajax doctor` and `smajax bench`: what smajax runs on, and how fast it is there."""
+"""`smajax doctor`: what smajax runs on, and what is wrong with it."""
 
 from __future__ import annotations
 
 import json
-from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from smajax.cli.options import UNMET, Json, console, resumable, within
+from smajax.cli.options import UNMET, Json
 
 
 def doctor(
     clear_cache: Annotated[bool, typer.Option("--clear-cache", help="delete the compiled programs first")] = False,
     json_out: Json = False,
 ) -> None:
-    """Say what smajax runs on and what is wrong with it: versions, devices, cache, memory, vectors of the processor.
+    """Show what smajax runs on and what is wrong with it: versions, devices, cache, memory, vectors of the processor.
 
-    Exit code 3 when something is. Put the answer of `smajax doctor --json` into a report of a defect.
+    Exit code 3 when something is wrong. Add the output of `smajax doctor --json` to a bug report.
 
     Example:  smajax doctor
     """
     from smajax.core.runtime import prepare
 
     prepare()
-    from smajax.cli import installation as surgery
+    from smajax.cli import installation
     from smajax.core.wording import counted
 
-    freed = surgery.clear_cache() if clear_cache else None
-    found = surgery.examined()
-    wrong = surgery.remarks(found)
+    freed = installation.clear_cache() if clear_cache else None
+    found = installation.examine()
+    wrong = installation.remarks(found)
     if json_out:
         typer.echo(json.dumps({**found, "remarks": wrong, "freed_bytes": freed}))
     else:
         if freed is not None:
             typer.echo(f"Deleted {freed / 1e6:.1f} MB of compiled programs.")
-        for line in told(found):
+        for line in lines_of(found):
             typer.echo(line)
         for line in wrong:
             typer.echo(f"! {line}")
@@ -44,8 +43,8 @@ def doctor(
         raise typer.Exit(UNMET)
 
 
-def told(found: dict[str, object]) -> list[str]:
-    """The same for a terminal."""
+def lines_of(found: dict[str, object]) -> list[str]:
+    """The result for a terminal."""
     from typing import cast
 
     one = cast(dict[str, Any], found)
@@ -81,39 +80,3 @@ def _engine(found: dict[str, Any]) -> str:
     if found["runs"] == "native":
         return f"engine: machine code, vectors of {found['vector_bits']} bits; SMAJAX_ENGINE=xla asks for XLA"
     return f"engine: {'XLA' if found['runs'] == 'xla' else 'none'}, because {found['why']}"
-
-
-def bench(
-    count: Annotated[int, typer.Option(callback=within(64), help="trajectories by smajax")] = 8192,
-    peers: Annotated[int, typer.Option(callback=within(1), help="of them by scipy too")] = 16,
-    out: Annotated[Path | None, typer.Option(help="file to write the numbers to, JSON")] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="write over that file")] = False,
-    json_out: Json = False,
-) -> None:
-    """Time the arm in many variants against scipy's LSODA on the same trajectories: a ratio, in under a minute.
-
-    Exit code 3 when the two disagree.
-
-    Example:  smajax bench --count 20000
-    """
-    if out is not None and out.exists() and not overwrite:
-        raise typer.BadParameter(f"{out} exists; give another name, or --overwrite.", param_hint="--out")
-    from smajax.core.runtime import prepare
-
-    prepare(cores=True)
-    from smajax.cli.benchmark import bench as timed
-    from smajax.cli.benchmark import in_words
-    from smajax.cli.progress_display import displayed
-    from smajax.core.files import json_text, replace
-
-    with resumable(), displayed(console()) as progress:
-        found = timed(count, min(peers, count), progress)
-    if out is not None:
-        replace(out, json_text(found))
-    if json_out:
-        typer.echo(json.dumps(found))
-    else:
-        for line in in_words(found):
-            typer.echo(line)
-    if not found["agree"]:
-        raise typer.Exit(UNMET)

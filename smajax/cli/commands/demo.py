@@ -1,0 +1,59 @@
+"""`smajax demo`: `close-loop` on two virtual benches."""
+
+from __future__ import annotations
+
+import json
+from importlib import resources
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from smajax.cli import completion
+from smajax.cli.commands.close_loop import print_findings, run_close_loop
+from smajax.cli.options import DEMOS, Json, Open, Overwrite
+from smajax.cli.terminal import browse
+
+
+def demo(
+    out: Annotated[Path, typer.Option(help="folder for the reports")] = Path("demo-report"),
+    only: Annotated[
+        str | None, typer.Option(help=f"one of {', '.join(DEMOS)}", autocompletion=completion.demos)
+    ] = None,
+    overwrite: Overwrite = False,
+    json_out: Json = False,
+    open_page: Open = False,
+) -> None:
+    """Run `close-loop` on two virtual benches of the package: the base model of one lacks an effect, that of the other none.
+
+    The data of each bench are from an independent simulator. Its true effects are in truth.toml, which `close-loop` does
+    not read and which is printed after each verdict.
+
+    Example:  smajax demo --only latent --out demo-report
+    """
+    if only is not None and only not in DEMOS:
+        raise typer.BadParameter(f"there is no demo `{only}`; choose one of {', '.join(DEMOS)}.", param_hint="--only")
+    pages: list[Path] = []
+    records = {}
+    for name in DEMOS if only is None else (only,):
+        with resources.as_file(resources.files("smajax") / "data" / "demo" / name) as folder:
+            if not json_out:
+                typer.echo(f"\n=== {name} ===")
+            findings, page = run_close_loop(
+                folder / "experiment.toml", out / name, f"smajax demo --only {name}", overwrite, not (json_out or pages)
+            )
+            if json_out:
+                from smajax.report.json_file import findings_to_json
+
+                records[name] = findings_to_json(findings)
+            else:
+                print_findings(findings, page)
+                typer.echo("The truth, which the loop did not read:")
+                for line in (folder / "truth.toml").read_text(encoding="utf-8").splitlines():
+                    typer.echo(f"  {line}")
+        pages.append(page)
+    if json_out:
+        typer.echo(json.dumps(records))
+    if open_page:
+        for page in pages:
+            browse(page)

@@ -1,0 +1,107 @@
+"""Many closed loops on perturbed plants in one program, `CHUNK` at a time side by side.
+
+A mismatch multiplies one parameter of the plant; the controller keeps its gains and the parameters that it assumes. The
+air's temperature is multiplied in degrees Celsius: 20 C becomes 10 to 40 C.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import numpy as np
+
+from smajax.control.closed_loop import simulate_closed_loop
+from smajax.control.controllers.base import AbstractController
+from smajax.control.figures_of_merit import Merit, judged_loop
+from smajax.control.interface import Interface
+from smajax.control.mismatch import MISMATCHES
+from smajax.control.perturbed_plant import perturbed_plant
+from smajax.control.reference import Reference, clock, constant
+from smajax.core.parameters import get_parameters, set_vector
+from smajax.core.progress import Progress, Stage, quiet
+from smajax.model.system import System
+from smajax.model.types import Scalar, Series
+from smajax.simulation.batch.axes import zipped
+from smajax.simulation.batch.chunks import Function, chunks
+
+# Names of a batch's axes, beside those of `MISMATCHES`.
+TARGET, GAIN, NUMBER = "set point", "share of the gain", "number"
+CHUNK = 1024  # loops between two reports of progress
+IDEAL_INTERFACE = Interface()  # the true state, at every step, without delay
+
+
+@dataclass(frozen=True)
+class LoopSetup:
+    """What all loops of a batch have in common. Each loop draws its own noise, from `seed`."""
+
+    system: System  # the plant before it is perturbed
+    controller: AbstractController
+    main_gain: str  # the gain that the last column of the rows multiplies
+    seconds: float = 10.0
+    dt: float = 0.01  # s
+    interface: Interface = IDEAL_INTERFACE
+    seed: int = 0
+
+
+class Outcome(NamedTuple):
+    """Results of closed loops: arrays of shape (L,)."""
+
+    merits: Merit
+    failed_at: np.ndarray  # s; infinity where the controller's output was always finite
+
+
+class _Setup(eqx.Module):
+    """`LoopSetup` as a pytree."""
+
+    system: System
+    controller: AbstractController
+    time: Series
+    interface: Interface
+    key: jax.Array
+    main_gain: str = eqx.field(static=True)
+
+
+def _loop(setup: _Setup, values: dict[str, Scalar]) -> tuple[System, AbstractController, Reference, dict[str, Any]]:
+    """Plant, controller, set point and interface of one closed loop."""
+    gain = get_parameters(setup.controller, [setup.main_gain]) * values[GAIN]
+    interface = setup.interface.settings(setup.time[1] - setup.time[0], setup.key, values[NUMBER])
+    controller = set_vector(setup.controller, [setup.main_gain], gain)
+    return perturbed_plant(setup.system, values), controller, constant(setup.time, values[TARGET]), interface
+
+
+def _merits(setup: _Setup, values: dict[str, Scalar]) -> dict[str, Any]:
+    plant, controller, wanted, interface = _loop(setup, values)
+    merits, failed_at = judged_loop(plant, controller, wanted, **interface)
+    return {"merits": merits, "failed_at": failed_at}
+
+
+def _position(setup: _Setup, values: dict[str, Scalar]) -> dict[str, Any]:
+    plant, controller, wanted, interface = _loop(setup, values)
+    return {"position": simulate_closed_loop(plant, controller, wanted, **interface).run.position}
+
+
+def _run(function: Function, setup: LoopSetup, rows: np.ndarray, progress: Progress) -> Any:
+    time, key = clock(setup.seconds, setup.dt), jax.random.key(setup.seed)
+    common = _Setup(setup.system, setup.controller, time, setup.interface, key, setup.main_gain)
+    columns = dict(zip((*MISMATCHES, TARGET, GAIN), rows.T, strict=True))
+    axes = zipped({**columns, NUMBER: np.arange(len(rows))})
+    count = -(-len(rows) // CHUNK)
+    results = []
+    for number, result in chunks(function, common, axes, min(CHUNK, len(rows)), range(count)):
+        results.append(result)
+        progress(Stage("sweeping", (number + 1) / count))
+    return jax.tree.map(lambda *leaves: np.concatenate(leaves), *results)
+
+
+def closed_loops(setup: LoopSetup, rows: np.ndarray, progress: Progress = quiet) -> Outcome:
+    """Run every row of `grid.loop_rows`, on all devices; trajectories are not stored."""
+    whole = _run(_merits, setup, rows, progress)
+    return Outcome(whole["merits"], whole["failed_at"])
+
+
+def positions(setup: LoopSetup, rows: np.ndarray) -> np.ndarray:
+    """Positions over time of every row of `grid.loop_rows`, (L, time), rad or m: for the few that are drawn."""
+    return _run(_position, setup, rows, quiet)["position"]

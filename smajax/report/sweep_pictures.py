@@ -1,0 +1,155 @@
+"""Pictures of a sweep: maps over two mismatches, curves over one, angles over time, and the comparison of controllers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib.axis import Axis
+from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator, FormatStrFormatter
+
+from smajax.control.figures_of_merit import Merit
+from smajax.control.sweep.grid import Grid
+from smajax.control.sweep.run_sweep import ControllerSweep
+from smajax.report.drawing import named, panels
+
+# Figure of merit -> (label, unit shown, factor from SI).
+SHOWN = {
+    "reach_time": ("reach time", "s", 1.0),
+    "settling_time": ("settling time", "s", 1.0),
+    "overshoot": ("overshoot", "°", 180.0 / np.pi),
+    "steady_error": ("steady error", "°", 180.0 / np.pi),
+    "energy": ("energy into the wire", "J", 1.0),
+    "switches_per_second": ("switches a second", "1/s", 1.0),
+    "peak_temperature": ("peak temperature", "°C", 1.0),
+}
+ROUNDING = 1e-6  # in the unit shown: below it a figure is a zero with rounding errors
+MAPPED = ("settling_time", "overshoot", "steady_error", "energy")
+COLOURS = ("#1f6fb2", "#c8553d", "#d9a441", "#3f8f5b", "#7a5195", "#8a8f98", "#1d1d1f", "#2aa5a0")
+# Figure of merit -> (the one that decides whether it exists, what its absence means).
+GREY = {"settling_time": ("settling_time", "never settles"), "overshoot": ("reach_time", "never arrives")}
+
+
+def merit_values(one: Merit, name: str) -> np.ndarray:
+    """A figure of merit in the unit shown."""
+    return np.asarray(getattr(one, name)) * SHOWN[name][2]
+
+
+def nominal_gain(grid: Grid) -> int:
+    """The index of the ratio of the main gain that is nearest to 1."""
+    return int(np.argmin(np.abs(grid.gains - 1.0)))
+
+
+def _edges(ratios: np.ndarray) -> np.ndarray:
+    """Of cells that have the ratios in their middle on a logarithmic axis."""
+    steps = np.log(ratios)
+    middle = 0.5 * (steps[1:] + steps[:-1])
+    return np.exp(np.concatenate([[2.0 * steps[0] - middle[0]], middle, [2.0 * steps[-1] - middle[-1]]]))
+
+
+def _over_set_points(grid: Grid, sweep: ControllerSweep, name: str) -> tuple[np.ndarray, str]:
+    """A figure of merit at the nominal gain, (A, A or 1, S), and the reason for its gaps; "" where there are none.
+
+    It is NaN where at half of the set points the angle never arrives, or never settles.
+    """
+    at = nominal_gain(grid)
+    values = merit_values(sweep.merits, name)[..., at]
+    if name not in GREY:
+        return values, ""
+    deciding, why = GREY[name]
+    never = ~np.isfinite(np.median(merit_values(sweep.merits, deciding)[..., at], axis=2))
+    return np.where(never[..., None], np.nan, values), why if never.any() else ""
+
+
+def _ratio_axis(axis: Axis) -> None:
+    axis.set_major_locator(FixedLocator([0.5, 0.7, 1.0, 1.4, 2.0]))
+    axis.set_major_formatter(FormatStrFormatter("%g"))
+    axis.set_minor_locator(FixedLocator([]))
+
+
+def draw_curves(figure: Figure, grid: Grid, sweep: ControllerSweep) -> None:
+    """Over one mismatch alone: the median over the set points as a line, their range as a band where all have a value."""
+    for axes, name in zip(panels(figure, 2, 2), MAPPED, strict=True):
+        label, unit, _ = SHOWN[name]
+        values, never = _over_set_points(grid, sweep, name)
+        lines = np.stack([one(values[:, 0], axis=1) for one in (np.min, np.median, np.max)])
+        lines[:, ~np.isfinite(lines[1])] = np.nan
+        least, middle, largest = np.where(np.isfinite(lines), lines, np.nan)
+        axes.plot(grid.ratios, middle, "o-", color=COLOURS[0], markersize=3, linewidth=1.3)
+        axes.fill_between(grid.ratios, least, largest, color=COLOURS[0], alpha=0.2, linewidth=0)
+        axes.set(xscale="log", xlim=_edges(grid.ratios)[[0, -1]])
+        axes.axvline(1.0, color="#9aa0a8", linewidth=1.0, linestyle="--")
+        _ratio_axis(axes.xaxis)
+        gaps = f"; no line: {never}" if never else ""
+        named(axes, f"{grid.first}, plant / controller", f"{label} ({unit}{gaps})")
+        if np.isnan(middle).all():  # no value: no scale
+            axes.set_yticks([])
+
+
+def draw_maps(figure: Figure, grid: Grid, sweep: ControllerSweep) -> None:
+    """Median over the set points, at the nominal gain, over the two mismatches.
+
+    Dashed: one mismatch alone, as in the source. Grey: at more than half of the set points the angle never arrives or settles.
+    """
+    edges = _edges(grid.ratios)
+    for axes, name in zip(panels(figure, 2, 2), MAPPED, strict=True):
+        label, unit, _ = SHOWN[name]
+        several, why = _over_set_points(grid, sweep, name)
+        values, never = np.median(several, axis=2), f"; grey: {why}" if why else ""
+        axes.set_facecolor("#c9ccd1")
+        mesh = axes.pcolormesh(edges, edges, np.ma.masked_invalid(values).T, cmap="viridis")
+        axes.set(xscale="log", yscale="log")
+        for axis in (axes.xaxis, axes.yaxis):
+            _ratio_axis(axis)
+        axes.axhline(1.0, color="white", linewidth=1.0, linestyle="--")
+        axes.axvline(1.0, color="white", linewidth=1.0, linestyle="--")
+        named(axes, f"{grid.first}, plant / controller", f"{grid.second}, plant / controller", label)
+        if np.isnan(values).all():  # no value: no scale
+            axes.set_title(f"{label}{never}", fontsize=9.5, loc="left")
+            continue
+        bar = figure.colorbar(mesh, ax=axes)
+        bar.ax.tick_params(labelsize=9)
+        bar.set_label(f"{label} ({unit}{never})", fontsize=9)
+
+
+def draw_lines(
+    figure: Figure, time: np.ndarray, ratios: Sequence[float], sweep: ControllerSweep, target: float
+) -> None:
+    """Angle over time with one mismatch at a time (Elahinia 2004, Fig. 4.23-4.25, for this controller)."""
+    for axes, (mismatch, angles) in zip(panels(figure, 2, 3), sweep.lines.items(), strict=True):
+        for colour, ratio, angle in zip(COLOURS, ratios, angles, strict=False):
+            axes.plot(time, np.degrees(angle), color=colour, linewidth=1.2, label=f"{ratio:g}")
+        axes.axhline(np.degrees(target), color="#9aa0a8", linewidth=0.8)
+        named(axes, "time (s)", "arm angle (°)", mismatch)
+    # One key for all panels, where it covers no line.
+    handles, labels = axes.get_legend_handles_labels()
+    figure.legend(
+        handles,
+        labels,
+        title="plant / controller",
+        loc="outside lower center",
+        ncols=len(labels),
+        columnspacing=1.0,
+        handlelength=1.2,
+        frameon=False,
+    )
+
+
+def draw_comparison(figure: Figure, targets: np.ndarray, merits: Mapping[str, Merit]) -> None:
+    """Every figure of merit over the set point, one line a controller."""
+    axes_of = panels(figure, 4, 2)
+    for axes, name in zip(axes_of, SHOWN, strict=False):
+        for k, (colour, (controller, one)) in enumerate(zip(COLOURS, merits.items(), strict=False)):
+            values = merit_values(one, name)
+            values = np.where(np.abs(values) < ROUNDING, 0.0, np.where(np.isfinite(values), values, np.nan))
+            if np.isnan(values).all():
+                nowhere = f"{controller}: at no set point"
+                axes.text(0.03, 0.92 - 0.09 * k, nowhere, color=colour, transform=axes.transAxes, fontsize=9)
+            axes.plot(np.degrees(targets), values, "o-", color=colour, markersize=3, linewidth=1.2, label=controller)
+        label, unit, _ = SHOWN[name]
+        named(axes, "set point (°)", f"{label} ({unit})")
+    last = axes_of[-1]
+    last.axis("off")
+    handles, labels = axes_of[0].get_legend_handles_labels()
+    last.legend(handles, labels, frameon=False, fontsize=9, loc="center", ncols=2)
