@@ -101,6 +101,7 @@ def tune(
     Raises ValueError for settings that make no sense, MissingExtraError without a package that they need.
     """
     settings.check(system)
+    settings.check_packages()
     scenarios = tuned_on(settings.set_points, settings.variation, settings.seed)
     task = SearchTask(problem_of(system, settings), settings.goal, scenarios)
     problem, name = task.problem, f"tuning {settings.controller}"
