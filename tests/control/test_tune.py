@@ -171,17 +171,17 @@ def test_a_bad_start_is_improved(surface: TuningProblem, by: str) -> None:
 
 def test_a_linear_program_finds_the_least_of_the_largest() -> None:
     """Two loops whose costs cross: max(1 + 2 d, 1.2 - d) is least at d = 0.2/3; a limit on the second moves it on."""
-    members = tuned_on([0.0, 1.0], {}, 0)
+    scenarios = tuned_on([0.0, 1.0], {}, 0)
     terms, slopes = np.zeros((2, len(TERMS))), np.zeros((2, len(TERMS), 1))
     at = list(TERMS).index("settling_time")
     terms[:, at], slopes[:, at, 0] = (1.0, 1.2), (2.0, -1.0)
     centre = np.asarray([0.5])
-    point, predicted = trust.step(Goal("worst"), terms, slopes, members, centre, 0.3)
+    point, predicted = trust.step(Goal("worst"), terms, slopes, scenarios, centre, 0.3)
     assert point[0] - 0.5 == pytest.approx(0.2 / 3.0)
     assert predicted == pytest.approx(1.0 + 0.4 / 3.0)
-    point, _ = trust.step(Goal("worst", limits={"settling_time": 1.1}), terms, slopes, members, centre, 0.3)
+    point, _ = trust.step(Goal("worst", limits={"settling_time": 1.1}), terms, slopes, scenarios, centre, 0.3)
     assert 0.05 - 1e-9 <= point[0] - 0.5 <= 0.1 + 1e-9
-    point, _ = trust.step(Goal("worst"), terms, slopes, members, centre, 0.01)
+    point, _ = trust.step(Goal("worst"), terms, slopes, scenarios, centre, 0.01)
     assert point[0] - 0.5 == pytest.approx(0.01)
 
 
@@ -282,7 +282,7 @@ def test_a_limit_that_is_kept_by_never_arriving_is_said_to_be() -> None:
     def told(before: list[float], after: list[float], limits: dict[str, float]) -> str:
         seen = SimpleNamespace(merits=SimpleNamespace(settling_time=np.asarray([before, after])))
         found: Any = SimpleNamespace(settings=SimpleNamespace(limits=limits))
-        check: Any = SimpleNamespace(members=SimpleNamespace(size=2), seen=seen)
+        check: Any = SimpleNamespace(scenarios=SimpleNamespace(size=2), seen=seen)
         return met(found, check, "tuned on")
 
     overshoot, both = {"overshoot": 0.1}, {"overshoot": 0.1, "settling_time": 4.0}
