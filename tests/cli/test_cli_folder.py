@@ -178,7 +178,7 @@ def test_a_figure_beside_others_stays_on_the_page(tmp_path: Path, monkeypatch: p
 
 def test_every_command_has_an_example_and_machines_are_answered(tmp_path: Path) -> None:
     told = run.invoke(app, ["--help"])
-    assert "Exit codes: 0 done" in told.output
+    assert "Exit codes: 0 success" in told.output
     commands = [one.name or one.callback.__name__.replace("_", "-") for one in app.registered_commands if one.callback]
     assert {"simulate", "doctor", "bench", "new-experiment", "close-loop"} <= set(commands)
     for name in commands:
