@@ -174,7 +174,7 @@ def test_ctrl_c_is_answered(tmp_path: Path) -> None:
         run.send_signal(signal.SIGINT)
         said = run.stderr.read()
     assert run.returncode == 130, said
-    assert "Interrupted. Nothing was finished: the same command begins anew." in said
+    assert "Interrupted. Nothing was finished: the same command starts from the beginning." in said
 
 
 @pytest.mark.parametrize("finished", [True, False])
