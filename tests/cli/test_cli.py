@@ -195,7 +195,7 @@ def test_ctrl_c_while_garbage_is_collected_ends_the_command() -> None:
     """What a callback of the collector raises is dropped by Python: Ctrl-C is given again until it is answered."""
     code = (
         "import gc, os, signal, time\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n"
-        "from smajax.cli.options import resumable\n"
+        "from smajax.cli.terminal import resumable\n"
         "def swallow(phase, info):\n    gc.callbacks.remove(swallow)\n    os.kill(os.getpid(), signal.SIGINT)\n"
         "    time.sleep(0.1)\n"
         "with resumable():\n    gc.callbacks.append(swallow)\n    gc.collect()\n    print('went on', flush=True)\n"
