@@ -39,7 +39,13 @@ CASES: dict[str, tuple[System, dict[str, jax.Array]]] = {
 }
 
 
-@pytest.mark.parametrize("case", sorted(CASES))
+# The loads of the others are under other laws in `test_law_gradients`.
+OFTEN = ("arm", "coupon")
+
+
+@pytest.mark.parametrize(
+    "case", [pytest.param(case, marks=() if case in OFTEN else pytest.mark.slow) for case in sorted(CASES)]
+)
 def test_every_base_parameter(case: str) -> None:
     compare(CASES[case][0], open_loop(CASES[case][1], DT))
 
