@@ -184,7 +184,7 @@ def test_what_is_kept_is_said_only_where_something_is(tmp_path: Path, finished: 
     if finished:
         (tmp_path / "fits" / f"{'0f' * 16}.npz").write_text("")
     code = (
-        "import pathlib, sys\nfrom smajax.cli.options import FITS, resumable\n"
+        "import pathlib, sys\nfrom smajax.cli.options import FITS\nfrom smajax.cli.terminal import resumable\n"
         "with resumable('Kept.', pathlib.Path(sys.argv[1]), FITS):\n    raise KeyboardInterrupt"
     )
     told = subprocess.run([sys.executable, "-c", code, str(tmp_path)], capture_output=True, text=True, check=False)
