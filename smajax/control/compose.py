@@ -10,7 +10,7 @@ from smajax.control.controllers.base import AbstractController
 from smajax.control.loop_dataset import Loop
 from smajax.control.mismatch import MISMATCHES, ratio_of
 from smajax.control.presets import CONTROLLERS
-from smajax.core.names import instead, of_many
+from smajax.core.names import close_matches, of_many
 from smajax.core.parameters import check_bounds, parameter_values, parameters, set_parameters
 from smajax.core.units import UnitError, parse_quantity
 from smajax.data.model_catalogue import check_together
@@ -194,7 +194,7 @@ def _around(system: System, controller: str | AbstractController, load: str) -> 
     if isinstance(controller, AbstractController):
         return Loop(system, controller)
     if controller not in CONTROLLERS:
-        raise KeyError(f"no controller {controller!r}{instead(controller, CONTROLLERS, 'there are')}")
+        raise KeyError(f"no controller {controller!r}{close_matches(controller, CONTROLLERS, 'there are')}")
     if not isinstance(system.load, AbstractMovingLoad) or system.load.reading[1] != "rad":
         raise ValueError(
             f"controllers by name have gains for the arm: give the load 'arm', not {load!r}, or a controller of your own."

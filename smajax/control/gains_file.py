@@ -16,7 +16,7 @@ from typing import Any
 from smajax.control.controllers.base import AbstractController
 from smajax.control.presets import CONTROLLERS
 from smajax.core.files import json_text, replace
-from smajax.core.names import instead
+from smajax.core.names import close_matches
 from smajax.core.parameters import check_bounds, parameters, set_parameters
 from smajax.model.system import System
 
@@ -75,7 +75,7 @@ def read_gains(path: Path, system: System) -> Gains:
         raise GainsFileError(f"{where} has the format {held['format']!r}; this version reads {FORMAT!r}.")
     name = held["controller"]
     if not isinstance(name, str) or name not in CONTROLLERS:
-        raise GainsFileError(f"{where}: no controller {name!r}{instead(str(name), CONTROLLERS, 'there are')}.")
+        raise GainsFileError(f"{where}: no controller {name!r}{close_matches(str(name), CONTROLLERS, 'there are')}.")
     preset = CONTROLLERS[name]
     plant = preset.plant(system)
     controller = preset.make(plant)
@@ -83,7 +83,7 @@ def read_gains(path: Path, system: System) -> Gains:
     values = {}
     for gain, entry in held["gains"].items():
         if gain not in known:
-            raise GainsFileError(f"{where}: {name} has no gain {gain!r}{instead(gain, preset.box, 'tuned are')}.")
+            raise GainsFileError(f"{where}: {name} has no gain {gain!r}{close_matches(gain, preset.box, 'tuned are')}.")
         unit = entry.get("unit", known[gain].unit) if isinstance(entry, dict) else known[gain].unit
         value = entry.get("value") if isinstance(entry, dict) else entry
         if isinstance(value, bool) or not isinstance(value, int | float):

@@ -13,7 +13,7 @@ import numpy as np
 from smajax.control.estimators.base import AbstractEstimator
 from smajax.control.measured_state import Sensor
 from smajax.control.presets import FILTERS
-from smajax.core.names import instead
+from smajax.core.names import close_matches
 from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.system import System
 from smajax.model.types import Scalar
@@ -59,7 +59,7 @@ def check_interface(filtered: str, noise: float, period: float, dt: float) -> No
     if not 0.0 <= noise < math.inf:
         raise ValueError(f"a noise is a number of degrees, 0 or more; not {noise:g}.")
     if filtered and filtered not in FILTERS:
-        raise ValueError(f"no filter `{filtered}`{instead(filtered, FILTERS, 'there are')}.")
+        raise ValueError(f"no filter `{filtered}`{close_matches(filtered, FILTERS, 'there are')}.")
     steps = period / dt
     if not 0.5 <= steps < math.inf or abs(steps - round(steps)) > 1e-6:
         raise ValueError(f"a controller's period is a whole number of simulation steps of {dt:g} s, not {period:g} s.")

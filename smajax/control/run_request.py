@@ -24,7 +24,7 @@ from smajax.control.interface import between_in_words, check_interface, check_se
 from smajax.control.loop_dataset import labelled_loop
 from smajax.control.presets import CONTROLLERS
 from smajax.control.reference import resting
-from smajax.core.names import instead
+from smajax.core.names import close_matches
 from smajax.core.parameters import parameter_values, parameters
 from smajax.core.wording import and_listed
 from smajax.data.experiment.magnitude import MELTS
@@ -145,7 +145,7 @@ def _check_inputs(request: RunRequest, required: frozenset[str], optional: froze
     for name in request.inputs:
         if name not in required | optional:
             known = sorted(required | optional)
-            raise RequestError(f"inputs.{name}", f"no input {name!r}{instead(name, known, 'this model takes')}")
+            raise RequestError(f"inputs.{name}", f"no input {name!r}{close_matches(name, known, 'this model takes')}")
     missing = sorted(required - request.inputs.keys())
     if missing:
         step = "--step LEVEL:TIME,LEVEL:TIME or " if len(required) == 1 else ""
@@ -201,7 +201,9 @@ def _gains(request: RunRequest, loop: LoopRequest) -> tuple[System, Gains]:
         raise ValueError(f"controllers are those of the arm: give the load `arm`, not `{request.load}`.")
     gains = Gains(loop.controller, {}) if loop.gains is None else read_gains(loop.gains, system)
     if gains.controller not in CONTROLLERS:
-        raise ValueError(f"no controller {gains.controller!r}{instead(gains.controller, CONTROLLERS, 'there are')}")
+        raise ValueError(
+            f"no controller {gains.controller!r}{close_matches(gains.controller, CONTROLLERS, 'there are')}"
+        )
     return CONTROLLERS[gains.controller].plant(system), gains
 
 

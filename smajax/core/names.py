@@ -1,4 +1,4 @@
-"""What to say about a name that is not known: the nearest one, and all there are or how to list them."""
+"""Messages about unknown names: close matches, and the list of all names or the command that lists them."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def nearest(name: str, known: Iterable[str]) -> str:
     return f"; did you mean {best!r}?" if best and _likeness(name, best)[0] > 0 else ""
 
 
-def instead(name: str, known: Iterable[str], lead: str, suggested: Iterable[str] | None = None) -> str:
+def close_matches(name: str, known: Iterable[str], lead: str, suggested: Iterable[str] | None = None) -> str:
     """`; did you mean 'x'? There are: x, y` with the lead "there are"; `; there are: x, y` when no name is close.
 
     suggested: the names that may be suggested, when these are not all that are known.

@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from smajax.core.names import instead
+from smajax.core.names import close_matches
 from smajax.core.parameters import set_parameters
 from smajax.core.plugins import LOADS as PLUGGED
 from smajax.core.plugins import PluginError, brought, points_of, whose
@@ -283,6 +283,6 @@ def build(wire: str, load: str, drive: str, law: str = "") -> System:
     """A system by preset names, its wire under the named kinetics law or its own; KeyError lists the names there are."""
     for kind, name, table in (("wire", wire, WIRES), ("load", load, LOADS), ("drive", drive, DRIVES)):
         if name not in table:
-            raise KeyError(f"No {kind} preset `{name}`{instead(name, sorted(table), 'there are')}.")
+            raise KeyError(f"No {kind} preset `{name}`{close_matches(name, sorted(table), 'there are')}.")
     made = WIRES[wire]()
     return System(under_law(made, law) if law else made, made_load(load), DRIVES[drive]())

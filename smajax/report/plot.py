@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from smajax.core.names import instead
+from smajax.core.names import close_matches
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -37,7 +37,7 @@ def plot(found: xr.Dataset, names: Sequence[str] = ()) -> Figure:
     chosen = [*names] or main_series(found)
     for name in chosen:
         if name not in found:
-            raise ValueError(f"no series {name!r}{instead(name, map(str, found.data_vars), 'there are')}")
+            raise ValueError(f"no series {name!r}{close_matches(name, map(str, found.data_vars), 'there are')}")
         if found[name].dims != ("time",):
             raise ValueError(
                 f"{name!r} has the dimensions {', '.join(map(str, found[name].dims)) or 'none'}, expected time alone: take one "

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from smajax.control.compose import compose
-from smajax.core.names import instead, listed, nearest, of_many
+from smajax.core.names import close_matches, listed, nearest, of_many
 from smajax.core.parameters import set_parameters
 from smajax.data.experiment.errors import ExperimentError, check_parameter
 from smajax.data.model_catalogue import CATALOGUE
@@ -41,9 +41,9 @@ def test_nothing_is_suggested_where_nothing_is_near(name: str, known: tuple[str,
 
 
 def test_the_sentence_with_and_without_a_suggestion() -> None:
-    assert instead("dutty", ("duty", "power"), "there are") == "; did you mean 'duty'? There are: duty, power"
-    assert instead("zzz", ("duty", "power"), "there are") == "; there are: duty, power"
-    assert instead("dutty", ("duty", "power"), "there are", ["power"]) == "; there are: duty, power"
+    assert close_matches("dutty", ("duty", "power"), "there are") == "; did you mean 'duty'? There are: duty, power"
+    assert close_matches("zzz", ("duty", "power"), "there are") == "; there are: duty, power"
+    assert close_matches("dutty", ("duty", "power"), "there are", ["power"]) == "; there are: duty, power"
 
 
 def test_every_name_is_listed() -> None:

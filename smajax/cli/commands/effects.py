@@ -27,7 +27,7 @@ def effects(
 
     Example:  smajax effects latent_heat sensor
     """
-    from smajax.core.names import instead
+    from smajax.core.names import close_matches
     from smajax.core.parameters import parameters
     from smajax.model.effects.library import LIBRARY
 
@@ -49,7 +49,7 @@ def effects(
     for name in names or ():
         if name not in known:
             raise typer.BadParameter(
-                f"no effect or equation `{name}`{instead(name, sorted(known), 'there are')}", param_hint="NAMES"
+                f"no effect or equation `{name}`{close_matches(name, sorted(known), 'there are')}", param_hint="NAMES"
             )
     if json_out:
         typer.echo(json.dumps(entries))

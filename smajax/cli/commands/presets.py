@@ -19,7 +19,7 @@ def _parts(names: Sequence[str]) -> dict[str, dict[str, dict[str, Any]]]:
 
     Of a wire, a load and a drive together also those of the whole, as `model`.
     """
-    from smajax.core.names import instead
+    from smajax.core.names import close_matches
     from smajax.model.presets import DRIVES, LOADS, WIRES, build, made_load
 
     made: dict[str, Callable[[str], Any]] = {
@@ -29,7 +29,7 @@ def _parts(names: Sequence[str]) -> dict[str, dict[str, dict[str, Any]]]:
     }
     for name in names:
         if name not in made:
-            raise typer.BadParameter(f"no preset `{name}`{instead(name, made, 'there are')}", param_hint="NAMES")
+            raise typer.BadParameter(f"no preset `{name}`{close_matches(name, made, 'there are')}", param_hint="NAMES")
     found = {name: _entries(made[name](name), ()) for name in names}
     if [next((kind for kind in (WIRES, LOADS, DRIVES) if name in kind), None) for name in names] == [
         WIRES,

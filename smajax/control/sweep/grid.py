@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from smajax.control.mismatch import MISMATCHES
-from smajax.core.names import instead
+from smajax.core.names import close_matches
 
 LEAST, MOST = 0.5, 2.0  # ratios of a perturbed parameter to its assumed value
 
@@ -31,7 +31,7 @@ def check_mismatches(first: str, second: str) -> None:
     """Raise ValueError for an unknown mismatch, or twice the same; `second` is "" for a sweep over the first alone."""
     for name in (first, second) if second else (first,):
         if name not in MISMATCHES:
-            raise ValueError(f"no mismatch `{name}`{instead(name, MISMATCHES, 'there are')}.")
+            raise ValueError(f"no mismatch `{name}`{close_matches(name, MISMATCHES, 'there are')}.")
     if first == second:
         raise ValueError(f"`{first}` twice, expected one mismatch or two different ones of {', '.join(MISMATCHES)}.")
 

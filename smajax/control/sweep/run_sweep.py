@@ -19,7 +19,7 @@ from smajax.control.presets import CONTROLLERS
 from smajax.control.sweep.batched_loops import LoopSetup, closed_loops, positions
 from smajax.control.sweep.grid import Grid, loop_rows, sweep_ratios
 from smajax.core.files import writing
-from smajax.core.names import instead
+from smajax.core.names import close_matches
 from smajax.core.parameters import get_parameters
 from smajax.core.progress import Event, Progress, Stage, quiet
 from smajax.core.provenance import digest
@@ -71,7 +71,7 @@ class SweepSettings:
         """Raise ValueError for names that do not exist and values that make no sense."""
         for name in self.controllers:
             if name not in CONTROLLERS:
-                raise ValueError(f"no controller `{name}`{instead(name, CONTROLLERS, 'there are')}.")
+                raise ValueError(f"no controller `{name}`{close_matches(name, CONTROLLERS, 'there are')}.")
         if not self.controllers:
             raise ValueError(f"no controller is named, expected some of {', '.join(CONTROLLERS)}.")
         check_set_points(system, self.set_points)

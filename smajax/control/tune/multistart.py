@@ -19,7 +19,7 @@ from smajax.control.tune.evaluate import TuningProblem
 from smajax.control.tune.objective import Goal, rank
 from smajax.control.tune.scenarios import Scenarios
 from smajax.core.files import writing
-from smajax.core.names import instead
+from smajax.core.names import close_matches
 from smajax.core.result_cache import arrays
 
 RULES = ("trust-region", "adam")
@@ -41,7 +41,7 @@ class Effort:
 
     def __post_init__(self) -> None:
         if self.by not in RULES:
-            raise ValueError(f"no rule `{self.by}`{instead(self.by, RULES, 'there are')}.")
+            raise ValueError(f"no rule `{self.by}`{close_matches(self.by, RULES, 'there are')}.")
         if min(self.starts, self.rounds) < 1 or self.tried < 0:
             raise ValueError(f"at least one start and one round, not {self.starts} and {self.rounds}.")
 

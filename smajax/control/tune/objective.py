@@ -24,7 +24,7 @@ import numpy as np
 from smajax.control.tune.evaluate import Evaluation
 from smajax.control.tune.scenarios import Scenarios
 from smajax.control.tune.terms import TERMS
-from smajax.core.names import instead
+from smajax.core.names import close_matches
 from smajax.model.types import Scalar
 
 OBJECTIVES = ("nominal", "worst", "mean-variance")
@@ -45,10 +45,12 @@ class Goal:
 
     def __post_init__(self) -> None:
         if self.objective not in OBJECTIVES:
-            raise ValueError(f"no objective `{self.objective}`{instead(self.objective, OBJECTIVES, 'there are')}.")
+            raise ValueError(
+                f"no objective `{self.objective}`{close_matches(self.objective, OBJECTIVES, 'there are')}."
+            )
         for name in (*self.weights, *self.limits):
             if name not in TERMS:
-                raise ValueError(f"no term `{name}`{instead(name, TERMS, 'there are')}.")
+                raise ValueError(f"no term `{name}`{close_matches(name, TERMS, 'there are')}.")
         if min(self.weights.values(), default=0.0) < 0.0 or not any(self.weights.values()):
             raise ValueError(f"weights are no less than 0, and one at least is more; not {dict(self.weights)}.")
         if min(self.limits.values(), default=1.0) <= 0.0:

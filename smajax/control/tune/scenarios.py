@@ -11,7 +11,7 @@ from scipy.stats import qmc
 
 from smajax.control.mismatch import MISMATCHES
 from smajax.control.sweep.grid import loop_rows
-from smajax.core.names import instead
+from smajax.core.names import close_matches
 
 CORNERS = 3  # mismatches of which every corner is taken
 DRAWN = 16  # plants drawn where there are more
@@ -54,7 +54,7 @@ def check_variation(variation: Mapping[str, float]) -> None:
     """ValueError for a mismatch there is not, or one that is no share between 0 and 1."""
     for name, share in variation.items():
         if name not in MISMATCHES:
-            raise ValueError(f"no variation `{name}`{instead(name, MISMATCHES, 'there are')}.")
+            raise ValueError(f"no variation `{name}`{close_matches(name, MISMATCHES, 'there are')}.")
         if not 0.0 < share < 1.0:
             percent = f"; {share:g} per cent is {name}={share:g}%" if 1.0 < share < 100.0 else ""
             raise ValueError(

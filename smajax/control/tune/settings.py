@@ -14,7 +14,7 @@ from smajax.control.tune.multistart import Effort
 from smajax.control.tune.objective import REGULATION, Goal
 from smajax.control.tune.scenarios import BESIDE, check_variation
 from smajax.control.tune.terms import TERMS
-from smajax.core.names import instead
+from smajax.core.names import close_matches
 from smajax.model.system import System
 
 
@@ -53,7 +53,9 @@ class TuneSettings:
     def check(self, system: System) -> None:
         """ValueError for what there is not, or makes no sense, with what does."""
         if self.controller not in CONTROLLERS:
-            raise ValueError(f"no controller `{self.controller}`{instead(self.controller, CONTROLLERS, 'there are')}.")
+            raise ValueError(
+                f"no controller `{self.controller}`{close_matches(self.controller, CONTROLLERS, 'there are')}."
+            )
         check_set_points(system, self.set_points)
         if len(set(self.set_points)) < len(self.set_points):
             raise ValueError(f"every set point once, not {', '.join(f'{angle:g}' for angle in self.set_points)}.")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from smajax.core.names import instead
+from smajax.core.names import close_matches
 from smajax.core.wording import and_listed
 from smajax.data.experiment.column_guess import COUPON, DRIVES, GUESS, Column
 from smajax.data.model_catalogue import check_together
@@ -42,7 +42,7 @@ def choose_model(columns: Mapping[str, Column], choice: ModelChoice) -> DraftMod
     model = _with_load(columns, load)
     for kind, name, known in (("wire", wire, WIRES), ("drive", drive, DRIVE_PRESETS)):
         if name and name not in known:
-            raise MeasuredDataError(f"there is no {kind} {name!r}{instead(name, known, 'there are')}")
+            raise MeasuredDataError(f"there is no {kind} {name!r}{close_matches(name, known, 'there are')}")
     if drive:
         # What the drive takes stands first; a mass that varies is the load's.
         needed = sorted(DRIVE_PRESETS[drive]().inputs_required)

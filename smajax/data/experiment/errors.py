@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from smajax.core.names import instead, of_many, own_first
+from smajax.core.names import close_matches, of_many, own_first
 from smajax.core.units import UnitError
 from smajax.data.readers.table import MeasuredDataError
 
@@ -24,7 +24,7 @@ def check_name(path: Path, key: str, kind: str, name: str, known: Iterable[str])
     """Raises ExperimentError unless `name` is one of the known names of that kind."""
     names = own_first(known)
     if name not in names:
-        raise ExperimentError(path, key, f"there is no {kind} {name!r}{instead(name, names, 'there are')}")
+        raise ExperimentError(path, key, f"there is no {kind} {name!r}{close_matches(name, names, 'there are')}")
 
 
 def check_parameter(path: Path, key: str, name: str, known: Iterable[str], presets: str) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from smajax.core.names import instead
+from smajax.core.names import close_matches
 from smajax.core.units import UnitError, convert, parse_quantity
 from smajax.data.experiment.column_overrides import own_columns
 from smajax.data.experiment.data_folder import data_folder
@@ -63,7 +63,7 @@ def _channel_units(path: Path, file: ExperimentFile, model: ModelDescription) ->
             raise ExperimentError(
                 path,
                 key,
-                f"the model has no {channel.role} {name!r}{instead(name, known, f'its {channel.role}s are')}; "
+                f"the model has no {channel.role} {name!r}{close_matches(name, known, f'its {channel.role}s are')}; "
                 "rename the channel, remove it, or choose another load or drive",
             )
         if channel.role == "output":

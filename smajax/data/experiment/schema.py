@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from smajax.core.names import instead
+from smajax.core.names import close_matches
 from smajax.data.experiment.errors import ExperimentError
 
 Quantity = str | float
@@ -254,7 +254,7 @@ def _message(error: Any, content: dict[str, Any]) -> tuple[str, str]:
     match error["type"]:
         case "extra_forbidden":
             known = list(section.model_fields) if section is not None else []
-            return key, f"is not a known key{instead(str(place[depth - 1]), known, 'known here')}"
+            return key, f"is not a known key{close_matches(str(place[depth - 1]), known, 'known here')}"
         case "missing":
             return key, f"is missing; {expected}"
         case "value_error":

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from smajax.core.names import instead
+from smajax.core.names import close_matches
 
 Array = NDArray[np.float64]
 
@@ -72,7 +72,7 @@ class Table:
         if key in self.columns or key in self.unusable:
             return key
         free = [name for number, name in enumerate(names, start=1) if name not in taken and number not in taken]
-        raise NoColumnError(f"{self.path}: no column {key!r}{instead(key, names, 'it has', free)}", key)
+        raise NoColumnError(f"{self.path}: no column {key!r}{close_matches(key, names, 'it has', free)}", key)
 
     def column(self, key: str | int, taken: Collection[str | int] = (), gaps: bool = False) -> Array:
         """The values of one column, shape (n,), all finite or, with `gaps`, nan where a sample is missing.

@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Sequence
 from typing import Any
 
-from smajax.core.names import instead
+from smajax.core.names import close_matches
 from smajax.core.plugins import EFFECTS, brought
 from smajax.model.effects.ambient_drift import AmbientDrift
 from smajax.model.effects.asymmetric_transformation import AsymmetricTransformation
@@ -172,5 +172,5 @@ def at_base(names: Sequence[str]) -> tuple[AbstractEffect, ...]:
     """
     unknown = [name for name in names if name not in LIBRARY]
     if unknown:
-        raise KeyError(f"No effect `{unknown[0]}`{instead(unknown[0], sorted(LIBRARY), 'the library has')}.")
+        raise KeyError(f"No effect `{unknown[0]}`{close_matches(unknown[0], sorted(LIBRARY), 'the library has')}.")
     return tuple(effect.base() for name, effect in LIBRARY.items() if name in names)

@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from smajax.core.names import instead
+from smajax.core.names import close_matches
 from smajax.model.wire.conditions import AbstractConditions, Brinson, Enhanced, Liang
 from smajax.model.wire.shape import AbstractShape, Cosine, Exponential
 from smajax.model.wire.variants import AbstractVariants, Single, Split
@@ -44,7 +44,7 @@ def under_law(wire: Wire, name: str) -> Wire:
             f"a law is the wire's: give `system.wire`, not {type(wire).__name__}, or `compose(..., law={name!r})`."
         )
     if name not in LAWS:
-        raise KeyError(f"No kinetics law `{name}`{instead(name, sorted(LAWS), 'there are')}.")
+        raise KeyError(f"No kinetics law `{name}`{close_matches(name, sorted(LAWS), 'there are')}.")
     law = LAWS[name]
     kinetics = dataclasses.replace(wire.kinetics, shape=law.shape, conditions=law.conditions, variants=law.variants())
     return dataclasses.replace(wire, kinetics=kinetics)
