@@ -17,7 +17,7 @@ import numpy as np  # noqa: E402
 
 from smajax.model.presets import build  # noqa: E402
 from smajax.simulation.batch.axes import grid, sampled  # noqa: E402
-from smajax.simulation.batch.run_batch import good, run_batch, told_of  # noqa: E402
+from smajax.simulation.batch.run_batch import good, run_batch, status_summary  # noqa: E402
 from smajax.simulation.measures import Largest, Last  # noqa: E402
 
 runs = 64 if os.environ.get("SMAJAX_FAST") else 4096
@@ -40,7 +40,7 @@ result = run_batch(
     keep=(),
     measures=(Last("position"), Largest("stress"), Largest("temperature")),
 )
-print(told_of(result))
+print(status_summary(result))
 angles = np.degrees(good(result)["last_position"])
 spread = (angles.quantile(0.95, "sample") - angles.quantile(0.05, "sample")).values
 for volts, middle, wide in zip(voltages, angles.median("sample").values, spread, strict=True):

@@ -60,7 +60,7 @@ if TYPE_CHECKING:
     from smajax.simulation.batch.axes import zipped as zipped
     from smajax.simulation.batch.run_batch import good as good
     from smajax.simulation.batch.run_batch import run_batch as run_batch
-    from smajax.simulation.batch.run_batch import told_of as told_of
+    from smajax.simulation.batch.run_batch import status_summary as status_summary
     from smajax.simulation.compiled import simulate_compiled as simulate_compiled
     from smajax.simulation.dataset import simulate_dataset as simulate_dataset
     from smajax.simulation.simulate import simulate as simulate
@@ -105,14 +105,14 @@ NAMES = {
     "simulate_compiled": ("smajax.simulation.compiled", "simulate_compiled"),
     "simulate_dataset": ("smajax.simulation.dataset", "simulate_dataset"),
     "simulate_loop_dataset": ("smajax.control.loop_dataset", "simulate_loop_dataset"),
-    "told_of": ("smajax.simulation.batch.run_batch", "told_of"),
+    "status_summary": ("smajax.simulation.batch.run_batch", "status_summary"),
     "under_law": ("smajax.model.wire.laws", "under_law"),
     "write_identified": ("smajax.report.identify_page", "write_identified"),
     "write_report": ("smajax.report.write", "write_report"),
     "zipped": ("smajax.simulation.batch.axes", "zipped"),
 }
 # A public name that was renamed -> (the new one, the version that will not have the old one): it works and warns till then.
-RENAMED: dict[str, tuple[str, str]] = {}
+RENAMED: dict[str, tuple[str, str]] = {"told_of": ("status_summary", "0.3")}
 # Modules that are asked for by their own name.
 MODULES = {
     "control_presets": "smajax.control.presets",

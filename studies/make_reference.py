@@ -33,7 +33,7 @@ STAGES = (
     ),
     ("Its parameters", ("parameter_values", "get_parameters", "set_parameters", "check_bounds", "units")),
     ("One run", ("simulate_dataset", "plot", "simulate_compiled", "simulate")),
-    ("Many runs", ("run_batch", "grid", "zipped", "sampled", "good", "told_of", "measure", "prepare")),
+    ("Many runs", ("run_batch", "grid", "zipped", "sampled", "good", "status_summary", "measure", "prepare")),
     (
         "A closed loop",
         (

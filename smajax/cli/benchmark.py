@@ -62,7 +62,7 @@ def benchmark(count: int = 8192, peers: int = 16, progress: Progress = quiet) ->
     progress(Stage("smajax", 0.4))
     best = min(once() for _ in range(REPEATS))
     progress(Stage("smajax", 1.0))
-    box = axes.members(0, peers)
+    box = axes.runs(0, peers)
     own = run_batch(system, {}, zipped(box), keep=("position",), **asked)["position"].to_numpy()
     times = np.arange(own.shape[-1]) * SAMPLE
     others, began = [], time.perf_counter()

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import abc
-from collections.abc import Mapping
-from typing import Any, NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax import lax
 
 from smajax.control.controllers.base import AbstractController
 from smajax.control.estimators.base import AbstractEstimator
@@ -21,8 +20,21 @@ from smajax.core.parameters import check_bounds, inside_bounds
 from smajax.model.system import System, initial_state
 from smajax.model.types import Scalar, Series, State, Trajectory
 from smajax.simulation.input_delay import refuse_lag
+from smajax.simulation.integrate import (
+    AbstractObserver,
+    Carry,
+    Control,
+    Controlled,
+    March,
+    Observed,
+    Period,
+    Schedule,
+    Step,
+    integrate,
+)
+from smajax.simulation.observers import StateTrace
 from smajax.simulation.simulate import DEFAULT_STEP, check_finite, check_step, trajectory
-from smajax.simulation.step import step
+from smajax.simulation.steppers import FixedStep
 
 
 class ClosedLoop(eqx.Module):
@@ -31,48 +43,141 @@ class ClosedLoop(eqx.Module):
     run: Trajectory
     wanted: Reference
     voltage: Series  # the controller's command, as it reaches the amplifier
-    measured: MeasuredState  # what the controller was told
-    failed_at: Scalar  # s, when the controller first answered with no number, from where on it gets 0 V; else inf
+    measured: MeasuredState  # what the controller measured
+    failed_at: Scalar  # s, when the command was first not finite, from where on the drive gets 0 V; else inf
 
 
-class AbstractWatch(eqx.Module):
-    """What looks on while a loop runs, so that a sweep stores no trajectory. `see` is called once a sample."""
-
-    @abc.abstractmethod
-    def start(self, state: State) -> Any:
-        """The memory before the first sample, which is `state`."""
-
-    @abc.abstractmethod
-    def see(self, memory: Any, state: State, command: Scalar, dt: Scalar) -> Any:
-        """The memory after a sample; `command` (V) holds from it on for `dt` seconds, 0 at the last one."""
-
-    @abc.abstractmethod
-    def result(self, memory: Any) -> Any:
-        """What it has seen, any pytree."""
+def as_reference(wanted: Reference | Series) -> Reference:
+    """Set points where it is a plain array."""
+    return wanted if isinstance(wanted, Reference) else resting(wanted)
 
 
-class _Nobody(AbstractWatch):
-    def start(self, state: State) -> None:
-        return None
-
-    def see(self, memory: None, state: State, command: Scalar, dt: Scalar) -> None:
-        return None
-
-    def result(self, memory: None) -> None:
-        return None
+def _seconds(dt: Scalar | float) -> Scalar:
+    check_step(dt)
+    return jnp.asarray(dt, dtype=float)
 
 
-class _Carry(NamedTuple):
-    state: State
+class ClosedLoopSetup(eqx.Module):
+    """All that a closed loop is made of; fields as the arguments of `simulate_closed_loop`."""
+
+    system: System
+    controller: AbstractController
+    wanted: Reference = eqx.field(converter=as_reference)
+    dt: Scalar = eqx.field(converter=_seconds, default=DEFAULT_STEP)
+    every: int = eqx.field(static=True, default=1)
+    estimator: AbstractEstimator | None = None
+    sensor: Sensor | None = None
+    key: jax.Array | None = None
+    delay: int = eqx.field(static=True, default=0)
+    disturbance: Mapping[str, Series] | None = None
+    initial: State | None = None
+
+    @property
+    def samples(self) -> int:
+        """How many, of set points and states."""
+        return jnp.shape(self.wanted.position)[0]
+
+    @property
+    def periods(self) -> int:
+        """How many control periods."""
+        return (self.samples - 1) // self.every
+
+    @property
+    def disturbances(self) -> dict[str, Series]:
+        """By channel, each of shape (samples,)."""
+        return {name: jnp.asarray(series, dtype=float) for name, series in (self.disturbance or {}).items()}
+
+    def start(self) -> State:
+        """The first state: `initial`, or rest with the first disturbances and 0 V."""
+        if self.initial is not None:
+            return self.initial
+        inputs = self.system.drive.from_voltage(jnp.zeros(()))
+        return initial_state(self.system, {**inputs, **{name: one[0] for name, one in self.disturbances.items()}})
+
+    def check(self) -> None:
+        """ValueError for what is out of bounds, of another length, or not finite where it is known."""
+        check_bounds(self.system)
+        check_bounds(self.controller)
+        refuse_lag(self.system, "a closed loop")
+        shape = jnp.shape(self.wanted.position)
+        if len(shape) != 1:
+            raise ValueError(
+                f"`wanted` has the shape {shape}; expected a series, as `reference.constant(reference.clock(seconds, dt), 0.5)` gives it."
+            )
+        check_finite("the set point `wanted`", self.wanted.position)
+        if self.every < 1 or (self.samples - 1) % self.every:
+            raise ValueError(
+                f"`wanted` has {self.samples} samples and the controller is called every {self.every}: give a multiple of {self.every} "
+                "and one sample more, so that the run ends with a whole control period."
+            )
+        if self.delay < 0:
+            raise ValueError(f"`delay` is a whole number of control periods, 0 or more, not {self.delay}.")
+        if self.sensor is not None and self.key is None:
+            raise ValueError("a sensor draws noise: give `key`, for instance `jax.random.key(0)`.")
+        if self.sensor is not None:
+            check_bounds(self.sensor)
+        known = self.system.load.inputs_optional | {"ambient_temperature"}
+        for name, series in self.disturbances.items():
+            if name not in known:
+                raise ValueError(f"`{name}` is no disturbance of this system; there are {listed(sorted(known))}.")
+            check_finite(f"the disturbance `{name}`", series)
+            if series.shape != (self.samples,):
+                raise ValueError(
+                    f"disturbance `{name}` has the shape {series.shape}, `wanted` has {self.samples} samples."
+                )
+
+
+class Command(NamedTuple):
+    """What a controller asks for, held for a control period."""
+
+    voltage: Scalar  # V, at the amplifier
+    dt: Scalar  # s, of a step
+    inputs: Mapping[str, Scalar]  # of the drive, by channel
+
+
+class ControlMemory(NamedTuple):
+    """What goes from one control period to the next."""
+
     estimate: Any  # the estimator's memory
-    memory: Any  # the controller's
+    controller: Any  # the controller's
     held: Scalar  # V, the command at the amplifier
     queue: Series  # V, commands on their way to the amplifier, shape (delay,)
     failed_at: Scalar
-    seen: Any  # the watch's memory
 
 
-def simulate_closed_loop(
+class AbstractLoopObserver(AbstractObserver):
+    """What is made of a closed loop while it runs, so that a sweep stores no trajectory. `see` is called once a sample."""
+
+    @abc.abstractmethod
+    def see(self, memory: Any, state: State, voltage: Scalar, dt: Scalar) -> Any:
+        """The memory after a sample; `voltage` (V) is held from it on for `dt` seconds, 0 at the last one."""
+
+    @abc.abstractmethod
+    def summary(self, memory: Any) -> Any:
+        """What was observed, any pytree."""
+
+    def update(self, memory: Any, step: Step) -> Any:
+        command = step.inputs.held
+        return self.see(memory, step.before, command.voltage, command.dt)
+
+    def result(self, run: Observed) -> Any:
+        held = run.control.held
+        return self.summary(self.see(run.memory, run.end, held, jnp.zeros_like(held)))
+
+
+class _ControlTrace(AbstractObserver):
+    """(command, measured state) of every period, leaves of shape (periods,)."""
+
+    per_period: ClassVar[bool] = True
+
+    def sample(self, now: Period) -> Any:
+        return now.shown
+
+    def result(self, run: Observed) -> Any:
+        return run.samples
+
+
+def simulate_closed_loop(  # the public form: what goes inwards is a `ClosedLoopSetup`
     system: System,
     controller: AbstractController,
     wanted: Reference | Series,
@@ -91,153 +196,88 @@ def simulate_closed_loop(
     `dt` is that of the clock by which `wanted` was made: a series carries no times, so another one stretches the run.
 
     Its command is held in between, as a digital controller holds it, and reaches the amplifier `delay` control periods
-    later. Without an `estimator` it is told the true state, with the position as `sensor` (with noise drawn from `key`)
+    later. Without an `estimator` it measures the true state, with the position as `sensor` (with noise drawn from `key`)
     reads it. `disturbance` are further inputs of the system, such as `load_torque` or `ambient_temperature`, each of
     shape (n,). A plain array for `wanted` means set points (`reference.resting`). `initial` defaults to rest.
 
-    Raises ValueError when a gain, a parameter or the sensor's noise lies outside its bounds, when `dt` is none or a set point
-    not finite (where values are known: outside of `jit`), when `wanted` has not a whole number of control periods and one sample more, and when noise has no `key`.
+    Raises ValueError when a gain, a parameter or the sensor's noise lies outside its bounds, when `dt` is not positive or a set point
+    not finite (where values are known: outside of `jit`), when `wanted` is not a whole number of control periods and one sample more, and when noise has no `key`.
     """
-    first, end, (states, held, measured), wanted = _run(
-        system, controller, wanted, dt, every, _Nobody(), True, estimator, sensor, key, delay, disturbance, initial
-    )
-    states = jax.tree.map(lambda rest: rest.reshape(-1, *rest.shape[2:]), states)
-    spread = lambda series: jnp.append(jnp.repeat(series, every), series[-1])  # noqa: E731
-    return ClosedLoop(trajectory(first, states), wanted, spread(held), jax.tree.map(spread, measured), end.failed_at)
+    setup = ClosedLoopSetup(system, controller, wanted, dt, every, estimator, sensor, key, delay, disturbance, initial)
+    return stored_loop(setup)
 
 
-def watch_closed_loop(
-    watch: AbstractWatch,
-    system: System,
-    controller: AbstractController,
-    wanted: Reference | Series,
-    dt: Scalar | float = DEFAULT_STEP,
-    every: int = 1,
-    *,
-    estimator: AbstractEstimator | None = None,
-    sensor: Sensor | None = None,
-    key: jax.Array | None = None,
-    delay: int = 0,
-    disturbance: Mapping[str, Series] | None = None,
-    initial: State | None = None,
-) -> tuple[Any, Scalar]:
-    """(what `watch` has seen, `failed_at`) of the loop that `simulate_closed_loop` simulates: nothing else is stored."""
-    _, end, _, _ = _run(
-        system, controller, wanted, dt, every, watch, False, estimator, sensor, key, delay, disturbance, initial
-    )
-    return watch.result(watch.see(end.seen, end.state, end.held, jnp.zeros_like(end.held))), end.failed_at
+def stored_loop(setup: ClosedLoopSetup) -> ClosedLoop:
+    """`simulate_closed_loop` of its arguments."""
+    run = _march(setup, (StateTrace(), _ControlTrace()))
+    states, (voltage, measured) = run.results
+    spread = lambda series: jnp.append(jnp.repeat(series, setup.every), series[-1])  # noqa: E731
+    measured = jax.tree.map(spread, measured)
+    return ClosedLoop(trajectory(states), setup.wanted, spread(voltage), measured, run.control.failed_at)
 
 
-def _run(
-    system: System,
-    controller: AbstractController,
-    wanted: Reference | Series,
-    dt: Scalar | float,
-    every: int,
-    watch: AbstractWatch,
-    kept: bool,
-    estimator: AbstractEstimator | None,
-    sensor: Sensor | None,
-    key: jax.Array | None,
-    delay: int,
-    disturbance: Mapping[str, Series] | None,
-    initial: State | None,
-) -> tuple[State, _Carry, Any, Reference]:
-    """(first state, end, (states, commands, measured) of every period where they are `kept`, what was wanted)."""
-    check_bounds(system)
-    check_bounds(controller)
-    check_step(dt)
-    refuse_lag(system, "a closed loop")
-    wanted = wanted if isinstance(wanted, Reference) else resting(wanted)
-    shape = jnp.shape(wanted.position)
-    if len(shape) != 1:
-        raise ValueError(
-            f"`wanted` has the shape {shape}; expected a series, as `reference.constant(reference.clock(seconds, dt), 0.5)` gives it."
-        )
-    check_finite("the set point `wanted`", wanted.position)
-    (count,) = shape
-    if every < 1 or (count - 1) % every:
-        raise ValueError(
-            f"`wanted` has {count} samples and the controller is called every {every}: give a multiple of {every} and "
-            "one sample more, so that the run ends with a whole control period."
-        )
-    if delay < 0:
-        raise ValueError(f"`delay` is a whole number of control periods, 0 or more, not {delay}.")
-    if sensor is not None and key is None:
-        raise ValueError("a sensor draws noise: give `key`, for instance `jax.random.key(0)`.")
-    if sensor is not None:
-        check_bounds(sensor)
-    disturbance = {name: jnp.asarray(series, dtype=float) for name, series in (disturbance or {}).items()}
-    for name, series in disturbance.items():
-        if name not in system.load.inputs_optional | {"ambient_temperature"}:
-            raise ValueError(
-                f"`{name}` is no disturbance of this system; there are "
-                f"{listed(sorted(system.load.inputs_optional | {'ambient_temperature'}))}."
-            )
-        check_finite(f"the disturbance `{name}`", series)
-        if series.shape != (count,):
-            raise ValueError(f"disturbance `{name}` has the shape {series.shape}, `wanted` has {count} samples.")
+def observe_closed_loop(observer: AbstractObserver, setup: ClosedLoopSetup) -> tuple[Any, Scalar]:
+    """(what `observer` gives, `failed_at`) of the loop that `simulate_closed_loop` simulates: nothing else is stored."""
+    run = _march(setup, (observer,))
+    return run.results[0], run.control.failed_at
 
-    periods = (count - 1) // every
-    period = jnp.asarray(dt, dtype=float) * every
-    noise = jnp.zeros(periods) if key is None else jax.random.normal(key, (periods,))
-    # Shape (periods, every): what holds in each step of each period.
-    acting = {name: series[:-1].reshape(periods, every) for name, series in disturbance.items()}
-    first = jax.tree.map(lambda series: series[0], wanted)
-    zero = jnp.zeros(())
-    at_rest = {**system.drive.from_voltage(zero), **{name: series[0] for name, series in disturbance.items()}}
-    state = initial_state(system, at_rest) if initial is None else initial
 
-    def seen(state: State, noise: Scalar) -> Scalar:
+def _march(setup: ClosedLoopSetup, observers: Sequence[AbstractObserver]) -> March:
+    setup.check()
+    plant = FixedStep(setup.system, setup.dt)
+
+    def advance(carry: Carry, inputs: Controlled) -> Carry:
+        return plant(carry, {**inputs.held.inputs, **inputs.now})
+
+    state = setup.start()
+    acting = {name: series[:-1] for name, series in setup.disturbances.items()}
+    schedule = Schedule(setup.samples - 1, setup.every)
+    return integrate(advance, plant.start(state), acting, schedule, observers, _control(setup, state))
+
+
+def _control(setup: ClosedLoopSetup, start: State) -> Control:
+    """Sensor, estimator, controller and delay, once a control period."""
+    controller, estimator, sensor = setup.controller, setup.estimator, setup.sensor
+    period = setup.dt * setup.every
+    periods = setup.periods
+    noise = jnp.zeros(periods) if setup.key is None else jax.random.normal(setup.key, (periods,))
+
+    def reading_of(state: State, noise: Scalar) -> Scalar:
         return state.reading if sensor is None else sensor.reading(state.reading, noise)
 
-    def told(state: State, reading: Scalar) -> MeasuredState:
+    def with_reading(state: State, reading: Scalar) -> MeasuredState:
         return eqx.tree_at(lambda measured: measured.position, truth(state), reading)
 
-    def period_of(carry: _Carry, now: tuple[Reference, Scalar, dict[str, Series], Scalar]) -> tuple[_Carry, Any]:
-        now_wanted, now_noise, now_acting, number = now
-        state = carry.state
-        reading = seen(state, now_noise)
+    def step(memory: ControlMemory, state: State, sample: tuple[Reference, Scalar, Scalar]) -> tuple[Any, Any, Any]:
+        wanted, noise, number = sample
+        reading = reading_of(state, noise)
         if estimator is None:
-            estimate, measured = carry.estimate, told(state, reading)
+            estimate, measured = memory.estimate, with_reading(state, reading)
         else:
             # The first reading has already been used to begin with.
-            later, after = estimator.step(carry.estimate, reading, carry.held, period)
+            later, after = estimator.step(memory.estimate, reading, memory.held, period)
             at_start = number == 0
             pick = lambda one, other: jnp.where(at_start, one, other)  # noqa: E731
-            estimate = jax.tree.map(pick, carry.estimate, later)
+            estimate = jax.tree.map(pick, memory.estimate, later)
             measured = jax.tree.map(pick, estimator.start(reading)[1], after)
-        memory, asked = controller.step(carry.memory, measured, now_wanted, period)
-        failed_at = jnp.minimum(carry.failed_at, jnp.where(jnp.isfinite(asked), jnp.inf, state.time))
-        asked = jnp.where(jnp.isfinite(failed_at), 0.0, asked)
-        queue = jnp.append(carry.queue, asked)
+        own, answer = controller.step(memory.controller, measured, wanted, period)
+        failed_at = jnp.minimum(memory.failed_at, jnp.where(jnp.isfinite(answer), jnp.inf, state.time))
+        queue = jnp.append(memory.queue, jnp.where(jnp.isfinite(failed_at), 0.0, answer))
         held, queue = queue[0], queue[1:]
-        inputs = system.drive.from_voltage(held)
+        command = Command(held, setup.dt, setup.system.drive.from_voltage(held))
+        return ControlMemory(estimate, own, held, queue, failed_at), command, (held, measured)
 
-        def body(carry: tuple[State, Any], acting: dict[str, Scalar]) -> tuple[tuple[State, Any], State | None]:
-            state, seen = carry
-            seen = watch.see(seen, state, held, jnp.asarray(dt, dtype=float))
-            new = step(system, state, {**inputs, **acting}, dt)
-            return (new, seen), new if kept else None
-
-        (state, seen_now), states = lax.scan(body, (state, carry.seen), now_acting, length=every)
-        shown = (states, held, measured) if kept else None
-        return _Carry(state, estimate, memory, held, queue, failed_at, seen_now), shown
-
-    reading = seen(state, noise[0])
-    estimate, measured = (None, told(state, reading)) if estimator is None else estimator.start(reading)
-    start = _Carry(
-        state,
+    reading = reading_of(start, noise[0])
+    estimate, measured = (None, with_reading(start, reading)) if estimator is None else estimator.start(reading)
+    memory = ControlMemory(
         estimate,
-        controller.start(measured, first),
-        zero,
-        jnp.zeros(delay),
-        jnp.where(inside_bounds(controller), jnp.inf, state.time),
-        watch.start(state),
+        controller.start(measured, jax.tree.map(lambda series: series[0], setup.wanted)),
+        jnp.zeros(()),
+        jnp.zeros(setup.delay),
+        jnp.where(inside_bounds(controller), jnp.inf, start.time),
     )
-    at_calls = jax.tree.map(lambda series: series[:-1:every], wanted)
-    end, shown = lax.scan(period_of, start, (at_calls, noise, acting, jnp.arange(periods)))
-    return state, end, shown if kept else (None, None, None), wanted
+    at_calls = jax.tree.map(lambda series: series[: -1 : setup.every], setup.wanted)
+    return Control(step, memory, (at_calls, noise, jnp.arange(periods)))
 
 
 def check_answers(loop: ClosedLoop) -> None:

@@ -3,26 +3,25 @@
 from __future__ import annotations
 
 import itertools
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax import lax
 
-from smajax.control.closed_loop import AbstractWatch, ClosedLoop, watch_closed_loop
-from smajax.control.controllers.base import AbstractController
+from smajax.control.closed_loop import AbstractLoopObserver, ClosedLoop, ClosedLoopSetup, observe_closed_loop
 from smajax.control.reference import Reference
 from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.system import System, heating_power
 from smajax.model.types import Scalar, Series, State, Trajectory
 from smajax.model.wire.resistance import resistance_per_metre
+from smajax.simulation.integrate import AbstractObserver, Carry, Observed, Schedule, Step, integrate
 
 BAND_DEGREES = 1.0  # an angle this near the set point counts as there
 BAND_SHARE = 0.01  # a length: this share of the stroke that the recoverable strain gives
-STEADY = 0.2  # the last share of a run in which the error counts as steady
-LIVELY = 0.5  # V: a command that turns back by less has not switched
+STEADY_SHARE = 0.2  # the last share of a run in which the error counts as steady
+SWITCH_THRESHOLD = 0.5  # V: a command that turns back by less has not switched
 
 
 class Merit(eqx.Module):
@@ -30,7 +29,7 @@ class Merit(eqx.Module):
 
     reach_time: Scalar  # s, first within the band or beyond the set point
     settling_time: Scalar  # s, in the band from there on, the whole last fifth of the run at least
-    overshoot: Scalar  # rad or m, largest distance beyond the set point, seen from the start (any, if it starts there)
+    overshoot: Scalar  # rad or m, largest distance beyond the set point, away from the start (on either side, if it starts there)
     steady_error: Scalar  # rad or m, mean of the absolute error over the last fifth
     steady_offset: Scalar  # rad or m, mean of position - set point there
     energy: Scalar  # J into the wire
@@ -60,10 +59,10 @@ def band_of(system: System) -> Scalar:
     return BAND_SHARE * system.wire.constitutive.recoverable_strain / load.contraction(system.wire)
 
 
-class _Seen(NamedTuple):
-    """What `Judge` remembers from sample to sample."""
+class MeritMemory(NamedTuple):
+    """What `MeritObserver` remembers from sample to sample."""
 
-    number: Scalar  # samples seen
+    number: Scalar  # samples so far
     began: Scalar  # s
     time: Scalar  # s, of the last sample
     side: Scalar  # 1 where the set point is approached from below, -1 from above
@@ -83,7 +82,7 @@ class _Seen(NamedTuple):
 
 
 class _Sample(NamedTuple):
-    """What is judged of a run at one moment."""
+    """What figures of merit take of a run at one sample."""
 
     time: Scalar
     position: Scalar
@@ -93,7 +92,7 @@ class _Sample(NamedTuple):
     dt: Scalar  # s that the command holds, 0 at the last sample
 
 
-class Judge(AbstractWatch):
+class MeritObserver(AbstractLoopObserver):
     """Figures of merit while a loop runs, against its last set point."""
 
     system: System  # the plant that runs
@@ -101,12 +100,12 @@ class Judge(AbstractWatch):
     band: Scalar  # rad or m
     samples: int = eqx.field(static=True)
 
-    def begun(self, position: Scalar, time: Scalar) -> _Seen:
+    def first(self, position: Scalar, time: Scalar) -> MeritMemory:
         """Before the first sample, which lies at `position`."""
         error = position - self.target
         zero, never = jnp.zeros_like(error), jnp.full_like(error, jnp.inf)
         no, nothing = jnp.zeros_like(error, bool), jnp.zeros_like(error, int)
-        return _Seen(
+        return MeritMemory(
             number=nothing,
             began=time,
             time=time,
@@ -126,51 +125,51 @@ class Judge(AbstractWatch):
             hottest=-never,
         )
 
-    def judged(self, seen: _Seen, now: _Sample) -> _Seen:
+    def scored(self, memory: MeritMemory, now: _Sample) -> MeritMemory:
         """One sample more."""
         error = now.position - self.target
         outside = ~(jnp.abs(error) <= self.band)  # what is no number is not there
-        there = seen.side * error >= -self.band
-        beyond = jnp.where(seen.starts_there, jnp.abs(error), seen.side * error)
-        steady = seen.number >= (1.0 - STEADY) * (self.samples - 1) - 1e-9
+        there = memory.side * error >= -self.band
+        beyond = jnp.where(memory.starts_there, jnp.abs(error), memory.side * error)
+        steady = memory.number >= (1.0 - STEADY_SHARE) * (self.samples - 1) - 1e-9
         weight = jnp.where(steady, 1.0, 0.0)
         # The highest (lowest) command since it last turned back; the first one counts as on its way up.
-        rising = jnp.where(seen.rising == 0.0, 1.0, seen.rising)
-        fresh = (seen.rising == 0.0) | (rising * (now.command - seen.extreme) > 0.0)
-        extreme = jnp.where(fresh, now.command, seen.extreme)
-        turned = rising * (extreme - now.command) > LIVELY
+        rising = jnp.where(memory.rising == 0.0, 1.0, memory.rising)
+        fresh = (memory.rising == 0.0) | (rising * (now.command - memory.extreme) > 0.0)
+        extreme = jnp.where(fresh, now.command, memory.extreme)
+        turned = rising * (extreme - now.command) > SWITCH_THRESHOLD
         system = self.system
         ohms = resistance_per_metre(system.wire, system.terms.resistance, now.temperature, now.fraction)
         power = heating_power(system, ohms, system.drive.from_voltage(now.command))
-        return _Seen(
-            number=seen.number + 1,
-            began=seen.began,
+        return MeritMemory(
+            number=memory.number + 1,
+            began=memory.began,
             time=now.time,
-            side=seen.side,
-            starts_there=seen.starts_there,
-            reached=jnp.where(there & ~(seen.reached < jnp.inf), now.time, seen.reached),
-            inside_since=jnp.where(outside, jnp.inf, jnp.minimum(seen.inside_since, now.time)),
-            unsettled=seen.unsettled | (outside & steady),
-            beyond=jnp.maximum(seen.beyond, beyond),
-            steady=seen.steady + weight,
-            error=seen.error + weight * jnp.abs(error),
-            offset=seen.offset + weight * error,
-            energy=seen.energy + power * system.wire.wire_length * now.dt,
+            side=memory.side,
+            starts_there=memory.starts_there,
+            reached=jnp.where(there & ~(memory.reached < jnp.inf), now.time, memory.reached),
+            inside_since=jnp.where(outside, jnp.inf, jnp.minimum(memory.inside_since, now.time)),
+            unsettled=memory.unsettled | (outside & steady),
+            beyond=jnp.maximum(memory.beyond, beyond),
+            steady=memory.steady + weight,
+            error=memory.error + weight * jnp.abs(error),
+            offset=memory.offset + weight * error,
+            energy=memory.energy + power * system.wire.wire_length * now.dt,
             extreme=jnp.where(turned, now.command, extreme),
             rising=jnp.where(turned, -rising, rising),
-            turns=seen.turns + turned,
-            hottest=jnp.maximum(seen.hottest, now.temperature),
+            turns=memory.turns + turned,
+            hottest=jnp.maximum(memory.hottest, now.temperature),
         )
 
-    def start(self, state: State) -> _Seen:
-        return self.begun(state.motion.position, state.time)
+    def init(self, state: State) -> MeritMemory:
+        return self.first(state.motion.position, state.time)
 
-    def see(self, memory: _Seen, state: State, command: Scalar, dt: Scalar) -> _Seen:
+    def see(self, memory: MeritMemory, state: State, voltage: Scalar, dt: Scalar) -> MeritMemory:
         wire = state.wire
-        now = _Sample(state.time, state.motion.position, wire.temperature, wire.martensite_fraction, command, dt)
-        return self.judged(memory, now)
+        now = _Sample(state.time, state.motion.position, wire.temperature, wire.martensite_fraction, voltage, dt)
+        return self.scored(memory, now)
 
-    def result(self, memory: _Seen) -> Merit:
+    def summary(self, memory: MeritMemory) -> Merit:
         # A run that is inside at its last sample by chance has not settled.
         return Merit(
             reach_time=memory.reached - memory.began,
@@ -184,31 +183,46 @@ class Judge(AbstractWatch):
         )
 
 
-def judge_of(system: System, wanted: Reference, band: Scalar | float | None = None) -> Judge:
-    """What judges a run of the plant `system` against the last set point of `wanted`.
+def merit_observer(system: System, wanted: Reference, band: Scalar | float | None = None) -> MeritObserver:
+    """The observer of a run of the plant `system` against the last set point of `wanted`.
 
     `band`, rad or m, is how near counts as there; default `band_of` the system.
     """
     held = band_of(system) if band is None else jnp.asarray(band, dtype=float)
-    return Judge(system, wanted.position[-1], held, jnp.shape(wanted.position)[0])
+    return MeritObserver(system, wanted.position[-1], held, jnp.shape(wanted.position)[0])
 
 
 def merit(loop: ClosedLoop, system: System, band: Scalar | float | None = None) -> Merit:
-    """Judge a run that was simulated; `system` is the plant that ran. Pure: `vmap` it with the loop."""
-    return _judged(judge_of(system, loop.wanted, band), loop.run, loop.voltage)
+    """Figures of merit of a run that was simulated; `system` is the plant that ran. Pure: `vmap` it with the loop."""
+    return _replayed(merit_observer(system, loop.wanted, band), loop.run, loop.voltage)
 
 
-def _judged(judge: Judge, run: Trajectory, voltage: Series) -> Merit:
+class _Replay(AbstractObserver):
+    """An observer of a stored run, whose samples are the inputs of its steps."""
+
+    observer: MeritObserver
+    first: _Sample
+
+    def init(self, state: None) -> MeritMemory:
+        return self.observer.first(self.first.position, self.first.time)
+
+    def update(self, memory: MeritMemory, step: Step) -> MeritMemory:
+        return self.observer.scored(memory, step.inputs)
+
+    def result(self, run: Observed) -> Merit:
+        return self.observer.summary(run.memory)
+
+
+def _replayed(observer: MeritObserver, run: Trajectory, voltage: Series) -> Merit:
     held = jnp.append(jnp.diff(run.time), 0.0)
     samples = _Sample(run.time, run.position, run.temperature, run.martensite_fraction, voltage, held)
-    seen, _ = lax.scan(
-        lambda seen, now: (judge.judged(seen, now), None), judge.begun(run.position[0], run.time[0]), samples
-    )
-    return judge.result(seen)
+    replay = _Replay(observer, jax.tree.map(lambda series: series[0], samples))
+    steps = Schedule(jnp.shape(run.time)[0])
+    return integrate(lambda carry, _: carry, Carry(None), samples, steps, (replay,)).results[0]
 
 
-class Rest(NamedTuple):
-    """A set point from when it is asked to the next one, and what is made of it there."""
+class SetPointMerit(NamedTuple):
+    """A set point from when it is set to the next one, and the figures of merit there."""
 
     begin: float  # s
     end: float  # s
@@ -216,32 +230,31 @@ class Rest(NamedTuple):
     merit: Merit  # times count from `begin`
 
 
-def rests(set_points: np.ndarray) -> list[tuple[int, int]]:
+def set_point_spans(set_points: np.ndarray) -> list[tuple[int, int]]:
     """(first sample, last one) of each set point; the last is the next one's first, where its command has done its work."""
     ends = [0, *(np.flatnonzero(np.diff(set_points)) + 1).tolist(), len(set_points) - 1]
     return [(first, last) for first, last in itertools.pairwise(ends) if first < last]
 
 
-def merit_by_set_point(loop: ClosedLoop, system: System, band: Scalar | float | None = None) -> tuple[Rest, ...]:
-    """`merit` of each set point by itself, as if the run began where it is asked and ended where the next is.
+def merit_by_set_point(
+    loop: ClosedLoop, system: System, band: Scalar | float | None = None
+) -> tuple[SetPointMerit, ...]:
+    """`merit` of each set point by itself, as if the run began where it is set and ended where the next is.
 
     For runs that have been computed: how many there are is in the values.
     """
-    held, judged = band_of(system) if band is None else jnp.asarray(band, dtype=float), eqx.filter_jit(_judged)
-    time, asked = np.asarray(loop.run.time), np.asarray(loop.wanted.position)
+    held, replayed = band_of(system) if band is None else jnp.asarray(band, dtype=float), eqx.filter_jit(_replayed)
+    time, wanted = np.asarray(loop.run.time), np.asarray(loop.wanted.position)
     found = []
-    for first, last in rests(asked):
+    for first, last in set_point_spans(wanted):
         run = jax.tree.map(lambda series, part=slice(first, last + 1): series[part], loop.run)
         voltage = jnp.asarray(loop.voltage)[first : last + 1].at[-1].set(loop.voltage[last - 1])
-        judge = Judge(system, jnp.asarray(asked[first]), held, last - first + 1)
-        one = jax.tree.map(np.asarray, judged(judge, run, voltage))
-        found.append(Rest(float(time[first]), float(time[last]), float(asked[first]), one))
+        observer = MeritObserver(system, jnp.asarray(wanted[first]), held, last - first + 1)
+        one = jax.tree.map(np.asarray, replayed(observer, run, voltage))
+        found.append(SetPointMerit(float(time[first]), float(time[last]), float(wanted[first]), one))
     return tuple(found)
 
 
-def judged_loop(
-    system: System, controller: AbstractController, wanted: Reference, *settings: Any, **interface: Any
-) -> tuple[Merit, Scalar]:
-    """(figures of merit, `failed_at`) of a loop, of which nothing else is stored; arguments as `simulate_closed_loop`'s."""
-    found, failed = watch_closed_loop(judge_of(system, wanted), system, controller, wanted, *settings, **interface)
-    return found, failed
+def evaluated_loop(setup: ClosedLoopSetup) -> tuple[Merit, Scalar]:
+    """(figures of merit, `failed_at`) of a loop, of which nothing else is stored."""
+    return observe_closed_loop(merit_observer(setup.system, setup.wanted), setup)

@@ -15,9 +15,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from smajax.control.closed_loop import ClosedLoopSetup
 from smajax.control.controllers.base import AbstractController
 from smajax.control.estimators.base import AbstractEstimator
-from smajax.control.figures_of_merit import Merit, judged_loop
+from smajax.control.figures_of_merit import Merit, evaluated_loop
 from smajax.control.reference import clock, constant
 from smajax.core.parameters import set_vector
 from smajax.core.progress import Progress, Stage, quiet
@@ -74,7 +75,8 @@ def merits_of(
 
     def one(row: jax.Array, target: Scalar) -> Merit:
         tuned = set_vector(controller, names, row)
-        return judged_loop(system, tuned, constant(time, target), settings.dt, settings.every, estimator=estimator)[0]
+        setup = ClosedLoopSetup(system, tuned, constant(time, target), settings.dt, settings.every, estimator)
+        return evaluated_loop(setup)[0]
 
     return jax.vmap(lambda row: jax.vmap(lambda target: one(row, target))(targets))(gains)
 

@@ -10,8 +10,8 @@ import jax.numpy as jnp
 import numpy as np
 import xarray as xr
 
-from smajax.control.closed_loop import ClosedLoop, check_answers
-from smajax.control.compiled_loop import judged_loop_compiled
+from smajax.control.closed_loop import ClosedLoop, ClosedLoopSetup, check_answers
+from smajax.control.compiled_loop import evaluated_loop_compiled
 from smajax.control.controllers.base import AbstractController
 from smajax.control.interface import check_interface
 from smajax.control.reference import Reference, resting
@@ -56,7 +56,7 @@ def simulate_loop_dataset(
 
     set_point: a number (rad or m), text with a unit (`"40 deg"`), levels each with its time (`"40deg:5s,10deg:5s"`, which
     need no `seconds`), or a `Reference` of samples `dt` apart, which has its own length. The controller is called every
-    `period` seconds and is told the true state; noise, a filter, delays and disturbances are `simulate_closed_loop`'s.
+    `period` seconds and measures the true state; noise, a filter, delays and disturbances are `simulate_closed_loop`'s.
 
     Raises TypeError for what is no `Loop` (a system without a controller), UnitError for a unit of another kind, ValueError
     for a coupon, a parameter or gain out of its bounds, a period that is no multiple of `dt`, a run without a length or
@@ -80,7 +80,7 @@ def simulate_loop_dataset(
     if samples <= every:
         raise ValueError(f"the run is shorter than one control period of {period:g} s.")
     wanted = Reference(wanted.position[:samples], wanted.velocity[:samples], wanted.acceleration[:samples])
-    run, _ = judged_loop_compiled(system, controller, wanted, dt, every)
+    run, _ = evaluated_loop_compiled(ClosedLoopSetup(system, controller, wanted, dt, every))
     check_answers(run)
     return labelled_loop(
         system, run, dt=dt, period=period, controller=type(controller).__name__, gains=parameter_values(controller)

@@ -15,10 +15,10 @@ import jax.numpy as jnp
 import numpy as np
 import xarray as xr
 
-from smajax.control.closed_loop import check_answers
-from smajax.control.compiled_loop import judged_loop_compiled
+from smajax.control.closed_loop import ClosedLoopSetup, check_answers
+from smajax.control.compiled_loop import evaluated_loop_compiled
 from smajax.control.compose import compose, with_values
-from smajax.control.figures_of_merit import Rest, merit_by_set_point, rests
+from smajax.control.figures_of_merit import SetPointMerit, merit_by_set_point, set_point_spans
 from smajax.control.gains_file import Gains, read_gains
 from smajax.control.interface import between_in_words, check_interface, check_set_points, interface_of
 from smajax.control.loop_dataset import labelled_loop
@@ -117,7 +117,7 @@ class RunResult:
     system: System
     merit: Mapping[str, float]
     notes: tuple[str, ...]
-    by_set_point: tuple[Rest, ...] = ()  # figures of merit by set point, where there are several
+    by_set_point: tuple[SetPointMerit, ...] = ()  # figures of merit by set point, where there are several
     mismatches: tuple[Mismatch, ...] = ()
 
 
@@ -229,7 +229,7 @@ def run_closed(request: RunRequest, loop: LoopRequest) -> RunResult:
     interface = interface_of(assumed, loop.estimator, loop.noise, loop.period, request.dt, loop.delay)
     clock, position = _set_points(request, loop, interface.every)
     controller = gains.put(assumed)
-    run, merits = judged_loop_compiled(
+    setup = ClosedLoopSetup(
         plant,
         controller,
         resting(jnp.asarray(position)),
@@ -240,6 +240,7 @@ def run_closed(request: RunRequest, loop: LoopRequest) -> RunResult:
         key=None if interface.sensor is None else jax.random.key(loop.seed),
         delay=interface.delay,
     )
+    run, merits = evaluated_loop_compiled(setup)
     # As in `run_open`.
     run = eqx.tree_at(lambda one: one.run.time, run, jnp.asarray(clock))
     between = between_in_words(loop.estimator, loop.noise, loop.period, loop.delay)
@@ -253,10 +254,10 @@ def run_closed(request: RunRequest, loop: LoopRequest) -> RunResult:
         notes.append(str(error))
     notes += _set_point_notes(assumed, position)
     figures = {name: float(value) for name, value in vars(merits).items()}
-    by_set_point: tuple[Rest, ...] = ()
+    by_set_point: tuple[SetPointMerit, ...] = ()
     if np.ptp(position) > 0.0:
         figures = {}  # they are those of one set point from the start of the run
-        count = len(rests(position))
+        count = len(set_point_spans(position))
         if count <= MOST_RESTS:
             by_set_point = merit_by_set_point(run, plant)
         else:

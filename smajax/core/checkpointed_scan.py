@@ -1,4 +1,4 @@
-"""A scan whose reverse-mode derivative keeps the square root of its steps, not all of them."""
+"""A scan whose reverse-mode derivative stores the square root of its steps, not all of them."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ def solved(tree: Any) -> Any:
 
 
 def recomputed(body: Callable[..., Any]) -> Callable[..., Any]:
-    """`body`, of which a reverse-mode derivative keeps what it began with and what was `solved` in it, and nothing else.
+    """`body`, of which a reverse-mode derivative stores what it began with and what was `solved` in it, and nothing else.
 
-    To compute the rest again is quicker than to fetch it from where it would be kept.
+    To compute the rest again is quicker than to store and fetch it.
     """
     return jax.checkpoint(body, prevent_cse=False, policy=jax.checkpoint_policies.save_only_these_names(SOLVED))
 
@@ -39,7 +39,7 @@ def segment_of(length: int, weight: int = 1) -> int:
 def checkpointed_scan(
     body: Callable[[Any, Any], tuple[Any, Any]], carry: Any, xs: Any, length: int, weight: int = 1
 ) -> tuple[Any, Any]:
-    """`lax.scan`. Its reverse-mode derivative keeps the carry at the start of each of about `sqrt(length)` segments,
+    """`lax.scan`. Its reverse-mode derivative stores the carry at the start of each of about `sqrt(length)` segments,
     and computes the carries within a segment again when it comes to it: one run more, for memory that grows as the
     square root. Without a derivative, and in forward mode, it costs what `lax.scan` does.
 

@@ -9,8 +9,8 @@ goes through the cache: a step of a wire is some hundred such loops. Here the sa
 becomes one loop over groups of runs, few enough that all they need stays in the nearest cache from the first step to the
 last, in phases (`phases`) that keep their results in registers.
 
-jaxpr (`translate`, `jax_versions`) -> LLVM's language (`text`, `arithmetic`, `phases`) -> machine code, and threads that run it
-(`kernel`), kept on disk (`cache`); or `xla`.
+jaxpr (`translate`, `array_operations`, `jax_versions`) -> LLVM's language (`text`, `arithmetic`, `phases`) -> machine code, and threads that run it
+(`kernel`), cached on disk (`cache`); or `xla`.
 """
 
 from smajax.engine.facade import Engine as Engine

@@ -172,6 +172,13 @@ def _square(text: Text, out: str, one: Lane, **_: Any) -> Lane:
     return _times(text, one, one)
 
 
+def _one_less_square(text: Text, out: str, one: Lane, **_: Any) -> Lane:
+    """1 - x^2 as (1 + x)(1 - x), exact where x is near 1 (an operation since JAX 0.12)."""
+    unit = text.constant(1, out)
+    above, below = _binary("fadd", "add")(text, out, unit, one), _binary("fsub", "sub")(text, out, unit, one)
+    return _times(text, above, below)
+
+
 def _inverse_root(text: Text, out: str, one: Lane, **_: Any) -> Lane:
     return reciprocal(text, text.call("llvm.sqrt", out, one.name))
 
@@ -352,6 +359,7 @@ ELEMENTWISE: Mapping[str, Operation] = {
     "integer_pow": _whole_power,
     "polynomial": _polynomial,
     "square": _square,
+    "one_minus_square": _one_less_square,
     "is_finite": _finite,
     "eq": _compare("oeq", "eq"),
     "ne": _compare("une", "ne"),

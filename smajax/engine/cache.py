@@ -1,6 +1,6 @@
 """Machine code on disk, under a key of the program's own text, so that another process need not compile it again.
 
-Where JAX keeps its compiled programs (`jax_compilation_cache_dir`, which our commands set), and only there. The key is of
+Where JAX caches its compiled programs (`jax_compilation_cache_dir`, which our commands set), and only there. The key is of
 LLVM's text of the program, the versions of what wrote and compiles it, and the processor: an edited comment compiles
 nothing anew, and whatever changes a program changes its key. What is read is machine code and nothing else.
 """
@@ -39,7 +39,7 @@ def versions() -> str:
 
 
 def folder() -> Path | None:
-    """Where programs are kept; None where JAX keeps none."""
+    """Where programs are cached; None where JAX caches none."""
     values = jax.config.values
     place = values["jax_compilation_cache_dir"]
     if not place or "://" in place or not values["jax_enable_compilation_cache"]:  # a bucket somewhere is JAX's alone
@@ -70,7 +70,7 @@ def load(key: str) -> bytes | None:
 
 
 def save(key: str, code: bytes) -> None:
-    """Keep machine code; where that cannot be done, it is compiled again the next time."""
+    """Cache machine code; where that cannot be done, it is compiled again the next time."""
     place = folder()
     if place is None:
         return

@@ -25,12 +25,12 @@ from smajax.engine.text import Unsupported
 
 Engine = Literal["auto", "native", "xla"]
 VARIABLE = "SMAJAX_ENGINE"
-KEPT = 128  # programs that a process remembers
+CACHED = 128  # programs that a process remembers
 Made = TypeVar("Made")
 
 
 class EngineWarning(UserWarning):
-    """A program runs by XLA, several times slower, because machine code could not be made of it; says why."""
+    """A program runs by XLA, several times slower, because machine code could not be made of it or failed; says why."""
 
 
 class EngineError(ValueError):
@@ -38,19 +38,32 @@ class EngineError(ValueError):
 
 
 class Program:
-    """`function(model, own)` of one run, for many: `program(model, own)`."""
+    """`function(model, own)` of one run, for many: `program(model, own)`.
 
-    def __init__(self, function: Function, alone: bool, native: NativeProgram | None) -> None:
-        self._function, self._alone, self.native = function, alone, native
+    What goes wrong while machine code runs is raised under "native"; otherwise XLA takes over for good, with one warning.
+    """
+
+    def __init__(
+        self, function: Function, alone: bool, native: NativeProgram | None, replaceable: bool = False
+    ) -> None:
+        """`replaceable`: XLA may stand in for `native`."""
+        self._function, self._alone, self._replaceable, self.native = function, alone, replaceable, native
 
     def __call__(self, model: Any, own: dict[str, np.ndarray], threads: int | None = None) -> Any:
         """What the function gives, arrays of numpy, every leaf with one row a run; `own` are arrays of shape (runs,).
 
         `threads` of machine code: by default as many as there are cores.
         """
-        if self.native is None:
-            return xla.evaluated(self._function, model, own, self._alone)
-        return self.native(model, own, threads or available_cores())
+        native = self.native
+        if native is not None:
+            try:
+                return native(model, own, threads or available_cores())
+            except Exception as error:
+                if not self._replaceable:
+                    raise
+                self.native = None
+                _warn(error, "failed while it ran")
+        return xla.evaluated(self._function, model, own, self._alone)
 
     def begin(
         self,
@@ -66,12 +79,12 @@ class Program:
         `devices`, `block` and `room` (runs that one compilation has room for) are of XLA, `threads` of machine code.
         """
         if self.native is None:
-            return xla.begun(self._function, model, own, devices, block, room)
+            return xla.started(self._function, model, own, devices, block, room)
         pool = ThreadPoolExecutor(1)
         try:
-            coming = pool.submit(self.native, model, own, threads)
+            coming = pool.submit(self, model, own, threads)
         except RuntimeError:  # no room for another thread under a cap on memory: done when it is asked for
-            return partial(self.native, model, own, threads)
+            return partial(self, model, own, threads)
         pool.shutdown(wait=False)
         return coming.result
 
@@ -81,10 +94,10 @@ def available_cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def engine_of(asked: str = "auto") -> Engine:
+def engine_of(requested: str = "auto") -> Engine:
     """The engine that is meant, with SMAJAX_ENGINE for "auto". Raises EngineError for one that there is not."""
-    named = asked
-    for engine, source in ((asked, "engine"), (os.environ.get(VARIABLE) or "auto", VARIABLE)):
+    named = requested
+    for engine, source in ((requested, "engine"), (os.environ.get(VARIABLE) or "auto", VARIABLE)):
         if engine == "lanes" and source == "engine":
             warnings.warn('`engine="lanes"` is "native" now; it goes in version 0.2', DeprecationWarning, stacklevel=3)
             return "native"
@@ -101,17 +114,17 @@ def kind_of(function: Function, model: Any, names: tuple[str, ...]) -> Hashable:
     settled, settled_tree = jax.tree.flatten(static)
     kinds = tuple((leaf.shape, str(leaf.dtype), getattr(leaf, "weak_type", False)) for leaf in leaves)
     # To Python 1, 1.0 and True are one key; to a traced program they are not.
-    told = tuple((type(one), repr(one)) if isinstance(one, bool | int | float | complex) else one for one in settled)
-    return function, tree, settled_tree, told, kinds, names, str(jnp.zeros(()).dtype)
+    numbers = tuple((type(one), repr(one)) if isinstance(one, bool | int | float | complex) else one for one in settled)
+    return function, tree, settled_tree, numbers, kinds, names, str(jnp.zeros(()).dtype)
 
 
-def recalled(kept: dict[Hashable, Made], key: Hashable, make: Callable[[], Made]) -> Made:
-    """What was made for a key before, or now; what was not asked for longest makes room."""
-    found = kept.pop(key) if key in kept else make()
-    while len(kept) >= KEPT:
-        kept.pop(next(iter(kept)), None)
-    kept[key] = found
-    return found
+def cached(made: dict[Hashable, Made], key: Hashable, make: Callable[[], Made]) -> Made:
+    """What was made for a key before, or now; the least recently used makes room."""
+    result = made.pop(key) if key in made else make()
+    while len(made) >= CACHED:
+        made.pop(next(iter(made)), None)
+    made[key] = result
+    return result
 
 
 _programs: dict[Hashable, Program] = {}
@@ -136,7 +149,7 @@ def program(
     if meant == "auto" and devices and devices[0].platform != "cpu":
         meant = "xla"
     key = (kind_of(function, model, names), alone, meant)
-    return recalled(_programs, key, lambda: _made(function, model, names, alone, meant))
+    return cached(_programs, key, lambda: _made(function, model, names, alone, meant))
 
 
 def _made(function: Function, model: Any, names: tuple[str, ...], alone: bool, engine: Engine) -> Program:
@@ -144,11 +157,11 @@ def _made(function: Function, model: Any, names: tuple[str, ...], alone: bool, e
         return Program(function, alone, None)
     traced = Traced(function, model, names)  # what goes wrong in here goes wrong by XLA too
     try:
-        return Program(function, alone, NativeProgram(traced, alone))
+        return Program(function, alone, NativeProgram(traced, alone), replaceable=engine == "auto")
     except Exception as error:
         if engine == "native":
             raise
-        warnings.warn(_told(error), EngineWarning, stacklevel=1)  # of one place, so that Python shows each reason once
+        _warn(error, "could not be made")
         return Program(function, alone, None)
 
 
@@ -158,10 +171,16 @@ def reason(error: BaseException) -> str:
     return ", ".join([named, *getattr(error, "__notes__", ())])
 
 
-def _told(error: BaseException) -> str:
+def _warn(error: BaseException, what: str) -> None:
+    warnings.warn(
+        _message(error, what), EngineWarning, stacklevel=1
+    )  # of one place, so that Python shows each reason once
+
+
+def _message(error: BaseException, what: str) -> str:
     if isinstance(error, ImportError):
         return f"machine code needs llvmlite, which cannot be imported ({error}): XLA is used, several times slower."
     return (
-        f"no machine code for a program, so XLA runs it, several times slower: {reason(error)} ({versions()}). Where the model "
+        f"machine code of a program {what}, so XLA runs it, several times slower: {reason(error)} ({versions()}). Where the model "
         "is smajax's own, please report this line with what `smajax doctor --json` says. SMAJAX_ENGINE=xla takes XLA at once."
     )

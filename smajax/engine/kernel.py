@@ -107,11 +107,11 @@ class Kernel:
         self._call = kind(self._engine.get_function_address(NAME))
 
     def __call__(self, shared: Sequence[np.ndarray], own: Sequence[np.ndarray], threads: int) -> list[np.ndarray]:
-        """`own` are arrays of shape (members,), `shared` of the shapes traced; results have shape (members, ...)."""
-        members = len(own[0])
-        count = -(-members // self._lanes)
+        """`own` are arrays of shape (runs,), `shared` of the shapes traced; results have shape (runs, ...)."""
+        runs = len(own[0])
+        count = -(-runs // self._lanes)
         room = count * self._lanes
-        filled = [np.concatenate([one, np.full(room - members, one[-1])]) for one in own]
+        filled = [np.concatenate([one, np.full(room - runs, one[-1])]) for one in own]
         results = [np.empty((room, *one.shape), one.dtype) for one in self._results]
         tables = [self._pointers(arrays) for arrays in (shared, filled, results)]
         edges = np.linspace(0, count, min(threads, count) + 1).astype(int)
@@ -125,7 +125,7 @@ class Kernel:
                 list(pool.map(part, edges[:-1].tolist(), edges[1:].tolist()))
         except RuntimeError:  # no room for another thread under a cap on memory: this one does it all
             part(0, count)
-        return [one[:members] for one in results]
+        return [one[:runs] for one in results]
 
     @staticmethod
     def _pointers(arrays: Sequence[np.ndarray]) -> Any:

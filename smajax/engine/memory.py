@@ -36,10 +36,10 @@ def in_registers(text: Text, value: Value) -> Held:
 def table(text: Text, value: np.ndarray) -> Stored:
     """A known array as a constant of the program."""
     dtype = str(value.dtype)
-    kept = value.astype("int8") if dtype == "bool" else value
+    stored = value.astype("int8") if dtype == "bool" else value
     name = f"@known{len(text.globals)}"
-    raw = "".join(f"\\{byte:02X}" for byte in np.ascontiguousarray(kept).tobytes())
-    text.globals.append(f'{name} = private constant [{kept.nbytes} x i8] c"{raw}", align 64')
+    raw = "".join(f"\\{byte:02X}" for byte in np.ascontiguousarray(stored).tobytes())
+    text.globals.append(f'{name} = private constant [{stored.nbytes} x i8] c"{raw}", align 64')
     return Stored(name, value.shape, dtype, own=False)
 
 
@@ -75,7 +75,7 @@ def row(text: Text, value: Value, index: str, shape: tuple[int, ...], dtype: str
 
 
 def write(text: Text, room: Stored, index: str, value: Value) -> None:
-    """`room[index] = value` in the members' own memory."""
+    """`room[index] = value` in memory of each run's own."""
     size = size_of(value)
     first = text.assign(f"mul i64 {index}, {size * text.room}")
     if isinstance(value, Filled) or (isinstance(value, Stored) and size > SMALL):

@@ -29,8 +29,8 @@ class Traced:
         shape: list[Any] = []
 
         def run(*flat: jax.Array) -> list[jax.Array]:
-            given = [_like(leaf, one) for leaf, one in zip(leaves, flat, strict=False)]
-            whole = eqx.combine(jax.tree.unflatten(tree, given), static)
+            inputs = [_like(leaf, one) for leaf, one in zip(leaves, flat, strict=False)]
+            whole = eqx.combine(jax.tree.unflatten(tree, inputs), static)
             found = function(whole, dict(zip(names, flat[len(leaves) :], strict=True)))
             results, out = jax.tree.flatten(found)
             shape[:] = [out]
@@ -75,7 +75,7 @@ class NativeProgram:
 
 
 def _kernel(translated: Translated) -> Kernel:
-    """Loaded from the disk, or compiled and kept there."""
+    """Loaded from the disk, or compiled and stored there."""
     key = cache.key_of(translated.text)
     code = cache.load(key)
     if code is None:
@@ -120,7 +120,7 @@ def _plain(leaf: Any) -> Any:
 
 
 def _like(leaf: Any, plain: Any) -> Any:
-    return jax.random.wrap_key_data(plain) if _is_key(leaf) else plain
+    return jax.random.wrap_key_data(plain, impl=jax.random.key_impl(leaf)) if _is_key(leaf) else plain
 
 
 def lanes_of(dtypes: set[str]) -> int:

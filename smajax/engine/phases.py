@@ -1,4 +1,4 @@
-"""A long run of instructions, cut into short loops over several vectors of members.
+"""A long run of instructions, cut into short loops over several vectors of runs.
 
 Written out for one vector a step waits for its own results most of the time; written out for several at once it fits
 neither the registers nor the cache of instructions. So it is cut into phases that each go over all vectors of a group: a
@@ -23,7 +23,7 @@ LABELS = re.compile(r", %(\w+) \]")
 
 @dataclass(slots=True)
 class Work:
-    """Instructions on one vector that stay together: `%turn` is its number within the group, `%at` that of its first member."""
+    """Instructions on one vector that stay together: `%turn` is its number within the group, `%at` that of its first run."""
 
     name: str | None  # of what comes out
     lines: list[str]
@@ -63,19 +63,19 @@ Item = str | Work | Write | Late | Edge | Chosen
 
 
 @dataclass(frozen=True, slots=True)
-class Kept:
+class Layout:
     """How a vector lies in memory."""
 
     kind: str  # LLVM's
     size: int  # bytes
-    mask: str | None = None  # of truth values that are kept as whole numbers: their kind in a register
+    mask: str | None = None  # of truth values that are stored as whole numbers: their kind in a register
 
 
 @dataclass(frozen=True, slots=True)
 class Names:
     """Those of what differs from vector to vector."""
 
-    kept: dict[str, Kept]
+    layouts: dict[str, Layout]
     cells: dict[str, str]  # name -> the cell whose present value it is
 
 
@@ -116,13 +116,13 @@ def _needed(items: Sequence[Item], cells: Mapping[str, str]) -> list[Item]:
         for cell, value in item.pairs if isinstance(item, Write) else ():
             held.setdefault(cell, []).append(value)
     wanted: set[str] = set()
-    asked = [name for one in works if not one.name for name in one.reads]
-    while asked:
-        name = asked.pop()
+    requested = [name for one in works if not one.name for name in one.reads]
+    while requested:
+        name = requested.pop()
         name = cells.get(name, name)
         if name not in wanted:
             wanted.add(name)
-            asked += makers[name].reads if name in makers else held.get(name, [])
+            requested += makers[name].reads if name in makers else held.get(name, [])
     lasting: list[Item] = []
     for item in items:
         if isinstance(item, Write):
@@ -205,8 +205,8 @@ def _joined(
         if outer is None or outer in same.values() or len(of[outer]) != 2:
             continue
         back = of[outer][1].phase
-        asked = [*reads.get(outer, []), *(one.phase for one in left if cells.get(one.value) == outer)]
-        meanwhile = any(first.phase < number <= back for number in asked)
+        requested = [*reads.get(outer, []), *(one.phase for one in left if cells.get(one.value) == outer)]
+        meanwhile = any(first.phase < number <= back for number in requested)
         if first.phase < back and _beside(first.phase, back, loops) and not meanwhile:
             same[inner] = outer
     return same
@@ -221,15 +221,15 @@ def _lay_early(
     cells: Mapping[str, str],
 ) -> None:
     """Leave values in their cells as soon as they are there, where nobody asks for the one before any more."""
-    asked = {cell: list(numbers) for cell, numbers in reads.items()}
+    requested = {cell: list(numbers) for cell, numbers in reads.items()}
     for one in left:
-        asked.setdefault(one.cell, []).append(one.phase)
+        requested.setdefault(one.cell, []).append(one.phase)
         if one.value in cells:
-            asked.setdefault(cells[one.value], []).append(one.phase)
+            requested.setdefault(cells[one.value], []).append(one.phase)
     for one in left:
         early, late = made.get(one.value, one.phase), one.phase
         beside = _beside(early, late, loops) and phases[early].chosen == phases[late].chosen
-        if beside and sum(early < at <= late for at in asked[one.cell]) == int(early < late):
+        if beside and sum(early < at <= late for at in requested[one.cell]) == int(early < late):
             one.phase = early
 
 
@@ -290,7 +290,7 @@ def _settled(
     _lay_early(left, made, by_cell(cells), phases, loops, cells)
 
     touched: dict[str, set[int]] = {}
-    for number, name in [*read, *((one.phase, one.value) for one in left if one.value in names.kept)]:
+    for number, name in [*read, *((one.phase, one.value) for one in left if one.value in names.layouts)]:
         if name in cells or made[name] != number:
             touched.setdefault(cells.get(name, name), set()).add(number)
             if name not in phases[number].loads:
@@ -309,7 +309,7 @@ def _settled(
             if not begin <= first < end and any(begin <= one < end for one in numbers):
                 last = max(last, end)  # the next round asks for it again
         spans[name] = first, last
-    return Names(names.kept, cells), spans
+    return Names(names.layouts, cells), spans
 
 
 def laid_out(items: Sequence[Item], names: Names, lanes: int, vectors: int, start: int) -> tuple[list[str], int]:
@@ -319,7 +319,7 @@ def laid_out(items: Sequence[Item], names: Names, lanes: int, vectors: int, star
     """
     blocks, loops = _blocks(_needed(items, names.cells), MOST if vectors > 1 else len(items))
     names, spans = _settled([phase for block in blocks for phase in block.phases], loops, names)
-    places, total = _places(spans, {name: names.kept[name].size for name in spans}, vectors)
+    places, total = _places(spans, {name: names.layouts[name].size for name in spans}, vectors)
     places = {name: start + at for name, at in places.items()}
 
     lines: list[str] = []
@@ -369,26 +369,26 @@ def _written(phase: _Phase, number: int, before: str, names: Names, lanes: int, 
     def address(name: str, use: str) -> str:
         base, where = f"{stem}.{use}.base", f"{stem}.{use}.address"
         lines.append(f"  {base} = getelementptr inbounds i8, ptr %scratch, i64 {places[name]}")
-        lines.append(f"  {where} = getelementptr inbounds [{names.kept[name].size} x i8], ptr {base}, i64 {turn}")
-        size = names.kept[name].size
+        lines.append(f"  {where} = getelementptr inbounds [{names.layouts[name].size} x i8], ptr {base}, i64 {turn}")
+        size = names.layouts[name].size
         return f"ptr {where}, align {min(size & -size, LINE)}"
 
     for k, name in enumerate(phase.loads):
         cell = names.cells.get(name, name)
-        kept, where = names.kept[cell], address(cell, f"load{k}")
-        if kept.mask is None:
-            lines.append(f"  {here[name]} = load {kept.kind}, {where}")
+        layout, where = names.layouts[cell], address(cell, f"load{k}")
+        if layout.mask is None:
+            lines.append(f"  {here[name]} = load {layout.kind}, {where}")
         else:
-            lines.append(f"  {here[name]}.kept = load {kept.kind}, {where}")
-            lines.append(f"  {here[name]} = icmp slt {kept.kind} {here[name]}.kept, zeroinitializer")
+            lines.append(f"  {here[name]}.stored = load {layout.kind}, {where}")
+            lines.append(f"  {here[name]} = icmp slt {layout.kind} {here[name]}.stored, zeroinitializer")
     for work in phase.works:
         lines += ["  " + own(one) for one in work.lines] if isinstance(work, Work) else []
     for k, (name, value) in enumerate(phase.stores):
-        kept, where, what = names.kept[name], address(name, f"store{k}"), own(value)
-        if kept.mask is not None:
-            lines.append(f"  {stem}.store{k} = sext {kept.mask} {what} to {kept.kind}")
+        layout, where, what = names.layouts[name], address(name, f"store{k}"), own(value)
+        if layout.mask is not None:
+            lines.append(f"  {stem}.store{k} = sext {layout.mask} {what} to {layout.kind}")
             what = f"{stem}.store{k}"
-        lines.append(f"  store {kept.kind} {what}, {where}")
+        lines.append(f"  store {layout.kind} {what}, {where}")
     return [
         *lines,
         f"  {stem}.next = add i64 {count}, 1",

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from smajax.engine.phases import NAMES, Chosen, Edge, Item, Kept, Late, Names, Work, Write
+from smajax.engine.phases import NAMES, Chosen, Edge, Item, Late, Layout, Names, Work, Write
 
-NAME = "members"  # of the translated function
+NAME = "runs"  # of the translated function
 
 # numpy's kinds of numbers -> LLVM's.
 TYPES = {
@@ -77,9 +77,9 @@ class Text:
     """The body of one function. Names are given in order, so the same program gives the same text."""
 
     def __init__(self, lanes: int, estimates: bool = False, vectors: int = 1, mask: str = "i1") -> None:
-        self.lanes = lanes  # members of a vector
+        self.lanes = lanes  # runs of a vector
         self.vectors = vectors  # of a group, at most
-        self.room = lanes * vectors  # members of a group
+        self.room = lanes * vectors  # runs of a group
         self.mask = mask  # a truth value in memory
         self.estimates = estimates  # 1/x by AVX-512's estimate, not by division
         self.either: dict[str, tuple[str, float, float]] = {}  # (mask, yes, no) of what is one of two constants
@@ -116,8 +116,8 @@ class Text:
             return level.known[right]
         name = level.known[right] = self.fresh()
         self.depth[name] = depth
-        if any(one in self.names.kept for one in names):
-            assert dtype is not None, f"of a kind that is not kept: {right}"
+        if any(one in self.names.layouts for one in names):
+            assert dtype is not None, f"of an unknown kind: {right}"
             self._differs(name, dtype)
             level.items.append(Work(name, [f"{name} = {right}"], self._reads(names)))
         else:
@@ -127,15 +127,15 @@ class Text:
     def _differs(self, name: str, dtype: str) -> None:
         kind = self.vector(dtype)
         if dtype != "bool":
-            self.names.kept[name] = Kept(kind, self.lanes * self.bytes(dtype))
+            self.names.layouts[name] = Layout(kind, self.lanes * self.bytes(dtype))
         elif self.mask == "i1":
-            self.names.kept[name] = Kept(kind, -(-self.lanes // 8))
+            self.names.layouts[name] = Layout(kind, -(-self.lanes // 8))
         else:
             whole = f"<{self.lanes} x {self.mask}>"
-            self.names.kept[name] = Kept(whole, self.lanes * int(self.mask[1:]) // 8, kind)
+            self.names.layouts[name] = Layout(whole, self.lanes * int(self.mask[1:]) // 8, kind)
 
     def _reads(self, names: Sequence[str]) -> tuple[str, ...]:
-        return tuple(dict.fromkeys(one for one in names if one in self.names.kept))
+        return tuple(dict.fromkeys(one for one in names if one in self.names.layouts))
 
     def work(self, lines: Sequence[str], dtype: str | None = None) -> str:
         """Lines that stay together, of one vector; the name of the last one's value, where it has one: `{}` in it."""
@@ -260,28 +260,28 @@ class Text:
 
     def address(self, base: str, index: str, dtype: str) -> str:
         """Where the number with the index (an i64) lies behind `base`. Truth values take a byte."""
-        kept = "i8" if dtype == "bool" else scalar_type(dtype)
-        return self.assign(f"getelementptr inbounds {kept}, ptr {base}, i64 {index}")
+        stored = "i8" if dtype == "bool" else scalar_type(dtype)
+        return self.assign(f"getelementptr inbounds {stored}, ptr {base}, i64 {index}")
 
     def load_lanes(self, address: str, dtype: str) -> Lane:
-        kept = "int8" if dtype == "bool" else dtype
+        stored = "int8" if dtype == "bool" else dtype
         where, raw = self.fresh("p"), self.fresh("r")
-        lines = [f"{where} = getelementptr inbounds {scalar_type(kept)}, ptr {address}, i64 %at"]
-        load = f"load {self.vector(kept)}, ptr {where}, align {self.bytes(dtype)}"
+        lines = [f"{where} = getelementptr inbounds {scalar_type(stored)}, ptr {address}, i64 %at"]
+        load = f"load {self.vector(stored)}, ptr {where}, align {self.bytes(dtype)}"
         if dtype == "bool":
-            lines += [f"{raw} = {load}", f"icmp ne {self.vector(kept)} {raw}, zeroinitializer"]
+            lines += [f"{raw} = {load}", f"icmp ne {self.vector(stored)} {raw}, zeroinitializer"]
         else:
             lines.append(load)
         return Lane(self.work(lines, dtype), dtype)
 
     def store_lanes(self, value: Lane, address: str) -> None:
-        kept = "int8" if value.dtype == "bool" else value.dtype
+        stored = "int8" if value.dtype == "bool" else value.dtype
         where, name, lines = self.fresh("p"), value.name, []
         if value.dtype == "bool":
             name = self.fresh("r")
-            lines = [f"{name} = zext {self.vector('bool')} {value.name} to {self.vector(kept)}"]
-        lines.append(f"{where} = getelementptr inbounds {scalar_type(kept)}, ptr {address}, i64 %at")
-        lines.append(f"store {self.vector(kept)} {name}, ptr {where}, align {self.bytes(value.dtype)}")
+            lines = [f"{name} = zext {self.vector('bool')} {value.name} to {self.vector(stored)}"]
+        lines.append(f"{where} = getelementptr inbounds {scalar_type(stored)}, ptr {address}, i64 %at")
+        lines.append(f"store {self.vector(stored)} {name}, ptr {where}, align {self.bytes(value.dtype)}")
         self.work(lines)
 
     def load_everywhere(self, address: str, dtype: str) -> Lane:
@@ -304,7 +304,7 @@ class Text:
 
 @dataclass(frozen=True)
 class Array:
-    """An argument or a result: shape of one member's, and numpy's kind of number."""
+    """An argument or a result: shape of one run's, and numpy's kind of number."""
 
     shape: tuple[int, ...]
     dtype: str

@@ -18,7 +18,7 @@ class Held(np.ndarray):
 
 @dataclass(frozen=True)
 class Stored:
-    """A large array in memory, row-major; each member's own (lanes side by side), or one for all."""
+    """A large array in memory, row-major; each run's own (lanes side by side), or one for all."""
 
     address: str  # of its first number
     shape: tuple[int, ...]

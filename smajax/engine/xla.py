@@ -60,7 +60,7 @@ def _single(function: Function, model: Any, own: dict[str, jax.Array]) -> Any:
     return function(model, own)
 
 
-def begun(
+def started(
     function: Function,
     model: Any,
     own: dict[str, np.ndarray],
@@ -97,7 +97,7 @@ def evaluated(function: Function, model: Any, own: dict[str, np.ndarray], alone:
     block = next((size for size in (8, 64) if count <= SMALL * size), BLOCK)
     device = jnp.zeros(()).device
     parts = [
-        begun(function, model, {name: one[first : first + block] for name, one in own.items()}, (device,), block)()
+        started(function, model, {name: one[first : first + block] for name, one in own.items()}, (device,), block)()
         for first in range(0, count, block)
     ]
     return jax.tree.map(lambda *leaves: np.concatenate(leaves), *parts)

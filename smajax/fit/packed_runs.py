@@ -17,7 +17,7 @@ from smajax.data.experiment.record import RUN_STARTS, Run
 from smajax.model.system import System, initial_state
 from smajax.model.types import Scalar, State, Trajectory
 from smajax.simulation.compiled import simulate_compiled
-from smajax.simulation.sensors import shown_by
+from smajax.simulation.sensors import sensor_output
 from smajax.simulation.simulate import simulate
 
 
@@ -110,7 +110,7 @@ def predict_run(
     """Predicted sensor outputs of one run, with its `values` of `names`."""
     here, initial = _started(system, names, values, inputs)
     run = simulate(here, inputs, dt, initial)
-    return jnp.stack([shown_by(here, run, name) for name in outputs])
+    return jnp.stack([sensor_output(here, run, name) for name in outputs])
 
 
 def simulate_batch(system: System, batch: RunBatch) -> Trajectory:

@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from smajax.control.figures_of_merit import MERIT_UNITS, STEADY, Rest
+from smajax.control.figures_of_merit import MERIT_UNITS, STEADY_SHARE, SetPointMerit
 from smajax.control.mismatch import in_words
 from smajax.control.run_request import RunResult
 from smajax.core.display_units import axis_label, digits, display, label
@@ -89,7 +89,7 @@ def _merit(figures: Mapping[str, float]) -> dict[str, Any]:
     return {name: {"value": value, "unit": MERIT_UNITS[name]} for name, value in figures.items()}
 
 
-def _figures(one: Rest) -> dict[str, float]:
+def _figures(one: SetPointMerit) -> dict[str, float]:
     return {name: float(value) for name, value in vars(one.merit).items()}
 
 
@@ -161,7 +161,7 @@ def summary_rows(data: xr.Dataset) -> list[list[str]]:
 
 def merit_rows(result: RunResult) -> list[list[str]]:
     """A row a figure of merit; the steady ones with the time over which they are means, since a short run may still be moving."""
-    steady = f" (last {STEADY:.0%} of the run)"
+    steady = f" (last {STEADY_SHARE:.0%} of the run)"
     return [
         [
             label(name) + steady * name.startswith("steady"),

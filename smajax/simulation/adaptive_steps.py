@@ -1,4 +1,4 @@
-"""As many steps as the error asks for: a time with held inputs -> the state at its end.
+"""Error-controlled steps: a time with held inputs -> the state at its end.
 
 The scheme of order 3 says what a step may be off by; steps that are off by too much are taken again, shorter. A wire that
 heats up alone goes through a tenth of a second at once, and one that has just caught its load takes milliseconds. Not for
@@ -20,7 +20,7 @@ from smajax.simulation.step import step_and_error
 
 SAFETY = 0.9
 SHRINK, GROW = 0.2, 4.0  # of one step to the next
-SHORTEST = 1e-3  # share of the time asked for, at which a step is taken whatever its error: an impact is not resolved
+SHORTEST = 1e-3  # share of the whole time, at which a step is taken whatever its error: an impact is not resolved
 VELOCITY_TIME = 0.01  # s: an error of velocity counts as what it has moved the load by in this time
 
 
@@ -32,7 +32,7 @@ class _At(NamedTuple):
 
 
 def _relative(system: System, error: tuple[Scalar, Scalar, Scalar], tolerance: Scalar) -> Scalar:
-    """The error over what is tolerated: shares of 1 C and of 1 % strain. No number counts as far too much."""
+    """The error over what is tolerated: shares of 1 C and of 1 % strain. NaN counts as infinite."""
     load = system.load
     assert isinstance(load, AbstractMovingLoad)
     temperature, position, velocity = error
@@ -56,21 +56,21 @@ def advance(
     def body(at: _At) -> _At:
         last = at.tried >= at.left * (1.0 - 1e-6)
         # Two equal ones in the place of a long and a short one.
-        own = jnp.where(last, at.left, jnp.minimum(at.tried, 0.5 * at.left))
-        new, error = step_and_error(system, at.state, inputs, own)
+        length = jnp.where(last, at.left, jnp.minimum(at.tried, 0.5 * at.left))
+        new, error = step_and_error(system, at.state, inputs, length)
         worst = _relative(system, error, tolerance)
-        # What is no number any more is let go on to the end at once: no step mends it.
+        # A state that is not finite goes to the end at once: no shorter step mends it.
         lost = ~jnp.isfinite(at.state.wire.temperature + at.state.motion.position + at.state.wire.stress)
-        own = jnp.where(lost, at.left, own)
+        length = jnp.where(lost, at.left, length)
         last = last | lost
-        good = (worst <= 1.0) | (own <= shortest) | lost
+        good = (worst <= 1.0) | (length <= shortest) | lost
         # The power 1/4 in the place of 1/3: two square roots are vector instructions, a power is a call a number.
         factor = jnp.clip(SAFETY / jnp.sqrt(jnp.sqrt(jnp.maximum(worst, 1e-6))), SHRINK, GROW)
-        asked = jnp.maximum(own * factor, shortest)
+        proposed = jnp.maximum(length * factor, shortest)
         # A step cut short by the end of the time says nothing against a longer one.
-        following = jnp.where(good & (own < at.tried), jnp.maximum(at.tried, asked), asked)
+        following = jnp.where(good & (length < at.tried), jnp.maximum(at.tried, proposed), proposed)
         state = jax.tree.map(lambda one, other: jnp.where(good, one, other), new, at.state)
-        left = jnp.where(good, jnp.where(last, 0.0, at.left - own), at.left)
+        left = jnp.where(good, jnp.where(last, 0.0, at.left - length), at.left)
         return _At(state, left, following, at.taken + 1)
 
     first = _At(state, dt, jnp.minimum(tried, dt), jnp.zeros_like(dt, int))

@@ -9,14 +9,12 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax import lax
 
 from smajax.core.parameters import check_bounds
 from smajax.engine import Engine, program
 from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.system import System
 from smajax.model.types import Scalar, Series, State, Trajectory
-from smajax.simulation.adaptive_steps import advance
 from smajax.simulation.input_delay import acting_inputs
 from smajax.simulation.simulate import (
     DEFAULT_STEP,
@@ -25,11 +23,12 @@ from smajax.simulation.simulate import (
     check_scalars,
     first_state,
     simulate,
-    trajectory,
+    trajectory_of,
 )
+from smajax.simulation.steppers import stepper_of
 
 
-class _Asked(eqx.Module):
+class _Request(eqx.Module):
     system: System
     inputs: dict[str, Series]
     dt: Scalar
@@ -37,21 +36,10 @@ class _Asked(eqx.Module):
     initial: State | None
 
 
-def _run(asked: _Asked, _: dict[str, Scalar]) -> Trajectory:
-    system, inputs, dt, tolerance = asked.system, asked.inputs, asked.dt, asked.tolerance
-    if tolerance is None:
-        return simulate(system, inputs, dt, asked.initial)
-    inputs = acting_inputs(system, inputs, dt)
-    state = first_state(system, inputs, asked.initial)
-
-    def one(carry: Any, now: dict[str, Scalar]) -> tuple[Any, State]:
-        state, tried = carry
-        state, tried, _ = advance(system, state, now, dt, tried, tolerance)
-        return (state, tried), state
-
-    begin: Any = (state, dt)
-    _, states = lax.scan(one, begin, {name: values[:-1] for name, values in inputs.items()})
-    return trajectory(state, states)
+def _run(request: _Request, _: dict[str, Scalar]) -> Trajectory:
+    series = acting_inputs(request.system, request.inputs, request.dt)
+    stepper = stepper_of(request.system, request.dt, request.tolerance)
+    return trajectory_of(stepper, series, first_state(request.system, series, request.initial))
 
 
 def simulate_compiled(
@@ -87,11 +75,10 @@ def simulate_compiled(
     if len(next(iter(series.values()))) == 1:  # the start alone: there is nothing to compile
         return jax.tree.map(np.asarray, simulate(system, series, dt, initial))
     limit = None if tolerance is None else jnp.asarray(tolerance, dtype=float)
-    asked = _Asked(system, series, jnp.asarray(dt, dtype=float), limit, initial)
-    return alone(_run, asked, engine)
+    return run_alone(_run, _Request(system, series, jnp.asarray(dt, dtype=float), limit, initial), engine)
 
 
-def alone(function: Callable[..., Any], asked: eqx.Module, engine: Engine) -> Any:
-    """What `function(asked, _)` gives of one run, arrays of numpy."""
-    run = program(function, asked, ("number",), alone=True, engine=engine)
-    return jax.tree.map(lambda leaf: leaf[0], run(asked, {"number": np.zeros(1)}, threads=1))
+def run_alone(function: Callable[..., Any], model: eqx.Module, engine: Engine) -> Any:
+    """What `function(model, _)` gives of one run, arrays of numpy."""
+    run = program(function, model, ("number",), alone=True, engine=engine)
+    return jax.tree.map(lambda leaf: leaf[0], run(model, {"number": np.zeros(1)}, threads=1))

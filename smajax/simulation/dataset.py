@@ -18,7 +18,7 @@ from smajax.model.types import Series, State, Trajectory
 from smajax.model.wire.order import check_order
 from smajax.simulation.compiled import simulate_compiled
 from smajax.simulation.measures import SHOWN
-from smajax.simulation.sensors import SENSORS, shown_by
+from smajax.simulation.sensors import SENSORS, sensor_output
 from smajax.simulation.simulate import DEFAULT_STEP, check_kinds
 
 LABELS = {"martensite_fraction": "martensite fraction", "reading": "reading of the load's sensor"}
@@ -36,18 +36,18 @@ def labelled_run(
 ) -> xr.Dataset:
     """A trajectory as a data set over `time` (s), every variable with `units` (SI, degC, rad) and `long_name`.
 
-    inputs: series of shape (n,) that are kept beside it. settings: attributes, such as `dt`. Force on the wire (N) and its
-    resistance (ohm) are worked out from the states.
+    inputs: series of shape (n,) that are stored beside it. settings: attributes, such as `dt`. Force on the wire (N) and its
+    resistance (ohm) are computed from the states.
     """
     units = _units(system)
     names = [name for name in units if hasattr(run, name)]
     columns = {name: np.asarray(getattr(run, name)) for name in names}
-    columns |= {name: np.asarray(shown_by(system, run, name)) for name in ("force", "resistance")}
-    given = {name: np.asarray(values) for name, values in (inputs or {}).items() if name not in columns}
-    units |= {name: INPUT_UNITS.get(name, "N m" if name == "load_torque" else "") for name in given}
+    columns |= {name: np.asarray(sensor_output(system, run, name)) for name in ("force", "resistance")}
+    columns_in = {name: np.asarray(values) for name, values in (inputs or {}).items() if name not in columns}
+    units |= {name: INPUT_UNITS.get(name, "N m" if name == "load_torque" else "") for name in columns_in}
     data = {
         name: ("time", values, {"units": units[name], "long_name": LABELS.get(name, name.replace("_", " "))})
-        for name, values in {**given, **columns}.items()
+        for name, values in {**columns_in, **columns}.items()
     }
     time = ("time", np.asarray(run.time), {"units": "s", "long_name": "time"})
     return xr.Dataset(data, {"time": time}, provenance(system, **settings))

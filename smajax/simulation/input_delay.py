@@ -46,6 +46,6 @@ def acting_inputs(system: System, series: Mapping[str, Series], dt: Scalar | flo
             (1.0 - share) * at(acting[name], newer) + share * at(acting[name], newer - 1) for name in channels
         ]
 
-    # One sample after the other: what each member looks up in a place of its own is one number at a time.
+    # One sample after the other: each run looks up one number at a time, at an index of its own.
     _, moved = lax.scan(shifted, None, jnp.arange(last + 1))
     return acting | dict(zip(channels, moved, strict=True))

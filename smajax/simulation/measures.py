@@ -1,4 +1,4 @@
-"""Numbers that are kept up while a run is simulated, so that a sweep that asks for them only stores no trajectory."""
+"""Measures: numbers that are updated while a run is simulated, so that a sweep of them stores no trajectory."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ class Largest(Last):
         return f"largest_{self.of}"
 
     def update(self, memory: Scalar, state: State, inputs: Inputs, dt: Scalar) -> Scalar:
-        # Not `maximum` with the memory first or last: a value that is no number must stay one.
+        # Not `maximum` with the memory first or last: a NaN must stay one.
         now = value_of(state, self.of)
         return jnp.where(memory > now, memory, now)
 
@@ -141,7 +141,7 @@ class Mean(AbstractMeasure):
 class MeanSquare(AbstractMeasure):
     """The mean square of the distance from a series, in units of `scale`: a cost of tracking, or of a fit, to differentiate.
 
-    of: what a state shows. wanted: its values, SI, from the start to the end of the last step, (steps + 1,), the same for all members of a
+    of: what a state shows. wanted: its values, SI, from the start to the end of the last step, (steps + 1,), the same for all runs of a
     batch; or a number. The first is not compared: nothing has happened by then.
     """
 
@@ -161,7 +161,7 @@ class MeanSquare(AbstractMeasure):
         if self.wanted.shape not in ((), (steps + 1,)):
             raise ValueError(
                 f"`wanted` of {self.name} has the shape {self.wanted.shape}: a run of {steps} steps takes {steps + 1} values, from its "
-                "start to its end, or one number. Members with a series each are batches of their own."
+                "start to its end, or one number. Runs with a series each are batches of their own."
             )
 
     def start(self, state: State, inputs: Inputs) -> tuple[Scalar, Scalar]:

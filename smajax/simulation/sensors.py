@@ -28,7 +28,7 @@ def sensors_of(system: System) -> dict[str, str]:
     return {name: unit, "resistance": SENSORS["resistance"]}
 
 
-def shown_by(system: System, run: Trajectory, name: str) -> Series:
+def sensor_output(system: System, run: Trajectory, name: str) -> Series:
     """What the sensor `name` shows of `run`, shape (n,): force A_w sigma, resistance R(xi) l_0 (eq. 3.15).
 
     The load's own sensor may be called by its name or `reading`.

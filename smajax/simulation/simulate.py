@@ -1,4 +1,4 @@
-"""The only scan: a system and its input series -> a trajectory. `jit`, `vmap` and `grad` stay outside."""
+"""A system and its input series -> a trajectory. `jit`, `vmap` and `grad` stay outside."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax import lax
 
 from smajax.core.names import listed
 from smajax.core.parameters import check_bounds, parameters
@@ -16,7 +15,9 @@ from smajax.model.load.coupon import AbstractCoupon
 from smajax.model.system import System, initial_state
 from smajax.model.types import Scalar, Series, State, Trajectory
 from smajax.simulation.input_delay import acting_inputs
-from smajax.simulation.step import step
+from smajax.simulation.integrate import Schedule, integrate
+from smajax.simulation.observers import StateTrace
+from smajax.simulation.steppers import FixedStep, Stepper
 
 # Keeps the arm within 0.05 degrees and the fraction within 1e-3 of the exact solution on the source's rigs, open and
 # closed loop (studies/convergence.py shows error against step).
@@ -24,7 +25,7 @@ DEFAULT_STEP = 0.005  # s
 
 
 def check_kinds(system: Any, inputs: Any) -> None:
-    """TypeError where these are something else altogether."""
+    """TypeError where these are of another kind."""
     if not isinstance(system, System):
         raise TypeError(
             f"a run is of a `System`, as `compose` makes it, not of {type(system).__name__}; a `Loop` goes to `simulate_loop_dataset`."
@@ -60,7 +61,7 @@ def check_inputs(system: System, inputs: Mapping[str, Series]) -> int:
 
 
 def check_finite(what: str, series: Any) -> None:
-    """ValueError where a series that is known holds something else than finite numbers."""
+    """ValueError where a series holds anything but finite numbers, where it is known."""
     if isinstance(series, jax.core.Tracer):
         return
     known = np.asarray(series)
@@ -73,7 +74,7 @@ def check_finite(what: str, series: Any) -> None:
 
 
 def check_step(dt: Any) -> None:
-    """ValueError for a step that is none, where it is known."""
+    """ValueError for a step that is not positive and finite, where it is known."""
     if isinstance(dt, str):
         raise ValueError(f"`dt` is a number of seconds, not {dt!r}.")
     if not isinstance(dt, jax.core.Tracer) and jnp.shape(dt) == () and not 0.0 < float(dt) < float("inf"):
@@ -81,7 +82,7 @@ def check_step(dt: Any) -> None:
 
 
 def check_scalars(system: System, dt: Scalar | float, initial: State | None = None) -> None:
-    """ValueError that names the number which is a batch, with its shape; and a step that is none."""
+    """ValueError that names the number which is a batch, with its shape; and for a wrong step."""
     check_step(dt)
     leaves = {f"`{name}`": leaf for name, leaf in _parameter_leaves(system).items()}
     leaves |= {
@@ -90,9 +91,9 @@ def check_scalars(system: System, dt: Scalar | float, initial: State | None = No
     leaves["`dt`"] = dt
     wrong = {name: jnp.shape(leaf) for name, leaf in leaves.items() if jnp.shape(leaf) != ()}
     if wrong:
-        told = "; ".join(f"{name} has the axes {shape}" for name, shape in wrong.items())
+        message = "; ".join(f"{name} has the axes {shape}" for name, shape in wrong.items())
         raise ValueError(
-            f"one run takes one number of each, and {told}. Map over the batch: `jax.vmap(run)(values)` with a `run` that puts "
+            f"one run takes one number of each, and {message}. Map over the batch: `jax.vmap(run)(values)` with a `run` that puts "
             "one value in (`set_parameters`), or name what varies in `run_batch`."
         )
 
@@ -138,24 +139,29 @@ def simulate(
     check_scalars(system, dt, initial)
     check_bounds(system)
     series = acting_inputs(system, {name: jnp.asarray(values, dtype=float) for name, values in inputs.items()}, dt)
-    state = first_state(system, series, initial)
+    return trajectory_of(FixedStep(system, dt), series, first_state(system, series, initial))
+
+
+def held_inputs(system: System, series: Mapping[str, Series]) -> dict[str, Series]:
+    """What is held during each step, (n - 1,), of series of n samples: the values at its start; a coupon's at its end."""
+    ahead = isinstance(system.load, AbstractCoupon)
+    return {name: values[1:] if ahead else values[:-1] for name, values in series.items()}
+
+
+def trajectory_of(stepper: Stepper, series: Mapping[str, Series], state: State) -> Trajectory:
+    """The run from `state` under series of n samples that act on the system (`acting_inputs`)."""
+    system = stepper.system
     # Every number of the state then has a derivative where the model has one: a scan some of whose numbers gain theirs
     # on the way is traced anew for each, and so is all within it.
     state = jax.tree.map(lambda leaf: leaf + 0.0 * system.start_fraction, state)
-    ahead = isinstance(system.load, AbstractCoupon)
-    held = {name: values[1:] if ahead else values[:-1] for name, values in series.items()}
-
-    def body(state: State, now: dict[str, Scalar]) -> tuple[State, State]:
-        new = step(system, state, now, dt)
-        return new, new
-
-    _, states = lax.scan(body, state, held)
-    return trajectory(state, states)
+    held = held_inputs(system, series)
+    steps = len(next(iter(held.values())))
+    run = integrate(stepper, stepper.start(state), held, Schedule(steps), (StateTrace(),))
+    return trajectory(run.results[0])
 
 
-def trajectory(first: State, rest: State) -> Trajectory:
-    """The state at t_0 and the stacked states after it, by name."""
-    states = jax.tree.map(lambda one, more: jnp.concatenate([one[None], more]), first, rest)
+def trajectory(states: State) -> Trajectory:
+    """Stacked states, leaves of shape (n,), by name."""
     w, m = states.wire, states.motion
     return Trajectory(
         time=states.time,

@@ -70,8 +70,8 @@ def _free_position(system: System, stage: Stage, inputs: Inputs, z: Unknowns) ->
     return z.position - (inertia * acceleration + resisting - pull) * stage.step**2 / inertia
 
 
-class Missed(NamedTuple):
-    """By how much three equations of a stage are missed, each in the unit of the unknown that it is solved for.
+class Residuals(NamedTuple):
+    """Residuals of three equations of a stage, each in the unit of the unknown that it is solved for.
 
     The fourth equation, of the kinetics, depends on the branch.
     """
@@ -82,7 +82,7 @@ class Missed(NamedTuple):
     free: Scalar  # not an equation: where the load would be without end stops
 
 
-def equations(system: System, stage: Stage, inputs: Inputs, z: Unknowns) -> Missed:
+def equations(system: System, stage: Stage, inputs: Inputs, z: Unknowns) -> Residuals:
     """Heat, motion and stress of a stage, zero at the solution."""
     wire, terms, load, old = system.wire, system.terms, system.load, stage.old.wire
     assert isinstance(load, AbstractMovingLoad)
@@ -97,5 +97,5 @@ def equations(system: System, stage: Stage, inputs: Inputs, z: Unknowns) -> Miss
     motion = z.position - jnp.where(free < lower, lower, jnp.where(free > upper, upper, free))
 
     strain = -load.contraction(wire) * (z.position - load.start())
-    asked = stress_at(wire, terms.constitutive, old, strain, z.temperature, z.stress, z.fraction)
-    return Missed(heat, motion, z.stress - asked, free)
+    expected = stress_at(wire, terms.constitutive, old, strain, z.temperature, z.stress, z.fraction)
+    return Residuals(heat, motion, z.stress - expected, free)

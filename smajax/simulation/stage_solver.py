@@ -9,9 +9,9 @@ is one equation of one unknown. It rises with xi (more martensite: warmer by lat
 it), so its root lies between the present fraction and the end of the branch. The cosine is all that bends much in a
 stage, and it is solved without a new linearisation.
 
-Two linearisations are nearly always enough (`studies/benchmarks` says how often), and cost the same for every member of a
+Two linearisations are nearly always enough (`studies/benchmarks` says how often), and cost the same for every run of a
 batch. Where the second still moved the solution by `Stage.enough`, more follow, with the inner equation solved to the end in
-its bracket: a member that needs them makes its batch wait, and changes nothing for the others.
+its bracket: a run that needs them makes its batch wait, and changes nothing for the others.
 """
 
 from __future__ import annotations
@@ -112,7 +112,7 @@ def solved_linear(rows: Sequence[Sequence[Entry]], *rights: Sequence[Entry]) -> 
 def _linearised(system: System, stage: Stage, inputs: Inputs, z: Unknowns) -> tuple[list[Scalar], list[list[Entry]]]:
     """(what `equations` says, its derivatives by the four unknowns)."""
     columns = []
-    missed: list[Scalar] = []
+    residuals: list[Scalar] = []
     for field in Unknowns._fields:
         # One unknown at a time: what does not depend on it is then known to have no derivative and is never computed,
         # which a batched `jacfwd` cannot know.
@@ -120,9 +120,9 @@ def _linearised(system: System, stage: Stage, inputs: Inputs, z: Unknowns) -> tu
             return list(equations(system, stage, inputs, z._replace(**{field: value})))
 
         here = getattr(z, field)
-        missed, column = eqx.filter_jvp(along, (here,), (jnp.ones_like(here),))
+        residuals, column = eqx.filter_jvp(along, (here,), (jnp.ones_like(here),))
         columns.append(column)
-    return missed, [list(row) for row in zip(*columns, strict=True)]
+    return residuals, [list(row) for row in zip(*columns, strict=True)]
 
 
 def _moves(system: System, change: Sequence[Scalar], tolerance: float) -> Bool[Array, ""]:
@@ -132,7 +132,7 @@ def _moves(system: System, change: Sequence[Scalar], tolerance: float) -> Bool[A
     phases = (jnp.full_like(change[0], phase) for phase in (0.0, 1.0))
     softer = jnp.minimum(*(young_modulus(system.wire, phase, system.terms.constitutive) for phase in phases))
     scales: list[Scalar | float] = [1.0, 0.01 / load.contraction(system.wire), 1e-4 * softer, 1.0]
-    # What is no number does not move: it stays none, and must not keep the others.
+    # NaN counts as not moving: it stays NaN, and must not hold up the others.
     return reduce(operator.or_, [jnp.abs(one) > tolerance * scale for one, scale in zip(change, scales, strict=True)])
 
 
@@ -160,9 +160,9 @@ def solve(system: System, stage: Stage, inputs: Inputs) -> Solution:
     def iterate(at: _Iterate, number: int | None) -> _Iterate:
         """One linearisation more; `number` of the first two, None for later ones."""
         z = at.z
-        (*missed, free), (*rows, free_row) = _linearised(system, stage, inputs, z)
+        (*residuals, free), (*rows, free_row) = _linearised(system, stage, inputs, z)
         by_fraction = [None if row[3] is None else -row[3] for row in rows]
-        base, slope = solved_linear([row[:3] for row in rows], [-value for value in missed], by_fraction)
+        base, slope = solved_linear([row[:3] for row in rows], [-value for value in residuals], by_fraction)
 
         def along(fraction: Scalar) -> tuple[Scalar, Scalar]:
             """(T, sigma) that go with a fraction."""
@@ -170,17 +170,17 @@ def solve(system: System, stage: Stage, inputs: Inputs) -> Solution:
             return z.temperature + base[0] + slope[0] * moved, z.stress + base[2] + slope[2] * moved
 
         tried = along(xi)
-        asked = choose_branch(law, terms, old, open_at_start, *tried)
+        branch = choose_branch(law, terms, old, open_at_start, *tried)
 
         def miss(fraction: Scalar) -> Scalar:
-            return fraction - curve_on(law, terms, old, asked, *along(fraction))
+            return fraction - curve_on(law, terms, old, branch, *along(fraction))
 
-        low, high = jnp.where(asked.heating, 0.0, xi), jnp.where(asked.cooling, 1.0, xi)
+        low, high = jnp.where(branch.heating, 0.0, xi), jnp.where(branch.cooling, 1.0, xi)
         start = z.fraction
         if number == 0:
             # Where the driving temperature is the one before: on a fast way that holds far better than the fraction.
             drive = jax.tree.map(
-                lambda heated, cooled: jnp.where(asked.cooling, cooled, heated),
+                lambda heated, cooled: jnp.where(branch.cooling, cooled, heated),
                 *(
                     [of(law, *at) for at in ((old.temperature, old.stress), tried, (slope[0], slope[2]))]
                     for of in DRIVING
@@ -207,9 +207,9 @@ def solve(system: System, stage: Stage, inputs: Inputs) -> Solution:
             step[1] = new.position - z.position
         free = free + sum(entry * change for entry, change in zip(free_row, step, strict=True) if entry is not None)
         if number == 0:  # it solves the inner equation roughly only
-            return _Iterate(new, asked, free, no, at.iterations + 1)
-        same = (asked.heating == at.branch.heating) & (asked.cooling == at.branch.cooling)
-        return _Iterate(new, asked, free, ~_moves(system, step, tolerance) & same, at.iterations + 1)
+            return _Iterate(new, branch, free, no, at.iterations + 1)
+        same = (branch.heating == at.branch.heating) & (branch.cooling == at.branch.cooling)
+        return _Iterate(new, branch, free, ~_moves(system, step, tolerance) & same, at.iterations + 1)
 
     no = jnp.zeros_like(xi, bool)
     guess = Unknowns(old.temperature, stage.old.motion.position, old.stress, xi)

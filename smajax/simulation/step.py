@@ -100,7 +100,7 @@ def _solved_jvp(primals, tangents):  # type: ignore[no-untyped-def]  # the signa
 def _differentiable(given: tuple[System, Stage, Inputs]) -> Solution:
     """The same, and one linear correction: its derivatives, the second too, are then those of the equations' root.
 
-    Only where a derivative is asked for: what the solver leaves is of the size of its tolerance squared, and moves a derivative
+    Only where a derivative is taken: what the solver leaves is of the size of its tolerance squared, and moves a derivative
     by some 1e-8 of itself. Where JAX computes what is known beforehand it follows no rule but goes through the correction: without one,
     forward over reverse mode takes the root for a constant. Derivatives of the first order alone do without.
     """
@@ -109,18 +109,18 @@ def _differentiable(given: tuple[System, Stage, Inputs]) -> Solution:
     found = solved(solve(_held(system), _held(stage), _held(dict(inputs))))
 
     def all_four(z: Unknowns) -> Unknowns:
-        missed = equations(system, stage, inputs, z)
-        asked = curve_on(wire.kinetics, terms, old, found.branch, z.temperature, z.stress)
-        return Unknowns(missed.heat, missed.motion, missed.stress, z.fraction - asked)
+        residuals = equations(system, stage, inputs, z)
+        on_curve = curve_on(wire.kinetics, terms, old, found.branch, z.temperature, z.stress)
+        return Unknowns(residuals.heat, residuals.motion, residuals.stress, z.fraction - on_curve)
 
-    def linear(g: Callable[[Unknowns], Unknowns], asked: Unknowns) -> Unknowns:
-        one, zero = jnp.ones_like(asked.fraction), jnp.zeros_like(asked.fraction)
+    def linear(g: Callable[[Unknowns], Unknowns], right: Unknowns) -> Unknowns:
+        one, zero = jnp.ones_like(right.fraction), jnp.zeros_like(right.fraction)
         columns = [g(Unknowns(*(one if k == at else zero for k in range(4)))) for at in range(4)]
-        return Unknowns(*solved_linear(list(zip(*columns, strict=True)), list(asked))[0])
+        return Unknowns(*solved_linear(list(zip(*columns, strict=True)), list(right))[0])
 
     def corrected(f: Callable[[Unknowns], Unknowns], rough: Unknowns) -> Unknowns:
-        missed, along = jax.linearize(f, rough)
-        change = linear(along, missed)
+        residuals, along = jax.linearize(f, rough)
+        change = linear(along, residuals)
         return Unknowns(*(value - step for value, step in zip(rough, change, strict=True)))
 
     def as_found(f: Callable[[Unknowns], Unknowns], rough: Unknowns) -> Unknowns:

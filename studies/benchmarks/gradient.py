@@ -26,8 +26,8 @@ from smajax.engine import program
 from smajax.model.rigs import arm
 from smajax.model.system import System
 from smajax.simulation.batch.axes import grid
-from smajax.simulation.batch.run_batch import recipe_of
-from smajax.simulation.batch.single_run import Recipe, member, slope_name
+from smajax.simulation.batch.recipe import BatchSettings, recipe_of
+from smajax.simulation.batch.single_run import Recipe, single_run, slope_name
 from smajax.simulation.measures import MeanSquare
 from smajax.simulation.simulate import DEFAULT_STEP
 from studies.benchmarks import tracking
@@ -43,7 +43,7 @@ def _recipe(system: System, steps: int, slopes: tuple[str, ...] = ()) -> Recipe:
     wanted = jnp.linspace(float(system.load.start()), tracking.ENDS_AT, steps + 1)
     measures = (MeanSquare("position", wanted, tracking.SCALE),)
     axes = grid(voltage=[8.0])
-    return recipe_of(system, {}, axes, seconds=steps * dt, dt=dt, keep=(), measures=measures, slopes=slopes)
+    return recipe_of(system, {}, axes, BatchSettings(steps * dt, dt, keep=(), measures=measures, slopes=slopes))
 
 
 def cost_of(system: System, names: tuple[str, ...], steps: int) -> Callable[[jax.Array, jax.Array], jax.Array]:
@@ -52,7 +52,7 @@ def cost_of(system: System, names: tuple[str, ...], steps: int) -> Callable[[jax
 
     def cost(vector: jax.Array, volts: jax.Array) -> jax.Array:
         changed = eqx.tree_at(lambda one: one.system, recipe, set_vector(system, names, vector))
-        return member(changed, {"voltage": volts})["mean_square_position"]
+        return single_run(changed, {"voltage": volts})["mean_square_position"]
 
     return cost
 
@@ -65,7 +65,7 @@ def _by_machine_code(
     for name, by in (("cost", ()), ("gradient", names)):
         recipe = _recipe(system, steps, by)
         begin = time.perf_counter()
-        run = program(member, recipe, ("voltage",), engine="native")
+        run = program(single_run, recipe, ("voltage",), engine="native")
         told[f"{name}_compile_s"] = time.perf_counter() - begin
         assert run.native is not None  # or there would have been an error
         times = []
@@ -84,7 +84,7 @@ def _by_xla(
     told: dict[str, float] = {}
     for name, by in (("cost", ()), ("gradient", names)):
         recipe = _recipe(system, steps, by)
-        run = jax.jit(jax.vmap(lambda own, recipe=recipe: member(recipe, {"voltage": own})))
+        run = jax.jit(jax.vmap(lambda own, recipe=recipe: single_run(recipe, {"voltage": own})))
         told |= timed(run, repeats, jnp.asarray(volts)).named(name)
     told["gradient_over_cost"] = told["gradient_s"] / told["cost_s"]
     if forward:

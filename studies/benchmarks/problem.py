@@ -50,7 +50,7 @@ def axes(count: int) -> Axes:
 
 def members(count: int) -> dict[str, np.ndarray]:
     """The same in numpy, each of shape (count,); fewer are the first of more."""
-    return axes(count).members(0, count)
+    return axes(count).runs(0, count)
 
 
 def _reference(p: dict[str, float], payload_mass: float) -> ArmParameters:

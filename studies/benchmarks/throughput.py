@@ -32,7 +32,7 @@ REPEATS = 3
 
 
 def _errors(given: Given, dt: float, tolerance: float | None) -> tuple[float, float]:
-    axes = zipped(problem.axes(len(given.voltage)).members(0, given.solved))
+    axes = zipped(problem.axes(len(given.voltage)).runs(0, given.solved))
     every = max(1, round(problem.EVERY / dt))
     keep = ("position", "martensite_fraction")
     found = run_batch(arm(), {}, axes, seconds=given.seconds, dt=dt, every=every, keep=keep, tolerance=tolerance)

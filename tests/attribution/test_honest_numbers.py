@@ -34,8 +34,8 @@ from smajax.model.wire.resistance import resistance_per_metre
 from smajax.report.narrative import narrate
 from smajax.simulation.batch.axes import zipped
 from smajax.simulation.batch.run_batch import run_batch
-from smajax.simulation.batch.single_run import COLDEST, GOOD, HOTTEST, NOT_FINITE, RUNAWAY
 from smajax.simulation.measures import Largest, Smallest
+from smajax.simulation.observers import COLDEST, GOOD, HOTTEST, NOT_FINITE, RUNAWAY
 from smajax.simulation.simulate import simulate
 
 RIGS = {

@@ -19,7 +19,7 @@ from smajax.data.experiment.magnitude import BY_HEAT
 from smajax.data.model_catalogue import CATALOGUE
 from smajax.model.presets import LOADS, build
 from smajax.simulation.compiled import simulate_compiled
-from smajax.simulation.sensors import sensors_of, shown_by
+from smajax.simulation.sensors import sensor_output, sensors_of
 from tests.helpers.small_bench import bench, log, refused, smajax, table
 
 PARAMETERS = "[model.parameters]\n{}\n[unknown]"
@@ -238,7 +238,7 @@ def test_heat_moves_outputs_as_the_check_of_signs_has_it(load: str) -> None:
     )
     run = simulate_compiled(system, {"voltage": jnp.repeat(jnp.asarray([0.0, 6.0]), 1000)})
     for name in BY_HEAT.keys() & sensors_of(system).keys():
-        shown = np.asarray(shown_by(system, run, name))
+        shown = np.asarray(sensor_output(system, run, name))
         assert BY_HEAT[name] * (shown[-1] - shown[900]) > 0.0, (load, name)
 
 

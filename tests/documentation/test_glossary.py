@@ -55,7 +55,7 @@ GIVEN_UP = {
     "valleys": "local_minima",
 }
 # Names that are still to be renamed. Take a name off the list with its rename.
-ALLOWED = {"told_of"}
+ALLOWED: set[str] = set()
 # Plain English in names. A word that is neither here nor in the glossary is a new term: explain it there, or choose another.
 PLAIN = set(
     [
@@ -180,6 +180,7 @@ PLAIN = set(
         "start",
         "state",
         "statistic",
+        "status",
         "step",
         "summary",
         "sweep",

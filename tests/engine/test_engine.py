@@ -109,7 +109,14 @@ def _wide() -> bool:
     return has_wide_vectors()
 
 
-@pytest.mark.parametrize("function", [jnp.exp, jnp.log, jnp.sqrt, jnp.tanh, jnp.sin], ids=lambda one: one.__name__)
+FUNCTIONS: dict[str, Function] = {
+    **{one.__name__: one for one in (jnp.exp, jnp.log, jnp.sqrt, jnp.tanh, jnp.sin)},
+    "slope of arccos": lambda x: jax.grad(jnp.arccos)(0.33 * x),
+    "slope of tanh": lambda x: jax.grad(jnp.tanh)(0.3 * x),
+}
+
+
+@pytest.mark.parametrize("function", FUNCTIONS.values(), ids=FUNCTIONS)
 def test_functions_agree(function):
     x = np.linspace(0.01, 3.0, 16)
     np.testing.assert_allclose(by_machine_code(function, x), by_xla(function, x), rtol=1e-14)
@@ -348,7 +355,7 @@ def test_a_batch_of_arms_is_that_of_xla():
 
 def test_a_member_is_the_same_to_the_bit_whatever_runs_beside_it():
     axes = sampled(50, voltage=(5.5, 8.5), payload_mass=(0.05, 0.09), seed=2)
-    box = axes.members(0, 50)
+    box = axes.runs(0, 50)
 
     def run(first: int, last: int, threads: int) -> np.ndarray:
         part = zipped({name: series[first:last] for name, series in box.items()})

@@ -170,6 +170,45 @@ def test_a_reason_is_said_once(monkeypatch: pytest.MonkeyPatch) -> None:
     assert sum("expected type" in str(one.message) for one in told) == 1
 
 
+def _sum(model: Any, own: dict[str, Any]) -> Any:
+    return model + own["a"]
+
+
+@pytest.mark.usefixtures("forgetful")
+@pytest.mark.parametrize("beside", [False, True])
+def test_what_fails_while_machine_code_runs_is_done_by_xla(beside: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In a call and beside the caller, with one warning; asked for by name, it is the error."""
+    values = np.arange(3.0)
+
+    def run(engine: Any) -> Any:
+        made = compiled_program(_sum, jnp.asarray(1.0), ("a",), engine=engine)
+        if not beside:
+            return made(jnp.asarray(1.0), {"a": values})
+        devices = tuple(jax.local_devices())
+        return made.begin(jnp.asarray(1.0), {"a": values}, 1, devices, 8, 8)()
+
+    monkeypatch.setattr(native.NativeProgram, "__call__", _fails("out of room"))
+    with pytest.warns(EngineWarning, match="failed while it ran, so XLA runs it.*RuntimeError: out of room") as told:
+        np.testing.assert_allclose(run("auto"), values + 1.0)
+    assert len(told) == 1
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        np.testing.assert_allclose(run("auto"), values + 1.0)
+    with pytest.raises(RuntimeError, match="out of room"):
+        run("native")
+
+
+@pytest.mark.usefixtures("forgetful")
+def test_random_keys_of_another_kind_are_drawn_from_by_xla() -> None:
+    def draw(key: Any, own: dict[str, Any]) -> Any:
+        return jax.random.normal(key) + own["a"]
+
+    key = jax.random.key(0, impl="rbg")
+    with pytest.warns(EngineWarning, match="random keys of the kind"):
+        drawn = compiled_program(draw, key, ("a",))(key, {"a": np.zeros(1)})
+    np.testing.assert_allclose(drawn, [jax.random.normal(key)])
+
+
 @pytest.mark.usefixtures("forgetful")
 def test_what_the_function_itself_raises_is_raised_by_every_engine() -> None:
     def impossible(model: Any, own: dict[str, Any]) -> Any:

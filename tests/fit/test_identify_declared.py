@@ -25,7 +25,7 @@ from smajax.model.presets import build
 from smajax.report.identify_page import page
 from smajax.report.identify_record import record
 from smajax.report.identify_words import conclusions
-from smajax.simulation.sensors import shown_by
+from smajax.simulation.sensors import sensor_output
 from smajax.simulation.simulate import simulate
 from tests.helpers import hung_weight
 from tests.helpers.hung_weight import PULSED, STAIRS, SWITCHED, HungRun
@@ -91,7 +91,9 @@ def coupon_file(
         shown = {"e": ("strain", NOISE["strain"]), "R": ("resistance", NOISE["resistance"])}
         columns = {"t": time, "T": celsius, "s": np.full(SAMPLES, stress)}
         for column, (sensor, noise) in shown.items():
-            columns[column] = np.asarray(shown_by(wire, run, sensor)) + scale * noise * rng.standard_normal(SAMPLES)
+            columns[column] = np.asarray(sensor_output(wire, run, sensor)) + scale * noise * rng.standard_normal(
+                SAMPLES
+            )
         gone = rng.random(SAMPLES) < lost
         gone[40:60] = lost > 0.0
         cells = {key: [f"{value:.12g}" for value in values] for key, values in columns.items()}

@@ -23,9 +23,11 @@ from smajax.core.progress import Stage
 from smajax.core.provenance import provenance
 from smajax.model.presets import build
 from smajax.simulation.batch.axes import Axes, grid, sampled, zipped
-from smajax.simulation.batch.run_batch import good, opened, recipe_of, run_batch, told_of
-from smajax.simulation.batch.single_run import NOT_FINITE, RUNAWAY, member
+from smajax.simulation.batch.recipe import BatchSettings, recipe_of
+from smajax.simulation.batch.run_batch import good, opened, run_batch, status_summary
+from smajax.simulation.batch.single_run import single_run
 from smajax.simulation.measures import Largest, Last, Mean, MeanSquare, Smallest, TimeAbove
+from smajax.simulation.observers import NOT_FINITE, RUNAWAY
 from smajax.simulation.simulate import simulate
 
 ARM = build("niti_table_3_1", "arm", "amplified_voltage")
@@ -48,7 +50,7 @@ def test_a_member_is_the_single_run() -> None:
         np.testing.assert_allclose(here["position"], one.position[::5], atol=1e-9)
         np.testing.assert_allclose(here["stress"], one.stress[::5], rtol=1e-7)
     np.testing.assert_allclose(found["time"], np.arange(21) * 0.1)
-    assert "All 6 members" in told_of(found)
+    assert "All 6 runs" in status_summary(found)
 
 
 def test_a_shared_series_and_a_varied_parameter() -> None:
@@ -109,12 +111,12 @@ def test_a_cost_of_a_batch_is_differentiated_in_reverse() -> None:
     names = tuple(parameters(ARM))
     at = get_parameters(ARM, names)
     measures = (MeanSquare("position", jnp.linspace(-0.7, 0.2, 101), 0.1),)
-    recipe = recipe_of(ARM, {}, AXES, seconds=SECONDS, dt=DT, keep=(), measures=measures)
+    recipe = recipe_of(ARM, {}, AXES, BatchSettings(SECONDS, DT, keep=(), measures=measures))
 
     def cost(share: jax.Array) -> jax.Array:
         changed = eqx.tree_at(lambda one: one.system, recipe, set_vector(ARM, names, at * share))
         volts = {"voltage": jnp.asarray(8.0), "payload_mass": jnp.asarray(0.05)}
-        return member(changed, volts)["mean_square_position"]
+        return single_run(changed, volts)["mean_square_position"]
 
     one = jnp.ones(len(names))
     along = jnp.asarray(np.random.default_rng(0).standard_normal(len(names)))
@@ -126,9 +128,9 @@ def test_samples_fill_the_box_and_come_again() -> None:
     box = {"voltage": (5.0, 9.0), "payload_mass": (0.04, 0.07)}
     for method in ("sobol", "latin-hypercube", "random"):
         one, other = (sampled(33, box, method=method, seed=3) for _ in range(2))
-        values = one.members(0, 33)
+        values = one.runs(0, 33)
         for name, (low, high) in box.items():
-            np.testing.assert_array_equal(values[name], other.members(0, 33)[name])
+            np.testing.assert_array_equal(values[name], other.runs(0, 33)[name])
             assert values[name].min() < low + 0.15 * (high - low)
             assert values[name].max() > high - 0.15 * (high - low)
     assert (grid(a=[1, 2]) * sampled(5, b=(0.0, 1.0))).shape == (2, 5)
@@ -136,9 +138,9 @@ def test_samples_fill_the_box_and_come_again() -> None:
 
 def test_members_of_a_slice_are_those_of_the_whole() -> None:
     axes = grid(a=[1.0, 2.0, 3.0]) * zipped(b=[4.0, 5.0], c=[6.0, 7.0])
-    whole = axes.members(0, axes.size)
+    whole = axes.runs(0, axes.size)
     assert [*zip(*(whole[name] for name in "abc"), strict=True)][:3] == [(1, 4, 6), (1, 5, 7), (2, 4, 6)]
-    for name, values in axes.members(2, 5).items():
+    for name, values in axes.runs(2, 5).items():
         np.testing.assert_array_equal(values, whole[name][2:5])
 
 
@@ -168,7 +170,7 @@ def test_chunks_change_nothing(small_chunks: None) -> None:
     some = _batch(axes)
     np.testing.assert_allclose(
         some["position"],
-        np.stack([_batch(grid(voltage=[v]))["position"][0] for v in axes.members(0, 11)["voltage"]]),
+        np.stack([_batch(grid(voltage=[v]))["position"][0] for v in axes.runs(0, 11)["voltage"]]),
         rtol=1e-12,
     )
 
@@ -220,8 +222,8 @@ def test_members_that_go_wrong_are_told_and_disturb_nobody() -> None:
     alone = run_batch(ARM, {"voltage": 7.0}, zipped(convection_coefficient=[70.0, 90.0]), seconds=SECONDS, dt=DT)
     np.testing.assert_array_equal(found["position"][[0, 2]], alone["position"])
     assert np.isnan(good(found)["position"][1]).all()
-    assert "1 of 3 members (33.33%)" in told_of(found)
-    with pytest.warns(UserWarning, match="such as 0: such members are run all the same"):
+    assert "1 of 3 runs (33.33%)" in status_summary(found)
+    with pytest.warns(UserWarning, match="such as 0: such runs are simulated all the same"):
         nothing = run_batch(ARM, {"voltage": 7.0}, zipped(wire_length=[1.0, 0.0]), seconds=SECONDS, dt=DT)
     assert nothing["status"].values.tolist() == [0, NOT_FINITE]
 

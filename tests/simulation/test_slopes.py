@@ -18,8 +18,9 @@ from smajax.model.extended import extended
 from smajax.model.presets import build
 from smajax.model.system import System
 from smajax.simulation.batch.axes import Axes, grid, sampled, zipped
-from smajax.simulation.batch.run_batch import recipe_of, run_batch
-from smajax.simulation.batch.single_run import Recipe, _run, slope_name
+from smajax.simulation.batch.recipe import BatchSettings, recipe_of
+from smajax.simulation.batch.run_batch import run_batch
+from smajax.simulation.batch.single_run import Recipe, slope_name, without_slopes
 from smajax.simulation.measures import AbstractMeasure, Last, Mean, MeanSquare, TimeAbove
 from tests.engine.test_engine import same_batch
 from tests.model.test_every_effect import RIGS, _rig
@@ -36,7 +37,7 @@ def _along(asked: tuple[Recipe, dict[str, float]], own: dict[str, jax.Array]) ->
     at = {name: own[name] if name in own else get_parameters(recipe.system, [name])[0] for name in way}
 
     def measured(at: dict[str, jax.Array]) -> dict[str, jax.Array]:
-        found = _run(recipe, own | at)
+        found = without_slopes(recipe, own | at)
         return {one.name: found[one.name] for one in recipe.measures}
 
     return jax.jvp(measured, (at,), ({name: jnp.asarray(step) for name, step in way.items()},))[1]
@@ -52,14 +53,14 @@ def _same_as_forward(
 ) -> None:
     """Along a way that moves every parameter by about its own size, or a little of its room where it is zero."""
     found = run_batch(system, inputs, axes, measures=measures, slopes=by, engine="native", keep=(), **more)
-    members, table = axes.members(0, axes.size), parameters(system)
+    members, table = axes.runs(0, axes.size), parameters(system)
     sizes = {
         name: abs(float(members[name][0] if name in members else get_parameters(system, [name])[0])) for name in by
     }
     sizes = {name: size or 1e-2 * (table[name].high - table[name].low) for name, size in sizes.items()}
     rng = np.random.default_rng(1)
     way = {name: size * rng.uniform(0.5, 1.0) * rng.choice([-1.0, 1.0]) for name, size in sizes.items()}
-    recipe = recipe_of(system, inputs, axes, measures=measures, slopes=by, keep=(), **more)
+    recipe = recipe_of(system, inputs, axes, BatchSettings(measures=measures, slopes=by, keep=(), **more))
     ahead = program(_along, (recipe, way), tuple(members), engine="native")((recipe, way), members, 1)
     for one in measures:
         parts = [found[slope_name(one.name, name)].to_numpy().ravel() * step for name, step in way.items()]
@@ -97,7 +98,7 @@ def test_they_are_those_of_differences() -> None:
 def test_they_have_the_unit_of_the_measure_over_that_of_the_parameter() -> None:
     measures = (Last("position"), Last("velocity"), Mean("temperature"), TRACKED)
     by = (*BY, "convection_coefficient", "start_fraction")
-    recipe = recipe_of(ARM, {}, grid(voltage=[6.0]), measures=measures, slopes=by, **SPREAD)
+    recipe = recipe_of(ARM, {}, grid(voltage=[6.0]), BatchSettings(measures=measures, slopes=by, **SPREAD))
     units = recipe.units()
     assert units["last_position_by_voltage"] == "rad/V"
     assert (units["last_velocity"], units["last_velocity_by_start_fraction"]) == ("rad/s", "rad/s")

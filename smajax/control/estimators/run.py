@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-import jax
 import jax.numpy as jnp
-from jax import lax
 
 from smajax.control.estimators.base import AbstractEstimator
 from smajax.control.measured_state import MeasuredState
 from smajax.model.types import Scalar, Series
+from smajax.simulation.integrate import Carry, Schedule, integrate
+from smajax.simulation.observers import StateTrace
 
 
 def estimate(
@@ -29,11 +29,8 @@ def estimate(
         )
     span = jnp.asarray(period, dtype=float)
 
-    def body(memory: Any, now: tuple[Scalar, Scalar]) -> tuple[Any, tuple[Any, MeasuredState]]:
-        memory, told = estimator.step(memory, *now, span)
-        return memory, (memory, told)
+    def advance(carry: Carry, now: tuple[Scalar, Scalar]) -> Carry:
+        return Carry(estimator.step(carry.state[0], *now, span))
 
-    first = estimator.start(readings[0])
-    _, rest = lax.scan(body, first[0], (readings[1:], voltages[:-1]))
-    memories, told = jax.tree.map(lambda one, more: jnp.concatenate([one[None], more]), first, rest)
-    return memories, told
+    start, steps = Carry(estimator.start(readings[0])), Schedule(readings.size - 1)
+    return integrate(advance, start, (readings[1:], voltages[:-1]), steps, (StateTrace(),)).results[0]

@@ -13,13 +13,13 @@ import equinox as eqx
 import jax
 import numpy as np
 
-from smajax.control.closed_loop import simulate_closed_loop
+from smajax.control.closed_loop import ClosedLoopSetup, stored_loop
 from smajax.control.controllers.base import AbstractController
-from smajax.control.figures_of_merit import Merit, judged_loop
+from smajax.control.figures_of_merit import Merit, evaluated_loop
 from smajax.control.interface import Interface
 from smajax.control.mismatch import MISMATCHES
 from smajax.control.perturbed_plant import perturbed_plant
-from smajax.control.reference import Reference, clock, constant
+from smajax.control.reference import clock, constant
 from smajax.core.parameters import get_parameters, set_vector
 from smajax.core.progress import Progress, Stage, quiet
 from smajax.model.system import System
@@ -64,23 +64,22 @@ class _Setup(eqx.Module):
     main_gain: str = eqx.field(static=True)
 
 
-def _loop(setup: _Setup, values: dict[str, Scalar]) -> tuple[System, AbstractController, Reference, dict[str, Any]]:
-    """Plant, controller, set point and interface of one closed loop."""
+def _loop(setup: _Setup, values: dict[str, Scalar]) -> ClosedLoopSetup:
+    """One closed loop."""
     gain = get_parameters(setup.controller, [setup.main_gain]) * values[GAIN]
     interface = setup.interface.settings(setup.time[1] - setup.time[0], setup.key, values[NUMBER])
     controller = set_vector(setup.controller, [setup.main_gain], gain)
-    return perturbed_plant(setup.system, values), controller, constant(setup.time, values[TARGET]), interface
+    plant = perturbed_plant(setup.system, values)
+    return ClosedLoopSetup(plant, controller, constant(setup.time, values[TARGET]), **interface)
 
 
 def _merits(setup: _Setup, values: dict[str, Scalar]) -> dict[str, Any]:
-    plant, controller, wanted, interface = _loop(setup, values)
-    merits, failed_at = judged_loop(plant, controller, wanted, **interface)
+    merits, failed_at = evaluated_loop(_loop(setup, values))
     return {"merits": merits, "failed_at": failed_at}
 
 
 def _position(setup: _Setup, values: dict[str, Scalar]) -> dict[str, Any]:
-    plant, controller, wanted, interface = _loop(setup, values)
-    return {"position": simulate_closed_loop(plant, controller, wanted, **interface).run.position}
+    return {"position": stored_loop(_loop(setup, values)).run.position}
 
 
 def _run(function: Function, setup: LoopSetup, rows: np.ndarray, progress: Progress) -> Any:

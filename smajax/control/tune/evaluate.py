@@ -15,9 +15,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from smajax.control.closed_loop import watch_closed_loop
+from smajax.control.closed_loop import ClosedLoopSetup, observe_closed_loop
 from smajax.control.controllers.base import AbstractController
-from smajax.control.figures_of_merit import Merit, judge_of
+from smajax.control.figures_of_merit import Merit, merit_observer
 from smajax.control.interface import Interface
 from smajax.control.mismatch import MISMATCHES
 from smajax.control.perturbed_plant import perturbed_plant
@@ -25,7 +25,7 @@ from smajax.control.presets import Box, ControllerPreset
 from smajax.control.reference import clock, constant
 from smajax.control.sweep.batched_loops import NUMBER, TARGET
 from smajax.control.tune.scenarios import Scenarios
-from smajax.control.tune.terms import TERMS, Terms, exact_vector, term_vector, watch_of
+from smajax.control.tune.terms import TERMS, Terms, exact_vector, term_observer, term_vector
 from smajax.core.parameters import check_bounds, get_parameters, set_parameters, set_vector
 from smajax.model.system import System
 from smajax.model.types import Scalar, Series
@@ -78,12 +78,9 @@ def _loop(problem: _Problem, values: dict[str, Scalar], point: Scalar) -> tuple[
     controller = set_vector(problem.controller, problem.names, jnp.exp(problem.low + point * problem.width))
     if problem.smoothed is not None:
         controller = problem.smoothed(controller, problem.softness)
-    watch = watch_of(judge_of(plant, wanted), problem.softness)
-    dt = problem.time[1] - problem.time[0]
-    found, _ = watch_closed_loop(
-        watch, plant, controller, wanted, **problem.interface.settings(dt, problem.key, values[NUMBER])
-    )
-    return found
+    observer = term_observer(merit_observer(plant, wanted), problem.softness)
+    settings = problem.interface.settings(problem.time[1] - problem.time[0], problem.key, values[NUMBER])
+    return observe_closed_loop(observer, ClosedLoopSetup(plant, controller, wanted, **settings))[0]
 
 
 def _valued(problem: _Problem, values: dict[str, Scalar]) -> dict[str, Any]:

@@ -9,9 +9,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from smajax.control.compiled_loop import judged_loop_compiled
+from smajax.control.closed_loop import ClosedLoopSetup
+from smajax.control.compiled_loop import evaluated_loop_compiled
 from smajax.control.controllers.base import AbstractController
-from smajax.control.figures_of_merit import Rest, merit_by_set_point
+from smajax.control.figures_of_merit import SetPointMerit, merit_by_set_point
 from smajax.control.reference import clock, resting
 from smajax.control.tune.evaluate import FINE, STEP, TuningProblem
 
@@ -52,9 +53,9 @@ def moved(rig: TuningProblem, pair: Sequence[AbstractController], set_points: Se
     time = np.asarray(clock(rig.seconds * len(asked), FINE))
     which = np.minimum((time / rig.seconds + 1e-9).astype(int), len(asked) - 1)
     wanted = resting(jnp.asarray(np.radians(asked)[which]))
-    several: list[tuple[Rest, ...]] = []
+    several: list[tuple[SetPointMerit, ...]] = []
     for controller in pair:
-        ran, _ = judged_loop_compiled(
+        setup = ClosedLoopSetup(
             rig.system,
             controller,
             wanted,
@@ -65,6 +66,7 @@ def moved(rig: TuningProblem, pair: Sequence[AbstractController], set_points: Se
             key=None if rig.interface.sensor is None else jax.random.key(rig.seed),
             delay=rig.interface.delay,
         )
+        ran, _ = evaluated_loop_compiled(setup)
         several.append(merit_by_set_point(ran, rig.system)[1:])
 
     def of(name: str) -> np.ndarray:

@@ -17,8 +17,8 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
-from smajax.control.closed_loop import AbstractWatch
-from smajax.control.figures_of_merit import Judge, Merit
+from smajax.control.closed_loop import AbstractLoopObserver
+from smajax.control.figures_of_merit import Merit, MeritObserver
 from smajax.model.types import Scalar, State
 
 FOLLOWS = 0.05  # s, tau: how fast the memory follows at the edge of the band
@@ -61,40 +61,40 @@ class Terms(NamedTuple):
 
 
 class _Seen(NamedTuple):
-    judged: Any  # the judge's own
+    judged: Any  # of the figures of merit
     outside: Scalar  # s
     late: Scalar  # rad s^2, sum of t |e| dt
     command: Scalar  # V, the last one; nan before the first
     moved: Scalar  # V
 
 
-class TermWatch(AbstractWatch):
+class TermObserver(AbstractLoopObserver):
     """Terms and figures of merit of a loop while it runs: (`Terms`, `Merit`)."""
 
-    judge: Judge
+    merit: MeritObserver
     softness: Scalar  # w, share of the band
 
-    def start(self, state: State) -> _Seen:
+    def init(self, state: State) -> _Seen:
         zero = jnp.zeros_like(state.motion.position)
-        return _Seen(self.judge.start(state), zero, zero, jnp.full_like(zero, jnp.nan), zero)
+        return _Seen(self.merit.init(state), zero, zero, jnp.full_like(zero, jnp.nan), zero)
 
-    def see(self, memory: _Seen, state: State, command: Scalar, dt: Scalar) -> _Seen:
-        judged = self.judge.see(memory.judged, state, command, dt)
+    def see(self, memory: _Seen, state: State, voltage: Scalar, dt: Scalar) -> _Seen:
+        judged = self.merit.see(memory.judged, state, voltage, dt)
         since = judged.time - judged.began
-        size = jnp.abs(state.motion.position - self.judge.target)
-        steep = (size / self.judge.band - 1.0) / self.softness
+        size = jnp.abs(state.motion.position - self.merit.target)
+        steep = (size / self.merit.band - 1.0) / self.softness
         rate = jnp.exp(jnp.minimum(steep, STEEPEST)) / FOLLOWS
         first = jnp.isnan(memory.command)
         return _Seen(
             judged,
             memory.outside - jnp.expm1(-rate * dt) * (since - memory.outside),
             memory.late + since * size * dt,
-            command,
-            memory.moved + jnp.where(first, 0.0, jnp.abs(command - jnp.where(first, command, memory.command))),
+            voltage,
+            memory.moved + jnp.where(first, 0.0, jnp.abs(voltage - jnp.where(first, voltage, memory.command))),
         )
 
-    def result(self, memory: _Seen) -> tuple[Terms, Merit]:
-        merit = self.judge.result(memory.judged)
+    def summary(self, memory: _Seen) -> tuple[Terms, Merit]:
+        merit = self.merit.summary(memory.judged)
         seconds = memory.judged.time - memory.judged.began
         # To twice the run, which a loop costs that never settles, as the settling time comes near to the steady part.
         late = jnp.clip((memory.outside / seconds - EARLIEST) / (LATEST - EARLIEST), 0.0, 1.0)
@@ -121,6 +121,8 @@ def exact_vector(terms: Terms, merit: Merit, seconds: Scalar | float) -> Scalar:
     return term_vector(terms._replace(settling_time=settling))
 
 
-def watch_of(judge: Judge, softness: Scalar) -> TermWatch:
-    """The watch around a judge."""
-    return eqx.tree_at(lambda watch: watch.softness, TermWatch(judge, softness), jnp.asarray(softness, dtype=float))
+def term_observer(merit: MeritObserver, softness: Scalar) -> TermObserver:
+    """The observer of terms around one of figures of merit."""
+    return eqx.tree_at(
+        lambda observer: observer.softness, TermObserver(merit, softness), jnp.asarray(softness, dtype=float)
+    )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -25,7 +26,7 @@ class Dimension:
 
 @dataclass(frozen=True)
 class Axes:
-    """Dimensions whose product is the batch: `axes * more` crosses two of them. Members count with the last fastest."""
+    """Dimensions whose product is the batch: `axes * more` crosses two of them. Runs count with the last fastest."""
 
     dimensions: tuple[Dimension, ...]
 
@@ -51,17 +52,22 @@ class Axes:
 
     @property
     def size(self) -> int:
-        """How many members."""
+        """How many runs."""
         return int(np.prod(self.shape, dtype=np.int64))
 
-    def members(self, start: int, stop: int) -> dict[str, np.ndarray]:
-        """The values of members `start` to `stop` - 1, each of shape (stop - start,): never all of them at once."""
+    def runs(self, start: int, stop: int) -> dict[str, np.ndarray]:
+        """The values of runs `start` to `stop` - 1, each of shape (stop - start,): never all of them at once."""
         places = np.unravel_index(np.arange(start, stop), self.shape) if self.dimensions else ()
         return {
             name: values[place]
             for one, place in zip(self.dimensions, places, strict=True)
             for name, values in one.values.items()
         }
+
+    def members(self, start: int, stop: int) -> dict[str, np.ndarray]:
+        """The old name of `runs`."""
+        warnings.warn("Axes.members is Axes.runs now; it is removed in version 0.3", DeprecationWarning, stacklevel=2)
+        return self.runs(start, stop)
 
 
 def _series(name: str, values: object) -> np.ndarray:

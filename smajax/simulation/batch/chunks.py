@@ -14,11 +14,11 @@ import jax.numpy as jnp
 import numpy as np
 
 from smajax.engine import Engine, available_cores, program
-from smajax.engine.facade import kind_of, recalled
+from smajax.engine.facade import cached, kind_of
 from smajax.engine.xla import block_size, rounded
 from smajax.simulation.batch.axes import Axes
 
-MOST = 1 << 15  # members a chunk, however little is kept of each: what an interruption loses
+MOST = 1 << 15  # runs a chunk, however little is stored of each: what an interruption loses
 Results = Any  # arrays by name: a dictionary, or one of records
 Function = Callable[[Any, dict[str, jax.Array]], Results]
 
@@ -26,30 +26,30 @@ _shapes: dict[Hashable, Any] = {}
 
 
 def result_shapes(function: Function, model: Any, axes: Axes) -> Any:
-    """Shapes and kinds of what one member gives; traced once for each kind of arguments."""
+    """Shapes and kinds of what one run gives; traced once for each kind of arguments."""
     one = {name: jnp.zeros(()) for name in axes.names}
     key = kind_of(function, model, tuple(axes.names))
-    return recalled(_shapes, key, lambda: eqx.filter_eval_shape(function, model, one))
+    return cached(_shapes, key, lambda: eqx.filter_eval_shape(function, model, one))
 
 
-def member_bytes(function: Function, model: Any, axes: Axes) -> int:
-    """What is kept of one member, bytes."""
+def run_bytes(function: Function, model: Any, axes: Axes) -> int:
+    """What is stored of one run, bytes."""
     leaves = jax.tree.leaves(result_shapes(function, model, axes))
     return sum(int(np.prod(leaf.shape, dtype=np.int64)) * leaf.dtype.itemsize for leaf in leaves)
 
 
 def chunk_size(function: Function, model: Any, axes: Axes, budget: int, devices: Sequence[jax.Device]) -> int:
-    """Members a chunk, so that its results take at most a quarter of `budget` bytes, and `MOST` at most; chunks are even.
+    """Runs a chunk, so that its results take at most a quarter of `budget` bytes, and `MOST` at most; chunks are even.
 
     A quarter: blocks and their concatenation on the device, and the copy that is written while the next chunk runs.
     Raises ValueError when not even one block fits.
     """
-    each = member_bytes(function, model, axes)
+    each = run_bytes(function, model, axes)
     whole = rounded(1, block_size(axes.size, devices), devices)
     most = budget // 4 // max(each, 1)
     if most < whole:
         raise ValueError(
-            f"one member keeps {each:,} bytes, and {budget:,} bytes have no room for {whole} at once (4 copies): keep "
+            f"one run stores {each:,} bytes, and {budget:,} bytes have no room for {whole} at once (4 copies): store "
             "fewer values, every so many steps only (`every`), or measures in the place of trajectories."
         )
     wholes = -(-axes.size // whole)
@@ -66,7 +66,7 @@ def chunks(
     devices: Sequence[jax.Device] | None = None,
     engine: Engine = "auto",
 ) -> Iterator[tuple[int, Results]]:
-    """(number, results) of the chunks `wanted`, each of `size` members but for the last, arrays of shape (members, ...).
+    """(number, results) of the chunks `wanted`, each of `size` runs but for the last, arrays of shape (runs, ...).
 
     While the caller writes one chunk the next is on its way. `devices` are those of XLA, and as many threads otherwise;
     all that there are where they are not given. Raises Unsupported where `engine` is "native" and the function is not for it.
@@ -78,7 +78,7 @@ def chunks(
     ahead: tuple[int, Callable[[], Results]] | None = None
     for number in wanted:
         start, stop = number * size, min((number + 1) * size, axes.size)
-        coming = run.begin(model, axes.members(start, stop), threads, several, block, size)
+        coming = run.begin(model, axes.runs(start, stop), threads, several, block, size)
         if ahead is not None:
             yield ahead[0], ahead[1]()
         ahead = number, coming

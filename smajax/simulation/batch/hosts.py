@@ -19,8 +19,9 @@ from smajax.model.system import System
 from smajax.model.types import Series
 from smajax.simulation.batch.axes import Axes
 from smajax.simulation.batch.chunks import chunk_size
-from smajax.simulation.batch.run_batch import BUDGET, created_or_opened, fill, opened, recipe_of
-from smajax.simulation.batch.single_run import member
+from smajax.simulation.batch.recipe import BatchSettings, recipe_of
+from smajax.simulation.batch.run_batch import BUDGET, created_or_opened, fill, opened
+from smajax.simulation.batch.single_run import single_run
 from smajax.simulation.batch.store import Store
 from smajax.simulation.simulate import DEFAULT_STEP
 
@@ -38,7 +39,7 @@ def join(coordinator: str | None = None, processes: int | None = None, process: 
     return jax.process_index(), jax.process_count()
 
 
-def run_batch_here(
+def run_batch_here(  # the public form, as `run_batch`
     system: System,
     inputs: Mapping[str, Series | float],
     axes: Axes,
@@ -54,13 +55,13 @@ def run_batch_here(
     """This process's share of `run_batch(..., out=out)`: chunks whose number leaves `process` when divided by `processes`.
 
     The folder must be one that all processes see. Raises TimeoutError when process 0 does not lay the store out.
-    Run again, with any number of processes, it goes on with the chunks that are missing.
+    Run again, with any number of processes, it resumes with the chunks that are missing.
     """
     progress = as_progress(progress)
     folder = Path(out)
-    recipe = recipe_of(system, inputs, axes, dt=dt, **settings)
+    recipe = recipe_of(system, inputs, axes, BatchSettings(dt=dt, **settings))
     devices = tuple(jax.local_devices())
-    size = chunk_size(member, recipe, axes, budget, devices)
+    size = chunk_size(single_run, recipe, axes, budget, devices)
     # Several chunks a process, so that a lost one takes little with it; the size must not depend on the process.
     size = min(size, max(1, -(-axes.size // (CHUNKS * processes))))
     store = created_or_opened(folder, recipe, axes, size) if process == 0 else _awaited(folder)

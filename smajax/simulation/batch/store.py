@@ -1,4 +1,4 @@
-"""A batch on disk: a Zarr group that is filled chunk by chunk, by one process or several, and gone on with later.
+"""A batch on disk: a Zarr group that is filled chunk by chunk, by one process or several, and resumed later.
 
 Each chunk of a result is one file per array, written under another name and renamed; a chunk counts as done when its
 mark is there, which comes last. So whatever moment a process is killed at, what is marked is whole.
@@ -53,7 +53,7 @@ class Store:
         attributes: Mapping[str, Any],
         units: Mapping[str, str],
     ) -> Store:
-        """A new one with nothing in it. `shapes` are those of one member; `attributes` have the digest of what is run."""
+        """A new one with nothing in it. `shapes` are those of one run; `attributes` have the digest of what is run."""
         # Laid out beside its place and renamed: a folder under its own name is whole.
         part = folder.with_name(f"{folder.name}.part")
         group = _zarr().open_group(part, mode="w", zarr_format=3)
@@ -64,7 +64,7 @@ class Store:
                 chunks=(min(chunk, axes.size), *shape),
                 dtype=dtype,
                 fill_value=np.nan if np.issubdtype(dtype, np.floating) else 0,
-                dimension_names=["member", *(["time"] if shape else [])],
+                dimension_names=["run", *(["time"] if shape else [])],
             )
             array.attrs["units"] = units[name]
         count = -(-axes.size // chunk)
@@ -94,8 +94,8 @@ class Store:
     def axis_units(self) -> dict[str, str]:
         """Of what is varied, where it is known."""
         arrays: Any = self.group[AXES]
-        told = {name: arrays[name].attrs.get("units") for one in self.axes.dimensions for name in one.values}
-        return {name: str(unit) for name, unit in told.items() if unit}
+        units = {name: arrays[name].attrs.get("units") for one in self.axes.dimensions for name in one.values}
+        return {name: str(unit) for name, unit in units.items() if unit}
 
     @property
     def chunk(self) -> int:
@@ -110,10 +110,10 @@ class Store:
         """Chunks that are still to be computed."""
         return np.flatnonzero(np.asarray(self.group[MARK][:]) == 0).tolist()
 
-    def write(self, number: int, found: Mapping[str, np.ndarray]) -> None:
+    def write(self, number: int, results: Mapping[str, np.ndarray]) -> None:
         """Chunk `number`, then its mark."""
         start = number * self.chunk
-        for name, values in found.items():
+        for name, values in results.items():
             self.group[name][start : start + len(values)] = values
         self.group[MARK][number] = 1
 

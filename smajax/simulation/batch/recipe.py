@@ -1,0 +1,200 @@
+"""What a batch runs: checks that a system, its inputs, axes and settings fit together, and the `Recipe` of them."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+
+import jax.numpy as jnp
+import numpy as np
+
+from smajax.core.names import listed
+from smajax.core.parameters import Parameter, check_bounds, parameters
+from smajax.model.load.coupon import AbstractCoupon
+from smajax.model.system import System
+from smajax.model.types import Scalar, Series
+from smajax.model.wire.order import check_order
+from smajax.simulation.batch.axes import Axes
+from smajax.simulation.batch.single_run import Recipe
+from smajax.simulation.measures import SHOWN, AbstractMeasure
+from smajax.simulation.simulate import DEFAULT_STEP, check_kinds, check_scalars
+
+STORED = ("position", "temperature", "martensite_fraction", "stress")
+Parameters = Mapping[str, Parameter]
+
+
+@dataclass(frozen=True)
+class BatchSettings:
+    """How long and in which steps runs go on, and what is stored of them; fields as the arguments of `run_batch`."""
+
+    seconds: float | None = None
+    dt: float = DEFAULT_STEP
+    every: int = 1
+    keep: Sequence[str] = STORED
+    measures: Sequence[AbstractMeasure] = ()
+    tolerance: float | None = None
+    slopes: Sequence[str] = ()
+
+
+DEFAULTS = BatchSettings()
+
+
+@dataclass(frozen=True)
+class _Inputs:
+    """The inputs of a batch, by what they are."""
+
+    series: dict[str, Series]  # the same for all runs, each of shape (n,)
+    constants: dict[str, Scalar]
+    channels: tuple[str, ...]  # varied
+
+
+def recipe_of(
+    system: System, inputs: Mapping[str, Series | float], axes: Axes, settings: BatchSettings = DEFAULTS
+) -> Recipe:
+    """What `run_batch` runs. Raises ValueError naming what does not fit together, TypeError for what is of another kind."""
+    check_kinds(system, inputs)
+    _check_axes(axes)
+    _check_measures(settings.measures)
+    table = parameters(system)
+    check_scalars(system, settings.dt)
+    check_bounds(system)
+    check_order(system)
+    _warn_beyond(axes, table)
+    sorted_inputs = _sorted_inputs(system, inputs, axes, table)
+    steps = _steps(sorted_inputs.series, settings)
+    _check_stored(settings, steps)
+    _check_tolerance(system, settings.tolerance)
+    _check_slopes(settings, table, sorted_inputs.channels, inputs)
+    return Recipe(
+        system=system,
+        series=sorted_inputs.series,
+        constants=sorted_inputs.constants,
+        dt=jnp.asarray(settings.dt, dtype=float),
+        measures=tuple(settings.measures),
+        tolerance=None if settings.tolerance is None else jnp.asarray(settings.tolerance, dtype=float),
+        channels=sorted_inputs.channels,
+        steps=steps,
+        every=settings.every,
+        keep=tuple(settings.keep),
+        slopes=tuple(settings.slopes),
+    )
+
+
+def _check_axes(axes: object) -> None:
+    if not isinstance(axes, Axes):
+        raise TypeError(f"`axes` is {type(axes).__name__}; expected what `grid`, `zipped` or `sampled` gives.")
+    if not axes.names:
+        raise ValueError("`axes` varies nothing: for a single run use `simulate`, or give `grid(voltage=[6.0])`.")
+
+
+def _check_measures(measures: Sequence[object]) -> None:
+    other = [measure for measure in measures if not isinstance(measure, AbstractMeasure)]
+    if other:
+        raise TypeError(f"`measures` holds {other[0]!r}; expected measures, such as `sma.measure.Largest('position')`.")
+
+
+def _warn_beyond(axes: Axes, table: Parameters) -> None:
+    """Warns of values that no wire or load has: what comes of them may look like a result."""
+    for dimension in axes.dimensions:
+        for name, values in dimension.values.items():
+            if name not in table:
+                continue
+            low, high = table[name].low, table[name].high
+            beyond = values[~((values >= low) & (values <= high))]
+            if beyond.size:
+                warnings.warn(
+                    f"{beyond.size} of {values.size} values of `{name}` are out of its bounds, {low:g} to {high:g} {table[name].unit}, "
+                    f"such as {beyond[0]:g}: such runs are simulated all the same, and what comes of them means nothing.",
+                    stacklevel=4,
+                )
+
+
+def _sorted_inputs(system: System, inputs: Mapping[str, Series | float], axes: Axes, table: Parameters) -> _Inputs:
+    drive, load = system.drive, system.load
+    required = drive.inputs_required | load.inputs_required
+    known = required | drive.inputs_optional | load.inputs_optional | {"ambient_temperature"}
+    # A name that is both (ambient_temperature) is the parameter, unless it is an input already.
+    channels = tuple(name for name in axes.names if name in known and name not in table)
+    unknown = [name for name in axes.names if name not in table and name not in channels]
+    if unknown:
+        raise ValueError(
+            f"{listed(unknown)}: neither parameters ({listed(sorted(table))}) nor inputs ({listed(sorted(known))}) of the system."
+        )
+    twice = sorted(set(axes.names) & set(inputs))
+    if twice:
+        raise ValueError(f"{listed(twice)}: varied by `axes` and given in `inputs` as well: leave them out of one.")
+    present = set(inputs) | set(channels)
+    if not required <= present or not present <= known:
+        raise ValueError(
+            f"the system needs the inputs {listed(sorted(required))} and may have {listed(sorted(known - required))}, but there are "
+            f"{listed(sorted(present))}, from `inputs` and `axes`."
+        )
+    odd = {name: np.shape(values) for name, values in inputs.items() if np.ndim(values) > 1}
+    if odd:
+        raise ValueError(f"an input is a number or a series of shape (n,), but {odd}. What differs by run is an axis.")
+    arrays = {name: jnp.asarray(values, dtype=float) for name, values in inputs.items()}
+    series = {name: values for name, values in arrays.items() if values.ndim == 1}
+    return _Inputs(series, {name: values for name, values in arrays.items() if values.ndim == 0}, channels)
+
+
+def _steps(series: Mapping[str, Series], settings: BatchSettings) -> int:
+    """How many steps a run has."""
+    seconds, dt, every = settings.seconds, settings.dt, settings.every
+    lengths = {name: len(values) for name, values in series.items()}
+    if len(set(lengths.values())) > 1:
+        raise ValueError(f"input series must be of one length, but there are {lengths}.")
+    if seconds is None and not lengths:
+        raise ValueError("no input is a series: give `seconds`, the length of the run.")
+    steps = next(iter(lengths.values())) - 1 if lengths else round(float(seconds or 0.0) / dt)
+    if lengths and seconds is not None and steps != round(seconds / dt):
+        raise ValueError(f"series of {steps + 1} samples last {steps * dt:g} s at {dt:g} s, not {seconds:g} s.")
+    if steps < 1 or every < 1 or steps % every:
+        raise ValueError(f"{steps} steps cannot be stored every {every}: give a divisor of the number of steps.")
+    return steps
+
+
+def _check_stored(settings: BatchSettings, steps: int) -> None:
+    wrong = sorted(set(settings.keep) - set(SHOWN))
+    if wrong:
+        raise ValueError(f"`keep` names what a state shows, {listed(sorted(SHOWN))}, not {listed(wrong)}.")
+    names = [one.name for one in settings.measures]
+    if len(set(names)) < len(names):
+        raise ValueError(f"measures must have names of their own, but there are {names}.")
+    for one in settings.measures:
+        one.check(steps)
+
+
+def _check_tolerance(system: System, tolerance: float | None) -> None:
+    if tolerance is not None and (not tolerance > 0.0 or isinstance(system.load, AbstractCoupon)):
+        raise ValueError(
+            f"`tolerance` is a share of 1 C and of 1 % strain a step, for a load that moves; got {tolerance} and "
+            f"{type(system.load).__name__}. Take 1e-4, or leave it out."
+        )
+
+
+def _check_slopes(settings: BatchSettings, table: Parameters, channels: Sequence[str], inputs: Collection[str]) -> None:
+    slopes, measures = settings.slopes, settings.measures
+    wrong = [name for name in slopes if name not in table and name not in channels]
+    if wrong:
+        raise ValueError(
+            f"`slopes` names parameters ({listed(sorted(table))}) or inputs that `axes` vary ({listed(sorted(channels))}), "
+            f"not {listed(wrong)}. An input that is the same for all may be an axis of one value."
+        )
+    if len(set(slopes)) < len(slopes):
+        raise ValueError(f"`slopes` names something twice: {listed(slopes)}.")
+    hidden = sorted(set(slopes) & set(inputs))
+    if hidden:
+        raise ValueError(
+            f"an input stands in for the parameter {listed(hidden)}: leave it out of `inputs`, or of `slopes`."
+        )
+    jumping = [one.name for one in measures if not one.smooth]
+    if slopes and jumping:
+        raise ValueError(f"{listed(jumping)} moves by whole steps and has no slope: leave it out, or `slopes`.")
+    if slopes and not measures:
+        raise ValueError("`slopes` are those of measures: give `measures`, as `smajax.simulation.measures.MeanSquare`.")
+    if slopes and settings.tolerance is not None:
+        raise ValueError(
+            "slopes are found backwards through fixed steps, and a `tolerance` makes their number depend on the parameters: "
+            "leave `tolerance` out, or `slopes`."
+        )
