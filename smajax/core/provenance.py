@@ -20,7 +20,7 @@ from smajax.core import plugins
 from smajax.core.parameters import parameter_values
 
 PACKAGES = ("smajax", "jax", "jaxlib", "equinox", "numpy")
-FIT_PACKAGES = ("smajax", "jax", "equinox", "numpy", "scipy")
+FIT_PACKAGES = ("smajax", "jax", "equinox", "numpy", "optimistix", "scipy")
 
 
 @lru_cache(maxsize=1)

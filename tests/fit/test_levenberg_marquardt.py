@@ -2,34 +2,72 @@
 
 from __future__ import annotations
 
-import numpy as np
-import pytest
-from scipy.optimize import lsq_linear
+from typing import Any
 
+import jax
+import jax.numpy as jnp
+import numpy as np
+import optimistix as optx
+import pytest
+from scipy.optimize import least_squares, lsq_linear
+
+from smajax.fit.bounded_descent import (
+    BoundedDampedNewtonDescent,
+    DescentState,
+    GainRatioSearch,
+    bounded_quadratic_minimum,
+)
 from smajax.fit.directions import directions, weak_combinations
-from smajax.fit.levenberg_marquardt import MAX_STEPS, LMState, _step, _update
+from smajax.fit.levenberg_marquardt import (
+    MAX_DAMPING,
+    MAX_STEPS,
+    TOLERANCE,
+    LMState,
+    NormalEquations,
+    Status,
+    _advanced,
+    _initial_state,
+)
+from smajax.fit.problem import FitTask
 from smajax.fit.robust import robust_variance
 from smajax.fit.sensitivity import Sensitivity
 
 
+class _BoundedLevenbergMarquardt(optx.AbstractGaussNewton):
+    """Descent and search of the package in optimistix's own loop."""
+
+    rtol: float = 1e-10
+    atol: float = 1e-10
+    norm: Any = staticmethod(optx.max_norm)
+    descent: Any = BoundedDampedNewtonDescent()
+    search: Any = GainRatioSearch()
+    verbose: Any = optx.LevenbergMarquardt(1e-3, 1e-3).verbose  # off
+
+    def terminate(
+        self, fn: Any, y: Any, args: Any, options: Any, state: Any, tags: Any
+    ) -> tuple[jax.Array, optx.RESULTS]:
+        ended, result = super().terminate(fn, y, args, options, state, tags)
+        return ended | (state.search_state.damping > MAX_DAMPING), result
+
+
+def _task(start: np.ndarray) -> FitTask:
+    """Every parameter is free, between 0 and 1."""
+    size = len(start)
+    return FitTask(np.arange(size), np.zeros(size), np.ones(size), start, np.ones(1), np.zeros(size))
+
+
 def _fitted(columns: np.ndarray, target: np.ndarray, start: np.ndarray) -> LMState:
-    square = columns.T @ columns
-
-    def at(y: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
-        residual = columns @ y - target
-        return float(residual @ residual), columns.T @ residual, square
-
-    cost, slope, _ = at(start)
-    state = LMState(start, cost, slope, square, np.diag(square).copy())
-    while not state.reason and state.steps < MAX_STEPS:
-        step = _step(state)
-        _update(state, step, at(np.clip(state.y + step, 0.0, 1.0)))
+    state = _initial_state(_task(start), 8)
+    while state.status == Status.RUNNING and state.steps < MAX_STEPS:
+        residual = columns @ np.asarray(state.y_eval)[: len(start)] - target
+        equations = float(residual @ residual), columns.T @ residual, columns.T @ columns
+        state = _advanced(state, equations, TOLERANCE)
     return state
 
 
 @pytest.mark.parametrize("size", [2, 3, 6])
 def test_linear_problems_end_where_scipys_do(size: int) -> None:
-    """Optima inside, on edges and in corners of the box."""
+    """Optima inside, on edges and in corners of the bounds."""
     rng = np.random.default_rng(size)
     for _ in range(100):
         columns = rng.standard_normal((50, size))
@@ -37,25 +75,59 @@ def test_linear_problems_end_where_scipys_do(size: int) -> None:
         target = columns @ truth + 0.1 * rng.standard_normal(50)
         state = _fitted(columns, target, rng.uniform(size=size))
         least = 2.0 * lsq_linear(columns, target, (0.0, 1.0), method="bvls").cost
-        assert state.reason
-        assert state.cost == pytest.approx(least, rel=1e-4)
+        assert state.status in (Status.CONVERGED, Status.NO_DESCENT)
+        assert 2.0 * float(state.f) == pytest.approx(least, rel=1e-4)
+
+
+@pytest.mark.parametrize("size", [1, 4, 20])
+def test_the_step_within_bounds_is_scipys(size: int) -> None:
+    """Exactly, in problems of a condition up to 1e6 in the Jacobian."""
+    rng = np.random.default_rng(size)
+    solve = jax.jit(bounded_quadratic_minimum)
+    for _ in range(100):
+        columns = np.linalg.qr(rng.standard_normal((60, size)))[0] * 10.0 ** rng.uniform(-3.0, 3.0, size)
+        columns = columns @ np.linalg.qr(rng.standard_normal((size, size)))[0]
+        target = rng.standard_normal(60) * np.linalg.norm(columns)
+        low, high = -rng.uniform(0.0, 1.0, size), rng.uniform(0.0, 1.0, size)
+        exact = lsq_linear(columns, target, (low, high), method="bvls", tol=1e-15, max_iter=1000)
+        step = np.asarray(solve(columns.T @ columns, -columns.T @ target, low, high))
+        assert ((low <= step) & (step <= high)).all()
+        cost = 0.5 * float(np.sum((columns @ step - target) ** 2))
+        assert cost <= exact.cost * (1.0 + 1e-9)
+
+
+def test_within_optimistixs_own_loop_the_end_is_scipys() -> None:
+    """Rosenbrock's function with its optimum inside, and with the bounds before it."""
+
+    def residual(y: jax.Array, args: float) -> jax.Array:
+        return jnp.stack([10.0 * (args * y[1] - (args * y[0]) ** 2), 1.0 - args * y[0]])
+
+    start = np.array([0.1, 0.9])
+    solver = _BoundedLevenbergMarquardt()
+    for scale in (2.0, 0.8):
+        solution = optx.least_squares(residual, solver, jnp.asarray(start), scale, max_steps=500)
+        exact = least_squares(lambda y, scale=scale: np.asarray(residual(jnp.asarray(y), scale)), start, bounds=(0, 1))
+        np.testing.assert_allclose(solution.value, exact.x, atol=1e-5)
 
 
 def test_a_step_to_a_jacobian_that_is_not_finite_is_rejected() -> None:
-    state = LMState(np.full(2, 0.5), 1.0, np.ones(2), np.eye(2), np.ones(2))
-    before = state.y.copy()
-    _update(state, np.full(2, -0.1), (0.5, np.array([np.nan, 1.0]), np.eye(2)))
-    np.testing.assert_array_equal(state.y, before)
-    assert not state.reason
+    state = _advanced(_initial_state(_task(np.full(2, 0.5)), 8), (1.0, np.ones(2), np.eye(2)), TOLERANCE)
+    assert not np.array_equal(state.y_eval, state.y)
+    after = _advanced(state, (0.5, np.array([np.nan, 1.0]), np.eye(2)), TOLERANCE)
+    np.testing.assert_array_equal(after.y, state.y)
+    assert after.status == Status.RUNNING
+    lost: NormalEquations = (np.nan, np.ones(2), np.eye(2))
+    assert _advanced(_initial_state(_task(np.full(2, 0.5)), 8), lost, TOLERANCE).status == Status.NOT_FINITE
 
 
 def test_equations_that_are_singular_to_rounding_are_no_error() -> None:
-    """Two parameters with one trace and next to no damping: a Cholesky factor may exist where a solution does not."""
+    """Two parameters with one trace and no damping: a Cholesky factor may exist where a solution does not."""
     random = np.random.default_rng(0)
+    step = jax.jit(BoundedDampedNewtonDescent().step)
     for _ in range(500):
         row = random.normal(size=2) * 10.0 ** random.integers(-3, 3, size=2)
-        state = LMState(np.full(2, 0.5), 1.0, row, np.outer(row, row), row**2, damping=0.0)
-        assert np.isfinite(_step(state)).all()
+        state = DescentState(*(jnp.asarray(part) for part in (np.full(2, 0.5), row, np.outer(row, row), row**2)))
+        assert np.isfinite(step(jnp.asarray(np.inf), state)[0]).all()
 
 
 def test_two_that_act_by_their_product_are_no_parameters_without_effect() -> None:
