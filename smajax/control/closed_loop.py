@@ -232,7 +232,7 @@ def _march(setup: ClosedLoopSetup, observers: Sequence[AbstractObserver]) -> Mar
     state = setup.start()
     acting = {name: series[:-1] for name, series in setup.disturbances.items()}
     schedule = Schedule(setup.samples - 1, setup.every)
-    return integrate(advance, plant.start(state), acting, schedule, observers, _control(setup, state))
+    return integrate(advance, plant.start(state, {}), acting, schedule, observers, _control(setup, state))
 
 
 def _control(setup: ClosedLoopSetup, start: State) -> Control:

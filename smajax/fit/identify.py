@@ -23,7 +23,7 @@ from smajax.fit.identify_stages import (
     Setup,
     Statistics,
     check_identifiability,
-    fit_unknowns,
+    fit_within_tolerance,
     residual_size,
     set_up,
     statistics_at,
@@ -62,7 +62,7 @@ def identify(  # ten parameters: the options of the command, by keyword
     begin = clock.monotonic()
     setup = set_up(experiment, options)
     check = check_identifiability(setup, options)
-    fitted = fit_unknowns(setup, options)
+    setup, fitted, integration = fit_within_tolerance(setup, options)
     statistics = statistics_at(setup, fitted, options)
     names, names_with_effect, weakest = setup.names, *_directions(setup, fitted, statistics)
     drawn = profiles(
@@ -105,6 +105,7 @@ def identify(  # ten parameters: the options of the command, by keyword
         )
         if design
         else (),
+        integration=integration,
         step=experiment.step,
         clocked=experiment.clocked,
         provenance=_provenance(command, seed, starts, clock.monotonic() - begin, options.cache),

@@ -9,6 +9,7 @@ import numpy as np
 from smajax.data.experiment.record import Prior
 from smajax.fit.design import Suggestion
 from smajax.fit.directions import Direction
+from smajax.fit.integration import IntegrationError
 from smajax.fit.posterior import Posterior
 from smajax.fit.profile import Profile
 
@@ -94,6 +95,7 @@ class Identified:
     robust: bool
     runs: tuple[IdentifiedRun, ...]
     suggestions: tuple[Suggestion, ...]
+    integration: IntegrationError  # what the integration leaves in the outputs, of every run
     step: float  # s from sample to sample of every run; one where only the order of the samples is known
     clocked: bool  # whether the samples have times
     provenance: dict[str, str]

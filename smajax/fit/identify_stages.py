@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -11,11 +12,12 @@ import jax.numpy as jnp
 import numpy as np
 
 from smajax.core.names import listed
-from smajax.core.progress import Progress, report_checks
+from smajax.core.progress import Progress, Stage, report_checks
 from smajax.core.result_cache import ResultCache
 from smajax.core.whiteness import LAGS, WHITE, correlation_time, split_runs, whiteness_p_value
 from smajax.data.experiment.record import Experiment, Run, Unknown
 from smajax.fit.experiment_problem import declared_problem, free_by_name
+from smajax.fit.integration import IntegrationError, choose_integration, described, integration_error, with_integration
 from smajax.fit.levenberg_marquardt import Fit, FitSettings, levenberg_marquardt
 from smajax.fit.noise import fit_with_noise
 from smajax.fit.posterior import library
@@ -24,6 +26,8 @@ from smajax.fit.robust import NORMAL, clipped, robust_fit, robust_variance, unwe
 from smajax.fit.sensitivity import Sensitivity, sensitivity
 from smajax.fit.starts import multistart
 from smajax.fit.uncertainty import Uncertainty, covariance_of, identifiability, uncertainty
+from smajax.model.system import System
+from smajax.simulation.steppers import Integration
 
 EDGE = 1e-6  # of the range: a fit within bounds comes to a bound itself
 
@@ -54,6 +58,11 @@ class Setup:
     unknowns: dict[str, Unknown]
     problem: Problem
     every_run: Problem
+
+    def integrated(self, integration: Integration) -> Setup:
+        """The same with all runs integrated in that way."""
+        problem, every_run = (with_integration(one, integration) for one in (self.problem, self.every_run))
+        return dataclasses.replace(self, problem=problem, every_run=every_run)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -112,7 +121,9 @@ def set_up(experiment: Experiment, options: Options) -> Setup:
             raise ValueError("a posterior is that of normal noise: ask for it without Huber's loss.")
         library()  # before the work, not after it
     problem, every_run = declared_problem(experiment, fit_runs), declared_problem(experiment, experiment.runs)
-    return Setup(experiment, fit_runs, unknowns, problem, every_run)
+    options.progress(Stage("choosing the integration", 0.0))
+    setup = Setup(experiment, fit_runs, unknowns, problem, every_run)
+    return setup.integrated(choose_integration(every_run, every_run.system))
 
 
 def check_identifiability(setup: Setup, options: Options) -> tuple[str, ...]:
@@ -127,10 +138,43 @@ def check_identifiability(setup: Setup, options: Options) -> tuple[str, ...]:
     return (*setup.experiment.warnings, *sentences)
 
 
-def fit_unknowns(setup: Setup, options: Options) -> Fitted:
-    """From many starts, then with the noise of the outputs estimated, then by Huber's loss where they are requested."""
+def fit_within_tolerance(setup: Setup, options: Options) -> tuple[Setup, Fitted, IntegrationError]:
+    """The best fit, refitted with a finer integration where the first left too much in an output at its end."""
+    fitted = fit_unknowns(setup, options)
+    error = _integration_error(setup, fitted)
+    if not error.small:
+        finer = choose_integration(with_noise(setup.every_run, fitted.problem), _system(setup, fitted))
+        if described(finer) != error.description:
+            setup = setup.integrated(finer)
+            fitted = fit_unknowns(setup, options, fitted.best.values)
+            error = _integration_error(setup, fitted)
+    return setup, fitted, error
+
+
+def _system(setup: Setup, fitted: Fitted) -> System:
+    return setup.problem.system_at(jnp.asarray(fitted.best.values))
+
+
+def _integration_error(setup: Setup, fitted: Fitted) -> IntegrationError:
+    """Of every run, at the fit."""
+    values = _full_values(setup.every_run, fitted.problem, fitted.best.values, fitted.own_of_held_out)
+    per_run = np.asarray(setup.every_run.per_run_at(jnp.asarray(values[: len(setup.every_run.names)])))
+    return integration_error(with_noise(setup.every_run, fitted.problem), _system(setup, fitted), per_run)
+
+
+def with_noise(problem: Problem, fitted: Problem) -> Problem:
+    """`problem` with the noise that was estimated in `fitted`."""
+    return eqx.tree_at(lambda one: one.noise_sigma, problem, fitted.noise_sigma)
+
+
+def fit_unknowns(setup: Setup, options: Options, initial_guess: np.ndarray | None = None) -> Fitted:
+    """From many starts, or one; then with the noise of the outputs estimated, then by Huber's loss where requested."""
     problem, names, experiment = setup.problem, setup.names, setup.experiment
-    fits = multistart(problem, names, setup.bounds, options.seed, options.starts, options.fit("fitting"))
+    if initial_guess is None:
+        fits = multistart(problem, names, setup.bounds, options.seed, options.starts, options.fit("fitting"))
+    else:
+        task = problem.task(names, setup.bounds, initial_guess)
+        fits = levenberg_marquardt(problem, [task], options.fit("fitting with a finer integration"))
 
     def refit(stage: str) -> Callable[[Problem, np.ndarray], Fit]:
         def fit(changed: Problem, values: np.ndarray) -> Fit:
@@ -156,7 +200,7 @@ def fit_unknowns(setup: Setup, options: Options) -> Fitted:
 def statistics_at(setup: Setup, fitted: Fitted, options: Options) -> Statistics:
     """Whiteness of the residual, and the covariance of the estimates."""
     robust, names = options.robust, setup.names
-    every_run = eqx.tree_at(lambda one: one.noise_sigma, setup.every_run, fitted.problem.noise_sigma)
+    every_run = with_noise(setup.every_run, fitted.problem)
     values = _full_values(every_run, fitted.problem, fitted.best.values, fitted.own_of_held_out)
     everywhere = sensitivity(every_run, values, names)
     at = _of_fit_runs(everywhere, setup)
@@ -217,7 +261,7 @@ def _own_of_held_out(setup: Setup, problem: Problem, values: np.ndarray, options
     runs = [run for run in experiment.runs if run.role != "fit"]
     if not runs or not problem.per_run.names:
         return {}
-    held_out = eqx.tree_at(lambda one: one.noise_sigma, declared_problem(experiment, runs), problem.noise_sigma)
+    held_out = with_integration(with_noise(declared_problem(experiment, runs), problem), problem.batch.integration)
     start = held_out.start_values()
     start[: len(held_out.shared)] = values[: len(held_out.shared)]
     free = held_out.per_run.full_names

@@ -16,9 +16,10 @@ from smajax.core.parameters import set_parameters
 from smajax.data.experiment.record import RUN_STARTS, Run
 from smajax.model.system import System, initial_state
 from smajax.model.types import Scalar, State, Trajectory
-from smajax.simulation.compiled import simulate_compiled
+from smajax.simulation.compiled import compiled_run
 from smajax.simulation.sensors import sensor_output
 from smajax.simulation.simulate import simulate
+from smajax.simulation.steppers import ONE_STEP, Integration
 
 
 class RunBatch(eqx.Module):
@@ -34,6 +35,7 @@ class RunBatch(eqx.Module):
     override_names: tuple[str, ...] = eqx.field(static=True)
     dt: float = eqx.field(static=True)
     outputs: tuple[str, ...] = eqx.field(static=True, default=("reading",))
+    integration: Integration = ONE_STEP  # how finely between two samples
 
     @property
     def runs(self) -> int:
@@ -106,10 +108,11 @@ def predict_run(
     names: Sequence[str],
     dt: Scalar | float,
     outputs: Sequence[str],
+    integration: Integration,
 ) -> Float[Array, "output time"]:
     """Predicted sensor outputs of one run, with its `values` of `names`."""
     here, initial = _started(system, names, values, inputs)
-    run = simulate(here, inputs, dt, initial)
+    run = simulate(here, inputs, dt, initial, integration)
     return jnp.stack([sensor_output(here, run, name) for name in outputs])
 
 
@@ -119,8 +122,25 @@ def simulate_batch(system: System, batch: RunBatch) -> Trajectory:
     for number in range(batch.runs):
         inputs = {name: series[number] for name, series in batch.inputs.items()}
         here, initial = _started(system, batch.override_names, batch.overrides[number], inputs)
-        runs.append(simulate_compiled(here, inputs, batch.dt, initial=initial))
+        runs.append(compiled_run(here, inputs, batch.dt, batch.integration, initial))
     return jax.tree.map(lambda *leaves: np.stack(leaves), *runs)
+
+
+def predict_compiled(
+    system: System, batch: RunBatch, more_names: Sequence[str] = (), more: np.ndarray | None = None
+) -> np.ndarray:
+    """`predict_batch` for a call by itself, outside of `jit`, `vmap` and `grad`: (series, N), numpy."""
+    names = (*batch.override_names, *more_names)
+    values = np.asarray(batch.overrides)
+    if more is not None:
+        values = np.concatenate([values, np.asarray(more)], axis=1)
+    rows = []
+    for number in range(batch.runs):
+        inputs = {name: series[number] for name, series in batch.inputs.items()}
+        here, initial = _started(system, names, jnp.asarray(values[number]), inputs)
+        run = compiled_run(here, inputs, batch.dt, batch.integration, initial)
+        rows += [np.asarray(sensor_output(here, run, name)) for name in batch.outputs]
+    return np.stack(rows)
 
 
 def predict_batch(
@@ -129,5 +149,5 @@ def predict_batch(
     """Predicted sensor outputs of the batch. `more`: each run's values of `more_names`, beside its overrides."""
     names = (*batch.override_names, *more_names)
     values = batch.overrides if more is None else jnp.concatenate([batch.overrides, more], axis=1)
-    one = partial(predict_run, system, names=names, dt=batch.dt, outputs=batch.outputs)
+    one = partial(predict_run, system, names=names, dt=batch.dt, outputs=batch.outputs, integration=batch.integration)
     return jax.vmap(lambda inputs, row: one(inputs, row))(batch.inputs, values).reshape(batch.output.shape[0], -1)

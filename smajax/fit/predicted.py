@@ -18,6 +18,7 @@ from smajax.fit.packed_runs import predict_run
 from smajax.fit.problem import Problem
 from smajax.model.system import System
 from smajax.model.types import Series
+from smajax.simulation.steppers import Integration
 
 MAX_BYTES = 2**28  # of predicted outputs at once: of long runs some points after the others
 FEW = 256  # points up to which derivatives that nobody needs are quicker than compiling a second program without them
@@ -34,6 +35,7 @@ class _Run(eqx.Module):
     override_names: tuple[str, ...] = eqx.field(static=True)
     per_run: tuple[str, ...] = eqx.field(static=True)
     outputs: tuple[str, ...] = eqx.field(static=True)
+    integration: Integration
 
 
 def _runs(problem: Problem) -> list[_Run]:
@@ -47,6 +49,7 @@ def _runs(problem: Problem) -> list[_Run]:
             batch.overrides[run],
             dt,
             *names,
+            batch.integration,
         )
         for run in range(batch.runs)
     ]
@@ -57,7 +60,9 @@ def _predict(run: _Run, values: jax.Array) -> jax.Array:
     count = len(run.shared)
     system = set_vector(run.system, run.shared, values[:count])
     overrides = jnp.concatenate([run.overrides, values[count:]])
-    return predict_run(system, run.inputs, overrides, (*run.override_names, *run.per_run), run.dt, run.outputs)
+    return predict_run(
+        system, run.inputs, overrides, (*run.override_names, *run.per_run), run.dt, run.outputs, run.integration
+    )
 
 
 def _vector(scalars: dict[str, jax.Array], kind: str) -> jax.Array:

@@ -1,8 +1,10 @@
 """Error-controlled steps: a time with held inputs -> the state at its end.
 
 The scheme of order 3 says what a step may be off by; steps that are off by too much are taken again, shorter. A wire that
-heats up alone goes through a tenth of a second at once, and one that has just caught its load takes milliseconds. Not for
-gradients: whether a step is taken again depends on the parameters by jumps, and reverse mode cannot go back through it.
+heats up alone goes through a tenth of a second at once, and one that has just caught its load takes milliseconds.
+
+Derivatives are those of the steps as they were taken: their lengths are held, for whether one is taken again depends on the
+parameters by jumps. In forward mode alone; reverse mode cannot go back through a loop whose length is not known.
 """
 
 from __future__ import annotations
@@ -42,11 +44,11 @@ def _relative(system: System, error: tuple[Scalar, Scalar, Scalar], tolerance: S
 
 
 def advance(
-    system: System, state: State, inputs: Inputs, dt: Scalar, tried: Scalar, tolerance: Scalar
+    system: System, state: State, inputs: Inputs, dt: Scalar, tried: Scalar, tolerance: Scalar, once: bool = False
 ) -> tuple[State, Scalar, Scalar]:
     """(state after `dt` seconds with `inputs` held, the step to begin with next time, how many were taken).
 
-    `tried` (s) is the step to begin with.
+    `tried` (s) is the step to begin with. `once`: as in `step.step`.
     """
     shortest = SHORTEST * dt
 
@@ -57,8 +59,8 @@ def advance(
         last = at.tried >= at.left * (1.0 - 1e-6)
         # Two equal ones in the place of a long and a short one.
         length = jnp.where(last, at.left, jnp.minimum(at.tried, 0.5 * at.left))
-        new, error = step_and_error(system, at.state, inputs, length)
-        worst = _relative(system, error, tolerance)
+        new, error = step_and_error(system, at.state, inputs, length, once)
+        worst = lax.stop_gradient(_relative(system, error, tolerance))
         # A state that is not finite goes to the end at once: no shorter step mends it.
         lost = ~jnp.isfinite(at.state.wire.temperature + at.state.motion.position + at.state.wire.stress)
         length = jnp.where(lost, at.left, length)
@@ -73,6 +75,7 @@ def advance(
         left = jnp.where(good, jnp.where(last, 0.0, at.left - length), at.left)
         return _At(state, left, following, at.taken + 1)
 
+    dt = lax.stop_gradient(dt)
     first = _At(state, dt, jnp.minimum(tried, dt), jnp.zeros_like(dt, int))
     end = lax.while_loop(unfinished, body, first)
     return end.state, end.tried, end.taken

@@ -25,20 +25,20 @@ from smajax.simulation.simulate import (
     simulate,
     trajectory_of,
 )
-from smajax.simulation.steppers import stepper_of
+from smajax.simulation.steppers import Integration, stepper_of
 
 
 class _Request(eqx.Module):
     system: System
     inputs: dict[str, Series]
     dt: Scalar
-    tolerance: Scalar | None
+    integration: Integration
     initial: State | None
 
 
 def _run(request: _Request, _: dict[str, Scalar]) -> Trajectory:
     series = acting_inputs(request.system, request.inputs, request.dt)
-    stepper = stepper_of(request.system, request.dt, request.tolerance)
+    stepper = stepper_of(request.system, request.dt, request.integration)
     return trajectory_of(stepper, series, first_state(request.system, series, request.initial))
 
 
@@ -71,11 +71,24 @@ def simulate_compiled(
     check_bounds(system)
     if tolerance is not None and (not tolerance > 0.0 or not isinstance(system.load, AbstractMovingLoad)):
         raise ValueError(f"`tolerance` is a positive number, for a load that moves; got {tolerance}. Take 1e-4.")
+    return compiled_run(
+        system, inputs, dt, Integration(None if tolerance is None else jnp.asarray(tolerance)), initial, engine
+    )
+
+
+def compiled_run(
+    system: System,
+    inputs: Mapping[str, Series],
+    dt: float,
+    integration: Integration,
+    initial: State | None = None,
+    engine: Engine = "auto",
+) -> Trajectory:
+    """`simulate_compiled` without its checks, integrated as `integration` says."""
     series = {name: jnp.asarray(values, dtype=float) for name, values in inputs.items()}
     if len(next(iter(series.values()))) == 1:  # the start alone: there is nothing to compile
         return jax.tree.map(np.asarray, simulate(system, series, dt, initial))
-    limit = None if tolerance is None else jnp.asarray(tolerance, dtype=float)
-    return run_alone(_run, _Request(system, series, jnp.asarray(dt, dtype=float), limit, initial), engine)
+    return run_alone(_run, _Request(system, series, jnp.asarray(dt, dtype=float), integration, initial), engine)
 
 
 def run_alone(function: Callable[..., Any], model: eqx.Module, engine: Engine) -> Any:

@@ -17,7 +17,7 @@ from smajax.model.types import Scalar, Series, State, Trajectory
 from smajax.simulation.input_delay import acting_inputs
 from smajax.simulation.integrate import Schedule, integrate
 from smajax.simulation.observers import StateTrace
-from smajax.simulation.steppers import FixedStep, Stepper
+from smajax.simulation.steppers import ONE_STEP, Integration, Stepper, stepper_of
 
 # Keeps the arm within 0.05 degrees and the fraction within 1e-3 of the exact solution on the source's rigs, open and
 # closed loop (studies/convergence.py shows error against step).
@@ -127,19 +127,24 @@ def first_state(system: System, series: Mapping[str, Series], initial: State | N
 
 
 def simulate(
-    system: System, inputs: Mapping[str, Series], dt: Scalar | float = DEFAULT_STEP, initial: State | None = None
+    system: System,
+    inputs: Mapping[str, Series],
+    dt: Scalar | float = DEFAULT_STEP,
+    initial: State | None = None,
+    integration: Integration = ONE_STEP,
 ) -> Trajectory:
     """Simulate over the samples of `inputs`, each of shape (n,), SI, `dt` seconds apart.
 
     The result holds the states at t_0 ... t_{n-1}; input i is held from t_i to t_{i+1} (a coupon's inputs are values
     at t_i). `initial` defaults to rest with the first inputs. Raises ValueError for missing or ill-shaped inputs, for one
     that is not finite and a parameter out of its bounds, unless the value is not known yet (`jit`, `vmap`, `grad`).
+    `integration`: how finely between two samples; error-controlled steps have derivatives in forward mode alone.
     """
     check_inputs(system, inputs)
     check_scalars(system, dt, initial)
     check_bounds(system)
     series = acting_inputs(system, {name: jnp.asarray(values, dtype=float) for name, values in inputs.items()}, dt)
-    return trajectory_of(FixedStep(system, dt), series, first_state(system, series, initial))
+    return trajectory_of(stepper_of(system, dt, integration), series, first_state(system, series, initial))
 
 
 def held_inputs(system: System, series: Mapping[str, Series]) -> dict[str, Series]:
@@ -154,9 +159,9 @@ def trajectory_of(stepper: Stepper, series: Mapping[str, Series], state: State) 
     # Every number of the state then has a derivative where the model has one: a scan some of whose numbers gain theirs
     # on the way is traced anew for each, and so is all within it.
     state = jax.tree.map(lambda leaf: leaf + 0.0 * system.start_fraction, state)
-    held = held_inputs(system, series)
+    held, first = held_inputs(system, series), {name: values[0] for name, values in series.items()}
     steps = len(next(iter(held.values())))
-    run = integrate(stepper, stepper.start(state), held, Schedule(steps), (StateTrace(),))
+    run = integrate(stepper, stepper.start(state, first), held, Schedule(steps), (StateTrace(),))
     return trajectory(run.results[0])
 
 

@@ -260,10 +260,10 @@ def step(system: System, state: State, inputs: Inputs, dt: Scalar | float, once:
 
 
 def step_and_error(
-    system: System, state: State, inputs: Inputs, dt: Scalar
+    system: System, state: State, inputs: Inputs, dt: Scalar, once: bool = False
 ) -> tuple[State, tuple[Scalar, Scalar, Scalar]]:
     """The same of a moving load by the scheme of order 3, and what it may be off by: (C, m or rad, m/s or rad/s)."""
-    new, (heat, position, velocity) = _moving_step(system, state, inputs, dt, ORDER_THREE)
+    new, (heat, position, velocity) = _moving_step(system, state, inputs, dt, ORDER_THREE, once)
     capacity = stored_heat(system.wire, (), jnp.ones_like(heat), new.wire.martensite_fraction)
     # Exact where the load moves evenly over the step, which here may be many times as long as the sensor's lag.
     lag = time_constant(system.terms.sensor)

@@ -1,17 +1,34 @@
 """How a system moves on from one sample of its inputs to the next: one fixed step, or as many as the error asks for.
 
-Both are an `advance` of `integrate`, for inputs by channel (SI, held).
+Each is an `advance` of `integrate`, for inputs by channel (SI; held, or of a coupon those at the end).
 """
 
 from __future__ import annotations
 
 import equinox as eqx
+import jax.numpy as jnp
+from jax import lax
 
+from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.system import System
 from smajax.model.types import Inputs, Scalar, State
 from smajax.simulation.adaptive_steps import advance
 from smajax.simulation.integrate import Carry
 from smajax.simulation.step import step
+
+
+class Integration(eqx.Module):
+    """How finely a run is integrated between two samples of its clock; by default one step.
+
+    tolerance: of a moving load, the error of a step, as a share of 1 C and of 1 % strain; None: one step, whatever its error.
+    substeps: of a coupon, whose temperature and stress (or strain) follow straight lines between two samples.
+    """
+
+    tolerance: Scalar | None = None
+    substeps: int = eqx.field(static=True, default=1)
+
+
+ONE_STEP = Integration()
 
 
 class FixedStep(eqx.Module):
@@ -21,8 +38,8 @@ class FixedStep(eqx.Module):
     dt: Scalar | float
     once: bool = eqx.field(static=True, default=False)  # differentiated once at most (`step`)
 
-    def start(self, state: State) -> Carry:
-        """What a run from `state` begins with."""
+    def start(self, state: State, inputs: Inputs) -> Carry:
+        """What a run from `state` begins with; `inputs` are those at its start."""
         return Carry(state)
 
     def __call__(self, carry: Carry, inputs: Inputs) -> Carry:
@@ -35,19 +52,51 @@ class ErrorControlledSteps(eqx.Module):
     system: System
     dt: Scalar
     tolerance: Scalar
+    once: bool = eqx.field(static=True, default=False)
 
-    def start(self, state: State) -> Carry:
+    def start(self, state: State, inputs: Inputs) -> Carry:
         """What a run from `state` begins with: the first step that is tried lasts `dt`."""
-        return Carry(state, self.dt)
+        return Carry(state, lax.stop_gradient(self.dt))
 
     def __call__(self, carry: Carry, inputs: Inputs) -> Carry:
-        state, following, _ = advance(self.system, carry.state, inputs, self.dt, carry.memory, self.tolerance)
+        state, following, _ = advance(
+            self.system, carry.state, inputs, self.dt, carry.memory, self.tolerance, self.once
+        )
         return Carry(state, following)
 
 
-Stepper = FixedStep | ErrorControlledSteps
+class CouponSubsteps(eqx.Module):
+    """So many equal steps in `dt` (s), of a coupon whose inputs follow straight lines from sample to sample."""
+
+    system: System
+    dt: Scalar | float
+    substeps: int = eqx.field(static=True)
+
+    def start(self, state: State, inputs: Inputs) -> Carry:
+        """What a run from `state` begins with; `inputs` are those at its start."""
+        return Carry(state, {name: jnp.asarray(value, dtype=float) for name, value in inputs.items()})
+
+    def __call__(self, carry: Carry, inputs: Inputs) -> Carry:
+        before: Inputs = carry.memory
+
+        def one(state: State, share: Scalar) -> tuple[State, None]:
+            now = {name: before[name] + share * (inputs[name] - before[name]) for name in inputs}
+            return step(self.system, state, now, self.dt / self.substeps), None
+
+        shares = jnp.arange(1, self.substeps + 1) / self.substeps
+        state, _ = lax.scan(one, carry.state, shares)
+        return Carry(state, dict(inputs))
 
 
-def stepper_of(system: System, dt: Scalar, tolerance: Scalar | None, once: bool = False) -> Stepper:
-    """Error-controlled steps where there is a `tolerance`, otherwise fixed ones."""
-    return FixedStep(system, dt, once) if tolerance is None else ErrorControlledSteps(system, dt, tolerance)
+Stepper = FixedStep | ErrorControlledSteps | CouponSubsteps
+
+
+def stepper_of(system: System, dt: Scalar | float, integration: Integration = ONE_STEP, once: bool = False) -> Stepper:
+    """The stepper that `integration` asks for of this load."""
+    if isinstance(system.load, AbstractMovingLoad):
+        if integration.tolerance is None:
+            return FixedStep(system, dt, once)
+        return ErrorControlledSteps(system, jnp.asarray(dt, dtype=float), integration.tolerance, once)
+    return (
+        FixedStep(system, dt, once) if integration.substeps == 1 else CouponSubsteps(system, dt, integration.substeps)
+    )

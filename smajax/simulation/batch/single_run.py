@@ -15,7 +15,7 @@ from smajax.simulation.integrate import AbstractObserver, Carry, Schedule, integ
 from smajax.simulation.measures import SHOWN, AbstractMeasure
 from smajax.simulation.observers import Measures, Status, ValueTrace
 from smajax.simulation.simulate import held_inputs
-from smajax.simulation.steppers import stepper_of
+from smajax.simulation.steppers import Integration, stepper_of
 
 DIFFERENCES = {"degC": "K", "-": "1"}
 Values = dict[str, Scalar]
@@ -95,7 +95,7 @@ def without_slopes(recipe: Recipe, values: Values) -> dict[str, jax.Array]:
     constants = recipe.constants | {name: values[name] for name in recipe.channels}
     acting = acting_inputs(system, recipe.series, recipe.dt)
     first = {**constants, **{name: series[0] for name, series in acting.items()}}
-    stepper = stepper_of(system, recipe.dt, recipe.tolerance, once=bool(recipe.slopes))
+    stepper = stepper_of(system, recipe.dt, Integration(recipe.tolerance), once=bool(recipe.slopes))
 
     def advance(carry: Carry, now: dict[str, Scalar]) -> Carry:
         return stepper(carry, {**constants, **now})
@@ -103,6 +103,6 @@ def without_slopes(recipe: Recipe, values: Values) -> dict[str, jax.Array]:
     traces: list[AbstractObserver] = [ValueTrace(recipe.keep)] if recipe.keep else []
     observers = [*traces, Measures(recipe.measures, recipe.dt, constants, first), Status()]
     schedule = Schedule(recipe.steps, recipe.every, checkpointed=True)
-    start = stepper.start(initial_state(system, first))
+    start = stepper.start(initial_state(system, first), first)
     run = integrate(advance, start, held_inputs(system, acting), schedule, observers)
     return {name: value for result in run.results for name, value in result.items()}
