@@ -22,8 +22,8 @@ from smajax.simulation.steppers import ONE_STEP, Integration
 LARGEST = 0.1  # of an output's noise: the error, rms over a run, that integration may leave in it
 MARGIN = 0.5  # of that, at the start: by the end of a fit its values have moved
 # One step a sample first: it is a scheme of order 2 with two stages, the others are of order 3 with three or more.
-TOLERANCES = (1e-3, 3e-4, 1e-4, 3e-5, 1e-5)
-FINEST = 3e-7  # what the others are measured against
+TOLERANCES = (1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6)
+FINEST = 1e-7  # what the others are measured against
 SUBSTEPS = (1, 2, 4, 8, 16)
 MOST_SUBSTEPS = 64
 

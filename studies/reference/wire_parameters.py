@@ -112,3 +112,13 @@ class DeadWeightParameters(WireParameters):
     martensite_slope: float = 6.89e6
     length: float = 0.537
     damping: float = 20.0  # N s/m
+
+
+@dataclass(frozen=True, kw_only=True)
+class BiasSpringParameters(WireParameters):
+    """Slider on a bias spring; of a wire of its own, so every value that the rig has must be given."""
+
+    slider_mass: float = 0.1  # kg
+    damping: float = 20.0  # N s/m
+    spring_stiffness: float = 100.0  # N/m
+    spring_preload: float = 10.0  # N

@@ -17,9 +17,17 @@ from numpy.typing import ArrayLike
 from studies.reference.event_march import Vector, march
 from studies.reference.loaded_modes import LoadedModes
 from studies.reference.wire_modes import Load, Modes
-from studies.reference.wire_parameters import ArmParameters, DeadWeightParameters, WireParameters
+from studies.reference.wire_parameters import ArmParameters, BiasSpringParameters, DeadWeightParameters, WireParameters
 
-__all__ = ["ArmParameters", "DeadWeightParameters", "WireParameters", "simulate_arm", "simulate_dead_weight"]
+__all__ = [
+    "ArmParameters",
+    "BiasSpringParameters",
+    "DeadWeightParameters",
+    "WireParameters",
+    "simulate_arm",
+    "simulate_bias_spring",
+    "simulate_dead_weight",
+]
 
 Voltage = float | Callable[[float], float]
 Piece = tuple[float, Voltage, Load]
@@ -96,6 +104,29 @@ def simulate_dead_weight(
     pieces = [(end, volts, hung(mass)) for end, volts, mass in segments]
     stress = segments[0][2] * GRAVITY / params.area
     out = _integrate(params, pieces, stress, 0.0, t_eval, rtol, method)
+    return {"position": out.pop("q"), "velocity": out.pop("speed"), **out}
+
+
+def simulate_bias_spring(
+    params: BiasSpringParameters,
+    voltage_segments: Sequence[tuple[float, Voltage]],
+    t_eval: ArrayLike,
+    *,
+    rtol: float = 1e-9,
+    method: str = "DOP853",
+) -> dict[str, Vector]:
+    """Slider pulled by the wire against a preloaded spring: m q'' + b q' + F_0 + k q = A_w stress; starts at rest at t = 0.
+
+    Arguments and results as `simulate_dead_weight`'s, without a mass in the segments.
+    """
+    load = Load(
+        ratio=1.0,
+        inertia=params.slider_mass,
+        damping=params.damping,
+        resistance=lambda q: params.spring_preload + params.spring_stiffness * q,
+    )
+    pieces = [(end, volts, load) for end, volts in voltage_segments]
+    out = _integrate(params, pieces, params.spring_preload / params.area, 0.0, t_eval, rtol, method)
     return {"position": out.pop("q"), "velocity": out.pop("speed"), **out}
 
 

@@ -1,0 +1,98 @@
+"""What integration leaves in the outputs of a fit is below a tenth of their noise, whatever the clock of the log."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from smajax.fit.integration import (
+    LARGEST,
+    choose_integration,
+    described,
+    integration_error,
+    with_integration,
+)
+from smajax.fit.levenberg_marquardt import FitSettings, levenberg_marquardt
+from smajax.fit.predicted import predicted_and_derivatives, predicted_at
+from smajax.fit.problem import Problem
+from smajax.simulation.steppers import ONE_STEP, Integration
+from studies import integration as study
+
+
+@pytest.fixture(scope="module")
+def rigs() -> dict[str, study.Rig]:
+    return {name: make() for name, make in study.RIGS.items()}
+
+
+def _chosen(problem: Problem) -> Problem:
+    return with_integration(problem, choose_integration(problem, problem.system))
+
+
+@pytest.mark.parametrize("name", study.RIGS)
+def test_a_log_of_100_ms_is_integrated_to_a_tenth_of_the_noise(rigs: dict[str, study.Rig], name: str) -> None:
+    """Against the event-aware integration by scipy; one step a sample leaves several times as much."""
+    problem = study._problem(rigs[name], 0.1)
+    one, own = study._error(with_integration(problem, ONE_STEP)), study._error(_chosen(problem))
+    assert own[0] < LARGEST
+    assert one[0] > 5.0 * LARGEST, "the rig does not show what is controlled here"
+
+
+@pytest.mark.parametrize("name", study.RIGS)
+def test_the_error_that_is_reported_is_that_against_the_reference(rigs: dict[str, study.Rig], name: str) -> None:
+    problem = with_integration(study._problem(rigs[name], 0.1), ONE_STEP)
+    reported, exact = integration_error(problem, problem.system), study._error(problem)
+    assert reported.share == pytest.approx(exact[0], rel=0.15)
+    assert not reported.small
+    assert reported.description == "one step a sample"
+
+
+def test_where_one_step_a_sample_is_enough_nothing_finer_is_paid_for(rigs: dict[str, study.Rig]) -> None:
+    problem = study._problem(rigs["dead weight"], 0.005)
+    assert described(choose_integration(problem, problem.system)) == "one step a sample"
+
+
+def test_less_noise_asks_for_a_finer_integration(rigs: dict[str, study.Rig]) -> None:
+    problem = study._problem(rigs["dead weight"], 0.05)
+    quiet = dataclasses.replace(problem, noise_sigma=problem.noise_sigma / 30.0)
+    coarse, fine = (choose_integration(one, one.system) for one in (problem, quiet))
+    assert float(fine.tolerance) < float(coarse.tolerance)
+    assert integration_error(with_integration(quiet, fine), quiet.system).small
+
+
+@pytest.mark.parametrize("name", ["arm", "dead weight"])
+def test_derivatives_of_error_controlled_steps(rigs: dict[str, study.Rig], name: str) -> None:
+    """Those of differences of the same integration, and of fine equal steps, through every change of branch of the run."""
+    problem = with_integration(study._problem(rigs[name], 0.05), Integration(jnp.asarray(1e-5)))
+    fine = study._problem(rigs[name], 0.001)
+    point = problem.start_values()
+    names = [one for one in study.FREE if one in problem.names]
+    tangents = np.eye(len(point))[[problem.names.index(one) for one in names]]
+    _, (slopes,) = predicted_and_derivatives(problem, point[None], tangents[None])
+    _, (exact,) = predicted_and_derivatives(fine, point[None], tangents[None])
+    scale = np.sqrt((exact[:, 0, ::50] ** 2).mean(axis=1))
+    assert (np.sqrt(((slopes[:, 0] - exact[:, 0, ::50]) ** 2).mean(axis=1)) < 0.02 * scale).all()
+    for tangent, slope, size in zip(tangents, slopes, scale, strict=True):
+        step = 1e-4 * tangent * point
+        above, below = predicted_at(problem, [point + step, point - step])
+        difference = (above - below)[0] / (2.0 * step.sum())
+        assert np.sqrt(((difference - slope[0]) ** 2).mean()) < 0.02 * size
+
+
+@pytest.mark.parametrize("name", ["dead weight", "arm"])
+def test_a_refit_of_exact_data_leaves_a_tenth_of_the_noise(rigs: dict[str, study.Rig], name: str) -> None:
+    """Three parameters from 5 % off; data of the scipy integration, without noise, logged every 100 ms."""
+    problem = _chosen(study._problem(rigs[name], 0.1))
+    free = ("convection_coefficient", "specific_heat", "recoverable_strain")
+    truth = problem.start_values()
+    begin = np.array(truth)
+    for one in free:
+        begin[problem.names.index(one)] *= 1.05
+    bounds = {one: (0.5 * truth[k], 2.0 * truth[k]) for one in free for k in [problem.names.index(one)]}
+    (fit,) = levenberg_marquardt(problem, [problem.task(free, bounds, begin)], FitSettings())
+    assert np.sqrt(fit.cost / problem.measured.size) < LARGEST
+    for one in free:
+        k = problem.names.index(one)
+        assert fit.values[k] == pytest.approx(truth[k], rel=1e-3)
