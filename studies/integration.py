@@ -167,9 +167,11 @@ RIGS: dict[str, Callable[[], Rig]] = {
 
 
 def _problem(rig: Rig, clock: float) -> Problem:
-    times = np.arange(round(SECONDS / clock) + 1) * clock
+    times = np.asarray(np.arange(round(SECONDS / clock) + 1) * clock, dtype=np.float64)
     name = rig.system.load.reading[0]
-    run = Run("log", "fit", times, rig.inputs(times), {name: rig.exact(times)}, {}, (), "")
+    run = Run(
+        "log", "fit", times, rig.inputs(times), {name: np.asarray(rig.exact(times), dtype=np.float64)}, {}, (), ""
+    )
     return Problem.build(rig.system, pack([run], clock, parameter_values(rig.system)), rig.noise, False)
 
 
@@ -224,7 +226,7 @@ def measured(rig: Rig, clock: float, compare: bool = True) -> dict[str, Any]:
 def main(fast: bool = False) -> dict[str, list[dict[str, Any]]]:
     """Print the table and keep it as JSON; rows by rig."""
     clocks = (0.02, 0.1) if fast else CLOCKS
-    table = {}
+    table: dict[str, list[dict[str, Any]]] = {}
     print(f"{'rig':12}{'clock':>8}{'one step':>20}{'chosen':>44}{'equal steps':>20}")
     for name, make in RIGS.items():
         rig = make()

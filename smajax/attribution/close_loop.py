@@ -31,7 +31,7 @@ from smajax.attribution.neutral import check_neutral
 from smajax.attribution.outlier_run import outlier_runs
 from smajax.attribution.refusal import refuse_keys_of_identify
 from smajax.attribution.search import search
-from smajax.attribution.step_size_check import step_size_error_of
+from smajax.attribution.step_size_check import integration_error_of
 from smajax.attribution.unknown_term import Lacking, in_place_of, unknown_terms
 from smajax.attribution.verdict import verdict_of
 from smajax.core.progress import Progress, Stage, as_progress, quiet, report_checks
@@ -194,7 +194,7 @@ def findings_of(context: Context, outcome: Outcome, compared: Compared, rejected
     after = parameters_found(job, setting, final, context.start) if final.effects else before
     effects = effects_found(job, setting, final, after, bootstrap_intervals(setting, final, context.seed))
     mistaken = confounders(setting, final, job.fit_runs)
-    step_size_error = step_size_error_of(job, final)
+    integration = integration_error_of(setting, final)
     setting.progress(Stage(WRITING, 1.0))
     verdict = verdict_of(final.effects, residual_after, setting.config)
     lacking, superseded = unknown_terms_of(context, outcome, verdict)
@@ -217,7 +217,7 @@ def findings_of(context: Context, outcome: Outcome, compared: Compared, rejected
         rounds=tuple(setting.rounds),
         explained_variance=setting.explained_variance(final.left_out_rmse),
         step=experiment.step,
-        step_size_error=step_size_error,
+        integration=integration,
         offset=experiment.offset,
         wire=experiment.wire,
         load=experiment.load,

@@ -102,8 +102,9 @@ class AttributionConfig:
     held_out_chance: float = 5.0  # by this over the root of twice their number
     worse_than_base: float = 1.02  # error of a held-out run over the base model's
     faint_p_value: float = 0.01  # corrected for the candidates: a trace below the noise is reported
-    step_error_of_error: float = 0.5  # change at half the step over the error: the model depends on the step
-    step_error_of_noise: float = 0.5  # change at half the step over the noise: a shorter step is advised
+    integration_error_of_error: float = (
+        0.5  # of the model's error on the fit runs: what was fitted may be the integration's
+    )
     large_load_share: float = 0.2  # of the load, wrong or shifting: a size of the bench is as likely to be wrong
     expansion_cancelled: float = 0.3  # share of the preset's expansion to within which one found is its negative
     confounder_mentioned: float = 0.05  # weight from which a confounder is named

@@ -15,6 +15,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 
 from smajax.attribution.config import AttributionConfig
+from smajax.fit.integration import IntegrationError
 from smajax.fit.uncertainty import Remark
 
 Role = Literal["fit", "held-out"]
@@ -328,8 +329,8 @@ class Findings:
     residual_after: ResidualDiagnostics
     rounds: tuple[Round, ...]
     explained_variance: float  # share of the motion in left-out runs that the final model predicts
-    step: float  # s, of the integration
-    step_size_error: float  # SI of the output: by how much halving the step changes what the final model gives
+    step: float  # s, of the log's clock
+    integration: IntegrationError  # of the final model on the fit runs
     offset: bool  # whether each run has its own zero
     wire: str  # presets
     load: str
@@ -346,6 +347,11 @@ class Findings:
     outlier_runs: tuple[OutlierRun, ...] = ()
     config: AttributionConfig = field(default_factory=AttributionConfig)
     provenance: dict[str, str] = field(default_factory=dict)  # versions, seed, data hashes, command, seconds
+
+    @property
+    def integration_error(self) -> float:
+        """What the integration leaves in the output of the final model, SI: root mean square of the worst fit run."""
+        return max(self.integration.rms.values())
 
     @property
     def added(self) -> tuple[EffectFinding, ...]:

@@ -9,6 +9,7 @@ from smajax.core.parameters import parameter_values, parameters
 from smajax.data.experiment.record import Experiment, Run
 from smajax.data.model_catalogue import candidates
 from smajax.fit.base_model import base_model
+from smajax.fit.integration import choose_integration, with_integration
 from smajax.fit.packed_runs import RunBatch, pack
 from smajax.fit.problem import Problem
 from smajax.model.effects.library import LIBRARY
@@ -45,13 +46,16 @@ def job_of(experiment: Experiment) -> Job:
         batch = pack(runs, experiment.step, parameter_values(model))
         return Problem.build(model, batch, experiment.noise_sigma, experiment.offset)
 
-    extent = extent_of(problem_with(declared))
+    declared_problem = problem_with(declared)
+    extent = extent_of(declared_problem)
     names = tuple(name for name in names if LIBRARY[name].candidate.observable(extent))
-    problem = problem_with((*declared, *names))
+    # At the values that the file declares: by the end of a loop the error of the final model is measured and reported.
+    integration = choose_integration(declared_problem, declared_problem.system)
+    problem = with_integration(problem_with((*declared, *names)), integration)
     full = problem.system
     bounds = {entry.name: (entry.low, entry.high) for entry in parameters(full).values()}
     bounds |= {f"{name}.{own}": one for name in names for own, one in LIBRARY[name].candidate.bounds(extent).items()}
     bounds |= {unknown.name: (unknown.low, unknown.high) for unknown in experiment.unknowns}
     others = tuple(run for run in experiment.runs if run.role != "fit")
-    held_out = pack(others, experiment.step, parameter_values(full)) if others else None
+    held_out = pack(others, experiment.step, parameter_values(full), integration) if others else None
     return Job(experiment, runs, problem, held_out, tuple(u.name for u in experiment.unknowns), bounds, names)

@@ -10,12 +10,11 @@ import jax.numpy as jnp
 import numpy as np
 
 from smajax.attribution.cross_validation import Model, Search, Start, base_value
-from smajax.attribution.job import Job
-from smajax.fit.packed_runs import halved, simulate_batch
+from smajax.fit.integration import IntegrationError, integration_error
+from smajax.fit.packed_runs import halved
 from smajax.fit.predicted import predicted_at
 from smajax.fit.problem import Problem
 from smajax.model.effects.library import LIBRARY
-from smajax.model.load.coupon import AbstractCoupon
 
 
 def gain_kept_at_half_step(setting: Search, new: Model, old: Model) -> float:
@@ -43,13 +42,7 @@ def gain_kept_at_half_step(setting: Search, new: Model, old: Model) -> float:
     return (without - cost) / (without - new.cost) if without > new.cost else 0.0
 
 
-def step_size_error_of(job: Job, final: Model) -> float:
-    """By how much the output (rms, worst fit run, SI, offset aside) changes when the step is halved."""
-    if isinstance(job.problem.system.load, AbstractCoupon):
-        return 0.0  # a closed form at each sample
-    batch, values = job.problem.batch, final.values
-    coarse = simulate_batch(job.problem.system_at(jnp.asarray(values)), batch).reading
-    fine = simulate_batch(job.problem.system_at(jnp.asarray(values)), halved(batch)).reading[:, ::2]
-    change, mask = np.asarray(fine - coarse), np.asarray(batch.mask)
-    centred = change - (job.experiment.offset * (change * mask).sum(1) / mask.sum(1))[:, None]
-    return float(np.sqrt(((centred * mask) ** 2).sum(1) / mask.sum(1)).max())
+def integration_error_of(setting: Search, final: Model) -> IntegrationError:
+    """What the integration leaves in the output of the final model on the fit runs."""
+    problem, index = setting.restricted(final.effects)
+    return integration_error(problem, problem.system_at(jnp.asarray(final.values[index])))

@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
@@ -39,6 +40,14 @@ class IntegrationError:
     largest: dict[str, float]
     share: float
     description: str
+
+    def record(self) -> dict[str, Any]:
+        """For JSON."""
+        return {
+            "how": self.description,
+            "outputs": {name: {"rms": rms, "largest": self.largest[name]} for name, rms in self.rms.items()},
+            "largest_rms_over_noise": self.share,
+        }
 
     @property
     def small(self) -> bool:

@@ -42,7 +42,7 @@ class RunBatch(eqx.Module):
         return self.output.shape[0] // len(self.outputs)
 
 
-def pack(runs: Sequence[Run], dt: float, defaults: dict[str, float]) -> RunBatch:
+def pack(runs: Sequence[Run], dt: float, defaults: dict[str, float], integration: Integration = ONE_STEP) -> RunBatch:
     """Pack `runs` (all with the same channels). `defaults` holds a value for every parameter a run overrides.
 
     Raises ValueError when the runs' input channels differ, naming the first run that does.
@@ -73,6 +73,7 @@ def pack(runs: Sequence[Run], dt: float, defaults: dict[str, float]) -> RunBatch
         override_names=names,
         dt=dt,
         outputs=tuple(runs[0].outputs),
+        integration=integration,
     )
 
 

@@ -72,14 +72,7 @@ def record(found: Identified) -> dict[str, Any]:
             }
             for run in found.runs
         },
-        "integration_error": {
-            "how": found.integration.description,
-            "outputs": {
-                name: {"rms": rms, "largest": found.integration.largest[name]}
-                for name, rms in found.integration.rms.items()
-            },
-            "largest_rms_over_noise": found.integration.share,
-        },
+        "integration_error": found.integration.record(),
         "own_of_held_out_runs": found.own_of_held_out,
         **({"posterior": _posterior_record(found.posterior)} if found.posterior is not None else {}),
         "suggestions": [

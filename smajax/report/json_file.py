@@ -170,6 +170,7 @@ def findings_to_json(findings: Findings, narrative: Narrative | None = None) -> 
             "noise_sigma": findings.noise_sigma,
             "noise_how": findings.noise_how,
         },
+        "integration_error": findings.integration.record(),
         "runs": [_run(run) for run in findings.runs],
         "before": {"parameters": {found.name: _parameter(found) for found in findings.before}},
         "after": {"parameters": {found.name: _parameter(found) for found in findings.after}},

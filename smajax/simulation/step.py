@@ -60,6 +60,7 @@ class Scheme(NamedTuple):
     enough: float  # of `Stage`
 
 
+SHORTEST_LAG = 1e-3  # of a step: below, exp(-dt/lag) is zero in double precision
 _TWO, _THREE = 1.0 - 0.5**0.5, 0.435866521508459
 # Alexander 1977: order 2 and 3, L-stable; the stages go forward in time, as a wire with a memory has to.
 ORDER_TWO = Scheme(_TWO, (_TWO, 1.0), (1.0 - _TWO, 0.0), (0.0, 0.0), (0.0, 0.0), enough=1e-4)
@@ -271,7 +272,10 @@ def step_and_error(
         late = new.motion.position
     else:
         behind = lag * (new.motion.position - state.motion.position) / dt
-        late = new.motion.position - behind + (followed(state) - state.motion.position + behind) * jnp.exp(-dt / lag)
+        # Without a lag nothing of the start is left; by the quotient the derivative would be NaN there.
+        lags = lag > SHORTEST_LAG * dt
+        left = jnp.where(lags, jnp.exp(-dt / jnp.where(lags, lag, dt)), 0.0)
+        late = new.motion.position - behind + (followed(state) - state.motion.position + behind) * left
     return _with_reading(system, state, new, late), (heat / capacity, position, velocity)
 
 

@@ -58,6 +58,8 @@ def test_less_noise_asks_for_a_finer_integration(rigs: dict[str, study.Rig]) -> 
     problem = study._problem(rigs["dead weight"], 0.05)
     quiet = dataclasses.replace(problem, noise_sigma=problem.noise_sigma / 30.0)
     coarse, fine = (choose_integration(one, one.system) for one in (problem, quiet))
+    assert fine.tolerance is not None
+    assert coarse.tolerance is not None
     assert float(fine.tolerance) < float(coarse.tolerance)
     assert integration_error(with_integration(quiet, fine), quiet.system).small
 

@@ -17,6 +17,7 @@ from smajax.attribution.findings import (
     Scored,
     Verdict,
 )
+from smajax.fit.integration import IntegrationError
 from smajax.fit.uncertainty import Remark, RemarkKind
 
 NOISE = 2.0e-5  # m
@@ -162,7 +163,7 @@ def made_findings() -> Findings:
         ),
         explained_variance=0.998,
         step=0.02,
-        step_size_error=0.0,
+        integration=IntegrationError({"position": 0.0}, {"position": 0.0}, 0.0, "one step a sample"),
         offset=True,
         wire="flexinol_table_3_2",
         load="dead_weight",

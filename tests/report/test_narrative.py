@@ -35,6 +35,7 @@ from smajax.attribution.findings import (
 )
 from smajax.attribution.unknown.terms import UNKNOWN
 from smajax.core.progress import Event, Message, Result, Stage
+from smajax.fit.integration import IntegrationError
 from smajax.fit.uncertainty import Remark, RemarkKind
 from smajax.report.narrative import narrate, narrated
 from smajax.report.narrative.rounds import reason_text
@@ -68,11 +69,13 @@ def test_what_depends_on_the_step_or_hides_in_the_noise_is_said_at_the_top() -> 
         evidence = {**faint.evidence, "score_p_value_at_the_end": p_value, "score_gain_at_the_end": gain}
         after = dataclasses.replace(made_residual(2e-5, ratio == 1.0), ratio=ratio)
         effects = (dataclasses.replace(faint, evidence=evidence),)
-        return _summary(verdict=verdict, effects=effects, residual_after=after, step_size_error=change)
+        rms = {"position": change}
+        integration = IntegrationError(rms, rms, change / findings.noise_sigma, "one step a sample")
+        return _summary(verdict=verdict, effects=effects, residual_after=after, integration=integration)
 
     adequate, missing = Verdict.ADEQUATE, Verdict.NOT_IN_LIBRARY
-    assert "halving the step" in said(adequate, 0.5, 2.0 * level)
-    assert "halving the step" not in said(adequate, 0.5, 0.1 * level)
+    assert "the integration leaves" in said(adequate, 0.5, 2.0 * level)
+    assert "the integration leaves" not in said(adequate, 0.5, 0.1 * level)
     assert "creep leaves a trace in the score test (p = 1e-9 after 1 candidates)" in said(adequate, 1e-9, 0.0)
     assert "leaves a trace" not in said(adequate, 0.5, 0.0) + said(missing, 1e-9, 0.0)
     assert "but runs left out are not predicted better" in said(adequate, 1e-9, 0.0, gain=0.3)

@@ -81,13 +81,12 @@ def of_a_faint_trace(findings: Findings) -> list[str]:
 def of_the_step(findings: Findings) -> list[str]:
     """A model whose answer depends on the step: where a load sticks and jumps, the step says when."""
     error = max(pooled_rmse(findings.runs, "fit", "after"), findings.noise_sigma)
-    change = findings.step_size_error
-    if not change > findings.config.step_error_of_error * error:
+    change = findings.integration_error
+    if not change > findings.config.integration_error_of_error * error:
         return []
     return [
-        f"Mind: halving the step of {findings.step:g} s changes what the model gives by {error_text(findings, change)}, {change / error:.1f} times its "
-        "error on the fit runs: what was fitted may be the integration's and not the wire's. Take a shorter step under [sampling] "
-        "and run again before you believe it."
+        f"Mind: the integration leaves {error_text(findings, change)} in the output, {change / error:.1f} times the model's error on the fit runs: "
+        "what was fitted may be the integration's and not the wire's. No finer steps settle it where a load sticks and jumps."
     ]
 
 

@@ -97,13 +97,16 @@ def _weak_test(findings: Findings) -> Iterator[str]:
 
 
 def _integration(findings: Findings) -> Iterator[str]:
-    error = findings.step_size_error
+    error = findings.integration_error
     if error > 0.0:
-        large = error > findings.config.step_error_of_noise * findings.noise_sigma
+        large = not findings.integration.small
         yield (
-            f"Anything below {error_text(findings, error)}: by so much the "
-            f"model's output changes when the step of {findings.step:g} s is halved"
-            + (". That is not small beside the noise: take a shorter step." if large else ".")
+            f"Anything below {error_text(findings, error)}: so much of the output is the integration's ({findings.integration.description})"
+            + (
+                ", which is not small beside the noise: where a load sticks and jumps no step settles when."
+                if large
+                else "."
+            )
         )
 
 
