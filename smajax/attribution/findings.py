@@ -367,8 +367,8 @@ class Findings:
         if name in _RENAMED:
             return _warned(name, f"findings.{_RENAMED[name]}", getattr(self, _RENAMED[name]))
         if name in _NARRATED:
-            # By its name: what finds nothing of the report, but for users of the old name.
-            narrated = import_module("smajax.report.narrative").narrate(self)
+            # By the package's public name: nothing here depends on the report, but for users of the old names.
+            narrated = import_module("smajax").narrate(self)
             return _warned(name, f"smajax.report.narrate(findings).{name}", getattr(narrated, name))
         raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
 

@@ -99,7 +99,7 @@ def engine_of(requested: str = "auto") -> Engine:
     named = requested
     for engine, source in ((requested, "engine"), (os.environ.get(VARIABLE) or "auto", VARIABLE)):
         if engine == "lanes" and source == "engine":
-            warnings.warn('`engine="lanes"` is "native" now; it goes in version 0.2', DeprecationWarning, stacklevel=3)
+            warnings.warn('`engine="lanes"` is "native" now; it goes in version 0.3', DeprecationWarning, stacklevel=3)
             return "native"
         if engine not in get_args(Engine):
             raise EngineError(f"{source} is {engine!r}; expected one of {', '.join(get_args(Engine))}.")
