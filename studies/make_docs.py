@@ -47,7 +47,7 @@ def page() -> str:
         "",
         "## Controllers and filters",
         "",
-        "Of the arm (`control_presets.py`). The source prints 10 V and 4 V, P_0, Q and the filter's first guess; gains come",
+        "Of the arm (`control/presets.py`). The source prints 10 V and 4 V, P_0, Q and the filter's first guess; gains come",
         "from the searches in `studies/gains`. What a controller believes of its plant is the plant's own table above.",
     ]
     system = arm()

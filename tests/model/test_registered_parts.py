@@ -1,0 +1,45 @@
+"""What the package registers is complete: an effect changes an equation, a preset says where each of its numbers comes from."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import pytest
+
+from smajax.control.presets import CONTROLLERS
+from smajax.core.parameters import parameters
+from smajax.model.effects.base import AbstractEffect
+from smajax.model.effects.library import _OWN, _wrong
+from smajax.model.preset_sources import ORIGINS
+from smajax.model.presets import _LOADS, WIRES
+from smajax.model.wire.heat import HeatTerm
+
+
+@pytest.mark.parametrize("name", _OWN)
+def test_an_effect_of_the_library_is_held_to_what_a_plug_in_is(name: str) -> None:
+    assert _wrong(name, _OWN[name]) == ""
+
+
+def test_a_misspelt_method_is_a_fault() -> None:
+    latent = _OWN["latent_heat"]
+
+    class Misspelt(AbstractEffect, HeatTerm):
+        effect_name = "misspelt"
+        candidate = dataclasses.replace(latent.candidate, switches=(), initial_guess={})
+
+        def heat_los(self) -> float:
+            return 1.0
+
+    assert "is one misspelt?" in _wrong("misspelt", Misspelt)
+
+
+@pytest.mark.parametrize("name", [*WIRES, *_LOADS])
+def test_a_preset_says_where_its_numbers_come_from(name: str) -> None:
+    made = (WIRES | _LOADS)[name]()
+    entries = parameters(made)
+    missing = sorted(set(entries) - set(ORIGINS.get(name, {})))
+    assert not missing, f"give {name} an entry in ORIGINS of smajax/model/preset_sources.py for {missing}"
+
+
+def test_controllers_are_presets_with_a_main_gain() -> None:
+    assert all(one.main_gain for one in CONTROLLERS.values())
