@@ -6,15 +6,20 @@ row of jumps happens to fall where the log's does, and gains what no wire does: 
 
 from __future__ import annotations
 
+import dataclasses
+
 import jax.numpy as jnp
 import numpy as np
 
 from smajax.attribution.cross_validation import Model, Search, Start, base_value
 from smajax.fit.integration import IntegrationError, integration_error
-from smajax.fit.packed_runs import halved
+from smajax.fit.packed_runs import RunBatch, halved
 from smajax.fit.predicted import predicted_at
 from smajax.fit.problem import Problem
 from smajax.model.effects.library import LIBRARY
+from smajax.simulation.steppers import Integration
+
+MUCH_FINER = 30.0  # tolerances: what a jump gains by chance at one is gone at the other
 
 
 def gain_kept_at_half_step(setting: Search, new: Model, old: Model) -> float:
@@ -36,10 +41,16 @@ def gain_kept_at_half_step(setting: Search, new: Model, old: Model) -> float:
         (fit,), _ = setting.fit([Start(partner, values)], "checking at half the step")
         without = min(without, fit.cost)
     problem, index = setting.restricted(new.effects)
-    fine = Problem.build(problem.system, halved(problem.batch), problem.noise_sigma, problem.offset)
+    fine = Problem.build(problem.system, _finer(problem.batch), problem.noise_sigma, problem.offset)
     misfit = problem.centred(problem.measured - predicted_at(fine, [new.values[index]])[0][:, ::2])
     cost = float(np.sum((np.asarray(misfit) / np.asarray(problem.noise)) ** 2))
     return (without - cost) / (without - new.cost) if without > new.cost else 0.0
+
+
+def _finer(batch: RunBatch) -> RunBatch:
+    """At half the step; error-controlled steps, which half a step alone changes little, at a far smaller tolerance too."""
+    fine, tolerance = halved(batch), batch.integration.tolerance
+    return fine if tolerance is None else dataclasses.replace(fine, integration=Integration(tolerance / MUCH_FINER))
 
 
 def integration_error_of(setting: Search, final: Model) -> IntegrationError:

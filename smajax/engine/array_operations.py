@@ -63,8 +63,23 @@ def at_known_places(name: str, given: list[Value]) -> bool:
     return data is None or all(is_known(one) for number, one in enumerate(given) if number not in data)
 
 
-def moved(text: Text, primitive: Any, params: dict[str, Any], given: list[Value]) -> list[Value]:
-    """What only moves numbers of small arrays about: done with their numbers in the place of themselves."""
+def moved(
+    text: Text, primitive: Any, params: dict[str, Any], given: list[Value], keys: Sequence[bool] = ()
+) -> list[Value]:
+    """What only moves numbers of small arrays about: done with their numbers in the place of themselves.
+
+    `keys`: which of them are random keys, of two words each, along a last axis of which the primitive knows nothing.
+    """
+    if any(keys):
+        words = []
+        for word in (0, 1):
+            own = [in_registers(text, one)[..., word] if key else one for one, key in zip(given, keys, strict=True)]
+            words.append(moved(text, primitive, params, own))
+        pairs = zip(*words, strict=True)
+        return [
+            held([lane for both in zip(one.ravel(), other.ravel(), strict=True) for lane in both], (*one.shape, 2))
+            for one, other in pairs
+        ]
     data = MOVES[primitive.name]
     lanes: list[Lane] = []
     named = []

@@ -12,7 +12,7 @@ import os
 import platform
 from contextlib import suppress
 from functools import cache
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import version
 from pathlib import Path
 
 import jax
@@ -32,7 +32,7 @@ def versions() -> str:
     def one(name: str) -> str:
         try:
             return f"{name} {version(name)}"
-        except PackageNotFoundError:
+        except Exception:  # not there, or with metadata that cannot be read: a message must not fail for it
             return f"{name} (none)"
 
     return ", ".join([f"Python {platform.python_version()}", *map(one, PACKAGES)])

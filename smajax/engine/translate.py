@@ -145,7 +145,8 @@ class _Translation:
         small = all(size_of(one) <= SMALL for one in given)
         small &= all(int(np.prod(one.aval.shape)) <= SMALL for one in equation.outvars)
         if name in MOVES and small and at_known_places(name, given):
-            return moved(self.text, equation.primitive, equation.params, given)
+            keys = [str(one.aval.dtype).startswith("key<") for one in equation.invars]
+            return moved(self.text, equation.primitive, equation.params, given, keys)
         if name in MOVES and len(set(map(only_lane, given[: 1 if MOVES[name] else None]))) == 1:
             lane = only_lane(given[0])
             if lane is not None and name not in ("dynamic_update_slice", "scatter", "split"):

@@ -143,7 +143,8 @@ def fit_within_tolerance(setup: Setup, options: Options) -> tuple[Setup, Fitted,
     fitted = fit_unknowns(setup, options)
     error = _integration_error(setup, fitted)
     if not error.small:
-        finer = choose_integration(with_noise(setup.every_run, fitted.problem), _system(setup, fitted))
+        at_fit = with_noise(setup.every_run, fitted.problem)
+        finer = choose_integration(at_fit, _system(setup, fitted), _per_run(setup, fitted))
         if described(finer) != error.description:
             setup = setup.integrated(finer)
             fitted = fit_unknowns(setup, options, fitted.best.values)
@@ -157,9 +158,14 @@ def _system(setup: Setup, fitted: Fitted) -> System:
 
 def _integration_error(setup: Setup, fitted: Fitted) -> IntegrationError:
     """Of every run, at the fit."""
+    at_fit = with_noise(setup.every_run, fitted.problem)
+    return integration_error(at_fit, _system(setup, fitted), _per_run(setup, fitted))
+
+
+def _per_run(setup: Setup, fitted: Fitted) -> np.ndarray:
+    """Each run's own values at the fit."""
     values = _full_values(setup.every_run, fitted.problem, fitted.best.values, fitted.own_of_held_out)
-    per_run = np.asarray(setup.every_run.per_run_at(jnp.asarray(values[: len(setup.every_run.names)])))
-    return integration_error(with_noise(setup.every_run, fitted.problem), _system(setup, fitted), per_run)
+    return np.asarray(setup.every_run.per_run_at(jnp.asarray(values[: len(setup.every_run.names)])))
 
 
 def with_noise(problem: Problem, fitted: Problem) -> Problem:

@@ -24,7 +24,7 @@ LARGEST = 0.1  # of an output's noise: the error, rms over a run, that integrati
 MARGIN = 0.5  # of that, at the start: by the end of a fit its values have moved
 # One step a sample first: it is a scheme of order 2 with two stages, the others are of order 3 with three or more.
 TOLERANCES = (1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6)
-FINEST = 1e-7  # what the others are measured against
+FINEST = 1e-8  # what the others are measured against
 SUBSTEPS = (1, 2, 4, 8, 16)
 MOST_SUBSTEPS = 64
 
@@ -89,12 +89,20 @@ def _predicted(problem: Problem, system: System, integration: Integration, per_r
     return predict_compiled(system, batch, problem.per_run.names, per_run)
 
 
+def _scale(problem: Problem, mask: np.ndarray) -> np.ndarray:
+    """Noise of every series; where it has none a tenth of its stroke, so that a hundredth of the stroke may be left."""
+    noise, measured = np.asarray(problem.noise)[:, 0], np.asarray(problem.batch.output)
+    high, low = np.where(mask, measured, -np.inf).max(axis=1), np.where(mask, measured, np.inf).min(axis=1)
+    stroke = np.where(mask.any(axis=1), high - low, 0.0)
+    return np.where(noise > 0.0, noise, np.maximum(0.1 * stroke, 1e-300))
+
+
 def _error(problem: Problem, difference: np.ndarray, integration: Integration) -> IntegrationError:
     mask = np.asarray(problem.batch.mask) > 0
     centred = np.where(mask, np.asarray(problem.centred(np.where(mask, difference, 0.0))), 0.0)
     rms = np.sqrt((centred**2).sum(axis=1) / np.maximum(mask.sum(axis=1), 1))
     names = problem.batch.outputs
-    share = float((rms / np.asarray(problem.noise)[:, 0]).max())
+    share = float((rms / _scale(problem, mask)).max())
     by_output = {name: float(rms[k :: len(names)].max()) for k, name in enumerate(names)}
     largest = {name: float(np.abs(centred[k :: len(names)]).max()) for k, name in enumerate(names)}
     # A state that is not finite is as wrong as can be.
@@ -109,12 +117,15 @@ def integration_error(problem: Problem, system: System, per_run: np.ndarray | No
     return _error(problem, _predicted(problem, system, chosen, own) - exact, chosen)
 
 
-def choose_integration(problem: Problem, system: System, largest: float = MARGIN * LARGEST) -> Integration:
+def choose_integration(
+    problem: Problem, system: System, per_run: np.ndarray | None = None, largest: float = MARGIN * LARGEST
+) -> Integration:
     """The cheapest integration that leaves at most `largest` of the noise in every output, at the values of `system`.
 
-    The least error there is where none does: where friction lets a load jump, no step length settles which sample it jumps at.
+    `per_run`: each run's own values, by default those they start from. The least error there is where none leaves so little:
+    where friction lets a load jump, no step length settles which sample it jumps at.
     """
-    own = np.asarray(problem.per_run.start)
+    own = np.asarray(problem.per_run.start if per_run is None else per_run)
     exact = _predicted(problem, system, _reference(system), own)
     best, least = ONE_STEP, np.inf
     for choice in _choices(system):

@@ -13,7 +13,7 @@ from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.system import System
 from smajax.model.types import Inputs, Scalar, State
 from smajax.simulation.adaptive_steps import advance
-from smajax.simulation.integrate import Carry
+from smajax.simulation.integrate import Carry, Schedule, integrate
 from smajax.simulation.step import step
 
 
@@ -79,13 +79,13 @@ class CouponSubsteps(eqx.Module):
     def __call__(self, carry: Carry, inputs: Inputs) -> Carry:
         before: Inputs = carry.memory
 
-        def one(state: State, share: Scalar) -> tuple[State, None]:
+        def advance(at: Carry, share: Scalar) -> Carry:
             now = {name: before[name] + share * (inputs[name] - before[name]) for name in inputs}
-            return step(self.system, state, now, self.dt / self.substeps), None
+            return Carry(step(self.system, at.state, now, self.dt / self.substeps))
 
         shares = jnp.arange(1, self.substeps + 1) / self.substeps
-        state, _ = lax.scan(one, carry.state, shares)
-        return Carry(state, dict(inputs))
+        end = integrate(advance, Carry(carry.state), shares, Schedule(self.substeps)).end
+        return Carry(end.state, dict(inputs))
 
 
 Stepper = FixedStep | ErrorControlledSteps | CouponSubsteps

@@ -69,7 +69,9 @@ def test_a_command_says_that_there_is_no_room_and_goes_on_when_there_is(tmp_path
     out = tmp_path / "out"
     ended = _command("simulate", *WIRE, "--out", out, before="ulimit -f 8")
     assert ended.returncode == 2, ended.stderr
-    assert "File too large: free some space and give the same command again. What was finished is kept." in ended.stderr
+    assert (
+        "File too large: free some space and give the same command again. Finished results are cached." in ended.stderr
+    )
     assert "Traceback" not in ended.stderr
     assert not list(tmp_path.rglob("*.part"))
     assert smajax("simulate", *WIRE, "--out", out).code == 0
@@ -93,7 +95,7 @@ def test_a_folder_that_may_not_be_written_is_said_before_the_work(tmp_path: Path
     inside = 'mount -t tmpfs none "$0" && mkdir "$0/out" && mount -o remount,ro "$0" || exit 99; "$@"'
     for out, words in (
         ("out", "cannot be written to (Read-only file system)"),
-        ("deep/out", "cannot be made (Read-only file"),
+        ("deep/out", "cannot be created (Read-only file"),
     ):
         command = [sys.executable, "-c", code, str(experiment), "--out", str(tmp_path / "disk" / out)]
         told = subprocess.run(
@@ -106,7 +108,7 @@ def test_a_folder_that_may_not_be_written_is_said_before_the_work(tmp_path: Path
 
 def test_a_folder_where_none_can_be_is_said(tmp_path: Path) -> None:
     said = refused("simulate", *WIRE, "--out", "/proc/no/such")
-    assert "--out /proc/no/such cannot be made" in said
+    assert "--out /proc/no/such cannot be created" in said
     (tmp_path / "file").write_text("mine")
     assert "is a file; give the name of a folder" in refused("simulate", *WIRE, "--out", tmp_path / "file" / "out")
 
@@ -177,7 +179,7 @@ prepare()
 import jax
 from smajax.simulation.batch.axes import grid
 from smajax.simulation.batch.chunks import chunks
-from smajax.simulation.batch import run
+from smajax.simulation.batch import run_batch as run
 from smajax.model.presets import build
 system = build("flexinol_table_3_2", "dead_weight", "flexinol_voltage")
 axes = grid(voltage=np.linspace(3.0, 6.0, 512))

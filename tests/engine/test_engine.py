@@ -122,14 +122,20 @@ def test_functions_agree(function):
     np.testing.assert_allclose(by_machine_code(function, x), by_xla(function, x), rtol=1e-14)
 
 
-@pytest.mark.parametrize("function", [jnp.expm1, jnp.log1p, lax.erf_inv], ids=["expm1", "log1p", "erf_inv"])
-def test_functions_agree_near_zero_and_at_their_ends(function):
+# XLA's own logarithm is off by 2e-14 in older versions: what is compared with is exact.
+EXACT = {"expm1": (jnp.expm1, np.expm1), "log1p": (jnp.log1p, np.log1p), "erf_inv": (lax.erf_inv, None)}
+
+
+@pytest.mark.parametrize(("function", "exact"), EXACT.values(), ids=EXACT)
+def test_functions_agree_near_zero_and_at_their_ends(function, exact):
     """Where the plain formula would leave no digit, and where it would be nothing times infinity."""
     ends = [-1.0, 0.0, 1e-300, -1e-12, 1e-5, np.nan]
     ends += [1.0, 1.0 - 1e-15] if function is lax.erf_inv else [np.inf, 709.5, 1e300]
     ends += [-np.inf, -700.0, -1e4] if function is jnp.expm1 else []
     x = np.concatenate([np.linspace(-0.999, 0.999, 500), ends])
-    np.testing.assert_allclose(by_machine_code(function, x), by_xla(function, x), rtol=1e-14)
+    with np.errstate(all="ignore"):
+        wanted = by_xla(function, x) if exact is None else exact(x)
+    np.testing.assert_allclose(by_machine_code(function, x), wanted, rtol=1e-14)
 
 
 @pytest.mark.parametrize("count", [5, 300])

@@ -273,8 +273,8 @@ def _with_terms(named: bool, *others: str, held_out: tuple[float, float] | None 
         kind = UNKNOWN[name]
         return UnknownTerm(
             name,
-            kind.title,
-            kind.equation,
+            kind.candidate.title,
+            kind.candidate.equation,
             kind.symbol,
             kind.state,
             kind.state_unit,

@@ -86,7 +86,7 @@ def of_the_step(findings: Findings) -> list[str]:
         return []
     return [
         f"Mind: the integration leaves {error_text(findings, change)} in the output, {change / error:.1f} times the model's error on the fit runs: "
-        "what was fitted may be the integration's and not the wire's. No finer steps settle it where a load sticks and jumps."
+        "what was fitted may be the integration's and not the wire's."
     ]
 
 
