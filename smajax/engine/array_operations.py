@@ -73,8 +73,8 @@ def moved(
     if any(keys):
         words = []
         for word in (0, 1):
-            own = [in_registers(text, one)[..., word] if key else one for one, key in zip(given, keys, strict=True)]
-            words.append(moved(text, primitive, params, own))
+            halves = [in_registers(text, one)[..., word] if key else one for one, key in zip(given, keys, strict=True)]
+            words.append([in_registers(text, one) for one in moved(text, primitive, params, halves)])
         pairs = zip(*words, strict=True)
         return [
             held([lane for both in zip(one.ravel(), other.ravel(), strict=True) for lane in both], (*one.shape, 2))
