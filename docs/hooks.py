@@ -59,7 +59,9 @@ def place(path: str) -> str:
     if Path(path).suffix == ".png" or any(Path(path).match(one) for one in TAKEN):
         return path
     # A page of its own by a command (`studies/sweep/index.html`) would lie where its README's does.
-    return path.replace("index.html", "page.html") if path.endswith(".html") else f"repository/{path}.md"
+    if path.endswith(".html"):
+        return path.replace("index.html", "page.html")
+    return f"repository/{path.removeprefix('.')}.md"  # a folder that begins with a dot has no place in a site
 
 
 def linked(page: str, text: str) -> list[str]:
