@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 
 import equinox as eqx
@@ -117,13 +117,19 @@ def predict_run(
     return jnp.stack([sensor_output(here, run, name) for name in outputs])
 
 
-def simulate_batch(system: System, batch: RunBatch) -> Trajectory:
-    """One trajectory per run, numpy's arrays of shape (R, N); outside of `jit`, `vmap` and `grad`."""
-    runs = []
+def _compiled_runs(
+    system: System, batch: RunBatch, names: Sequence[str], values: np.ndarray
+) -> Iterator[tuple[System, Trajectory]]:
+    """Each run's system, with its `values` (R, names), and its trajectory."""
     for number in range(batch.runs):
         inputs = {name: series[number] for name, series in batch.inputs.items()}
-        here, initial = _started(system, batch.override_names, batch.overrides[number], inputs)
-        runs.append(compiled_run(here, inputs, batch.dt, batch.integration, initial))
+        here, initial = _started(system, names, jnp.asarray(values[number]), inputs)
+        yield here, compiled_run(here, inputs, batch.dt, batch.integration, initial)
+
+
+def simulate_batch(system: System, batch: RunBatch) -> Trajectory:
+    """One trajectory per run, numpy's arrays of shape (R, N); outside of `jit`, `vmap` and `grad`."""
+    runs = [run for _, run in _compiled_runs(system, batch, batch.override_names, np.asarray(batch.overrides))]
     return jax.tree.map(lambda *leaves: np.stack(leaves), *runs)
 
 
@@ -131,17 +137,11 @@ def predict_compiled(
     system: System, batch: RunBatch, more_names: Sequence[str] = (), more: np.ndarray | None = None
 ) -> np.ndarray:
     """`predict_batch` for a call by itself, outside of `jit`, `vmap` and `grad`: (series, N), numpy."""
-    names = (*batch.override_names, *more_names)
-    values = np.asarray(batch.overrides)
+    names, values = (*batch.override_names, *more_names), np.asarray(batch.overrides)
     if more is not None:
         values = np.concatenate([values, np.asarray(more)], axis=1)
-    rows = []
-    for number in range(batch.runs):
-        inputs = {name: series[number] for name, series in batch.inputs.items()}
-        here, initial = _started(system, names, jnp.asarray(values[number]), inputs)
-        run = compiled_run(here, inputs, batch.dt, batch.integration, initial)
-        rows += [np.asarray(sensor_output(here, run, name)) for name in batch.outputs]
-    return np.stack(rows)
+    runs = _compiled_runs(system, batch, names, values)
+    return np.stack([np.asarray(sensor_output(here, run, name)) for here, run in runs for name in batch.outputs])
 
 
 def predict_batch(
