@@ -1,7 +1,7 @@
 """Machine code on disk, under a key of the program's own text, so that another process need not compile it again.
 
 Where JAX caches its compiled programs (`jax_compilation_cache_dir`, which our commands set), and only there. The key is of
-LLVM's text of the program, the versions of what wrote and compiles it, and the processor: an edited comment compiles
+LLVM's text of the program, the versions of what wrote and compiles it, its options, and the processor: an edited comment compiles
 nothing anew, and whatever changes a program changes its key. What is read is machine code and nothing else.
 """
 
@@ -18,7 +18,7 @@ from pathlib import Path
 import jax
 
 from smajax.core.files import writing
-from smajax.engine.kernel import processor
+from smajax.engine.kernel import COMPILE_OPTIONS, processor
 
 LARGEST = 2**30  # bytes in the folder: beyond, what was not used longest goes
 HEAD = b"smajax program 2\n"
@@ -50,7 +50,8 @@ def folder() -> Path | None:
 def key_of(text: str) -> str:
     """Of a program by its text."""
     packages = versions().split(", ", 1)[1]  # the interpreter has no part in it
-    return hashlib.sha256("\n".join([packages, processor(), text]).encode()).hexdigest()
+    options = ", ".join(f"{name} {value}" for name, value in sorted(COMPILE_OPTIONS.items()))
+    return hashlib.sha256("\n".join([packages, processor(), options, text]).encode()).hexdigest()
 
 
 def load(key: str) -> bytes | None:

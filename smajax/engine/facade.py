@@ -13,14 +13,13 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from typing import Any, Literal, TypeVar, cast, get_args
 
-import equinox as eqx
 import jax
-import jax.numpy as jnp
 import numpy as np
 
 from smajax.engine import xla
+from smajax.engine.arguments import check_arguments, checked_threads, key_of, signature
 from smajax.engine.cache import versions
-from smajax.engine.native import Function, NativeProgram, Traced, is_array
+from smajax.engine.native import Function, NativeProgram, Traced
 from smajax.engine.text import Unsupported
 
 Engine = Literal["auto", "native", "xla"]
@@ -41,29 +40,43 @@ class Program:
     """`function(model, own)` of one run, for many: `program(model, own)`.
 
     What goes wrong while machine code runs is raised under "native"; otherwise XLA takes over for good, with one warning.
+    Raises ValueError for a model or arrays of another kind than it was made for.
     """
 
     def __init__(
-        self, function: Function, alone: bool, native: NativeProgram | None, replaceable: bool = False
+        self,
+        function: Function,
+        model: Any,
+        names: tuple[str, ...],
+        alone: bool,
+        native: NativeProgram | None,
+        replaceable: bool = False,
     ) -> None:
-        """`replaceable`: XLA may stand in for `native`."""
+        """`model` and `names` are what it is made for; `replaceable`: XLA may stand in for `native`."""
         self._function, self._alone, self._replaceable, self.native = function, alone, replaceable, native
+        self._made_for, self._names = signature(model), names
 
     def __call__(self, model: Any, own: dict[str, np.ndarray], threads: int | None = None) -> Any:
         """What the function gives, arrays of numpy, every leaf with one row a run; `own` are arrays of shape (runs,).
 
         `threads` of machine code: by default as many as there are cores.
         """
+        check_arguments(self._made_for, self._names, model, own)
+        threads = available_cores() if threads is None else checked_threads(threads)
         native = self.native
-        if native is not None:
-            try:
-                return native(model, own, threads or available_cores())
-            except Exception as error:
-                if not self._replaceable:
-                    raise
-                self.native = None
-                _warn(error, "failed while it ran")
-        return xla.evaluated(self._function, model, own, self._alone)
+        if native is None:
+            return xla.evaluated(self._function, model, own, self._alone)
+        try:
+            return native(model, own, threads)
+        except Exception as error:
+            if not self._replaceable:
+                raise
+            failure = error
+        # What XLA raises too is the caller's: it is raised, and machine code stays.
+        results = xla.evaluated(self._function, model, own, self._alone)
+        self.native = None
+        _warn(failure, "failed while it ran")
+        return results
 
     def begin(
         self,
@@ -78,6 +91,7 @@ class Program:
 
         `devices`, `block` and `room` (runs that one compilation has room for) are of XLA, `threads` of machine code.
         """
+        check_arguments(self._made_for, self._names, model, own)
         if self.native is None:
             return xla.started(self._function, model, own, devices, block, room)
         pool = ThreadPoolExecutor(1)
@@ -105,17 +119,6 @@ def engine_of(requested: str = "auto") -> Engine:
             raise EngineError(f"{source} is {engine!r}; expected one of {', '.join(get_args(Engine))}.")
         named = engine if named == "auto" else named
     return cast(Engine, named)
-
-
-def kind_of(function: Function, model: Any, names: tuple[str, ...]) -> Hashable:
-    """What a traced program depends on: not on the values of the model's arrays."""
-    arrays, static = eqx.partition(model, is_array)
-    leaves, tree = jax.tree.flatten(arrays)
-    settled, settled_tree = jax.tree.flatten(static)
-    kinds = tuple((leaf.shape, str(leaf.dtype), getattr(leaf, "weak_type", False)) for leaf in leaves)
-    # To Python 1, 1.0 and True are one key; to a traced program they are not.
-    numbers = tuple((type(one), repr(one)) if isinstance(one, bool | int | float | complex) else one for one in settled)
-    return function, tree, settled_tree, numbers, kinds, names, str(jnp.zeros(()).dtype)
 
 
 def cached(made: dict[Hashable, Made], key: Hashable, make: Callable[[], Made]) -> Made:
@@ -148,21 +151,22 @@ def program(
     meant = engine_of(engine)
     if meant == "auto" and devices and devices[0].platform != "cpu":
         meant = "xla"
-    key = (kind_of(function, model, names), alone, meant)
+    key = (key_of(function, model, names), alone, meant)
     return cached(_programs, key, lambda: _made(function, model, names, alone, meant))
 
 
 def _made(function: Function, model: Any, names: tuple[str, ...], alone: bool, engine: Engine) -> Program:
     if engine == "xla":
-        return Program(function, alone, None)
+        return Program(function, model, names, alone, None)
     traced = Traced(function, model, names)  # what goes wrong in here goes wrong by XLA too
     try:
-        return Program(function, alone, NativeProgram(traced, alone), replaceable=engine == "auto")
+        native = NativeProgram(traced, alone)
     except Exception as error:
         if engine == "native":
             raise
         _warn(error, "could not be made")
-        return Program(function, alone, None)
+        return Program(function, model, names, alone, None)
+    return Program(function, model, names, alone, native, replaceable=engine == "auto")
 
 
 def reason(error: BaseException) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import struct
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
@@ -14,6 +15,15 @@ from smajax.engine.text import NAME, Array
 from smajax.engine.translate import Translated
 
 ALIGNED = 64  # bytes
+# Of LLVM; part of the key of a cached program. Every instruction is on a whole vector already, and a step is long enough as
+# it is, so that vectorization and unrolling of loops would only cost time.
+COMPILE_OPTIONS = {
+    "codegen_level": 3,
+    "speed_level": 3,
+    "loop_vectorization": False,
+    "slp_vectorization": False,
+    "loop_unrolling": False,
+}
 
 
 def _machine() -> Any:
@@ -24,7 +34,7 @@ def _machine() -> Any:
     llvm.initialize_native_asmprinter()
     features = ",".join(f"{'+' if has else '-'}{name}" for name, has in sorted(_features().items()))
     return llvm.Target.from_default_triple().create_target_machine(
-        cpu=llvm.get_host_cpu_name(), features=features, opt=3, jit=True
+        cpu=llvm.get_host_cpu_name(), features=features, opt=COMPILE_OPTIONS["codegen_level"], jit=True
     )
 
 
@@ -84,22 +94,62 @@ def compiled(translated: Translated) -> bytes:
     module = llvm.parse_assembly(translated.text)
     module.triple, module.data_layout = machine.triple, str(machine.target_data)
     module.verify()
-    # Every instruction is on a whole vector already, and a step is long enough as it is.
-    options = llvm.create_pipeline_tuning_options(speed_level=3)
-    options.loop_vectorization = options.slp_vectorization = options.loop_unrolling = False
+    options = llvm.create_pipeline_tuning_options(speed_level=COMPILE_OPTIONS["speed_level"])
+    for name in ("loop_vectorization", "slp_vectorization", "loop_unrolling"):
+        setattr(options, name, COMPILE_OPTIONS[name])
     builder = llvm.create_pass_builder(machine, options)
     builder.getModulePassManager().run(module, builder)
     return bytes(machine.emit_object(module))
 
 
+class UnresolvedSymbol(RuntimeError):
+    """Machine code calls functions that this process does not have; to link it would end the process."""
+
+
+def undefined_symbols(code: bytes) -> list[str]:
+    """Names that an object file of the kind ELF (64 bits, little-endian) needs from elsewhere; none for other kinds of file.
+
+    The symbol table is the section of type 2 (SHT_SYMTAB), its entries of 24 bytes, and section 0 (SHN_UNDEF) is that of what
+    is defined elsewhere (System V ABI, chapter 4).
+    """
+    if code[:6] != b"\x7fELF\x02\x01":
+        return []
+    (headers,) = struct.unpack_from("<Q", code, 0x28)
+    size, count = struct.unpack_from("<HH", code, 0x3A)
+    sections = [struct.unpack_from("<IIQQQQII", code, headers + number * size) for number in range(count)]
+    names = []
+    for _, kind, _, _, start, length, link, _ in sections:
+        if kind != 2:
+            continue
+        texts = sections[link][4]
+        for place in range(start, start + length, 24):
+            name, _, _, section = struct.unpack_from("<IBBH", code, place)
+            if name and section == 0:
+                names.append(code[texts + name : code.index(b"\0", texts + name)].decode())
+    return sorted(names)
+
+
+def _check_symbols(code: bytes) -> None:
+    """Raise UnresolvedSymbol for functions that are nowhere in the process: LLVM's linker would end it."""
+    import llvmlite.binding as llvm
+
+    missing = [name for name in undefined_symbols(code) if not llvm.address_of_symbol(name)]
+    if missing:
+        raise UnresolvedSymbol(
+            f"machine code calls {', '.join(missing)}, which neither this process nor its mathematical library has; expected "
+            "functions of the C library alone. Take another version of llvmlite, or SMAJAX_ENGINE=xla."
+        )
+
+
 class Kernel:
-    """Machine code as a function of whole arrays. Threads share nothing but what they read."""
+    """Machine code as a function of whole arrays. Threads share nothing but what they read. Raises UnresolvedSymbol."""
 
     def __init__(self, code: bytes, lanes: int, results: Sequence[Array], scratch: int) -> None:
         import llvmlite.binding as llvm
 
         self._lanes, self._results, self.scratch = lanes, tuple(results), scratch
         self._engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _machine())
+        _check_symbols(code)  # after the compiler, which makes the process's own functions known
         self._engine.add_object_file(llvm.ObjectFileRef.from_data(code))
         self._engine.finalize_object()
         pointer, number = ctypes.c_void_p, ctypes.c_int64

@@ -12,6 +12,7 @@ import numpy as np
 
 from smajax.core.compiling import compiling
 from smajax.engine import cache
+from smajax.engine.arguments import is_array
 from smajax.engine.kernel import Kernel, compiled, divides_slowly, has_wide_vectors, vector_bits
 from smajax.engine.translate import VECTORS, Translated, translate
 
@@ -103,11 +104,6 @@ def alike(series: Sequence[np.ndarray]) -> np.ndarray:
         for bit in range(bits):
             code |= ((rank >> bit) & 1) << (bit * len(varied) + place)
     return np.argsort(code, kind="stable")
-
-
-def is_array(leaf: Any) -> bool:
-    """Whether a leaf of a model is given to the compiled program, and not part of it."""
-    return isinstance(leaf, jax.Array | np.ndarray)
 
 
 def _is_key(leaf: Any) -> bool:

@@ -15,7 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from smajax.engine import cache, facade, native
+from smajax.engine import cache, facade, kernel, native
 from smajax.model.presets import build
 from smajax.model.system import System
 from smajax.model.types import Trajectory
@@ -144,6 +144,14 @@ def test_a_program_of_other_versions_is_not_used(programs: Path, monkeypatch: py
     _run()
     assert len(list(programs.iterdir())) == 2
     assert cache.key_of("text") != first.name
+
+
+def test_a_program_of_other_compile_options_is_not_used(programs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    _run()
+    facade._programs.clear()
+    monkeypatch.setitem(kernel.COMPILE_OPTIONS, "speed_level", 2)
+    _run()
+    assert len(list(programs.iterdir())) == 2
 
 
 @pytest.mark.parametrize("place", [None, "gs://bucket/programs"])

@@ -16,7 +16,17 @@ import numpy as np
 import pytest
 
 from smajax.data.open_experiment import open_experiment
-from smajax.engine import EngineError, EngineWarning, Unsupported, arithmetic, cache, jax_versions, native, translate
+from smajax.engine import (
+    EngineError,
+    EngineWarning,
+    Unsupported,
+    arithmetic,
+    cache,
+    jax_versions,
+    kernel,
+    native,
+    translate,
+)
 from smajax.engine import program as compiled_program
 from smajax.engine.facade import _programs
 from smajax.fit.experiment_problem import declared_problem
@@ -196,6 +206,74 @@ def test_what_fails_while_machine_code_runs_is_done_by_xla(beside: bool, monkeyp
         np.testing.assert_allclose(run("auto"), values + 1.0)
     with pytest.raises(RuntimeError, match="out of room"):
         run("native")
+
+
+@pytest.mark.usefixtures("forgetful")
+@pytest.mark.parametrize("engine", ["auto", "native", "xla"])
+@pytest.mark.parametrize(
+    ("model", "own", "message"),
+    [
+        (
+            np.zeros(4),
+            {"a": np.arange(3.0)},
+            r"Leaf 0 of the model is an array of the shape \(4,\), float64; .* \(3,\)",
+        ),
+        (np.zeros(3, np.float32), {"a": np.arange(3.0)}, "float32; the program was made for .* float64"),
+        (2.5, {"a": np.arange(3.0)}, "is the number 2.5; the program was made for an array"),
+        ((np.zeros(3), np.zeros(3)), {"a": np.arange(3.0)}, "has another structure"),
+        (np.zeros(3), {"b": np.arange(3.0)}, r"named \['b'\]; the program was made for \['a'\]"),
+        (np.zeros(3), {"a": np.zeros((3, 2))}, r"shapes \{'a': \(3, 2\)\}; expected one number a run"),
+        (np.zeros(3), {"a": np.zeros(0)}, "expected one number a run"),
+    ],
+)
+def test_arguments_of_another_kind_than_it_was_made_for(engine: Any, model: Any, own: Any, message: str) -> None:
+    """Machine code would read beyond the end of an array; no engine takes the blame for it."""
+    made = compiled_program(_sum, np.zeros(3), ("a",), engine=engine)
+    native_before = made.native
+    with pytest.raises(ValueError, match=message):
+        made(model, own)
+    with pytest.raises(ValueError, match=message):
+        made.begin(model, own, 1, tuple(jax.local_devices()), 8, 8)
+    assert made.native is native_before
+    np.testing.assert_allclose(made(np.ones(3), {"a": np.arange(2.0)})[1], np.full(3, 2.0))
+
+
+@pytest.mark.usefixtures("forgetful")
+def test_an_error_of_the_caller_leaves_machine_code_in_place(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What no engine can do is the caller's error: it is raised as it is, and the next call runs machine code."""
+    made = compiled_program(_sum, jnp.asarray(1.0), ("a",))
+    assert made.native is not None
+    texts: Any = {"a": np.array(["one", "two"])}
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with pytest.raises(ValueError, match="could not convert"):
+            made(jnp.asarray(1.0), texts)
+        with pytest.raises(ValueError, match="`threads` is 'all'; expected a whole number"):
+            made(jnp.asarray(1.0), {"a": np.ones(2)}, threads="all")  # type: ignore[arg-type]
+    assert made.native is not None
+    with pytest.raises(TypeError, match="hold a value that has no hash"):
+        compiled_program(_sum, jnp.asarray(1.0), ["a"])  # type: ignore[arg-type]
+
+
+@pytest.mark.usefixtures("forgetful")
+def test_a_symbol_that_is_nowhere_does_not_end_the_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    """LLVM's linker ends the process for it; under "auto" XLA runs the program, under "native" it is an error."""
+    import llvmlite.binding as llvm
+
+    def nowhere(_: Any) -> bytes:
+        text = "declare double @no_such_function(double)\ndefine double @runs(double %x) {\n"
+        text += "  %y = call double @no_such_function(double %x)\n  ret double %y\n}\n"
+        return bytes(kernel._machine().emit_object(llvm.parse_assembly(text)))
+
+    if not sys.platform.startswith("linux"):
+        pytest.skip("object files of other systems are not read")
+    monkeypatch.setattr(native, "compiled", nowhere)
+    monkeypatch.setattr(cache, "folder", lambda: None)
+    with pytest.raises(kernel.UnresolvedSymbol, match="calls no_such_function, which"):
+        compiled_program(_sum, jnp.asarray(1.0), ("a",), engine="native")
+    with pytest.warns(EngineWarning, match="no_such_function"):
+        made = compiled_program(_sum, jnp.asarray(1.0), ("a",))
+    np.testing.assert_allclose(made(jnp.asarray(1.0), {"a": np.arange(3.0)}), np.arange(3.0) + 1.0)
 
 
 @pytest.mark.usefixtures("forgetful")

@@ -14,7 +14,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from smajax.engine import Engine, available_cores, program
-from smajax.engine.facade import cached, kind_of
+from smajax.engine.arguments import key_of
+from smajax.engine.facade import cached
 from smajax.engine.xla import block_size, rounded
 from smajax.simulation.batch.axes import Axes
 
@@ -28,7 +29,7 @@ _shapes: dict[Hashable, Any] = {}
 def result_shapes(function: Function, model: Any, axes: Axes) -> Any:
     """Shapes and kinds of what one run gives; traced once for each kind of arguments."""
     one = {name: jnp.zeros(()) for name in axes.names}
-    key = kind_of(function, model, tuple(axes.names))
+    key = key_of(function, model, tuple(axes.names))
     return cached(_shapes, key, lambda: eqx.filter_eval_shape(function, model, one))
 
 
