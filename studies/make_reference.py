@@ -133,7 +133,7 @@ def effects() -> str:
         effect.__module__ for equation in EQUATIONS for effect in own.values() if effect.candidate.equation == equation
     )
     lines += ["", "## Their classes"]
-    first = [f"smajax.model.effects.{name}" for name in ("base", "candidate", "grouping", "library")]
+    first = [f"smajax.model.effects.{name}" for name in ("base", "candidate", "prior_width", "grouping", "library")]
     for module in (*first, "smajax.model.extended", *modules):
         lines += ["", f"::: {module}"]
     return "\n".join(lines) + "\n"

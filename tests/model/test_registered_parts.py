@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import pytest
 
 from smajax.control.presets import CONTROLLERS
 from smajax.core.parameters import parameters
 from smajax.model.effects.base import AbstractEffect
+from smajax.model.effects.candidate import Width
 from smajax.model.effects.library import _OWN, _wrong
 from smajax.model.preset_sources import ORIGINS
 from smajax.model.presets import _LOADS, WIRES
@@ -25,12 +27,33 @@ def test_a_misspelt_method_is_a_fault() -> None:
 
     class Misspelt(AbstractEffect, HeatTerm):
         effect_name = "misspelt"
-        candidate = dataclasses.replace(latent.candidate, switches=(), initial_guess={})
+        candidate = dataclasses.replace(latent.candidate, switches=(), initial_guess={}, widths={})
 
         def heat_los(self) -> float:
             return 1.0
 
     assert "is one misspelt?" in _wrong("misspelt", Misspelt)
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"prior_class": "weather"}, "is of the class 'weather'; expected one of material, bench, event"),
+        ({"widths": {"entalpy": Width(1.0, "")}}, "has a width of what is none of its parameters: entalpy"),
+        ({"widths": {"enthalpy": Width(0.0, "")}}, "for enthalpy; expected a sigma above 0"),
+        (
+            {"widths": {"enthalpy": Width(1.0, "", of="hour")}},  # type: ignore[arg-type]
+            "'stroke', 'increment', 'run', 'load', '1/run', 'stroke/run'",
+        ),
+    ],
+)
+def test_a_prior_that_cannot_be_read_is_a_fault(changed: dict[str, Any], message: str) -> None:
+    latent = _OWN["latent_heat"]
+
+    class Changed(latent):  # type: ignore[misc, valid-type]
+        candidate = dataclasses.replace(latent.candidate, **changed)
+
+    assert message in _wrong("latent_heat", Changed)
 
 
 @pytest.mark.parametrize("name", [*WIRES, *_LOADS])

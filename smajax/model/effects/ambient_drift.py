@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Candidate
+from smajax.model.effects.candidate import Candidate, Width
 from smajax.model.types import Scalar
 from smajax.model.wire.heat import HeatTerm
 
@@ -26,6 +26,10 @@ class AmbientDrift(AbstractEffect, HeatTerm):
         sentence="The air around the wire warms up (or cools) while a run lasts, as in a closed box.",
         switches=("rate",),
         initial_guess={"rate": 0.02},
+        prior_class="event",
+        widths={
+            "rate": Width(2.0, "a closed room or box beside a heated wire: 1 to 3 K while a run lasts", of="1/run"),
+        },
     )
 
     def ambient_shift(self, time: Scalar) -> Scalar | float:

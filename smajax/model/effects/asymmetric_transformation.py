@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Candidate
+from smajax.model.effects.candidate import Candidate, Width
 from smajax.model.types import Scalar
 from smajax.model.wire.kinetics_terms import ShapeTerm
 
@@ -36,6 +36,15 @@ class AsymmetricTransformation(AbstractEffect, ShapeTerm):
         "reverse, and differently on heating and on cooling.",
         switches=("heating", "cooling"),
         initial_guess={"heating": 0.2, "cooling": 0.2},
+        prior_class="material",
+        widths={
+            "heating": Width(
+                0.4, "calorimetry of NiTi: peaks with one steep and one slow side (Otsuka and Wayman 1998)"
+            ),
+            "cooling": Width(
+                0.4, "calorimetry of NiTi: peaks with one steep and one slow side (Otsuka and Wayman 1998)"
+            ),
+        },
     )
 
     def heating_shape(self, z: Scalar, remaining: Scalar) -> Scalar:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Literal, NamedTuple, Protocol, get_args
 
 from smajax.model.drive.base import AbstractDrive
@@ -14,6 +15,19 @@ from smajax.model.wire.wire import Wire
 Equation = Literal["heat", "electrical", "kinetics", "constitutive", "mechanics", "sensor", "input"]
 EQUATIONS: tuple[str, ...] = get_args(Equation)
 
+# material: physics that every wire has. bench: a property that some wires or benches have and others have not (friction,
+# lag, gain, leads, supply, training). event: what happens in some runs, or a wrong record.
+PriorClass = Literal["material", "bench", "event"]
+PRIOR_CLASSES: tuple[str, ...] = get_args(PriorClass)
+# Prior odds that the runs of an experiment need one given effect. There are some fifty candidates: with the same odds for
+# all of them, two or three per experiment would be odds of 0.05. A property of every wire gets twice that, one that a bench
+# may lack about half. An event explains nothing but the run it happens in and can imitate anything there, so it needs
+# evidence thirty times as strong (3.5 in its natural logarithm) as a property of every wire.
+PRIOR_ODDS: Mapping[PriorClass, float] = MappingProxyType({"material": 0.1, "bench": 0.03, "event": 0.003})
+
+Scale = Literal["", "stroke", "increment", "run", "load", "1/run", "stroke/run"]
+SCALES: tuple[str, ...] = get_args(Scale)
+
 
 class Extent(NamedTuple):
     """How far the runs of an experiment go."""
@@ -21,6 +35,24 @@ class Extent(NamedTuple):
     seconds: float  # length of one
     stroke: float  # between the smallest and the largest reading of all, SI
     increment: float  # from one level to the next where the readings lie on levels, SI; 0 where they do not
+
+
+class Width(NamedTuple):
+    """How far a coefficient lies from its base value, over the wires and benches that have the effect.
+
+    `of` says what `sigma` and `base` are multiplied by: "stroke" is the range of all readings (m, rad on an arm, - for a
+    strain), "increment" that of the readings, "run" the length of a run (s), "load" the load's force at rest at its start
+    (N, N m on an arm), "1/run" one over the length of a run and "stroke/run" the stroke over it, for rates; "" is nothing.
+    """
+
+    sigma: (
+        float  # standard deviation, in the coefficient's unit over that of `of`; -, of its logarithm, where logarithmic
+    )
+    source: str  # where the number comes from
+    of: Scale = ""
+    logarithmic: bool = False
+    # Middle of the prior, times `of`; None for the base value of a switch and the initial guess of any other coefficient.
+    base: float | None = None
 
 
 class Actuator(Protocol):
@@ -80,3 +112,7 @@ class Candidate:
     # Ranges of coefficients, positive, from all over which a refit begins where the misfit has many local minima; of
     # the switches as the score test has them.
     start_ranges: Callable[[Mapping[str, float]], dict[str, tuple[float, float]]] = _no_ranges
+    # What is known before the runs: the odds that they need it (`PRIOR_ODDS`), and how large its coefficients are where
+    # it is present. `prior_width.width_of` has the width of those that are not listed.
+    prior_class: PriorClass = "bench"
+    widths: Mapping[str, Width] = field(default_factory=dict)

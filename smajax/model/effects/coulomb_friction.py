@@ -6,9 +6,16 @@ from typing import ClassVar
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Candidate
+from smajax.model.effects.candidate import Candidate, Width
 from smajax.model.load.friction import PRESLIDING, FrictionTerm
 from smajax.model.types import Scalar
+
+LIMIT_WIDTH = Width(0.1, "guides and bearings: 0.02 to 0.2 of what they carry (machine-element handbooks)", of="load")
+BEND_WIDTH = Width(
+    1.0,
+    "presliding of rough contacts: micrometres to a tenth of a millimetre (Dahl 1968; Canudas de Wit et al. 1995)",
+    logarithmic=True,
+)
 
 
 def presliding_parameter() -> Scalar:
@@ -33,6 +40,11 @@ class CoulombFriction(AbstractEffect, FrictionTerm):
         "change of direction.",
         switches=("limit",),
         initial_guess={"limit": 0.1, "bend": PRESLIDING},
+        prior_class="bench",
+        widths={
+            "limit": LIMIT_WIDTH,
+            "bend": BEND_WIDTH,
+        },
     )
 
     def friction_limit(self, load_at_rest: Scalar) -> Scalar:

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Candidate, Extent
+from smajax.model.effects.candidate import Candidate, Extent, Width
 from smajax.model.types import Scalar, WireState
 from smajax.model.wire.constitutive import ConstitutiveTerm
 from smajax.model.wire.history import DURATION, HistoryTerm, following
@@ -45,6 +45,18 @@ class Creep(AbstractEffect, HistoryTerm, ConstitutiveTerm):
         initial_guess={"austenite": 5e-12, "martensite": 5e-12, "time_constant": 5.0},
         needs_time=True,
         grid=_grid,
+        prior_class="bench",
+        widths={
+            "austenite": Width(
+                5e-12,
+                "NiTi at rest creeps by a few per cent up to a third of its elastic strain, 1/E_A = 1.3e-11 1/Pa (Table 3.2)",
+            ),
+            "martensite": Width(
+                1e-11,
+                "NiTi at rest creeps by a few per cent up to a third of its elastic strain, 1/E_M = 3.6e-11 1/Pa (Table 3.2)",
+            ),
+            "time_constant": Width(1.5, "creep after a step of load: from a second to a minute", logarithmic=True),
+        },
     )
 
     def _settled(self, at: WireState) -> Scalar:

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 from smajax.core.parameters import parameter
 from smajax.model.drive.inputs import CommandTerm
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Actuator, Candidate
+from smajax.model.effects.candidate import Actuator, Candidate, Width
 from smajax.model.types import Scalar
 
 
@@ -37,6 +37,12 @@ class DeadZone(AbstractEffect, CommandTerm):
         switches=("threshold",),
         initial_guess={"threshold": 0.02},
         applies=_applies,
+        prior_class="bench",
+        widths={
+            "threshold": Width(
+                0.1, "output stages: millivolts to the 0.6 V of a diode; a duty of some per cent (data sheets)"
+            ),
+        },
     )
 
     def command(self, channel: str, value: Scalar) -> Scalar:

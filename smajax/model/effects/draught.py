@@ -6,8 +6,8 @@ from typing import ClassVar
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Candidate, Extent
-from smajax.model.effects.change import changed, during
+from smajax.model.effects.candidate import Candidate, Extent, Width
+from smajax.model.effects.change import STEP_WIDTH, TIME_WIDTH, changed, during
 from smajax.model.types import Scalar
 from smajax.model.wire.heat import HeatState, HeatTerm, convection
 from smajax.model.wire.wire import Wire
@@ -44,6 +44,16 @@ class Draught(AbstractEffect, HeatTerm):
         switches=("change",),
         initial_guess={"change": 0.1, "time": 2.0, "lasting": NEVER_ENDS, "width": 1.0},
         grid=_grid,
+        prior_class="event",
+        widths={
+            "change": Width(
+                0.3,
+                "a thin wire loses 30 % more in air of 0.05 m/s than in still air (Hilpert and Morgan, in Incropera and DeWitt)",
+            ),
+            "time": TIME_WIDTH,
+            "lasting": Width(2.0, "a twentieth of a run or to its end", logarithmic=True, of="run", base=1.0),
+            "width": STEP_WIDTH,
+        },
     )
 
     def heat_loss(self, wire: Wire, at: HeatState) -> Scalar | float:

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Candidate
+from smajax.model.effects.candidate import Candidate, Width
 from smajax.model.types import Scalar, WireState
 from smajax.model.wire.history import TRANSFORMED, HistoryTerm, transformed
 from smajax.model.wire.kinetics import cooling_width, heating_width
@@ -35,6 +35,14 @@ class DriftingTemperatures(AbstractEffect, HistoryTerm, RangeTerm):
         sentence="The wire is not yet trained: from cycle to cycle it transforms at other temperatures, ever less so.",
         switches=("heating", "cooling"),
         initial_guess={"heating": 1.0, "cooling": 1.0, "cycles": 5.0},
+        prior_class="bench",
+        widths={
+            "heating": Width(5.0, "functional fatigue of NiTi: A_s and A_f move by up to 10 K (Eggeler et al. 2004)"),
+            "cooling": Width(5.0, "functional fatigue of NiTi: M_s and M_f move by 5 to 20 K (Eggeler et al. 2004)"),
+            "cycles": Width(
+                1.2, "shakedown of NiTi wires: a few to some tens of cycles (Eggeler et al. 2004)", logarithmic=True
+            ),
+        },
     )
 
     def history_at_start(self, at: WireState) -> dict[str, Scalar]:

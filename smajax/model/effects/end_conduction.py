@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Candidate
+from smajax.model.effects.candidate import Candidate, Width
 from smajax.model.types import Scalar
 from smajax.model.wire.kinetics_terms import ShapeTerm
 from smajax.model.wire.shape import Cosine
@@ -48,6 +48,19 @@ class EndConduction(AbstractEffect, ShapeTerm):
         "does, and the ends turn back first.",
         switches=("share",),
         initial_guess={"share": 0.05, "above_air_heating": 5.0, "above_air_cooling": 3.0},
+        prior_class="material",
+        widths={
+            "share": Width(
+                0.1,
+                "6/(mu l_0) with k = 8.6 to 18 W/(m K) (NiTi data sheets): 0.04 for 150 um and 250 mm, 0.16 for 500 um and 200 mm",
+            ),
+            "above_air_heating": Width(
+                0.5, "its definition, of the wires of Table 3.2 and of data sheets: 3 to 8", logarithmic=True
+            ),
+            "above_air_cooling": Width(
+                0.5, "its definition, of the wires of Table 3.2 and of data sheets: 2 to 5", logarithmic=True
+            ),
+        },
     )
 
     def _mixed(self, z: Scalar, remaining: Scalar, distance: Scalar, left: Callable[[Scalar], Scalar]) -> Scalar:

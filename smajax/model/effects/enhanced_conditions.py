@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Actuator, Candidate
+from smajax.model.effects.candidate import Actuator, Candidate, Width
 from smajax.model.types import Scalar
 from smajax.model.wire.conditions import AbstractConditions, Enhanced
 from smajax.model.wire.kinetics_terms import PopulationTerm
@@ -41,6 +41,10 @@ class EnhancedConditions(AbstractEffect, PopulationTerm):
         switches=("share",),
         initial_guess={"share": 0.5},
         applies=_applies,
+        prior_class="material",
+        widths={
+            "share": Width(0.5, "all of a wire follows them (Elahinia 2004, eq. 3.17 and 3.18)"),
+        },
     )
 
     def second_conditions(self) -> tuple[AbstractConditions, Scalar]:

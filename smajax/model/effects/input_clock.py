@@ -7,7 +7,7 @@ from typing import ClassVar
 from smajax.core.parameters import parameter
 from smajax.model.drive.inputs import InputLagTerm
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Actuator, Candidate
+from smajax.model.effects.candidate import Actuator, Candidate, Width
 from smajax.model.load.coupon import AbstractCoupon
 from smajax.model.types import Scalar
 
@@ -36,6 +36,10 @@ class InputClock(AbstractEffect, InputLagTerm):
         initial_guess={"rate": 0.005},
         needs_time=True,
         applies=_applies,
+        prior_class="event",
+        widths={
+            "rate": Width(3e-3, "crystals: 1e-4 and less (data sheets); loops timed by software: up to 1 %"),
+        },
     )
 
     def input_lag(self, time: Scalar) -> Scalar | float:

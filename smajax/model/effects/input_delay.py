@@ -7,7 +7,7 @@ from typing import ClassVar
 from smajax.core.parameters import parameter
 from smajax.model.drive.inputs import InputLagTerm
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Actuator, Candidate
+from smajax.model.effects.candidate import Actuator, Candidate, Width
 from smajax.model.load.coupon import AbstractCoupon
 from smajax.model.types import Scalar
 
@@ -34,6 +34,10 @@ class InputDelay(AbstractEffect, InputLagTerm):
         initial_guess={"delay": 0.03},
         needs_time=True,
         applies=_applies,
+        prior_class="event",
+        widths={
+            "delay": Width(0.03, "buffers of loggers, serial lines and video: a sample to 0.1 s"),
+        },
     )
 
     def input_lag(self, time: Scalar) -> Scalar | float:

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 from smajax.core.parameters import parameter
 from smajax.model.drive.inputs import CommandTerm
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Actuator, Candidate
+from smajax.model.effects.candidate import Actuator, Candidate, Width
 from smajax.model.types import Scalar
 
 
@@ -34,6 +34,11 @@ class InputLevel(AbstractEffect, CommandTerm):
         switches=("gain", "offset"),
         initial_guess={"gain": 0.03, "offset": 0.02},
         applies=_applies,
+        prior_class="event",
+        widths={
+            "gain": Width(0.05, "shunts, dividers and amplifiers out of calibration: 1 to 10 %"),
+            "offset": Width(0.05, "zero of a meter or an amplifier: some hundredths of its unit"),
+        },
     )
 
     def command(self, channel: str, value: Scalar) -> Scalar:

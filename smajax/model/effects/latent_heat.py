@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Candidate
+from smajax.model.effects.candidate import Candidate, Width
 from smajax.model.types import Scalar
 from smajax.model.wire.heat import HeatTerm, mass_per_metre
 from smajax.model.wire.wire import Wire
@@ -26,6 +26,10 @@ class LatentHeat(AbstractEffect, HeatTerm):
         "both strokes are slower than the heat balance alone says, and the same at rest.",
         switches=("enthalpy",),
         initial_guess={"enthalpy": 1e4},
+        prior_class="material",
+        widths={
+            "enthalpy": Width(2e4, "NiTi data sheets: 10 to 30 kJ/kg; Elahinia 2004, Table 3.2: 24.2 kJ/kg"),
+        },
     )
 
     def stored_heat(self, wire: Wire, temperature: Scalar, fraction: Scalar) -> Scalar | float:

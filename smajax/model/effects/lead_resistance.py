@@ -8,7 +8,7 @@ from smajax.core.parameters import parameter
 from smajax.model.drive.base import AbstractDrive
 from smajax.model.drive.supply import SeriesTerm
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Actuator, Candidate
+from smajax.model.effects.candidate import Actuator, Candidate, Width
 from smajax.model.types import Scalar
 
 
@@ -32,6 +32,10 @@ class LeadResistance(AbstractEffect, SeriesTerm):
         switches=("resistance",),
         initial_guess={"resistance": 0.5},
         applies=_applies,
+        prior_class="bench",
+        widths={
+            "resistance": Width(0.5, "two metres of copper lead (0.2 mm2) and two crimps: 0.1 to 0.5 ohm"),
+        },
     )
 
     def series_resistance(self) -> Scalar | float:

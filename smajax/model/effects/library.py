@@ -11,7 +11,7 @@ from smajax.core.plugins import EFFECTS, brought
 from smajax.model.effects.ambient_drift import AmbientDrift
 from smajax.model.effects.asymmetric_transformation import AsymmetricTransformation
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import EQUATIONS
+from smajax.model.effects.candidate import EQUATIONS, PRIOR_CLASSES, SCALES
 from smajax.model.effects.contracts import CONTRACTS, methods
 from smajax.model.effects.coulomb_friction import CoulombFriction
 from smajax.model.effects.creep import Creep
@@ -138,11 +138,21 @@ def _wrong(name: str, effect: Any) -> str:
         return f"calls itself {effect.effect_name!r}: give the entry point and the effect the same name"
     if candidate.equation not in EQUATIONS:
         return f"is in the equation {candidate.equation!r}; expected one of {', '.join(EQUATIONS)}"
+    if candidate.prior_class not in PRIOR_CLASSES:
+        return f"is of the class {candidate.prior_class!r}; expected one of {', '.join(PRIOR_CLASSES)}"
     fields = [field.name for field in dataclasses.fields(effect)]
-    for which, named in (("switches", candidate.switches), ("an initial guess", tuple(candidate.initial_guess))):
+    given = (
+        ("switches", candidate.switches),
+        ("an initial guess", tuple(candidate.initial_guess)),
+        ("a width", tuple(candidate.widths)),
+    )
+    for which, named in given:
         strange = [one for one in named if one not in fields]
         if strange:
             return f"has {which} of what is none of its parameters: {', '.join(strange)}; these are {', '.join(fields)}"
+    for coefficient, width in candidate.widths.items():
+        if width.of not in SCALES or not width.sigma > 0.0:
+            return f"has {width!r} for {coefficient}; expected a sigma above 0, and `of` one of {', '.join(map(repr, SCALES))}"
     accepted = [contract for contract in CONTRACTS if issubclass(effect, contract)]
     if not accepted:
         return f"changes no equation: it inherits from none of {', '.join(one.__name__ for one in CONTRACTS)}"

@@ -6,8 +6,8 @@ from typing import ClassVar
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Candidate, Extent
-from smajax.model.effects.change import changed, during
+from smajax.model.effects.candidate import Candidate, Extent, Width
+from smajax.model.effects.change import STEP_WIDTH, TIME_WIDTH, changed, during
 from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.load.force import EndMotion, ForceTerm
 from smajax.model.types import Scalar
@@ -33,6 +33,12 @@ class LoadShift(AbstractEffect, ForceTerm):
         switches=("share",),
         initial_guess={"share": 0.05, "time": 2.0, "width": 1.0},
         grid=_grid,
+        prior_class="event",
+        widths={
+            "share": Width(0.2, "a weight that is hung on or a support that carries a part: tens of per cent"),
+            "time": TIME_WIDTH,
+            "width": STEP_WIDTH,
+        },
     )
 
     def resisting_force(self, load: AbstractMovingLoad, at: EndMotion) -> Scalar | float:

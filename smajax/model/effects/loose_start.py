@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Actuator, Candidate
+from smajax.model.effects.candidate import Actuator, Candidate, Width
 from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.load.mounting import MountingTerm
 from smajax.model.types import Scalar
@@ -38,6 +38,10 @@ class LooseStart(AbstractEffect, MountingTerm):
         switches=("length",),
         initial_guess={"length": 5e-4},
         applies=_applies,
+        prior_class="event",
+        widths={
+            "length": Width(1e-3, "mounting by hand: some tenths of a millimetre to 2 mm"),
+        },
     )
 
     def loose_length(self) -> Scalar | float:

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Candidate, Extent
+from smajax.model.effects.candidate import Candidate, Extent, Width
 from smajax.model.types import Scalar, WireState
 from smajax.model.wire.kinetics_terms import RangeTerm
 from smajax.model.wire.wire import Kinetics
@@ -57,6 +57,19 @@ class MinorLoops(AbstractEffect, RangeTerm):
         switches=("heating", "cooling"),
         initial_guess={"heating": 0.1, "cooling": 0.1, "small": 0.0, "pinned": 0.0},
         grid=_grid,
+        prior_class="material",
+        widths={
+            "heating": Width(
+                0.3,
+                "minor loops of NiTi wires begin their way back earlier by up to a third of the range (Lagoudas 2008)",
+            ),
+            "cooling": Width(
+                0.3,
+                "minor loops of NiTi wires begin their way back earlier by up to a third of the range (Lagoudas 2008)",
+            ),
+            "small": Width(0.5, "any share from 0 to 1"),
+            "pinned": Width(0.5, "any share from 0 to 1"),
+        },
     )
 
     def _earlier(self, size: Scalar, z: Scalar, amplitude: Scalar) -> Scalar:

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Actuator, Candidate
+from smajax.model.effects.candidate import Actuator, Candidate, Width
 from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.load.force import EndMotion, ForceTerm
 from smajax.model.types import Scalar
@@ -39,6 +39,14 @@ class NonlinearSpring(AbstractEffect, ForceTerm):
         switches=("change",),
         initial_guess={"change": 0.1, "displacement": 0.01},
         applies=_applies,
+        prior_class="bench",
+        widths={
+            "change": Width(
+                0.2,
+                "coil springs: a few per cent over the middle of their travel, more towards its ends (EN 13906); rubber: half",
+            ),
+            "displacement": Width(1.0, "stroke of a wire of 0.1 to 1 m: 3 to 30 mm", logarithmic=True),
+        },
     )
 
     def resisting_force(self, load: AbstractMovingLoad, at: EndMotion) -> Scalar | float:

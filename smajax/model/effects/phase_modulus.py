@@ -8,7 +8,7 @@ import jax.numpy as jnp
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Actuator, Candidate
+from smajax.model.effects.candidate import Actuator, Candidate, Width
 from smajax.model.load.coupon import Coupon
 from smajax.model.types import Scalar
 from smajax.model.wire.constitutive import ConstitutiveTerm
@@ -46,6 +46,10 @@ class PhaseModulus(AbstractEffect, ConstitutiveTerm):
         switches=("contrast",),
         initial_guess={"contrast": 0.5},
         applies=_applies,
+        prior_class="material",
+        widths={
+            "contrast": Width(1.5, "Elahinia 2004, Table 3.2: 28 and 75 GPa; NiTi data sheets: 28 to 41 and 83 GPa"),
+        },
     )
 
     def modulus_change(self, wire: Wire, fraction: Scalar) -> Scalar | float:

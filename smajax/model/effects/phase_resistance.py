@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Candidate
+from smajax.model.effects.candidate import Candidate, Width
 from smajax.model.types import Scalar
 from smajax.model.wire.resistance import ResistanceTerm
 
@@ -25,6 +25,13 @@ class PhaseResistance(AbstractEffect, ResistanceTerm):
         "transforms.",
         switches=("contrast",),
         initial_guess={"contrast": -0.1},
+        prior_class="material",
+        widths={
+            "contrast": Width(
+                0.2,
+                "Elahinia 2004, Table 3.2: 76 and 84 uohm cm; NiTi data sheets: 80 and 100; with R-phase and strain down to -0.2",
+            ),
+        },
     )
 
     def resistance_factor(self, temperature: Scalar, fraction: Scalar) -> Scalar | float:

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Candidate, Extent
+from smajax.model.effects.candidate import Candidate, Extent, Width
 from smajax.model.types import Scalar
 from smajax.model.wire.heat import HeatState, HeatTerm, mass_per_metre
 from smajax.model.wire.wire import Wire
@@ -42,6 +42,13 @@ class PhaseSpecificHeat(AbstractEffect, HeatTerm):
         switches=("contrast",),
         initial_guess={"contrast": 0.05, "kirchhoff": 0.95},
         grid=_grid,
+        prior_class="material",
+        widths={
+            "contrast": Width(
+                0.1, "calorimetry of NiTi: both phases within 10 % of each other (Otsuka and Wayman 1998)"
+            ),
+            "kirchhoff": Width(0.5, "any share from 0 to 1"),
+        },
     )
 
     def _more(self, wire: Wire, temperature: Scalar) -> Scalar:

@@ -6,10 +6,15 @@ from typing import ClassVar
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Actuator, Candidate
-from smajax.model.effects.coulomb_friction import presliding_parameter
+from smajax.model.effects.candidate import Actuator, Candidate, Width
+from smajax.model.effects.coulomb_friction import BEND_WIDTH, presliding_parameter
 from smajax.model.load.friction import PRESLIDING, FrictionTerm
 from smajax.model.types import Scalar
+
+SHARE_WIDTH = Width(
+    0.05,
+    "ball bearings: 0.005 and less of what they carry, plain bearings and ropes: 0.05 to 0.1 (machine-element handbooks)",
+)
 
 
 def _applies(system: Actuator) -> bool:
@@ -34,6 +39,11 @@ class PulleyFriction(AbstractEffect, FrictionTerm):
         switches=("share",),
         initial_guess={"share": 0.02, "bend": PRESLIDING},
         applies=_applies,
+        prior_class="bench",
+        widths={
+            "share": SHARE_WIDTH,
+            "bend": BEND_WIDTH,
+        },
     )
 
     def friction_limit(self, load_at_rest: Scalar) -> Scalar:

@@ -8,9 +8,9 @@ from typing import ClassVar
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
 from smajax.model.effects.candidate import Candidate
-from smajax.model.effects.coulomb_friction import presliding_parameter
-from smajax.model.effects.pulley_friction import PulleyFriction
-from smajax.model.effects.stribeck_friction import all_over, falling
+from smajax.model.effects.coulomb_friction import BEND_WIDTH, presliding_parameter
+from smajax.model.effects.pulley_friction import SHARE_WIDTH, PulleyFriction
+from smajax.model.effects.stribeck_friction import SLIDING_WIDTH, SPEED_WIDTH, all_over, falling
 from smajax.model.load.friction import PRESLIDING, FrictionTerm
 from smajax.model.types import Scalar
 
@@ -47,6 +47,13 @@ class PulleyStribeckFriction(AbstractEffect, FrictionTerm):
         stick_slip=True,
         start_ranges=_start_ranges,
         applies=PulleyFriction.candidate.applies,
+        prior_class="bench",
+        widths={
+            "share": SHARE_WIDTH,
+            "sliding": SLIDING_WIDTH,
+            "speed": SPEED_WIDTH,
+            "bend": BEND_WIDTH,
+        },
     )
 
     def friction_limit(self, load_at_rest: Scalar) -> Scalar:

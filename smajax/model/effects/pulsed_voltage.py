@@ -9,7 +9,7 @@ import jax.numpy as jnp
 from smajax.core.parameters import parameter
 from smajax.model.drive.inputs import CommandTerm
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Actuator, Candidate
+from smajax.model.effects.candidate import Actuator, Candidate, Width
 from smajax.model.types import Scalar
 
 SUPPLY = 10.0  # V, height of the pulses; with another the losses and the heat capacity take up a factor
@@ -38,6 +38,10 @@ class PulsedVoltage(AbstractEffect, CommandTerm):
         switches=("share",),
         initial_guess={"share": 0.05},
         applies=_applies,
+        prior_class="bench",
+        widths={
+            "share": Width(0.3, "inductance and filters leave any share from 0 to 1"),
+        },
     )
 
     def command(self, channel: str, value: Scalar) -> Scalar:

@@ -7,7 +7,7 @@ from typing import ClassVar
 from smajax.core.parameters import parameter
 from smajax.model.drive.inputs import CommandTerm
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Actuator, Candidate
+from smajax.model.effects.candidate import Actuator, Candidate, Width
 from smajax.model.types import Scalar
 
 
@@ -34,6 +34,10 @@ class PwmSmoothing(AbstractEffect, CommandTerm):
         switches=("share",),
         initial_guess={"share": 0.1},
         applies=_applies,
+        prior_class="bench",
+        widths={
+            "share": Width(0.3, "inductance and filters take any share from 0 to 1"),
+        },
     )
 
     def command(self, channel: str, value: Scalar) -> Scalar:

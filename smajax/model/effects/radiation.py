@@ -8,7 +8,7 @@ import jax.numpy as jnp
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Candidate
+from smajax.model.effects.candidate import Candidate, Width
 from smajax.model.types import Scalar
 from smajax.model.wire.heat import HeatState, HeatTerm
 from smajax.model.wire.wire import Wire
@@ -31,6 +31,10 @@ class Radiation(AbstractEffect, HeatTerm):
         "in still air.",
         switches=("emissivity",),
         initial_guess={"emissivity": 0.3},
+        prior_class="material",
+        widths={
+            "emissivity": Width(0.5, "emissivity of metals: 0.1 polished, 0.4 to 0.8 oxidised (Incropera and DeWitt)"),
+        },
     )
 
     def heat_loss(self, wire: Wire, at: HeatState) -> Scalar | float:

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Candidate
+from smajax.model.effects.candidate import Candidate, Width
 from smajax.model.types import Scalar, WireState
 from smajax.model.wire.constitutive import ConstitutiveTerm
 from smajax.model.wire.history import TRANSFORMED, HistoryTerm, transformed
@@ -30,6 +30,15 @@ class ResidualStrain(AbstractEffect, HistoryTerm, ConstitutiveTerm):
         "its stroke is repeatable.",
         switches=("first",),
         initial_guess={"first": 4e-4, "cycles": 5.0},
+        prior_class="bench",
+        widths={
+            "first": Width(
+                1e-3, "first cycle of an untrained NiTi wire under 100 to 200 MPa: 0.05 to 0.2 % (Lagoudas 2008)"
+            ),
+            "cycles": Width(
+                1.2, "shakedown of NiTi wires: a few to some tens of cycles (Eggeler et al. 2004)", logarithmic=True
+            ),
+        },
     )
 
     def history_at_start(self, at: WireState) -> dict[str, Scalar]:

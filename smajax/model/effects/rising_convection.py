@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Candidate
+from smajax.model.effects.candidate import Candidate, Width
 from smajax.model.types import Scalar
 from smajax.model.wire.heat import HeatState, HeatTerm, convection
 from smajax.model.wire.wire import Wire
@@ -27,6 +27,13 @@ class RisingConvection(AbstractEffect, HeatTerm):
         "and too much when nearly cold.",
         switches=("slope",),
         initial_guess={"slope": 2e-3},
+        prior_class="material",
+        widths={
+            "slope": Width(
+                4e-3,
+                "free convection of a thin wire, h ~ (T - T_inf)^0.06 to ^0.19 (Morgan, in Incropera and DeWitt), 30 to 100 K above the air",
+            ),
+        },
     )
 
     def heat_loss(self, wire: Wire, at: HeatState) -> Scalar | float:

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Candidate, Extent
+from smajax.model.effects.candidate import Candidate, Extent, Width
 from smajax.model.sensor_reading import SensorTerm
 from smajax.model.types import Scalar
 
@@ -41,6 +41,12 @@ class SensorBacklash(AbstractEffect, SensorTerm):
         initial_guess={"half_width": 1e-4},
         bounds=_bounds,
         start_ranges=_start_ranges,
+        prior_class="bench",
+        widths={
+            "half_width": Width(
+                0.01, "couplings and gears of sensors: 0.1 to 2 % of the stroke (data sheets)", of="stroke"
+            ),
+        },
     )
     recalls: ClassVar[bool] = True
 

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Candidate, Extent
+from smajax.model.effects.candidate import Candidate, Extent, Width
 from smajax.model.sensor_reading import SensorTerm
 from smajax.model.types import Scalar
 
@@ -33,6 +33,12 @@ class SensorDrift(AbstractEffect, SensorTerm):
         initial_guess={"rate": 1e-5},
         needs_time=True,
         bounds=_bounds,
+        prior_class="event",
+        widths={
+            "rate": Width(
+                0.01, "warming-up of sensors and amplifiers: 0.1 to 1 % of the stroke (data sheets)", of="stroke/run"
+            ),
+        },
     )
 
     def sensed(self, reading: Scalar, time: Scalar, last: Scalar) -> Scalar:

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Candidate
+from smajax.model.effects.candidate import Candidate, Width
 from smajax.model.sensor_reading import SensorTerm
 from smajax.model.types import Scalar
 
@@ -24,6 +24,12 @@ class SensorGain(AbstractEffect, SensorTerm):
         sentence="The sensor's scale is off: every stroke reads too long or too short by the same share.",
         switches=("error",),
         initial_guess={"error": 0.01},
+        prior_class="bench",
+        widths={
+            "error": Width(
+                0.03, "displacement sensors: 0.2 to 2 % (data sheets); scales set by hand and by camera: up to 5 %"
+            ),
+        },
     )
 
     def sensed(self, reading: Scalar, time: Scalar, last: Scalar) -> Scalar:

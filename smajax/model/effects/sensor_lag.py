@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Candidate
+from smajax.model.effects.candidate import Candidate, Width
 from smajax.model.sensor_reading import SensorLagTerm
 from smajax.model.types import Scalar
 
@@ -25,6 +25,10 @@ class SensorLag(AbstractEffect, SensorLagTerm):
         switches=("time_constant",),
         initial_guess={"time_constant": 0.1},
         needs_time=True,
+        prior_class="bench",
+        widths={
+            "time_constant": Width(0.05, "filters of displacement sensors and amplifiers: 1 to 100 ms (data sheets)"),
+        },
     )
 
     def sensor_time_constant(self) -> Scalar | float:

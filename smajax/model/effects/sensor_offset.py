@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Candidate, Extent
+from smajax.model.effects.candidate import Candidate, Extent, Width
 from smajax.model.sensor_reading import SensorTerm
 from smajax.model.types import Scalar
 
@@ -29,6 +29,10 @@ class SensorOffset(AbstractEffect, SensorTerm):
         switches=("shift",),
         initial_guess={"shift": 1e-4},
         bounds=_bounds,
+        prior_class="bench",
+        widths={
+            "shift": Width(0.01, "a zero set by hand: 0.1 to 2 % of the stroke", of="stroke"),
+        },
     )
 
     def sensed(self, reading: Scalar, time: Scalar, last: Scalar) -> Scalar:

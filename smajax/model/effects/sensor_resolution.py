@@ -8,7 +8,7 @@ import jax.numpy as jnp
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Candidate, Extent
+from smajax.model.effects.candidate import Candidate, Extent, Width
 from smajax.model.sensor_reading import SensorTerm
 from smajax.model.types import Scalar
 
@@ -48,6 +48,12 @@ class SensorResolution(AbstractEffect, SensorTerm):
         initial_guess={"share": 0.9, "increment": 1e-3, "zero": 0.0},
         observable=_observable,
         grid=_grid,
+        prior_class="bench",
+        widths={
+            "share": Width(0.5, "a sensor that has the staircase has all of it"),
+            "increment": Width(0.05, "read off the levels of the log", logarithmic=True, of="increment", base=1.0),
+            "zero": Width(0.5, "any place within one increment", of="increment"),
+        },
     )
 
     def sensed(self, reading: Scalar, time: Scalar, last: Scalar) -> Scalar:

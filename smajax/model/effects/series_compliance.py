@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Candidate
+from smajax.model.effects.candidate import Candidate, Width
 from smajax.model.types import Scalar, WireState
 from smajax.model.wire.constitutive import ConstitutiveTerm
 from smajax.model.wire.heat import cross_section
@@ -32,6 +32,10 @@ class SeriesCompliance(AbstractEffect, ConstitutiveTerm):
         "rises on the way, and sags when it is loaded.",
         switches=("compliance",),
         initial_guess={"compliance": 1e-4},
+        prior_class="bench",
+        widths={
+            "compliance": Width(2e-4, "crimps, ropes and frames: 3 to 100 N/mm"),
+        },
     )
 
     def strain(self, wire: Wire, at: WireState) -> Scalar | float:

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Candidate
+from smajax.model.effects.candidate import Candidate, Width
 from smajax.model.types import Scalar, WireState
 from smajax.model.wire.constitutive import ConstitutiveTerm
 from smajax.model.wire.heat import cross_section
@@ -34,6 +34,11 @@ class Slack(AbstractEffect, ConstitutiveTerm):
         "force is small.",
         switches=("length",),
         initial_guess={"length": 1e-3, "force": 1.0},
+        prior_class="bench",
+        widths={
+            "length": Width(1e-3, "kinks, knots and crimps: some tenths of a millimetre to 2 mm"),
+            "force": Width(1.0, "thin wires straighten at 0.3 to 3 N", logarithmic=True),
+        },
     )
 
     def strain(self, wire: Wire, at: WireState) -> Scalar | float:

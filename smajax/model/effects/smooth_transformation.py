@@ -8,7 +8,7 @@ import jax
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Candidate
+from smajax.model.effects.candidate import Candidate, Width
 from smajax.model.types import Scalar
 from smajax.model.wire.kinetics_terms import ShapeTerm
 
@@ -30,6 +30,10 @@ class SmoothTransformation(AbstractEffect, ShapeTerm):
         "do not switch at one temperature.",
         switches=("weight",),
         initial_guess={"weight": 0.3},
+        prior_class="material",
+        widths={
+            "weight": Width(0.3, "calorimetry of NiTi: peaks with rounded ends (Otsuka and Wayman 1998)"),
+        },
     )
 
     def heating_shape(self, z: Scalar, remaining: Scalar) -> Scalar:

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Candidate
+from smajax.model.effects.candidate import Candidate, Width
 from smajax.model.types import Scalar, WireState
 from smajax.model.wire.kinetics_terms import RangeTerm
 from smajax.model.wire.wire import Kinetics
@@ -31,6 +31,17 @@ class StressDependentWidth(AbstractEffect, RangeTerm):
         sentence="Under a heavier load the transformation is spread over more degrees: it starts where it should and ends late.",
         switches=("heating", "cooling"),
         initial_guess={"heating": 1e-9, "cooling": 1e-9},
+        prior_class="material",
+        widths={
+            "heating": Width(
+                3e-9,
+                "stress slopes of start and finish: 5 to 8 MPa/K (Otsuka and Wayman 1998), over a range of 10 to 20 K",
+            ),
+            "cooling": Width(
+                3e-9,
+                "stress slopes of start and finish: 5 to 8 MPa/K (Otsuka and Wayman 1998), over a range of 10 to 20 K",
+            ),
+        },
     )
 
     def heating_distance(self, law: Kinetics, z: Scalar, temperature: Scalar, stress: Scalar, old: WireState) -> Scalar:

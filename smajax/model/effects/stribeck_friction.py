@@ -9,14 +9,23 @@ import jax.numpy as jnp
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Candidate
-from smajax.model.effects.coulomb_friction import presliding_parameter
+from smajax.model.effects.candidate import Candidate, Width
+from smajax.model.effects.coulomb_friction import BEND_WIDTH, LIMIT_WIDTH, presliding_parameter
 from smajax.model.load.friction import PRESLIDING, FrictionTerm
 from smajax.model.types import Scalar
 
 # A load that sticks and jumps has a local minimum of the misfit for every row of jumps, so refits begin all over these.
 # Friction at rest is larger than what the score test says, which knows no jumps: over that, r, v_s (m/s) and delta (m).
 MORE, SLIDING, SPEED, BENT = (1.5, 4.0), (0.2, 0.8), (1e-4, 1e-2), (1e-5, 2e-4)
+
+SLIDING_WIDTH = Width(
+    0.2, "kinetic over static friction of dry metals and plastics: 0.4 to 0.9 (machine-element handbooks)"
+)
+SPEED_WIDTH = Width(
+    1.5,
+    "Stribeck speeds of guides: 1 to 10 mm/s (Armstrong-Helouvry et al. 1994); a tenth of that when dry",
+    logarithmic=True,
+)
 
 
 def falling(speed: Scalar, sliding: Scalar, scale: Scalar) -> Scalar:
@@ -62,6 +71,13 @@ class StribeckFriction(AbstractEffect, FrictionTerm):
         initial_guess={"limit": 0.1, "sliding": 0.5, "speed": 5e-3, "bend": PRESLIDING},
         stick_slip=True,
         start_ranges=_start_ranges,
+        prior_class="bench",
+        widths={
+            "limit": LIMIT_WIDTH,
+            "sliding": SLIDING_WIDTH,
+            "speed": SPEED_WIDTH,
+            "bend": BEND_WIDTH,
+        },
     )
 
     def friction_limit(self, load_at_rest: Scalar) -> Scalar:

@@ -10,7 +10,7 @@ from smajax.core.parameters import parameter
 from smajax.model.drive.base import AbstractDrive
 from smajax.model.drive.supply import NO_VOLTAGE, Circuit, SupplyTerm
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Actuator, Candidate, Extent
+from smajax.model.effects.candidate import Actuator, Candidate, Extent, Width
 from smajax.model.types import Scalar, WireState
 from smajax.model.wire.history import DURATION, HistoryTerm, forgotten
 
@@ -47,6 +47,11 @@ class SupplyMemory(AbstractEffect, HistoryTerm, SupplyTerm):
         needs_time=True,
         grid=_grid,
         applies=_applies,
+        prior_class="bench",
+        widths={
+            "resistance": Width(0.2, "polarisation of small batteries: 0.05 to 0.3 ohm (data sheets)"),
+            "time_constant": Width(1.2, "polarisation of batteries and slow regulators: 0.5 to 20 s", logarithmic=True),
+        },
     )
 
     def history_at_start(self, at: WireState) -> dict[str, Scalar]:

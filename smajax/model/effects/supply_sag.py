@@ -8,7 +8,7 @@ from smajax.core.parameters import parameter
 from smajax.model.drive.base import AbstractDrive
 from smajax.model.drive.supply import Circuit, SupplyTerm
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Actuator, Candidate
+from smajax.model.effects.candidate import Actuator, Candidate, Width
 from smajax.model.types import Scalar, WireState
 
 
@@ -33,6 +33,10 @@ class SupplySag(AbstractEffect, SupplyTerm):
         switches=("sag",),
         initial_guess={"sag": 0.05},
         applies=_applies,
+        prior_class="bench",
+        widths={
+            "sag": Width(0.15, "bench supplies and amplifiers: 3 to 20 A at most (data sheets)"),
+        },
     )
 
     def voltage_share(self, circuit: Circuit, old: WireState | None) -> Scalar | float:

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Candidate
+from smajax.model.effects.candidate import Candidate, Width
 from smajax.model.types import Scalar
 from smajax.model.wire.resistance import ResistanceTerm
 
@@ -29,6 +29,12 @@ class TemperatureResistance(AbstractEffect, ResistanceTerm):
         "measured resistance goes on rising where nothing transforms.",
         switches=("coefficient",),
         initial_guess={"coefficient": 5e-4},
+        prior_class="material",
+        widths={
+            "coefficient": Width(
+                1e-3, "NiTi within a phase: 3e-4 to 1.5e-3 1/K (Otsuka and Wayman 1998); pure metals: 4e-3"
+            ),
+        },
     )
 
     def resistance_factor(self, temperature: Scalar, fraction: Scalar) -> Scalar | float:

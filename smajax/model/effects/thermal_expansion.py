@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Candidate
+from smajax.model.effects.candidate import Candidate, Width
 from smajax.model.types import Scalar, WireState
 from smajax.model.wire.constitutive import ConstitutiveTerm
 from smajax.model.wire.wire import Wire
@@ -31,6 +31,13 @@ class ThermalExpansion(AbstractEffect, ConstitutiveTerm):
         "coefficient it creeps back while the power stays on and first contracts when the power is cut.",
         switches=("martensite", "austenite"),
         initial_guess={"martensite": 1e-5, "austenite": 1e-5},
+        prior_class="material",
+        widths={
+            "martensite": Width(
+                2e-5, "NiTi data sheets: 6.6e-6 1/K; less the preset's -theta_T/E_M it is up to 2.6e-5"
+            ),
+            "austenite": Width(2e-5, "NiTi data sheets: 11e-6 1/K; less the preset's -theta_T/E_A it is up to 1.8e-5"),
+        },
     )
 
     def strain(self, wire: Wire, at: WireState) -> Scalar | float:

@@ -7,7 +7,7 @@ from typing import ClassVar
 import jax
 
 from smajax.core.parameters import parameter
-from smajax.model.effects.candidate import Candidate
+from smajax.model.effects.candidate import Candidate, Width
 from smajax.model.effects.second_range import SWITCHES, AbstractSecondRange
 from smajax.model.types import Scalar
 
@@ -36,6 +36,14 @@ class TwoPartTransformation(AbstractSecondRange):
             "heating_shift": 0.0,
             "cooling_shift": 0.0,
             "width": 0.8,
+        },
+        prior_class="material",
+        widths={
+            "heating_weight": Width(0.3, "grips, ends and grains of another orientation: some tenths of a wire"),
+            "cooling_weight": Width(0.3, "grips, ends and grains of another orientation: some tenths of a wire"),
+            "heating_shift": Width(0.5, "tails about the middle of the core, within half a range"),
+            "cooling_shift": Width(0.5, "tails about the middle of the core, within half a range"),
+            "width": Width(0.7, "tails of half to twice the range", logarithmic=True),
         },
     )
 

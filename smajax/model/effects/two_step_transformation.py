@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from smajax.core.parameters import parameter
-from smajax.model.effects.candidate import Candidate, Extent
+from smajax.model.effects.candidate import Candidate, Extent, Width
 from smajax.model.effects.second_range import SWITCHES, AbstractSecondRange
 from smajax.model.types import Scalar
 from smajax.model.wire.shape import Cosine
@@ -46,6 +46,22 @@ class TwoStepTransformation(AbstractSecondRange):
             "width": WIDE,
         },
         grid=_grid,
+        prior_class="bench",
+        widths={
+            "heating_weight": Width(
+                0.3, "a small share of the R-phase on heating, most of the strain in one step (Otsuka and Wayman 1998)"
+            ),
+            "cooling_weight": Width(
+                0.3, "strain of the R-phase on cooling: a tenth to a third of the whole (Otsuka and Wayman 1998)"
+            ),
+            "heating_shift": Width(
+                1.0, "R-phase and martensite 10 to 30 K apart, ranges of 10 to 20 K (Otsuka and Wayman 1998)"
+            ),
+            "cooling_shift": Width(
+                1.0, "R-phase and martensite 10 to 30 K apart, ranges of 10 to 20 K (Otsuka and Wayman 1998)"
+            ),
+            "width": Width(1.5, "from one range to twenty", logarithmic=True),
+        },
     )
 
     def second(self, beyond: Scalar) -> Scalar:

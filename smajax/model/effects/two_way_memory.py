@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Candidate
+from smajax.model.effects.candidate import Candidate, Width
 from smajax.model.types import Scalar, WireState
 from smajax.model.wire.constitutive import ConstitutiveTerm
 from smajax.model.wire.wire import Wire
@@ -31,6 +31,10 @@ class TwoWayMemory(AbstractEffect, ConstitutiveTerm):
         sentence="The wire is trained: it lengthens on cooling even where hardly any load pulls on it.",
         switches=("share",),
         initial_guess={"share": 0.1},
+        prior_class="bench",
+        widths={
+            "share": Width(0.3, "trained NiTi: 1 to 3 % of two-way strain, of 4 to 6 % (Otsuka and Wayman 1998)"),
+        },
     )
 
     def strain(self, wire: Wire, at: WireState) -> Scalar | float:

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Candidate
+from smajax.model.effects.candidate import Candidate, Width
 from smajax.model.types import Scalar, WireState
 from smajax.model.wire.kinetics import cooling_width, heating_width
 from smajax.model.wire.kinetics_terms import RangeTerm
@@ -37,6 +37,17 @@ class UnequalStressSlopes(AbstractEffect, RangeTerm):
         "gets wider or narrower with the load.",
         switches=("heating", "cooling"),
         initial_guess={"heating": 0.1, "cooling": 0.1},
+        prior_class="material",
+        widths={
+            "heating": Width(
+                0.3,
+                "stress slopes of NiTi: 5 to 8 MPa/K, of either phase (Otsuka and Wayman 1998; Liang and Rogers 1990)",
+            ),
+            "cooling": Width(
+                0.3,
+                "stress slopes of NiTi: 5 to 8 MPa/K, of either phase (Otsuka and Wayman 1998; Liang and Rogers 1990)",
+            ),
+        },
     )
 
     def heating_distance(self, law: Kinetics, z: Scalar, temperature: Scalar, stress: Scalar, old: WireState) -> Scalar:

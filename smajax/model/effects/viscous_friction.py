@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Candidate
+from smajax.model.effects.candidate import Candidate, Width
 from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.load.force import EndMotion, ForceTerm
 from smajax.model.types import Scalar
@@ -25,6 +25,10 @@ class ViscousFriction(AbstractEffect, ForceTerm):
         sentence="The guide (grease, a damper, air) resists in proportion to speed by more than the model has it.",
         switches=("coefficient",),
         initial_guess={"coefficient": 2.0},
+        prior_class="bench",
+        widths={
+            "coefficient": Width(5.0, "greased guides and small dampers: 1 to 10 N s/m"),
+        },
     )
 
     def resisting_force(self, load: AbstractMovingLoad, at: EndMotion) -> Scalar | float:

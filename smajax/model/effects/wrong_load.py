@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Candidate
+from smajax.model.effects.candidate import Candidate, Width
 from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.load.force import EndMotion, ForceTerm
 from smajax.model.types import Scalar
@@ -26,6 +26,12 @@ class WrongLoad(AbstractEffect, ForceTerm):
         "make.",
         switches=("share",),
         initial_guess={"share": 0.05},
+        prior_class="bench",
+        widths={
+            "share": Width(
+                0.1, "spring rates of coil springs: within 5 to 15 % (EN 15800); a weight that is not weighed: as much"
+            ),
+        },
     )
 
     def resisting_force(self, load: AbstractMovingLoad, at: EndMotion) -> Scalar | float:

@@ -29,6 +29,12 @@ class ForceTerm(abc.ABC):
         """Force against contraction beside the load's, N; a change of the load itself is a share of its static force."""
 
 
+def force_at_rest(load: AbstractMovingLoad, inputs: Inputs) -> Scalar:
+    """Size of what the load at rest pulls by at its start, N (N m for an arm)."""
+    start = jnp.asarray(load.start())
+    return jnp.abs(load.resistance(start, jnp.zeros_like(start), inputs))
+
+
 def load_resistance(
     load: AbstractMovingLoad,
     terms: Sequence[ForceTerm],

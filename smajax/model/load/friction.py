@@ -17,6 +17,7 @@ from typing import ClassVar, NamedTuple
 import jax.numpy as jnp
 
 from smajax.model.load.base import AbstractMovingLoad
+from smajax.model.load.force import force_at_rest
 from smajax.model.types import Inputs, Motion, Scalar
 
 PRESLIDING = 5e-5  # m, where nothing is known of it: asperities bend by micrometres before they slip (Dahl 1968)
@@ -60,7 +61,7 @@ def rubbing(
     if not terms:
         return []
     speed = load.lever() * jnp.maximum(jnp.abs(before.velocity), jnp.abs(velocity))
-    at_rest = jnp.abs(load.resistance(load.start(), jnp.zeros_like(velocity), inputs))
+    at_rest = force_at_rest(load, inputs)
     return [
         Rubbing(
             term.effect_name,

@@ -1,0 +1,115 @@
+r"""Normal prior of a coefficient of an effect, from its effect's `Width` and from how far the runs of an experiment go.
+
+Of a coefficient $\theta$ with the base value $\theta_0$ the prior is $\theta \sim N(\theta_0, s^2)$, or $\ln\theta \sim
+N(\ln\theta_0, s^2)$ where it is logarithmic, given that the wire or the bench has the effect (automatic relevance
+determination: MacKay 1992, Tipping 2001).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from smajax.core.names import close_matches
+from smajax.core.parameters import Parameter, parameters
+from smajax.model.effects.base import AbstractEffect
+from smajax.model.effects.candidate import Extent, Scale, Width
+
+# Of what a `Width` does not say.
+SWITCH_GUESSES = 2.0  # width of a switch over its initial guess, which is a usual size
+LOGARITHMIC = 1.0  # of a positive time, width or scale: a factor of 2.7 either way
+SHARE_OF_BOUNDS = 0.25  # of any other: the bounds are two widths from their middle
+
+_PHRASES: dict[Scale, str] = {
+    "stroke": "of the stroke",
+    "increment": "of the increment",
+    "run": "of a run's length",
+    "load": "of the load at rest",
+    "stroke/run": "of the stroke per run",
+}
+
+
+class CoefficientPrior(NamedTuple):
+    """Normal distribution of a coefficient, or of its natural logarithm."""
+
+    base: float  # where it is centred, in the coefficient's unit, also where it is logarithmic
+    sigma: float  # standard deviation, in the coefficient's unit, or of the natural logarithm
+    logarithmic: bool
+
+
+def width_of(
+    effect: type[AbstractEffect],
+    coefficient: str,
+    bounds: tuple[float, float] | None,
+    extent: Extent,
+    load_at_rest: float = 0.0,
+) -> CoefficientPrior:
+    """Prior of one coefficient of `effect`, by its own name (`"enthalpy"`).
+
+    `bounds`: within which it is fitted, in its unit; None for its own and those of the runs (`Candidate.bounds`).
+    `load_at_rest`: size of the load's force at its start (`load.force.force_at_rest`), N, or N m on an arm; 0 where
+    there is none. The width is at most half of the bounds, of their logarithm where it is logarithmic. A width of which
+    the scale is zero (no force at rest, no increment) is that of a coefficient that is not listed in `Candidate.widths`:
+    a switch has twice its initial guess, any other a logarithmic width of 1 where its lower bound is positive, and a
+    quarter of its bounds where it is not.
+    Raises ValueError, with close matches, where the effect has no such coefficient.
+    """
+    entry = entry_of(effect, coefficient)
+    candidate = effect.candidate
+    low, high = bounds or candidate.bounds(extent).get(coefficient, (entry.low, entry.high))
+    default = float(getattr(effect.base(), coefficient))
+    switch = coefficient in candidate.switches
+    guess = float(candidate.initial_guess.get(coefficient, default))
+    width = candidate.widths.get(coefficient)
+    scale = _scale(width.of, extent, load_at_rest) if width else 0.0
+    if width is None or not scale > 0.0:
+        width, scale = _unlisted(switch, abs(guess - default), (low, high)), 1.0
+    base = width.base * scale if width.base is not None else default if switch else guess
+    base = min(max(base, low), high)
+    if width.logarithmic:
+        widest = 0.5 * math.log(high / low) if low > 0.0 else math.inf
+        return CoefficientPrior(base, min(width.sigma, widest), True)
+    return CoefficientPrior(base, min(width.sigma * scale, 0.5 * (high - low)), False)
+
+
+def entry_of(effect: type[AbstractEffect], coefficient: str) -> Parameter:
+    """Unit, bounds and meaning of a coefficient; ValueError, with close matches, where the effect has none of that name."""
+    entries = {name.removeprefix(f"{effect.effect_name}."): one for name, one in parameters(effect.base()).items()}
+    if coefficient not in entries:
+        near = close_matches(coefficient, sorted(entries), "it has")
+        raise ValueError(f"The effect `{effect.effect_name}` has no coefficient `{coefficient}`{near}.")
+    return entries[coefficient]
+
+
+def unit_of_width(unit: str, width: Width) -> str:
+    """What the number `width.sigma` is in, of a coefficient in `unit`: "J/kg", "of the stroke", "K per run"."""
+    if width.logarithmic:
+        return "of the natural logarithm"
+    if width.of == "1/run":
+        return f"{unit.removesuffix('/s')} per run"
+    return _PHRASES.get(width.of, unit)
+
+
+def _scale(of: Scale, extent: Extent, load_at_rest: float) -> float:
+    """What a width is times, SI; 0 where these runs or this load have none."""
+    lasts = extent.seconds > 0.0
+    scales: dict[Scale, float] = {
+        "": 1.0,
+        "stroke": extent.stroke,
+        "increment": extent.increment,
+        "run": extent.seconds,
+        "load": abs(load_at_rest),
+        "1/run": 1.0 / extent.seconds if lasts else 0.0,
+        "stroke/run": extent.stroke / extent.seconds if lasts else 0.0,
+    }
+    return scales[of]
+
+
+def _unlisted(switch: bool, guess: float, bounds: tuple[float, float]) -> Width:
+    """Width where the effect gives none; `guess`: the initial guess, from the base value."""
+    low, high = bounds
+    if switch and guess > 0.0:
+        return Width(SWITCH_GUESSES * guess, "twice the initial guess of a refit")
+    if not switch and low > 0.0:
+        return Width(LOGARITHMIC, "a factor of 2.7 either way", logarithmic=True)
+    return Width(SHARE_OF_BOUNDS * (high - low), "a quarter of the bounds")
