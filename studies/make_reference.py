@@ -5,12 +5,17 @@ from __future__ import annotations
 import html
 import inspect
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import smajax
-from smajax.model.effects.candidate import EQUATIONS
+from smajax.core.parameters import parameters
+from smajax.model.effects.base import AbstractEffect
+from smajax.model.effects.candidate import EQUATIONS, PRIOR_ODDS
 from smajax.model.effects.library import LIBRARY, of_others
+from smajax.model.effects.prior_width import stated_width
+from smajax.report.effect_priors import odds_in_words, width_in_words
 
 FOLDER = Path(__file__).parents[1] / "docs" / "reference"
 NAMES = "names.md"
@@ -123,20 +128,48 @@ def effects() -> str:
         "[how to add an effect](../how-to/add-an-effect.md).",
     ]
     for equation in EQUATIONS:
-        lines += ["", f"## {equation.capitalize()}", "", "| effect | what it is | what it changes |", "|---|---|---|"]
+        lines += [
+            "",
+            f"## {equation.capitalize()}",
+            "",
+            "| effect | what it is | what it changes | prior |",
+            "|---|---|---|---|",
+        ]
         for name, effect in own.items():
             if effect.candidate.equation == equation:
                 lines.append(
-                    f"| [`{name}`](#{effect.__module__}) | {effect.candidate.title} | {_cell(effect.candidate.formula)} |"
+                    f"| [`{name}`](#{effect.__module__}) | {effect.candidate.title} | {_cell(effect.candidate.formula)} | {odds_in_words(effect)} |"
                 )
     modules = dict.fromkeys(
         effect.__module__ for equation in EQUATIONS for effect in own.values() if effect.candidate.equation == equation
     )
+    lines += _priors(own)
     lines += ["", "## Their classes"]
     first = [f"smajax.model.effects.{name}" for name in ("base", "candidate", "prior_width", "grouping", "library")]
     for module in (*first, "smajax.model.extended", *modules):
         lines += ["", f"::: {module}"]
     return "\n".join(lines) + "\n"
+
+
+def _priors(own: Mapping[str, type[AbstractEffect]]) -> list[str]:
+    """The section of the prior of every coefficient."""
+    lines = [
+        "",
+        "## Priors",
+        "",
+        "What is known of a coefficient before the runs, where the wire or the bench has the effect: its base value and the standard",
+        "deviation about it, in its own unit or of what the runs show (`Width` of [candidate](#smajax.model.effects.candidate)). The odds",
+        "are those that the runs of an experiment need the effect:",
+        f"{', '.join(f'{odds:g} for the class {name}' for name, odds in PRIOR_ODDS.items())}.",
+        "",
+        "| coefficient | prior | source; without a name it is an estimate of usual sizes |",
+        "|---|---|---|",
+    ]
+    for effect in own.values():
+        for name, entry in parameters(effect.base()).items():
+            width = stated_width(effect, name.split(".", 1)[1])
+            lines.append(f"| `{name}` | {width_in_words(entry.unit, width)} | {width.source} |")
+    return lines
 
 
 PAGES = {"effects.md": effects, NAMES: names}

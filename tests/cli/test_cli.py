@@ -60,7 +60,18 @@ def test_help_waits_for_nothing_heavy(tmp_path: Path) -> None:
 
 def test_effects_and_presets_are_listed_for_machines(tmp_path: Path) -> None:
     effects = json.loads(_run("effects", "--json", cwd=tmp_path).out)
-    assert effects["latent_heat"]["parameters"]["latent_heat.enthalpy"]["unit"] == "J/kg"
+    enthalpy = effects["latent_heat"]["parameters"]["latent_heat.enthalpy"]
+    assert enthalpy["unit"] == "J/kg"
+    assert effects["latent_heat"]["prior"] == {"class": "material", "odds": 0.1}
+    assert {name: enthalpy["prior"][name] for name in ("base", "sigma", "unit", "of", "logarithmic")} == {
+        "base": 0.0,
+        "sigma": 2e4,
+        "unit": "J/kg",
+        "of": "",
+        "logarithmic": False,
+    }
+    assert "data sheets" in enthalpy["prior"]["source"]
+    assert effects["ambient_drift"]["parameters"]["ambient_drift.rate"]["prior"]["unit"] == "K per run"
     presets = json.loads(_run("presets", "--json", cwd=tmp_path).out)
     assert {"arm", "dead_weight", "bias_spring"} <= set(presets["loads"])
     assert presets["wire_sizes"].keys() == set(presets["wires"])
@@ -78,6 +89,14 @@ def test_named_effects_and_those_of_an_equation_are_listed_alone(tmp_path: Path)
     told = json.loads(_run("effects", "latent_heat", "electrical", "--json", cwd=tmp_path).out)
     assert "latent_heat" in told
     assert {one["equation"] for name, one in told.items() if name != "latent_heat"} == {"electrical"}
+
+
+def test_an_effect_is_listed_with_its_odds_and_widths(tmp_path: Path) -> None:
+    told = _run("effects", "creep", "latent_heat", "sensor_offset", cwd=tmp_path).out
+    assert "latent_heat  [heat; material, odds 0.1]" in told
+    assert "      prior 0 ± 20000 J/kg; Elahinia 2004, Table 3.2, and NiTi data sheets: 24.2 kJ/kg" in told
+    assert "      prior 5 s, times or over 4.5; " in told
+    assert "      prior 0 ± 0.01 of the stroke; " in told
     misspelt = _run("effects", "latent_heats", cwd=tmp_path)
     assert misspelt.code == 2
     assert "did you mean 'latent_heat'?" in misspelt.said

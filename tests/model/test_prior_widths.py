@@ -34,6 +34,8 @@ def test_a_coefficient_has_a_width_with_a_source(effect: str, coefficient: str) 
     assert len(width.source) >= 15, "say where the number comes from, or why it is that"
     if coefficient in candidate.switches:
         assert (width.logarithmic, width.base) == (False, None), "a switch is centred on its base value, zero"
+    elif width.of and width.base is None:
+        assert candidate.initial_guess[coefficient] == 0.0, "give the base of a scaled width in that scale too"
 
 
 @pytest.mark.parametrize(("effect", "coefficient"), COEFFICIENTS)
@@ -149,7 +151,7 @@ def test_an_unknown_coefficient_is_an_error_with_close_matches() -> None:
         ("m", Width(1.0, "", of="stroke"), "of the stroke"),
         ("K/s", Width(1.0, "", of="1/run"), "K per run"),
         ("m/s", Width(1.0, "", of="stroke/run"), "of the stroke per run"),
-        ("s", Width(1.0, "", of="run", logarithmic=True), "of the natural logarithm"),
+        ("s", Width(1.0, "", of="run", logarithmic=True), "of a run's length"),
     ],
 )
 def test_a_width_is_shown_in_its_own_unit(unit: str, width: Width, expected: str) -> None:

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import json
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from smajax.cli import completion
 from smajax.cli.options import Json
 from smajax.cli.terminal import until_pipe_closes
+
+if TYPE_CHECKING:
+    from smajax.model.effects.base import AbstractEffect
 
 
 def effects(
@@ -19,7 +22,7 @@ def effects(
     ] = None,
     json_out: Json = False,
 ) -> None:
-    """List the effects that `close-loop` may add: equation, formula and physical meaning.
+    """List the effects that `close-loop` may add: equation, formula, physical meaning, prior odds and widths.
 
     With names these alone; the name of an equation (heat, kinetics, sensor, ...) means all of its effects.
 
@@ -28,34 +31,67 @@ def effects(
     Example:  smajax effects latent_heat sensor
     """
     from smajax.core.names import close_matches
-    from smajax.core.parameters import parameters
     from smajax.model.effects.library import LIBRARY
 
-    entries = {
-        name: {
-            "title": effect.candidate.title,
-            "equation": effect.candidate.equation,
-            "formula": effect.candidate.formula,
-            "meaning": effect.candidate.sentence,
-            "parameters": {
-                entry.name: {"unit": entry.unit, "bounds": [entry.low, entry.high]}
-                for entry in parameters(effect.base()).values()
-            },
-        }
-        for name, effect in LIBRARY.items()
-        if not names or name in names or effect.candidate.equation in names
-    }
     known = {*LIBRARY, *(effect.candidate.equation for effect in LIBRARY.values())}
     for name in names or ():
         if name not in known:
             raise typer.BadParameter(
                 f"no effect or equation `{name}`{close_matches(name, sorted(known), 'there are')}", param_hint="NAMES"
             )
+    chosen = {
+        name: effect
+        for name, effect in LIBRARY.items()
+        if not names or name in names or effect.candidate.equation in names
+    }
     if json_out:
-        typer.echo(json.dumps(entries))
+        typer.echo(json.dumps({name: _entry(effect) for name, effect in chosen.items()}))
         return
     with until_pipe_closes():
-        for name, one in entries.items():
-            typer.echo(f"{name}  [{one['equation']}]\n  {one['title']}: {one['formula']}\n  {one['meaning']}")
-            for full, entry in one["parameters"].items():  # type: ignore[attr-defined]
-                typer.echo(f"    {full}: {entry['bounds'][0]:g} to {entry['bounds'][1]:g} {entry['unit']}")
+        for effect in chosen.values():
+            typer.echo(_text(effect))
+
+
+def _entry(effect: type[AbstractEffect]) -> dict[str, Any]:
+    """One effect for a program. `sigma` is in `unit`, and of the natural logarithm where it is logarithmic."""
+    from smajax.core.parameters import parameters
+    from smajax.model.effects.candidate import PRIOR_ODDS
+    from smajax.model.effects.prior_width import stated_width, unit_of_width
+
+    candidate = effect.candidate
+    entries: dict[str, dict[str, Any]] = {}
+    for name, entry in parameters(effect.base()).items():
+        width = stated_width(effect, name.split(".", 1)[1])
+        entries[name] = {
+            "unit": entry.unit,
+            "bounds": [entry.low, entry.high],
+            "prior": width._asdict() | {"unit": unit_of_width(entry.unit, width)},
+        }
+    return {
+        "title": candidate.title,
+        "equation": candidate.equation,
+        "formula": candidate.formula,
+        "meaning": candidate.sentence,
+        "prior": {"class": candidate.prior_class, "odds": PRIOR_ODDS[candidate.prior_class]},
+        "parameters": entries,
+    }
+
+
+def _text(effect: type[AbstractEffect]) -> str:
+    from smajax.core.parameters import parameters
+    from smajax.model.effects.prior_width import stated_width
+    from smajax.report.effect_priors import odds_in_words, width_in_words
+
+    candidate = effect.candidate
+    lines = [
+        f"{effect.effect_name}  [{candidate.equation}; {odds_in_words(effect)}]",
+        f"  {candidate.title}: {candidate.formula}",
+        f"  {candidate.sentence}",
+    ]
+    for name, entry in parameters(effect.base()).items():
+        width = stated_width(effect, name.split(".", 1)[1])
+        lines += [
+            f"    {name}: {entry.low:g} to {entry.high:g} {entry.unit}",
+            f"      prior {width_in_words(entry.unit, width)}; {width.source}",
+        ]
+    return "\n".join(lines)

@@ -38,12 +38,8 @@ class AsymmetricTransformation(AbstractEffect, ShapeTerm):
         initial_guess={"heating": 0.2, "cooling": 0.2},
         prior_class="material",
         widths={
-            "heating": Width(
-                0.4, "calorimetry of NiTi: peaks with one steep and one slow side (Otsuka and Wayman 1998)"
-            ),
-            "cooling": Width(
-                0.4, "calorimetry of NiTi: peaks with one steep and one slow side (Otsuka and Wayman 1998)"
-            ),
+            "heating": Width(0.4, "calorimetry of NiTi: peaks with one steep and one slow side"),
+            "cooling": Width(0.4, "calorimetry of NiTi: peaks with one steep and one slow side"),
         },
     )
 

@@ -48,7 +48,7 @@ class Width(NamedTuple):
     sigma: (
         float  # standard deviation, in the coefficient's unit over that of `of`; -, of its logarithm, where logarithmic
     )
-    source: str  # where the number comes from
+    source: str  # where the number comes from: what is named has it printed; without a name it is an estimate of usual sizes
     of: Scale = ""
     logarithmic: bool = False
     # Middle of the prior, times `of`; None for the base value of a switch and the initial guess of any other coefficient.

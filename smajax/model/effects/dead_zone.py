@@ -39,9 +39,7 @@ class DeadZone(AbstractEffect, CommandTerm):
         applies=_applies,
         prior_class="bench",
         widths={
-            "threshold": Width(
-                0.1, "output stages: millivolts to the 0.6 V of a diode; a duty of some per cent (data sheets)"
-            ),
+            "threshold": Width(0.1, "output stages: millivolts to the 0.6 V of a diode; a duty of some per cent"),
         },
     )
 

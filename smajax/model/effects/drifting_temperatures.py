@@ -37,11 +37,9 @@ class DriftingTemperatures(AbstractEffect, HistoryTerm, RangeTerm):
         initial_guess={"heating": 1.0, "cooling": 1.0, "cycles": 5.0},
         prior_class="bench",
         widths={
-            "heating": Width(5.0, "functional fatigue of NiTi: A_s and A_f move by up to 10 K (Eggeler et al. 2004)"),
-            "cooling": Width(5.0, "functional fatigue of NiTi: M_s and M_f move by 5 to 20 K (Eggeler et al. 2004)"),
-            "cycles": Width(
-                1.2, "shakedown of NiTi wires: a few to some tens of cycles (Eggeler et al. 2004)", logarithmic=True
-            ),
+            "heating": Width(5.0, "functional fatigue of NiTi: A_s and A_f move by up to 10 K"),
+            "cooling": Width(5.0, "functional fatigue of NiTi: M_s and M_f move by 5 to 20 K"),
+            "cycles": Width(1.2, "shakedown of NiTi wires: a few to some tens of cycles", logarithmic=True),
         },
     )
 

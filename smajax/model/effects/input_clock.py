@@ -38,7 +38,7 @@ class InputClock(AbstractEffect, InputLagTerm):
         applies=_applies,
         prior_class="event",
         widths={
-            "rate": Width(3e-3, "crystals: 1e-4 and less (data sheets); loops timed by software: up to 1 %"),
+            "rate": Width(3e-3, "crystals: 1e-4 and less; loops timed by software: up to 1 %"),
         },
     )
 

@@ -28,7 +28,10 @@ class LatentHeat(AbstractEffect, HeatTerm):
         initial_guess={"enthalpy": 1e4},
         prior_class="material",
         widths={
-            "enthalpy": Width(2e4, "NiTi data sheets: 10 to 30 kJ/kg; Elahinia 2004, Table 3.2: 24.2 kJ/kg"),
+            "enthalpy": Width(
+                2e4,
+                "Elahinia 2004, Table 3.2, and NiTi data sheets: 24.2 kJ/kg; by composition and cold work 10 to 30 kJ/kg",
+            ),
         },
     )
 

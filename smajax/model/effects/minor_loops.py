@@ -61,11 +61,11 @@ class MinorLoops(AbstractEffect, RangeTerm):
         widths={
             "heating": Width(
                 0.3,
-                "minor loops of NiTi wires begin their way back earlier by up to a third of the range (Lagoudas 2008)",
+                "minor loops of NiTi wires begin their way back earlier by up to a third of the range",
             ),
             "cooling": Width(
                 0.3,
-                "minor loops of NiTi wires begin their way back earlier by up to a third of the range (Lagoudas 2008)",
+                "minor loops of NiTi wires begin their way back earlier by up to a third of the range",
             ),
             "small": Width(0.5, "any share from 0 to 1"),
             "pinned": Width(0.5, "any share from 0 to 1"),

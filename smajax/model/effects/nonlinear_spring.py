@@ -43,7 +43,7 @@ class NonlinearSpring(AbstractEffect, ForceTerm):
         widths={
             "change": Width(
                 0.2,
-                "coil springs: a few per cent over the middle of their travel, more towards its ends (EN 13906); rubber: half",
+                "coil springs: a few per cent over the middle of their travel, more towards its ends; rubber: half",
             ),
             "displacement": Width(1.0, "stroke of a wire of 0.1 to 1 m: 3 to 30 mm", logarithmic=True),
         },

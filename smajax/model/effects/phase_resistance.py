@@ -29,7 +29,7 @@ class PhaseResistance(AbstractEffect, ResistanceTerm):
         widths={
             "contrast": Width(
                 0.2,
-                "Elahinia 2004, Table 3.2: 76 and 84 uohm cm; NiTi data sheets: 80 and 100; with R-phase and strain down to -0.2",
+                "Elahinia 2004, Table 3.2: 76 and 84 uohm cm; NiTi data sheets: 80 and 100; of strained wires and with an R-phase as low as -0.2",
             ),
         },
     )

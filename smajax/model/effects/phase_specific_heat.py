@@ -44,9 +44,7 @@ class PhaseSpecificHeat(AbstractEffect, HeatTerm):
         grid=_grid,
         prior_class="material",
         widths={
-            "contrast": Width(
-                0.1, "calorimetry of NiTi: both phases within 10 % of each other (Otsuka and Wayman 1998)"
-            ),
+            "contrast": Width(0.1, "calorimetry of NiTi: both phases within 10 % of each other"),
             "kirchhoff": Width(0.5, "any share from 0 to 1"),
         },
     )

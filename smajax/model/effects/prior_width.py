@@ -55,21 +55,26 @@ def width_of(
     Raises ValueError, with close matches, where the effect has no such coefficient.
     """
     entry = entry_of(effect, coefficient)
-    candidate = effect.candidate
-    low, high = bounds or candidate.bounds(extent).get(coefficient, (entry.low, entry.high))
-    default = float(getattr(effect.base(), coefficient))
-    switch = coefficient in candidate.switches
-    guess = float(candidate.initial_guess.get(coefficient, default))
-    width = candidate.widths.get(coefficient)
-    scale = _scale(width.of, extent, load_at_rest) if width else 0.0
-    if width is None or not scale > 0.0:
-        width, scale = _unlisted(switch, abs(guess - default), (low, high)), 1.0
-    base = width.base * scale if width.base is not None else default if switch else guess
-    base = min(max(base, low), high)
+    low, high = bounds or effect.candidate.bounds(extent).get(coefficient, (entry.low, entry.high))
+    width = stated_width(effect, coefficient)
+    scale = _scale(width.of, extent, load_at_rest)
+    if not scale > 0.0:
+        width, scale = _unlisted(effect, coefficient, (low, high)), 1.0
+    base = min(max(scale * _base(effect, coefficient, width), low), high)
     if width.logarithmic:
         widest = 0.5 * math.log(high / low) if low > 0.0 else math.inf
         return CoefficientPrior(base, min(width.sigma, widest), True)
     return CoefficientPrior(base, min(width.sigma * scale, 0.5 * (high - low)), False)
+
+
+def stated_width(effect: type[AbstractEffect], coefficient: str) -> Width:
+    """Width and base of a coefficient before any runs are known: what its effect says, and else what an unlisted one has.
+
+    Raises ValueError, with close matches, where the effect has no such coefficient.
+    """
+    entry = entry_of(effect, coefficient)
+    width = effect.candidate.widths.get(coefficient) or _unlisted(effect, coefficient, (entry.low, entry.high))
+    return width._replace(base=_base(effect, coefficient, width))
 
 
 def entry_of(effect: type[AbstractEffect], coefficient: str) -> Parameter:
@@ -82,9 +87,10 @@ def entry_of(effect: type[AbstractEffect], coefficient: str) -> Parameter:
 
 
 def unit_of_width(unit: str, width: Width) -> str:
-    """What the number `width.sigma` is in, of a coefficient in `unit`: "J/kg", "of the stroke", "K per run"."""
-    if width.logarithmic:
-        return "of the natural logarithm"
+    """What the base of a width is in, and its sigma where it is not logarithmic, of a coefficient in `unit`.
+
+    As "J/kg", "of the stroke" or "K per run".
+    """
     if width.of == "1/run":
         return f"{unit.removesuffix('/s')} per run"
     return _PHRASES.get(width.of, unit)
@@ -105,9 +111,26 @@ def _scale(of: Scale, extent: Extent, load_at_rest: float) -> float:
     return scales[of]
 
 
-def _unlisted(switch: bool, guess: float, bounds: tuple[float, float]) -> Width:
-    """Width where the effect gives none; `guess`: the initial guess, from the base value."""
+def _default(effect: type[AbstractEffect], coefficient: str) -> float:
+    return float(getattr(effect.base(), coefficient))
+
+
+def _base(effect: type[AbstractEffect], coefficient: str, width: Width) -> float:
+    """Where a prior is centred, over the scale of its width."""
+    if width.base is not None:
+        return width.base
+    default = _default(effect, coefficient)
+    if coefficient in effect.candidate.switches:
+        return default
+    return float(effect.candidate.initial_guess.get(coefficient, default))
+
+
+def _unlisted(effect: type[AbstractEffect], coefficient: str, bounds: tuple[float, float]) -> Width:
+    """Width of a coefficient of which its effect gives none, or none that these runs have a scale for."""
     low, high = bounds
+    candidate, default = effect.candidate, _default(effect, coefficient)
+    switch = coefficient in candidate.switches
+    guess = abs(float(candidate.initial_guess.get(coefficient, default)) - default)
     if switch and guess > 0.0:
         return Width(SWITCH_GUESSES * guess, "twice the initial guess of a refit")
     if not switch and low > 0.0:

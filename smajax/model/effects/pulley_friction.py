@@ -13,7 +13,7 @@ from smajax.model.types import Scalar
 
 SHARE_WIDTH = Width(
     0.05,
-    "ball bearings: 0.005 and less of what they carry, plain bearings and ropes: 0.05 to 0.1 (machine-element handbooks)",
+    "ball bearings: 0.005 and less of what they carry, plain bearings and ropes: 0.05 to 0.1",
 )
 
 

@@ -32,12 +32,8 @@ class ResidualStrain(AbstractEffect, HistoryTerm, ConstitutiveTerm):
         initial_guess={"first": 4e-4, "cycles": 5.0},
         prior_class="bench",
         widths={
-            "first": Width(
-                1e-3, "first cycle of an untrained NiTi wire under 100 to 200 MPa: 0.05 to 0.2 % (Lagoudas 2008)"
-            ),
-            "cycles": Width(
-                1.2, "shakedown of NiTi wires: a few to some tens of cycles (Eggeler et al. 2004)", logarithmic=True
-            ),
+            "first": Width(1e-3, "first cycle of an untrained NiTi wire under 100 to 200 MPa: 0.05 to 0.2 %"),
+            "cycles": Width(1.2, "shakedown of NiTi wires: a few to some tens of cycles", logarithmic=True),
         },
     )
 

@@ -43,9 +43,7 @@ class SensorBacklash(AbstractEffect, SensorTerm):
         start_ranges=_start_ranges,
         prior_class="bench",
         widths={
-            "half_width": Width(
-                0.01, "couplings and gears of sensors: 0.1 to 2 % of the stroke (data sheets)", of="stroke"
-            ),
+            "half_width": Width(0.01, "couplings and gears of sensors: 0.1 to 2 % of the stroke", of="stroke"),
         },
     )
     recalls: ClassVar[bool] = True

@@ -35,9 +35,7 @@ class SensorDrift(AbstractEffect, SensorTerm):
         bounds=_bounds,
         prior_class="event",
         widths={
-            "rate": Width(
-                0.01, "warming-up of sensors and amplifiers: 0.1 to 1 % of the stroke (data sheets)", of="stroke/run"
-            ),
+            "rate": Width(0.01, "warming-up of sensors and amplifiers: 0.1 to 1 % of the stroke", of="stroke/run"),
         },
     )
 

@@ -26,9 +26,7 @@ class SensorGain(AbstractEffect, SensorTerm):
         initial_guess={"error": 0.01},
         prior_class="bench",
         widths={
-            "error": Width(
-                0.03, "displacement sensors: 0.2 to 2 % (data sheets); scales set by hand and by camera: up to 5 %"
-            ),
+            "error": Width(0.03, "displacement sensors: 0.2 to 2 %; scales set by hand and by camera: up to 5 %"),
         },
     )
 

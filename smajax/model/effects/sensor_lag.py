@@ -27,7 +27,7 @@ class SensorLag(AbstractEffect, SensorLagTerm):
         needs_time=True,
         prior_class="bench",
         widths={
-            "time_constant": Width(0.05, "filters of displacement sensors and amplifiers: 1 to 100 ms (data sheets)"),
+            "time_constant": Width(0.05, "filters of displacement sensors and amplifiers: 1 to 100 ms"),
         },
     )
 

@@ -32,7 +32,7 @@ class SmoothTransformation(AbstractEffect, ShapeTerm):
         initial_guess={"weight": 0.3},
         prior_class="material",
         widths={
-            "weight": Width(0.3, "calorimetry of NiTi: peaks with rounded ends (Otsuka and Wayman 1998)"),
+            "weight": Width(0.3, "calorimetry of NiTi: peaks with rounded ends"),
         },
     )
 

@@ -53,8 +53,8 @@ class StressDependentStrain(AbstractEffect, HistoryTerm, ConstitutiveTerm):
         grid=_grid,
         prior_class="material",
         widths={
-            "gain": Width(0.02, "NiTi: 1 to 4 % more from low to high stress (Lagoudas et al. 2012, H^cur)"),
-            "scale": Width(0.7, "NiTi: 50 to 200 MPa (Lagoudas et al. 2012, 1/k)", logarithmic=True),
+            "gain": Width(0.02, "NiTi: 1 to 4 % more strain from low to high stress"),
+            "scale": Width(0.7, "NiTi: 50 to 200 MPa", logarithmic=True),
             "returned": Width(0.3, "any share from 0 to 1"),
         },
     )

@@ -35,11 +35,11 @@ class StressDependentWidth(AbstractEffect, RangeTerm):
         widths={
             "heating": Width(
                 3e-9,
-                "stress slopes of start and finish: 5 to 8 MPa/K (Otsuka and Wayman 1998), over a range of 10 to 20 K",
+                "stress slopes of start and finish: 5 to 8 MPa/K, over a range of 10 to 20 K",
             ),
             "cooling": Width(
                 3e-9,
-                "stress slopes of start and finish: 5 to 8 MPa/K (Otsuka and Wayman 1998), over a range of 10 to 20 K",
+                "stress slopes of start and finish: 5 to 8 MPa/K, over a range of 10 to 20 K",
             ),
         },
     )

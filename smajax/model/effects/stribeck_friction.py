@@ -18,12 +18,10 @@ from smajax.model.types import Scalar
 # Friction at rest is larger than what the score test says, which knows no jumps: over that, r, v_s (m/s) and delta (m).
 MORE, SLIDING, SPEED, BENT = (1.5, 4.0), (0.2, 0.8), (1e-4, 1e-2), (1e-5, 2e-4)
 
-SLIDING_WIDTH = Width(
-    0.2, "kinetic over static friction of dry metals and plastics: 0.4 to 0.9 (machine-element handbooks)"
-)
+SLIDING_WIDTH = Width(0.2, "kinetic over static friction of dry metals and plastics: 0.4 to 0.9")
 SPEED_WIDTH = Width(
     1.5,
-    "Stribeck speeds of guides: 1 to 10 mm/s (Armstrong-Helouvry et al. 1994); a tenth of that when dry",
+    "Stribeck speeds of guides: 1 to 10 mm/s; a tenth of that when dry",
     logarithmic=True,
 )
 

@@ -49,7 +49,7 @@ class SupplyMemory(AbstractEffect, HistoryTerm, SupplyTerm):
         applies=_applies,
         prior_class="bench",
         widths={
-            "resistance": Width(0.2, "polarisation of small batteries: 0.05 to 0.3 ohm (data sheets)"),
+            "resistance": Width(0.2, "polarisation of small batteries: 0.05 to 0.3 ohm"),
             "time_constant": Width(1.2, "polarisation of batteries and slow regulators: 0.5 to 20 s", logarithmic=True),
         },
     )

@@ -35,7 +35,7 @@ class SupplySag(AbstractEffect, SupplyTerm):
         applies=_applies,
         prior_class="bench",
         widths={
-            "sag": Width(0.15, "bench supplies and amplifiers: 3 to 20 A at most (data sheets)"),
+            "sag": Width(0.15, "bench supplies and amplifiers: 3 to 20 A at most"),
         },
     )
 

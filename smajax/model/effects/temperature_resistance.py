@@ -31,9 +31,7 @@ class TemperatureResistance(AbstractEffect, ResistanceTerm):
         initial_guess={"coefficient": 5e-4},
         prior_class="material",
         widths={
-            "coefficient": Width(
-                1e-3, "NiTi within a phase: 3e-4 to 1.5e-3 1/K (Otsuka and Wayman 1998); pure metals: 4e-3"
-            ),
+            "coefficient": Width(1e-3, "NiTi within a phase: 3e-4 to 1.5e-3 1/K; pure metals: 4e-3"),
         },
     )
 

@@ -48,18 +48,10 @@ class TwoStepTransformation(AbstractSecondRange):
         grid=_grid,
         prior_class="bench",
         widths={
-            "heating_weight": Width(
-                0.3, "a small share of the R-phase on heating, most of the strain in one step (Otsuka and Wayman 1998)"
-            ),
-            "cooling_weight": Width(
-                0.3, "strain of the R-phase on cooling: a tenth to a third of the whole (Otsuka and Wayman 1998)"
-            ),
-            "heating_shift": Width(
-                1.0, "R-phase and martensite 10 to 30 K apart, ranges of 10 to 20 K (Otsuka and Wayman 1998)"
-            ),
-            "cooling_shift": Width(
-                1.0, "R-phase and martensite 10 to 30 K apart, ranges of 10 to 20 K (Otsuka and Wayman 1998)"
-            ),
+            "heating_weight": Width(0.3, "a small share of the R-phase on heating, most of the strain in one step"),
+            "cooling_weight": Width(0.3, "strain of the R-phase on cooling: a tenth to a third of the whole"),
+            "heating_shift": Width(1.0, "R-phase and martensite 10 to 30 K apart, ranges of 10 to 20 K"),
+            "cooling_shift": Width(1.0, "R-phase and martensite 10 to 30 K apart, ranges of 10 to 20 K"),
             "width": Width(1.5, "from one range to twenty", logarithmic=True),
         },
     )

@@ -33,7 +33,7 @@ class TwoWayMemory(AbstractEffect, ConstitutiveTerm):
         initial_guess={"share": 0.1},
         prior_class="bench",
         widths={
-            "share": Width(0.3, "trained NiTi: 1 to 3 % of two-way strain, of 4 to 6 % (Otsuka and Wayman 1998)"),
+            "share": Width(0.3, "trained NiTi: 1 to 3 % of two-way strain, of 4 to 6 %"),
         },
     )
 

@@ -41,11 +41,11 @@ class UnequalStressSlopes(AbstractEffect, RangeTerm):
         widths={
             "heating": Width(
                 0.3,
-                "stress slopes of NiTi: 5 to 8 MPa/K, of either phase (Otsuka and Wayman 1998; Liang and Rogers 1990)",
+                "stress slopes of NiTi: 5 to 8 MPa/K, of either phase; Elahinia 2004, Table 3.2: 6.89 MPa/K",
             ),
             "cooling": Width(
                 0.3,
-                "stress slopes of NiTi: 5 to 8 MPa/K, of either phase (Otsuka and Wayman 1998; Liang and Rogers 1990)",
+                "stress slopes of NiTi: 5 to 8 MPa/K, of either phase; Elahinia 2004, Table 3.2: 6.89 MPa/K",
             ),
         },
     )

@@ -29,7 +29,7 @@ class WrongLoad(AbstractEffect, ForceTerm):
         prior_class="bench",
         widths={
             "share": Width(
-                0.1, "spring rates of coil springs: within 5 to 15 % (EN 15800); a weight that is not weighed: as much"
+                0.1, "spring rates of coil springs: within 5 to 15 %; a weight that is not weighed: as much"
             ),
         },
     )
