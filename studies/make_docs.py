@@ -8,7 +8,7 @@ from smajax.control.presets import CONTROLLERS, model_filter, printed_filter
 from smajax.core.display_units import digits
 from smajax.core.parameters import get_parameters, parameters
 from smajax.core.runtime import prepare
-from smajax.model.preset_sources import ORIGINS
+from smajax.model.preset_sources import origins_of
 from smajax.model.presets import DRIVES, LOADS, WIRES
 from smajax.model.rigs import arm
 from smajax.model.wire.laws import LAWS, detwinning
@@ -36,9 +36,9 @@ def page() -> str:
             if not table:
                 continue
             lines += ["", "| parameter | value | unit | bounds | where from | meaning |", "|---|---|---|---|---|---|"]
-            values = get_parameters(part, list(table))
+            values, origins = get_parameters(part, list(table)), origins_of(name, part)
             for value, entry in zip(values, table.values(), strict=True):
-                origin = ORIGINS[name][entry.name]
+                origin = origins[entry.name]
                 lines.append(
                     f"| `{entry.name}` | {digits(float(value), 5)} | {entry.unit} | {digits(entry.low)} to "
                     f"{digits(entry.high)} | {origin.kind}: {origin.note} | {entry.about} |"

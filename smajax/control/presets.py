@@ -6,12 +6,13 @@ A preset takes the system that the controller is to believe in.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 
 from smajax.control.controllers.backstepping_one import BacksteppingOne
 from smajax.control.controllers.backstepping_two import BacksteppingTwo
 from smajax.control.controllers.base import AbstractController
 from smajax.control.controllers.pid import Pid
+from smajax.control.controllers.preset import ANGLE, STATE, Box, ControllerPreset
 from smajax.control.controllers.stress_sliding import StressSliding
 from smajax.control.controllers.temperature_vsc import Passing, TemperatureVsc
 from smajax.control.controllers.vsc1 import Vsc1
@@ -22,6 +23,7 @@ from smajax.control.estimators.model_filter import ModelFilter
 from smajax.control.estimators.printed_filter import PrintedFilter
 from smajax.core.names import listed
 from smajax.core.parameters import set_parameters
+from smajax.core.plugins import resolved
 from smajax.model.load.arm import Arm
 from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.system import System
@@ -197,8 +199,6 @@ def layered(controller: AbstractController, width: Scalar) -> AbstractController
     return Vsc2(controller.high_voltage, controller.low_voltage, width)
 
 
-Box = Mapping[str, tuple[float, float]]  # gain -> its positive bounds; the box is searched by logarithm
-
 PID_BOX: Box = {
     "proportional_gain": (0.5, 100.0),
     "integral_gain": (0.1, 100.0),
@@ -221,43 +221,33 @@ STRESS_BOX: Box = {
 }
 
 
-@dataclasses.dataclass(frozen=True)
-class ControllerPreset:
-    """A controller as a sweep runs it and as tuning changes it."""
-
-    make: Callable[[System], AbstractController]
-    main_gain: str  # the gain that a sweep varies
-    told: str  # what it reads of the plant
-    box: Box  # the gains that are tuned
-    plant: Callable[[System], System] = lambda system: system  # the plant that its section is written for
-    # One that switches -> one with a derivative, of a width that goes to nothing.
-    smoothed: Callable[[AbstractController, Scalar], AbstractController] | None = None
-
-
-ANGLE, STATE = "angle", "angle, rate, stress, temperature, fraction"
-
-# Name on the command line -> controller.
-CONTROLLERS: dict[str, ControllerPreset] = {
-    "pid": ControllerPreset(pid, "proportional_gain", ANGLE, PID_BOX),
-    "vsc1": ControllerPreset(vsc1, "high_voltage", ANGLE, SWITCH_BOX, smoothed=layered),
-    "vsc2": ControllerPreset(vsc2, "boundary", ANGLE, {**SWITCH_BOX, "boundary": (0.01, 1.0)}),
-    "vsc3": ControllerPreset(vsc3, "surface_slope", ANGLE, {**SWITCH_BOX, **SURFACE_BOX}),
-    "nvsc": ControllerPreset(temperature_vsc, "temperature_gain", STATE, {**SWITCH_BOX, **SURFACE_BOX, **PASSING_BOX}),
-    "sld": ControllerPreset(quick_stress_sliding, "surface_slope", STATE, STRESS_BOX),
-    "backstepping1": ControllerPreset(
-        backstepping_one,
-        "damping_gain",
-        STATE,
-        {"damping_gain": (0.2, 10.0), "stress_gain": (1.0, 150.0)},
-        with_printed_law,
-    ),
-    "backstepping2": ControllerPreset(
-        backstepping_two,
-        "damping_gain",
-        STATE,
-        {"damping_gain": (0.2, 10.0), "temperature_gain": (1.0, 150.0)},
-        with_printed_law,
-    ),
-}
+# Name on the command line -> controller. One in a file of its own, with its preset, is one line:
+# "my_pi": "smajax.control.controllers.my_pi:PRESET".
+CONTROLLERS: dict[str, ControllerPreset] = resolved(
+    {
+        "pid": ControllerPreset(pid, "proportional_gain", ANGLE, PID_BOX),
+        "vsc1": ControllerPreset(vsc1, "high_voltage", ANGLE, SWITCH_BOX, smoothed=layered),
+        "vsc2": ControllerPreset(vsc2, "boundary", ANGLE, {**SWITCH_BOX, "boundary": (0.01, 1.0)}),
+        "vsc3": ControllerPreset(vsc3, "surface_slope", ANGLE, {**SWITCH_BOX, **SURFACE_BOX}),
+        "nvsc": ControllerPreset(
+            temperature_vsc, "temperature_gain", STATE, {**SWITCH_BOX, **SURFACE_BOX, **PASSING_BOX}
+        ),
+        "sld": ControllerPreset(quick_stress_sliding, "surface_slope", STATE, STRESS_BOX),
+        "backstepping1": ControllerPreset(
+            backstepping_one,
+            "damping_gain",
+            STATE,
+            {"damping_gain": (0.2, 10.0), "stress_gain": (1.0, 150.0)},
+            with_printed_law,
+        ),
+        "backstepping2": ControllerPreset(
+            backstepping_two,
+            "damping_gain",
+            STATE,
+            {"damping_gain": (0.2, 10.0), "temperature_gain": (1.0, 150.0)},
+            with_printed_law,
+        ),
+    }
+)
 # Name on the command line -> filter.
 FILTERS: dict[str, Callable[[System], AbstractEstimator]] = {"printed": printed_filter, "model": model_filter}

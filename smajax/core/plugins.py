@@ -26,6 +26,16 @@ class PluginError(RuntimeError):
     """An entry point that cannot be used: which, of which package, why, what to do."""
 
 
+def resolved(table: Mapping[str, Part | str]) -> dict[str, Part]:
+    """A table of our own parts with those imported that it names as an entry point does, `package.module:name`.
+
+    A part in a file of its own is so one line of a table. Raises ImportError or AttributeError where there is none.
+    """
+    return {
+        name: EntryPoint(name, part, group="").load() if isinstance(part, str) else part for name, part in table.items()
+    }
+
+
 def whose(point: EntryPoint) -> str:
     """The entry point in words: name, place, package, group."""
     package = f" of {point.dist.name} {point.dist.version}" if point.dist is not None else ""

@@ -1,4 +1,7 @@
-"""Where each preset's numbers come from: printed in the source, corrected, or chosen here. Read by the documentation."""
+"""Where each preset's numbers come from: printed in the source, corrected, or chosen here. Read by the documentation.
+
+A load in a file of its own says so itself, in its class variable `origins`.
+"""
 
 from __future__ import annotations
 
@@ -125,3 +128,9 @@ for _name in ("niti_table_3_1", "flexinol_table_3_2"):
     ORIGINS[f"{_name}_expanding"] = ORIGINS[_name] | _chosen(
         "thermal_modulus", "the printed size with the physical sign"
     )
+
+
+def origins_of(name: str, part: object) -> dict[str, Origin]:
+    """Parameter -> origin of a preset and what it makes: of the table above, or else what the part's class says (`origins`)."""
+    said = {key: Origin(*text.split(": ", 1)) for key, text in getattr(part, "origins", {}).items()}
+    return ORIGINS.get(name, said)

@@ -14,7 +14,7 @@ from typing import Any
 from smajax.core.names import close_matches
 from smajax.core.parameters import set_parameters
 from smajax.core.plugins import LOADS as PLUGGED
-from smajax.core.plugins import PluginError, brought, points_of, whose
+from smajax.core.plugins import PluginError, brought, points_of, resolved, whose
 from smajax.model.drive.base import AbstractDrive
 from smajax.model.drive.current import Current
 from smajax.model.drive.duty import Duty
@@ -226,13 +226,16 @@ WIRES: dict[str, Callable[[], Wire]] = {
         flexinol_isobaric,
     )
 }
-_LOADS: dict[str, Callable[[], AbstractMovingLoad | AbstractCoupon]] = {
-    "dead_weight": dead_weight,
-    "bias_spring": bias_spring,
-    "arm": arm,
-    "coupon": Coupon,
-    "strain_coupon": StrainCoupon,
-}
+# One in a file of its own, with its preset, is one line: "my_load": "smajax.model.load.my_load:my_load".
+_LOADS: dict[str, Callable[[], AbstractMovingLoad | AbstractCoupon]] = resolved(
+    {
+        "dead_weight": dead_weight,
+        "bias_spring": bias_spring,
+        "arm": arm,
+        "coupon": Coupon,
+        "strain_coupon": StrainCoupon,
+    }
+)
 
 
 WANTED_LOAD = "expected a function without arguments that returns a load (`def my_load(): return MyLoad(...)`)"

@@ -11,7 +11,7 @@ from smajax.core.parameters import parameter
 from smajax.model.drive import supply
 from smajax.model.drive.base import AbstractDrive
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.grouping import Terms, grouped
+from smajax.model.effects.grouping import Terms, check_effects, grouped
 from smajax.model.load import force
 from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.load.coupon import AbstractCoupon, StrainCoupon
@@ -25,13 +25,16 @@ from smajax.model.wire.wire import Wire
 
 
 class System(eqx.Module):
-    """One actuator (or one coupon) with the effects that its equations carry."""
+    """One actuator (or one coupon) with the effects that its equations carry. Raises TypeError for what is no effect."""
 
     wire: Wire
     load: AbstractMovingLoad | AbstractCoupon
     drive: AbstractDrive
     effects: tuple[AbstractEffect, ...] = ()
     start_fraction: Scalar = parameter("-", 0.0, 1.0, "martensite fraction at the start", default=1.0)
+
+    def __check_init__(self) -> None:
+        check_effects(self.effects)
 
     @property
     def terms(self) -> Terms:

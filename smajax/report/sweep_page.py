@@ -138,7 +138,7 @@ def description(name: str) -> str:
     """What a controller reads, and of which plant."""
     preset = CONTROLLERS[name]
     plant = " Plant: the integrated law without a thermal term (eq. 4.51)." if preset.plant is with_printed_law else ""
-    return f"It reads {preset.told}.{plant}"
+    return f"It reads {preset.reads}.{plant}"
 
 
 def failures(sweep: ControllerSweep) -> str:

@@ -192,8 +192,11 @@ def test_an_effect_and_a_load_of_another_package(package: str, tmp_path: Path) -
         ("draft = airflow:Breeze", "calls itself 'breeze'"),
         ("breeze = airflow:nothing", "expected a class of `smajax.AbstractEffect`"),
         ("breeze = airflow:missing", "cannot be loaded"),
-        ("misspelt = airflow:Misspelt", "changes no equation: it has none of the methods stored_heat"),
-        ("outside = airflow:Outside", "changes no equation: it inherits from none of HeatTerm, ResistanceTerm"),
+        ("misspelt = airflow:Misspelt", "and overrides none of the methods stored_heat"),
+        (
+            "outside = airflow:Outside",
+            "override a method: HeatTerm (stored_heat, heat_loss, ambient_shift); ResistanceTerm (",
+        ),
         ("untitled = airflow:Untitled", "lacks candidate, which every effect says of itself"),
         ("switched = airflow:Switched", "has switches of what is none of its parameters: strenght; these are strength"),
         ("started = airflow:Started", "has an initial guess of what is none of its parameters: x; these are strength"),

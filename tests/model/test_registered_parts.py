@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any
+from typing import Any, ClassVar
 
 import pytest
 
 from smajax.control.presets import CONTROLLERS
 from smajax.core.parameters import parameters
+from smajax.core.plugins import resolved
 from smajax.model.effects.base import AbstractEffect
 from smajax.model.effects.candidate import Width
 from smajax.model.effects.library import _OWN, _wrong
-from smajax.model.preset_sources import ORIGINS
-from smajax.model.presets import _LOADS, WIRES
+from smajax.model.load.arm import Arm
+from smajax.model.load.dead_weight import DeadWeight
+from smajax.model.preset_sources import origins_of
+from smajax.model.presets import _LOADS, WIRES, build
 from smajax.model.wire.heat import HeatTerm
 
 
@@ -32,7 +35,51 @@ def test_a_misspelt_method_is_a_fault() -> None:
         def heat_los(self) -> float:
             return 1.0
 
-    assert "is one misspelt?" in _wrong("misspelt", Misspelt)
+    assert "it has heat_los, and overrides none of the methods stored_heat, heat_loss" in _wrong("misspelt", Misspelt)
+    with pytest.raises(TypeError, match=r"^Misspelt changes no equation: it has heat_los, .*; is one misspelt\?"):
+        dataclasses.replace(build("niti_table_3_1", "arm", "voltage"), effects=(Misspelt(),))
+
+
+def test_an_effect_without_a_contract_is_told_which_has_its_method() -> None:
+    """It would be ignored without a word; a method that a contract has names that contract alone."""
+
+    class Bare(AbstractEffect):
+        effect_name = "bare"
+
+    class Loss(Bare):
+        def friction_limits(self) -> float:
+            return 1.0
+
+    system = build("niti_table_3_1", "arm", "voltage")
+    with pytest.raises(
+        TypeError, match=r"Bare changes no equation: it inherits from no contract.*HeatTerm \(stored_heat"
+    ):
+        dataclasses.replace(system, effects=(Bare(),))
+    with pytest.raises(TypeError, match=r"Loss changes no equation.*FrictionTerm \(friction_limit"):
+        dataclasses.replace(system, effects=(Loss(),))
+    with pytest.raises(TypeError, match=r"LatentHeat in the effects of a system is a class; expected an instance"):
+        dataclasses.replace(system, effects=(_OWN["latent_heat"],))
+    with pytest.raises(TypeError, match=r"str is no effect"):
+        dataclasses.replace(system, effects=("latent_heat",))
+
+
+def test_a_part_in_a_file_of_its_own_is_one_line_of_a_table() -> None:
+    table = {"one": Arm, "other": "smajax.model.load.dead_weight:DeadWeight"}
+    assert resolved(table) == {"one": Arm, "other": DeadWeight}
+    with pytest.raises(AttributeError, match="no attribute 'Antagonist'"):
+        resolved({"antagonist": "smajax.model.load.dead_weight:Antagonist"})
+
+
+def test_a_load_says_itself_where_its_numbers_come_from() -> None:
+    class Blade(DeadWeight):
+        origins: ClassVar[dict[str, str]] = {
+            "load_mass": "chosen: of the bench",
+            "damping": "printed: Table 1: no ringing",
+        }
+
+    origins = origins_of("blade", Blade(load_mass=0.1, damping=20.0))
+    assert (origins["load_mass"].kind, origins["load_mass"].note) == ("chosen", "of the bench")
+    assert origins["damping"].note == "Table 1: no ringing"
 
 
 @pytest.mark.parametrize(
@@ -60,8 +107,10 @@ def test_a_prior_that_cannot_be_read_is_a_fault(changed: dict[str, Any], message
 def test_a_preset_says_where_its_numbers_come_from(name: str) -> None:
     made = (WIRES | _LOADS)[name]()
     entries = parameters(made)
-    missing = sorted(set(entries) - set(ORIGINS.get(name, {})))
-    assert not missing, f"give {name} an entry in ORIGINS of smajax/model/preset_sources.py for {missing}"
+    origins = origins_of(name, made)
+    missing = sorted(set(entries) - set(origins))
+    assert not missing, f"say where the numbers of {name} come from, in `origins` of its class, for {missing}"
+    assert {one.kind for one in origins.values()} <= {"printed", "corrected", "chosen"}
 
 
 def test_controllers_are_presets_with_a_main_gain() -> None:

@@ -17,11 +17,11 @@ import numpy as np
 
 from smajax.control.closed_loop import ClosedLoopSetup, observe_closed_loop
 from smajax.control.controllers.base import AbstractController
+from smajax.control.controllers.preset import Box, ControllerPreset
 from smajax.control.figures_of_merit import Merit, merit_observer
 from smajax.control.interface import Interface
 from smajax.control.mismatch import MISMATCHES
 from smajax.control.perturbed_plant import perturbed_plant
-from smajax.control.presets import Box, ControllerPreset
 from smajax.control.reference import clock, constant
 from smajax.control.sweep.batched_loops import NUMBER, TARGET
 from smajax.control.tune.scenarios import Scenarios

@@ -40,3 +40,22 @@ CONTRACTS: tuple[abc.ABCMeta, ...] = (
 def methods(contract: type) -> list[str]:
     """The methods of a contract by name."""
     return [name for name in vars(contract) if name[0] != "_" and isinstance(getattr(contract, name), FunctionType)]
+
+
+def contract_fault(effect: type) -> str:
+    """What keeps a class from changing an equation: which contract or which methods are missing; nothing where it does."""
+    accepted = [contract for contract in CONTRACTS if issubclass(effect, contract)]
+    own = [name for name in vars(effect) if name[0] != "_" and isinstance(vars(effect)[name], FunctionType)]
+    if not accepted:
+        fitting = [contract for contract in CONTRACTS if set(own) & set(methods(contract))] or CONTRACTS
+        choices = "; ".join(f"{one.__name__} ({', '.join(methods(one))})" for one in fitting)
+        return f"changes no equation: it inherits from no contract. Inherit from the one of its equation, and override a method: {choices}"
+    abstract: frozenset[str] = getattr(effect, "__abstractmethods__", frozenset())
+    if abstract:
+        return f"lacks the methods {', '.join(sorted(abstract))} of its contract"
+    terms = [(contract, name) for contract in accepted for name in methods(contract)]
+    if all(getattr(effect, name) is getattr(contract, name) for contract, name in terms):
+        has = f"it has {', '.join(own)}" if own else "it has no method of its own"
+        names = ", ".join(name for _, name in terms)
+        return f"changes no equation: {has}, and overrides none of the methods {names}; is one misspelt?"
+    return ""

@@ -6,11 +6,13 @@ An effect belongs to every contract that it inherits from. The grouping is made 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from functools import cache
+from typing import Any, NamedTuple
 
 from smajax.model.drive.inputs import CommandTerm, InputLagTerm
 from smajax.model.drive.supply import SeriesTerm, SupplyTerm, SupplyTerms
 from smajax.model.effects.base import AbstractEffect
+from smajax.model.effects.contracts import contract_fault
 from smajax.model.effects.old_contract import adopt
 from smajax.model.load.force import ForceTerm
 from smajax.model.load.friction import FrictionTerm
@@ -37,6 +39,26 @@ class Terms(NamedTuple):
     supply: SupplyTerms = SupplyTerms()
     sensor: SensorTerms = SensorTerms()
     input_lag: tuple[InputLagTerm, ...] = ()
+
+
+@cache
+def _fault(effect: Any) -> str:
+    if not issubclass(effect, AbstractEffect):
+        return "is no effect: expected a class that inherits from AbstractEffect and from the contract of an equation"
+    adopt(effect)
+    return contract_fault(effect)
+
+
+def check_effects(effects: Sequence[AbstractEffect]) -> None:
+    """Raise TypeError for an effect that no equation would accept: it would be ignored without a word."""
+    for effect in effects:
+        if isinstance(effect, type):
+            raise TypeError(
+                f"{effect.__name__} in the effects of a system is a class; expected an instance: {effect.__name__}(...)."
+            )
+        kind: Any = type(effect)
+        if fault := _fault(kind):
+            raise TypeError(f"{kind.__name__} {fault} (docs/how-to/add-an-effect.md).")
 
 
 def grouped(effects: Sequence[AbstractEffect]) -> Terms:

@@ -4,125 +4,86 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
+from importlib import import_module
 from typing import Any
 
 from smajax.core.names import close_matches
 from smajax.core.plugins import EFFECTS, brought
-from smajax.model.effects.ambient_drift import AmbientDrift
-from smajax.model.effects.asymmetric_transformation import AsymmetricTransformation
 from smajax.model.effects.base import AbstractEffect
 from smajax.model.effects.candidate import EQUATIONS, PRIOR_CLASSES, SCALES
-from smajax.model.effects.contracts import CONTRACTS, methods
-from smajax.model.effects.coulomb_friction import CoulombFriction
-from smajax.model.effects.creep import Creep
-from smajax.model.effects.dead_zone import DeadZone
-from smajax.model.effects.draught import Draught
-from smajax.model.effects.drifting_temperatures import DriftingTemperatures
-from smajax.model.effects.end_conduction import EndConduction
-from smajax.model.effects.enhanced_conditions import EnhancedConditions
-from smajax.model.effects.input_clock import InputClock
-from smajax.model.effects.input_delay import InputDelay
-from smajax.model.effects.input_level import InputLevel
-from smajax.model.effects.lagging_transformation import LaggingTransformation
-from smajax.model.effects.latent_heat import LatentHeat
-from smajax.model.effects.lead_resistance import LeadResistance
-from smajax.model.effects.liang_conditions import LiangConditions
-from smajax.model.effects.load_shift import LoadShift
-from smajax.model.effects.loose_start import LooseStart
-from smajax.model.effects.minor_loops import MinorLoops
-from smajax.model.effects.nonlinear_spring import NonlinearSpring
+from smajax.model.effects.contracts import contract_fault
 from smajax.model.effects.old_contract import adopt
-from smajax.model.effects.phase_modulus import PhaseModulus
-from smajax.model.effects.phase_resistance import PhaseResistance
-from smajax.model.effects.phase_specific_heat import PhaseSpecificHeat
-from smajax.model.effects.pulley_friction import PulleyFriction
-from smajax.model.effects.pulley_stribeck_friction import PulleyStribeckFriction
-from smajax.model.effects.pulsed_voltage import PulsedVoltage
-from smajax.model.effects.pwm_smoothing import PwmSmoothing
-from smajax.model.effects.radiation import Radiation
-from smajax.model.effects.residual_strain import ResidualStrain
-from smajax.model.effects.rising_convection import RisingConvection
-from smajax.model.effects.sensor_backlash import SensorBacklash
-from smajax.model.effects.sensor_drift import SensorDrift
-from smajax.model.effects.sensor_gain import SensorGain
-from smajax.model.effects.sensor_lag import SensorLag
-from smajax.model.effects.sensor_offset import SensorOffset
-from smajax.model.effects.sensor_resolution import SensorResolution
-from smajax.model.effects.series_compliance import SeriesCompliance
-from smajax.model.effects.slack import Slack
-from smajax.model.effects.smooth_transformation import SmoothTransformation
-from smajax.model.effects.stress_dependent_strain import StressDependentStrain
-from smajax.model.effects.stress_dependent_width import StressDependentWidth
-from smajax.model.effects.stribeck_friction import StribeckFriction
-from smajax.model.effects.supply_memory import SupplyMemory
-from smajax.model.effects.supply_sag import SupplySag
-from smajax.model.effects.temperature_resistance import TemperatureResistance
-from smajax.model.effects.thermal_expansion import ThermalExpansion
-from smajax.model.effects.two_part_transformation import TwoPartTransformation
-from smajax.model.effects.two_step_transformation import TwoStepTransformation
-from smajax.model.effects.two_way_memory import TwoWayMemory
-from smajax.model.effects.unequal_stress_slopes import UnequalStressSlopes
-from smajax.model.effects.viscous_friction import ViscousFriction
-from smajax.model.effects.wrong_load import WrongLoad
 
-_OWN: dict[str, type[AbstractEffect]] = {
-    effect.effect_name: effect
-    for effect in (
-        # What was recorded comes before what the drive makes of it.
-        InputLevel,
-        InputDelay,
-        InputClock,
-        LatentHeat,
-        RisingConvection,
-        Radiation,
-        AmbientDrift,
-        Draught,
-        PhaseSpecificHeat,
-        EndConduction,
-        PhaseResistance,
-        TemperatureResistance,
-        LeadResistance,
-        SupplySag,
-        SupplyMemory,
-        DeadZone,
-        PwmSmoothing,
-        PulsedVoltage,
-        SmoothTransformation,
-        AsymmetricTransformation,
-        TwoPartTransformation,
-        TwoStepTransformation,
-        EnhancedConditions,
-        LiangConditions,
-        UnequalStressSlopes,
-        StressDependentWidth,
-        MinorLoops,
-        LaggingTransformation,
-        DriftingTemperatures,
-        PhaseModulus,
-        ThermalExpansion,
-        StressDependentStrain,
-        TwoWayMemory,
-        ResidualStrain,
-        Creep,
-        CoulombFriction,
-        PulleyFriction,
-        StribeckFriction,
-        PulleyStribeckFriction,
-        ViscousFriction,
-        SeriesCompliance,
-        Slack,
-        LooseStart,
-        NonlinearSpring,
-        WrongLoad,
-        LoadShift,
-        SensorLag,
-        SensorGain,
-        SensorDrift,
-        SensorOffset,
-        SensorBacklash,
-        SensorResolution,
+# A line each: the file in this folder, which has the effect of the same name. What was recorded comes before what the drive
+# makes of it, and of two effects on one shape the first acts first.
+_NAMES = (
+    "input_level",
+    "input_delay",
+    "input_clock",
+    "latent_heat",
+    "rising_convection",
+    "radiation",
+    "ambient_drift",
+    "draught",
+    "phase_specific_heat",
+    "end_conduction",
+    "phase_resistance",
+    "temperature_resistance",
+    "lead_resistance",
+    "supply_sag",
+    "supply_memory",
+    "dead_zone",
+    "pwm_smoothing",
+    "pulsed_voltage",
+    "smooth_transformation",
+    "asymmetric_transformation",
+    "two_part_transformation",
+    "two_step_transformation",
+    "enhanced_conditions",
+    "liang_conditions",
+    "unequal_stress_slopes",
+    "stress_dependent_width",
+    "minor_loops",
+    "lagging_transformation",
+    "drifting_temperatures",
+    "phase_modulus",
+    "thermal_expansion",
+    "stress_dependent_strain",
+    "two_way_memory",
+    "residual_strain",
+    "creep",
+    "coulomb_friction",
+    "pulley_friction",
+    "stribeck_friction",
+    "pulley_stribeck_friction",
+    "viscous_friction",
+    "series_compliance",
+    "slack",
+    "loose_start",
+    "nonlinear_spring",
+    "wrong_load",
+    "load_shift",
+    "sensor_lag",
+    "sensor_gain",
+    "sensor_drift",
+    "sensor_offset",
+    "sensor_backlash",
+    "sensor_resolution",
+)
+
+
+def _effect_of(name: str) -> type[AbstractEffect]:
+    """The class with that `effect_name` in the file of that name. Raises LookupError where it has none."""
+    module = import_module(f"smajax.model.effects.{name}")
+    for one in vars(module).values():
+        if isinstance(one, type) and issubclass(one, AbstractEffect) and getattr(one, "effect_name", "") == name:
+            return one
+    raise LookupError(
+        f"smajax/model/effects/{name}.py has no class with `effect_name = {name!r}`; give its effect that name."
     )
-}
+
+
+_OWN: dict[str, type[AbstractEffect]] = {name: _effect_of(name) for name in _NAMES}
 
 
 def _wrong(name: str, effect: Any) -> str:
@@ -153,16 +114,7 @@ def _wrong(name: str, effect: Any) -> str:
     for coefficient, width in candidate.widths.items():
         if width.of not in SCALES or not width.sigma > 0.0:
             return f"has {width!r} for {coefficient}; expected a sigma above 0, and `of` one of {', '.join(map(repr, SCALES))}"
-    accepted = [contract for contract in CONTRACTS if issubclass(effect, contract)]
-    if not accepted:
-        return f"changes no equation: it inherits from none of {', '.join(one.__name__ for one in CONTRACTS)}"
-    terms = [one for contract in accepted for one in methods(contract)]
-    if all(getattr(effect, one) is getattr(contract, one) for contract in accepted for one in methods(contract)):
-        return f"changes no equation: it has none of the methods {', '.join(terms)}; is one misspelt?"
-    abstract: frozenset[str] = getattr(effect, "__abstractmethods__", frozenset())
-    if abstract:
-        return f"lacks the methods {', '.join(sorted(abstract))} of its contract"
-    return ""
+    return contract_fault(effect)
 
 
 # Ours, then those of other packages (`smajax.core.plugins`), in the order of their names.

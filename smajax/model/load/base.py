@@ -9,6 +9,7 @@ and stress or strain are prescribed, has no equation of motion (`load/coupon.py`
 from __future__ import annotations
 
 import abc
+from collections.abc import Mapping
 from typing import ClassVar
 
 import equinox as eqx
@@ -25,6 +26,8 @@ class AbstractMovingLoad(eqx.Module):
     inputs_required: ClassVar[frozenset[str]] = frozenset()
     inputs_optional: ClassVar[frozenset[str]] = frozenset()
     reading: ClassVar[tuple[str, str]]  # what its sensor shows, and the SI unit
+    # Of the load's preset: parameter -> where its number comes from, "printed: Table 3.1", "corrected: ..." or "chosen: ...".
+    origins: ClassVar[Mapping[str, str]] = {}
 
     @abc.abstractmethod
     def start(self) -> Scalar:
