@@ -90,7 +90,7 @@ def moved(
         own = in_registers(text, one)
         named.append(np.arange(len(lanes), len(lanes) + own.size, dtype="int32").reshape(own.shape))
         lanes += list(own.ravel())
-    if "FILL" in str(params.get("mode")):
+    if primitive.name == "gather" and "FILL" in str(params.get("mode")):
         params = {**params, "fill_value": -1}  # not a place there is: found out below where it would be put in
     with jax.ensure_compile_time_eval():
         found = primitive.bind(*named, **params)

@@ -220,6 +220,11 @@ def _repeated(a: jax.Array) -> jax.Array:
     return (rows * jnp.broadcast_to(jnp.arange(100.0)[:, None], (100, 3))).reshape(-1)[::7] + jnp.sinc(a)
 
 
+def _placed(a: jax.Array) -> jax.Array:
+    """Numbers put in their places of an array; what lies beyond its end is dropped."""
+    return jnp.zeros((3, 3)).at[0, 1].set(a).at[1, :2].set(2.0 * a).at[5, 5].set(-a).at[2].set(a * jnp.arange(3.0))
+
+
 def _folded(a: jax.Array) -> jax.Array:
     """Of more numbers than there are registers: their sum, the largest, and whether all of them are below another."""
     kept = lax.scan(lambda c, x: (jnp.sin(c) + x, c * a), a, jnp.arange(200.0) / 100.0)[1]
@@ -228,7 +233,7 @@ def _folded(a: jax.Array) -> jax.Array:
 
 @pytest.mark.parametrize(
     "function",
-    [_newton, _long, _looked_up, _backwards, _every_seventh, _repeated, _folded],
+    [_newton, _long, _looked_up, _backwards, _every_seventh, _repeated, _placed, _folded],
     ids=lambda one: one.__name__,
 )
 def test_loops_and_tables_agree(function):
