@@ -34,9 +34,11 @@ from smajax.model.wire.resistance import resistance_per_metre
 from smajax.report.narrative import narrate
 from smajax.simulation.batch.axes import zipped
 from smajax.simulation.batch.run_batch import run_batch
+from smajax.simulation.compiled import simulate_compiled
 from smajax.simulation.measures import Largest, Smallest
 from smajax.simulation.observers import COLDEST, GOOD, HOTTEST, NOT_FINITE, RUNAWAY
 from smajax.simulation.simulate import simulate
+from tests.helpers.machine_code import by_machine_code
 
 RIGS = {
     "arm": (build("niti_table_3_1", "arm", "amplified_voltage"), "voltage", 9.0),
@@ -44,7 +46,7 @@ RIGS = {
     "bias_spring": (build("flexinol_ht_500um", "bias_spring", "duty"), "duty", 0.3),
 }
 FAST, SLOW = 1024, 40_000  # members of each rig
-RUN = eqx.filter_jit(simulate)
+RUN = simulate_compiled
 
 
 def _whole_box(system: System, count: int, seed: int) -> dict[str, np.ndarray]:
@@ -219,7 +221,7 @@ def test_the_same_seed_gives_the_same_bytes() -> None:
     """Noise, filter and controller at work, in two calls; and another seed does not."""
     arm = RIGS["arm"][0]
 
-    @eqx.filter_jit
+    @by_machine_code
     def run(key: jax.Array) -> ClosedLoop:
         return simulate_closed_loop(
             arm,

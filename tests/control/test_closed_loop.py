@@ -21,16 +21,18 @@ from smajax.control.reference_file import read_reference
 from smajax.core.parameters import get_parameters, set_parameters
 from smajax.core.units import UnitError
 from smajax.data.readers.table import MeasuredDataError
+from smajax.engine import Engine, program
 from smajax.model.drive.duty import Duty
 from smajax.model.load.base import GRAVITY
 from smajax.model.presets import amplified_voltage, arm, build, niti_table_3_1
 from smajax.model.system import System
 from smajax.model.types import Scalar
-from smajax.simulation.simulate import simulate
+from smajax.simulation.compiled import simulate_compiled
+from tests.helpers.machine_code import by_machine_code
 
 ARM = System(niti_table_3_1(), arm(), amplified_voltage())
 DT = 0.01
-RUN = eqx.filter_jit(simulate_closed_loop)
+RUN = by_machine_code(simulate_closed_loop)
 
 
 class Played(AbstractController):
@@ -48,13 +50,13 @@ VOLTS = jnp.asarray(np.random.default_rng(1).uniform(0.0, 9.0, 201))
 
 @pytest.mark.parametrize(("every", "delay"), [(1, 0), (4, 0), (1, 3), (4, 2)])
 def test_a_command_is_held_and_comes_late(every: int, delay: int) -> None:
-    loop = simulate_closed_loop(ARM, Played(), VOLTS, DT, every, delay=delay)
+    loop = RUN(ARM, Played(), VOLTS, DT, every, delay=delay)
     asked = np.asarray(VOLTS)[:-1:every]
     late = np.concatenate([np.zeros(delay), asked])[: len(asked)]
     held = np.append(np.repeat(late, every), late[-1])
     np.testing.assert_array_equal(loop.voltage, held)
     # And the plant is the simulator's own under that command.
-    alone = simulate(ARM, {"voltage": jnp.asarray(held)}, DT)
+    alone = simulate_compiled(ARM, {"voltage": jnp.asarray(held)}, DT)
     np.testing.assert_allclose(loop.run.position, alone.position, rtol=0.0, atol=1e-12)
 
 
@@ -62,8 +64,8 @@ def test_a_duty_cycle_heats_as_the_voltage_does() -> None:
     """A supply behind an amplifier of gain 1 gives the same power by its duty, until there is no more of it."""
     supply = System(ARM.wire, ARM.load, Duty(supply_voltage=16.2))
     volts = jnp.linspace(0.0, 20.0, 201)
-    by_duty = simulate_closed_loop(supply, Played(), volts, DT)
-    direct = simulate_closed_loop(ARM, Played(), jnp.minimum(volts, 16.2) / 1.8, DT)
+    by_duty = RUN(supply, Played(), volts, DT)
+    direct = RUN(ARM, Played(), jnp.minimum(volts, 16.2) / 1.8, DT)
     np.testing.assert_allclose(by_duty.run.temperature, direct.run.temperature, rtol=0.0, atol=1e-9)
 
 
@@ -143,7 +145,7 @@ def test_a_reference_from_a_file(tmp_path: Path) -> None:
 
 def test_figures_of_merit_of_a_known_run() -> None:
     """A hand-made trajectory: rises to 1.1, back to 1 within the band from 3 s on; the command turns back once."""
-    loop = simulate_closed_loop(ARM, Played(), jnp.ones(501), DT)
+    loop = RUN(ARM, Played(), jnp.ones(501), DT)
     time = loop.run.time
     position = jnp.interp(time, jnp.asarray([0.0, 1.0, 2.0, 3.0, 5.0]), jnp.asarray([0.0, 1.0, 1.1, 1.01, 1.01]))
     voltage = jnp.where((time > 1.0) & (time < 2.0), 10.0, 2.0)
@@ -162,7 +164,7 @@ def test_figures_of_merit_of_a_known_run() -> None:
 
 
 def test_figures_of_merit_in_awkward_cases() -> None:
-    loop = simulate_closed_loop(ARM, Played(), jnp.ones(501), DT)
+    loop = RUN(ARM, Played(), jnp.ones(501), DT)
     time = loop.run.time
 
     def judged(position: Any, voltage: Any = 0.0, band: float = 0.02) -> Any:
@@ -191,24 +193,26 @@ def test_the_band_of_a_length_is_a_share_of_its_stroke() -> None:
     assert float(band_of(ARM)) == pytest.approx(np.radians(1.0))
 
 
-@pytest.mark.parametrize("name", ["sld", "backstepping1", "backstepping2"])
-def test_a_bad_gain_fails_its_own_run_and_no_other(name: str) -> None:
+@pytest.mark.parametrize(
+    ("name", "engine"), [("sld", "xla"), ("sld", "native"), ("backstepping1", "native"), ("backstepping2", "native")]
+)
+def test_a_bad_gain_fails_its_own_run_and_no_other(name: str, engine: Engine) -> None:
     """In a batch, where no error can be raised: a gain that is no number, and one out of its bounds."""
     controller = CONTROLLERS[name].make(ARM)
     gain = CONTROLLERS[name].main_gain
     good = float(get_parameters(controller, [gain])[0])
-    values = jnp.asarray([good, jnp.nan, -good, good])
+    values = np.asarray([good, np.nan, -good, good])
 
-    def run(value: Any) -> Any:
-        return simulate_closed_loop(ARM, set_parameters(controller, {gain: value}), jnp.full(31, 0.3), DT)
+    def run(_: None, own: dict[str, Any]) -> Any:
+        return simulate_closed_loop(ARM, set_parameters(controller, own), jnp.full(31, 0.3), DT)
 
-    loop = eqx.filter_jit(jax.vmap(run))(values)
+    loop = program(run, None, (gain,), engine=engine)(None, {gain: values})
     np.testing.assert_array_equal(np.isfinite(loop.failed_at), [False, True, True, False])
     np.testing.assert_array_equal(loop.voltage[1:3], 0.0)
     np.testing.assert_array_equal(loop.run.position[0], loop.run.position[3])
     assert float(jnp.abs(loop.voltage[0]).max()) > 1.0
     with pytest.raises(ValueError, match=f"{gain}.*-"):
-        run(-good)
+        run(None, {gain: -good})
 
 
 def test_what_a_loop_refuses() -> None:
@@ -232,7 +236,7 @@ def test_what_a_loop_refuses() -> None:
     with pytest.raises(ValueError, match="a clock takes seconds of 0 or more and a `dt` above zero"):
         clock(1.0, -0.01)
     # Under `jit` a set point is not known: what its controller answers is told.
-    broken = eqx.filter_jit(simulate_closed_loop)(ARM, Played(), gone, DT)
+    broken = RUN(ARM, Played(), gone, DT)
     assert float(broken.failed_at) == pytest.approx(0.5)
     assert np.isfinite(broken.run.position).all()
     np.testing.assert_array_equal(broken.voltage[50:], 0.0)

@@ -7,7 +7,6 @@ import json
 from pathlib import Path
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -35,9 +34,11 @@ from smajax.control.presets import (
     vsc3_of_section_4_6,
 )
 from smajax.control.reference import Reference, clock, constant
-from smajax.core.parameters import get_parameters, parameters, set_parameters, set_vector
+from smajax.core.parameters import get_parameters, parameters, set_parameters
+from smajax.engine import program
 from smajax.model.presets import amplified_voltage, arm, niti_table_3_1
 from smajax.model.system import System
+from tests.helpers.machine_code import by_machine_code
 
 SYSTEM = System(niti_table_3_1(), arm(), amplified_voltage())
 CONTROLLERS: dict[str, AbstractController] = {
@@ -61,7 +62,7 @@ def set_point(position: Any) -> Reference:
     return Reference(jnp.asarray(position, dtype=float), zero, zero)
 
 
-@eqx.filter_jit
+@by_machine_code
 def driven(controller: Pid, a: Any, b: Any, c: Any, wanted: jax.Array, period: float) -> tuple[Any, Any, Any]:
     """(output, command, integral) of the discrete plant x' = a x + b u, y = c x under the controller."""
     start = jnp.zeros(a.shape[0]), controller.start(told(0.0), set_point(0.0))
@@ -176,23 +177,33 @@ def test_the_printed_layer_jumps_at_an_edge_whatever_its_gain(gain: float) -> No
     assert (beyond > short) == (gain > 0.0), "K > 0 heats beyond the set point and not short of it"
 
 
-@eqx.filter_jit
-def batch(controller: AbstractController, names: tuple[str, ...], gains: jax.Array, degrees: jax.Array) -> ClosedLoop:
-    """Closed loops of 1.5 s on the arm, one for each row of gains; compiled once a controller."""
+def _loop(model: tuple[AbstractController, jax.Array], own: dict[str, jax.Array]) -> ClosedLoop:
+    """A closed loop of 1.5 s on the arm, with the gains in `own`."""
+    controller, degrees = model
+    return simulate_closed_loop(
+        SYSTEM, set_parameters(controller, own), constant(clock(1.5, DT), jnp.radians(degrees)), DT
+    )
+
+
+def _slope(model: tuple[AbstractController, jax.Array], own: dict[str, jax.Array]) -> jax.Array:
+    """Derivative of the mean square error at the gains in `own`, along the direction there."""
+    names = [name.removeprefix("along ") for name in own if name.startswith("along ")]
+    at, along = ({name: own[f"{kind}{name}"] for name in names} for kind in ("", "along "))
+    return jax.jvp(lambda gains: squares(_loop(model, gains)), (at,), (along,))[1]
+
+
+def batch(controller: AbstractController, names: tuple[str, ...], gains: Any, degrees: Any) -> ClosedLoop:
+    """Closed loops by machine code, one for each row of gains; compiled once a controller."""
     # `degrees` is an array: a plain number would compile again.
-    wanted = constant(clock(1.5, DT), jnp.radians(degrees))
-    return jax.vmap(lambda row: simulate_closed_loop(SYSTEM, set_vector(controller, names, row), wanted, DT))(gains)
+    own = dict(zip(names, np.asarray(gains).T, strict=True))
+    return program(_loop, (controller, degrees), names, engine="native")((controller, degrees), own, 1)
 
 
-@eqx.filter_jit
-def slopes(controller: AbstractController, names: tuple[str, ...], at: jax.Array, degrees: jax.Array) -> jax.Array:
+def slopes(controller: AbstractController, names: tuple[str, ...], at: Any, degrees: Any) -> np.ndarray:
     """Derivatives of the mean square error by each gain."""
-    wanted = constant(clock(1.5, DT), jnp.radians(degrees))
-
-    def cost(vector: jax.Array) -> jax.Array:
-        return squares(simulate_closed_loop(SYSTEM, set_vector(controller, names, vector), wanted, DT))
-
-    return jax.jacfwd(cost)(at)
+    own = {name: np.full(len(names), float(at[k])) for k, name in enumerate(names)}
+    own |= {f"along {name}": row for name, row in zip(names, np.eye(len(names)), strict=True)}
+    return program(_slope, (controller, degrees), tuple(own), engine="native")((controller, degrees), own, 1)
 
 
 def squares(loop: ClosedLoop) -> jax.Array:

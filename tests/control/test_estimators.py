@@ -23,21 +23,24 @@ from smajax.control.estimators.unscented import Unscented
 from smajax.control.measured_state import Sensor
 from smajax.control.presets import model_filter, printed_filter, stress_sliding
 from smajax.core.parameters import get_parameters, set_parameters, set_vector
+from smajax.engine import program
 from smajax.model.rigs import arm, coupon, dead_weight
 from smajax.model.system import initial_state
-from smajax.model.types import Motion
+from smajax.model.types import Motion, State
 from smajax.model.wire.branch_amplitude import AsPrinted
+from smajax.simulation.compiled import simulate_compiled
 from smajax.simulation.simulate import simulate
+from tests.helpers.machine_code import by_machine_code
 
 PERIOD, COUNT, NOISE = 0.01, 450, 1e-3
 ARM = arm()
 # 8 V for 3 s, then none: up through the whole range, and most of the way down.
 VOLTS = jnp.where(jnp.arange(COUNT) * PERIOD < 2.995, 8.0, 0.0)
-TRUTH = eqx.filter_jit(simulate)(ARM, {"voltage": VOLTS}, PERIOD)
+TRUTH = simulate_compiled(ARM, {"voltage": VOLTS}, PERIOD)
 READINGS = TRUTH.position + NOISE * jax.random.normal(jax.random.key(1), (COUNT,))
 MODEL, PRINTED = model_filter(ARM), printed_filter(ARM)
 
-followed = eqx.filter_jit(lambda estimator, readings, volts: estimate(estimator, readings, volts, PERIOD))
+followed = by_machine_code(lambda estimator, readings, volts: estimate(estimator, readings, volts, PERIOD))
 
 
 def _rms(one, other, here=slice(None)):
@@ -177,7 +180,7 @@ def test_the_model_filter_follows_everything() -> None:
 
 @pytest.mark.slow
 def test_two_substeps_follow_a_plant_of_half_the_step() -> None:
-    fine = eqx.filter_jit(simulate)(ARM, {"voltage": jnp.repeat(VOLTS, 2)}, PERIOD / 2).position[::2]
+    fine = simulate_compiled(ARM, {"voltage": jnp.repeat(VOLTS, 2)}, PERIOD / 2).position[::2]
     errors = []
     for substeps in (1, 2):
         tight = dataclasses.replace(MODEL, substeps=substeps)
@@ -267,7 +270,11 @@ def test_a_step_down_a_cliff_stays_on_the_ground() -> None:
     )
     motion = Motion(jnp.asarray(-0.6181031604727328), jnp.asarray(-6.989864112333557))
     state = dataclasses.replace(rest, wire=wire, motion=motion)
-    after = jax.vmap(lambda span: advanced(ARM, state, jnp.zeros(()), span, 1))(jnp.linspace(0.0099, 0.0101, 101))
+
+    def ended(state: State, own: dict[str, jax.Array]) -> State:
+        return advanced(ARM, state, jnp.zeros(()), own["span"], 1)
+
+    after = program(ended, state, ("span",), engine="native")(state, {"span": np.linspace(0.0099, 0.0101, 101)}, 1)
     assert float(after.wire.stress.max()) < 200e6
     assert float(after.motion.position.max()) < -0.6
 
@@ -305,7 +312,7 @@ def test_float32_follows_float64() -> None:
             assert _rms(getattr(single, name), getattr(double, name)) < limit, name
 
 
-@eqx.filter_jit
+@by_machine_code
 def _missed(estimator, names, at, direction):
     """How far stress and temperature are missed, and the derivative along `direction`."""
     span, count = 0.05, 70
@@ -343,7 +350,7 @@ def test_derivatives_by_the_filters_gains_and_what_it_believes(estimator, names)
 
 def test_in_a_closed_loop() -> None:
     """Sliding control on the filter's stress settles as on the true one; noise on the readings shakes the voltage."""
-    target, run = jnp.full(1001, jnp.radians(30.0)), eqx.filter_jit(simulate_closed_loop)
+    target, run = jnp.full(1001, jnp.radians(30.0)), by_machine_code(simulate_closed_loop)
     late, loops = slice(900, None), []
     for noise in (0.0, NOISE):
         sensor, key = Sensor(noise_sigma=noise), jax.random.key(5)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -14,11 +15,14 @@ import pytest
 from smajax.control.closed_loop import simulate_closed_loop
 from smajax.control.presets import stress_sliding
 from smajax.core.parameters import get_parameters, parameters, set_parameters, set_vector
+from smajax.engine import program
 from smajax.model.presets import build
 from smajax.model.system import System
 from smajax.model.wire.laws import LAWS, under_law
+from smajax.simulation.compiled import simulate_compiled
 from smajax.simulation.simulate import simulate
 from tests.helpers.derivatives import compare
+from tests.helpers.machine_code import by_machine_code
 
 DT = 0.05
 NAMES = sorted(LAWS)
@@ -103,14 +107,13 @@ def test_closed_loop_has_the_derivatives_of_its_gains() -> None:
     assert set(gains) <= set(table)
     at = get_parameters(stress_sliding(arm), gains)
 
-    @jax.jit
-    def cost(share: jax.Array) -> jax.Array:
+    def cost_of(share: jax.Array) -> jax.Array:
         loop = simulate_closed_loop(arm, set_vector(stress_sliding(arm), gains, at * share), target, 0.02)
         return jnp.mean((loop.run.position - loop.wanted.position) ** 2)
 
     one = jnp.ones(len(gains))
-    automatic = np.asarray(jax.jit(jax.grad(cost))(one))
-    step = 1e-5
+    automatic = by_machine_code(jax.grad(cost_of))(one)
+    cost, step = by_machine_code(cost_of), 1e-5
     for k in range(len(gains)):
         along = jnp.zeros(len(gains)).at[k].set(step)
         difference = float(cost(one + along) - cost(one - along)) / (2 * step)
@@ -120,13 +123,23 @@ def test_closed_loop_has_the_derivatives_of_its_gains() -> None:
 def _finite(system: System, inputs: dict[str, jax.Array], dt: float = DT) -> None:
     names = list(parameters(system))
 
-    def ends(vector: jax.Array) -> jax.Array:
-        run = simulate(set_vector(system, names, vector), inputs, dt)
+    def ends(at: jax.Array) -> jax.Array:
+        run = simulate(set_vector(system, names, at), inputs, dt)
         return jnp.stack([run.reading[-1], run.martensite_fraction.min(), run.temperature[-1], run.stress.mean()])
 
+    def column(at: jax.Array, own: dict[str, jax.Array]) -> jax.Array:
+        return jax.jvp(ends, (at,), (jnp.stack([own[name] for name in names]),))[1]
+
+    def row(at: jax.Array, own: dict[str, jax.Array]) -> jax.Array:
+        return jax.vjp(ends, at)[1](jnp.stack([own[k] for k in "abcd"]))[0]
+
+    def of_each(function: Callable[..., Any], kinds: Sequence[str]) -> np.ndarray:
+        """One run for each of `kinds`, along itself."""
+        own = dict(zip(kinds, np.eye(len(kinds)), strict=True))
+        return program(function, at, tuple(kinds), engine="native")(at, own, 1)
+
     at = get_parameters(system, names)
-    forward = np.asarray(jax.jit(jax.jacfwd(ends))(at))
-    backward = np.asarray(jax.jit(jax.jacrev(ends))(at))
+    forward, backward = of_each(column, names).T, of_each(row, "abcd")
     assert np.isfinite(forward).all()
     np.testing.assert_allclose(backward, forward, rtol=1e-6, atol=1e-9 * np.abs(forward).max())
 
@@ -145,8 +158,9 @@ def test_derivatives_are_finite_at_end_stops_and_when_slack() -> None:
     arm = set_parameters(build("niti_table_3_1", "arm", "amplified_voltage"), {"upper_stop": 0.5})
     _finite(arm, {"voltage": jnp.concatenate([jnp.full(300, 8.0), jnp.zeros(100)])})
     weight = build("flexinol_table_3_2", "dead_weight", "voltage")
-    run = simulate(weight, {"voltage": jnp.concatenate([jnp.full(150, 12.0), jnp.zeros(150)])}, DT)
-    _finite(weight, {"voltage": jnp.concatenate([jnp.full(150, 12.0), jnp.zeros(150)])})
+    slackening = {"voltage": jnp.concatenate([jnp.full(150, 12.0), jnp.zeros(150)])}
+    run = simulate_compiled(weight, slackening, DT)
+    _finite(weight, slackening)
     assert (np.asarray(run.stress) == 0.0).any(), "the case does not go slack any more"
 
 
@@ -154,12 +168,12 @@ def test_a_clipped_voltage_has_the_derivative_of_the_limit() -> None:
     """Beyond the amplifier's limit the end depends on the limit and not on the voltage; below it, the other way round."""
     weight = build("flexinol_table_3_2", "dead_weight", "voltage")
 
-    @jax.jit
-    def end(limit: jax.Array, volts: jax.Array) -> jax.Array:
+    @by_machine_code
+    @partial(jax.grad, argnums=(0, 1))
+    def slope(limit: jax.Array, volts: jax.Array) -> jax.Array:
         limited = set_parameters(weight, {"amplifier_limit": limit})
         return simulate(limited, {"voltage": jnp.full(60, volts)}, DT).temperature[-1]
 
-    slope = jax.jit(jax.grad(end, argnums=(0, 1)))
     beyond = slope(jnp.asarray(5.0), jnp.asarray(8.0))
     below = slope(jnp.asarray(8.0), jnp.asarray(5.0))
     assert float(beyond[0]) > 0.0
@@ -173,16 +187,18 @@ def test_a_parameter_walks_across_a_branch_change() -> None:
     """From a voltage that never reaches A_s' to one that transforms to the end: the derivative follows the path."""
     weight = build("flexinol_table_3_2", "dead_weight", "voltage")
 
-    @eqx.filter_jit
     def end(volts: jax.Array) -> jax.Array:
         return 1e3 * simulate(weight, {"voltage": jnp.full(200, volts)}, DT).position.mean()
 
-    volts = jnp.linspace(6.3, 8.1, 61)
-    value = np.asarray(jax.vmap(end)(volts))
-    slope = np.asarray(jax.vmap(jax.grad(end))(volts))
+    def value_and_slope(_: None, own: dict[str, jax.Array]) -> tuple[jax.Array, jax.Array]:
+        return jax.value_and_grad(end)(own["volts"])
+
+    volts, step = np.linspace(6.3, 8.1, 61), 1e-5
+    run = program(value_and_slope, None, ("volts",), engine="native")
+    values, slopes = run(None, {"volts": np.concatenate([volts, volts + step, volts - step])}, 1)
+    (value, ahead, behind), slope = np.split(values, 3), slopes[:61]
     assert np.isfinite(slope).all()
-    step = 1e-5
-    difference = np.asarray(jax.vmap(end)(volts + step) - jax.vmap(end)(volts - step)) / (2 * step)
+    difference = (ahead - behind) / (2 * step)
     close = np.abs(slope - difference) <= 1e-4 * np.abs(difference).max()
     assert close.mean() >= 0.95, "more than a kink or two disagree"
     # The derivative integrates to the value across the change of branch, so that nothing is lost at it.
@@ -237,10 +253,12 @@ def test_a_second_derivative_by_reverse_mode() -> None:
         run = simulate(set_vector(system, names, at * share), inputs, DT)
         return run.temperature.sum() / 10.0 + run.stress.mean() / 1e8
 
-    slope, step = jax.jit(jax.grad(shown)), 1e-4
-    found = jax.jit(jax.jacfwd(jax.grad(shown)))(1.0)
+    slope, step = by_machine_code(jax.grad(shown)), 1e-4
+    found = by_machine_code(jax.jacfwd(jax.grad(shown)))(jnp.asarray(1.0))
     assert abs(found) > 1e-3
-    np.testing.assert_allclose(found, (slope(1.0 + step) - slope(1.0 - step)) / (2.0 * step), rtol=1e-6)
+    np.testing.assert_allclose(
+        found, (slope(jnp.asarray(1.0 + step)) - slope(jnp.asarray(1.0 - step))) / (2.0 * step), rtol=1e-6
+    )
 
 
 @pytest.mark.slow  # a minute to compile

@@ -20,13 +20,14 @@ from smajax.model.wire.branch_amplitude import AsPrinted
 from smajax.model.wire.form import IntegratedForm
 from smajax.model.wire.laws import LAWS, under_law
 from smajax.model.wire.stiffness import Constant
-from smajax.simulation.simulate import DEFAULT_STEP, simulate
+from smajax.simulation.compiled import simulate_compiled
+from smajax.simulation.simulate import DEFAULT_STEP
 from studies.reference.path_reference import simulate_path
 from studies.reference.sliding import sliding_controller
 from studies.reference.wire_parameters import ArmParameters, DeadWeightParameters
 from studies.reference.wire_reference import simulate_arm, simulate_dead_weight
 
-RUN = eqx.filter_jit(simulate)
+RUN = simulate_compiled
 NAMES = sorted(LAWS)
 DETWINNING: dict[str, Any] = {"detwinning_start": 10e6, "detwinning_finish": 40e6}
 LEG = 400  # samples between two corners

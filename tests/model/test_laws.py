@@ -22,9 +22,11 @@ from smajax.model.wire.kinetics import austenite_left, martensite_left
 from smajax.model.wire.kinetics_terms import NO_TERMS
 from smajax.model.wire.laws import LAWS, under_law
 from smajax.model.wire.stiffness import Constant, Mixed, MixedConstantOmega
+from smajax.simulation.compiled import simulate_compiled
 from smajax.simulation.simulate import simulate
+from tests.helpers.machine_code import by_machine_code
 
-RUN = eqx.filter_jit(simulate)
+RUN = simulate_compiled
 EACH = 60  # samples a leg
 NAMES = sorted(LAWS)
 
@@ -285,7 +287,7 @@ def test_nothing_drifts_in_a_million_steps(chunks: int) -> None:
     system = _with(build("flexinol_table_3_2", "dead_weight", "voltage"), form=IntegratedForm())
     chunk = jnp.tile(jnp.concatenate([jnp.full(500, 7.0), jnp.full(500, 0.0)]), 50)
 
-    @eqx.filter_jit
+    @by_machine_code
     def carried_on(system: System, volts: jax.Array):
         from smajax.model.system import initial_state
         from smajax.simulation.step import step

@@ -18,14 +18,12 @@ from smajax.model.wire.constitutive import young_modulus
 from smajax.model.wire.kinetics import martensite_left
 from smajax.model.wire.kinetics_terms import NO_TERMS
 from smajax.simulation.compiled import simulate_compiled
-from smajax.simulation.simulate import simulate
 
 RIGS = {
     "arm": (build("niti_table_3_1", "arm", "amplified_voltage"), "voltage", 9.0),
     "dead_weight": (build("flexinol_table_3_2", "dead_weight", "voltage"), "voltage", 12.0),
     "bias_spring": (build("flexinol_ht_500um", "bias_spring", "duty"), "duty", 0.3),
 }
-RUN = eqx.filter_jit(simulate)
 SAMPLES = 400
 DT = 0.02
 
@@ -57,7 +55,7 @@ def test_fraction_stays_in_range_and_stress_is_never_negative(
     rig: str, levels: list[float], shares: list[float]
 ) -> None:
     system, channel, top = RIGS[rig]
-    run = RUN(_spread(system, shares), _inputs(channel, top, levels), DT)
+    run = simulate_compiled(_spread(system, shares), _inputs(channel, top, levels), DT)
     for name in ("temperature", "stress", "strain", "martensite_fraction", "position", "velocity", "reading"):
         assert np.isfinite(getattr(run, name)).all(), f"{name} is not finite"
     assert run.martensite_fraction.min() >= 0.0
@@ -112,7 +110,7 @@ def test_stored_states_satisfy_the_rate_form_without_drift() -> None:
     """Eq. 3.2 summed over the stored stage ends gives back the stored stress (taut wire), over many cycles."""
     system, channel, top = RIGS["dead_weight"]
     cycle = jnp.concatenate([jnp.full(150, 0.7), jnp.full(150, 0.0)])
-    run = RUN(system, {channel: top * jnp.tile(cycle, 40)}, DT)
+    run = simulate_compiled(system, {channel: top * jnp.tile(cycle, 40)}, DT)
     wire = system.wire
     # The wire carries the weight and the guide's damping, whatever happened in the cycles before.
     resting = np.arange(299, 300 * 40, 300)
@@ -130,7 +128,7 @@ def test_one_step_satisfies_the_constitutive_increment() -> None:
     system = build("flexinol_table_3_2", "coupon", "none")
     temperature = jnp.concatenate([jnp.linspace(23.0, 120.0, 200), jnp.linspace(120.0, 23.0, 200)])
     stress = 1e6 * (60.0 + 40.0 * jnp.sin(jnp.linspace(0.0, 9.0, 400)))
-    run = RUN(system, {"temperature": temperature, "stress": stress}, 1.0)
+    run = simulate_compiled(system, {"temperature": temperature, "stress": stress}, 1.0)
     wire = system.wire
     xi, law = run.martensite_fraction, system.wire.constitutive
     modulus = young_modulus(wire, 0.5 * (xi[1:] + xi[:-1]))
@@ -149,10 +147,10 @@ def test_float32_follows_float64() -> None:
     """The same run in single precision: same branches, and a fraction within 1e-3."""
     system, channel, top = RIGS["dead_weight"]
     inputs = _inputs(channel, top, [0.75, 0.2, 0.7, 0.0])
-    double = RUN(system, inputs, DT)
+    double = simulate_compiled(system, inputs, DT)
     with jax.enable_x64(False):
         narrow = jax.tree.map(lambda leaf: leaf.astype(jnp.float32) if eqx.is_array(leaf) else leaf, (system, inputs))
-        single = RUN(*narrow, DT)
+        single = simulate_compiled(narrow[0], narrow[1], DT)
     assert single.position.dtype == jnp.float32
     assert float(np.abs(np.asarray(single.martensite_fraction) - np.asarray(double.martensite_fraction)).max()) < 1e-3
     assert double.martensite_fraction.min() < 0.2
@@ -161,7 +159,7 @@ def test_float32_follows_float64() -> None:
 def test_at_an_end_stop_the_fraction_is_that_of_the_stressed_wire() -> None:
     """Held by the stop the wire is tighter, which keeps it from transforming: xi = h(T - sigma/C_A) still holds."""
     system = set_parameters(RIGS["arm"][0], {"upper_stop": 0.5})
-    run = RUN(system, {"voltage": jnp.full(800, 7.3)}, 0.01)
+    run = simulate_compiled(system, {"voltage": jnp.full(800, 7.3)}, 0.01)
     stopped = np.asarray(run.position) >= 0.5
     assert stopped.sum() > 100
     assert np.abs(run.velocity[stopped]).max() == 0.0

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from smajax.core.parameters import set_parameters
+from smajax.engine import Engine
 from smajax.fit.problem import Problem
 from smajax.model.presets import build
 from smajax.model.system import System
@@ -41,13 +42,14 @@ CASES: dict[str, tuple[System, dict[str, jax.Array]]] = {
 
 # The loads of the others are under other laws in `test_law_gradients`.
 OFTEN = ("arm", "coupon")
+ENGINES: dict[str, Engine] = {"arm": "xla"}  # one rig by the other engine
 
 
 @pytest.mark.parametrize(
     "case", [pytest.param(case, marks=() if case in OFTEN else pytest.mark.slow) for case in sorted(CASES)]
 )
 def test_every_base_parameter(case: str) -> None:
-    compare(CASES[case][0], open_loop(CASES[case][1], DT))
+    compare(CASES[case][0], open_loop(CASES[case][1], DT), engine=ENGINES.get(case, "native"))
 
 
 def test_reverse_mode_agrees_with_forward_mode() -> None:
