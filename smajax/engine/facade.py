@@ -55,6 +55,7 @@ class Program:
         """`model` and `names` are what it is made for; `replaceable`: XLA may stand in for `native`."""
         self._function, self._alone, self._replaceable, self.native = function, alone, replaceable, native
         self._made_for, self._names = signature(model), names
+        self._blocks = xla.BlockLengths()
 
     def __call__(self, model: Any, own: dict[str, np.ndarray], threads: int | None = None) -> Any:
         """What the function gives, arrays of numpy, every leaf with one row a run; `own` are arrays of shape (runs,).
@@ -65,7 +66,7 @@ class Program:
         threads = available_cores() if threads is None else checked_threads(threads)
         native = self.native
         if native is None:
-            return xla.evaluated(self._function, model, own, self._alone)
+            return xla.evaluated(self._function, model, own, self._alone, self._blocks)
         try:
             return native(model, own, threads)
         except Exception as error:
@@ -73,7 +74,7 @@ class Program:
                 raise
             failure = error
         # What XLA raises too is the caller's: it is raised, and machine code stays.
-        results = xla.evaluated(self._function, model, own, self._alone)
+        results = xla.evaluated(self._function, model, own, self._alone, self._blocks)
         self.native = None
         _warn(failure, "failed while it ran")
         return results

@@ -4,7 +4,7 @@ The scheme of order 3 says what a step may be off by; steps that are off by too 
 heats up alone goes through a tenth of a second at once, and one that has just caught its load takes milliseconds.
 
 Derivatives are those of the steps as they were taken: their lengths are held, for whether one is taken again depends on the
-parameters by jumps. In forward mode alone; reverse mode cannot go back through a loop whose length is not known.
+parameters by jumps. By the whole time, that of the last step. In forward mode alone; reverse mode cannot go back through a loop whose length is not known.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def advance(
 
     `tried` (s) is the step to begin with. `once`: as in `step.step`.
     """
-    shortest = SHORTEST * dt
+    shortest = SHORTEST * lax.stop_gradient(dt)
 
     def unfinished(at: _At) -> Scalar:
         return at.left > 0.0
@@ -58,7 +58,7 @@ def advance(
     def body(at: _At) -> _At:
         last = at.tried >= at.left * (1.0 - 1e-6)
         # Two equal ones in the place of a long and a short one.
-        length = jnp.where(last, at.left, jnp.minimum(at.tried, 0.5 * at.left))
+        length = jnp.where(last, at.left, lax.stop_gradient(jnp.minimum(at.tried, 0.5 * at.left)))
         new, error = step_and_error(system, at.state, inputs, length, once)
         worst = lax.stop_gradient(_relative(system, error, tolerance))
         # A state that is not finite goes to the end at once: no shorter step mends it.
@@ -68,14 +68,13 @@ def advance(
         good = (worst <= 1.0) | (length <= shortest) | lost
         # The power 1/4 in the place of 1/3: two square roots are vector instructions, a power is a call a number.
         factor = jnp.clip(SAFETY / jnp.sqrt(jnp.sqrt(jnp.maximum(worst, 1e-6))), SHRINK, GROW)
-        proposed = jnp.maximum(length * factor, shortest)
+        proposed = lax.stop_gradient(jnp.maximum(length * factor, shortest))
         # A step cut short by the end of the time says nothing against a longer one.
         following = jnp.where(good & (length < at.tried), jnp.maximum(at.tried, proposed), proposed)
         state = jax.tree.map(lambda one, other: jnp.where(good, one, other), new, at.state)
         left = jnp.where(good, jnp.where(last, 0.0, at.left - length), at.left)
         return _At(state, left, following, at.taken + 1)
 
-    dt = lax.stop_gradient(dt)
-    first = _At(state, dt, jnp.minimum(tried, dt), jnp.zeros_like(dt, int))
+    first = _At(state, dt, lax.stop_gradient(jnp.minimum(tried, dt)), jnp.zeros_like(dt, int))
     end = lax.while_loop(unfinished, body, first)
     return end.state, end.tried, end.taken

@@ -8,8 +8,10 @@ import jax
 import jax.numpy as jnp
 from jax import lax
 
+from smajax.model.drive.inputs import with_switch
+from smajax.model.load.coupon import AbstractCoupon
 from smajax.model.system import System, recorded_apart
-from smajax.model.types import Scalar, Series
+from smajax.model.types import Inputs, Scalar, Series
 
 
 def refuse_lag(system: System, what: str) -> None:
@@ -24,8 +26,8 @@ def refuse_lag(system: System, what: str) -> None:
 def acting_inputs(system: System, series: Mapping[str, Series], dt: Scalar | float) -> dict[str, Series]:
     """`series` (each of shape (n,), `dt` seconds apart) with the channels `recorded_apart` as late as the effects say.
 
-    A lag of a part of a step gives the mean over the step of a command that holds between samples, and of what was
-    measured at them the straight line between two. Beyond its ends a series is as at them.
+    A lag of a part of a step gives two commands that hold one after the other (`with_switch`), and of what was measured at the
+    samples (a coupon's temperature) the straight line between two. Beyond its ends a series is as at them.
     """
     late, acting = system.terms.input_lag, dict(series)
     channels = sorted(recorded_apart(system) & set(series))
@@ -33,19 +35,19 @@ def acting_inputs(system: System, series: Mapping[str, Series], dt: Scalar | flo
         return acting
     last = jnp.shape(acting[channels[0]])[0] - 1
 
-    def shifted(_: None, number: jax.Array) -> tuple[None, list[Scalar]]:
+    def shifted(_: None, number: jax.Array) -> tuple[None, tuple[Scalar, Inputs, Inputs]]:
         lag = sum(effect.input_lag(number * dt) for effect in late) / dt
         whole = jnp.floor(lag)
         newer = number - whole.astype(number.dtype)
-        share = lag - whole
 
-        def at(values: Series, place: jax.Array) -> Scalar:
-            return lax.dynamic_index_in_dim(values, jnp.clip(place, 0, last), keepdims=False)
+        def at(place: jax.Array) -> Inputs:
+            within = jnp.clip(place, 0, last)
+            return {name: lax.dynamic_index_in_dim(acting[name], within, keepdims=False) for name in channels}
 
-        return None, [
-            (1.0 - share) * at(acting[name], newer) + share * at(acting[name], newer - 1) for name in channels
-        ]
+        return None, (lag - whole, at(newer - 1), at(newer))
 
     # One sample after the other: each run looks up one number at a time, at an index of its own.
-    _, moved = lax.scan(shifted, None, jnp.arange(last + 1))
-    return acting | dict(zip(channels, moved, strict=True))
+    _, (share, older, newer) = lax.scan(shifted, None, jnp.arange(last + 1))
+    if isinstance(system.load, AbstractCoupon):
+        return acting | {name: share * older[name] + (1.0 - share) * newer[name] for name in channels}
+    return acting | with_switch(older, newer, share)

@@ -17,7 +17,7 @@ def _applies(system: Actuator) -> bool:
 
 
 class InputDelay(AbstractEffect, InputLagTerm):
-    r"""$u(t) = u_{rec}(t - \tau)$; between samples the mean over a step of the held input, a straight line in $\tau$.
+    r"""$u(t) = u_{rec}(t - \tau)$; a held input then switches within a step, which is integrated in two parts.
 
     On a whole recorded series (`simulate`, a batch or a fit); a closed loop has a delay of its own.
     """

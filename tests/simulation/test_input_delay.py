@@ -1,0 +1,78 @@
+"""A command that is late by a part of a step acts in two parts of it: against an integration by other code, with its derivative."""
+
+from __future__ import annotations
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from smajax.core.parameters import parameter_values
+from smajax.data.experiment.record import Run
+from smajax.fit.integration import with_integration
+from smajax.fit.packed_runs import pack
+from smajax.fit.predicted import predicted_and_derivatives
+from smajax.fit.problem import Problem
+from smajax.model.extended import extended
+from smajax.model.presets import build
+from smajax.simulation.batch.axes import zipped
+from smajax.simulation.batch.run_batch import run_batch
+from smajax.simulation.steppers import Integration
+from studies import integration as study
+from studies.reference.wire_parameters import DeadWeightParameters
+from studies.reference.wire_reference import simulate_dead_weight
+
+NOISE = 1e-5  # m
+MASS = 0.110
+SECONDS = 16.0
+
+
+def _exact(times: np.ndarray, delay: float) -> np.ndarray:
+    segments = [(end + delay, volts, MASS) for end, volts in study._pieces(7.95)]
+    return np.asarray(simulate_dead_weight(DeadWeightParameters(), segments, times)["position"])
+
+
+def _late(clock: float, delay: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(times, position, its derivative by the delay) of a dead weight whose voltage acts `delay` late."""
+    times = np.asarray(np.arange(round(SECONDS / clock) + 1) * clock, dtype=np.float64)
+    system = extended(
+        build("flexinol_table_3_2", "dead_weight", "voltage"), ("input_delay",), {"input_delay.delay": delay}
+    )
+    inputs = {"voltage": 7.95 * study._level(times, study.LEVELS), "mass": np.full(times.size, MASS)}
+    run = Run("log", "fit", times, inputs, {"position": np.zeros(times.size)}, {}, (), "")
+    problem = Problem.build(system, pack([run], clock, parameter_values(system)), NOISE, False)
+    problem = with_integration(problem, Integration(jnp.asarray(1e-5)))
+    tangent = np.eye(len(problem.names))[[problem.names.index("input_delay.delay")]]
+    position, slope = predicted_and_derivatives(problem, problem.start_values()[None], tangent[None])
+    return times, position[0, 0], slope[0, 0, 0]
+
+
+@pytest.mark.parametrize("clock", [0.02, 0.1])
+def test_a_delay_of_a_part_of_a_step(clock: float) -> None:
+    """Held over the step, the mean command left 5 noises at 20 ms and 22 at 100 ms."""
+    times, position, _ = _late(clock, 0.03)
+    assert np.abs(position - _exact(times, 0.03)).max() < 0.1 * NOISE
+
+
+# At no delay, where a score test takes it, the first part of the step has no length.
+@pytest.mark.parametrize("delay", [0.0, 0.03])
+def test_the_derivative_by_the_delay(delay: float) -> None:
+    times, _, slope = _late(0.1, delay)
+    low, high = max(delay - 1e-4, 0.0), delay + 1e-4
+    exact = (_exact(times, high) - _exact(times, low)) / (high - low)
+    assert np.sqrt(np.mean(exact**2)) > 1e-3
+    assert np.sqrt(np.mean((slope - exact) ** 2)) < 2e-3 * np.sqrt(np.mean(exact**2))
+
+
+def test_a_constant_command_is_not_late() -> None:
+    """A batch over levels of the voltage has no series of it."""
+    system = extended(build("flexinol_table_3_2", "dead_weight", "voltage"), ("input_delay",))
+    levels = zipped({"voltage": [4.0, 6.0], "input_delay.delay": [0.0, 0.03]})
+    late = run_batch(system, {"mass": MASS}, levels, seconds=2.0, dt=0.02)
+    plain = run_batch(
+        build("flexinol_table_3_2", "dead_weight", "voltage"),
+        {"mass": MASS},
+        zipped({"voltage": [4.0, 6.0]}),
+        seconds=2.0,
+        dt=0.02,
+    )
+    np.testing.assert_allclose(late["position"], plain["position"], rtol=0.0, atol=1e-12)
