@@ -252,12 +252,12 @@ def step(system: System, state: State, inputs: Inputs, dt: Scalar | float, once:
     dt = jnp.asarray(dt, dtype=float)
     if isinstance(system.load, Coupon):
         new = _coupon_step(system, state, inputs, dt)
-        return _read(system, state, new, new.wire.strain, dt)
+        return _read(system, state, new, (state.wire.strain, new.wire.strain), dt)
     if isinstance(system.load, StrainCoupon):
         new = _strain_coupon_step(system, state, inputs, dt)
-        return _read(system, state, new, new.wire.stress, dt)
+        return _read(system, state, new, (state.wire.stress, new.wire.stress), dt)
     new, _ = _moving_step(system, state, inputs, dt, ORDER_TWO, once)
-    return _read(system, state, new, new.motion.position, dt)
+    return _read(system, state, new, (state.motion.position, new.motion.position), dt)
 
 
 def step_and_error(
@@ -266,27 +266,22 @@ def step_and_error(
     """The same of a moving load by the scheme of order 3, and what it may be off by: (C, m or rad, m/s or rad/s)."""
     new, (heat, position, velocity) = _moving_step(system, state, inputs, dt, ORDER_THREE, once)
     capacity = stored_heat(system.wire, (), jnp.ones_like(heat), new.wire.martensite_fraction)
-    # Exact where the load moves evenly over the step, which here may be many times as long as the sensor's lag.
-    lag = time_constant(system.terms.sensor)
-    if lag is None:
-        late = new.motion.position
-    else:
-        behind = lag * (new.motion.position - state.motion.position) / dt
+    read = _read(system, state, new, (state.motion.position, new.motion.position), dt)
+    return read, (heat / capacity, position, velocity)
+
+
+def _read(system: System, old: State, new: State, shown: tuple[Scalar, Scalar], dt: Scalar) -> State:
+    """`new` with what the sensor reads of what is `shown` before and after the step.
+
+    Exact where that moves evenly over the step, which may be many times as long as the sensor's lag. It has a slope at no lag,
+    which a score test needs.
+    """
+    before, after = shown
+    lag, late = time_constant(system.terms.sensor), after
+    if lag is not None:
+        behind = lag * (after - before) / dt
         # Without a lag nothing of the start is left; by the quotient the derivative would be NaN there.
         lags = lag > SHORTEST_LAG * dt
         left = jnp.where(lags, jnp.exp(-dt / jnp.where(lags, lag, dt)), 0.0)
-        late = new.motion.position - behind + (followed(state) - state.motion.position + behind) * left
-    return _with_reading(system, state, new, late), (heat / capacity, position, velocity)
-
-
-def _read(system: System, old: State, new: State, shown: Scalar, dt: Scalar) -> State:
-    """`new` with what the sensor reads of `shown`.
-
-    Backward Euler in the reading: unlike exp(-dt/tau) it has a slope at tau = 0, which a score test needs.
-    """
-    lag = time_constant(system.terms.sensor)
-    return _with_reading(system, old, new, shown if lag is None else (lag * followed(old) + dt * shown) / (lag + dt))
-
-
-def _with_reading(system: System, old: State, new: State, late: Scalar) -> State:
+        late = after - behind + (followed(old) - before + behind) * left
     return State(new.time, new.wire, new.motion, *reading_of(system.terms.sensor, late, new.time, old.sensor))
