@@ -119,15 +119,15 @@ def _regulated(seconds: float) -> Callable[[float], Errors]:
 def cases(fast: bool) -> dict[str, Callable[[float], Errors]]:
     """Each rig's errors as a function of the step; the reference is made here."""
     seconds = 8.0 if fast else 20.0
-    found = {
+    result = {
         "M3: arm, 7.3 V": _arm_step(7.3, 12.0 if fast else 20.0),
         "M11: 75 g, 7.4 V on and off": _weight([(4.0, 7.4, 0.075), (8.0, 0.0, 0.075)]),
     }
     if not fast:
-        found["M2: arm, 7.2 V"] = _arm_step(7.2, 20.0)
-        found["M13: 363 g, 96 g off and on"] = _weight([(12.0, 7.95, 0.363), (16.0, 7.95, 0.267), (20.0, 7.95, 0.363)])
-    found["arm regulated at 85°"] = _regulated(seconds)
-    return found
+        result["M2: arm, 7.2 V"] = _arm_step(7.2, 20.0)
+        result["M13: 363 g, 96 g off and on"] = _weight([(12.0, 7.95, 0.363), (16.0, 7.95, 0.267), (20.0, 7.95, 0.363)])
+    result["arm regulated at 85°"] = _regulated(seconds)
+    return result
 
 
 def main(fast: bool = False) -> dict[str, list[Errors]]:

@@ -73,26 +73,26 @@ def record(system: System, seeds: int) -> Record:
 @eqx.filter_jit
 def _told(estimator: Any, readings: Any, volts: Any) -> Any:
     def one(row: Any) -> Any:
-        memory, told = estimate(estimator, row, volts, PERIOD)
-        return told, memory.innovation.value**2 / memory.innovation.variance
+        memory, estimated = estimate(estimator, row, volts, PERIOD)
+        return estimated, memory.innovation.value**2 / memory.innovation.variance
 
     return jax.vmap(one)(readings)
 
 
 def judged(estimator: Any, run: Record, readings: Any = None) -> tuple[dict[str, float], Any]:
     """(errors by quantity, overall and at the turn, with the mean squared normalised innovation; estimates)."""
-    told, squares = recorded(_told(estimator, run.readings if readings is None else readings, run.volts))
+    estimated, squares = recorded(_told(estimator, run.readings if readings is None else readings, run.volts))
     true, time = run.true, run.true.time
     turn = np.abs(time - time[true.position.argmax()]) < 0.25
     landed = (true.position <= float(true.position.min()) + 1e-6) & (time > 3.0)
     air = (time > 0.1) & (time < (time[landed][0] - PERIOD if landed.any() else np.inf))
     errors = {}
     for name, (factor, _) in SHOWN.items():
-        off = (factor * (getattr(told, name) - getattr(true, name))) ** 2
+        off = (factor * (getattr(estimated, name) - getattr(true, name))) ** 2
         errors[name] = float(np.sqrt(off[:, air].mean()))
         errors[f"{name}_turn"] = float(np.sqrt(off[:, turn].mean()))
     errors["innovation"] = float(squares[:, air].mean())
-    return errors, told
+    return errors, estimated
 
 
 def _shown(label: str, errors: dict[str, float]) -> None:
@@ -110,9 +110,9 @@ def main(fast: bool = False) -> dict[str, dict[str, float]]:
     )
 
     def tried(label: str, estimator: Any, against: Record, readings: Any = None) -> Any:
-        table[label], told = judged(estimator, against, readings)
+        table[label], estimated = judged(estimator, against, readings)
         _shown(label, table[label])
-        return told
+        return estimated
 
     printed, model = printed_filter(system), model_filter(system)
     for variance in READING_VARIANCES[::2] if fast else READING_VARIANCES:
@@ -157,8 +157,8 @@ def _draw(table: dict[str, dict[str, float]], starts: dict[tuple[str, str], Any]
             walks.loglog(WALKS, at, style, color=colour, label=plant if name == "extended" else None)
     walks.axhline(1.0, color=GREY, linewidth=0.8)
     named(walks, "random walks over the preset's", "mean squared innovation over its variance", "dotted: unscented")
-    for (name, start), told in starts.items():
-        off = np.sqrt(((told.temperature - run.true.temperature) ** 2).mean(axis=0))
+    for (name, start), estimated in starts.items():
+        off = np.sqrt(((estimated.temperature - run.true.temperature) ** 2).mean(axis=0))
         drawn: dict[str, Any] = {
             "color": BLUE if name == "extended" else RED,
             "linestyle": "-" if "cold" in start else "--",

@@ -63,8 +63,8 @@ def _cell(text: str) -> str:
 
 
 def _first_paragraph(of: Any) -> str:
-    told = " ".join((inspect.getdoc(of) or "").split("\n\n")[0].split())
-    return told.replace("|", "\\|")
+    summary = " ".join((inspect.getdoc(of) or "").split("\n\n")[0].split())
+    return summary.replace("|", "\\|")
 
 
 def _page_of(module: str) -> str:
@@ -76,8 +76,8 @@ def _page_of(module: str) -> str:
 
 def _stages() -> list[tuple[str, tuple[str, ...]]]:
     """`STAGES`, and last the names that are in none of them."""
-    told = {name for _, members in STAGES for name in members}
-    left = tuple(name for name in sorted([*smajax.NAMES, *smajax.MODULES]) if name not in told)
+    summary = {name for _, members in STAGES for name in members}
+    left = tuple(name for name in sorted([*smajax.NAMES, *smajax.MODULES]) if name not in summary)
     return [*STAGES, *([("More", left)] if left else [])]
 
 
@@ -87,9 +87,9 @@ def _row(name: str) -> str:
         page = "effects.md" if name == "effects" else f"{_page_of(module)}#{module}"
         return f"| [`{name}`]({page}) | module | {SAID.get(name) or _first_paragraph(getattr(smajax, name))} |"
     module, own = smajax.NAMES[name]
-    found = getattr(smajax, name)
-    kind = "class" if inspect.isclass(found) else "function" if callable(found) else "table"
-    about = SAID.get(name) or _first_paragraph(found)
+    result = getattr(smajax, name)
+    kind = "class" if inspect.isclass(result) else "function" if callable(result) else "table"
+    about = SAID.get(name) or _first_paragraph(result)
     return f"| [`{name}`]({_page_of(module)}#{module}{'' if kind == 'table' else '.' + own}) | {kind} | {about} |"
 
 

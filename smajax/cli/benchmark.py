@@ -40,8 +40,8 @@ def _lsoda(p: dict[str, float], voltage: float, payload: float, at: np.ndarray) 
         return explicit_arm.rates(explicit_arm.Floats, p, voltage, payload, (a, b, c, d, e))
 
     first = explicit_arm.start(explicit_arm.Floats, p, payload)
-    found = solve_ivp(slope, (0.0, SECONDS), first, "LSODA", t_eval=at, rtol=LSODA_TOLERANCE, atol=LSODA_TOLERANCE)
-    return np.degrees(found.y[2])
+    result = solve_ivp(slope, (0.0, SECONDS), first, "LSODA", t_eval=at, rtol=LSODA_TOLERANCE, atol=LSODA_TOLERANCE)
+    return np.degrees(result.y[2])
 
 
 def benchmark(count: int = 8192, peers: int = 16, progress: Progress = quiet) -> dict[str, Any]:
@@ -51,11 +51,11 @@ def benchmark(count: int = 8192, peers: int = 16, progress: Progress = quiet) ->
     masses = (PAYLOADS[0] * p["payload_mass"], PAYLOADS[1] * p["payload_mass"])
     axes = sampled(count, voltage=VOLTAGES, payload_mass=masses, seed=0)
     measures = (Last("position"), Last("martensite_fraction"))
-    asked: dict[str, Any] = {"seconds": SECONDS, "dt": SAMPLE, "tolerance": TOLERANCE}
+    settings: dict[str, Any] = {"seconds": SECONDS, "dt": SAMPLE, "tolerance": TOLERANCE}
 
     def once() -> float:
         begin = time.perf_counter()
-        run_batch(system, {}, axes, keep=(), measures=measures, **asked)
+        run_batch(system, {}, axes, keep=(), measures=measures, **settings)
         return time.perf_counter() - begin
 
     first = once()
@@ -63,7 +63,7 @@ def benchmark(count: int = 8192, peers: int = 16, progress: Progress = quiet) ->
     best = min(once() for _ in range(REPEATS))
     progress(Stage("smajax", 1.0))
     box = axes.runs(0, peers)
-    own = run_batch(system, {}, zipped(box), keep=("position",), **asked)["position"].to_numpy()
+    own = run_batch(system, {}, zipped(box), keep=("position",), **settings)["position"].to_numpy()
     times = np.arange(own.shape[-1]) * SAMPLE
     others, began = [], time.perf_counter()
     for number in range(peers):

@@ -121,8 +121,10 @@ def unknowns_declared(ctx: typer.Context, incomplete: str) -> list[str]:
     """What the experiment before is to find; nothing where it cannot be read: the command will say why."""
     for path in map(Path, _before(ctx)):
         try:
-            told = tomllib.loads((path / "experiment.toml" if path.is_dir() else path).read_text(encoding="utf-8"))
-            return _after_commas([*told["unknown"], "all"], incomplete)
+            experiment = tomllib.loads(
+                (path / "experiment.toml" if path.is_dir() else path).read_text(encoding="utf-8")
+            )
+            return _after_commas([*experiment["unknown"], "all"], incomplete)
         except (KeyError, OSError, TypeError, ValueError):
             continue
     return []

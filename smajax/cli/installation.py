@@ -19,13 +19,13 @@ WORK = ("dev", "docs")  # extras for work on smajax itself: no command uses them
 
 def _requirements() -> dict[str, bool]:
     """Every package that a command uses -> whether it is of an extra."""
-    found: dict[str, bool] = {}
+    result: dict[str, bool] = {}
     for line in metadata.requires(PACKAGE) or ():
         name = re.match(r"[\w.-]+", line)
         extra = re.search(r"extra == ['\"]([\w.-]+)", line)
         if name is not None and (extra is None or extra[1] not in WORK):
-            found[name.group()] = found.get(name.group(), True) and extra is not None
-    return found
+            result[name.group()] = result.get(name.group(), True) and extra is not None
+    return result
 
 
 def _version(name: str) -> str:
@@ -49,24 +49,24 @@ def _engine() -> dict[str, Any]:
     from smajax.model.presets import build
     from smajax.simulation.compiled import simulate_compiled
 
-    asked = engine_of()
-    found: dict[str, Any] = {"runs": "native", "why": "", "vector_bits": None}
-    if asked == "xla":
-        return {**found, "runs": "xla", "why": f"{VARIABLE} asks for it"}
+    requested = engine_of()
+    result: dict[str, Any] = {"runs": "native", "why": "", "vector_bits": None}
+    if requested == "xla":
+        return {**result, "runs": "xla", "why": f"{VARIABLE} asks for it"}
     system = build("flexinol_table_3_2", "dead_weight", "voltage")
     command = {"voltage": jnp.full(21, 3.0)}
     try:
         from smajax.engine.kernel import vector_bits
 
-        found["vector_bits"] = vector_bits()
+        result["vector_bits"] = vector_bits()
         run = simulate_compiled(system, command, 0.01, engine="native")
         by_xla = simulate_compiled(system, command, 0.01, engine="xla")
         off = float(np.abs(run.temperature - by_xla.temperature).max())
         if not off < SAME:
-            return {**found, "runs": "native", "faulty": True, "why": f"a run is {off:g} C off that of XLA"}
-        return found
+            return {**result, "runs": "native", "faulty": True, "why": f"a run is {off:g} C off that of XLA"}
+        return result
     except Exception as error:
-        return {**found, "runs": "none" if asked == "native" else "xla", "faulty": True, "why": reason(error)}
+        return {**result, "runs": "none" if requested == "native" else "xla", "faulty": True, "why": reason(error)}
 
 
 def _plugin_faults() -> list[str]:
@@ -123,38 +123,40 @@ def examine(engine: bool = True) -> dict[str, Any]:
     }
 
 
-def remarks(found: dict[str, Any]) -> list[str]:
+def remarks(result: dict[str, Any]) -> list[str]:
     """What is likely to give trouble, each with what to do."""
-    told = [
-        f"plug-in: {fault} Until then the commands that need it refuse to work." for fault in found["plug-in faults"]
+    lines = [
+        f"plug-in: {fault} Until then the commands that need it refuse to work." for fault in result["plug-in faults"]
     ]
-    told += [
+    lines += [
         f"{name} is not installed: pip install '{PACKAGE}'"
-        for name, version in found["packages"].items()
+        for name, version in result["packages"].items()
         if not version
     ]
-    jaxlib = found["machine"]["versions"].get("jaxlib", "0.0")
+    jaxlib = result["machine"]["versions"].get("jaxlib", "0.0")
     numbers = tuple(int(part) for part in jaxlib.split(".")[:2])
     if not TRIED[0] <= numbers <= TRIED[1]:
-        told.append(
+        lines.append(
             f"jaxlib {jaxlib} is none that was tried ({TRIED[0]} to {TRIED[1]}): it compiles with its own defaults."
         )
-    if not found["float64"]:
-        told.append("JAX computes in float32 here: jax.config.update('jax_enable_x64', True) before the first array.")
-    if found["engine"].get("faulty"):
-        told.append(
+    if not result["float64"]:
+        lines.append("JAX computes in float32 here: jax.config.update('jax_enable_x64', True) before the first array.")
+    if result["engine"].get("faulty"):
+        lines.append(
             {
-                "native": f"machine code gives wrong numbers here ({found['engine']['why']}): set SMAJAX_ENGINE=xla, and please report it.",
-                "xla": f"machine code does not work here ({found['engine']['why']}): XLA is used, several times slower.",
-                "none": f"machine code does not work here ({found['engine']['why']}), and SMAJAX_ENGINE=native asks for nothing else.",
-            }[found["engine"]["runs"]]
+                "native": f"machine code gives wrong numbers here ({result['engine']['why']}): set SMAJAX_ENGINE=xla, and please report it.",
+                "xla": f"machine code does not work here ({result['engine']['why']}): XLA is used, several times slower.",
+                "none": f"machine code does not work here ({result['engine']['why']}), and SMAJAX_ENGINE=native asks for nothing else.",
+            }[result["engine"]["runs"]]
         )
-    if not found["compiled programs"]["writable"]:
-        told.append("the folder of compiled programs cannot be written: set JAX_COMPILATION_CACHE_DIR to one that can.")
-    memory = found["memory"]["available_bytes"]
+    if not result["compiled programs"]["writable"]:
+        lines.append(
+            "the folder of compiled programs cannot be written: set JAX_COMPILATION_CACHE_DIR to one that can."
+        )
+    memory = result["memory"]["available_bytes"]
     if memory is not None and memory < 2 << 30:
-        told.append(f"only {memory / 1e9:.1f} GB of memory are free: give `run_batch` a smaller `budget`.")
-    return told
+        lines.append(f"only {memory / 1e9:.1f} GB of memory are free: give `run_batch` a smaller `budget`.")
+    return lines
 
 
 def clear_cache() -> int:

@@ -41,7 +41,7 @@ class Command(TyperCommand):
             wrong: Any = error
             if type(error).__name__ == "NoSuchOption":
                 arguments = [one for one in self.params if isinstance(one, TyperArgument)]
-                told = _argument(wrong.option_name, arguments, typed, f"smajax {self.name}")
-                if told:
-                    wrong.message, wrong.possibilities = f"No such option: {wrong.option_name}; {told}", None
+                advice = _argument(wrong.option_name, arguments, typed, f"smajax {self.name}")
+                if advice:
+                    wrong.message, wrong.possibilities = f"No such option: {wrong.option_name}; {advice}", None
             raise

@@ -36,8 +36,8 @@ def parameter_name(system: System, name: str) -> str:
     meant = {**short, **places, **{own: own for own in table}}
     if name in meant:
         return meant[name]
-    told = f"{name!r} ({MISMATCHES[name]})" if name in MISMATCHES else f"{name!r}"
-    raise ValueError(f"no parameter {told}{of_many(name, [*table, *short], PARAMETERS)}")
+    which = f"{name!r} ({MISMATCHES[name]})" if name in MISMATCHES else f"{name!r}"
+    raise ValueError(f"no parameter {which}{of_many(name, [*table, *short], PARAMETERS)}")
 
 
 def _value(before: System, system: System, name: str, own: str, value: str | float) -> float:
@@ -73,7 +73,7 @@ def _value(before: System, system: System, name: str, own: str, value: str | flo
         raise UnitError(f"{name}: {error}") from None
 
 
-def _changed(before: System, own: str, told: str, unit: str) -> float:
+def _changed(before: System, own: str, which: str, unit: str) -> float:
     """The value that a change is a share of. ValueError where there is none, or zero."""
     value = parameter_values(before).get(own)
     effect, _, coefficient = own.partition(".")
@@ -81,9 +81,9 @@ def _changed(before: System, own: str, told: str, unit: str) -> float:
     like = "a value" + (f" in {unit}" if unit != "-" else "") + (f", such as '{started:g} {unit}'" if started else "")
     like = like.replace(" -'", "'")  # of a number without unit
     if value is None:
-        raise ValueError(f"{told} is a change of what is there, and the effect {effect} is not: give {like}.")
+        raise ValueError(f"{which} is a change of what is there, and the effect {effect} is not: give {like}.")
     if value == 0.0:
-        raise ValueError(f"{told} is a change of what is there, which is 0, as any share of it: give {like}.")
+        raise ValueError(f"{which} is a change of what is there, which is 0, as any share of it: give {like}.")
     return value
 
 
@@ -101,12 +101,12 @@ def with_values(system: System, values: Mapping[str, str | float]) -> System:
         if meant in own:
             raise ValueError(f"{name!r} and {own[meant]!r} are the same parameter: give it once.")
         own[meant] = name
-    found = set_parameters(
+    result = set_parameters(
         wider, {meant: _value(system, wider, name, meant, values[name]) for meant, name in own.items()}
     )
-    check_bounds(found)
-    check_order(found)
-    return found
+    check_bounds(result)
+    check_order(result)
+    return result
 
 
 def _with_effects(system: System, names: Sequence[str]) -> System:

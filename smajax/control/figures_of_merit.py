@@ -245,14 +245,14 @@ def merit_by_set_point(
     """
     held, replayed = band_of(system) if band is None else jnp.asarray(band, dtype=float), eqx.filter_jit(_replayed)
     time, wanted = np.asarray(loop.run.time), np.asarray(loop.wanted.position)
-    found = []
+    result = []
     for first, last in set_point_spans(wanted):
         run = jax.tree.map(lambda series, part=slice(first, last + 1): series[part], loop.run)
         voltage = jnp.asarray(loop.voltage)[first : last + 1].at[-1].set(loop.voltage[last - 1])
         observer = MeritObserver(system, jnp.asarray(wanted[first]), held, last - first + 1)
         one = jax.tree.map(np.asarray, replayed(observer, run, voltage))
-        found.append(SetPointMerit(float(time[first]), float(time[last]), float(wanted[first]), one))
-    return tuple(found)
+        result.append(SetPointMerit(float(time[first]), float(time[last]), float(wanted[first]), one))
+    return tuple(result)
 
 
 def evaluated_loop(setup: ClosedLoopSetup) -> tuple[Merit, Scalar]:

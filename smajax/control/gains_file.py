@@ -46,9 +46,10 @@ class Gains:
 
 def write_gains(path: Path, gains: Gains, units: Mapping[str, str], more: Mapping[str, Any]) -> Path:
     """Write the file in one step; `more` says where the gains come from."""
-    told = {name: {"value": value, "unit": units[name]} for name, value in gains.values.items()}
+    gains_with_units = {name: {"value": value, "unit": units[name]} for name, value in gains.values.items()}
     return replace(
-        path, json_text({"format": FORMAT, "controller": gains.controller, "gains": told, "from": dict(more)})
+        path,
+        json_text({"format": FORMAT, "controller": gains.controller, "gains": gains_with_units, "from": dict(more)}),
     )
 
 

@@ -77,7 +77,7 @@ def interface_of(system: System, filtered: str, noise: float, period: float, dt:
 
 def between_in_words(filtered: str, noise: float, period: float, delay: int) -> str:
     """The same in a sentence."""
-    told = f"their states from the filter `{filtered}`" if filtered else "the true state"
+    reads = f"their states from the filter `{filtered}`" if filtered else "the true state"
     read = f"the angle with {noise:g}° of noise" if noise else "the angle without noise"
     late = f", commands {delay} periods late" if delay else ""
-    return f"Controllers are called every {1e3 * period:g} ms{late} and are told {told}, {read}."
+    return f"Controllers are called every {1e3 * period:g} ms{late} and are told {reads}, {read}."

@@ -38,11 +38,11 @@ def labelled_loop(system: System, loop: ClosedLoop, **settings: object) -> xr.Da
 
     A mapping among the settings, such as `gains`, becomes JSON.
     """
-    told = {name: json.dumps(dict(one)) if isinstance(one, Mapping) else one for name, one in settings.items()}
-    found = labelled_run(system, loop.run, {"voltage": loop.voltage}, **told)
-    position = found["position"].attrs["units"]
-    found["wanted"] = ("time", np.asarray(loop.wanted.position), {"units": position, "long_name": "set point"})
-    return found
+    attributes = {name: json.dumps(dict(one)) if isinstance(one, Mapping) else one for name, one in settings.items()}
+    result = labelled_run(system, loop.run, {"voltage": loop.voltage}, **attributes)
+    position = result["position"].attrs["units"]
+    result["wanted"] = ("time", np.asarray(loop.wanted.position), {"units": position, "long_name": "set point"})
+    return result
 
 
 def simulate_loop_dataset(
@@ -93,10 +93,10 @@ def _wanted(set_point: float | str | Reference, unit: str, seconds: float | None
         if seconds is not None:
             raise ValueError("a Reference has its own length: leave `seconds` out.")
         return set_point
-    asked = given(set_point if isinstance(set_point, str) else f"{float(set_point)!r} {unit}", unit)
-    if seconds is None and asked.seconds is None:
+    desired = given(set_point if isinstance(set_point, str) else f"{float(set_point)!r} {unit}", unit)
+    if seconds is None and desired.seconds is None:
         raise ValueError(
             "nothing says how long the run is: give `seconds`, or levels with times ('40deg:5s,10deg:5s')."
         )
     # A set point holds from its instant on: a mean over the step before it would come early.
-    return resting(jnp.asarray(asked.at(clock_of([asked], seconds, dt))))
+    return resting(jnp.asarray(desired.at(clock_of([desired], seconds, dt))))

@@ -37,10 +37,10 @@ def ratio_of(name: str, text: str, plain: bool = False) -> float | None:
     plain: a percentage without a sign is a value too, of a parameter that has no unit.
     Raises ValueError for a percentage that does not say which way.
     """
-    found = _ONE_WAY.fullmatch(text)
-    if found is not None:
-        size = float(found[2]) / 100.0
-        return 1.0 + size if found[1] == "+" else 1.0 - size
+    result = _ONE_WAY.fullmatch(text)
+    if result is not None:
+        size = float(result[2]) / 100.0
+        return 1.0 + size if result[1] == "+" else 1.0 - size
     both = _BOTH_WAYS.fullmatch(text) or (None if plain else _UNSIGNED.fullmatch(text))
     if both is not None:
         raise ValueError(
@@ -49,13 +49,13 @@ def ratio_of(name: str, text: str, plain: bool = False) -> float | None:
     return None
 
 
-def variation_of(told: Mapping[str, str]) -> dict[str, float]:
+def variation_of(widths: Mapping[str, str]) -> dict[str, float]:
     """Shares by the names of `MISMATCHES`, of text such as `20%`, `0.2` or `±20%`: 0.2.
 
     Raises ValueError for what is no share, one way alone, or twice of one parameter.
     """
-    found: dict[str, float] = {}
-    for name, text in told.items():
+    result: dict[str, float] = {}
+    for name, text in widths.items():
         both = _BOTH_WAYS.fullmatch(text) or _UNSIGNED.fullmatch(text)
         if _ONE_WAY.fullmatch(text):
             size = text.strip().lstrip(f"+-{MINUS} ")
@@ -63,16 +63,16 @@ def variation_of(told: Mapping[str, str]) -> dict[str, float]:
                 f"got {name}={text.strip()}, expected a variation, which goes both ways: {name}={size} is from -{size} to "
                 f"+{size} of what the controller believes."
             )
-        if short_name(name) in found:
+        if short_name(name) in result:
             raise ValueError(f"{name} is `{short_name(name)}`, which is given already: give it once.")
         try:
-            found[short_name(name)] = float(both[1]) / 100.0 if both else parse_quantity(text, "1")
+            result[short_name(name)] = float(both[1]) / 100.0 if both else parse_quantity(text, "1")
         except UnitError as error:
             comma = f" ({error})" if re.fullmatch(r"\s*\d*,\d+\s*%?\s*", text) else ""
             raise ValueError(
                 f"got {name}={text}, expected a share such as {name}=20% or {name}=0.2, with a comma before the next name{comma}."
             ) from None
-    return found
+    return result
 
 
 def in_words(believed: float | None, true: float, unit: str) -> str:

@@ -84,6 +84,6 @@ def heading(name: str, unit: str) -> str:
     return f"{name} [{'1' if unit in ('-', '') else unit}]"
 
 
-def as_netcdf(found: xr.Dataset) -> bytes:
+def as_netcdf(result: xr.Dataset) -> bytes:
     """NetCDF 3, which every reader knows."""
-    return bytes(found.to_netcdf(engine="scipy"))
+    return bytes(result.to_netcdf(engine="scipy"))

@@ -27,8 +27,10 @@ def _processor() -> str:
 
 
 def _compiler() -> str:
-    found = shutil.which("g++")
-    return subprocess.run([found, "--version"], capture_output=True, text=True).stdout.splitlines()[0] if found else ""
+    result = shutil.which("g++")
+    return (
+        subprocess.run([result, "--version"], capture_output=True, text=True).stdout.splitlines()[0] if result else ""
+    )
 
 
 def machine() -> dict[str, object]:
@@ -52,31 +54,31 @@ def peak_memory() -> int:
 
 def available_memory() -> int | None:
     """Bytes that a program may still take without swapping and within its caps; None where the system does not say."""
-    told = [*_free(), *_below_caps()]
-    return max(0, min(told)) if told else None
+    limits = [*_free(), *_below_caps()]
+    return max(0, min(limits)) if limits else None
 
 
 def _free() -> list[int]:
     """Of the machine, and of the container that it may be."""
-    found = []
+    result = []
     file = Path("/proc/meminfo")
     if file.exists():
         for line in file.read_text().splitlines():
             if line.startswith("MemAvailable:"):
-                found.append(1024 * int(line.split()[1]))
+                result.append(1024 * int(line.split()[1]))
     group = Path("/sys/fs/cgroup")
     with suppress(OSError, ValueError):  # no container, or one without a cap
-        found.append(int((group / "memory.max").read_text()) - int((group / "memory.current").read_text()))
-    return found
+        result.append(int((group / "memory.max").read_text()) - int((group / "memory.current").read_text()))
+    return result
 
 
 def _below_caps() -> list[int]:
     """What `ulimit -v` and `ulimit -d` leave to this process."""
-    file, found = Path("/proc/self/statm"), []
+    file, result = Path("/proc/self/statm"), []
     if file.exists():
         pages = [int(part) for part in file.read_text().split()]
         for cap, taken in ((resource.RLIMIT_AS, pages[0]), (resource.RLIMIT_DATA, pages[5])):
             soft = resource.getrlimit(cap)[0]
             if soft != resource.RLIM_INFINITY:
-                found.append(soft - taken * resource.getpagesize())
-    return found
+                result.append(soft - taken * resource.getpagesize())
+    return result

@@ -47,7 +47,7 @@ class Parameter:
 
 def parameters(model: eqx.Module) -> dict[str, Parameter]:
     """Every parameter of `model` by name. Effects (anything with an `effect_name`) prefix theirs: `latent_heat.enthalpy`."""
-    found: dict[str, Parameter] = {}
+    result: dict[str, Parameter] = {}
 
     def walk(node: Any, path: tuple[str | int, ...], prefix: str) -> None:
         if isinstance(node, (tuple, list)):
@@ -60,18 +60,18 @@ def parameters(model: eqx.Module) -> dict[str, Parameter]:
             here = (*path, entry.name)
             if "unit" in entry.metadata:
                 name = prefix + entry.name
-                if name in found:
+                if name in result:
                     raise ValueError(
-                        f"Two parameters are named `{name}`, at {found[name].path} and at {here}. Rename one: "
+                        f"Two parameters are named `{name}`, at {result[name].path} and at {here}. Rename one: "
                         "every stage after this one knows parameters by name."
                     )
                 meta = entry.metadata
-                found[name] = Parameter(name, meta["unit"], meta["low"], meta["high"], meta["about"], here)
+                result[name] = Parameter(name, meta["unit"], meta["low"], meta["high"], meta["about"], here)
             else:
                 walk(getattr(node, entry.name), here, prefix)
 
     walk(model, (), "")
-    return found
+    return result
 
 
 def _lookup(model: Any, path: tuple[str | int, ...]) -> Any:
@@ -84,8 +84,8 @@ def _select(model: eqx.Module, names: Sequence[str]) -> list[Parameter]:
     table = parameters(model)
     unknown = [name for name in names if name not in table]
     if unknown:
-        told = of_many(unknown[0], table, "`smajax.parameter_values(model)` lists all of this model")
-        raise ValueError(f"No parameter `{unknown[0]}`{told}.")
+        matches = of_many(unknown[0], table, "`smajax.parameter_values(model)` lists all of this model")
+        raise ValueError(f"No parameter `{unknown[0]}`{matches}.")
     return [table[name] for name in names]
 
 
@@ -128,10 +128,10 @@ def check_bounds(model: eqx.Module) -> None:
         value = _lookup(model, entry.path)
         if isinstance(value, jax.core.Tracer):
             continue
-        found = np.asarray(value)
-        inside = (found >= entry.low) & (found <= entry.high)  # nan is not
+        result = np.asarray(value)
+        inside = (result >= entry.low) & (result <= entry.high)  # nan is not
         if not inside.all():
-            first = found[~inside].ravel()[0]
+            first = result[~inside].ravel()[0]
             wrong.append(f"`{entry.name}` = {first:g} {entry.unit} (from {entry.low:g} to {entry.high:g})")
     if wrong:
         raise ValueError(f"outside of the bounds: {'; '.join(wrong)}.")

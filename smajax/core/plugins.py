@@ -53,7 +53,7 @@ def brought(group: str, own: Mapping[str, Part], check: Callable[[str, Any], str
     check(name, part) says what is wrong with a part, or nothing. Raises PluginError, a line each, for parts that cannot be
     loaded, are not what they should be, or have a name that is taken.
     """
-    found: dict[str, Part] = {}
+    result: dict[str, Part] = {}
     faults = []
     for point in points_of(group):
         try:
@@ -61,15 +61,15 @@ def brought(group: str, own: Mapping[str, Part], check: Callable[[str, Any], str
         except Exception as error:
             faults.append(f"{whose(point)} cannot be loaded ({error!r}): mend or uninstall that package.")
             continue
-        if point.name in own or point.name in found:
+        if point.name in own or point.name in result:
             faults.append(f"{whose(point)} has a name that is taken: rename it there, or uninstall that package.")
         elif wrong := check(point.name, part):
             faults.append(f"{whose(point)} {wrong}.")
         else:
-            found[point.name] = part
+            result[point.name] = part
     if faults:
         raise PluginError("\n".join(faults))
-    return found
+    return result
 
 
 @lru_cache(maxsize=1)

@@ -59,11 +59,11 @@ def digest(model: Any, more: Sequence[str | np.ndarray] = ()) -> str:
 
 def provenance(model: eqx.Module, **settings: object) -> dict[str, str]:
     """Attributes of a result: text only, so that every format can hold them; no `git` outside of a repository."""
-    told = {f"version of {name}": version for name, version in versions().items()}
-    told |= {name: str(value) for name, value in settings.items()}
+    rows = {f"version of {name}": version for name, version in versions().items()}
+    rows |= {name: str(value) for name, value in settings.items()}
     commit = git_state()
-    told |= {"git": commit} if commit else {}
-    return told | {"parameters (SI)": json.dumps(parameter_values(model))}
+    rows |= {"git": commit} if commit else {}
+    return rows | {"parameters (SI)": json.dumps(parameter_values(model))}
 
 
 def made_with() -> dict[str, str]:

@@ -77,8 +77,8 @@ def _unit(text: str, like: str | None = None) -> Any:
     name = text.strip()
     if name in _DIMENSIONLESS:
         return _registry().parse_units("dimensionless")
-    for found, meant in _SPELLINGS:
-        name = name.replace(found, meant)
+    for result, meant in _SPELLINGS:
+        name = name.replace(result, meant)
     try:
         if len(name) > LONGEST or _TOWER.search(name):
             raise ValueError("no power of a unit")
@@ -222,10 +222,10 @@ def to_si(value: str | float, unit: str) -> float:
 
 def own_unit(unit: str) -> str:
     """The program's own unit for what `unit` measures: "K" and "degF" -> "degC", "deg" -> "rad", else SI base."""
-    found = _unit(unit)
-    if _is_temperature(found) and not str(found).startswith("delta_"):
+    result = _unit(unit)
+    if _is_temperature(result) and not str(result).startswith("delta_"):
         return "degC"
-    return _compact(_registry().get_root_units(found)[1])
+    return _compact(_registry().get_root_units(result)[1])
 
 
 def _compact(unit: Any) -> str:

@@ -86,10 +86,10 @@ def reads_file(text: str) -> bool:
 
 def _time(table: Table, time: str) -> tuple[Array, str, str]:
     """(values, name, unit) of the column that `COLUMN` or `COLUMN:UNIT` names, or its heading. Raises MeasuredDataError."""
-    asked, _, unit = time.partition(":")
+    level, _, unit = time.partition(":")
     try:
-        key = int(asked) if asked.isdigit() and asked not in table.columns else asked
-        name = table.name_of(key) if asked else time_column(table)
+        key = int(level) if level.isdigit() and level not in table.columns else level
+        name = table.name_of(key) if level else time_column(table)
     except MeasuredDataError as error:
         how = "a time column is named by --time, as COLUMN or COLUMN:UNIT; how long a run is says --seconds"
         raise MeasuredDataError(f"{error}; {how}") from None

@@ -53,20 +53,20 @@ def _extreme(larger: bool) -> Operation:
         if left.number is not None and math.isnan(left.number):
             return left
         # The second where one is no number: enough where the first is a constant.
-        found = _chosen(text, text.assign(f"fcmp o{sign} {kind} {left.name}, {right.name}", "bool"), left, right)
+        result = _chosen(text, text.assign(f"fcmp o{sign} {kind} {left.name}, {right.name}", "bool"), left, right)
         if left.constant:
-            return found
-        return _chosen(text, text.assign(f"fcmp uno {kind} {left.name}, {left.name}", "bool"), left, found)
+            return result
+        return _chosen(text, text.assign(f"fcmp uno {kind} {left.name}, {left.name}", "bool"), left, result)
 
     return put
 
 
 def _chosen(text: Text, mask: str, yes: Lane, no: Lane) -> Lane:
     kind = text.vector(yes.dtype)
-    found = text.lane(f"select {text.vector('bool')} {mask}, {kind} {yes.name}, {kind} {no.name}", yes.dtype)
+    result = text.lane(f"select {text.vector('bool')} {mask}, {kind} {yes.name}, {kind} {no.name}", yes.dtype)
     if yes.number is not None and no.number is not None:
-        text.either[found.name] = mask, yes.number, no.number
-    return found
+        text.either[result.name] = mask, yes.number, no.number
+    return result
 
 
 def _compare(floating: str, whole: str) -> Operation:
@@ -107,8 +107,8 @@ def _sign(text: Text, out: str, one: Lane, **_: Any) -> Lane:
     above, below = ("fcmp ogt", "fcmp olt") if _floating(out) else ("icmp sgt", "icmp slt")
     positive = text.assign(f"{above} {kind} {one.name}, {zero.name}", "bool")
     negative = text.assign(f"{below} {kind} {one.name}, {zero.name}", "bool")
-    found = _chosen(text, positive, text.constant(1, out), one)
-    return _chosen(text, negative, text.constant(-1, out), found)
+    result = _chosen(text, positive, text.constant(1, out), one)
+    return _chosen(text, negative, text.constant(-1, out), result)
 
 
 def _finite(text: Text, out: str, one: Lane, **_: Any) -> Lane:
@@ -132,14 +132,14 @@ def reciprocal(text: Text, one: Lane) -> Lane:
     if not text.estimates or one.constant or text.lanes != parts[1]:
         return _binary("fdiv", None)(text, dtype, text.constant(1, dtype), one)
     rough = _estimated(text, one, parts[0])
-    found, unit = rough, text.constant(1, dtype)
+    result, unit = rough, text.constant(1, dtype)
     for _ in range(parts[2]):
-        missed = _binary("fsub", None)(text, dtype, unit, _times(text, one, found))
-        found = _binary("fadd", None)(text, dtype, found, _times(text, found, missed))
+        missed = _binary("fsub", None)(text, dtype, unit, _times(text, one, result))
+        result = _binary("fadd", None)(text, dtype, result, _times(text, result, missed))
     name, mask = f"llvm.is.fpclass.v{text.lanes}{text.suffix(dtype)}", text.vector("bool")
     text.declare(name, mask, [text.vector(dtype), "i32"])
     ordinary = text.assign(f"call {mask} @{name}({text.vector(dtype)} {rough.name}, i32 {NORMAL})", "bool")
-    return _chosen(text, ordinary, found, rough)  # of infinity the estimate is exact, and so it is of zero
+    return _chosen(text, ordinary, result, rough)  # of infinity the estimate is exact, and so it is of zero
 
 
 def _estimated(text: Text, one: Lane, kind: str) -> Lane:
@@ -150,22 +150,22 @@ def _estimated(text: Text, one: Lane, kind: str) -> Lane:
 
 
 def _whole_power(text: Text, out: str, one: Lane, *, power: int, **_: Any) -> Lane:
-    found: Lane | None = None
+    result: Lane | None = None
     square, left = reciprocal(text, one) if power < 0 else one, abs(power)
     while left:
         if left & 1:
-            found = square if found is None else _times(text, found, square)
+            result = square if result is None else _times(text, result, square)
         left >>= 1
         square = _times(text, square, square) if left else square
-    return found or text.constant(1, out)
+    return result or text.constant(1, out)
 
 
 def _polynomial(text: Text, out: str, one: Lane, *coefficients: Lane, **_: Any) -> Lane:
     """c_0 + c_1 x + ... (an operation since JAX 0.12)."""
-    found = coefficients[-1]
+    result = coefficients[-1]
     for coefficient in reversed(coefficients[:-1]):
-        found = _binary("fadd", "add")(text, out, _times(text, found, one), coefficient)
-    return found
+        result = _binary("fadd", "add")(text, out, _times(text, result, one), coefficient)
+    return result
 
 
 def _square(text: Text, out: str, one: Lane, **_: Any) -> Lane:
@@ -187,10 +187,10 @@ def _grown_less_one(text: Text, out: str, one: Lane, **_: Any) -> Lane:
     """exp(x) - 1 = 2 sinh(x/2) exp(x/2): exact where x is small; -1 where the product would be nothing times infinity."""
     half = _times(text, one, text.constant(0.5, out))
     wave, grown = text.call("llvm.sinh", out, half.name), text.call("llvm.exp", out, half.name)
-    found = _times(text, _times(text, text.constant(2.0, out), wave), grown)
+    result = _times(text, _times(text, text.constant(2.0, out), wave), grown)
     least = text.constant(-80.0, out)
     low = text.assign(f"fcmp olt {text.vector(out)} {one.name}, {least.name}", "bool")
-    return _chosen(text, low, text.constant(-1.0, out), found)
+    return _chosen(text, low, text.constant(-1.0, out), result)
 
 
 def _log_beside_one(text: Text, out: str, one: Lane, **_: Any) -> Lane:
@@ -200,12 +200,12 @@ def _log_beside_one(text: Text, out: str, one: Lane, **_: Any) -> Lane:
     u = text.lane(f"fadd {kind} {unit.name}, {one.name}", out)
     above = text.lane(f"fsub {kind} {u.name}, {unit.name}", out)
     logarithm = text.call("llvm.log", out, u.name, flags="")
-    found = text.lane(f"fmul {kind} {logarithm.name}, {exact_quotient(text, out, one, above).name}", out)
+    result = text.lane(f"fmul {kind} {logarithm.name}, {exact_quotient(text, out, one, above).name}", out)
     small = text.assign(f"fcmp oeq {kind} {above.name}, {text.constant(0.0, out).name}", "bool")
     endless = text.assign(f"fcmp oeq {kind} {u.name}, {text.constant(np.inf, out).name}", "bool")
     least = text.assign(f"fcmp oeq {kind} {u.name}, {text.constant(0.0, out).name}", "bool")
-    found = _chosen(text, least, text.constant(-np.inf, out), found)
-    return _chosen(text, small, one, _chosen(text, endless, u, found))
+    result = _chosen(text, least, text.constant(-np.inf, out), result)
+    return _chosen(text, small, one, _chosen(text, endless, u, result))
 
 
 def _shifted(how: str) -> Operation:
@@ -216,8 +216,8 @@ def _shifted(how: str) -> Operation:
         most = text.constant(bits - 1, out)
         inside = text.assign(f"icmp ule {kind} {by.name}, {most.name}", "bool")
         near = _chosen(text, inside, by, most)
-        found = text.lane(f"{how} {kind} {one.name}, {near.name}", out)
-        return found if how == "ashr" else _chosen(text, inside, found, text.constant(0, out))
+        result = text.lane(f"{how} {kind} {one.name}, {near.name}", out)
+        return result if how == "ashr" else _chosen(text, inside, result, text.constant(0, out))
 
     return put
 
@@ -297,13 +297,13 @@ def select(text: Text, out: str, which: Lane, *cases: Lane, **_: Any) -> Lane:
     """JAX's `select_n`: the case with the number `which`; the first for false, the second for true."""
     if which.dtype == "bool":
         return _chosen(text, which.name, cases[1], cases[0])
-    found = cases[0]
+    result = cases[0]
     for number, case in enumerate(cases[1:], start=1):
         is_it = text.assign(
             f"icmp sge {text.vector(which.dtype)} {which.name}, {text.constant(number, which.dtype).name}", "bool"
         )
-        found = _chosen(text, is_it, case, found)
-    return found
+        result = _chosen(text, is_it, case, result)
+    return result
 
 
 def _clamped(text: Text, out: str, low: Lane, one: Lane, high: Lane, **_: Any) -> Lane:

@@ -93,8 +93,8 @@ def moved(
     if primitive.name == "gather" and "FILL" in str(params.get("mode")):
         params = {**params, "fill_value": -1}  # not a place there is: found out below where it would be put in
     with jax.ensure_compile_time_eval():
-        found = primitive.bind(*named, **params)
-    results = found if primitive.multiple_results else [found]
+        result = primitive.bind(*named, **params)
+    results = result if primitive.multiple_results else [result]
     places = [np.asarray(one) for one in results]
     if any(((one < 0) | (one >= len(lanes))).any() for one in places):
         raise Unsupported(f"the operation `{primitive.name}` beyond the ends of an array")
@@ -316,15 +316,15 @@ def _dot_general(text: Text, params: Any, given: list[Value], out: Array, kinds:
     rows = np.moveaxis(left, left_axes, range(-len(left_axes), 0)).reshape(-1, count)
     columns = np.moveaxis(right, right_axes, range(len(right_axes))).reshape(count, -1)
     put = ELEMENTWISE
-    found = []
+    result = []
     for one in rows:
         for other in columns.T:
             total = put["mul"](text, out.dtype, one[0], other[0])
             for k in range(1, count):
                 product = put["mul"](text, out.dtype, one[k], other[k])
                 total = put["add"](text, out.dtype, total, product)
-            found.append(total)
-    return held(found, out.shape)
+            result.append(total)
+    return held(result, out.shape)
 
 
 # Primitive -> what is done where an array is large, or where its numbers come from is known only when the program runs:

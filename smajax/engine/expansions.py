@@ -139,8 +139,8 @@ def _one_by_one(function: Callable[..., Any], *arrays: jax.Array) -> Any:
     whole = [jnp.broadcast_to(one, shape) for one in arrays]
     if whole[0].size <= SMALL:
         return function(*whole)
-    found = lax.map(lambda each: function(*each), tuple(one.ravel() for one in whole))
-    return jax.tree.map(lambda one: one.reshape(shape), found)
+    result = lax.map(lambda each: function(*each), tuple(one.ravel() for one in whole))
+    return jax.tree.map(lambda one: one.reshape(shape), result)
 
 
 def _block(first: jax.Array, second: jax.Array, left: jax.Array, right: jax.Array) -> tuple[jax.Array, jax.Array]:
@@ -159,15 +159,15 @@ def _block(first: jax.Array, second: jax.Array, left: jax.Array, right: jax.Arra
 def _inverse_error(x: jax.Array) -> jax.Array:
     w = -jnp.log1p(-x * x)
     parts = DOUBLE if x.dtype == jnp.float64 else SINGLE
-    found = None
+    result = None
     for number, (bound, middle, coefficients) in reversed(list(enumerate(parts))):
         z = (w if number == 0 else jnp.sqrt(w)) - middle
         value = jnp.full_like(x, coefficients[0])
         for coefficient in coefficients[1:]:
             value = value * z + coefficient
-        found = value if found is None else jnp.where(w < bound, value, found)
-    assert found is not None
-    return jnp.where(jnp.abs(x) == 1.0, x * jnp.inf, found * x)
+        result = value if result is None else jnp.where(w < bound, value, result)
+    assert result is not None
+    return jnp.where(jnp.abs(x) == 1.0, x * jnp.inf, result * x)
 
 
 # Operation -> (its parameters) -> the function of plain arrays that it is.

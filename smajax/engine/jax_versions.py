@@ -77,11 +77,11 @@ TABLE: Mapping[str, Mapping[str, tuple[Reading, ...]]] = {
 def parameters_of(equation: Any) -> dict[str, Any]:
     """An equation's parameters by our names; empty for a primitive that needs none. Raises Unsupported."""
     name, given = equation.primitive.name, equation.params
-    found = {}
+    result = {}
     for own, readings in TABLE.get(name, {}).items():
         for reading in readings:
             try:
-                found[own] = given[reading] if isinstance(reading, str) else reading(given)
+                result[own] = given[reading] if isinstance(reading, str) else reading(given)
                 break
             except (KeyError, AttributeError, TypeError, ValueError, IndexError):
                 continue
@@ -90,7 +90,7 @@ def parameters_of(equation: Any) -> dict[str, Any]:
                 f"the operation `{name}` of this version of JAX: it has no parameter that says its {own.replace('_', ' ')}, but "
                 f"{sorted(given)}"
             )
-    return found
+    return result
 
 
 def opened(program: Any) -> tuple[Any, list[Any]]:

@@ -32,8 +32,8 @@ class Traced:
         def run(*flat: jax.Array) -> list[jax.Array]:
             inputs = [_like(leaf, one) for leaf, one in zip(leaves, flat, strict=False)]
             whole = eqx.combine(jax.tree.unflatten(tree, inputs), static)
-            found = function(whole, dict(zip(names, flat[len(leaves) :], strict=True)))
-            results, out = jax.tree.flatten(found)
+            result = function(whole, dict(zip(names, flat[len(leaves) :], strict=True)))
+            results, out = jax.tree.flatten(result)
             shape[:] = [out]
             return results
 

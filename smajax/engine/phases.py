@@ -145,13 +145,13 @@ def _cut(works: Sequence[Work | Write], most: int) -> list[list[Work | Write]]:
         change[place[name] + 1] += 1
         change[end + 1] -= 1
     crossing = np.cumsum(change)
-    found, start = [], 0
+    result, start = [], 0
     while len(works) - start > most:
         window = crossing[start + LEAST : start + most + 1]
         cut = start + LEAST + len(window) - 1 - int(np.argmin(window[::-1]))  # the last one of the best
-        found.append(list(works[start:cut]))
+        result.append(list(works[start:cut]))
         start = cut
-    return [*found, list(works[start:])] if start < len(works) else found
+    return [*result, list(works[start:])] if start < len(works) else result
 
 
 def _blocks(items: Iterable[Item], most: int) -> tuple[list[_Block], list[tuple[int, int]]]:
@@ -240,18 +240,18 @@ def _places(spans: Mapping[str, tuple[int, int]], sizes: Mapping[str, int], vect
     """
     free: dict[int, list[int]] = {}
     living: list[str] = []
-    found: dict[str, int] = {}
+    result: dict[str, int] = {}
     total = 0
     for name in sorted(spans, key=lambda one: spans[one][0]):
         for over in [one for one in living if spans[one][1] <= spans[name][0]]:
-            free.setdefault(sizes[over], []).append(found[over])
+            free.setdefault(sizes[over], []).append(result[over])
             living.remove(over)
         if free.get(sizes[name]):
-            found[name] = free[sizes[name]].pop()
+            result[name] = free[sizes[name]].pop()
         else:
-            found[name], total = total, total - (-sizes[name] * vectors // LINE) * LINE
+            result[name], total = total, total - (-sizes[name] * vectors // LINE) * LINE
         living.append(name)
-    return found, total
+    return result, total
 
 
 def _settled(
@@ -271,11 +271,11 @@ def _settled(
                 made[work.name] = number
 
     def by_cell(cells: Mapping[str, str]) -> dict[str, list[int]]:
-        found: dict[str, list[int]] = {}
+        result: dict[str, list[int]] = {}
         for number, name in read:
             if name in cells:
-                found.setdefault(cells[name], []).append(number)
-        return found
+                result.setdefault(cells[name], []).append(number)
+        return result
 
     same = _joined(left, by_cell(names.cells), loops, names.cells)
 

@@ -249,9 +249,9 @@ class Text:
                 f"store i64 {after}, ptr {chosen.count}",
             ]
         )
-        found, going = self.fresh("b"), self.fresh("b")
+        result, going = self.fresh("b"), self.fresh("b")
         items = self.levels[-1].items
-        items += [Late(f"  {found} = load i64, ptr {chosen.count}"), Late(f"  {going} = icmp ne i64 {found}, 0")]
+        items += [Late(f"  {result} = load i64, ptr {chosen.count}"), Late(f"  {going} = icmp ne i64 {result}, 0")]
         return going, chosen
 
     def only(self, chosen: Chosen) -> None:

@@ -101,12 +101,12 @@ class _Translation:
             given = [read(one) for one in equation.invars]
             whole = equation.primitive.name == "div" and id(equation.outvars[0]) in to_the_bit
             try:
-                found = self.equation(equation, given, "exact_div" if whole else equation.primitive.name)
+                result = self.equation(equation, given, "exact_div" if whole else equation.primitive.name)
             except Exception as error:
                 if not hasattr(error, "__notes__"):  # of the innermost alone
                     error.add_note(f"while the operation `{equation.primitive.name}` was translated")
                 raise
-            for variable, value in zip(equation.outvars, found, strict=True):
+            for variable, value in zip(equation.outvars, result, strict=True):
                 names[variable] = value
         return [read(one) for one in jaxpr.outvars]
 
@@ -130,8 +130,8 @@ class _Translation:
             return self.closed(expanded(equation), given)
         if all(is_known(one) for one in given):
             with jax.ensure_compile_time_eval():
-                found = equation.primitive.bind(*given, **equation.params)
-            return [_numbers(one) for one in (found if equation.primitive.multiple_results else [found])]
+                result = equation.primitive.bind(*given, **equation.params)
+            return [_numbers(one) for one in (result if equation.primitive.multiple_results else [result])]
         out = _array(equation.outvars[0].aval)
         kinds = [str(one.aval.dtype) for one in equation.invars]
         if name == "exact_div" and not out.dtype.startswith("float"):
@@ -225,10 +225,10 @@ class _Translation:
         if backward:
             index = text.assign(f"sub i64 {length - 1}, {index}")
         now = [row(text, one, index, kind.shape, kind.dtype) for one, kind in zip(series, kinds, strict=True)]
-        found = self.program(jaxpr, known, [*given[:fixed], *loop.carry, *now])
-        for room, one in zip(rooms, found[carry:], strict=True):
+        result = self.program(jaxpr, known, [*given[:fixed], *loop.carry, *now])
+        for room, one in zip(rooms, result[carry:], strict=True):
             write(text, room, index, one)
-        loop.end_after(length, [self.carried(one) for one in found[:carry]])
+        loop.end_after(length, [self.carried(one) for one in result[:carry]])
         return [*loop.carried(), *rooms]
 
     def repeat(self, params: dict[str, Any], given: list[Value]) -> list[Value]:
@@ -244,7 +244,7 @@ class _Translation:
         text.branch(some, inside, after)
         text.label(inside)
         text.only(chosen)
-        found = self.closed(params["body"], [*bodies, *loop.carry])
+        result = self.closed(params["body"], [*bodies, *loop.carry])
         new = [
             held(
                 [
@@ -253,7 +253,7 @@ class _Translation:
                 ],
                 old.shape,
             )
-            for old, value in zip(loop.carry, found, strict=True)
+            for old, value in zip(loop.carry, result, strict=True)
         ]
         loop.again(new)
         text.label(after)
@@ -265,7 +265,7 @@ class _Translation:
         if is_known(which):
             return self.closed(branches[min(max(whole_number(which), 0), len(branches) - 1)], rest)
         number = in_registers(self.text, which).ravel()[0]
-        found = [[self.carried(one) for one in self.closed(branch, rest)] for branch in branches]
+        result = [[self.carried(one) for one in self.closed(branch, rest)] for branch in branches]
         return [
             held(
                 [
@@ -274,7 +274,7 @@ class _Translation:
                 ],
                 of[0].shape,
             )
-            for of in zip(*found, strict=True)
+            for of in zip(*result, strict=True)
         ]
 
 
@@ -325,8 +325,8 @@ def translate(
     results = tuple(_array(aval) for aval in program.out_avals)
     # What no result asks for may well be what has no translation.
     needed, _ = partial_eval.dce_jaxpr(program.jaxpr, [True] * len(results), instantiate=True)
-    found = put.program(needed, _constants(program.consts), given)
-    for pointer, result, answer in zip(outputs, results, found, strict=True):
+    outcome = put.program(needed, _constants(program.consts), given)
+    for pointer, result, answer in zip(outputs, results, outcome, strict=True):
         _leave(text, pointer, first, result, answer)
     following = text.assign(f"add i64 {group}, {vectors}")
     text.branch(text.assign(f"icmp slt i64 {following}, %last"), "groups", "finished")

@@ -45,10 +45,10 @@ Value = np.ndarray | Held | Stored | Filled
 def held(lanes: Any, shape: tuple[int, ...] = ()) -> Held:
     """An array of `Lane`s: numpy must not look into them."""
     flat = lanes if isinstance(lanes, list) else [lanes]
-    found = np.empty(len(flat), dtype=object)
+    result = np.empty(len(flat), dtype=object)
     for number, lane in enumerate(flat):
-        found[number] = lane
-    return found.reshape(shape).view(Held)
+        result[number] = lane
+    return result.reshape(shape).view(Held)
 
 
 def is_known(value: Value) -> bool:

@@ -46,8 +46,8 @@ def _evaluated(
         whole = eqx.combine(arrays, static)
         run = jax.vmap(lambda own: function(whole, own))
         blocks = jax.tree.map(lambda leaf: leaf.reshape(-1, block, *leaf.shape[1:]), values)
-        found = lax.map(run, blocks)
-        return jax.tree.map(lambda leaf: leaf.reshape(-1, *leaf.shape[2:]), found)
+        result = lax.map(run, blocks)
+        return jax.tree.map(lambda leaf: leaf.reshape(-1, *leaf.shape[2:]), result)
 
     # Over one device as well: it is then the same program that every device runs.
     mesh = Mesh(np.asarray(devices), ("runs",))

@@ -85,7 +85,7 @@ def identify(  # ten parameters: the options of the command, by keyword
         stopped=_stopped(fitted, statistics.inflation),
         check=check,
         estimates=_estimates(setup, fitted, statistics.uncertainty),
-        own_of_held_out=fitted.own_of_held_out,
+        values_of_held_out_runs=fitted.values_of_held_out_runs,
         correlated=statistics.correlated,
         correlation=statistics.covariance / np.outer(spread, spread),
         weak=tuple(weak_combinations(weakest)),

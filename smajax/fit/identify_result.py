@@ -79,7 +79,7 @@ class Identified:
     stopped: str
     check: tuple[str, ...]
     estimates: tuple[Estimate, ...]
-    own_of_held_out: dict[str, float]  # values of single held-out runs, fitted with all others fixed
+    values_of_held_out_runs: dict[str, float]  # values of single held-out runs, fitted with all others fixed
     correlated: tuple[str, ...]
     correlation: np.ndarray
     weak: tuple[str, ...]

@@ -83,7 +83,7 @@ class Fitted:
     fits: list[Fit]  # from each start that was run until its end, before the noise was estimated
     noise_estimated: list[bool]  # of each output
     values: dict[str, float]  # of the unknowns
-    own_of_held_out: dict[str, float]
+    values_of_held_out_runs: dict[str, float]
 
 
 @dataclass(frozen=True)
@@ -164,7 +164,7 @@ def _integration_error(setup: Setup, fitted: Fitted) -> IntegrationError:
 
 def _per_run(setup: Setup, fitted: Fitted) -> np.ndarray:
     """Each run's own values at the fit."""
-    values = _full_values(setup.every_run, fitted.problem, fitted.best.values, fitted.own_of_held_out)
+    values = _full_values(setup.every_run, fitted.problem, fitted.best.values, fitted.values_of_held_out_runs)
     return np.asarray(setup.every_run.per_run_at(jnp.asarray(values[: len(setup.every_run.names)])))
 
 
@@ -199,7 +199,7 @@ def fit_unknowns(setup: Setup, options: Options, initial_guess: np.ndarray | Non
     if options.robust:
         weighted, best = robust_fit(problem, best, refit("fitting by Huber's loss"))
     values = {name: float(best.values[problem.names.index(name)]) for name in names}
-    own = _own_of_held_out(setup, problem, best.values, options)
+    own = _values_of_held_out_runs(setup, problem, best.values, options)
     return Fitted(problem, weighted, best, fits, estimated, values, own)
 
 
@@ -207,7 +207,7 @@ def statistics_at(setup: Setup, fitted: Fitted, options: Options) -> Statistics:
     """Whiteness of the residual, and the covariance of the estimates."""
     robust, names = options.robust, setup.names
     every_run = with_noise(setup.every_run, fitted.problem)
-    values = _full_values(every_run, fitted.problem, fitted.best.values, fitted.own_of_held_out)
+    values = _full_values(every_run, fitted.problem, fitted.best.values, fitted.values_of_held_out_runs)
     everywhere = sensitivity(every_run, values, names)
     at = _of_fit_runs(everywhere, setup)
     misfit = unweighted_misfit(fitted.weighted, fitted.best.values) if robust else at.misfit
@@ -261,7 +261,7 @@ def residual_size(misfit: np.ndarray, robust: bool) -> float:
     return NORMAL * float(np.median(np.abs(misfit))) if robust else float(np.sqrt(np.mean(misfit**2)))
 
 
-def _own_of_held_out(setup: Setup, problem: Problem, values: np.ndarray, options: Options) -> dict[str, float]:
+def _values_of_held_out_runs(setup: Setup, problem: Problem, values: np.ndarray, options: Options) -> dict[str, float]:
     """Values of single held-out runs: no other run determines them, so they are fitted to these, all others fixed."""
     experiment, bounds = setup.experiment, setup.bounds
     runs = [run for run in experiment.runs if run.role != "fit"]

@@ -210,9 +210,9 @@ def uncertainty(
         if not remark[name] and error[index] / scale[index] > ranges[index]:
             errors[name], remark[name] = None, Remark(RemarkKind.RANGE_OPEN)
     groups = [tuple(free[clear[index]] for index in cluster) for cluster in _clusters(covariance[np.ix_(clear, clear)])]
-    for members in groups:
-        for name in members:
-            others = tuple(other for other in members if other != name)
+    for group in groups:
+        for name in group:
+            others = tuple(other for other in group if other != name)
             remark[name] = remark[name] or Remark(RemarkKind.CORRELATED, others)
     return Uncertainty(errors, remark, tuple(groups))
 

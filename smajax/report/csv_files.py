@@ -30,8 +30,8 @@ def findings_parameters(findings: Findings) -> str:
     return csv_text(["parameter", "unit", *head], rows)
 
 
-def _fitted(found: ParameterFinding | None) -> list[float | None]:
-    return [None, None] if found is None else [found.value, found.standard_error]
+def _fitted(result: ParameterFinding | None) -> list[float | None]:
+    return [None, None] if result is None else [result.value, result.standard_error]
 
 
 def findings_runs(findings: Findings) -> str:
@@ -44,23 +44,23 @@ def findings_runs(findings: Findings) -> str:
     return _runs(series, seen)
 
 
-def identified_parameters(found: Identified) -> str:
+def identified_parameters(result: Identified) -> str:
     """The estimates, in the order of the record."""
     rows = [
         [one.name, one.unit, one.value, one.standard_error, one.lower, one.upper, one.start, one.remark]
-        for one in found.estimates
+        for one in result.estimates
     ]
     head = ["parameter", "unit", "estimate", "standard error", "lower", "upper", "start", "remark"]
     return csv_text(head, rows)
 
 
-def identified_runs(found: Identified) -> str:
+def identified_runs(result: Identified) -> str:
     """Inputs and, sensor by sensor, measurement, simulation and the standard error of that, of every run."""
     units: dict[str, str] = {}
     series = []
-    for run in found.runs:
+    for run in result.runs:
         columns = {"time": run.time, **run.inputs}
-        for output, one in zip(found.outputs, run.series, strict=True):
+        for output, one in zip(result.outputs, run.series, strict=True):
             for what in ("measured", "simulated", "spread"):
                 units[f"{one.output} {what}"] = output.unit
                 columns[f"{one.output} {what}"] = getattr(one, what)

@@ -88,8 +88,8 @@ def picture(image: bytes | None, alt: str, kind: str = "wide", upright: bytes | 
 
 def _parameter_rows(findings: Findings) -> list[dict[str, Any]]:
     """One row a parameter, before and after side by side, in the order of the record."""
-    before = {found.name: found for found in findings.before}
-    after = {found.name: found for found in findings.after}
+    before = {result.name: result for result in findings.before}
+    after = {result.name: result for result in findings.after}
     correlated = {name for cluster in findings.correlated for name in cluster}
     rows = []
     for name in dict.fromkeys([*before, *after]):
@@ -109,10 +109,10 @@ def _parameter_rows(findings: Findings) -> list[dict[str, Any]]:
     return rows
 
 
-def _fitted(found: ParameterFinding | None) -> Shown:
-    if found is None:
+def _fitted(result: ParameterFinding | None) -> Shown:
+    if result is None:
         return Shown("–", None)
-    return estimate(found.value, found.standard_error, found.unit, found.name)
+    return estimate(result.value, result.standard_error, result.unit, result.name)
 
 
 def _remarks(before: ParameterFinding | None, after: ParameterFinding | None) -> str:

@@ -21,45 +21,45 @@ KNOWN = "Every combination of the parameters is known to 5 % (temperatures: to 1
 KNOWN_OF_THE_REST = "Of the parameters that are neither at a bound nor without effect, every combination is known to 5 % (temperatures: to 1 K)."
 
 
-def _run_rows(found: Identified) -> tuple[list[str], list[list[str]]]:
+def _run_rows(result: Identified) -> tuple[list[str], list[list[str]]]:
     """(head, rows): each run's error by output."""
 
     def head(one: IdentifiedOutput) -> str:
         unit = display(one.unit, one.name).unit or "-"
-        return f"rms error ({unit})" if len(found.outputs) == 1 else f"{label(one.name)}, rms error ({unit})"
+        return f"rms error ({unit})" if len(result.outputs) == 1 else f"{label(one.name)}, rms error ({unit})"
 
     rows = []
-    for run in found.runs:
+    for run in result.runs:
         errors = [
             digits(display(one.unit, one.name).of(series.rmse), 3)
-            for one, series in zip(found.outputs, run.series, strict=True)
+            for one, series in zip(result.outputs, run.series, strict=True)
         ]
         rows.append([run.name, run.role, str(len(run.time)), *errors])
-    return ["run", "role", "samples", *(head(one) for one in found.outputs)], rows
+    return ["run", "role", "samples", *(head(one) for one in result.outputs)], rows
 
 
-def _what_to_do(found: Identified) -> str:
+def _what_to_do(result: Identified) -> str:
     """About parameters of which the runs see one combination; empty where there are none."""
-    if not any("are correlated" in one for one in found.weak):
+    if not any("are correlated" in one for one in result.weak):
         return ""
-    where = "such runs are ranked below" if found.suggestions else "<code>--design</code> ranks such runs"
+    where = "such runs are ranked below" if result.suggestions else "<code>--design</code> ranks such runs"
     return (
         "<p>Of correlated parameters measure one by itself and give it under <code>[model.parameters]</code> in the place of "
         f"<code>[unknown]</code>, or add a run that separates them (another load, a slower or a hotter one): {where}.</p>"
     )
 
 
-def _correlations(found: Identified) -> str:
+def _correlations(result: Identified) -> str:
     """The correlation matrix of the estimates as text that keeps its size on a telephone; nothing for fewer than two."""
-    if len(found.correlated) < 2:
+    if len(result.correlated) < 2:
         return ""
-    numbered = range(1, len(found.correlated) + 1)
+    numbered = range(1, len(result.correlated) + 1)
     columns = "".join(f"<th class=n>{number}</th>" for number in numbered)
     rows = [
         f'<tr><td data-v="{number}">{number}&nbsp;{breakable(name)}</td>'
         + "".join(f'<td class=n style="background:{_colour(value)}">{correlation(value)}</td>' for value in line)
         + "</tr>"
-        for number, name, line in zip(numbered, found.correlated, found.correlation.tolist(), strict=True)
+        for number, name, line in zip(numbered, result.correlated, result.correlation.tolist(), strict=True)
     ]
     return (
         "<p class=quiet>Correlations of the estimates; a column is the parameter of its number.</p>"
@@ -74,45 +74,48 @@ def _colour(value: float) -> str:
     return f"rgb({'178 24 43' if value > 0.0 else '33 102 172'} / {0.7 * abs(value):.2f})"
 
 
-def page(found: Identified) -> str:
+def page(result: Identified) -> str:
     """The whole page."""
     say = html.escape
-    run_head, runs = _run_rows(found)
-    interval = ["95 % (profile)"] if found.profiles else []
+    run_head, runs = _run_rows(result)
+    interval = ["95 % (profile)"] if result.profiles else []
     head = ["parameter", "estimate ± standard error", "unit", *interval, "bounds", "start", "remark"]
-    rows = estimate_rows(found)
-    if any(one.prior for one in found.estimates):
+    rows = estimate_rows(result)
+    if any(one.prior for one in result.estimates):
         head.insert(-1, "known before")
-        rows = [[*row[:-1], prior_shown(one), row[-1]] for row, one in zip(rows, found.estimates, strict=True)]
+        rows = [[*row[:-1], prior_shown(one), row[-1]] for row, one in zip(rows, result.estimates, strict=True)]
     parts = [
-        f"<h1>{say(found.title or found.experiment)}: parameters</h1>",
-        bullets(conclusions(found)),
+        f"<h1>{say(result.title or result.experiment)}: parameters</h1>",
+        bullets(conclusions(result)),
         "<h2>Parameters</h2>",
         table(head, rows, [k for k, title in enumerate(head) if title not in ("parameter", "unit", "remark")]),
         "<h2>Which combinations are identifiable</h2>",
-        bullets(found.weak) or f"<p>{KNOWN if found.all_took_part else KNOWN_OF_THE_REST}</p>",
-        _what_to_do(found),
-        _correlations(found),
+        bullets(result.weak) or f"<p>{KNOWN if result.all_took_part else KNOWN_OF_THE_REST}</p>",
+        _what_to_do(result),
+        _correlations(result),
     ]
-    if found.profiles:
+    if result.profiles:
         parts += [
             "<h2>Profile likelihood</h2><p class=quiet>Each parameter held, all others fitted again: the rise of the cost "
             "(blue), what the standard error stands for (grey), the 95 % line (red).</p>",
-            picture(draw.profile_curves(found), "profiles", "panels", draw.profile_curves(found, upright=True)),
+            picture(draw.profile_curves(result), "profiles", "panels", draw.profile_curves(result, upright=True)),
         ]
-    if found.posterior is not None:
+    if result.posterior is not None:
         chains = ["parameter", "mean ± standard deviation", "unit", "95 %", "R-hat", "independent draws"]
         parts += [
             "<h2>Posterior</h2><p class=quiet>Drawn by Markov chains, even within the bounds but for what was known before; "
-            f"{100.0 * found.posterior.accepted:.0f} % of the jumps were taken; the samples count by 1/"
-            f"{digits(found.posterior.inflation, 2)}, as in the standard errors. Histograms: draws; grey: what the standard "
+            f"{100.0 * result.posterior.accepted:.0f} % of the jumps were taken; the samples count by 1/"
+            f"{digits(result.posterior.inflation, 2)}, as in the standard errors. Histograms: draws; grey: what the standard "
             "error stands for.</p>",
-            table(chains, posterior_rows(found), (1, 3, 4, 5)),
+            table(chains, posterior_rows(result), (1, 3, 4, 5)),
             picture(
-                draw.posterior_histograms(found), "posterior", "panels", draw.posterior_histograms(found, upright=True)
+                draw.posterior_histograms(result),
+                "posterior",
+                "panels",
+                draw.posterior_histograms(result, upright=True),
             ),
         ]
-    if found.suggestions:
+    if result.suggestions:
         rows = [
             [
                 str(number),
@@ -120,45 +123,45 @@ def page(found: Identified) -> str:
                 digits(one.information, 3),
                 ", ".join(f"{label(name)} × {digits(share, 2)}" for name, share in one.shrinks.items()),
             ]
-            for number, one in enumerate(found.suggestions, start=1)
+            for number, one in enumerate(result.suggestions, start=1)
         ]
         parts += [
             "<h2>What to measure next</h2><p class=quiet>Courses of the input within what was applied already, ranked by "
             "what one such run would determine (D-optimal, at the fit).</p>",
             table(["rank", "run", "information, nats", "standard errors become"], rows, (0, 2)),
-            picture(draw.suggested_inputs(found), "suggested inputs"),
+            picture(draw.suggested_inputs(result), "suggested inputs"),
         ]
     parts += ["<h2>Runs</h2>", table(run_head, runs, range(2, len(run_head)))]
-    if found.own_of_held_out:
-        units = {one.name.split("[")[0]: display(one.unit, one.name) for one in found.estimates}
+    if result.values_of_held_out_runs:
+        units = {one.name.split("[")[0]: display(one.unit, one.name) for one in result.estimates}
         own = [
             f"{name} {digits(units[name.split('[')[0]].of(value))} {units[name.split('[')[0]].unit}".strip()
-            for name, value in found.own_of_held_out.items()
+            for name, value in result.values_of_held_out_runs.items()
         ]
         parts.append(
             f"<p class=quiet>What is each run's own was found for the held-out runs from themselves, all else held: "
             f"{say('; '.join(own))}.</p>"
         )
-    for run in found.runs:
+    for run in result.runs:
         pictures = [
-            picture(draw.run_with_band(found, run, k), f"{label(run.name)}, {label(one.name)}")
-            for k, one in enumerate(found.outputs)
+            picture(draw.run_with_band(result, run, k), f"{label(run.name)}, {label(one.name)}")
+            for k, one in enumerate(result.outputs)
             if np.isfinite(run.series[k].rmse)
         ]
         parts.append(f"<h3>{say(run.name)} ({say(run.role)})</h3>{''.join(pictures)}")
     parts += [
         "<h2>Checks and provenance</h2>",
-        bullets(found.check),
-        table(["", ""], list(map(list, found.provenance.items()))),
+        bullets(result.check),
+        table(["", ""], list(map(list, result.provenance.items()))),
         f"<p class=quiet>The same numbers: identify.json, {PARAMETERS}, {RUNS}.</p>",
     ]
-    return whole(f"{found.title or found.experiment}", parts)
+    return whole(f"{result.title or result.experiment}", parts)
 
 
-def write_identified(found: Identified, folder: Path) -> Path:
+def write_identified(result: Identified, folder: Path) -> Path:
     """`identify.html`, `identify.json` and its tables in `folder`, each whole or not at all; the path of the page."""
     folder.mkdir(parents=True, exist_ok=True)
-    replace(folder / "identify.json", json_text(record(found)))
-    replace(folder / PARAMETERS, identified_parameters(found))
-    replace(folder / RUNS, identified_runs(found))
-    return replace(folder / "identify.html", page(found))
+    replace(folder / "identify.json", json_text(record(result)))
+    replace(folder / PARAMETERS, identified_parameters(result))
+    replace(folder / RUNS, identified_runs(result))
+    return replace(folder / "identify.html", page(result))

@@ -25,9 +25,9 @@ from smajax.report.pictures import (
 )
 
 
-def run_with_band(found: Identified, run: IdentifiedRun, k: int = 0) -> bytes:
+def run_with_band(result: Identified, run: IdentifiedRun, k: int = 0) -> bytes:
     """Of the k-th output: measured, simulated, residual with the noise's band and the parameters', varying inputs."""
-    sensor, one = found.outputs[k], run.series[k]
+    sensor, one = result.outputs[k], run.series[k]
     shown = display(sensor.unit, sensor.name)
     figure, rows = run_panels(run.time, run.inputs, sensor.name, shown)
     output, residual = rows[:2]
@@ -53,13 +53,13 @@ def _panels(count: int, height: float, upright: bool) -> tuple[Figure, np.ndarra
     return figure, figure.subplots(rows, columns, squeeze=False).ravel()
 
 
-def profile_curves(found: Identified, upright: bool = False) -> bytes | None:
+def profile_curves(result: Identified, upright: bool = False) -> bytes | None:
     """Rise of the cost over each profiled parameter, with the parabola that its standard error stands for."""
-    if not found.profiles:
+    if not result.profiles:
         return None
-    figure, panels = _panels(len(found.profiles), 2.5, upright)
-    estimates = {one.name: one for one in found.estimates}
-    for axes, one in zip(panels, found.profiles, strict=False):
+    figure, panels = _panels(len(result.profiles), 2.5, upright)
+    estimates = {one.name: one for one in result.estimates}
+    for axes, one in zip(panels, result.profiles, strict=False):
         estimate = estimates[one.name]
         unit = display(estimate.unit, one.name)
         axes.plot(unit.of(one.values), one.rise, "o-", color=AFTER, markersize=3.5, linewidth=1.2)
@@ -74,19 +74,19 @@ def profile_curves(found: Identified, upright: bool = False) -> bytes | None:
         axes.xaxis.set_major_locator(MaxNLocator(3, prune="both"))
         axes.set_xlabel(axis_label(one.name, unit), fontsize=8)
         tidy(axes)
-    for axes in panels[len(found.profiles) :]:
+    for axes in panels[len(result.profiles) :]:
         axes.set_visible(False)
     panels[0].set_ylabel("rise of the cost", fontsize=8)
     return as_png(figure)
 
 
-def posterior_histograms(found: Identified, upright: bool = False) -> bytes | None:
+def posterior_histograms(result: Identified, upright: bool = False) -> bytes | None:
     """Each parameter's draws beside the Gaussian of its standard error."""
-    drawn = found.posterior
+    drawn = result.posterior
     if drawn is None:
         return None
     figure, panels = _panels(len(drawn.names), 2.2, upright)
-    estimates = {one.name: one for one in found.estimates}
+    estimates = {one.name: one for one in result.estimates}
     for axes, name, draws in zip(panels, drawn.names, drawn.flat.T, strict=False):
         estimate = estimates[name]
         unit = display(estimate.unit, name)
@@ -106,19 +106,19 @@ def posterior_histograms(found: Identified, upright: bool = False) -> bytes | No
     return as_png(figure)
 
 
-def suggested_inputs(found: Identified) -> bytes | None:
+def suggested_inputs(result: Identified) -> bytes | None:
     """The inputs of the suggested runs, best first."""
-    if not found.suggestions:
+    if not result.suggestions:
         return None
-    figure = new_figure(1.25 * len(found.suggestions) + 0.4)
-    panels = figure.subplots(len(found.suggestions), 1, sharex=True, squeeze=False)[:, 0]
-    for number, (axes, one) in enumerate(zip(panels, found.suggestions, strict=True), start=1):
+    figure = new_figure(1.25 * len(result.suggestions) + 0.4)
+    panels = figure.subplots(len(result.suggestions), 1, sharex=True, squeeze=False)[:, 0]
+    for number, (axes, one) in enumerate(zip(panels, result.suggestions, strict=True), start=1):
         name = max(one.inputs, key=lambda channel_: float(np.ptp(one.inputs[channel_])))
         unit = channel(name)
-        time = np.arange(len(one.inputs[name])) * found.step
+        time = np.arange(len(one.inputs[name])) * result.step
         axes.plot(time, unit.of(one.inputs[name]), color="#5b6470", linewidth=1.1)
         axes.set_title(f"{number}. {digits(one.information, 3)} nats", fontsize=8, loc="left", pad=2)
         axes.set_ylabel(f"{label(name)}" + (f"\n({unit.unit})" if unit.unit else ""), fontsize=7)
         tidy(axes)
-    panels[-1].set_xlabel("time (s)" if found.clocked else "sample", fontsize=8)
+    panels[-1].set_xlabel("time (s)" if result.clocked else "sample", fontsize=8)
     return as_png(figure)

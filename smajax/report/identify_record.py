@@ -11,13 +11,13 @@ from smajax.fit.posterior import Posterior
 from smajax.report.identify_words import conclusions, rms_by_role
 
 
-def record(found: Identified) -> dict[str, Any]:
+def record(result: Identified) -> dict[str, Any]:
     """Everything but the series, in the program's own units; a number that is none is null."""
-    profiled = {one.name: one for one in found.profiles}
+    profiled = {one.name: one for one in result.profiles}
     return {
-        "experiment": found.experiment,
-        "title": found.title,
-        "conclusions": conclusions(found),
+        "experiment": result.experiment,
+        "title": result.title,
+        "conclusions": conclusions(result),
         "parameters": {
             one.name: {
                 "value": one.value,
@@ -37,28 +37,32 @@ def record(found: Identified) -> dict[str, Any]:
                     else {}
                 ),
             }
-            for one in found.estimates
+            for one in result.estimates
         },
-        "correlation": {"parameters": list(found.correlated), "matrix": found.correlation.tolist()},
-        "weak_combinations": list(found.weak),
-        "fits": {"mean_square_over_noise": list(found.start_costs), "stopped": found.stopped, "robust": found.robust},
+        "correlation": {"parameters": list(result.correlated), "matrix": result.correlation.tolist()},
+        "weak_combinations": list(result.weak),
+        "fits": {
+            "mean_square_over_noise": list(result.start_costs),
+            "stopped": result.stopped,
+            "robust": result.robust,
+        },
         "residual": {
-            "rms_over_noise": found.ratio,
-            "whiteness_p_value": found.whiteness_p,
-            "normality_p_value": found.normality_p,
-            "samples_an_independent_one": found.independent,
+            "rms_over_noise": result.ratio,
+            "whiteness_p_value": result.whiteness_p,
+            "normality_p_value": result.normality_p,
+            "samples_an_independent_one": result.independent,
         },
-        "noise_sigma": found.outputs[0].noise_sigma,
-        "output": {"name": found.outputs[0].name, "unit": found.outputs[0].unit},
+        "noise_sigma": result.outputs[0].noise_sigma,
+        "output": {"name": result.outputs[0].name, "unit": result.outputs[0].unit},
         "outputs": {
             one.name: {
                 "unit": one.unit,
                 "noise_sigma": one.noise_sigma,
                 "noise_how": one.noise_how,
                 "rms_over_noise": one.ratio,
-                "rmse": rms_by_role(found, k),
+                "rmse": rms_by_role(result, k),
             }
-            for k, one in enumerate(found.outputs)
+            for k, one in enumerate(result.outputs)
         },
         "runs": {
             run.name: {
@@ -70,17 +74,17 @@ def record(found: Identified) -> dict[str, Any]:
                     for one in run.series
                 },
             }
-            for run in found.runs
+            for run in result.runs
         },
-        "integration_error": found.integration.record(),
-        "own_of_held_out_runs": found.own_of_held_out,
-        **({"posterior": _posterior_record(found.posterior)} if found.posterior is not None else {}),
+        "integration_error": result.integration.record(),
+        "values_of_held_out_runs": result.values_of_held_out_runs,
+        **({"posterior": _posterior_record(result.posterior)} if result.posterior is not None else {}),
         "suggestions": [
             {"run": one.what, "information_nats": one.information, "standard_errors_become": one.shrinks}
-            for one in found.suggestions
+            for one in result.suggestions
         ],
-        "check": list(found.check),
-        "provenance": found.provenance,
+        "check": list(result.check),
+        "provenance": result.provenance,
     }
 
 

@@ -18,49 +18,49 @@ FAR = 2.0  # standard deviations of what was known before, from which on an esti
 OFF = 1.25  # ratio of residual to noise that is worth a sentence
 
 
-def conclusions(found: Identified) -> list[str]:
+def conclusions(result: Identified) -> list[str]:
     """What was found, in sentences that say no more than the numbers."""
-    sentences = [found.stopped, *(_error(found, k) for k in range(len(found.outputs)))]
-    given = [one.noise_before is None for one in found.outputs]
-    if not all(np.isfinite(one.ratio) for one in found.outputs):
+    sentences = [result.stopped, *(_error(result, k) for k in range(len(result.outputs)))]
+    given = [one.noise_before is None for one in result.outputs]
+    if not all(np.isfinite(one.ratio) for one in result.outputs):
         sentences.append("The residual of these runs is NaN or infinite: neither it nor the values mean anything.")
-    elif found.whiteness_p < WHITE:
+    elif result.whiteness_p < WHITE:
         sentences.append(
-            f"The residual is {_times(found)} and is autocorrelated ({p_value(found.whiteness_p)}; one "
-            f"sample in {found.independent:.0f} is independent): the model lacks something, and the standard errors allow "
+            f"The residual is {_times(result)} and is autocorrelated ({p_value(result.whiteness_p)}; one "
+            f"sample in {result.independent:.0f} is independent): the model lacks something, and the standard errors allow "
             "for the autocorrelation but not for what that does to the values. `smajax close-loop` looks for what it is."
         )
     else:
         sentences.append(
-            f"The residual is {_times(found)} and is white "
-            f"({p_value(found.whiteness_p)}): nothing in these runs speaks against the model."
+            f"The residual is {_times(result)} and is white "
+            f"({p_value(result.whiteness_p)}): nothing in these runs speaks against the model."
         )
         wrong = [
             one
-            for one, was_given in zip(found.outputs, given, strict=True)
+            for one, was_given in zip(result.outputs, given, strict=True)
             if was_given and not 1.0 / OFF < one.ratio < OFF
         ]
-        if wrong and len(found.outputs) == 1:
+        if wrong and len(result.outputs) == 1:
             sentences.append("The noise is not what was declared: errors were taken from the residual.")
         elif wrong:
             sentences.append(
                 f"The noise of {and_listed([one.name for one in wrong])} is not what was declared, so the outputs do not "
                 "have the weights they deserve: write noise = 'estimate' for it."
             )
-    larger = [one for one in found.outputs if one.noise_before and one.noise_sigma > OFF * one.noise_before]
+    larger = [one for one in result.outputs if one.noise_before and one.noise_sigma > OFF * one.noise_before]
     if larger:
         sentences.append(
             f"The residual of {and_listed([one.name for one in larger])} is larger than the noise that the signal "
             "itself shows: part of it is what the model lacks, and was given the weight of noise."
         )
-    if found.normality_p < WHITE and not found.robust:
+    if result.normality_p < WHITE and not result.robust:
         sentences.append(
-            f"It is not normally distributed ({p_value(found.normality_p)}): if single samples are far off, fit by Huber's "
+            f"It is not normally distributed ({p_value(result.normality_p)}): if single samples are far off, fit by Huber's "
             "loss (`--robust`)."
         )
-    sentences += [said for one in found.estimates if (said := _contradicted(one))]
-    edge = [one.name for one in found.estimates if "bound" in one.remark and one.standard_error is None]
-    not_identifiable = [one.name for one in found.estimates if one.standard_error is None and one.name not in edge]
+    sentences += [said for one in result.estimates if (said := _contradicted(one))]
+    edge = [one.name for one in result.estimates if "bound" in one.remark and one.standard_error is None]
+    not_identifiable = [one.name for one in result.estimates if one.standard_error is None and one.name not in edge]
     if edge:
         sentences.append(
             f"Held by a bound, which the truth may lie beyond: {', '.join(edge)}; the others are estimated with it held."
@@ -69,22 +69,22 @@ def conclusions(found: Identified) -> list[str]:
         sentences.append(
             f"{', '.join(not_identifiable)} {'is' if len(not_identifiable) == 1 else 'are'} not identifiable from these runs: see the remarks."
         )
-    if better := [one.name for one in found.profiles if one.better]:
+    if better := [one.name for one in result.profiles if one.better]:
         sentences.append(
             f"The profile of {', '.join(better)} found a better fit than this one: ask for more `--starts`."
         )
-    if found.posterior is not None:
-        sentences.append(_chains(found.posterior))
-    if found.robust:
+    if result.posterior is not None:
+        sentences.append(_chains(result.posterior))
+    if result.robust:
         sentences.append("Huber's loss: samples far off count less, and errors are those of that estimate.")
     return sentences
 
 
-def _times(found: Identified) -> str:
+def _times(result: Identified) -> str:
     """`1.1 times the noise`, or by output where the fit did not make it one."""
-    if len(found.outputs) == 1:
-        return times_noise(found.ratio)
-    return and_listed([f"{times_noise(one.ratio)} ({one.name})" for one in found.outputs])
+    if len(result.outputs) == 1:
+        return times_noise(result.ratio)
+    return and_listed([f"{times_noise(one.ratio)} ({one.name})" for one in result.outputs])
 
 
 def _contradicted(one: Estimate) -> str:
@@ -107,35 +107,35 @@ def _contradicted(one: Estimate) -> str:
     )
 
 
-def rms_by_role(found: Identified, output: int) -> dict[str, float]:
+def rms_by_role(result: Identified, output: int) -> dict[str, float]:
     """Error of one output over all runs of a role, SI."""
     by_role = {}
-    for role in dict.fromkeys(run.role for run in found.runs):
-        errors = [run.series[output].rmse for run in found.runs if run.role == role]
+    for role in dict.fromkeys(run.role for run in result.runs):
+        errors = [run.series[output].rmse for run in result.runs if run.role == role]
         known = [error for error in errors if np.isfinite(error)]
         if known:
             by_role[role] = float(np.sqrt(np.mean(np.square(known))))
     return by_role
 
 
-def _error(found: Identified, output: int) -> str:
+def _error(result: Identified, output: int) -> str:
     """Error of one output and its noise, in its own unit."""
-    one = found.outputs[output]
+    one = result.outputs[output]
     unit = display(one.unit, one.name)
     errors = "; ".join(
         f"{role} runs {digits(unit.of(error), 3)} {unit.unit}".strip()
-        for role, error in rms_by_role(found, output).items()
+        for role, error in rms_by_role(result, output).items()
     )
-    whose = f"Error of the {label(one.name)} (rms)" if len(found.outputs) > 1 else "Error (rms)"
+    whose = f"Error of the {label(one.name)} (rms)" if len(result.outputs) > 1 else "Error (rms)"
     noise = f"noise {digits(unit.of(one.noise_sigma), 3)} {unit.unit}, {one.noise_how}"
     if one.noise_before is not None:
         noise += f" (its differences show {digits(unit.of(one.noise_before), 3)} {unit.unit})".replace(" )", ")")
     return f"{whose}: {errors}; {noise}.".replace(" ,", ",")
 
 
-def estimate_rows(found: Identified) -> list[list[str]]:
+def estimate_rows(result: Identified) -> list[list[str]]:
     """Parameter, estimate with standard error, unit, 95 % interval of the profile if any was drawn, bounds, start, remark."""
-    profiled = {one.name: one for one in found.profiles}
+    profiled = {one.name: one for one in result.profiles}
 
     def interval(one: Estimate) -> str:
         if one.name not in profiled:
@@ -149,7 +149,7 @@ def estimate_rows(found: Identified) -> list[list[str]]:
         return " … ".join(ends)
 
     rows = []
-    for one in found.estimates:
+    for one in result.estimates:
         unit = display(one.unit, one.name)
         error = None if one.standard_error is None else unit.of(one.standard_error)
         bounds = f"{digits(unit.of(one.lower))} … {digits(unit.of(one.upper))}"
@@ -175,17 +175,17 @@ def _chains(drawn: Posterior) -> str:
     return f"The chains of the posterior do not agree yet ({worst}): ask for more draws, and do not use them before."
 
 
-def posterior_rows(found: Identified) -> list[list[str]]:
+def posterior_rows(result: Identified) -> list[list[str]]:
     """Parameter, mean with standard deviation, unit, 95 % interval, R-hat, independent draws."""
-    if found.posterior is None:
+    if result.posterior is None:
         return []
-    units = {one.name: display(one.unit, one.name) for one in found.estimates}
+    units = {one.name: display(one.unit, one.name) for one in result.estimates}
     rows = []
-    for k, name in enumerate(found.posterior.names):
-        draws, unit = found.posterior.flat[:, k], units[name]
+    for k, name in enumerate(result.posterior.names):
+        draws, unit = result.posterior.flat[:, k], units[name]
         low, high = (digits(unit.of(float(end))) for end in np.percentile(draws, [2.5, 97.5]))
         value = with_error(unit.of(float(draws.mean())), unit.of(float(draws.std())))
-        chains = [f"{found.posterior.r_hat[k]:.3f}", f"{found.posterior.effective[k]:.0f}"]
+        chains = [f"{result.posterior.r_hat[k]:.3f}", f"{result.posterior.effective[k]:.0f}"]
         rows.append([name, value, unit.unit, f"{low} … {high}", *chains])
     return rows
 

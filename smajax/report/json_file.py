@@ -76,24 +76,24 @@ def _run(run: RunFinding) -> dict[str, Any]:
     }
 
 
-def _parameter(found: ParameterFinding) -> dict[str, Any]:
+def _parameter(result: ParameterFinding) -> dict[str, Any]:
     return {
-        "value": found.value,
-        "standard_error": found.standard_error,
-        "unit": found.unit,
-        "lower": found.lower,
-        "upper": found.upper,
-        "start": found.start,
-        "remark": found.remark.text,
+        "value": result.value,
+        "standard_error": result.standard_error,
+        "unit": result.unit,
+        "lower": result.lower,
+        "upper": result.upper,
+        "start": result.start,
+        "remark": result.remark.text,
     }
 
 
-def _coefficient(found: CoefficientFinding) -> dict[str, Any]:
+def _coefficient(result: CoefficientFinding) -> dict[str, Any]:
     return {
-        "value": found.value,
-        "standard_error": found.standard_error,
-        "unit": found.unit,
-        "interval_over_runs": found.by_runs,
+        "value": result.value,
+        "standard_error": result.standard_error,
+        "unit": result.unit,
+        "interval_over_runs": result.by_runs,
     }
 
 
@@ -105,7 +105,7 @@ def _effect(effect: EffectFinding, narrative: Narrative) -> dict[str, Any]:
         "formula": effect.formula,
         "sentence": narrative.effects.get(effect.name, ""),
         "added": effect.added,
-        "coefficients": {name: _coefficient(found) for name, found in effect.coefficients.items()},
+        "coefficients": {name: _coefficient(result) for name, result in effect.coefficients.items()},
         "evidence": effect.evidence,
     }
 
@@ -141,8 +141,8 @@ def _unknown(term: UnknownTerm, why: str) -> dict[str, Any]:
     }
 
 
-def _residual(found: ResidualDiagnostics, sentences: Sequence[str]) -> dict[str, Any]:
-    return {**dataclasses.asdict(found), "sentences": sentences}
+def _residual(result: ResidualDiagnostics, sentences: Sequence[str]) -> dict[str, Any]:
+    return {**dataclasses.asdict(result), "sentences": sentences}
 
 
 def _round(entry: Round, why: str) -> dict[str, Any]:
@@ -172,8 +172,8 @@ def findings_to_json(findings: Findings, narrative: Narrative | None = None) -> 
         },
         "integration_error": findings.integration.record(),
         "runs": [_run(run) for run in findings.runs],
-        "before": {"parameters": {found.name: _parameter(found) for found in findings.before}},
-        "after": {"parameters": {found.name: _parameter(found) for found in findings.after}},
+        "before": {"parameters": {result.name: _parameter(result) for result in findings.before}},
+        "after": {"parameters": {result.name: _parameter(result) for result in findings.after}},
         "effects": [_effect(effect, words) for effect in findings.effects],
         "residual_before": _residual(findings.residual_before, words.residual_before),
         "residual_after": _residual(findings.residual_after, words.residual_after),
@@ -198,18 +198,18 @@ def with_current_keys(record: Mapping[str, Any]) -> dict[str, Any]:
             return [renamed(place, one) for one in entry]
         if not isinstance(entry, Mapping):
             return entry
-        found = {}
+        result = {}
         for key, value in entry.items():
             now = RENAMED.get((place, key), key)
             if now != key:
                 old[f"{place}.{key}".removeprefix(".")] = now
-            found[now] = value if place else renamed(now, value)
-        return found
+            result[now] = value if place else renamed(now, value)
+        return result
 
-    found = dict(renamed("", record))
+    result = dict(renamed("", record))
     if old:
         listed = ", ".join(f"{key} ({now} now)" for key, now in old.items())
         warnings.warn(
             f"keys of an older report.json, read until version 0.3: {listed}", DeprecationWarning, stacklevel=2
         )
-    return found
+    return result

@@ -16,7 +16,7 @@ MOVED = ("position", "temperature", "martensite_fraction", "stress")
 PULLED = ("temperature", "stress", "strain", "martensite_fraction")  # of a coupon
 
 
-def plot(found: xr.Dataset, names: Sequence[str] = ()) -> Figure:
+def plot(result: xr.Dataset, names: Sequence[str] = ()) -> Figure:
     """Draw `names` of a data set over time, one panel each, and return the figure of `pyplot`, for `plt.show()`.
 
     found: of `simulate_dataset` or `simulate_loop_dataset`. names: by default what the drive is given, position (with the set
@@ -29,35 +29,35 @@ def plot(found: xr.Dataset, names: Sequence[str] = ()) -> Figure:
     from smajax.core.display_units import axis_label, display
     from smajax.report.drawing import BLUE, GREY, RED, named, styled
 
-    if not hasattr(found, "data_vars"):
+    if not hasattr(result, "data_vars"):
         raise TypeError(
-            f"plot takes a data set, of `simulate_dataset` or `simulate_loop_dataset`, not a {type(found).__name__}, whose arrays are "
+            f"plot takes a data set, of `simulate_dataset` or `simulate_loop_dataset`, not a {type(result).__name__}, whose arrays are "
             "its attributes."
         )
-    chosen = [*names] or main_series(found)
+    chosen = [*names] or main_series(result)
     for name in chosen:
-        if name not in found:
-            raise ValueError(f"no series {name!r}{close_matches(name, map(str, found.data_vars), 'there are')}")
-        if found[name].dims != ("time",):
+        if name not in result:
+            raise ValueError(f"no series {name!r}{close_matches(name, map(str, result.data_vars), 'there are')}")
+        if result[name].dims != ("time",):
             raise ValueError(
-                f"{name!r} has the dimensions {', '.join(map(str, found[name].dims)) or 'none'}, expected time alone: take one "
+                f"{name!r} has the dimensions {', '.join(map(str, result[name].dims)) or 'none'}, expected time alone: take one "
                 "run of a batch, `found.isel(sample=0)`."
             )
     figure, axes = plt.subplots(
         len(chosen), 1, sharex=True, squeeze=False, figsize=(7.0, 1.0 + 1.5 * len(chosen)), layout="constrained"
     )
-    time = found["time"].to_numpy()
+    time = result["time"].to_numpy()
     for one, name in zip(styled(*axes.flat), chosen, strict=True):
-        unit = display(found[name].attrs.get("units", ""), name)
-        one.plot(time, unit.of(found[name].to_numpy()), color=RED if name in INPUTS else BLUE, linewidth=1.3)
-        if name == "position" and "wanted" in found:
-            one.plot(time, unit.of(found["wanted"].to_numpy()), color=GREY, linewidth=1.0, linestyle="--")
+        unit = display(result[name].attrs.get("units", ""), name)
+        one.plot(time, unit.of(result[name].to_numpy()), color=RED if name in INPUTS else BLUE, linewidth=1.3)
+        if name == "position" and "wanted" in result:
+            one.plot(time, unit.of(result["wanted"].to_numpy()), color=GREY, linewidth=1.0, linestyle="--")
         named(one, "", axis_label(name, unit))
     axes[-1, 0].set_xlabel("time (s)", fontsize=9)
     return figure
 
 
-def main_series(found: xr.Dataset) -> list[str]:
+def main_series(result: xr.Dataset) -> list[str]:
     """What a look at a run is about, of the variables that are there."""
-    moves = "position" not in found or found["position"].attrs.get("units") in ("m", "rad")
-    return [name for name in (*INPUTS, *(MOVED if moves else PULLED)) if name in found]
+    moves = "position" not in result or result["position"].attrs.get("units") in ("m", "rad")
+    return [name for name in (*INPUTS, *(MOVED if moves else PULLED)) if name in result]

@@ -28,26 +28,26 @@ LEAST_PRICE = 0.1  # J, V/s, 1/s: what is less is nothing, however it grew
 UNITS = {"°": "deg", "°C": "degC"}  # as a file has them
 
 
-def checked_on(found: TuningResult, name: str) -> str:
+def checked_on(result: TuningResult, name: str) -> str:
     """The plants and set points of a check, in words; a share of the air's temperature in kelvins."""
     if name == "tuned on":
         return name
     if name == "inside":
-        return f"never seen: {found.settings.held_out_sentence()}"
-    air = "" if "ambient" in found.settings.variation else f" (the air by {BEYOND * abs(found.air):.3g} K)"
+        return f"never seen: {result.settings.held_out_sentence()}"
+    air = "" if "ambient" in result.settings.variation else f" (the air by {BEYOND * abs(result.air):.3g} K)"
     return f"never seen: another parameter wrong by {100 * BEYOND:g} %{air}, set points tuned"
 
 
-def gains_of(found: TuningResult) -> dict[str, dict[str, Any]]:
+def gains_of(result: TuningResult) -> dict[str, dict[str, Any]]:
     """Of each gain its value before and after, unit, and box, as the record has them."""
     return {
         name: {
-            "before": found.before[name],
-            "after": found.after.values[name],
-            "unit": found.units[name],
+            "before": result.before[name],
+            "after": result.after.values[name],
+            "unit": result.units[name],
             "box": list(box),
         }
-        for name, box in found.box.items()
+        for name, box in result.box.items()
     }
 
 
@@ -61,43 +61,43 @@ def at_the_edge(gains: Mapping[str, Mapping[str, Any]]) -> list[str]:
     return edge
 
 
-def broken(found: TuningResult, check: Check) -> list[str]:
+def broken(result: TuningResult, check: Check) -> list[str]:
     """Which limits the tuned gains do not meet: by how much, where, in how many loops."""
-    told = []
-    for name, limit in found.settings.limits.items():
+    sentences = []
+    for name, limit in result.settings.limits.items():
         term, values = TERMS[name], check.seen.exact[1, :, list(TERMS).index(name)]
         over = values > limit
         if over.any():
             at = int(np.argmax(values))
-            never = name == "settling_time" and values[at] >= 2.0 * found.settings.seconds
+            never = name == "settling_time" and values[at] >= 2.0 * result.settings.seconds
             worst = "never reached" if never else f"{digits(float(values[at]), 3)} {term.unit}"
-            told.append(
+            sentences.append(
                 f"{term.label} {worst} at {np.degrees(check.scenarios.targets[at]):.3g}° where {limit:g} {term.unit} are "
                 f"asked ({int(over.sum())} of {len(values)} loops)"
             )
-    return told
+    return sentences
 
 
-def met(found: TuningResult, check: Check, where: str) -> str:
+def met(result: TuningResult, check: Check, where: str) -> str:
     """That every limit is met, and where that says little: a loop that stays short of its set point overshoots nothing."""
-    told = f"Every limit is met in all {check.scenarios.size} closed loops {where}"
+    sentence = f"Every limit is met in all {check.scenarios.size} closed loops {where}"
     settled = np.isfinite(np.asarray(check.seen.merits.settling_time)).sum(axis=1)
-    if "settling_time" in found.settings.limits or (settled[1] >= settled[0] and settled[1] > 0):
-        return f"{told}."
+    if "settling_time" in result.settings.limits or (settled[1] >= settled[0] and settled[1] > 0):
+        return f"{sentence}."
     after = (
         "none of them settles"
         if settled[1] == 0
         else f"only {settled[1]} of them {'settles' if settled[1] == 1 else 'settle'}"
     )
     return (
-        f"{told}, but {after} ({settled[0]} with the preset's gains): what never comes to rest at its set point can keep such "
+        f"{sentence}, but {after} ({settled[0]} with the preset's gains): what never comes to rest at its set point can keep such "
         "a limit; limit settling_time as well."
     )
 
 
-def price(found: TuningResult) -> list[str]:
+def price(result: TuningResult) -> list[str]:
     """What the tuned gains cost: energy, chatter or switching whose median or worst, as the table has them, grew by over half."""
-    seen = found.checks["tuned on"].seen
+    seen = result.checks["tuned on"].seen
     figures = [
         (TERMS[name].label, TERMS[name].unit, seen.exact[..., list(TERMS).index(name)])
         for name in ("energy", "chatter")
@@ -113,18 +113,18 @@ def price(found: TuningResult) -> list[str]:
     return [f"The tuned gains have their price, where they were tuned: {'; '.join(grown)}."] if grown else []
 
 
-def in_moves(found: TuningResult) -> list[str]:
+def in_moves(result: TuningResult) -> list[str]:
     """How every loop begins, and what the gains do from one set point to another, which nothing was tuned on."""
     cold = "Each of these loops is one step from the start, cold and at rest"
-    if found.moves is None:
+    if result.moves is None:
         return [f"{cold}: moves from one set point to another were not tried."]
-    moves = found.moves
+    moves = result.moves
     ends = [f"{low:g}° to {high:g}°" for low, high in itertools.pairwise(moves.asked)]
     overshoot, at = float(moves.overshoot[1].max()), ends[int(np.argmax(moves.overshoot[1]))]
     never = int((~np.isfinite(moves.settling_time[1])).sum())
     slowest = float(np.max(moves.settling_time[1], where=np.isfinite(moves.settling_time[1]), initial=0.0))
     settled = f"{never} of {len(ends)} never settle" if never else f"all settle, in {digits(slowest, 3)} s at most"
-    limits = found.settings.limits
+    limits = result.settings.limits
     missed = [
         word
         for word, over in (
@@ -142,45 +142,45 @@ def in_moves(found: TuningResult) -> list[str]:
     ]
 
 
-def conclusions(found: TuningResult) -> list[str]:
+def conclusions(result: TuningResult) -> list[str]:
     """What came out, in sentences that say no more than the numbers."""
-    before, after = found.costs
-    tuned, inside = found.checks["tuned on"], found.checks["inside"]
-    told = [f"The cost is {digits(after, 3)} with the tuned gains and {digits(before, 3)} with the preset's."]
-    if dict(found.before) == dict(found.after.values) or (
-        after >= before and found.excesses["tuned on"][1] >= found.excesses["tuned on"][0]
+    before, after = result.costs
+    tuned, inside = result.checks["tuned on"], result.checks["inside"]
+    sentences = [f"The cost is {digits(after, 3)} with the tuned gains and {digits(before, 3)} with the preset's."]
+    if dict(result.before) == dict(result.after.values) or (
+        after >= before and result.excesses["tuned on"][1] >= result.excesses["tuned on"][0]
     ):
-        told = ["Nothing better than the preset's gains was found."]
-    if found.settings.limits:
-        missed = broken(found, tuned)
-        told.append(f"Not every limit is met: {'; '.join(missed)}." if missed else met(found, tuned, "tuned on"))
-        missed = broken(found, inside)
-        told.append(
-            f"Of what was never seen ({found.settings.held_out_sentence()}): {'; '.join(missed)}."
+        sentences = ["Nothing better than the preset's gains was found."]
+    if result.settings.limits:
+        missed = broken(result, tuned)
+        sentences.append(f"Not every limit is met: {'; '.join(missed)}." if missed else met(result, tuned, "tuned on"))
+        missed = broken(result, inside)
+        sentences.append(
+            f"Of what was never seen ({result.settings.held_out_sentence()}): {'; '.join(missed)}."
             if missed
-            else met(found, inside, f"that were never seen ({found.settings.held_out_sentence()})")
+            else met(result, inside, f"that were never seen ({result.settings.held_out_sentence()})")
         )
-        if "beyond" in found.checks and (missed := broken(found, found.checks["beyond"])):
-            told.append(f"With a parameter wrong that was not varied: {'; '.join(missed)}.")
-    for name, check in found.checks.items():
+        if "beyond" in result.checks and (missed := broken(result, result.checks["beyond"])):
+            sentences.append(f"With a parameter wrong that was not varied: {'; '.join(missed)}.")
+    for name, check in result.checks.items():
         settled = np.isfinite(np.asarray(check.seen.merits.settling_time)).mean(axis=1)
         if settled.min() < 1.0:
-            told.append(
-                f"Loops that settle, {checked_on(found, name)}: {100 * settled[0]:.0f} % before, {100 * settled[1]:.0f} % after."
+            sentences.append(
+                f"Loops that settle, {checked_on(result, name)}: {100 * settled[0]:.0f} % before, {100 * settled[1]:.0f} % after."
             )
-    told += in_moves(found)
-    told += price(found)
-    if edge := at_the_edge(gains_of(found)):
-        told.append(f"At a bound of the box, beyond which better gains may lie: {', '.join(edge)}.")
-    descent, evolution = found.descent, found.evolution
+    sentences += in_moves(result)
+    sentences += price(result)
+    if edge := at_the_edge(gains_of(result)):
+        sentences.append(f"At a bound of the box, beyond which better gains may lie: {', '.join(edge)}.")
+    descent, evolution = result.descent, result.evolution
     if evolution.generations:
         # It begins with where slopes have ended.
-        told.append(
+        sentences.append(
             f"Slopes ended at a cost of {_ended(evolution.costs[0, 0], evolution.excesses[0, 0])}, the search without them at "
-            f"{_ended(found.costs[1], found.excesses['tuned on'][1])}."
+            f"{_ended(result.costs[1], result.excesses['tuned on'][1])}."
         )
-    told.append(
-        f"It took {counted(found.simulations, 'closed loop')} in {counted(descent.round, 'round')} by slopes"
+    sentences.append(
+        f"It took {counted(result.simulations, 'closed loop')} in {counted(descent.round, 'round')} by slopes"
         + (f" and {counted(evolution.generations, 'generation')} without" if evolution.generations else "")
         + (
             f"; {descent.unusable:,} loops had slopes of no use (a limit cycle multiplies every difference)"
@@ -190,7 +190,7 @@ def conclusions(found: TuningResult) -> list[str]:
         + (f"; {descent.non_finite:,} gave numbers that are none" if descent.non_finite else "")
         + "."
     )
-    return told
+    return sentences
 
 
 def _ended(cost: float, excess: float) -> str:
@@ -213,49 +213,49 @@ def gain_rows(gains: Mapping[str, Mapping[str, Any]]) -> list[list[str]]:
     ]
 
 
-def _figures(found: TuningResult, check: Check) -> list[list[str]]:
+def _figures(result: TuningResult, check: Check) -> list[list[str]]:
     """A row a term: median and worst before and after, and the limits where there are some."""
     rows = []
     for column, (name, term) in enumerate(TERMS.items()):
         cells = []
         for which in (0, 1):
             values = check.seen.exact[which, :, column]
-            never = 2.0 * found.settings.seconds if name == "settling_time" else np.inf
+            never = 2.0 * result.settings.seconds if name == "settling_time" else np.inf
             for value in (float(np.median(values)), float(np.max(values))):
                 cells.append("never" if value >= never else digits(0.0 if abs(value) < 1e-6 else value, 3))
-        if found.settings.limits:
-            limit = found.settings.limits.get(name)
+        if result.settings.limits:
+            limit = result.settings.limits.get(name)
             cells.append("" if limit is None else f"{limit:g}")
         rows.append([f"{term.label} ({term.unit})", *cells])
     return rows
 
 
-def page(found: TuningResult, pictures: Mapping[str, bytes], command: str) -> str:
+def page(result: TuningResult, pictures: Mapping[str, bytes], command: str) -> str:
     """The whole page, pictures inside."""
-    say, settings = html.escape, found.settings
+    say, settings = html.escape, result.settings
     head = ["figure", "median before", "worst before", "median after", "worst after"]
     head += ["limit"] if settings.limits else []
     parts = [
         f"<h1>Gains of {say(settings.controller)}, tuned</h1>",
-        bullets(conclusions(found)),
-        f"<p>TuningResult on {say(settings.plants_sentence(found.air))}. {say(settings.goal_sentence())}.</p>",
+        bullets(conclusions(result)),
+        f"<p>TuningResult on {say(settings.plants_sentence(result.air))}. {say(settings.goal_sentence())}.</p>",
         picture(
             pictures["before_after.png"],
             "angles and figures of merit before and after",
             "panels",
-            before_after(found, upright=True),
+            before_after(result, upright=True),
         ),
         "<p class=quiet>Above: thick, the plant as believed; thin, plants never seen. Below: from the least to the largest "
         "over the plants at each set point; squares were tuned on, circles never seen.</p>",
         "<h2>Gains</h2>",
-        table(["gain", "before", "after", "unit", "box", "remark"], gain_rows(gains_of(found)), (1, 2)),
+        table(["gain", "before", "after", "unit", "box", "remark"], gain_rows(gains_of(result)), (1, 2)),
     ]
-    for name, check in found.checks.items():
-        what = checked_on(found, name)
+    for name, check in result.checks.items():
+        what = checked_on(result, name)
         parts += [
             f"<h2>{say(what[0].upper() + what[1:])}</h2><p class=quiet>"
             f"{counted(check.scenarios.size, 'closed loop')} of {settings.seconds:g} s.</p>",
-            table(head, _figures(found, check), range(1, len(head))),
+            table(head, _figures(result, check), range(1, len(head))),
         ]
     parts += [
         "<h2>The search</h2>",
@@ -268,51 +268,51 @@ def page(found: TuningResult, pictures: Mapping[str, bytes], command: str) -> st
     return whole(f"Gains of {settings.controller}", [str(part) for part in parts])
 
 
-def loops(found: TuningResult) -> str:
+def loops(result: TuningResult) -> str:
     """CSV, a row a closed loop: which check, whose gains, plant over what is believed, set point, figures (none: never)."""
     rows = []
-    for name, check in found.checks.items():
+    for name, check in result.checks.items():
         for which, when in enumerate(("before", "after")):
             for plant, figures in zip(check.scenarios.rows.tolist(), check.seen.exact[which], strict=True):
-                told = [_plain(found, term, value) for term, value in zip(TERMS, figures, strict=True)]
-                rows.append([name, when, *plant[:-1], float(np.degrees(plant[-1])), *told])
+                sentences = [_plain(result, term, value) for term, value in zip(TERMS, figures, strict=True)]
+                rows.append([name, when, *plant[:-1], float(np.degrees(plant[-1])), *sentences])
     terms = [heading(name, UNITS.get(term.unit, term.unit)) for name, term in TERMS.items()]
     return csv_text(["check", "gains", *(f"{name} ratio" for name in MISMATCHES), "set point [deg]", *terms], rows)
 
 
-def record(found: TuningResult, command: str) -> dict[str, Any]:
+def record(result: TuningResult, command: str) -> dict[str, Any]:
     """Everything but the lines; a settling time that is never is null."""
-    descent = found.descent
+    descent = result.descent
     return {
-        "controller": found.settings.controller,
-        "conclusions": conclusions(found),
-        "price": price(found),
-        "asked": found.settings.record(),
-        "gains": gains_of(found),
-        "cost": {"before": found.costs[0], "after": found.costs[1]},
-        "limits_met": found.within_limits if found.settings.limits else None,
+        "controller": result.settings.controller,
+        "conclusions": conclusions(result),
+        "price": price(result),
+        "settings": result.settings.record(),
+        "gains": gains_of(result),
+        "cost": {"before": result.costs[0], "after": result.costs[1]},
+        "limits_met": result.within_limits if result.settings.limits else None,
         "checks": {
             name: {
-                "what": checked_on(found, name),
+                "what": checked_on(result, name),
                 "loops": one.scenarios.size,
-                "limit_exceeded_by_share": {"before": found.excesses[name][0], "after": found.excesses[name][1]},
+                "limit_exceeded_by_share": {"before": result.excesses[name][0], "after": result.excesses[name][1]},
                 **{
                     when: {
                         term: {
                             "unit": TERMS[term].unit,
-                            "median": _plain(found, term, np.median(one.seen.exact[which, :, column])),
-                            "worst": _plain(found, term, np.max(one.seen.exact[which, :, column])),
+                            "median": _plain(result, term, np.median(one.seen.exact[which, :, column])),
+                            "worst": _plain(result, term, np.max(one.seen.exact[which, :, column])),
                         }
                         for column, term in enumerate(TERMS)
                     }
                     for which, when in ((0, "before"), (1, "after"))
                 },
             }
-            for name, one in found.checks.items()
+            for name, one in result.checks.items()
         },
-        "moves": _moves(found.moves),
+        "moves": _moves(result.moves),
         "search": {
-            "closed_loops": found.simulations,
+            "closed_loops": result.simulations,
             "rounds": descent.round,
             "slopes_of_no_use": descent.unusable,
             "no_numbers": descent.non_finite,
@@ -320,9 +320,9 @@ def record(found: TuningResult, command: str) -> dict[str, Any]:
                 descent.costs[: descent.round], descent.excesses[: descent.round]
             ),
             "closed_loops_by_round": descent.ran[: descent.round].tolist(),
-            "generations_without_slopes": found.evolution.generations,
-            "closed_loops_by_generation": found.evolution.ran.tolist(),
-            "best_cost_within_limits_by_generation": _best_so_far(found.evolution.costs, found.evolution.excesses),
+            "generations_without_slopes": result.evolution.generations,
+            "closed_loops_by_generation": result.evolution.ran.tolist(),
+            "best_cost_within_limits_by_generation": _best_so_far(result.evolution.costs, result.evolution.excesses),
         },
         "command": command,
         "made_with": made_with(),
@@ -351,6 +351,6 @@ def _best_so_far(costs: np.ndarray, excesses: np.ndarray) -> list[float]:
     return np.minimum.accumulate(np.nanmin(np.where(excesses <= 0.0, costs, np.inf), axis=1)).tolist()
 
 
-def _plain(found: TuningResult, term: str, value: float) -> float | None:
-    never = term == "settling_time" and value >= 2.0 * found.settings.seconds
+def _plain(result: TuningResult, term: str, value: float) -> float | None:
+    never = term == "settling_time" and value >= 2.0 * result.settings.seconds
     return None if never else float(value)

@@ -15,22 +15,22 @@ WIDE = 9.6  # inches
 COLUMNS = list(TERMS)
 
 
-def before_after(found: TuningResult, upright: bool = False) -> bytes:
+def before_after(result: TuningResult, upright: bool = False) -> bytes:
     """Angles over time with the preset's gains and with the tuned ones, and what was asked for over the set point.
 
     upright: one below the other, for a telephone.
     """
-    asked = [name for name in ("settling_time", "overshoot", "steady_error") if name in TERMS]
+    limited = [name for name in ("settling_time", "overshoot", "steady_error") if name in TERMS]
     if upright:
         figure = new_figure(13.0, width=4.6)
-        left, right, *below = figure.subplots(2 + len(asked), 1)
+        left, right, *below = figure.subplots(2 + len(limited), 1)
         right.sharey(left)
     else:
         figure = new_figure(7.4, width=WIDE)
         top, bottom = np.asarray(figure.subfigures(2, 1, height_ratios=[1.15, 1.0]))
         left, right = top.subplots(1, 2, sharey=True)
-        below = list(bottom.subplots(1, len(asked)))
-    lines = found.lines
+        below = list(bottom.subplots(1, len(limited)))
+    lines = result.lines
     alone = len(np.unique(lines.targets))
     for axes, angles, colour, name in (
         (left, lines.angles[0], BEFORE, "before: the preset's gains"),
@@ -56,23 +56,23 @@ def before_after(found: TuningResult, upright: bool = False) -> bytes:
         right.plot([], [], color=MEASURED, linewidth=1.5, label="plant as believed")
         right.plot([], [], color=MEASURED, linewidth=0.5, label="plants never seen")
         right.legend(frameon=False, fontsize=8, loc="lower right")
-    for axes, name in zip(below, asked, strict=True):
-        _over_set_points(axes, found, name)
+    for axes, name in zip(below, limited, strict=True):
+        _over_set_points(axes, result, name)
     return as_png(figure)
 
 
-def _over_set_points(axes: Axes, found: TuningResult, name: str) -> None:
+def _over_set_points(axes: Axes, result: TuningResult, name: str) -> None:
     """A figure of merit, from its least to its largest over the plants at each set point; never settled at the top."""
     term, column = TERMS[name], COLUMNS.index(name)
-    never = 2.0 * found.settings.seconds if name == "settling_time" else np.inf
+    never = 2.0 * result.settings.seconds if name == "settling_time" else np.inf
     shown = [("tuned on", "s"), ("inside", "o")]
-    for which, (colour, told, shift) in enumerate(((BEFORE, "before", -0.7), (AFTER, "after", 0.7))):
+    for which, (colour, label, shift) in enumerate(((BEFORE, "before", -0.7), (AFTER, "after", 0.7))):
         for check, marker in shown:
-            one = found.checks[check]
+            one = result.checks[check]
             for target in np.unique(one.scenarios.targets):
                 values = one.seen.exact[which, one.scenarios.targets == target, column]
                 at = np.degrees(target) + shift
-                ends = np.where(values >= never, 1.08 * found.settings.seconds, values)
+                ends = np.where(values >= never, 1.08 * result.settings.seconds, values)
                 axes.plot([at, at], [ends.min(), ends.max()], color=colour, linewidth=1.4)
                 lost = bool((values >= never).any())
                 filled = colour if check == "tuned on" else "white"
@@ -84,14 +84,14 @@ def _over_set_points(axes: Axes, found: TuningResult, name: str) -> None:
                     markersize=5 if lost else 3.5,
                     markerfacecolor=filled,
                 )
-        axes.plot([], [], "s-", color=colour, markersize=3.5, label=told)
-    if any((found.checks[check].seen.exact[..., column] >= never).any() for check, _ in shown):
-        at_top = 1.08 * found.settings.seconds
+        axes.plot([], [], "s-", color=colour, markersize=3.5, label=label)
+    if any((result.checks[check].seen.exact[..., column] >= never).any() for check, _ in shown):
+        at_top = 1.08 * result.settings.seconds
         axes.annotate("never", (0.01, at_top), xycoords=("axes fraction", "data"), fontsize=8, va="bottom")
-    if name in found.settings.limits:
-        axes.axhline(found.settings.limits[name], color=MEASURED, linewidth=0.9, linestyle=":", label="limit")
+    if name in result.settings.limits:
+        axes.axhline(result.settings.limits[name], color=MEASURED, linewidth=0.9, linestyle=":", label="limit")
     # Room above for the legend.
-    axes.set_ylim(0.0, 1.35 * max(axes.dataLim.y1, found.settings.limits.get(name, 0.0), 1e-3))
+    axes.set_ylim(0.0, 1.35 * max(axes.dataLim.y1, result.settings.limits.get(name, 0.0), 1e-3))
     axes.plot([], [], "o", color=QUIET, markerfacecolor="white", markersize=3.5, label="never seen")
     axes.set_xlabel("set point (°)", fontsize=9)
     axes.set_title(f"{term.label} ({term.unit})", fontsize=9.5, loc="left")
@@ -99,9 +99,9 @@ def _over_set_points(axes: Axes, found: TuningResult, name: str) -> None:
     tidy(axes)
 
 
-def costs_over_loops(found: TuningResult) -> bytes:
+def costs_over_loops(result: TuningResult) -> bytes:
     """What each round of each start and the best of each generation cost, over the closed loops run so far; the best as a line."""
-    descent, evolution = found.descent, found.evolution
+    descent, evolution = result.descent, result.evolution
     figure = new_figure(3.2)
     axes = figure.subplots()
     costs, excesses = descent.costs[: descent.round], descent.excesses[: descent.round]
@@ -111,7 +111,7 @@ def costs_over_loops(found: TuningResult) -> bytes:
         first = np.argmin(rank(evolution.costs, evolution.excesses), axis=1)[:, None]
         cost, excess = (np.take_along_axis(one, first, axis=1) for one in (evolution.costs, evolution.excesses))
         seen.append(("d", evolution.ran[:, None], cost, excess, "a generation's best"))
-    limits = bool(found.settings.limits)
+    limits = bool(result.settings.limits)
     for marker, at, cost, excess, label in seen:
         within = excess <= 0.0
         for mask, filled, told in (
@@ -127,7 +127,7 @@ def costs_over_loops(found: TuningResult) -> bytes:
     if np.isfinite(best).any():
         known = np.isfinite(best)
         axes.step(ran[order][known], best[known], where="post", color=MEASURED, label="best so far")
-    axes.axhline(found.costs[0], color=BEFORE, linewidth=0.9, linestyle="--", label="the preset's gains")
+    axes.axhline(result.costs[0], color=BEFORE, linewidth=0.9, linestyle="--", label="the preset's gains")
     every = np.concatenate([cost.ravel() for _, _, cost, *_ in seen])
     finite = every[np.isfinite(every) & (every > 0.0)]
     if finite.size and finite.max() > 5.0 * finite.min():

@@ -99,13 +99,13 @@ def check_scalars(system: System, dt: Scalar | float, initial: State | None = No
 
 
 def _parameter_leaves(system: System) -> dict[str, Any]:
-    found = {}
+    result = {}
     for name, entry in parameters(system).items():
         leaf: Any = system
         for key in entry.path:
             leaf = leaf[key] if isinstance(key, int) else getattr(leaf, key)
-        found[name] = leaf
-    return found
+        result[name] = leaf
+    return result
 
 
 def first_state(system: System, series: Mapping[str, Series], initial: State | None) -> State:

@@ -189,10 +189,10 @@ def solve(system: System, stage: Stage, inputs: Inputs) -> Solution:
             start = xi + (drive[0] - drive[1]) / jnp.where(drive[2] > 0.0, drive[2], jnp.inf)
         inside = jnp.where(start > high, high, jnp.where(start < low, low, start))
         if number is None:
-            found = bracketed(miss, inside, low, high, CLOSE)
+            result = bracketed(miss, inside, low, high, CLOSE)
         else:
-            found = _nearly(miss, inside, low, high, INNER[number])
-        moved = found - z.fraction
+            result = _nearly(miss, inside, low, high, INNER[number])
+        moved = result - z.fraction
         step = [base[k] + slope[k] * moved for k in range(3)] + [moved]
         if number is None:
             # A stiff-soft-stiff wire (detwinning) can send Newton to and fro between its two stiff ends.

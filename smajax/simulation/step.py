@@ -107,11 +107,11 @@ def _differentiable(given: tuple[System, Stage, Inputs]) -> Solution:
     """
     system, stage, inputs = given
     wire, terms, old = system.wire, system.terms.kinetics, stage.old.wire
-    found = solved(solve(_held(system), _held(stage), _held(dict(inputs))))
+    result = solved(solve(_held(system), _held(stage), _held(dict(inputs))))
 
     def all_four(z: Unknowns) -> Unknowns:
         residuals = equations(system, stage, inputs, z)
-        on_curve = curve_on(wire.kinetics, terms, old, found.branch, z.temperature, z.stress)
+        on_curve = curve_on(wire.kinetics, terms, old, result.branch, z.temperature, z.stress)
         return Unknowns(residuals.heat, residuals.motion, residuals.stress, z.fraction - on_curve)
 
     def linear(g: Callable[[Unknowns], Unknowns], right: Unknowns) -> Unknowns:
@@ -127,8 +127,8 @@ def _differentiable(given: tuple[System, Stage, Inputs]) -> Solution:
     def as_found(f: Callable[[Unknowns], Unknowns], rough: Unknowns) -> Unknowns:
         return rough
 
-    z = lax.custom_root(all_four, found.z, as_found if stage.once else corrected, linear)
-    return Solution(z, found.branch, found.free)
+    z = lax.custom_root(all_four, result.z, as_found if stage.once else corrected, linear)
+    return Solution(z, result.branch, result.free)
 
 
 def _ended(system: System, stage: Stage, inputs: Inputs) -> tuple[WireState, Scalar, Scalar]:

@@ -60,7 +60,7 @@ def build(folder: Path, flags: tuple[str, ...] = ()) -> Path | None:
 def run(
     program: Path,
     system: System,
-    members: np.ndarray,
+    runs: np.ndarray,
     dt: float,
     steps: int,
     threads: int = 1,
@@ -69,7 +69,7 @@ def run(
     every: int = 1,
     recorded: int = 0,
 ) -> Result:
-    """Simulate `members`, rows of (voltage in V, payload mass in kg), over `steps` of `dt` s.
+    """Simulate `runs`, rows of (voltage in V, payload mass in kg), over `steps` of `dt` s.
 
     `system` is `smajax.model.rigs.arm()` with any parameters; `precision` is "double" or "float". Of the first
     `recorded` members every `every`-th sample comes back, the first one included.
@@ -82,7 +82,7 @@ def run(
         folder = Path(place)
         lines = [f"{name} {float(value)!r}" for name, value in zip(names, values, strict=True)]
         (folder / "parameters").write_text("\n".join(lines) + "\n")
-        np.ascontiguousarray(members, dtype=np.float64).tofile(folder / "members")
+        np.ascontiguousarray(runs, dtype=np.float64).tofile(folder / "members")
         options = {
             "dt": repr(dt),
             "steps": steps,
@@ -100,7 +100,7 @@ def run(
             raise RuntimeError(f"{program.name} failed: {done.stderr}")
         said = json.loads(done.stdout)
         ends = np.fromfile(folder / "result").reshape(-1, 4)
-        record = np.fromfile(folder / "record").reshape(steps // every + 1, min(recorded, len(members)), 2)
+        record = np.fromfile(folder / "record").reshape(steps // every + 1, min(recorded, len(runs)), 2)
     angle, largest, smallest, temperature = ends.T
     return Result(
         seconds=said["seconds"],

@@ -101,14 +101,14 @@ def _over_blocks(solve: Solve, block: int, cores: int) -> Any:
     return jax.jit(jax.shard_map(part, mesh=mesh, in_specs=(same, over, over), out_specs=over, check_vma=False))
 
 
-def _timed(given: Given, found: dict[str, Any], block: int, cores: int, count: int, kept: bool) -> dict[str, Any]:
+def _timed(given: Given, result: dict[str, Any], block: int, cores: int, count: int, kept: bool) -> dict[str, Any]:
     """Milliseconds of wall clock a trajectory, best of some repeats; the compilation in seconds."""
-    solve = _one(given, found["solver"], found["adaptive"], kept)
+    solve = _one(given, result["solver"], result["adaptive"], kept)
     whole = block * cores
     count = max(1, count // whole) * whole
-    members = np.resize(given.voltage, count), np.resize(given.payload_mass, count)
-    asked = (found["setting"], *members)
-    measured = timed(_over_blocks(solve, block, cores), REPEATS, *asked)
+    varied = np.resize(given.voltage, count), np.resize(given.payload_mass, count)
+    parser = (result["setting"], *varied)
+    measured = timed(_over_blocks(solve, block, cores), REPEATS, *parser)
     each = 1e3 * measured.seconds / count
     return {
         "block": block,
@@ -123,11 +123,11 @@ def _tried(given: Given, solver: str, adaptive: bool, cores: int) -> dict[str, A
     """One solver: its loosest accurate setting and the time at it, or why there is none."""
     named = {"solver": solver, "adaptive": adaptive}
     try:
-        found = {**named, **_accurate(given, solver, adaptive)}
-        if "setting" not in found:
-            return found
+        result = {**named, **_accurate(given, solver, adaptive)}
+        if "setting" not in result:
+            return result
         # The fastest are found with one block per core; those are timed in full.
-        return {**found, **_timed(given, found, FIRST_BLOCK, cores, 0, kept=False)}
+        return {**result, **_timed(given, result, FIRST_BLOCK, cores, 0, kept=False)}
     except Exception as error:  # one that a version cannot compile is no reason to lose the others
         return {**named, "reason": f"{type(error).__name__}: {error}".splitlines()[0]}
 
@@ -152,11 +152,11 @@ def run(given: Given, cores: int, count: int) -> dict[str, Any]:
 
 
 def main() -> None:
-    asked = argparse.ArgumentParser(description=__doc__)
-    asked.add_argument("file", type=Path)
-    asked.add_argument("--cores", type=int, default=os.cpu_count() or 1)
-    asked.add_argument("--count", type=int, default=4096, help="members that are timed")
-    options = asked.parse_args()
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("file", type=Path)
+    parser.add_argument("--cores", type=int, default=os.cpu_count() or 1)
+    parser.add_argument("--count", type=int, default=4096, help="members that are timed")
+    options = parser.parse_args()
     # Before jax is imported: a device a core.
     flags = os.environ.get("XLA_FLAGS", "")
     os.environ["XLA_FLAGS"] = f"{flags} --xla_force_host_platform_device_count={options.cores}".strip()

@@ -60,5 +60,5 @@ def save(file: Path, given: Given) -> None:
 
 def load(file: Path) -> Given:
     """Read a problem."""
-    with np.load(file) as kept:
-        return Given(str(kept["said"]), *(kept[name] for name in Given.__annotations__ if name != "said"))
+    with np.load(file) as archive:
+        return Given(str(archive["said"]), *(archive[name] for name in Given.__annotations__ if name != "said"))

@@ -61,48 +61,48 @@ def _by_machine_code(
     system: System, names: tuple[str, ...], steps: int, volts: np.ndarray, repeats: int
 ) -> dict[str, Any]:
     """Time and memory of the cost, and of it with its slopes; `slopes` (members, names) too."""
-    told: dict[str, Any] = {}
+    record: dict[str, Any] = {}
     for name, by in (("cost", ()), ("gradient", names)):
         recipe = _recipe(system, steps, by)
         begin = time.perf_counter()
         run = program(single_run, recipe, ("voltage",), engine="native")
-        told[f"{name}_compile_s"] = time.perf_counter() - begin
+        record[f"{name}_compile_s"] = time.perf_counter() - begin
         assert run.native is not None  # or there would have been an error
         times = []
         for _ in range(repeats):
             begin = time.perf_counter()
             results = run(recipe, {"voltage": volts}, 1)
             times.append(time.perf_counter() - begin)
-        told |= {f"{name}_s": min(times), f"{name}_memory_MB": run.native.scratch / 1e6}
-    told["slopes"] = np.stack([results[slope_name("mean_square_position", name)] for name in names], axis=1)
-    return told | {"gradient_over_cost": told["gradient_s"] / told["cost_s"]}
+        record |= {f"{name}_s": min(times), f"{name}_memory_MB": run.native.scratch / 1e6}
+    record["slopes"] = np.stack([results[slope_name("mean_square_position", name)] for name in names], axis=1)
+    return record | {"gradient_over_cost": record["gradient_s"] / record["cost_s"]}
 
 
 def _by_xla(
     system: System, names: tuple[str, ...], steps: int, volts: np.ndarray, repeats: int, forward: bool
 ) -> dict[str, float]:
-    told: dict[str, float] = {}
+    record: dict[str, float] = {}
     for name, by in (("cost", ()), ("gradient", names)):
         recipe = _recipe(system, steps, by)
         run = jax.jit(jax.vmap(lambda own, recipe=recipe: single_run(recipe, {"voltage": own})))
-        told |= timed(run, repeats, jnp.asarray(volts)).named(name)
-    told["gradient_over_cost"] = told["gradient_s"] / told["cost_s"]
+        record |= timed(run, repeats, jnp.asarray(volts)).named(name)
+    record["gradient_over_cost"] = record["gradient_s"] / record["cost_s"]
     if forward:
         jacobian = jax.jit(jax.vmap(jax.jacfwd(cost_of(system, names, steps)), (None, 0)))
-        told |= timed(jacobian, repeats, get_parameters(system, names), jnp.asarray(volts)).named("jacobian")
-        told["jacobian_over_cost"] = told["jacobian_s"] / told["cost_s"]
-    return told
+        record |= timed(jacobian, repeats, get_parameters(system, names), jnp.asarray(volts)).named("jacobian")
+        record["jacobian_over_cost"] = record["jacobian_s"] / record["cost_s"]
+    return record
 
 
-def run(steps: int, members: int, forward: bool) -> dict[str, Any]:
-    """Cost, gradient and, when asked for, Jacobian over `steps` of `members` arms of different voltages."""
-    system, volts = arm(), np.linspace(*tracking.VOLTAGES, members)
+def run(steps: int, runs: int, forward: bool) -> dict[str, Any]:
+    """Cost, gradient and, when asked for, Jacobian over `steps` of `runs` arms of different voltages."""
+    system, volts = arm(), np.linspace(*tracking.VOLTAGES, runs)
     names = tuple(parameters(system))
     repeats = REPEATS if steps <= LONGEST_REPEATED else 1
     own = _by_machine_code(system, names, steps, volts, repeats)
     del own["slopes"]
     xla = _by_xla(system, names, steps, volts, repeats, forward)
-    return {"peer": "gradient", "steps": steps, "members": members, "parameters": len(names), **own, "xla": xla}
+    return {"peer": "gradient", "steps": steps, "members": runs, "parameters": len(names), **own, "xla": xla}
 
 
 def tracked_arm(given: tracking.Tracking) -> System:
@@ -115,18 +115,18 @@ def run_tracking(given: tracking.Tracking, forward: bool) -> dict[str, Any]:
     system, steps = tracked_arm(given), round(tracking.SECONDS / DEFAULT_STEP)
     own = _by_machine_code(system, given.names, steps, given.voltage, tracking.REPEATS)
     slopes = own.pop("slopes")[np.searchsorted(given.voltage, given.solved)]
-    told: dict[str, Any] = {"peer": "smajax", "members": len(given.voltage), "parameters": len(given.names)}
-    told |= {"setting": DEFAULT_STEP, "gradient_error": given.error(slopes), **own}
-    return told | {"xla": _by_xla(system, given.names, steps, given.voltage, tracking.REPEATS, forward)}
+    record: dict[str, Any] = {"peer": "smajax", "members": len(given.voltage), "parameters": len(given.names)}
+    record |= {"setting": DEFAULT_STEP, "gradient_error": given.error(slopes), **own}
+    return record | {"xla": _by_xla(system, given.names, steps, given.voltage, tracking.REPEATS, forward)}
 
 
 def main() -> None:
-    asked = argparse.ArgumentParser(description=__doc__)
-    asked.add_argument("--steps", type=int, default=2000)
-    asked.add_argument("--members", type=int, default=512)
-    asked.add_argument("--forward", action="store_true", help="the forward-mode Jacobian too")
-    asked.add_argument("--tracking", type=Path, metavar="FILE", help="the peers' problem (`tracking.py`)")
-    options = asked.parse_args()
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--steps", type=int, default=2000)
+    parser.add_argument("--members", type=int, default=512)
+    parser.add_argument("--forward", action="store_true", help="the forward-mode Jacobian too")
+    parser.add_argument("--tracking", type=Path, metavar="FILE", help="the peers' problem (`tracking.py`)")
+    options = parser.parse_args()
     tracking.on_one_core()
     prepare(cores=True)
     jax.config.update("jax_enable_compilation_cache", False)

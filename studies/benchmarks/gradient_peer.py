@@ -91,13 +91,13 @@ def _by_diffrax(given: Tracking, solver: str, adjoint: str) -> dict[str, Any]:
                 break
         else:
             return {**named, "reason": _not_accurate(min(off))}
-        found: dict[str, Any] = {**named, "setting": tolerance, "gradient_error": off[-1]}
+        result: dict[str, Any] = {**named, "setting": tolerance, "gradient_error": off[-1]}
         at = given.vector, given.voltage, tolerance
-        found |= timed(jax.jit(cost), REPEATS, *at).named("cost")
-        found |= timed(jax.jit(slopes), REPEATS, *at).named("gradient")
+        result |= timed(jax.jit(cost), REPEATS, *at).named("cost")
+        result |= timed(jax.jit(slopes), REPEATS, *at).named("gradient")
     except Exception as error:  # one that does not work is no reason to lose the others
         return {**named, "reason": _first_line(error)}
-    return {**found, "gradient_over_cost": found["gradient_s"] / found["cost_s"]}
+    return {**result, "gradient_over_cost": result["gradient_s"] / result["cost_s"]}
 
 
 def by_diffrax(given: Tracking) -> dict[str, Any]:
@@ -162,17 +162,17 @@ def _by_gradsolve(given: Tracking, engine: str) -> dict[str, Any]:
                 break
         else:
             return {**named, "reason": _not_accurate(min(off))}
-        found: dict[str, Any] = {**named, "setting": tolerance, "gradient_error": off[-1]}
+        result: dict[str, Any] = {**named, "setting": tolerance, "gradient_error": off[-1]}
         recording = []
         for _ in range(REPEATS):
             begin = time.perf_counter()
             run, p = replayed(given.voltage, tolerance)
             recording.append(time.perf_counter() - begin)
-        found |= timed(jax.jit(run), REPEATS, p).named("cost")
-        found |= timed(jax.jit(slopes(run)), REPEATS, p).named("gradient")
+        result |= timed(jax.jit(run), REPEATS, p).named("cost")
+        result |= timed(jax.jit(slopes(run)), REPEATS, p).named("gradient")
     except Exception as error:
         return {**named, "reason": _first_line(error)}
-    return {**found, "record_s": min(recording), "gradient_over_cost": found["gradient_s"] / found["cost_s"]}
+    return {**result, "record_s": min(recording), "gradient_over_cost": result["gradient_s"] / result["cost_s"]}
 
 
 def by_gradsolve(given: Tracking) -> dict[str, Any]:
@@ -185,10 +185,10 @@ PEERS = {"diffrax": by_diffrax, "gradsolve": by_gradsolve}
 
 
 def main() -> None:
-    asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    asked.add_argument("peer", choices=PEERS)
-    asked.add_argument("file", type=Path)
-    options = asked.parse_args()
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("peer", choices=PEERS)
+    parser.add_argument("file", type=Path)
+    options = parser.parse_args()
     tracking.on_one_core()
     # XLA is asked for the same as by `gradient.py`: float64, the widest vectors, and no program from before.
     prepare(cores=True)
@@ -197,8 +197,8 @@ def main() -> None:
     jax.config.update("jax_enable_compilation_cache", False)
     jax.config.update("jax_platforms", "cpu")
     given = load(options.file)
-    told = PEERS[options.peer](given)
-    print(json.dumps({"peer": options.peer, "members": len(given.voltage), "parameters": len(given.names), **told}))
+    record = PEERS[options.peer](given)
+    print(json.dumps({"peer": options.peer, "members": len(given.voltage), "parameters": len(given.names), **record}))
 
 
 if __name__ == "__main__":

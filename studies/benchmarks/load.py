@@ -111,12 +111,12 @@ def _written(place: Path, runs: int, samples: int) -> None:
     coupon = set_parameters(build("flexinol_isobaric", "coupon", "none"), TRUTH)
     random = np.random.default_rng(1)
     only = ", ".join(f'"{name}"' for name in CANDIDATES)
-    told = [COUPON.format(noise=NOISE, only=only)]
+    lines = [COUPON.format(noise=NOISE, only=only)]
     if samples > MOST_SAMPLES:  # a step of several samples
         step = -(-samples // MOST_SAMPLES)
-        told.append(f'[time]\ncolumn = "t"\nunit = "s"\n[sampling]\nstep = "{step} s"')
+        lines.append(f'[time]\ncolumn = "t"\nunit = "s"\n[sampling]\nstep = "{step} s"')
     else:
-        told.append('[time]\nkind = "sample"')
+        lines.append('[time]\nkind = "sample"')
     for number in range(runs):
         stress = float(np.interp(number / max(runs - 1, 1), (0.0, 1.0), STRESSES))
         # A cycle ends where it began, but for a strain that the law keeps of each: a longer run is the same again on top of it.
@@ -133,8 +133,8 @@ def _written(place: Path, runs: int, samples: int) -> None:
                 for part in np.array_split(np.column_stack((clock, temperature, shown)), -(-each // BLOCK)):
                     log.write("\n".join(f"{t:.0f},{a:.4f},{b:.6f}" for t, a, b in part) + "\n")
         role = "held-out" if number % 10 == 9 else "fit"
-        told.append(RUN.format(name=name, role=role, stress=stress))
-    (place / "experiment.toml").write_text("\n".join(told), encoding="utf-8")
+        lines.append(RUN.format(name=name, role=role, stress=stress))
+    (place / "experiment.toml").write_text("\n".join(lines), encoding="utf-8")
 
 
 def _samples(count: int, place: Path) -> Work:
@@ -145,8 +145,8 @@ def _samples(count: int, place: Path) -> Work:
     file = _experiment(place, 1, count)
 
     def work() -> Told:
-        found = {one.name: one.value for one in identify(load_experiment(file, CATALOGUE), starts=0).estimates}
-        return {"samples": count, "off": abs(found["austenite_finish"] - TRUTH["austenite_finish"])}
+        result = {one.name: one.value for one in identify(load_experiment(file, CATALOGUE), starts=0).estimates}
+        return {"samples": count, "off": abs(result["austenite_finish"] - TRUTH["austenite_finish"])}
 
     return work
 
@@ -170,12 +170,12 @@ def _day(hours: int, place: Path) -> Work:
     steps = round(3600.0 * hours / DAY_STEP)
     # A step of the supply every minute, as a series of the whole day.
     voltage = np.where((np.arange(steps + 1) // round(60.0 / DAY_STEP)) % 2 == 0, 8.0, 2.0)
-    inputs, members, out = {"voltage": jnp.asarray(voltage)}, grid(payload_mass=[0.1]), place / "day"
+    inputs, axes, out = {"voltage": jnp.asarray(voltage)}, grid(payload_mass=[0.1]), place / "day"
 
     def work() -> Told:
-        found = run_batch(arm(), inputs, members, dt=DAY_STEP, every=DAY_KEPT, out=out)
-        kept = int(np.isfinite(np.asarray(found["position"])).sum())
-        return {"hours": hours, "steps": steps, "kept_samples": kept}
+        result = run_batch(arm(), inputs, axes, dt=DAY_STEP, every=DAY_KEPT, out=out)
+        finite = int(np.isfinite(np.asarray(result["position"])).sum())
+        return {"hours": hours, "steps": steps, "kept_samples": finite}
 
     return work
 
@@ -189,18 +189,18 @@ WHAT: dict[str, Callable[[int, Path], Work]] = {
 
 
 def main() -> None:
-    asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    asked.add_argument("what", choices=WHAT)
-    asked.add_argument("--count", type=int, required=True)
-    options = asked.parse_args()
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("what", choices=WHAT)
+    parser.add_argument("--count", type=int, required=True)
+    options = parser.parse_args()
     prepare()
     with tempfile.TemporaryDirectory() as place:
         work = WHAT[options.what](options.count, Path(place))
         before, begin = peak_memory(), time.perf_counter()
-        found = work()
+        result = work()
         took, grown = time.perf_counter() - begin, peak_memory() - before
-    told = {"peer": "load", "what": options.what, "count": options.count, **found, "s": took, "grown_MB": grown / 1e6}
-    print(json.dumps({**told, "peak_memory_MB": peak_memory() / 1e6}))
+    lines = {"peer": "load", "what": options.what, "count": options.count, **result, "s": took, "grown_MB": grown / 1e6}
+    print(json.dumps({**lines, "peak_memory_MB": peak_memory() / 1e6}))
 
 
 if __name__ == "__main__":

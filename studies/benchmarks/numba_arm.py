@@ -158,7 +158,7 @@ def members_of(p: Constants, dt: float, voltage: np.ndarray, payload_mass: np.nd
 def build(real: Any, lanes: int, tools: Tools = PLAIN) -> Callable[..., Any]:
     """`simulate(rig, members, steps, every, record, result)` in the precision `real` (numpy's), `lanes` members to a block.
 
-    `rig` by `rig_of`, `members` by `members_of` in the same precision, their number a multiple of `lanes`. `result` of shape
+    `rig` by `rig_of`, `runs` by `members_of` in the same precision, their number a multiple of `lanes`. `result` of shape
     (members, COLUMNS) is filled; `record` of shape (samples, members recorded, 2) with angle in rad and fraction at every
     `every`-th sample, the first one included. Returns the iterations of all stages of all blocks.
     """
@@ -243,11 +243,11 @@ def build(real: Any, lanes: int, tools: Tools = PLAIN) -> Callable[..., Any]:
         warmer = zero if first else b[Z_TEMPERATURE + i] - b[TEMPERATURE + i]
         modulus = r.modulus + r.modulus_more * (xi if first else fraction + half * grown)
         elastic = -r.contraction * (x - r.start) - b[STRAIN + i] - r.recoverable * grown
-        asked = modulus * elastic + b[STRESS + i] + r.thermal * warmer
-        taut = one if asked > zero else zero
+        trial = modulus * elastic + b[STRESS + i] + r.thermal * warmer
+        taut = one if trial > zero else zero
         by_temperature, stiffness = taut * r.thermal, taut * (modulus * r.contraction)
         by_fraction = taut * (half * r.modulus_more * elastic - modulus * r.recoverable)
-        excess = taut * asked - sigma
+        excess = taut * trial - sigma
 
         ohms = r.ohms + r.ohms_more * xi
         determinant = by_angle_held + pull_held * stiffness
@@ -312,9 +312,9 @@ def build(real: Any, lanes: int, tools: Tools = PLAIN) -> Callable[..., Any]:
         z = within(b[DISTANCE + i] + slope * gone, zero, one)
         root = quarter_cosine(z)
         share = root * root
-        kept = share if share > finished_at else zero
+        remaining = share if share > finished_at else zero
         by_gone = one + two * amplitude * slope * root * z * quarter_cosine_slope(z * z)
-        return gone - b[PHASE + i] + amplitude * kept, by_gone
+        return gone - b[PHASE + i] + amplitude * remaining, by_gone
 
     @inlined
     def newton(b: Any, i: int) -> None:
@@ -550,11 +550,11 @@ def build(real: Any, lanes: int, tools: Tools = PLAIN) -> Callable[..., Any]:
         return iterations
 
     @compiled
-    def start(b: Any, r: Rig, members: Any, at: int) -> None:
+    def start(b: Any, r: Rig, runs: Any, at: int) -> None:
         for i in range(lanes):
             for own in range(5):
-                b[own * lanes + i] = members[own, at + i]
-            stress, xi, temperature = members[5, at + i], r.initial_fraction, r.initial_temperature
+                b[own * lanes + i] = runs[own, at + i]
+            stress, xi, temperature = runs[5, at + i], r.initial_fraction, r.initial_temperature
             b[TEMPERATURE + i], b[ANGLE + i], b[VELOCITY + i] = temperature, r.start, zero
             b[STRESS + i], b[STRAIN + i], b[FRACTION + i] = stress, zero, xi
             b[Z_TEMPERATURE + i], b[Z_ANGLE + i], b[Z_STRESS + i], b[Z_FRACTION + i] = temperature, r.start, stress, xi
@@ -574,9 +574,9 @@ def build(real: Any, lanes: int, tools: Tools = PLAIN) -> Callable[..., Any]:
             record[sample, at + i, 0], record[sample, at + i, 1] = b[ANGLE + i], b[FRACTION + i]
 
     @compiled
-    def block(r: Rig, members: Any, at: int, steps: int, every: int, record: Any, result: Any) -> int:
-        b = np.zeros(FIELDS * lanes, members.dtype)
-        start(b, r, members, at)
+    def block(r: Rig, runs: Any, at: int, steps: int, every: int, record: Any, result: Any) -> int:
+        b = np.zeros(FIELDS * lanes, runs.dtype)
+        start(b, r, runs, at)
         write(b, at, 0, record)
         iterations = 0
         for step in range(1, steps + 1):
@@ -590,10 +590,10 @@ def build(real: Any, lanes: int, tools: Tools = PLAIN) -> Callable[..., Any]:
         return iterations
 
     @parallel
-    def simulate(r: Rig, members: Any, steps: int, every: int, record: Any, result: Any) -> int:
+    def simulate(r: Rig, runs: Any, steps: int, every: int, record: Any, result: Any) -> int:
         iterations = 0
-        for k in over(members.shape[1] // lanes):
-            iterations += block(r, members, k * lanes, steps, every, record, result)
+        for k in over(runs.shape[1] // lanes):
+            iterations += block(r, runs, k * lanes, steps, every, record, result)
         return iterations
 
     return simulate

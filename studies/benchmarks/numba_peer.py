@@ -30,9 +30,9 @@ def tools() -> Tools:
     """numba's decorators; without checks of a division, which would make a jump of each."""
     import numba
 
-    told = {"fastmath": True, "error_model": "numpy"}
+    record = {"fastmath": True, "error_model": "numpy"}
     return Tools(
-        numba.njit(forceinline=True, **told), numba.njit(**told), numba.njit(parallel=True, **told), numba.prange
+        numba.njit(forceinline=True, **record), numba.njit(**record), numba.njit(parallel=True, **record), numba.prange
     )
 
 
@@ -97,7 +97,7 @@ def run(given: Given, count: int, dt: float) -> dict[str, Any]:
     """Both precisions, each at its fastest number of lanes."""
     import numba
 
-    told: dict[str, Any] = {
+    record: dict[str, Any] = {
         "peer": "numba",
         "versions": {name: version(name) for name in ("numba", "llvmlite", "numpy")},
         "dt": dt,
@@ -107,19 +107,19 @@ def run(given: Given, count: int, dt: float) -> dict[str, Any]:
         # The fastest number is found on a part of the runs; that one is timed in full.
         tried = [_timed(given, real, lanes, max(count // 8, lanes), dt) for lanes in LANES]
         best = min(tried, key=lambda one: float(one["ms_per_trajectory"]))
-        told[name] = _timed(given, real, best["lanes"], count, dt)
+        record[name] = _timed(given, real, best["lanes"], count, dt)
         # kB on Linux: of the whole process, the interpreter and the compiler with it.
-        told[name] |= {"tried": tried, "peak_memory_MB": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3}
-    return told
+        record[name] |= {"tried": tried, "peak_memory_MB": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3}
+    return record
 
 
 def main() -> None:
-    asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    asked.add_argument("file", type=Path)
-    asked.add_argument("--count", type=int, default=65536, help="members that are timed")
-    asked.add_argument("--dt", type=float, default=0.005, help="s")
-    asked.add_argument("--cores", type=int, default=os.cpu_count() or 1)
-    options = asked.parse_args()
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("file", type=Path)
+    parser.add_argument("--count", type=int, default=65536, help="members that are timed")
+    parser.add_argument("--dt", type=float, default=0.005, help="s")
+    parser.add_argument("--cores", type=int, default=os.cpu_count() or 1)
+    options = parser.parse_args()
     # Before numba is imported.
     os.environ["NUMBA_NUM_THREADS"] = str(options.cores)
     print(json.dumps(run(load(options.file), options.count, options.dt)))

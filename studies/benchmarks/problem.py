@@ -118,14 +118,14 @@ def given(solved: int, count: int, folder: Path) -> tuple[Path, Given]:
     About a third of a second a member that is solved, unless the file is there already.
     """
     p, box = constants(), members(count)
-    asked = {"constants": p, "rtol": RTOL, "limits": [ANGLE_LIMIT, FRACTION_LIMIT]}
-    said = json.dumps(asked, sort_keys=True)
+    request = {"constants": p, "rtol": RTOL, "limits": [ANGLE_LIMIT, FRACTION_LIMIT]}
+    said = json.dumps(request, sort_keys=True)
     file = folder / f"arm_{solved}_of_{count}.npz"
     if file.is_file():
-        kept = load(file)
-        same = all(np.array_equal(getattr(kept, name), values) for name, values in box.items())
-        if kept.said == said and same and np.array_equal(kept.times, sample_times()):
-            return file, kept
+        cached = load(file)
+        same = all(np.array_equal(getattr(cached, name), values) for name, values in box.items())
+        if cached.said == said and same and np.array_equal(cached.times, sample_times()):
+            return file, cached
     runs = [_solved(p, float(box["voltage"][k]), float(box["payload_mass"][k])) for k in range(solved)]
     angle, fraction = (np.array(each) for each in zip(*runs, strict=True))
     made = Given(said, box["voltage"], box["payload_mass"], sample_times(), angle, fraction)

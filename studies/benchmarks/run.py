@@ -80,11 +80,11 @@ def _cpp(plan: Plan) -> Part:
     given = load(plan.file())
     rows = np.stack([given.voltage, given.payload_mass], axis=1)
     steps, every = round(given.seconds / DEFAULT_STEP), round(float(given.times[1]) / DEFAULT_STEP)
-    found: Part = {"peer": "cpp"}
+    result: Part = {"peer": "cpp"}
     with TemporaryDirectory() as place:
         program = cpp.build(Path(place))
         if program is None:
-            return {**found, "reason": cpp.MISSING}
+            return {**result, "reason": cpp.MISSING}
         for precision in cpp.PRECISIONS:
             one = cpp.run(program, arm(), rows, DEFAULT_STEP, steps, os.cpu_count() or 1, precision, 3)
             solved = cpp.run(
@@ -99,14 +99,14 @@ def _cpp(plan: Plan) -> Part:
                 recorded=given.solved,
             )
             off = given.errors(np.degrees(solved.angle).T, solved.fraction.T)
-            found[precision] = {
+            result[precision] = {
                 "angle_error": off[0],
                 "fraction_error": off[1],
                 "accurate": given.meets(off),
                 "ms_per_trajectory": 1e3 * one.seconds / plan.members,
                 "iterations_per_stage": one.iterations_per_stage,
             }
-    return found
+    return result
 
 
 # The voltage is held, so that nothing asks for a step to end before a quarter of a second: compared with the exact solution there.
@@ -144,16 +144,16 @@ PARTS: dict[str, Callable[[Plan], Part]] = {
 
 
 def main() -> None:
-    asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    asked.add_argument(
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument(
         "parts", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)}; default: what is not there yet"
     )
-    asked.add_argument("--fast", action="store_true", help="small: to see that it runs")
-    asked.add_argument("--out", type=Path)
-    options = asked.parse_args()
+    parser.add_argument("--fast", action="store_true", help="small: to see that it runs")
+    parser.add_argument("--out", type=Path)
+    options = parser.parse_args()
     unknown = sorted(set(options.parts) - set(PARTS))
     if unknown:
-        asked.error(f"no part {unknown}; there are {', '.join(PARTS)}")
+        parser.error(f"no part {unknown}; there are {', '.join(PARTS)}")
     prepare()
     here = machine()
     slug = re.sub(r"[^a-z0-9]+", "-", str(here["processor"]).lower()).strip("-")
@@ -170,8 +170,8 @@ def main() -> None:
         whole = out / f".{name}.json"
         whole.write_text(json.dumps({"machine": machine(), **part(plan)}, indent=1) + "\n", encoding="utf-8")
         whole.replace(file)
-    found = {name: json.loads((out / f"{name}.json").read_text()) for name in PARTS if (out / f"{name}.json").exists()}
-    text = told(here, found)
+    result = {name: json.loads((out / f"{name}.json").read_text()) for name in PARTS if (out / f"{name}.json").exists()}
+    text = told(here, result)
     (out / "README.md").write_text(text, encoding="utf-8")
     print(text)
     print(f"written to {out}")

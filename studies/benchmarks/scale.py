@@ -18,10 +18,10 @@ from studies.benchmarks.throughput import MEASURES
 
 
 def main() -> None:
-    asked = argparse.ArgumentParser(description=__doc__)
-    asked.add_argument("--count", type=int, default=10**4)
-    asked.add_argument("--seconds", type=float, default=problem.SECONDS)
-    options = asked.parse_args()
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--count", type=int, default=10**4)
+    parser.add_argument("--seconds", type=float, default=problem.SECONDS)
+    options = parser.parse_args()
     prepare(cores=True)
     before = peak_memory()
     with tempfile.TemporaryDirectory() as place:
@@ -39,9 +39,11 @@ def main() -> None:
         )
         took = time.perf_counter() - begin
         size = sum(file.stat().st_size for file in Path(place).rglob("*") if file.is_file())
-    told = {"peer": "scale", "members": options.count, "s": took, "ms_per_trajectory": 1e3 * took / options.count}
+    record = {"peer": "scale", "members": options.count, "s": took, "ms_per_trajectory": 1e3 * took / options.count}
     print(
-        json.dumps({**told, "peak_memory_MB": peak_memory() / 1e6, "imports_MB": before / 1e6, "store_MB": size / 1e6})
+        json.dumps(
+            {**record, "peak_memory_MB": peak_memory() / 1e6, "imports_MB": before / 1e6, "store_MB": size / 1e6}
+        )
     )
 
 

@@ -41,9 +41,9 @@ def run(given: Given, count: int) -> dict[str, Any]:
     solve = _solver(given)
     tried = []
     for tolerance in TOLERANCES:
-        found = np.array([solve(k, tolerance, given.times).y for k in range(given.solved)])
-        xi = equations.fraction(np, given.constants, tuple(found.swapaxes(0, 1)))
-        off = given.errors(np.degrees(found[:, 2]), xi)
+        result = np.array([solve(k, tolerance, given.times).y for k in range(given.solved)])
+        xi = equations.fraction(np, given.constants, tuple(result.swapaxes(0, 1)))
+        off = given.errors(np.degrees(result[:, 2]), xi)
         tried.append({"tolerance": tolerance, "angle_error": off[0], "fraction_error": off[1]})
         if given.meets(off):
             break
@@ -58,10 +58,10 @@ def run(given: Given, count: int) -> dict[str, Any]:
 
 
 def main() -> None:
-    asked = argparse.ArgumentParser(description=__doc__)
-    asked.add_argument("file", type=Path)
-    asked.add_argument("--count", type=int, default=64, help="members that are timed")
-    options = asked.parse_args()
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("file", type=Path)
+    parser.add_argument("--count", type=int, default=64, help="members that are timed")
+    options = parser.parse_args()
     given = load(options.file)
     print(json.dumps(run(given, min(options.count, len(given.voltage)))))
 

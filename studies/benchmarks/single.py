@@ -27,9 +27,9 @@ TOLERANCE = 3e-4
 
 
 def main() -> None:
-    asked = argparse.ArgumentParser(description=__doc__)
-    asked.add_argument("file", type=Path)
-    given = load(asked.parse_args().file)
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("file", type=Path)
+    given = load(parser.parse_args().file)
     prepare()
     jax.config.update("jax_enable_compilation_cache", False)
     run, system, volts = eqx.filter_jit(simulate), arm(), float(given.voltage[0])
@@ -45,9 +45,9 @@ def main() -> None:
         (lambda: run(system, many, DEFAULT_STEP)),
     )
     first, first_xla = timed(own), timed(fixed)
-    told = {"peer": "single", "first_call_s": first, "ms": 1e3 * min(timed(own) for _ in range(REPEATS))}
-    told |= {"xla_first_call_s": first_xla, "xla_ms": 1e3 * min(timed(fixed) for _ in range(REPEATS))}
-    print(json.dumps(told))
+    record = {"peer": "single", "first_call_s": first, "ms": 1e3 * min(timed(own) for _ in range(REPEATS))}
+    record |= {"xla_first_call_s": first_xla, "xla_ms": 1e3 * min(timed(fixed) for _ in range(REPEATS))}
+    print(json.dumps(record))
 
 
 if __name__ == "__main__":

@@ -14,9 +14,9 @@ LOADS = {
 }
 
 
-def _each(found: Found, name: str, *way: str) -> float | None:
+def _each(result: Found, name: str, *way: str) -> float | None:
     """Milliseconds a trajectory of a part, or None where it could not run."""
-    at: Any = found.get(name, {})
+    at: Any = result.get(name, {})
     for key in (*way, "ms_per_trajectory"):
         at = at.get(key) if isinstance(at, Mapping) else None
     return float(at) if at is not None else None
@@ -39,47 +39,47 @@ def _at_most(what: str, most: float, value: float | None, unit: str = "") -> str
     return _row(what, f"<= {most:g}{unit}", value, value is not None and value <= most)
 
 
-def _ratios(found: Found) -> list[str]:
-    fixed, own, single = _each(found, "smajax"), _each(found, "smajax_own_steps"), found.get("single", {})
-    scipy = _each(found, "scipy", "best")
-    gradient = found.get("gradient", {})
+def _ratios(result: Found) -> list[str]:
+    fixed, own, single = _each(result, "smajax"), _each(result, "smajax_own_steps"), result.get("single", {})
+    scipy = _each(result, "scipy", "best")
+    gradient = result.get("gradient", {})
     rows = [
         _at_least(
             "throughput over the C++ program, the same fixed steps, float64",
             0.7,
-            _ratio(_each(found, "cpp", "double"), fixed),
+            _ratio(_each(result, "cpp", "double"), fixed),
         ),
         _at_least(
             "throughput over the C++ program, the same fixed steps, float32",
             0.7,
-            _ratio(_each(found, "cpp", "float"), _each(found, "smajax_float32")),
+            _ratio(_each(result, "cpp", "float"), _each(result, "smajax_float32")),
         ),
         _at_least(
-            "throughput over the C++ program, own steps, float64", 0.7, _ratio(_each(found, "cpp", "double"), own)
+            "throughput over the C++ program, own steps, float64", 0.7, _ratio(_each(result, "cpp", "double"), own)
         ),
         _at_least(
             "throughput over the C++ program, own steps, float32",
             0.7,
-            _ratio(_each(found, "cpp", "float"), _each(found, "smajax_own_steps_float32")),
+            _ratio(_each(result, "cpp", "float"), _each(result, "smajax_own_steps_float32")),
         ),
         _row(
             "throughput over numba, the same scheme and fixed steps, float64",
             "",
-            _ratio(_each(found, "numba", "double"), fixed),
+            _ratio(_each(result, "numba", "double"), fixed),
             None,
         ),
-        _row("throughput over numba, own steps, float64", "", _ratio(_each(found, "numba", "double"), own), None),
-        _at_least("throughput over diffrax at its best", 5.0, _ratio(_each(found, "diffrax", "best"), own)),
+        _row("throughput over numba, own steps, float64", "", _ratio(_each(result, "numba", "double"), own), None),
+        _at_least("throughput over diffrax at its best", 5.0, _ratio(_each(result, "diffrax", "best"), own)),
         _at_least("throughput over scipy's LSODA", 200.0, _ratio(scipy, own)),
         _at_least("one trajectory: scipy's time over ours", 1.0, _ratio(scipy, single.get("ms"))),
         _at_most("first call of a process, nothing kept, s", 3.0, single.get("first_call_s")),
         _at_most("reverse-mode gradient by all parameters over one run", 4.0, gradient.get("gradient_over_cost")),
         _at_most("the same by XLA", 4.0, gradient.get("xla", {}).get("gradient_over_cost")),
     ]
-    tracked = found.get("gradient_tracking", {})
+    tracked = result.get("gradient_tracking", {})
     others = [
         1e3 * float(one["gradient_s"]) / part["members"]
-        for part in (found.get("gradient_diffrax", {}), found.get("gradient_gradsolve", {}))
+        for part in (result.get("gradient_diffrax", {}), result.get("gradient_gradsolve", {}))
         for one in part.get("ways", [])
         if "gradient_s" in one
     ]
@@ -100,22 +100,22 @@ def _ratios(found: Found) -> list[str]:
     return ["| | bar | measured | holds |", "|---|---|---|---|", *rows]
 
 
-def _times(found: Found) -> list[str]:
+def _times(result: Found) -> list[str]:
     rows = [
         "| | ms a trajectory | error of the angle, degrees | of the fraction | compiling, s | peak memory, MB |",
         "|---|---|---|---|---|---|",
     ]
     parts = {
-        "smajax, own steps, float64": found.get("smajax_own_steps", {}),
-        "smajax, own steps, float32": found.get("smajax_own_steps_float32", {}),
-        "smajax, fixed steps, float64": found.get("smajax", {}),
-        "smajax, fixed steps, float32": found.get("smajax_float32", {}),
-        "diffrax": found.get("diffrax", {}).get("best", found.get("diffrax", {})),
-        "scipy LSODA, one core": found.get("scipy", {}).get("best", found.get("scipy", {})),
-        "C++, float64": found.get("cpp", {}).get("double", found.get("cpp", {})),
-        "C++, float32": found.get("cpp", {}).get("float", found.get("cpp", {})),
-        "numba, float64": found.get("numba", {}).get("double", found.get("numba", {})),
-        "numba, float32": found.get("numba", {}).get("float", found.get("numba", {})),
+        "smajax, own steps, float64": result.get("smajax_own_steps", {}),
+        "smajax, own steps, float32": result.get("smajax_own_steps_float32", {}),
+        "smajax, fixed steps, float64": result.get("smajax", {}),
+        "smajax, fixed steps, float32": result.get("smajax_float32", {}),
+        "diffrax": result.get("diffrax", {}).get("best", result.get("diffrax", {})),
+        "scipy LSODA, one core": result.get("scipy", {}).get("best", result.get("scipy", {})),
+        "C++, float64": result.get("cpp", {}).get("double", result.get("cpp", {})),
+        "C++, float32": result.get("cpp", {}).get("float", result.get("cpp", {})),
+        "numba, float64": result.get("numba", {}).get("double", result.get("numba", {})),
+        "numba, float32": result.get("numba", {}).get("float", result.get("numba", {})),
     }
     keys = ("ms_per_trajectory", "angle_error", "fraction_error", "compile_s", "peak_memory_MB")
     for name, one in parts.items():
@@ -125,7 +125,7 @@ def _times(found: Found) -> list[str]:
             # What is not accurate enough is shown for what it is.
             named = name if one.get("accurate", True) else f"{name}, **not accurate enough**"
             rows.append(f"| {named} | " + " | ".join(f"{one[key]:.3g}" if key in one else "" for key in keys) + " |")
-    best = found.get("diffrax", {}).get("best")
+    best = result.get("diffrax", {}).get("best")
     if best:
         way = "adaptive" if best["adaptive"] else "fixed steps"
         rows += ["", f"diffrax's best: {best['solver']}, {way}, {best['setting']:g}, blocks of {best['block']}."]
@@ -140,20 +140,20 @@ def _section(title: str, head: str, rows: Sequence[str], words: str = "") -> lis
     return [f"## {title}", "", *([words, ""] if words else []), f"| {head} |", under, *rows, ""]
 
 
-def _gradients(found: Found) -> list[str]:
+def _gradients(result: Found) -> list[str]:
     """Ours, and every way of the others, found or not."""
-    own = found.get("gradient_tracking", {})
+    own = result.get("gradient_tracking", {})
     rows, steps = [], []
 
-    def row(name: str, setting: str, one: Mapping[str, Any], members: int, way: str = "gradient") -> str:
+    def row(name: str, setting: str, one: Mapping[str, Any], runs: int, way: str = "gradient") -> str:
         if f"{way}_s" not in one:
             return f"| {name} | | {one.get('reason', 'not measured')} | | | | | |"
-        cost, slopes = (1e3 * float(one[f"{key}_s"]) / members for key in ("cost", way))
+        cost, slopes = (1e3 * float(one[f"{key}_s"]) / runs for key in ("cost", way))
         numbers = (cost, slopes, one[f"{way}_over_cost"], one["gradient_error"], one[f"{way}_memory_MB"])
         shown = " | ".join(f"{number:.3g}" for number in numbers)
         return f"| {name} | {setting} | {shown} | {one[f'{way}_compile_s']:.1f} |"
 
-    if not any(name in found for name in ("gradient_tracking", "gradient_diffrax", "gradient_gradsolve")):
+    if not any(name in result for name in ("gradient_tracking", "gradient_diffrax", "gradient_gradsolve")):
         return []
     by_xla = {**own, **own.get("xla", {})} if "xla" in own else {"reason": own.get("reason", "not measured")}
     for name, one, way in (
@@ -163,7 +163,7 @@ def _gradients(found: Found) -> list[str]:
     ):
         rows.append(row(name, f"steps of {1e3 * own.get('setting', 0.0):g} ms", one, own.get("members", 1), way))
     for peer in ("diffrax", "gradsolve"):
-        part = found.get(f"gradient_{peer}", {})
+        part = result.get(f"gradient_{peer}", {})
         if "ways" not in part:
             rows.append(row(peer, "", part, 1))
         for one in part.get("ways", []):
@@ -181,9 +181,9 @@ def _gradients(found: Found) -> list[str]:
     return _section("A gradient by all parameters, beside others", head, rows, words)
 
 
-def _growth(found: Found) -> list[str]:
+def _growth(result: Found) -> list[str]:
     def runs(part: str, known: str) -> list[Mapping[str, Any]]:
-        return [one for one in found.get(part, {}).get("runs", []) if known in one]
+        return [one for one in result.get(part, {}).get("runs", []) if known in one]
 
     def told_of(one: Mapping[str, Any]) -> str:
         return f"{one['cost_memory_MB']:.3g} | {one['gradient_memory_MB']:.3g} | {one['gradient_over_cost']:.2f}"
@@ -218,7 +218,7 @@ def _growth(found: Found) -> list[str]:
     ]
 
 
-def told(machine: Mapping[str, Any], found: Found) -> str:
+def told(machine: Mapping[str, Any], result: Found) -> str:
     """The page, Markdown."""
     versions = ", ".join(f"{name} {version}" for name, version in machine["versions"].items())
     lines = [
@@ -231,13 +231,13 @@ def told(machine: Mapping[str, Any], found: Found) -> str:
         "(`studies/benchmarks/problem.py`). Every ratio is of `python -m studies.benchmarks.run` on this machine; "
         "what was not run again keeps its number of an earlier run.",
         "",
-        *_ratios(found),
+        *_ratios(result),
         "",
         "## Times",
         "",
-        *_times(found),
+        *_times(result),
         "",
-        *_gradients(found),
-        *_growth(found),
+        *_gradients(result),
+        *_growth(result),
     ]
     return "\n".join(lines)

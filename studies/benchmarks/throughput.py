@@ -35,9 +35,9 @@ def _errors(given: Given, dt: float, tolerance: float | None) -> tuple[float, fl
     axes = zipped(problem.axes(len(given.voltage)).runs(0, given.solved))
     every = max(1, round(problem.EVERY / dt))
     keep = ("position", "martensite_fraction")
-    found = run_batch(arm(), {}, axes, seconds=given.seconds, dt=dt, every=every, keep=keep, tolerance=tolerance)
+    result = run_batch(arm(), {}, axes, seconds=given.seconds, dt=dt, every=every, keep=keep, tolerance=tolerance)
     compared = max(1, round(dt / problem.EVERY))
-    return given.errors(np.degrees(found["position"].to_numpy()), found["martensite_fraction"].to_numpy(), compared)
+    return given.errors(np.degrees(result["position"].to_numpy()), result["martensite_fraction"].to_numpy(), compared)
 
 
 def run(given: Given, dt: float, tolerance: float | None, count: int) -> dict[str, Any]:
@@ -69,13 +69,13 @@ def run(given: Given, dt: float, tolerance: float | None, count: int) -> dict[st
 
 
 def main() -> None:
-    asked = argparse.ArgumentParser(description=__doc__)
-    asked.add_argument("file", type=Path)
-    asked.add_argument("--count", type=int, default=65536)
-    asked.add_argument("--dt", type=float, default=DEFAULT_STEP)
-    asked.add_argument("--tolerance", type=float)
-    asked.add_argument("--single-precision", action="store_true")
-    options = asked.parse_args()
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("file", type=Path)
+    parser.add_argument("--count", type=int, default=65536)
+    parser.add_argument("--dt", type=float, default=DEFAULT_STEP)
+    parser.add_argument("--tolerance", type=float)
+    parser.add_argument("--single-precision", action="store_true")
+    options = parser.parse_args()
     prepare(cores=True)
     jax.config.update("jax_enable_compilation_cache", False)  # so that compiling is seen
     if options.single_precision:

@@ -114,9 +114,9 @@ def tracking(constants: Mapping[str, float], solved: int, count: int, folder: Pa
     said, voltage = json.dumps(own), np.linspace(*VOLTAGES, count)
     file = folder / f"tracking_{solved}_of_{count}.npz"
     if file.is_file():
-        kept = load(file)
-        if kept.said == said and np.array_equal(kept.voltage, voltage):
-            return file, kept
+        cached = load(file)
+        if cached.said == said and np.array_equal(cached.voltage, voltage):
+            return file, cached
     made = Tracking(said, voltage, np.zeros(solved), np.zeros((solved, len(own))))
     made = Tracking(said, voltage, *_solved(own, made.solved))
     file.parent.mkdir(parents=True, exist_ok=True)
@@ -126,5 +126,5 @@ def tracking(constants: Mapping[str, float], solved: int, count: int, folder: Pa
 
 def load(file: Path) -> Tracking:
     """Read a problem."""
-    with np.load(file) as kept:
-        return Tracking(str(kept["said"]), kept["voltage"], kept["cost"], kept["slopes"])
+    with np.load(file) as cached:
+        return Tracking(str(cached["said"]), cached["voltage"], cached["cost"], cached["slopes"])

@@ -16,7 +16,7 @@ def main() -> None:
     parser.add_argument("--coordinator", help="host:port of process 0; not needed under SLURM or MPI")
     parser.add_argument("--processes", type=int)
     parser.add_argument("--process", type=int)
-    asked = parser.parse_args()
+    options = parser.parse_args()
 
     from smajax.core.runtime import prepare
 
@@ -26,17 +26,19 @@ def main() -> None:
     from smajax.simulation.batch.hosts import join, run_batch_here
     from smajax.simulation.measures import Largest, Last, Smallest
 
-    alone = asked.coordinator is None and not {"SLURM_JOB_ID", "OMPI_COMM_WORLD_SIZE"} & set(os.environ)
-    process, processes = (0, 1) if alone else join(asked.coordinator, asked.processes, asked.process)
-    axes = sampled(asked.members, voltage=(5.5, 8.5), payload_mass=(0.045, 0.068), convection_coefficient=(60.0, 80.0))
+    alone = options.coordinator is None and not {"SLURM_JOB_ID", "OMPI_COMM_WORLD_SIZE"} & set(os.environ)
+    process, processes = (0, 1) if alone else join(options.coordinator, options.processes, options.process)
+    axes = sampled(
+        options.members, voltage=(5.5, 8.5), payload_mass=(0.045, 0.068), convection_coefficient=(60.0, 80.0)
+    )
     run_batch_here(
         build("niti_table_3_1", "arm", "amplified_voltage"),
         {},
         axes,
-        asked.out,
+        options.out,
         process,
         processes,
-        seconds=asked.seconds,
+        seconds=options.seconds,
         keep=(),
         measures=(Last("position"), Largest("stress"), Smallest("martensite_fraction")),
         progress=lambda event: print(f"process {process}: {event}", flush=True),

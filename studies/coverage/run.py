@@ -128,33 +128,33 @@ def study(fast: bool) -> dict[str, Any]:
     }
 
 
-def page(found: dict[str, Any]) -> str:
+def page(result: dict[str, Any]) -> str:
     """The README."""
     rows = [
-        f"| {name} | {100 * found['relative_standard_error'][name]:.2g} % | {100 * found['coverage'][name]:.1f} % | "
-        f"{found['bias_in_standard_errors'][name]:+.2f} | {found['spread_over_standard_error'][name]:.2f} | "
-        f"{found['without_noise_relative_error'][name]:+.1e} |"
-        for name in found["coverage"]
+        f"| {name} | {100 * result['relative_standard_error'][name]:.2g} % | {100 * result['coverage'][name]:.1f} % | "
+        f"{result['bias_in_standard_errors'][name]:+.2f} | {result['spread_over_standard_error'][name]:.2f} | "
+        f"{result['without_noise_relative_error'][name]:+.1e} |"
+        for name in result["coverage"]
     ]
-    scipy = found["scipy"]
+    scipy = result["scipy"]
     worst = max(scipy["cost_over_ours"]), min(scipy["cost_over_ours"])
     return "\n".join(
         [
             "# How often the interval of a fit contains the true value, with white noise",
             "",
-            f"{found['experiments']} repeated experiments of a hung weight in three runs of 12 s (switched, ramped, pulsed; "
-            f"{found['samples']} samples, {1e3 * found['noise_m']:g} mm of noise), integrated by scipy from event to event; six "
-            f"parameters fitted at a step of {1e3 * found['step_s']:g} ms from one start each, 30 % off (a temperature: by its "
-            f"distance from the air). {found['converged']} of the fits converged. Of all intervals {100 * found['coverage_of_all']:.1f} % contain the true value; by chance a row "
-            f"may differ by {100 * np.sqrt(0.05 * 0.95 / found['experiments']):.1f} points, a bias by "
-            f"{1.0 / np.sqrt(found['experiments']):.2f}.",
+            f"{result['experiments']} repeated experiments of a hung weight in three runs of 12 s (switched, ramped, pulsed; "
+            f"{result['samples']} samples, {1e3 * result['noise_m']:g} mm of noise), integrated by scipy from event to event; six "
+            f"parameters fitted at a step of {1e3 * result['step_s']:g} ms from one start each, 30 % off (a temperature: by its "
+            f"distance from the air). {result['converged']} of the fits converged. Of all intervals {100 * result['coverage_of_all']:.1f} % contain the true value; by chance a row "
+            f"may differ by {100 * np.sqrt(0.05 * 0.95 / result['experiments']):.1f} points, a bias by "
+            f"{1.0 / np.sqrt(result['experiments']):.2f}.",
             "",
             "| parameter | standard error | intervals that contain the true value | bias, in standard errors | spread over standard error "
-            f"| error without noise, at {1e3 * found['step_without_noise_s']:g} ms |",
+            f"| error without noise, at {1e3 * result['step_without_noise_s']:g} ms |",
             "|---|---|---|---|---|---|",
             *rows,
             "",
-            f"A fit takes {found['seconds_a_fit']:.2f} s in the batch of all, which goes over all {found['devices']} cores. scipy's `least_squares` with differences on the same "
+            f"A fit takes {result['seconds_a_fit']:.2f} s in the batch of all, which goes over all {result['devices']} cores. scipy's `least_squares` with differences on the same "
             f"compiled simulator takes {scipy['seconds_a_fit']:.1f} s, {scipy['ratio']:.1f} times as long ({scipy['fits']} fits) "
             f"and {scipy['ratio_of_processor_seconds']:.1f} times the processor time, and ends at {worst[1]:.7f} to "
             f"{worst[0]:.7f} times the cost. Much of that is the batch: one fit at a time, and by machine code for both, it is some four times as "
@@ -173,11 +173,11 @@ def page(found: dict[str, Any]) -> str:
 
 def main(fast: bool) -> None:
     prepare(cores=True)  # compiled to run fast
-    found = study(fast)
-    print(json.dumps(found, indent=1))
+    result = study(fast)
+    print(json.dumps(result, indent=1))
     if not fast:
-        (HERE / "coverage.json").write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
-        (HERE / "README.md").write_text(page(found), encoding="utf-8")
+        (HERE / "coverage.json").write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+        (HERE / "README.md").write_text(page(result), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -47,7 +47,7 @@ def searched(
     """The record of one search, on the arm where no `system` is given, gains to three digits as the presets have them."""
     targets = [float(np.radians(angle)) for angle in targets_deg]
     plant = system or arm()
-    found = search_gains(
+    result = search_gains(
         plant,
         controller,
         box,
@@ -55,7 +55,7 @@ def searched(
         SearchSettings(seconds, STEP, 1, candidates, rounds, seed),
         cost=cost,
     )
-    gains = {name: float(f"{value:.3g}") for name, value in found.gains.items()}
+    gains = {name: float(f"{value:.3g}") for name, value in result.gains.items()}
     # What is recorded is what the preset does: the rounded gains, at a finer step than the search's.
     judged = merits_of(
         plant,
@@ -73,8 +73,8 @@ def searched(
         "targets_deg": list(targets_deg),
         "seconds": seconds,
         "seed": seed,
-        "tried": found.tried,
-        "cost": round(found.cost, 4),
+        "tried": result.tried,
+        "cost": round(result.cost, 4),
         "gains": gains,
         "at_the_edge_of_its_box": sorted(
             name
@@ -95,6 +95,6 @@ def main(name: str, searches: Callable[[], dict[str, dict[str, Any]]]) -> None:
     jax.config.update("jax_enable_x64", True)
     # A time that is never has no number in JSON; a list stays on its line.
     text = json.dumps(searches(), indent=2).replace("Infinity", '"never"')
-    text = re.sub(r"\[[^\[\]]*\]", lambda found: f"[{' '.join(found[0][1:-1].split())}]", text)
+    text = re.sub(r"\[[^\[\]]*\]", lambda result: f"[{' '.join(result[0][1:-1].split())}]", text)
     print(text)
     (HERE / f"{name}.json").write_text(text + "\n", encoding="utf-8")

@@ -55,7 +55,7 @@ def march(
     `segments`: (end time, what to call at its start with time and state, to set the inputs) in turn.
     """
     size, done, now, count, step = state.size, 0, 0.0, 0, MAX_STEP
-    kept = np.empty((size + 1, times.size))
+    states = np.empty((size + 1, times.size))
     for end, begin in segments:
         begin(now, state)
         state = modes.settle(now, state)
@@ -89,8 +89,8 @@ def march(
             step = MAX_STEP
             if len(piece.t):
                 got = int(np.searchsorted(wanted, piece.t[-1], side="right"))
-                kept[:size, done : done + got] = piece.y[:, :got]
-                kept[size, done : done + got] = [modes.fraction(s) for s in piece.y.T[:got]]
+                states[:size, done : done + got] = piece.y[:, :got]
+                states[size, done : done + got] = [modes.fraction(s) for s in piece.y.T[:got]]
                 done += got
             hits = [(at[-1], i) for i, at in enumerate(piece.t_events[: len(watched)]) if at.size]
             if piece.status == 1 and hits:
@@ -98,7 +98,7 @@ def march(
                 state = modes.handle(watched[i][0], now, piece.y_events[i][-1].copy())
             else:
                 now, state = end, piece.y[:, -1].copy()
-    return kept
+    return states
 
 
 def _event(function: Function, direction: int, terminal: bool) -> Function:

@@ -192,39 +192,39 @@ class LawModes(ABC):
 
     def watch(self) -> list[tuple[str, int, Function]]:
         """(name, direction, function) of each event that can end the present mode."""
-        found: list[tuple[str, int, Function]] = []
+        result: list[tuple[str, int, Function]] = []
         rest, b, law = self.rest_rate, self.active, self.law
         if self.slack:
-            found.append(("taut", 1, lambda t, s: s[4] - 1e-13))
+            result.append(("taut", 1, lambda t, s: s[4] - 1e-13))
         else:
-            found.append(("slack", -1, lambda t, s: s[1] - SLACK_BELOW))
+            result.append(("slack", -1, lambda t, s: s[1] - SLACK_BELOW))
         if b is not None:
-            found.append(("reverse", -1, partial(self._pace, b, -rest)))
+            result.append(("reverse", -1, partial(self._pace, b, -rest)))
             if not law.exponential:
-                found.append(("complete", 1, lambda _t, s: b.progress(s) - 1))
+                result.append(("complete", 1, lambda _t, s: b.progress(s) - 1))
             if b.offset < 0:
-                found.append(("complete", -1, lambda _t, s: b.offset + b.amplitude * law.curve(b.progress(s))))
+                result.append(("complete", -1, lambda _t, s: b.offset + b.amplitude * law.curve(b.progress(s))))
             if b.sign < 0 and law.conditions == "brinson":
                 side = -1 if self.loaded else 1
-                found.append(("memory", side, lambda t, s: self._loading(t, s) - side * rest))
+                result.append(("memory", side, lambda t, s: self._loading(t, s) - side * rest))
         else:
             for held in filter(self.may, self.branches):
                 if held.beyond:
-                    found.append(("turn", 1, partial(self._pace, held, 2 * rest)))
+                    result.append(("turn", 1, partial(self._pace, held, 2 * rest)))
                 elif math.isfinite(held.contact):
-                    found.append(("contact", 1, partial(_ahead, held)))
+                    result.append(("contact", 1, partial(_ahead, held)))
         if law.split and self.detwinning:
-            found.append(("detwin", -1, lambda t, s: self.material(t, s)[1] + self._rest()[1]))
+            result.append(("detwin", -1, lambda t, s: self.material(t, s)[1] + self._rest()[1]))
         elif law.split and not self.slack:
-            found.append(("detwin", -1, self._spare))
+            result.append(("detwin", -1, self._spare))
         for i in {"enhanced": (), "liang": (0,), "brinson": (0, 1)}[law.conditions]:
             still, sense = self._rest()[i], self.senses[i]
             for side in (-1, 1):
                 # from rest a rate must pass twice the rest rate, to rest fall below it
                 level = still * (sense if sense else 2 * side)
                 if side != sense:
-                    found.append(("sense", side, partial(self._held_rate, i, level)))
-        return found
+                    result.append(("sense", side, partial(self._held_rate, i, level)))
+        return result
 
     def _pace(self, branch: Branch, level: float, t: float, s: Vector) -> float:
         rates = self.material(t, s)

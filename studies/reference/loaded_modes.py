@@ -50,13 +50,13 @@ class LoadedModes(LawModes):
 
     def watch(self) -> list[tuple[str, int, Function]]:
         """The wire's events and those of the stops."""
-        found, load = super().watch(), self.load
+        result, load = super().watch(), self.load
         if self.stop:
-            found.append(("release", -self.stop, lambda t, s: self._net_force(s)))
+            result.append(("release", -self.stop, lambda t, s: self._net_force(s)))
         elif math.isfinite(load.low):
-            found.append(("low", -1, lambda t, s: s[2] - load.low + EVENT_GAP))
-            found.append(("high", 1, lambda t, s: s[2] - load.high - EVENT_GAP))
-        return found
+            result.append(("low", -1, lambda t, s: s[2] - load.low + EVENT_GAP))
+            result.append(("high", 1, lambda t, s: s[2] - load.high - EVENT_GAP))
+        return result
 
     def handle(self, name: str, t: float, s: Vector) -> Vector:
         """Switch the modes at an event; returns the state after it."""

@@ -77,13 +77,13 @@ def simulate_path(
         modes.leg = (corners[i + 1] - corners[i]).tolist()
 
     legs = [(float(i + 1), partial(leg, i)) for i in range(len(corners) - 1)]
-    kept = march(modes, legs, state, points, rtol * SCALES, rtol, "DOP853")
+    states = march(modes, legs, state, points, rtol * SCALES, rtol, "DOP853")
     return {
         "path": points,
-        "temperature": kept[0],
-        "stress": np.maximum(kept[1], 0.0),
-        "strain": kept[2] - kept[4],
-        "slack": kept[4],
-        "martensite_fraction": kept[6],
-        "detwinned_fraction": modes.detwinned(kept, kept[6]),
+        "temperature": states[0],
+        "stress": np.maximum(states[1], 0.0),
+        "strain": states[2] - states[4],
+        "slack": states[4],
+        "martensite_fraction": states[6],
+        "detwinned_fraction": modes.detwinned(states, states[6]),
     }

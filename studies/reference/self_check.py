@@ -168,13 +168,13 @@ def dynamics() -> None:
         for params, out, loose in runs:
             assert np.ptp(out["martensite_fraction"]) > 0.99, "the wire transforms throughout"
             first = detwinned_share(params, out["stress"][0])[0] if law == "brinson" else 1.0
-            found = {
+            result = {
                 "xi_s at the start": abs(out["detwinned_fraction"][0] - first),
                 "constitutive law": constitutive_miss(params, out),
                 "relative tolerance 1e-8 for 1e-9: xi": np.abs(loose[SHARES[0]] - out[SHARES[0]]).max(),
                 **dict(zip(("replay: xi", "replay: xi_s", "replay: strain"), replayed(params, out), strict=True)),
             }
-            for what, miss in found.items():
+            for what, miss in result.items():
                 misses[what] = max(misses[what], float(miss))
     for what, miss in misses.items():
         check(f"dynamic, {what}", miss, 1e-12 if "start" in what else 2e-4 if "xi_s" in what else 1e-5)

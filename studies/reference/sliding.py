@@ -31,8 +31,8 @@ def sliding_controller(gains: Any, target: float, period: float) -> Controller:
     ) -> tuple[float, float]:
         error = wanted(angle, rate) - stress
         summed = memory + period * error
-        asked = float(gains.stress_gain) * error + float(gains.stress_integral_gain) * summed
-        volts = min(max(asked, 0.0), float(gains.largest_voltage))
-        return volts, summed if volts == asked else memory
+        unlimited = float(gains.stress_gain) * error + float(gains.stress_integral_gain) * summed
+        volts = min(max(unlimited, 0.0), float(gains.largest_voltage))
+        return volts, summed if volts == unlimited else memory
 
     return controller

@@ -97,15 +97,15 @@ def substep_path(
     stress = path[0][1] if control == "stress" else initial_stress
     point = Point(params, path[0][0], stress)
     point.strain = 0.0 if control == "stress" else path[0][1]
-    kept = [point]
+    points = [point]
     for start, end in pairwise(path):
         for u in np.linspace(0, 1, steps + 1)[1:]:
             temperature, value = (float(a + u * (b - a)) for a, b in zip(start, end, strict=True))
             if control == "strain":
                 value = _stress(point, temperature, value)
             point = point.moved(temperature, value)
-        kept.append(point)
-    return kept
+        points.append(point)
+    return points
 
 
 def _stress(point: Point, temperature: float, strain: float) -> float:

@@ -210,42 +210,42 @@ class Modes:
     def watch(self) -> list[tuple[str, int, Callable[[float, Vector], float]]]:
         """(name, direction, function) of each event that can end the present mode."""
         w = self.wire
-        found: list[tuple[str, int, Callable[[float, Vector], float]]] = []
+        result: list[tuple[str, int, Callable[[float, Vector], float]]] = []
         if self.slack:
-            found.append(("taut", 1, lambda t, s: s[4] - 1e-13))
+            result.append(("taut", 1, lambda t, s: s[4] - 1e-13))
         else:
-            found.append(("slack", -1, lambda t, s: s[1] + 0.1))
+            result.append(("slack", -1, lambda t, s: s[1] + 0.1))
         if self.stop:
-            found.append(("release", -self.stop, lambda t, s: self.net_force(s)))
+            result.append(("release", -self.stop, lambda t, s: self.net_force(s)))
         elif math.isfinite(self.load.low):
-            found.append(("low", -1, lambda t, s: s[2] - self.load.low + EVENT_GAP))
-            found.append(("high", 1, lambda t, s: s[2] - self.load.high - EVENT_GAP))
+            result.append(("low", -1, lambda t, s: s[2] - self.load.low + EVENT_GAP))
+            result.append(("high", 1, lambda t, s: s[2] - self.load.high - EVENT_GAP))
         if self.phase:
             rest = -self.phase * self.rest_rate
-            found.append(("reverse", -self.phase, lambda t, s: self._y_rate(t, s) - rest))
+            result.append(("reverse", -self.phase, lambda t, s: self._y_rate(t, s) - rest))
             end = w.austenite_finish if self.phase > 0 else w.martensite_finish
-            found.append(("complete", self.phase, lambda t, s: self._y(s)[0 if self.phase > 0 else 1] - end))
+            result.append(("complete", self.phase, lambda t, s: self._y(s)[0 if self.phase > 0 else 1] - end))
         else:
             if math.isfinite(self.contact_a) and self.may(1):
-                found.append(("contact", 1, lambda t, s: self._y(s)[0] - self.contact_a))
+                result.append(("contact", 1, lambda t, s: self._y(s)[0] - self.contact_a))
             if math.isfinite(self.contact_m) and self.may(-1):
-                found.append(("contact", -1, lambda t, s: self._y(s)[1] - self.contact_m))
+                result.append(("contact", -1, lambda t, s: self._y(s)[1] - self.contact_m))
         if self.liang and self.sense:
             still = self.sense * self.rest_rate
-            found.append(("rest", -self.sense, lambda t, s: self.rates(t, s, hold=True)[0] - still))
+            result.append(("rest", -self.sense, lambda t, s: self.rates(t, s, hold=True)[0] - still))
         elif self.liang:
-            found.append(("warming", 1, lambda t, s: self.rates(t, s, hold=True)[0] - 2 * self.rest_rate))
-            found.append(("cooling", -1, lambda t, s: self.rates(t, s, hold=True)[0] + 2 * self.rest_rate))
-        return found
+            result.append(("warming", 1, lambda t, s: self.rates(t, s, hold=True)[0] - 2 * self.rest_rate))
+            result.append(("cooling", -1, lambda t, s: self.rates(t, s, hold=True)[0] + 2 * self.rest_rate))
+        return result
 
     def peaks(self) -> list[tuple[int, Callable[[float, Vector], float]]]:
         """(direction, function) of each turning of y while held: a contact passed and left in one step shows there."""
         w = self.wire
-        found: list[tuple[int, Callable[[float, Vector], float]]] = []
+        result: list[tuple[int, Callable[[float, Vector], float]]] = []
         for branch, slope in ((1, w.austenite_slope), (-1, w.martensite_slope)):
             if self.phase == 0 and self.may(branch):
-                found.append((-branch, _turning(self, slope, -2 * branch * self.rest_rate)))
-        return found
+                result.append((-branch, _turning(self, slope, -2 * branch * self.rest_rate)))
+        return result
 
     def passed(self, s: Vector) -> bool:
         """Whether a state lies beyond a contact that should have ended the held mode."""

@@ -183,17 +183,17 @@ def _integrate(
         modes.volts = volts if callable(volts) else _constant(volts)
 
     segments = [(end, partial(begin, i)) for i, end in enumerate(ends)]
-    kept = march(modes, segments, state, times, rtol * SCALES[: state.size], rtol, method)
-    xi, load = kept[-1], modes.load
+    states = march(modes, segments, state, times, rtol * SCALES[: state.size], rtol, method)
+    xi, load = states[-1], modes.load
     out = {
         "time": times,
-        "q": kept[2],
-        "speed": kept[3],
-        "temperature": kept[0],
-        "stress": np.maximum(kept[1], 0.0),
+        "q": states[2],
+        "speed": states[3],
+        "temperature": states[0],
+        "stress": np.maximum(states[1], 0.0),
         "martensite_fraction": xi,
-        "detwinned_fraction": modes.detwinned(kept, xi) if isinstance(modes, LoadedModes) else xi,
-        "strain": -load.ratio * (kept[2] - start) / wire.length - kept[4],
+        "detwinned_fraction": modes.detwinned(states, xi) if isinstance(modes, LoadedModes) else xi,
+        "strain": -load.ratio * (states[2] - start) / wire.length - states[4],
     }
     if isinstance(drive, _Sampled):
         out["volts"] = np.array(drive.given)[np.searchsorted(ends, times, side="right")]

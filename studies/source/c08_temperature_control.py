@@ -40,7 +40,7 @@ def work(fast: bool) -> Result:
     filtered = at_set_points(nvsc, fast, estimator=printed_filter(system))
     numbers = measures(before, "vsc_") | measures(after, "nvsc_")
     numbers |= measures(damped, "nvsc_without_K_p_") | measures(filtered, "nvsc_with_filter_")
-    old, new, bare, told = (_judged(runs) for runs in (before, after, damped, filtered))
+    old, new, bare, estimated = (_judged(runs) for runs in (before, after, damped, filtered))
     numbers["largest_rate_of_the_finish_C_per_s"] = largest_finish_rate(after)
     later = {angle: time_of(new[angle].reach_time) - time_of(old[angle].reach_time) for angle in SET_POINTS}
     slower = {angle: time_of(new[angle].settling_time) - time_of(old[angle].settling_time) for angle in SET_POINTS}
@@ -53,7 +53,7 @@ def work(fast: bool) -> Result:
     numbers |= {name: float(part) for name, part in parts.items()}
     late = [angle for angle in SET_POINTS if slower[angle] >= 1.5 * PERIOD]
     apart = [angle for angle in SET_POINTS if abs(farther[angle]) >= SAME]
-    never = [angle for angle in SET_POINTS if time_of(told[angle].settling_time) > SECONDS]
+    never = [angle for angle in SET_POINTS if time_of(estimated[angle].settling_time) > SECONDS]
     return Result(
         holds=all(parts.values()),
         found=f"at {SET_POINTS[0]:g} to {SET_POINTS[-1]:g}° the overshoot falls from {_span(map(overshoot, old.values()))}° under VSC to "
@@ -71,8 +71,8 @@ def work(fast: bool) -> Result:
         "damping: inside the band the command falls with the speed, whatever the temperature, and with K_p = 0 the overshoot is "
         f"{max(map(overshoot, bare.values())):.1f}° at most. What the temperature term adds to that is the earlier arrival, at 50° after "
         f"{time_of(new[50.0].reach_time):.2f} instead of {time_of(bare[50.0].reach_time):.2f} s. On the printed filter's states (no noise) NVSC overshoots by "
-        f"{', '.join(f'{overshoot(told[angle]):.1f}' for angle in SET_POINTS)}° at {', '.join(f'{angle:g}' for angle in SET_POINTS)}°, never settles at {_list(never)}, and has "
-        f"{max(map(steady, told.values())):.1f}° of steady error at most. VSC has the quick gains of C9: with those of C4 it overshoots nowhere beyond -15°, and "
+        f"{', '.join(f'{overshoot(estimated[angle]):.1f}' for angle in SET_POINTS)}° at {', '.join(f'{angle:g}' for angle in SET_POINTS)}°, never settles at {_list(never)}, and has "
+        f"{max(map(steady, estimated.values())):.1f}° of steady error at most. VSC has the quick gains of C9: with those of C4 it overshoots nowhere beyond -15°, and "
         "nothing is left to mend. Gains of both chosen here.",
     )
 

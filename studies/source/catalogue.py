@@ -105,8 +105,8 @@ def rows(name: str) -> tuple[Row, ...]:
     """The figures of a chapter, or the one figure of that name. KeyError lists the names there are."""
     if name in CHAPTERS:
         return CHAPTERS[name]
-    found = tuple(row for row in every_row() if row.name.lower() == name.lower())
-    if not found:
+    result = tuple(row for row in every_row() if row.name.lower() == name.lower())
+    if not result:
         names = [row.name for row in every_row()]
         raise KeyError(f"No figure `{name}`; there are {', '.join([*CHAPTERS, *names])}.")
-    return found
+    return result

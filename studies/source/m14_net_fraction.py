@@ -18,17 +18,17 @@ LEVELS = (5.45, 5.5, 5.55, VOLTS, 5.6)
 def work(fast: bool) -> Result:
     """96 g taken off and put back at several voltages: deflection over full stroke against the simulated fraction."""
     runs, before, _ = unloaded("enhanced", fast, *(("96 g", volts) for volts in LEVELS))
-    found = net_deflection(runs, before) / FULL_STROKE
+    result = net_deflection(runs, before) / FULL_STROKE
     carried = runs.martensite_fraction[:, before] - runs.martensite_fraction[:, -1]
     at = LEVELS.index(VOLTS)
     printed = 0.27 / FULL_STROKE
-    off = float(np.abs(found / carried - 1.0).max())
+    off = float(np.abs(result / carried - 1.0).max())
 
     def draw(figure: Figure) -> None:
         (axes,) = panels(figure, 1)
         top = 1.1 * float(carried.max())
         axes.plot([0.0, top], [0.0, top], "--", color=GREY, label="equal")
-        axes.plot(carried, found, "o", color=BLUE, label="simulated, 96 g, five voltages")
+        axes.plot(carried, result, "o", color=BLUE, label="simulated, 96 g, five voltages")
         axes.plot([0.011], [printed], "s", color=RED, label="eq. 3.22")
         axes.set_xscale("log")
         axes.set_yscale("log")
@@ -37,11 +37,11 @@ def work(fast: bool) -> Result:
 
     return Result(
         holds=abs(printed - 0.011) < 5e-4 and off < 0.05 and abs(float(carried[at]) - 0.011) < 0.25 * 0.011,
-        found=f"0.27/24.75 = {printed:.4f}; simulated: {found[at]:.4f} from the deflection, {carried[at]:.4f} carried; at "
+        found=f"0.27/24.75 = {printed:.4f}; simulated: {result[at]:.4f} from the deflection, {carried[at]:.4f} carried; at "
         f"all voltages the two agree within {100 * off:.0f} %",
         numbers={
             "printed": printed,
-            "from_deflection": float(found[at]),
+            "from_deflection": float(result[at]),
             "carried": float(carried[at]),
             "largest_relative_difference": off,
         },

@@ -73,8 +73,8 @@ def at_set_points(
     """
     targets = jnp.radians(jnp.asarray(degrees, dtype=float))
     none = jnp.zeros((len(degrees), 0))
-    found = _batch(arm(), controller, (), none, targets, PERIOD if fast else DEFAULT_STEP, estimator)
-    return dict(zip(degrees, _unstacked(found, len(degrees)), strict=True))
+    result = _batch(arm(), controller, (), none, targets, PERIOD if fast else DEFAULT_STEP, estimator)
+    return dict(zip(degrees, _unstacked(result, len(degrees)), strict=True))
 
 
 @functools.cache
@@ -92,8 +92,8 @@ def swept(controller: AbstractController, gain: str, values: Sequence[float], de
     """(run, figures of merit) for each value of one gain, at one set point."""
     targets = jnp.full(len(values), jnp.radians(degrees))
     gains = jnp.asarray(values)[:, None]
-    found = _batch(arm(), controller, (gain,), gains, targets, PERIOD if fast else DEFAULT_STEP)
-    return dict(zip(values, _unstacked(found, len(values)), strict=True))
+    result = _batch(arm(), controller, (gain,), gains, targets, PERIOD if fast else DEFAULT_STEP)
+    return dict(zip(values, _unstacked(result, len(values)), strict=True))
 
 
 def overshoot(one: Recorded) -> float:
@@ -119,15 +119,15 @@ def time_of(value: Recorded) -> float:
 
 def measures(runs: Runs, prefix: str = "") -> dict[str, float]:
     """The checked numbers of a batch of set points."""
-    found: dict[str, float] = {}
+    result: dict[str, float] = {}
     for angle, (_, one) in runs.items():
-        found |= {
+        result |= {
             f"{prefix}reach_at_{angle:g}_deg_s": time_of(one.reach_time),
             f"{prefix}settling_at_{angle:g}_deg_s": time_of(one.settling_time),
             f"{prefix}overshoot_at_{angle:g}_deg_deg": overshoot(one),
             f"{prefix}steady_error_at_{angle:g}_deg_deg": steady(one),
         }
-    return found
+    return result
 
 
 def draw_angles(axes: Axes, runs: Runs) -> None:

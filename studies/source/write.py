@@ -47,10 +47,10 @@ def _kept(row: Row, folder: Path) -> Drawn | None:
     if not (record.exists() and picture.exists()):
         return None
     try:
-        found = json.loads(record.read_text(encoding="utf-8"))
+        result = json.loads(record.read_text(encoding="utf-8"))
     except ValueError:
         return None  # damaged: drawn again
-    return Drawn(row, found["holds"], found["found"], found["caveat"])
+    return Drawn(row, result["holds"], result["found"], result["caveat"])
 
 
 def _made(row: Row, folder: Path, fast: bool) -> Drawn:

@@ -82,12 +82,12 @@ def closed(out: Path, law: str) -> Findings:
 def told(findings: Findings) -> dict[str, Any]:
     """What is asserted of it; the enhanced conditions are no candidate where the model begins with them."""
     share = next((effect for effect in findings.effects if effect.name == "enhanced_conditions"), None)
-    found = share.coefficients.get("share") if share else None
+    result = share.coefficients.get("share") if share else None
     return {
         "verdict": findings.verdict,
         "added": [effect.name for effect in findings.effects if effect.added],
-        "share": found.value if found else None,
-        "standard_error": found.standard_error if found else None,
+        "share": result.value if result else None,
+        "standard_error": result.standard_error if result else None,
         "rmse": {run.name: (run.rmse_before, run.rmse_after) for run in findings.runs},
         "noise": findings.noise_sigma,
     }
@@ -96,11 +96,11 @@ def told(findings: Findings) -> dict[str, Any]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, required=True)
-    asked = parser.parse_args()
+    options = parser.parse_args()
     prepare()
-    found = {law: told(closed(asked.out, law)) for law in ("liang", "enhanced")}
-    (asked.out / "results.json").write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
-    print(json.dumps(found, indent=1))
+    result = {law: told(closed(options.out, law)) for law in ("liang", "enhanced")}
+    (options.out / "results.json").write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    print(json.dumps(result, indent=1))
 
 
 if __name__ == "__main__":

@@ -75,13 +75,13 @@ class Counted:
             raise Spent
         before = self.rig.simulations
         some = np.clip(points[:left], 0.0, 1.0)
-        found = self.goal.cost(self.rig.evaluate(some, self.scenarios, STEP).exact, self.scenarios)
-        for k, cost in enumerate(found):
+        result = self.goal.cost(self.rig.evaluate(some, self.scenarios, STEP).exact, self.scenarios)
+        for k, cost in enumerate(result):
             best = min(float(cost), self.course[-1][1] if self.course else np.inf)
             self.course.append((before + (k + 1) * self.scenarios.size, best))
         if left < len(points):
             raise Spent
-        return found
+        return result
 
 
 def _by_gradient(
@@ -171,9 +171,9 @@ def searched(system: System, problem: Problem, way: str, budget: int, seed: int)
             run()
         course = counted.course
     # Only where it becomes better.
-    kept = [one for k, one in enumerate(course) if k == 0 or one[1] < course[k - 1][1]]
+    improvements = [one for k, one in enumerate(course) if k == 0 or one[1] < course[k - 1][1]]
     return {
-        "course": [[loops, float(f"{cost:.5g}")] for loops, cost in kept],
+        "course": [[loops, float(f"{cost:.5g}")] for loops, cost in improvements],
         "closed_loops": course[-1][0] if course else 0,
         "seconds": round(clock.monotonic() - began, 1),
     }

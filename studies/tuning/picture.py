@@ -22,9 +22,9 @@ COLUMNS = 2
 def draw(results: Mapping[str, Any]) -> bytes:
     """A panel a problem, a line a search; a fifth of the loops marked."""
     courses: dict[str, list[tuple[str, np.ndarray, int]]] = {}
-    for name, found in results["peers"].items():
+    for name, result in results["peers"].items():
         problem, way, _ = name.split("; ")
-        courses.setdefault(problem, []).append((way, np.asarray(found["course"], dtype=float), found["closed_loops"]))
+        courses.setdefault(problem, []).append((way, np.asarray(result["course"], dtype=float), result["closed_loops"]))
     rows = -(-len(courses) // COLUMNS)
     figure = new_figure(3.0 * rows + 0.4, width=10.0)
     panels = figure.subplots(rows, COLUMNS, squeeze=False).ravel()

@@ -91,19 +91,19 @@ def _over(goal: Goal, judged: np.ndarray) -> np.ndarray:
 
 def _told(judged: np.ndarray, scenarios: Scenarios, seconds: float) -> dict[str, Any]:
     """The worst of each limited term over loops (M, terms), where, and how many loops meet its limit."""
-    told: dict[str, Any] = {}
+    record: dict[str, Any] = {}
     for name, limit in LIMITS.items():
         values = judged[:, list(TERMS).index(name)]
         at = int(np.argmax(values))
         never = name == "settling_time" and values[at] >= 2.0 * seconds
-        told[name] = {
+        record[name] = {
             "worst": None if never else float(f"{values[at]:.4g}"),
             "at_deg": round(float(np.degrees(scenarios.targets[at])), 1),
             "loops_within": int((values <= limit).sum()),
         }
     met = _over(Goal(limits=LIMITS), judged) <= 0.0
-    told["loops"], told["loops_that_meet_all"] = len(judged), int(met.sum())
-    return told
+    record["loops"], record["loops_that_meet_all"] = len(judged), int(met.sum())
+    return record
 
 
 def _worst_plant(over: np.ndarray, scenarios: Scenarios) -> dict[str, Any]:
@@ -117,14 +117,14 @@ def _worst_plant(over: np.ndarray, scenarios: Scenarios) -> dict[str, Any]:
 
 def _added(over: np.ndarray, scenarios: Scenarios) -> list[float]:
     """Set points (deg) of the worst loops, no two near to each other."""
-    found: list[float] = []
+    result: list[float] = []
     for k in np.argsort(-over, kind="stable"):
         angle = round(float(np.degrees(scenarios.targets[k])), 6)
-        if over[k] <= 0.0 or len(found) == ADDED:
+        if over[k] <= 0.0 or len(result) == ADDED:
             break
-        if all(abs(angle - one) >= APART for one in found):
-            found.append(angle)
-    return found
+        if all(abs(angle - one) >= APART for one in result):
+            result.append(angle)
+    return result
 
 
 def _passes(system: System, controller: str, plan: Plan, progress: Progress) -> tuple[TuningResult, Counter[str]]:
@@ -141,29 +141,29 @@ def _passes(system: System, controller: str, plan: Plan, progress: Progress) -> 
         finish=plan.finish,
         seconds=plan.seconds,
     )
-    asked = asked_by(plan)
+    requirements = asked_by(plan)
     took: Counter[str] = Counter()
     best, least = None, np.inf
     for number in range(plan.passes):
-        found = tune(system, settings, progress=progress)
+        result = tune(system, settings, progress=progress)
         rig = problem_of(system, settings)
-        over = _over(margin, rig.evaluate(rig.point(found.after.values)[None], asked).exact[0])
+        over = _over(margin, rig.evaluate(rig.point(result.after.values)[None], requirements).exact[0])
         worst = float(np.max(np.nan_to_num(over, nan=np.inf)))
         took.update(
             passes=1,
-            closed_loops=found.simulations,
-            rounds=found.descent.round,
-            generations_without_slopes=found.evolution.generations,
-            slopes_of_no_use=found.descent.unusable,
+            closed_loops=result.simulations,
+            rounds=result.descent.round,
+            generations_without_slopes=result.evolution.generations,
+            slopes_of_no_use=result.descent.unusable,
         )
         progress(Message(f"{controller}: pass {number + 1} exceeds the margin by {worst:.3f}"))
         if best is None or worst < least:
-            best, least = found, worst
+            best, least = result, worst
         if worst <= 0.0 or worst > HOPELESS:
             break
         settings = dataclasses.replace(
             settings,
-            set_points=tuple(sorted({*settings.set_points, *_added(over, asked)})),
+            set_points=tuple(sorted({*settings.set_points, *_added(over, requirements)})),
             start=best.after.values,
             starts=max(2, plan.starts // 2),
             tried=plan.tried // 2,
@@ -192,19 +192,21 @@ def _again(
 
 def requirement(system: System, controller: str, plan: Plan, progress: Progress, keep: bool) -> dict[str, Any]:
     """Tune one controller with the requirement as limits; judge preset and result on loops that nothing has touched."""
-    found, took = _passes(system, controller, plan, progress)
+    result, took = _passes(system, controller, plan, progress)
     if keep:
         (HERE / "gains").mkdir(exist_ok=True)
-        write_gains(HERE / "gains" / f"{controller}.json", found.after, found.units, {"tuned": found.settings.record()})
+        write_gains(
+            HERE / "gains" / f"{controller}.json", result.after, result.units, {"tuned": result.settings.record()}
+        )
     goal, (scenarios, drawn) = Goal(limits=LIMITS), judged_on(plan)
-    rig = problem_of(system, found.settings)
-    point = rig.point(found.after.values)
+    rig = problem_of(system, result.settings)
+    point = rig.point(result.after.values)
     before, after = rig.evaluate(np.stack([rig.before, point]), scenarios).exact
     over = np.nan_to_num(_over(goal, after), nan=np.inf)
     again = _again(rig, goal, point, scenarios, over, plan.worst)
     corners, nominal = ~drawn, scenarios.nominal
     return {
-        "gains": dict(found.after.values),
+        "gains": dict(result.after.values),
         "met": bool(over.max() <= 0.0 and again["fail"] == 0),
         "limit_exceeded_by_share": {
             "before": float(np.max(np.nan_to_num(_over(goal, before), nan=np.inf))),
@@ -217,6 +219,6 @@ def requirement(system: System, controller: str, plan: Plan, progress: Progress,
         "after_on_the_plant_as_believed": _told(after[nominal], _some(scenarios, nominal), plan.seconds),
         "worst_plant": _worst_plant(over[corners], _some(scenarios, corners)),
         "again_at_a_finer_step": again,
-        "set_points_tuned_deg": list(found.settings.set_points),
+        "set_points_tuned_deg": list(result.settings.set_points),
         **took,
     }

@@ -45,15 +45,15 @@ def compare(
 ) -> None:
     """Every way on every problem, stored one by one."""
     for problem in problems:
-        members = len(problem.set_points) * (9 if problem.varied else 1)
+        loops = len(problem.set_points) * (9 if problem.varied else 1)
         for way, seeds in seeds_of.items():
             for seed in seeds:
                 name = f"{problem.name}; {way}; {seed}"
                 if name in kept(path).get("peers", {}) and not again:
                     continue
-                found = searched(arm(), problem, way, candidates * members, seed)
-                keep(path, "peers", name, found)
-                progress(Message(f"{name}: cost {found['course'][-1][1]:.4g} in {found['closed_loops']} loops"))
+                result = searched(arm(), problem, way, candidates * loops, seed)
+                keep(path, "peers", name, result)
+                progress(Message(f"{name}: cost {result['course'][-1][1]:.4g} in {result['closed_loops']} loops"))
 
 
 def require(path: Path, names: list[str], plan: Plan, again: bool, progress: Progress = say) -> None:
@@ -61,9 +61,9 @@ def require(path: Path, names: list[str], plan: Plan, again: bool, progress: Pro
     for name in names:
         if name in kept(path).get("requirement", {}) and not again:
             continue
-        found = requirement(arm(), name, plan, progress, keep=path.name == "results.json")
-        keep(path, "requirement", name, found)
-        progress(Message(f"{name}: {'met' if found['met'] else 'not met'}, {found['limit_exceeded_by_share']}"))
+        result = requirement(arm(), name, plan, progress, keep=path.name == "results.json")
+        keep(path, "requirement", name, result)
+        progress(Message(f"{name}: {'met' if result['met'] else 'not met'}, {result['limit_exceeded_by_share']}"))
 
 
 def main(arguments: list[str]) -> None:

@@ -21,19 +21,19 @@ def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     return "\n".join(lines)
 
 
-def cost_after(found: Mapping[str, Any], loops: float) -> float:
+def cost_after(result: Mapping[str, Any], loops: float) -> float:
     """The best cost of a search after so many closed loops; infinite before its first."""
-    done = [cost for run, cost in found["course"] if run <= loops]
+    done = [cost for run, cost in result["course"] if run <= loops]
     return float(done[-1]) if done else np.inf
 
 
 def by_problem(results: Mapping[str, Any]) -> dict[str, dict[str, list[Mapping[str, Any]]]]:
     """Problem -> way -> its searches, one a seed."""
-    found: dict[str, dict[str, list[Mapping[str, Any]]]] = {}
+    result: dict[str, dict[str, list[Mapping[str, Any]]]] = {}
     for name, one in results["peers"].items():
         problem, way, _ = name.split("; ")
-        found.setdefault(problem, {}).setdefault(way, []).append(one)
-    return found
+        result.setdefault(problem, {}).setdefault(way, []).append(one)
+    return result
 
 
 def reached(ways: Mapping[str, list[Mapping[str, Any]]], peer: str, budget: float) -> bool:
@@ -65,7 +65,7 @@ def peers_table(results: Mapping[str, Any]) -> str:
 
 def verdict(results: Mapping[str, Any]) -> str:
     """Where a fifth of the loops was enough, in a sentence a peer."""
-    told = []
+    rows = []
     problems = by_problem(results)
     for peer in PEERS:
         lost = []
@@ -74,21 +74,21 @@ def verdict(results: Mapping[str, Any]) -> str:
             if not reached(ways, peer, budget):
                 lost.append(problem)
         name = {"adam": "Adam", "cma-es": "CMA-ES", "nelder-mead": "Nelder-Mead", "grid": "the grid"}[peer]
-        told.append(
+        rows.append(
             f"- against {name}: {len(problems) - len(lost)} of {len(problems)} problems"
             + (f"; not on {'; '.join(lost)}" if 0 < len(lost) < len(problems) else "")
         )
-    return "\n".join(told)
+    return "\n".join(rows)
 
 
 def first_below(results: Mapping[str, Any]) -> str:
     """Closed loops until PID's worst case costs less than `LEVEL`, a number a seed."""
     ways = by_problem(results)["pid, worst, plants 20 % wrong"]
-    told = []
+    rows = []
     for way, several in ways.items():
         firsts = [next((run for run, cost in one["course"] if cost < LEVEL), None) for one in several]
-        told.append(f"{way} {' / '.join('never' if one is None else f'{one:,}' for one in firsts)}")
-    return f"{'; '.join(told)} loops."
+        rows.append(f"{way} {' / '.join('never' if one is None else f'{one:,}' for one in firsts)}")
+    return f"{'; '.join(rows)} loops."
 
 
 def requirement_table(results: Mapping[str, Any]) -> str:

@@ -227,7 +227,7 @@ def test_a_value_of_each_run_and_one_that_is_held(tmp_path: Path) -> None:
         assert one.standard_error < 0.02
         assert abs(one.value - own[run]["start_fraction"]) < 4.0 * one.standard_error
     # A held-out run's own is found from itself, and said; nothing else is.
-    assert found.own_of_held_out["initial_martensite_fraction[c]"] == pytest.approx(0.7, abs=0.02)
+    assert found.values_of_held_out_runs["initial_martensite_fraction[c]"] == pytest.approx(0.7, abs=0.02)
     assert "found for the held-out runs from themselves" in page(found)
 
 
@@ -338,7 +338,7 @@ def test_a_hung_weight_with_three_sensors_of_another_codes_making(tmp_path: Path
     for name, value in truth.items():
         assert abs(_by_name(found["all"])[name].value - value) < 4.0 * _error(found["all"], name)
         assert _error(found["all"], name) < 0.8 * _error(found["position"], name)
-    assert found["all"].own_of_held_out["initial_temperature[held]"] == pytest.approx(40.0, abs=1.0)
+    assert found["all"].values_of_held_out_runs["initial_temperature[held]"] == pytest.approx(40.0, abs=1.0)
 
 
 @pytest.mark.parametrize(("study", "unknowns"), [("flexinol_isobaric", 16), ("bias_spring_bench", 15)])

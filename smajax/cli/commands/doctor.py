@@ -27,14 +27,14 @@ def doctor(
     from smajax.core.wording import counted
 
     freed = installation.clear_cache() if clear_cache else None
-    found = installation.examine()
-    wrong = installation.remarks(found)
+    result = installation.examine()
+    wrong = installation.remarks(result)
     if json_out:
-        typer.echo(json.dumps({**found, "remarks": wrong, "freed_bytes": freed}))
+        typer.echo(json.dumps({**result, "remarks": wrong, "freed_bytes": freed}))
     else:
         if freed is not None:
             typer.echo(f"Deleted {freed / 1e6:.1f} MB of compiled programs.")
-        for line in lines_of(found):
+        for line in lines_of(result):
             typer.echo(line)
         for line in wrong:
             typer.echo(f"! {line}")
@@ -43,11 +43,11 @@ def doctor(
         raise typer.Exit(UNMET)
 
 
-def lines_of(found: dict[str, object]) -> list[str]:
+def lines_of(result: dict[str, object]) -> list[str]:
     """The result for a terminal."""
     from typing import cast
 
-    one = cast(dict[str, Any], found)
+    one = cast(dict[str, Any], result)
     here, cache, engine, memory = (
         one["machine"],
         one["compiled programs"],
@@ -73,10 +73,10 @@ def lines_of(found: dict[str, object]) -> list[str]:
     ]
 
 
-def _engine(found: dict[str, Any]) -> str:
+def _engine(result: dict[str, Any]) -> str:
     """Which engine runs, and why not the other."""
-    if not found:
+    if not result:
         return "engine: not tried, because of the plug-ins"
-    if found["runs"] == "native":
-        return f"engine: machine code, vectors of {found['vector_bits']} bits; SMAJAX_ENGINE=xla asks for XLA"
-    return f"engine: {'XLA' if found['runs'] == 'xla' else 'none'}, because {found['why']}"
+    if result["runs"] == "native":
+        return f"engine: machine code, vectors of {result['vector_bits']} bits; SMAJAX_ENGINE=xla asks for XLA"
+    return f"engine: {'XLA' if result['runs'] == 'xla' else 'none'}, because {result['why']}"

@@ -30,15 +30,15 @@ def _parts(names: Sequence[str]) -> dict[str, dict[str, dict[str, Any]]]:
     for name in names:
         if name not in made:
             raise typer.BadParameter(f"no preset `{name}`{close_matches(name, made, 'there are')}", param_hint="NAMES")
-    found = {name: _entries(made[name](name), ()) for name in names}
+    result = {name: _entries(made[name](name), ()) for name in names}
     if [next((kind for kind in (WIRES, LOADS, DRIVES) if name in kind), None) for name in names] == [
         WIRES,
         LOADS,
         DRIVES,
     ]:
         whole = build(*names)
-        found["model"] = _entries(whole, {one for part in found.values() for one in part})
-    return found
+        result["model"] = _entries(whole, {one for part in result.values() for one in part})
+    return result
 
 
 def _entries(part: Any, without: Collection[str]) -> dict[str, dict[str, Any]]:

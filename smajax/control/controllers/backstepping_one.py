@@ -120,11 +120,11 @@ class BacksteppingOne(AbstractController):
     def step(
         self, memory: BacksteppingOneMemory, measured: MeasuredState, wanted: Reference, period: Scalar
     ) -> tuple[BacksteppingOneMemory, Scalar]:
-        asked = self.asked(memory, measured, wanted, period)
+        unlimited = self.asked(memory, measured, wanted, period)
         voltage = voltage_for(
-            self.believed, asked.power, asked.temperature, measured.martensite_fraction, self.largest_voltage
+            self.believed, unlimited.power, unlimited.temperature, measured.martensite_fraction, self.largest_voltage
         )
-        return BacksteppingOneMemory(measured.stress, asked.heating), voltage
+        return BacksteppingOneMemory(measured.stress, unlimited.heating), voltage
 
     def _inertia(self) -> Scalar:
         return moving_load(self.believed).inertia({})

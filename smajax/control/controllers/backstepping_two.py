@@ -130,9 +130,11 @@ class BacksteppingTwo(AbstractController):
     def step(
         self, memory: BacksteppingTwoMemory, measured: MeasuredState, wanted: Reference, period: Scalar
     ) -> tuple[BacksteppingTwoMemory, Scalar]:
-        asked = self.asked(memory, measured, wanted)
-        voltage = voltage_for(self.believed, asked.power, measured.temperature, asked.fraction, self.largest_voltage)
-        return BacksteppingTwoMemory(asked.heating), voltage
+        unlimited = self.asked(memory, measured, wanted)
+        voltage = voltage_for(
+            self.believed, unlimited.power, measured.temperature, unlimited.fraction, self.largest_voltage
+        )
+        return BacksteppingTwoMemory(unlimited.heating), voltage
 
     def _inertia(self) -> Scalar:
         return moving_load(self.believed).inertia({})

@@ -51,8 +51,8 @@ class Pid(AbstractController):
         error = wanted.position - measured.position
         motion = filtered_rate(memory.motion, measured.position, self.rate_filter, period)
         damping = self.derivative_gain * (wanted.velocity - motion.rate)
-        asked = self.proportional_gain * error + memory.integral + damping
-        voltage = limited(asked, self.smallest_voltage, self.largest_voltage)
+        unlimited = self.proportional_gain * error + memory.integral + damping
+        voltage = limited(unlimited, self.smallest_voltage, self.largest_voltage)
         # Backward Euler in the unwinding: stable for every T_t.
-        unwound = (voltage - asked) * period / (self.unwinding_time + period)
+        unwound = (voltage - unlimited) * period / (self.unwinding_time + period)
         return PidMemory(memory.integral + period * self.integral_gain * error + unwound, motion), voltage

@@ -65,8 +65,8 @@ class StressSliding(AbstractController):
         error = self.stress_wanted(measured, wanted) - measured.stress
         integral = memory.integral + period * error
         rate = (error - memory.error) / period
-        asked = self.stress_gain * error + self.stress_integral_gain * integral + self.stress_derivative_gain * rate
-        voltage = limited(asked, 0.0, self.largest_voltage)
+        unlimited = self.stress_gain * error + self.stress_integral_gain * integral + self.stress_derivative_gain * rate
+        voltage = limited(unlimited, 0.0, self.largest_voltage)
         # Conditional integration: what the amplifier cannot give is not summed up.
-        integral = jnp.where(voltage == asked, integral, memory.integral)
+        integral = jnp.where(voltage == unlimited, integral, memory.integral)
         return StressSlidingMemory(integral, error), voltage

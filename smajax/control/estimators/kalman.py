@@ -52,8 +52,8 @@ def corrected(belief: Belief, reading: Scalar, seen: Vector, reading_variance: S
     seen_with = belief.covariance @ seen
     innovation = Innovation(reading - seen @ belief.mean, seen @ seen_with + reading_variance)
     gain = seen_with / innovation.variance
-    kept = jnp.eye(seen.size, dtype=seen.dtype) - jnp.outer(gain, seen)
-    covariance = symmetric(kept @ belief.covariance @ kept.T + reading_variance * jnp.outer(gain, gain))
+    complement = jnp.eye(seen.size, dtype=seen.dtype) - jnp.outer(gain, seen)
+    covariance = symmetric(complement @ belief.covariance @ complement.T + reading_variance * jnp.outer(gain, gain))
     return Belief(belief.mean + gain * innovation.value, covariance), innovation
 
 

@@ -145,6 +145,8 @@ class PrintedFilter(AbstractEstimator):
 
     def _told(self, belief: Belief, coupon: State, innovation: Innovation) -> tuple[PrintedFilterMemory, MeasuredState]:
         angle, rate, stress, temperature = belief.mean[:4]
-        kept = coupon.wire
-        told = MeasuredState(angle, rate, MEGA * stress, temperature, kept.martensite_fraction, kept.xi_M, kept.xi_A)
-        return PrintedFilterMemory(belief, coupon, innovation), told
+        wire = coupon.wire
+        measured = MeasuredState(
+            angle, rate, MEGA * stress, temperature, wire.martensite_fraction, wire.xi_M, wire.xi_A
+        )
+        return PrintedFilterMemory(belief, coupon, innovation), measured

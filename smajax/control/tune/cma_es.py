@@ -85,9 +85,9 @@ def load(path: Path) -> CmaEsState | None:
     whole = arrays(path)
     if whole is None or whole.keys() != {field.name for field in dataclasses.fields(CmaEsState)}:
         return None
-    found = CmaEsState(**whole)
-    shapes = found.points.shape[:2], found.points.shape[:2], found.points.shape[:1]
-    return found if (found.costs.shape, found.excesses.shape, found.ran.shape) == shapes else None
+    result = CmaEsState(**whole)
+    shapes = result.points.shape[:2], result.points.shape[:2], result.points.shape[:1]
+    return result if (result.costs.shape, result.excesses.shape, result.ran.shape) == shapes else None
 
 
 def package() -> ModuleType:

@@ -179,13 +179,13 @@ class TuningProblem:
         columns = {f"at {name}": np.repeat(points[:, k], size) for k, name in enumerate(self.names)}
         columns |= dict(zip((*MISMATCHES, TARGET), np.tile(scenarios.rows, (count, 1)).T, strict=True))
         columns[NUMBER] = np.tile(np.arange(size, dtype=float), count)
-        found = []
+        result = []
         for start in range(0, count * size, self.loops):
             # Batches of one size, the last one filled up: one program serves however many starts are left.
             some = np.minimum(np.arange(start, start + self.loops), count * size - 1)
             axes = zipped({name: values[some] for name, values in columns.items()})
-            found += [answer for _, answer in chunks(function, problem, axes, self.loops, [0])]
-        whole = jax.tree.map(lambda *leaves: np.concatenate(leaves)[: count * size], *found)
+            result += [answer for _, answer in chunks(function, problem, axes, self.loops, [0])]
+        whole = jax.tree.map(lambda *leaves: np.concatenate(leaves)[: count * size], *result)
         self.simulations += count * size
         by_candidate = jax.tree.map(lambda leaf: leaf.reshape(count, size, *leaf.shape[1:]), whole)
         return Evaluation(**{"gradients": np.zeros((count, size, len(TERMS), 0)), **by_candidate})

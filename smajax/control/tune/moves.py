@@ -37,12 +37,12 @@ def walk(set_points: Sequence[float]) -> list[float]:
     ordered = sorted(set_points)
     if len(ordered) > MOST:
         ordered = [ordered[k] for k in np.linspace(0, len(ordered) - 1, MOST).round().astype(int)]
-    found: list[float] = []
+    result: list[float] = []
     while ordered:
-        found.append(ordered.pop(0))
+        result.append(ordered.pop(0))
         if ordered:
-            found.append(ordered.pop())
-    return found
+            result.append(ordered.pop())
+    return result
 
 
 def moved(rig: TuningProblem, pair: Sequence[AbstractController], set_points: Sequence[float]) -> Moves | None:

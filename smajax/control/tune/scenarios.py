@@ -100,8 +100,8 @@ def held_out(targets: Sequence[float], variation: Mapping[str, float], count: in
     """
     others = [name for name in MISMATCHES if name not in variation]
     inside = _drawn(variation, count, seed + UNSEEN) if variation else [{}]
-    found = {"inside": _crossed(_plants(inside), between(targets))}
+    result = {"inside": _crossed(_plants(inside), between(targets))}
     if others:
         beyond = [{name: ratio} for name in others for ratio in (1.0 - BEYOND, 1.0 + BEYOND)]
-        found["beyond"] = _crossed(_plants(beyond), targets)
-    return found
+        result["beyond"] = _crossed(_plants(beyond), targets)
+    return result

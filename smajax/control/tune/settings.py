@@ -88,8 +88,8 @@ class TuneSettings:
         if "ambient" in sizes:
             sizes["ambient"] = f"{self.variation['ambient'] * abs(air):.3g} K"
         wrong = [f"{name} ±{size}" for name, size in sizes.items()]
-        told = f"the plant as believed and with {', '.join(wrong)} at once" if wrong else "the plant as believed"
-        return f"{told}; set points {', '.join(f'{angle:g}°' for angle in self.set_points)}"
+        plants = f"the plant as believed and with {', '.join(wrong)} at once" if wrong else "the plant as believed"
+        return f"{plants}; set points {', '.join(f'{angle:g}°' for angle in self.set_points)}"
 
     def held_out_sentence(self) -> str:
         """On what the gains are checked that tuning never saw."""

@@ -170,17 +170,17 @@ def in_levels(values: Array) -> bool:
 
 def _by_shape(columns: Sequence[Column], table: Table) -> list[Column]:
     """Columns without headings: what rests at levels is taken for the voltage, what moves for the position."""
-    found: list[Column] = []
+    result: list[Column] = []
     for one in columns:
-        taken = {other.quantity for other in found} | {other.quantity for other in columns if other.quantity}
+        taken = {other.quantity for other in result} | {other.quantity for other in columns if other.quantity}
         quantity = "voltage" if in_levels(table.columns[one.name]) else "position"
         if one.quantity or not isinstance(one.key, int) or quantity in taken:
-            found.append(one)
+            result.append(one)
             continue
         unit = _unit_by_size(quantity, table.columns[one.name])
         why = "it rests at levels" if quantity == "voltage" else "it moves all the time"
-        found.append(Column(one.key, one.name, quantity, unit, GUESS, f"no heading; {why}; unit by magnitude"))
-    return found
+        result.append(Column(one.key, one.name, quantity, unit, GUESS, f"no heading; {why}; unit by magnitude"))
+    return result
 
 
 def time_unit_of(table: Table, name: str) -> str:
@@ -213,7 +213,7 @@ def columns_of(table: Table) -> list[Column]:
     headed = not all(name.isdigit() for name in every)
     clocks = [name for name in order if _is_clock(table, name, headed)]
     clock = None if table.clocks else next((name for name in clocks if name in table.moments), next(iter(clocks), None))
-    found: list[Column] = []
+    result: list[Column] = []
     if clock is not None:
         unit = _unit(table, clock)
         key: str | int = clock if headed else every.index(clock) + 1
@@ -224,7 +224,7 @@ def columns_of(table: Table) -> list[Column]:
             if headed and unit
             else (LIKELY if headed else GUESS, "it only grows; unit by magnitude")
         )
-        found.append(Column(key, clock, TIME, unit or time_unit(table.columns[clock]), sure, why))
+        result.append(Column(key, clock, TIME, unit or time_unit(table.columns[clock]), sure, why))
     rest = [_column(table, name if headed else every.index(name) + 1, name) for name in order if name != clock]
     rest = _by_shape(rest, table)
     rank = {SURE: 0, LIKELY: 1, GUESS: 2}
@@ -233,5 +233,5 @@ def columns_of(table: Table) -> list[Column]:
         first = min(rivals, key=lambda other: rank[other.sure])
         if one.quantity and one is not first:
             one = Column(one.key, one.name, "", one.unit, GUESS, f"{first.name!r} is taken for the {first.quantity}")
-        found.append(one)
-    return found
+        result.append(one)
+    return result

@@ -27,7 +27,7 @@ def _words(file: Path) -> set[str]:
 
 def _without(file: Path, words: set[str]) -> str:
     """The file's name without these words: `SensorInput_Step01` without `SensorInput` is `Step01`."""
-    left = WORD.sub(lambda found: "" if found.group() in words else found.group(), file.stem)
+    left = WORD.sub(lambda result: "" if result.group() in words else result.group(), file.stem)
     return re.sub(r"([\W_])[\W_]+", r"\1", left).strip("_-. ")
 
 
@@ -44,12 +44,12 @@ def paired(kinds: Sequence[Sequence[Path]]) -> tuple[RunFiles, ...]:
         by_name.append({_without(file, own): file for file in files})
     for files, named in zip(kinds, by_name, strict=True):
         if len(named) < len(files) or named.keys() != by_name[0].keys():
-            told = "; ".join(
+            lines = "; ".join(
                 f"{listed(sorted(one))} among {kind[0].name} and its like"
                 for kind, one in zip(kinds, by_name, strict=True)
             )
             raise MeasuredDataError(
-                f"no file has both an input and an output, and their names do not tell which ones make a run: runs {told}. "
+                f"no file has both an input and an output, and their names do not tell which ones make a run: runs {lines}. "
                 "Name them alike but for the sensor (input_step1.mat, position_step1.mat), or write files = { channel = "
                 "'file' } under each [[runs]] by hand"
             )

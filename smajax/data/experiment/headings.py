@@ -26,7 +26,7 @@ def heading_warnings(
     else:
         where = {name: f"runs.{run.name}.units.{name}" for name in {**run.columns, **run.units}}
     keys = [(key, places[name].column, places[name].unit) for name, key in where.items()]
-    found = []
+    result = []
     for key, heading, declared in keys:
         said = unit_in(heading) if isinstance(heading, str) else ""
         if said in ("", "-", "1"):  # a plain number: of a log in per cent as often as not
@@ -37,8 +37,8 @@ def heading_warnings(
         except UnitError:
             continue
         if not (math.isclose(one, 1.0, rel_tol=1e-9) and abs(zero) < 1e-9):
-            found.append(
+            result.append(
                 f"{key} is {declared!r}, and the heading {heading!r} says {said}: 1 {said} is {one:g} {declared}. One of the two "
                 "is wrong; the file's is taken"
             )
-    return found
+    return result

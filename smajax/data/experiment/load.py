@@ -226,10 +226,10 @@ def _check_order(
     path: Path, file: ExperimentFile, model: ModelDescription, values: Mapping[str, float], place: str = ""
 ) -> None:
     """ExperimentError where values (known ones, and starts of unknown ones) contradict each other."""
-    found = model.disorder(values)
-    if found is None:
+    result = model.disorder(values)
+    if result is None:
         return
-    colder, warmer, what = found
+    colder, warmer, what = result
     named = next((name for name in (colder, warmer) if name in file.unknown or name in values), colder)
     key = place or ("unknown" if named in file.unknown else "model.parameters")
     raise ExperimentError(path, place if place else f"{key}.{named}", what)

@@ -35,27 +35,27 @@ def logs_of(files: Sequence[Path], tables: Sequence[Table]) -> Logs:
             for table, columns in zip(tables, seen, strict=True)
         )
         return Logs(tuple((one, 0) for one in seen[0]), (tables[0],), runs, own)
-    members = [[k for k, held in enumerate(quantities) if held == kind] for kind in kinds]
-    runs = paired([[files[k] for k in several] for several in members])
+    groups = [[k for k, held in enumerate(quantities) if held == kind] for kind in kinds]
+    runs = paired([[files[k] for k in several] for several in groups])
     columns: list[tuple[Column, int]] = []
-    for kind, several in enumerate(members):
+    for kind, several in enumerate(groups):
         for one in seen[several[0]]:
             rival = next((other for other, _ in columns if one.quantity and other.quantity == one.quantity), None)
             if rival is not None and one.quantity != TIME:
                 one = replace(one, quantity="", sure=GUESS, why=f"{rival.name!r} is taken for the {one.quantity}")
             elif rival is not None and (rival.key, rival.unit) != (one.key, one.unit):
                 raise MeasuredDataError(
-                    f"{files[several[0]]}: its time is {one.name!r} in {one.unit}, that of {files[members[0][0]].name} is "
+                    f"{files[several[0]]}: its time is {one.name!r} in {one.unit}, that of {files[groups[0][0]].name} is "
                     f"{rival.name!r} in {rival.unit}; an experiment has one name for both: rename one"
                 )
             if rival is None or one.quantity != TIME:
                 columns.append((one, kind))
-    return Logs(tuple(columns), tuple(tables[several[0]] for several in members), runs)
+    return Logs(tuple(columns), tuple(tables[several[0]] for several in groups), runs)
 
 
 def _otherwise(table: Table, usual: Sequence[Column], own: Sequence[Column]) -> dict[str, Column]:
     """Quantity -> the column that this log has for it, where the usual one is not in it. Raises NoColumnError where it has none."""
-    found = {}
+    result = {}
     for one in usual:
         try:
             if one.quantity:
@@ -64,8 +64,8 @@ def _otherwise(table: Table, usual: Sequence[Column], own: Sequence[Column]) -> 
             other = next((other for other in own if other.quantity == one.quantity), None)
             if other is None:
                 raise
-            found[one.quantity] = other
-    return found
+            result[one.quantity] = other
+    return result
 
 
 def _is_whole(quantities: Collection[str]) -> bool:

@@ -51,26 +51,26 @@ def _values(read: ReadRun, name: str) -> Array | None:
 
 
 def _extremes(runs: Sequence[ReadRun], name: str) -> tuple[float, float] | None:
-    found = [values for read in runs if (values := _values(read, name)) is not None and values.size]
-    return (min(float(one.min()) for one in found), max(float(one.max()) for one in found)) if found else None
+    result = [values for read in runs if (values := _values(read, name)) is not None and values.size]
+    return (min(float(one.min()) for one in result), max(float(one.max()) for one in result)) if result else None
 
 
 def _size_warnings(runs: Sequence[ReadRun]) -> list[str]:
     """Channels whose values no wire stands; one sentence a channel."""
-    found: list[str] = []
+    result: list[str] = []
     for name, (most, own, other) in LARGEST.items():
         ends = _extremes(runs, name)
         if ends is not None and max(map(abs, ends)) > most:
             size = f"{max(map(abs, ends)):.5g} {own}".strip()
-            found.append(f"the {name} reaches {size}; is it in {other}?")
+            result.append(f"the {name} reaches {size}; is it in {other}?")
     stress = _extremes(runs, "stress")
     if stress is not None and 0.0 < max(map(abs, stress)) < 1e4:
-        found.append(f"the stress reaches no more than {max(map(abs, stress)):.5g} Pa; is it in MPa?")
+        result.append(f"the stress reaches no more than {max(map(abs, stress)):.5g} Pa; is it in MPa?")
     for name, warmest in (("temperature", COLDEST_IN_K), ("ambient_temperature", WARMEST_AIR)):
         ends = _extremes(runs, name)
         if ends is not None and ends[0] > warmest:
-            found.append(f"the {name} never falls below {ends[0]:.5g} degC; is it in K, or in degF?")
-    return found
+            result.append(f"the {name} never falls below {ends[0]:.5g} degC; is it in K, or in degF?")
+    return result
 
 
 def _heating_warnings(runs: Sequence[ReadRun], scale: Scale, heats: Sequence[str]) -> list[str]:
@@ -105,26 +105,26 @@ def _stroke_warnings(runs: Sequence[ReadRun], scale: Scale) -> list[str]:
     if ends is None:
         return []
     share = (ends[1] - ends[0]) / scale.wire_length
-    told = f"the output 'position' moves by {ends[1] - ends[0]:.3g} m, {share:.3g} times the wire's length of {scale.wire_length:.3g} m"
+    message = f"the output 'position' moves by {ends[1] - ends[0]:.3g} m, {share:.3g} times the wire's length of {scale.wire_length:.3g} m"
     if share > LARGEST_STROKE:
-        return [f"{told}; is it in mm, or is `wire_length` another?"]
+        return [f"{message}; is it in mm, or is `wire_length` another?"]
     if 0.0 < share < SMALLEST_STROKE:
-        return [f"{told}; is it in mm or m, and was the wire heated at all?"]
+        return [f"{message}; is it in mm or m, and was the wire heated at all?"]
     return []
 
 
 def _dynamics_warnings(runs: Sequence[ReadRun], scale: Scale, step: float) -> list[str]:
     """Runs and steps against the time that the wire takes to cool."""
     slow = f"the wire's time constant rho c_p d / (4 h) of {scale.time_constant:.3g} s where the search starts"
-    found = [
+    result = [
         f"run {read.run.name!r} lasts {read.run.time[-1] - read.run.time[0]:.3g} s, less than {slow}: it tells little of "
         "heat and nothing of rest; take a longer run"
         for read in runs
         if read.run.time[-1] - read.run.time[0] < scale.time_constant
     ]
     if step > 0.5 * scale.time_constant:
-        found.append(f"the step of {step:.3g} s is more than half of {slow}; take a shorter one")
-    return found
+        result.append(f"the step of {step:.3g} s is more than half of {slow}; take a shorter one")
+    return result
 
 
 def _exchange_warnings(runs: Sequence[ReadRun], heats: Sequence[str]) -> list[str]:
@@ -155,7 +155,7 @@ def _following(
     following: dict[str, Sequence[Array]] = {}
     shares = [1.0 - np.exp(-step / (lag * scale.time_constant)) for lag in LAGS]
     for name in runs[0].run.outputs:
-        found = []
+        result = []
         for read in runs:
             given = {channel: read.run.inputs[channel] for channel in heats if channel in read.run.inputs}
             output = read.run.outputs[name]
@@ -165,16 +165,16 @@ def _following(
             power = scale.warming(given)
             warm = [lfilter([share], [1.0, share - 1.0], power)[there] for share in shares]
             if np.ptp(warm[0]) > 0.0:
-                found.append(np.asarray([spearmanr(one, output[there]).statistic for one in warm]))
-        if found:
-            following[name] = found
+                result.append(np.asarray([spearmanr(one, output[there]).statistic for one in warm]))
+        if result:
+            following[name] = result
     return following
 
 
 def _unrelated_warnings(following: Mapping[str, Sequence[Array]]) -> list[str]:
     """Outputs that do not follow the heat: files that do not belong together, or samples out of order."""
-    for name, found in following.items():
-        median = float(np.median([abs(by_lag[0]) for by_lag in found]))
+    for name, result in following.items():
+        median = float(np.median([abs(by_lag[0]) for by_lag in result]))
         if median < FOLLOWS:
             return [
                 f"the output {name!r} hardly follows the heat (rank correlation {median:.2f} in the median run): do "
@@ -185,44 +185,44 @@ def _unrelated_warnings(following: Mapping[str, Sequence[Array]]) -> list[str]:
 
 def _reversed_warnings(following: Mapping[str, Sequence[Array]]) -> list[str]:
     """Outputs that move against the heat where the model's move with it, or the other way round."""
-    told = []
-    for name, found in following.items():
-        median = float(np.median([max(by_lag, key=abs) for by_lag in found]))
+    message = []
+    for name, result in following.items():
+        median = float(np.median([max(by_lag, key=abs) for by_lag in result]))
         if name in BY_HEAT and BY_HEAT[name] * median < -AGAINST:
-            told.append(
+            message.append(
                 f"the output {name!r} moves against the model (rank correlation with the heat {median:.2f} in the median run; "
                 f"the model's {'rises' if BY_HEAT[name] > 0 else 'falls'} with it): is the sensor's sign reversed? Set "
                 f"reversed = true under [channels.{name}], or take it out where it is set"
             )
-    return told
+    return message
 
 
 def common_warnings(runs: Sequence[ReadRun]) -> list[str]:
     """Signals of one run that begin or end at different times: only what all have in common is used."""
-    found = []
+    result = []
     for read in runs:
         used = float(read.run.time[-1] - read.run.time[0])
         name, longest = max(
             ((name, float(one.time[-1] - one.time[0])) for name, one in read.signals.items()), key=lambda one: one[1]
         )
         if used < IN_COMMON * longest - (read.run.time[1] - read.run.time[0]):
-            found.append(
+            result.append(
                 f"run {read.run.name!r}: {name!r} lasts {longest:.4g} s, and only {used:.4g} s are common to all signals; the "
                 "rest is not used"
             )
-    return found
+    return result
 
 
 def magnitude_warnings(runs: Sequence[ReadRun], scale: Scale | None, heats: Sequence[str], step: float) -> list[str]:
     """All of them. scale: of the model at its known values and starts; heats: the inputs that heat the wire."""
-    found = [*_size_warnings(runs), *_exchange_warnings(runs, heats)]
+    result = [*_size_warnings(runs), *_exchange_warnings(runs, heats)]
     if scale is not None:
-        found += [*_heating_warnings(runs, scale, heats), *_stroke_warnings(runs, scale)]
+        result += [*_heating_warnings(runs, scale, heats), *_stroke_warnings(runs, scale)]
         if heats:
             following = _following(runs, scale, heats, step)
-            found += [
+            result += [
                 *_dynamics_warnings(runs, scale, step),
                 *_unrelated_warnings(following),
                 *_reversed_warnings(following),
             ]
-    return found
+    return result

@@ -64,11 +64,11 @@ def _output_warnings(run: str, name: str, signal: Signal) -> list[str]:
         return [f"run {run!r}: the output {name!r} has no sample"]
     if np.ptp(values) == 0.0:
         return [f"run {run!r}: the output {name!r} is constant ({values[0]:g}); nothing can be learnt from it"]
-    found = _far_off(run, name, signal)
+    result = _far_off(run, name, signal)
     cut = [
         word for word, extreme in (("highest", values.max()), ("lowest", values.min())) if _sticks_at(values, extreme)
     ]
-    return found + [
+    return result + [
         f"run {run!r}: the output {name!r} runs into its {word} value and stays exactly there; "
         "is the sensor at the end of its range, or the load at a stop?"
         for word in cut
@@ -90,25 +90,25 @@ def _time_warnings(run: str, name: str, signal: Signal) -> list[str]:
     intervals = np.diff(signal.time)
     usual = float(np.median(intervals))
     longest = int(np.argmax(intervals))
-    found: list[str] = []
+    result: list[str] = []
     uneven = float(np.mean(np.abs(intervals - usual) > UNEVEN * usual))
     if uneven > UNEVEN_SHARE:
         low, high = np.percentile(intervals, [5.0, 95.0])
-        found.append(
+        result.append(
             f"run {run!r}: {name!r} is sampled unevenly ({low:.3g} to {high:.3g} s apart); it is brought to the even clock "
             "by its own times"
         )
     if intervals[longest] <= GAP_STEPS * usual:
-        return found
+        return result
     slow = intervals > GAP_STEPS * usual
     if slow.mean() > TWO_RATES:
         return [
-            *found,
+            *result,
             f"run {run!r}: {name!r} is sampled at two rates, every {usual:.4g} s and every {np.median(intervals[slow]):.4g} s, "
             f"the latter first at {signal.time[int(np.argmax(slow))]:.6g} s; between samples it is bridged",
         ]
     return [
-        *found,
+        *result,
         f"run {run!r}: {name!r} has a gap of {intervals[longest]:.4g} s at {signal.time[longest]:.6g} s "
         f"(usual interval {usual:.4g} s); it is bridged, check that nothing happened in it",
     ]
@@ -117,29 +117,29 @@ def _time_warnings(run: str, name: str, signal: Signal) -> list[str]:
 def run_warnings(read: ReadRun, step: float) -> list[str]:
     """What looks wrong in one run, one sentence each."""
     run = read.run
-    found: list[str] = []
+    result: list[str] = []
     if run.time.size < FEW_SAMPLES:
-        found.append(f"run {run.name!r}: only {run.time.size} samples at a step of {step:g} s; is the step too long?")
+        result.append(f"run {run.name!r}: only {run.time.size} samples at a step of {step:g} s; is the step too long?")
     clocked = {name: signal for name, signal in read.signals.items() if name not in read.skipping}
-    found += _repeated_warnings(run.name, clocked)
+    result += _repeated_warnings(run.name, clocked)
     for name, signal in clocked.items():
-        found += _time_warnings(run.name, name, signal)
+        result += _time_warnings(run.name, name, signal)
     duty = run.inputs.get("duty")
     if duty is not None and (duty.min() < 0.0 or duty.max() > 1.0):
-        found.append(
+        result.append(
             f"run {run.name!r}: the duty goes from {duty.min():g} to {duty.max():g}, outside 0 to 1; is it in percent?"
         )
     for output_name in run.outputs:
         output = read.signals[output_name]
-        found += _output_warnings(run.name, output_name, output)
+        result += _output_warnings(run.name, output_name, output)
         sensor_step = float(np.median(np.diff(output.time)))
         if step < 0.95 * sensor_step:
             whose = "the sensor's" if len(run.outputs) == 1 else f"{output_name!r}'s"
-            found.append(
+            result.append(
                 f"run {run.name!r}: the step of {step:g} s is shorter than {whose} {sensor_step:g} s; values between "
                 "two samples are interpolated and their errors are not independent"
             )
-    return found
+    return result
 
 
 def constant_warnings(runs: Sequence[ReadRun]) -> list[str]:
@@ -171,12 +171,12 @@ def quantum_warning(runs: Sequence[ReadRun], name: str, sensor_noise: float, uni
 def copy_warnings(runs: Sequence[ReadRun]) -> list[str]:
     """Runs that are the same files: a held-out run that was fitted too proves nothing."""
     first: dict[str, str] = {}
-    found: list[str] = []
+    result: list[str] = []
     for read in runs:
         twin = first.setdefault(read.run.sha256, read.run.name)
         if twin != read.run.name:
-            found.append(f"runs {twin!r} and {read.run.name!r} have the same data")
-    return found
+            result.append(f"runs {twin!r} and {read.run.name!r} have the same data")
+    return result
 
 
 def length_warnings(runs: Sequence[ReadRun], unit: str) -> list[str]:
@@ -190,13 +190,13 @@ def length_warnings(runs: Sequence[ReadRun], unit: str) -> list[str]:
 
 def role_warnings(runs: Sequence[RunSection]) -> list[str]:
     """What cannot be told from so few runs."""
-    found: list[str] = []
+    result: list[str] = []
     fit = sum(run.role == "fit" for run in runs)
     if fit < FEWEST_FIT_RUNS:
-        found.append(
+        result.append(
             f"only {fit} fit {'run' if fit == 1 else 'runs'}: runs left out in turn tell little; "
             "give at least three of different kinds"
         )
     if fit == len(runs):
-        found.append("no run is held out: the error after is shown on no run that the fit never saw")
-    return found
+        result.append("no run is held out: the error after is shown on no run that the fit never saw")
+    return result

@@ -18,7 +18,7 @@ LEAST = {
 }
 
 
-def check_readings(name: str, given: bool, values: Array, told: Callable[[int], str]) -> None:
+def check_readings(name: str, given: bool, values: Array, where: Callable[[int], str]) -> None:
     """Raises MeasuredDataError for the first value (n,), SI and degC, that the channel `name` cannot have; nan is a gap.
 
     given: an input, and no sensor, which may be off by its noise. told: where a sample is, and what is written there.
@@ -34,5 +34,5 @@ def check_readings(name: str, given: bool, values: Array, told: Callable[[int], 
         first = int(np.argmax(wrong))
         more = int(wrong.sum()) - 1
         raise MeasuredDataError(
-            f"{told(first)}{f' and in {more} more' if more else ''}; {why}: take such samples out, or correct the unit or the sign"
+            f"{where(first)}{f' and in {more} more' if more else ''}; {why}: take such samples out, or correct the unit or the sign"
         )

@@ -304,9 +304,9 @@ def read_schema(path: Path) -> ExperimentFile:
     try:
         return ExperimentFile.model_validate(content)
     except ValidationError as error:
-        found = dict.fromkeys(_message(one, content) for one in error.errors())
+        result = dict.fromkeys(_message(one, content) for one in error.errors())
         # A union reports once per member, and an unknown key may be why another is missing: the typo comes first.
-        ordered = sorted(found, key=lambda one: "not a known key" not in one[1])
+        ordered = sorted(result, key=lambda one: "not a known key" not in one[1])
         first, *others = ordered
         more = "".join(f"\n{path}: {key}: {message}" for key, message in others[:4])
         raise ExperimentError(path, first[0], first[1] + more) from None

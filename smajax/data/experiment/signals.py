@@ -248,9 +248,9 @@ def _kept(path: Path, run: RunSection, start: float, end: float, unit: str) -> t
 
 def _constant(name: str, value: str | float, unit: str) -> float:
     """An input that a run holds. Raises UnitError, and MeasuredDataError for what it cannot be."""
-    found = parse_quantity(value, unit)
-    check_readings(name, True, np.asarray([found]), lambda _: f"got {value!r}")
-    return found
+    result = parse_quantity(value, unit)
+    check_readings(name, True, np.asarray([result]), lambda _: f"got {value!r}")
+    return result
 
 
 def read_run(reading: Reading, run: RunSection, parameters: dict[str, float]) -> ReadRun:

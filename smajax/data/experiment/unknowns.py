@@ -36,14 +36,14 @@ def given_parameters(
     path: Path, key: str, values: Mapping[str, Quantity], file: ExperimentFile, known: Mapping[str, ParameterInfo]
 ) -> dict[str, float]:
     """Known values in the program's own units; none of them an unknown too."""
-    found: dict[str, float] = {}
+    result: dict[str, float] = {}
     for name, value in values.items():
         where = f"{key}.{name}"
         check_parameter(path, where, name, known, _presets(file))
         if name in file.unknown:
             raise ExperimentError(path, where, f"is given here and is an unknown too; remove this or [unknown.{name}]")
-        found[name] = _bounded(path, where, value, known[name])
-    return found
+        result[name] = _bounded(path, where, value, known[name])
+    return result
 
 
 def _prior(path: Path, key: str, section: PriorSection, info: ParameterInfo, low: float) -> Prior:
@@ -112,7 +112,7 @@ def preset_warnings(wire: str, free: Sequence[Unknown], known: Mapping[str, Para
 
 def run_starts(path: Path, file: ExperimentFile, model: ModelDescription) -> tuple[Unknown, ...]:
     """What each run starts with and nobody measured."""
-    found = []
+    result = []
     for name, parameter in RUN_STARTS.items():
         section: BoxSection | None = getattr(file.nuisance, name)
         if section is None:
@@ -125,5 +125,5 @@ def run_starts(path: Path, file: ExperimentFile, model: ModelDescription) -> tup
         given = [place for place, names in places.items() if parameter in names]
         if given:
             raise ExperimentError(path, key, f"is {parameter!r}, which {given[0]} gives too; remove one of the two")
-        found.append(_unknown(path, key, name, section, model.parameters.get(parameter, CELSIUS), True))
-    return tuple(found)
+        result.append(_unknown(path, key, name, section, model.parameters.get(parameter, CELSIUS), True))
+    return tuple(result)

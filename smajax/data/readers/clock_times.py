@@ -21,10 +21,10 @@ MOMENT = re.compile(
 
 def moment(cell: str) -> int | None:
     """ISO date and time in ns since the year 1, or a time of day in ns since midnight; None where `cell` is neither."""
-    found = MOMENT.fullmatch(cell.strip())
-    if found is None:
+    result = MOMENT.fullmatch(cell.strip())
+    if result is None:
         return None
-    year, month, day, hours, minutes, seconds, part, sign, zone_hours, zone_minutes = found.groups()
+    year, month, day, hours, minutes, seconds, part, sign, zone_hours, zone_minutes = result.groups()
     try:
         days = date(int(year), int(month), int(day)).toordinal() if year else 0
     except ValueError:
@@ -40,6 +40,6 @@ def past_midnight(seconds: Array, first: int) -> Array:
     if first >= DAYS * DAY * NANO or not there.any():
         return seconds
     steps = np.diff(seconds[there], prepend=seconds[there][:1])
-    found = seconds.copy()
-    found[there] += DAY * np.cumsum(steps < -0.5 * DAY)
-    return found
+    result = seconds.copy()
+    result[there] += DAY * np.cumsum(steps < -0.5 * DAY)
+    return result

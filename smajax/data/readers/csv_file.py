@@ -78,11 +78,11 @@ def _separator(path: Path, lines: Sequence[str], decimal: str | None) -> str | N
     The bulk of the data lines decides: a header may hold commas in a whitespace-separated file, and one line that is
     cut short holds no mark at all. A header alone is asked when there is nothing else.
     """
-    asked = lines[1:] or lines
-    if 2 * sum(_blank_separated(line) for line in asked) > len(asked):
+    candidates = lines[1:] or lines
+    if 2 * sum(_blank_separated(line) for line in candidates) > len(candidates):
         return None
-    mark = next((mark for mark in SEPARATORS if 2 * sum(mark in line for line in asked) > len(asked)), None)
-    if decimal is None or mark != decimal or '"' in asked[0]:  # in quotes a cell may hold the mark
+    mark = next((mark for mark in SEPARATORS if 2 * sum(mark in line for line in candidates) > len(candidates)), None)
+    if decimal is None or mark != decimal or '"' in candidates[0]:  # in quotes a cell may hold the mark
         return mark
     if "," in lines[0] and not DECIMAL_COMMA.fullmatch(lines[0].strip()):
         raise MeasuredDataError(
@@ -185,10 +185,10 @@ def _units(names: Sequence[str], cells: Sequence[str]) -> dict[str, str] | None:
 def _numbers(lines: list[tuple[int, str]], separator: str | None, width: int) -> Array | None:
     """All cells of a block of plain numbers, shape (lines, width), without looking at each; None where it is not that."""
     try:
-        found = np.loadtxt([line for _, line in lines], delimiter=separator, comments=None, ndmin=2)
+        result = np.loadtxt([line for _, line in lines], delimiter=separator, comments=None, ndmin=2)
     except ValueError:
         return None
-    return found if found.shape == (len(lines), width) else None
+    return result if result.shape == (len(lines), width) else None
 
 
 def _checked_names(

@@ -22,8 +22,8 @@ def once(time: Array, values: Array, how: Repeated) -> tuple[Array, Array, int]:
         return time, values, 0
     equal = (np.diff(values) == 0.0) | (np.isnan(values[1:]) & np.isnan(values[:-1]))
     if how == "refuse":
-        kept = np.concatenate([[True], ~(same & equal)])
-        return time[kept], values[kept], int((~kept).sum())
+        distinct = np.concatenate([[True], ~(same & equal)])
+        return time[distinct], values[distinct], int((~distinct).sum())
     group = np.concatenate([[0], np.cumsum(~same)])
     starts = np.flatnonzero(np.concatenate([[True], ~same]))
     ends = np.append(starts[1:], time.size) - 1

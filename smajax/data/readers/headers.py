@@ -23,9 +23,9 @@ def bare(name: str) -> str:
 
 def _behind(name: str) -> tuple[str, str]:
     """(the name, the unit) of a heading without brackets: the unit behind a word, a comma, a blank or a slash; else empty."""
-    found = BEHIND.match(name.strip())
-    if found is not None:
-        before, unit = (found[1], found[2]) if found[1] else (found[3], found[4])
+    result = BEHIND.match(name.strip())
+    if result is not None:
+        before, unit = (result[1], result[2]) if result[1] else (result[3], result[4])
         if unit in SLASHED and unit not in ("1", "-"):
             return before, unit
     before, slash, unit = (part.strip() for part in name.partition("/"))
@@ -41,9 +41,9 @@ def words(name: str) -> list[str]:
 def unit_in(name: str) -> str:
     """The unit that a heading has in brackets at its end, `U [mV]` or `T (°C)`, behind a slash, `U/mV`, or behind an
     underscore, `time_s`; else empty."""
-    found = BRACKETS.search(name)
-    if found is not None:
-        return found.group(1).strip()
+    result = BRACKETS.search(name)
+    if result is not None:
+        return result.group(1).strip()
     if unit := _behind(name)[1]:
         return unit
     tail = name.rsplit("_", 1)[-1] if "_" in name else ""
@@ -94,8 +94,8 @@ def is_time(name: str) -> bool:
 def time_column(table: Table) -> str:
     """The only column whose heading names a time. Raises MeasuredDataError where none or several do."""
     names = table.order or tuple(table.columns)
-    found = [name for name in names if is_time(name)]
-    if len(found) == 1:
-        return found[0]
-    told = f"columns {listed(found)} may be the time" if found else "no column is named like a time"
-    raise MeasuredDataError(f"{table.path}: {told}; say which it is (it has: {listed(names)})")
+    result = [name for name in names if is_time(name)]
+    if len(result) == 1:
+        return result[0]
+    reason = f"columns {listed(result)} may be the time" if result else "no column is named like a time"
+    raise MeasuredDataError(f"{table.path}: {reason}; say which it is (it has: {listed(names)})")

@@ -58,9 +58,9 @@ def _signals(file: Any, name: str, node: Any, deeper: bool = True) -> list[tuple
             return _one(name, _numbers(by_small["time"]), values, "")
         if deeper:
             inside = [_signals(file, f"{name}.{one}", node[one], False) for one in node if hasattr(node[one], "keys")]
-            found = [signal for several in inside if not isinstance(several, str) for signal in several]
-            if found:
-                return found
+            result = [signal for several in inside if not isinstance(several, str) for signal in several]
+            if result:
+                return result
     if signals is None or not hasattr(signals, "keys") or "values" not in signals:
         return f"variable {name!r} is a struct with fields {sorted(node)}; expected 'time' and 'signals.values'"
     time = _numbers(node["time"]) if "time" in node else None
@@ -99,15 +99,15 @@ def read_mat73(path: Path) -> Table:
             for name, node in file.items():
                 if name.startswith("#"):
                     continue
-                found: list[tuple[str, Array | None, Array, str]] | str = f"variable {name!r} holds no real numbers"
+                result: list[tuple[str, Array | None, Array, str]] | str = f"variable {name!r} holds no real numbers"
                 if hasattr(node, "keys"):
-                    found = _signals(file, name, node)
+                    result = _signals(file, name, node)
                 elif (plain := _numbers(node)) is not None:
-                    found = [(name, None, plain, "")]
-                if isinstance(found, str):
-                    unusable[name] = found
+                    result = [(name, None, plain, "")]
+                if isinstance(result, str):
+                    unusable[name] = result
                     continue
-                for own, time, values, label in found:
+                for own, time, values, label in result:
                     names = [own] if values.shape[1] == 1 else [f"{own}[{k}]" for k in range(1, values.shape[1] + 1)]
                     columns.update(zip(names, values.T, strict=True))
                     if time is not None:

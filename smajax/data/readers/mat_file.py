@@ -73,8 +73,8 @@ def _field(record: Any, *names: str) -> Any:
     return next((record[one] for one in record.dtype.names or () if one.lower() in names), None)
 
 
-def _add_structure(name: str, value: Any, found: Signals, deeper: bool = True) -> str | None:
-    """Adds the signals of one "Structure with time" to `found`; returns why it could not, or None.
+def _add_structure(name: str, value: Any, result: Signals, deeper: bool = True) -> str | None:
+    """Adds the signals of one "Structure with time" to `result`; returns why it could not, or None.
 
     A struct with time and values is one signal, and one of such structs, as logged signals are kept, several (`deeper`).
     """
@@ -85,14 +85,14 @@ def _add_structure(name: str, value: Any, found: Signals, deeper: bool = True) -
     if "signals" not in fields:
         time, values = _field(record, "time"), _field(record, "values", "data")
         if time is not None and values is not None:
-            return _add(name, _numbers(time), _numbers(values), [], found)
+            return _add(name, _numbers(time), _numbers(values), [], result)
         inside = {one: np.asarray(_plain(record[one])) for one in fields}
-        told = [
-            _add_structure(f"{name}.{one}", held, found, False)
+        lines = [
+            _add_structure(f"{name}.{one}", held, result, False)
             for one, held in inside.items()
             if held.dtype.names and deeper
         ]
-        if None in told:
+        if None in lines:
             return None
         return f"variable {name!r} is a struct with fields {list(fields)}; expected 'time' and 'signals.values'"
     signals = np.asarray(record["signals"])
@@ -108,13 +108,13 @@ def _add_structure(name: str, value: Any, found: Signals, deeper: bool = True) -
     for number, signal in enumerate(signals.ravel(), start=1):
         base = name if signals.size == 1 else f"{name}.{number}"
         values = _numbers(signal["values"])
-        wrong = _add(base, time, values, [] if values is None else _labels(signal, values.shape[1]), found)
+        wrong = _add(base, time, values, [] if values is None else _labels(signal, values.shape[1]), result)
         if wrong is not None:
             return wrong
     return None
 
 
-def _add(name: str, time: Array | None, values: Array | None, labels: Sequence[str], found: Signals) -> str | None:
+def _add(name: str, time: Array | None, values: Array | None, labels: Sequence[str], result: Signals) -> str | None:
     """Adds one signal, values (n, k); returns why it could not, or None."""
     if values is None:
         return f"variable {name!r}: its field 'signals.values' is not a real array"
@@ -122,10 +122,10 @@ def _add(name: str, time: Array | None, values: Array | None, labels: Sequence[s
         return f"variable {name!r}: {time.size} times and {values.shape[0]} values; expected as many of both"
     names = _names(name, values)
     for column, one in zip(names, values.T, strict=True):
-        found.columns[column] = one
+        result.columns[column] = one
         if time is not None and time.size:
-            found.clocks[column] = time[:, 0]
-    found.labels.update({column: label for column, label in zip(names, labels, strict=False) if label})
+            result.clocks[column] = time[:, 0]
+    result.labels.update({column: label for column, label in zip(names, labels, strict=False) if label})
     return None
 
 
@@ -153,8 +153,8 @@ def read_mat(path: Path) -> Table:
     except Exception as error:  # a damaged file raises whatever its bytes happen to lead to
         raise MeasuredDataError(f"{path}: the MATLAB file is damaged or cut short ({error})") from error
 
-    found = Signals()
-    columns = found.columns
+    result = Signals()
+    columns = result.columns
     unusable: dict[str, str] = {
         name: f"variable {name!r} is or holds an object of MATLAB's (a string, table, time series, function); expected numbers "
         "or a struct: save those"
@@ -166,7 +166,7 @@ def read_mat(path: Path) -> Table:
             continue
         value = np.asarray(_plain(raw))
         if value.dtype.names:
-            reason = _add_structure(name, value, found)
+            reason = _add_structure(name, value, result)
             if reason is not None:
                 unusable[name] = reason
             continue
@@ -177,4 +177,4 @@ def read_mat(path: Path) -> Table:
         columns.update(zip(_names(name, values), values.T, strict=True))
     if not columns:
         raise MeasuredDataError(f"{path}: no signal in it; {'; '.join(unusable.values()) or 'it has no variable'}")
-    return Table(path=path, columns=columns, clocks=found.clocks, unusable=unusable, labels=found.labels)
+    return Table(path=path, columns=columns, clocks=result.clocks, unusable=unusable, labels=result.labels)

@@ -139,13 +139,13 @@ def sound_arrays(content: bytes) -> dict[str, bool]:
     if len(content) < HEADING or content[126:128] not in (b"IM", b"MI"):
         raise Damaged(f"a heading of {HEADING} bytes that ends in IM or MI should begin it")
     order = "<" if content[126:128] == b"IM" else ">"
-    found: dict[str, bool] = {}
+    result: dict[str, bool] = {}
     for kind, packed in _elements(memoryview(content)[HEADING:], order):
         element = _whole(kind, packed, order)
         name = _name(element, order)
         try:
             _array(element, order)
-            found[name] = found.get(name, True)
+            result[name] = result.get(name, True)
         except Opaque:
-            found[name] = False
-    return found
+            result[name] = False
+    return result

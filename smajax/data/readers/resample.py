@@ -106,9 +106,9 @@ def resample_with_gaps(time: Array, values: Array, clock: Array, step: float) ->
     here = np.searchsorted(time, at)
     measured = np.isclose(time[np.minimum(here, time.size - 1)], at, rtol=0.0, atol=1e-9 * usual)
     lost = ~(measured & known[np.minimum(here, time.size - 1)])
-    found = resample_output(time, np.interp(time, time[known], values[known]), clock, step)
+    result = resample_output(time, np.interp(time, time[known], values[known]), clock, step)
     made_up = resample_output(at, lost.astype(np.float64), clock, step).values
-    return Resampled(np.where(made_up > MADE_UP, np.nan, found.values), found.noise_gain)
+    return Resampled(np.where(made_up > MADE_UP, np.nan, result.values), result.noise_gain)
 
 
 def window_noise_gain(samples_per_step: float) -> float:

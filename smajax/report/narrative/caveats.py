@@ -126,15 +126,15 @@ def of_the_preset(findings: Findings, effect: EffectFinding) -> str:
     expansion = findings.preset_expansion
     if effect.name != "thermal_expansion" or expansion is None:
         return ""
-    found = [effect.coefficients[phase] for phase in ("martensite", "austenite")]
+    result = [effect.coefficients[phase] for phase in ("martensite", "austenite")]
     if any(
         abs(one.value - preset)
         > max(findings.config.expansion_cancelled * abs(preset), 3.0 * (one.standard_error or 0.0))
-        for one, preset in zip(found, expansion, strict=True)
+        for one, preset in zip(result, expansion, strict=True)
     ):
         return ""
     return (
-        f"The thermal expansion that was found ({found[0].value:.2g} and {found[1].value:.2g} 1/K) takes back the one that the base model has by its "
+        f"The thermal expansion that was found ({result[0].value:.2g} and {result[1].value:.2g} 1/K) takes back the one that the base model has by its "
         f"preset's thermal_modulus ({-expansion[0]:.2g} and {-expansion[1]:.2g}): it says nothing of the wire, but that its thermal strain is not the preset's. "
         "Give thermal_modulus in [model.parameters] ('0 MPa/K' where the wire shows none) and run again: in rate form it also leaves a strain "
         "with every cycle, and other effects that are named here may make up for that."

@@ -9,27 +9,27 @@ from smajax.report.narrative.caveats import held_out_warnings
 MENTIONED = 0.2  # size of a correlation from which it is worth a sentence
 
 
-def residual_sentences(found: ResidualDiagnostics) -> tuple[str, ...]:
+def residual_sentences(result: ResidualDiagnostics) -> tuple[str, ...]:
     """Its size and autocorrelation; where it is no noise, the phase with most of it and what it is correlated with."""
-    memory = "is white" if found.white else "is autocorrelated"
-    if found.filter_coefficient > 0.0 and not found.white:
+    memory = "is white" if result.white else "is autocorrelated"
+    if result.filter_coefficient > 0.0 and not result.white:
         memory = (
-            f"is first-order autoregressive noise with coefficient {found.filter_coefficient:.2f}, and nothing beyond"
+            f"is first-order autoregressive noise with coefficient {result.filter_coefficient:.2f}, and nothing beyond"
         )
-    sentences = [f"The residual is {times_noise(found.ratio, 'the measurement noise')} and {memory}."]
-    if found.white or found.filter_coefficient > 0.0:
+    sentences = [f"The residual is {times_noise(result.ratio, 'the measurement noise')} and {memory}."]
+    if result.white or result.filter_coefficient > 0.0:
         return tuple(sentences)
-    phases = found.by_phase
+    phases = result.by_phase
     worst = max(phases, key=lambda name: phases[name]["share_of_squared_error"])
     samples = sum(entry["samples"] for entry in phases.values())
     sentences.append(
         f"{phases[worst]['share_of_squared_error']:.0%} of its square falls into the phase “{worst}” "
         f"({phases[worst]['samples'] / samples:.0%} of the samples)."
     )
-    strongest = max(found.correlation, key=lambda name: abs(found.correlation[name]))
-    if abs(found.correlation[strongest]) > MENTIONED:
+    strongest = max(result.correlation, key=lambda name: abs(result.correlation[name]))
+    if abs(result.correlation[strongest]) > MENTIONED:
         sentences.append(
-            f"It is correlated most with {strongest.replace('_', ' ')} (correlation {found.correlation[strongest]:+.2f})."
+            f"It is correlated most with {strongest.replace('_', ' ')} (correlation {result.correlation[strongest]:+.2f})."
         )
     return tuple(sentences)
 

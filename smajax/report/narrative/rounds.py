@@ -24,13 +24,13 @@ def chosen_text(entry: Round) -> str:
     return f"without {entry.chosen}" if entry.removed else entry.chosen
 
 
-def comparison_text(found: Comparison, unit: str, quantity: str) -> str:
+def comparison_text(result: Comparison, unit: str, quantity: str) -> str:
     """`error on left-out runs 1.8 mm -> 0.2 mm (+99% of its mean square, 8.1 standard errors)`."""
-    runs = "left-out runs" if found.left_out else "the one fit run itself"
-    without, with_it = (value_text(one, unit, quantity) for one in (found.rmse_without, found.rmse_with))
+    runs = "left-out runs" if result.left_out else "the one fit run itself"
+    without, with_it = (value_text(one, unit, quantity) for one in (result.rmse_without, result.rmse_with))
     return (
         f"error on {runs} {without} -> {with_it} "
-        f"({found.gain:+.0%} of its mean square, {found.standard_errors:.1f} standard errors)"
+        f"({result.gain:+.0%} of its mean square, {result.standard_errors:.1f} standard errors)"
     )
 
 

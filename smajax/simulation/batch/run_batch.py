@@ -90,8 +90,8 @@ def run_batch(  # the public form: what goes inwards is a `BatchSettings`
         return opened(Path(out))
     parts: list[dict[str, np.ndarray]] = []
     count = -(-axes.size // size)
-    for number, found in chunks(single_run, recipe, axes, size, range(count), devices, engine):
-        parts.append(found)
+    for number, result in chunks(single_run, recipe, axes, size, range(count), devices, engine):
+        parts.append(result)
         progress(Stage("simulating", (number + 1) / count))
     whole = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     return labelled(whole, axes, recipe.units(), np.arange(recipe.steps // every + 1) * every * dt, _attributes(recipe))
@@ -143,10 +143,10 @@ def fill(
     engine: Engine = "auto",
 ) -> None:
     """Compute the chunks `wanted` of a store."""
-    for done, (number, found) in enumerate(
+    for done, (number, result) in enumerate(
         chunks(single_run, recipe, store.axes, store.chunk, wanted, devices, engine), start=1
     ):
-        store.write(number, found)
+        store.write(number, result)
         progress(Stage("simulating", done / len(wanted)))
 
 
@@ -173,8 +173,8 @@ def labelled(
     # A coordinate that shares its name with a result keeps it apart by a prefix.
     clash = sorted(set(coordinates) & set(data))
     coordinates = {f"axis_{name}" if name in clash else name: entry for name, entry in coordinates.items()}
-    found = xr.Dataset(data, coordinates, dict(attributes))
-    return found.set_coords(["status", "first_bad_time"])
+    result = xr.Dataset(data, coordinates, dict(attributes))
+    return result.set_coords(["status", "first_bad_time"])
 
 
 def opened(folder: Path | str) -> xr.Dataset:
@@ -186,31 +186,31 @@ def opened(folder: Path | str) -> xr.Dataset:
     lazy = xr.open_zarr(Path(folder), consolidated=False, chunks=None, mask_and_scale=False)
     if len(axes.dimensions) == 1:
         one = axes.dimensions[0]
-        found = lazy[list(store.names())].rename({lazy["status"].dims[0]: one.name})
+        result = lazy[list(store.names())].rename({lazy["status"].dims[0]: one.name})
         units = store.axis_units
-        found = found.assign_coords(
+        result = result.assign_coords(
             {name: (one.name, series, _with_unit(units, name)) for name, series in one.values.items()}
         )
-        if "time" in found.dims:
-            found = found.assign_coords(time=("time", time, {"units": "s"}))
-        found.attrs = attributes
-        return found.set_coords(["status", "first_bad_time"])
+        if "time" in result.dims:
+            result = result.assign_coords(time=("time", time, {"units": "s"}))
+        result.attrs = attributes
+        return result.set_coords(["status", "first_bad_time"])
     units = store.axis_units | {name: str(group[name].attrs["units"]) for name in store.names()}
     return labelled({name: np.asarray(group[name][:]) for name in store.names()}, axes, units, time, attributes)
 
 
-def good(found: xr.Dataset) -> xr.Dataset:
-    """`found` with runs that went wrong as NaN: what statistics are taken of."""
-    return found.where(found["status"] == GOOD)
+def good(result: xr.Dataset) -> xr.Dataset:
+    """`result` with runs that went wrong as NaN: what statistics are taken of."""
+    return result.where(result["status"] == GOOD)
 
 
-def status_summary(found: xr.Dataset) -> str:
+def status_summary(result: xr.Dataset) -> str:
     """How many runs went wrong, and when first, in a sentence."""
-    status = np.asarray(found["status"])
+    status = np.asarray(result["status"])
     bad = int((status != GOOD).sum())
     if not bad:
         return f"All {status.size:,} runs ran to their end."
-    when = float(np.nanmin(np.where(status != GOOD, np.asarray(found["first_bad_time"]), np.nan)))
+    when = float(np.nanmin(np.where(status != GOOD, np.asarray(result["first_bad_time"]), np.nan)))
     return (
         f"{bad:,} of {status.size:,} runs ({bad / status.size:.2%}) went wrong, the first after {when:g} s: `status` "
         "says which, and `good` leaves them out."

@@ -40,16 +40,16 @@ class Recipe(eqx.Module):
         """Of everything that a run gives, and of what may be varied."""
         own = self.system.load.reading[1]
         own_of = {name: unit or (f"{own}/s" if name == "velocity" else own) for name, unit in SHOWN.items()}
-        found = {name: own_of[name] for name in self.keep}
+        result = {name: own_of[name] for name in self.keep}
         measured = {one.name: one.unit or own_of.get(getattr(one, "of", ""), own) for one in self.measures}
-        found |= measured
+        result |= measured
         table = parameters(self.system)
         for one in self.measures:
             for name in self.slopes:
                 below = table[name].unit if name in table else INPUT_UNITS[name]
-                found[slope_name(one.name, name)] = _per(measured[one.name], below)
+                result[slope_name(one.name, name)] = _per(measured[one.name], below)
         varied = {**INPUT_UNITS, **{name: one.unit for name, one in table.items()}}
-        return varied | found | {"status": "-", "first_bad_time": "s"}
+        return varied | result | {"status": "-", "first_bad_time": "s"}
 
 
 def slope_name(measure: str, name: str) -> str:
@@ -77,15 +77,15 @@ def single_run(recipe: Recipe, values: Values) -> dict[str, jax.Array]:
     names = [one.name for one in recipe.measures]
 
     def measured(at: Values) -> tuple[tuple[Scalar, ...], dict[str, jax.Array]]:
-        found = without_slopes(recipe, values | at)
-        return tuple(found[name] for name in names), found
+        result = without_slopes(recipe, values | at)
+        return tuple(result[name] for name in names), result
 
-    _, back, found = jax.vjp(measured, at, has_aux=True)
+    _, back, result = jax.vjp(measured, at, has_aux=True)
     for number, name in enumerate(names):
         weights = tuple(jnp.asarray(float(k == number)) for k in range(len(names)))
         (slopes,) = back(weights)
-        found |= {slope_name(name, by): slope for by, slope in slopes.items()}
-    return found
+        result |= {slope_name(name, by): slope for by, slope in slopes.items()}
+    return result
 
 
 def without_slopes(recipe: Recipe, values: Values) -> dict[str, jax.Array]:
