@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -11,12 +12,14 @@ import numpy as np
 import pytest
 
 from smajax.core.parameters import get_parameters, parameters, set_parameters, set_vector
-from smajax.engine import program
+from smajax.engine import Engine, facade, program
 from smajax.model.effects.library import LIBRARY
 from smajax.model.extended import extended
 from smajax.model.presets import build
 from smajax.model.system import System
 from smajax.model.wire.laws import LAWS, under_law
+from smajax.simulation.batch.axes import grid
+from smajax.simulation.batch.run_batch import run_batch
 from smajax.simulation.compiled import simulate_compiled
 from smajax.simulation.simulate import simulate
 
@@ -124,3 +127,46 @@ def test_steps_of_its_own_are_told_apart_from_fixed_ones():
         simulate_compiled(system, {channel: jnp.asarray(few)}, 0.1, 0.0)
     with pytest.raises(ValueError, match="voltage"):
         simulate_compiled(system, {}, 0.1)
+
+
+@pytest.mark.parametrize("engine", ["auto", "native"])
+def test_a_program_is_traced_once_for_runs_of_one_kind(engine: Engine, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Other values trace nothing; another length of the series, or another effect, traces once more."""
+    traces: list[object] = []
+
+    class Counted(facade.Traced):
+        def __init__(self, *arguments: Any) -> None:
+            traces.append(arguments)
+            super().__init__(*arguments)
+
+    monkeypatch.setattr(facade, "Traced", Counted)
+    monkeypatch.setattr(facade, "_programs", {})
+    system = build("flexinol_table_3_2", "dead_weight", "voltage")
+    for volts, mass in ((4.0, 0.075), (5.0, 0.075), (5.0, 0.1)):
+        heavier = set_parameters(system, {"load_mass": mass})
+        simulate_compiled(heavier, {"voltage": jnp.full(20, volts)}, 0.01, engine=engine)
+    assert len(traces) == 1
+    simulate_compiled(system, {"voltage": jnp.full(21, 5.0)}, 0.01, engine=engine)
+    assert len(traces) == 2
+    simulate_compiled(extended(system, ("latent_heat",)), {"voltage": jnp.full(21, 5.0)}, 0.01, engine=engine)
+    assert len(traces) == 3
+
+
+def test_batches_of_every_size_share_a_trace(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A sweep of three runs, of seventy and in chunks: one program."""
+    traces: list[object] = []
+
+    class Counted(facade.Traced):
+        def __init__(self, *arguments: Any) -> None:
+            traces.append(arguments)
+            super().__init__(*arguments)
+
+    monkeypatch.setattr(facade, "Traced", Counted)
+    monkeypatch.setattr(facade, "_programs", {})
+    system = build("flexinol_table_3_2", "dead_weight", "voltage")
+    for count in (3, 70):
+        batch = run_batch(
+            system, {"voltage": jnp.full(20, 5.0)}, grid(load_mass=np.linspace(0.05, 0.1, count)), keep=("position",)
+        )
+        assert batch.sizes["load_mass"] == count
+    assert len(traces) == 1
