@@ -13,6 +13,7 @@ import pytest
 
 from smajax.core.parameters import get_parameters, parameters, set_parameters, set_vector
 from smajax.engine import Engine, facade, program
+from smajax.engine.native import Traced
 from smajax.model.effects.library import LIBRARY
 from smajax.model.extended import extended
 from smajax.model.presets import build
@@ -134,7 +135,7 @@ def test_a_program_is_traced_once_for_runs_of_one_kind(engine: Engine, monkeypat
     """Other values trace nothing; another length of the series, or another effect, traces once more."""
     traces: list[object] = []
 
-    class Counted(facade.Traced):
+    class Counted(Traced):
         def __init__(self, *arguments: Any) -> None:
             traces.append(arguments)
             super().__init__(*arguments)
@@ -156,7 +157,7 @@ def test_batches_of_every_size_share_a_trace(monkeypatch: pytest.MonkeyPatch) ->
     """A sweep of three runs, of seventy and in chunks: one program."""
     traces: list[object] = []
 
-    class Counted(facade.Traced):
+    class Counted(Traced):
         def __init__(self, *arguments: Any) -> None:
             traces.append(arguments)
             super().__init__(*arguments)
