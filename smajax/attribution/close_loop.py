@@ -31,7 +31,7 @@ from smajax.attribution.neutral import check_neutral
 from smajax.attribution.outlier_run import outlier_runs
 from smajax.attribution.refusal import refuse_keys_of_identify
 from smajax.attribution.search import search
-from smajax.attribution.step_size_check import integration_error_of
+from smajax.attribution.step_size_check import finer_integration, integration_error_of
 from smajax.attribution.unknown_term import Lacking, in_place_of, unknown_terms
 from smajax.attribution.verdict import verdict_of
 from smajax.core.progress import Progress, Stage, as_progress, quiet, report_checks
@@ -40,6 +40,7 @@ from smajax.core.result_cache import ResultCache
 from smajax.data.experiment.record import Experiment
 from smajax.fit.sensitivity import sensitivity
 from smajax.fit.uncertainty import identifiability
+from smajax.simulation.steppers import Integration
 
 SEED = 2004
 CHECKING, WRITING = "checking what these runs determine", "standard errors and pictures"
@@ -104,8 +105,12 @@ def close_loop(  # keywords, which a caller names one by one
     cache = ResultCache(memory)
     settings = config or AttributionConfig()
     context = prepared(experiment, cache, as_progress(progress), seed, compile_per_model, settings)
-    base = context.setting.base(context.start, seed)
-    outcome = Outcome(*search(context.setting, base))
+    outcome = searched(context)
+    finer = finer_integration(context.setting, outcome.final)
+    if finer is not None:
+        # Models are compared as one integration gives them: all of them again.
+        context = prepared(experiment, cache, as_progress(progress), seed, compile_per_model, settings, finer)
+        outcome = searched(context)
     outcome = against_an_unknown_term(context, outcome)
     outcome = against_an_outlier_run(context, outcome)
     final, compared, rejected = validated(context.job, context.setting, outcome.base, outcome.final)
@@ -120,9 +125,10 @@ def prepared(  # the stage's inputs, each once
     seed: int,
     compile_per_model: bool,
     config: AttributionConfig,
+    integration: Integration | None = None,
 ) -> Context:
     """The experiment as a problem, and what its runs determine, from the Jacobian at the start values."""
-    job = job_of(experiment)
+    job = job_of(experiment, integration)
     progress(Stage(CHECKING, 0.0))
     start = job.problem.start_values()
     setting = Search(
@@ -141,6 +147,11 @@ def prepared(  # the stage's inputs, each once
     progress(Stage(CHECKING, 1.0))
     report_checks(progress, experiment.warnings, identifiable)
     return Context(job, setting, start, (*experiment.warnings, *identifiable), seed)
+
+
+def searched(context: Context) -> Outcome:
+    """The base model and the one that the search ends with."""
+    return Outcome(*search(context.setting, context.setting.base(context.start, context.seed)))
 
 
 def against_an_unknown_term(context: Context, outcome: Outcome) -> Outcome:

@@ -14,6 +14,7 @@ from smajax.fit.packed_runs import RunBatch, pack
 from smajax.fit.problem import Problem
 from smajax.model.effects.library import LIBRARY
 from smajax.model.extended import extended
+from smajax.simulation.steppers import Integration
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,7 @@ class Job:
     candidates: tuple[str, ...]
 
 
-def job_of(experiment: Experiment) -> Job:
+def job_of(experiment: Experiment, integration: Integration | None = None) -> Job:
     """The fit runs packed, the base model with every candidate at its base value, and the box of each parameter.
 
     A candidate that no fit run can show (a drift over cycles in a log of one, say) is left out here; a box that hangs on the
@@ -49,8 +50,7 @@ def job_of(experiment: Experiment) -> Job:
     declared_problem = problem_with(declared)
     extent = extent_of(declared_problem)
     names = tuple(name for name in names if LIBRARY[name].candidate.observable(extent))
-    # At the values that the file declares: by the end of a loop the error of the final model is measured and reported.
-    integration = choose_integration(declared_problem, declared_problem.system)
+    integration = integration or choose_integration(declared_problem, declared_problem.system)
     problem = with_integration(problem_with((*declared, *names)), integration)
     full = problem.system
     bounds = {entry.name: (entry.low, entry.high) for entry in parameters(full).values()}

@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from smajax.attribution.cross_validation import Model, Search, Start, base_value
-from smajax.fit.integration import IntegrationError, integration_error
+from smajax.fit.integration import IntegrationError, choose_integration, described, integration_error
 from smajax.fit.packed_runs import RunBatch, halved
 from smajax.fit.predicted import predicted_at
 from smajax.fit.problem import Problem
@@ -57,3 +57,16 @@ def integration_error_of(setting: Search, final: Model) -> IntegrationError:
     """What the integration leaves in the output of the final model on the fit runs."""
     problem, index = setting.restricted(final.effects)
     return integration_error(problem, problem.system_at(jnp.asarray(final.values[index])))
+
+
+def finer_integration(setting: Search, model: Model) -> Integration | None:
+    """The integration that `model` asks for, where the present one leaves more than a tenth of the noise in its output on the fit runs.
+
+    None where it does not, or where none leaves less.
+    """
+    problem, index = setting.restricted(model.effects)
+    system = problem.system_at(jnp.asarray(model.values[index]))
+    if integration_error(problem, system).small:
+        return None
+    finer = choose_integration(problem, system)
+    return None if described(finer) == described(problem.batch.integration) else finer

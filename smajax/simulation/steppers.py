@@ -8,6 +8,7 @@ from __future__ import annotations
 import dataclasses
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 from jax import lax
 
@@ -35,6 +36,7 @@ ONE_STEP = Integration()
 # Shortest part of a step on either side of a switch of the command, as a power of the rounding: 1.3e-6 in float64. Rounding in the
 # derivative by the time of the switch grows as the inverse square of the part: at 1.3e-6 it is below 2e-4, at 1e-8 of its own size.
 SHORTEST_PART = 0.375
+SAYS_NOTHING = 0.01  # of a step: the next one would grow from there by four at a time
 
 
 class FixedStep(eqx.Module):
@@ -123,7 +125,10 @@ class SwitchedSteps(eqx.Module):
 
         def advance(at: Carry, part: tuple[Scalar, Inputs]) -> Carry:
             length, now = part
-            return dataclasses.replace(self.within, dt=length)(at, now)
+            new = dataclasses.replace(self.within, dt=length)(at, now)
+            # How long a step may be is not learned from a part of next to no length.
+            none = length < SAYS_NOTHING * self.within.dt
+            return Carry(new.state, jax.tree.map(lambda old, own: jnp.where(none, old, own), at.memory, new.memory))
 
         return integrate(advance, carry, (lengths, held), Schedule(2)).end
 

@@ -3,22 +3,29 @@
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
 
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from smajax.attribution.close_loop import prepared
+from smajax.attribution.config import AttributionConfig
 from smajax.attribution.cross_validation import Model, Search
 from smajax.attribution.search import accepted_of
-from smajax.attribution.step_size_check import gain_kept_at_half_step
+from smajax.attribution.step_size_check import finer_integration, gain_kept_at_half_step, integration_error_of
 from smajax.core.parameters import parameters
+from smajax.core.progress import quiet
 from smajax.core.result_cache import ResultCache
+from smajax.data.open_experiment import open_experiment
+from smajax.fit.integration import described
 from smajax.fit.packed_runs import RunBatch, halved, simulate_batch
 from smajax.fit.predicted import misfits
 from smajax.fit.problem import Problem
 from smajax.model.extended import extended
 from smajax.model.presets import build
 
+DEMO = Path(__file__).parents[2] / "smajax" / "data" / "demo" / "latent" / "experiment.toml"
 DT, SAMPLES, NOISE = 0.1, 300, 1e-5
 TRUE = {"limit": 0.5, "sliding": 0.9, "speed": 1e-3, "bend": 1e-4}
 HEAT, FRICTION = ("latent_heat",), ("stribeck_friction",)
@@ -92,3 +99,20 @@ def test_a_gain_that_hangs_on_the_step_is_not_taken_and_the_next_best_is(setting
     assert [one.effects for one in reason.step_dependent] == ["stribeck_friction"]
     assert reason.step_dependent[0].gain_kept < 0.1
     assert reason.comparison is not None
+
+
+def test_an_effect_that_asks_for_a_finer_integration_than_the_base_model_gets_it() -> None:
+    """The demo logs at 100 ms; under Liang's conditions its branches end more sharply than those of the base model."""
+    experiment = open_experiment(DEMO)
+    context = prepared(experiment, ResultCache(), quiet, 1, False, AttributionConfig())
+    setting = context.setting
+    base, liang = _model(setting, ()), _model(setting, ("liang_conditions",), share=1.0)
+    assert integration_error_of(setting, base).small
+    assert finer_integration(setting, base) is None
+    assert not integration_error_of(setting, liang).small
+    finer = finer_integration(setting, liang)
+    assert finer is not None
+    again = prepared(experiment, ResultCache(), quiet, 1, False, AttributionConfig(), finer)
+    assert integration_error_of(again.setting, liang).small
+    assert again.job.held_out is not None
+    assert described(again.job.held_out.integration) == described(finer)
