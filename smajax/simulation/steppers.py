@@ -6,6 +6,7 @@ Each is an `advance` of `integrate`, for inputs by channel (SI; held, or of a co
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -33,9 +34,9 @@ class Integration(eqx.Module):
 
 
 ONE_STEP = Integration()
-# Shortest part of a step on either side of a switch of the command, as a power of the rounding: 1.3e-6 in float64. Rounding in the
-# derivative by the time of the switch grows as the inverse square of the part: at 1.3e-6 it is below 2e-4, at 1e-8 of its own size.
-SHORTEST_PART = 0.375
+# Shortest part of a step on either side of a switch of the command. Rounding in a derivative by the length of a step grows as its
+# inverse square: at 1e-6 it is 2e-4 of the derivative.
+SHORTEST_PART = 3e-6
 SAYS_NOTHING = 0.01  # of a step: the next one would grow from there by four at a time
 
 
@@ -99,8 +100,8 @@ class CouponSubsteps(eqx.Module):
 class SwitchedSteps(eqx.Module):
     """Two parts in `dt` (s), of a moving load whose command switches within: each part by the stepper `within`.
 
-    The derivative by the time of the switch is that of the lengths of the parts. Neither is of no length (`SHORTEST_PART`), for
-    which a step has no derivative by it.
+    The derivative by the time of the switch is that of the lengths of the parts. A switch next to an end of the step is none, so
+    that without a delay the run is that of the model without the effect; its derivative by the time is that at `SHORTEST_PART`.
     """
 
     within: FixedStep | ErrorControlledSteps
@@ -114,23 +115,42 @@ class SwitchedSteps(eqx.Module):
         return self.within.start(state, inputs)
 
     def __call__(self, carry: Carry, inputs: Inputs) -> Carry:
-        parts = switched(inputs)
-        if parts is None:  # a command that does not change in time has no series to be late
+        commands = switched(inputs)
+        if commands is None:  # a command that does not change in time has no series to be late
             return self.within(carry, inputs)
-        share, before, after = parts
-        shortest = float(jnp.finfo(share.dtype).eps) ** SHORTEST_PART
-        share = share + lax.stop_gradient(jnp.clip(share, shortest, 1.0 - shortest) - share)
-        lengths = self.within.dt * jnp.stack([share, 1.0 - share])
-        held = {name: jnp.stack([jnp.asarray(before[name], dtype=float), after[name]]) for name in after}
+        share, before, after = commands
+        at_end = (share < SHORTEST_PART) | (share > 1.0 - SHORTEST_PART)
 
-        def advance(at: Carry, part: tuple[Scalar, Inputs]) -> Carry:
-            length, now = part
-            new = dataclasses.replace(self.within, dt=length)(at, now)
+        clipped = share + lax.stop_gradient(jnp.clip(share, SHORTEST_PART, 1.0 - SHORTEST_PART) - share)
+        lengths = self.within.dt * jnp.stack([clipped, 1.0 - clipped, jnp.ones_like(clipped)])
+        one = {name: jnp.where(share < 0.5, after[name], before[name]) for name in after}
+        held = {name: jnp.stack([jnp.asarray(before[name], dtype=float), after[name], one[name]]) for name in after}
+
+        # One scan, so that the step is compiled once: the two parts, then the whole step from where they began.
+        def advance(parts: Carry, now: tuple[Any, Scalar, Inputs]) -> Carry:
+            number, length, command = now
+            _, at = parts.state
+            start = _where(number == 1, at, _without_derivative(at_end & (number == 0), carry))
+            within, command = _without_derivative(at_end & (number < 2), (self.within, command))
+            new = dataclasses.replace(within, dt=length)(start, command)
             # How long a step may be is not learned from a part of next to no length.
             none = length < SAYS_NOTHING * self.within.dt
-            return Carry(new.state, jax.tree.map(lambda old, own: jnp.where(none, old, own), at.memory, new.memory))
+            return Carry((at, Carry(new.state, _where(none, start.memory, new.memory))))
 
-        return integrate(advance, carry, (lengths, held), Schedule(2)).end
+        march = integrate(advance, Carry((carry, carry)), (jnp.arange(3), lengths, held), Schedule(3))
+        split, whole = march.end.state
+        moved = jax.tree.map(lambda alone, two: alone + (two - lax.stop_gradient(two)), whole, split)
+        return _where(at_end, moved, split)
+
+
+def _where(condition: Any, one: Any, other: Any) -> Any:
+    return jax.tree.map(lambda first, second: jnp.where(condition, first, second), one, other)
+
+
+def _without_derivative(condition: Any, tree: Any) -> Any:
+    """`tree`, whose numbers have no derivative where the condition holds."""
+    numbers, rest = eqx.partition(tree, eqx.is_inexact_array)
+    return eqx.combine(_where(condition, lax.stop_gradient(numbers), numbers), rest)
 
 
 Stepper = FixedStep | ErrorControlledSteps | CouponSubsteps | SwitchedSteps

@@ -412,8 +412,7 @@ def test_a_delay_of_whole_and_of_half_steps_is_the_shifted_input() -> None:
         places = np.clip(np.arange(360) - steps, 0, 359)
         late = simulate_compiled(extended(system, ("input_delay",), {"input_delay.delay": delay}), inputs, DT)
         moved = simulate_compiled(system, {channel: inputs[channel][places]}, DT)
-        # A switch at the very start of a step comes 1.3e-6 of it late (`SHORTEST_PART`).
-        np.testing.assert_allclose(late.reading, moved.reading, rtol=0.0, atol=1e-6 * np.ptp(moved.reading))
+        np.testing.assert_allclose(late.reading, moved.reading, rtol=0.0, atol=1e-9 * np.ptp(moved.reading))
     # Half a step: what two steps of half the length give, the first of them under the older command.
     half = simulate_compiled(extended(system, ("input_delay",), {"input_delay.delay": 0.5 * DT}), inputs, DT)
     twice = jnp.repeat(inputs[channel], 2)[np.clip(np.arange(719) - 1, 0, 719)]

@@ -33,7 +33,8 @@ class InputClock(AbstractEffect, InputLagTerm):
         formula="u(t) = u_recorded(t (1 - r))",
         sentence="Two recorders with two clocks: input and motion fit at the start of a run and drift apart towards its end.",
         switches=("rate",),
-        initial_guess={"rate": 0.005},
+        # By 0.005 the command of sample 200 would switch exactly at a sample, where the derivative of fixed steps is one-sided.
+        initial_guess={"rate": 0.0047},
         needs_time=True,
         applies=_applies,
         prior_class="event",
