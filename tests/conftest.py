@@ -23,6 +23,12 @@ if CACHE not in os.environ:
     os.environ[CACHE] = tempfile.mkdtemp(prefix="smajax-tests-")
     atexit.register(shutil.rmtree, os.environ[CACHE], ignore_errors=True)
 
+# Most of the suite's time is compilation by XLA, of programs that run once for milliseconds: it does without LLVM's
+# optimisation. Commands that a test starts inherit it. Every version of XLA knows this flag.
+UNOPTIMISED = "--xla_backend_optimization_level=0"
+if UNOPTIMISED.split("=")[0] not in os.environ.get("XLA_FLAGS", ""):
+    os.environ["XLA_FLAGS"] = f"{os.environ.get('XLA_FLAGS', '')} {UNOPTIMISED}".strip()
+
 prepare()
 
 # Tracing makes millions of small objects that live: the collector looked at them again and again, a tenth of the time.

@@ -44,7 +44,8 @@ def by_machine_code(
 
 
 def by_xla(function: Function, *own: np.ndarray) -> np.ndarray:
-    return np.asarray(jax.jit(jax.vmap(function))(*own))
+    """As XLA optimises it: other tests do without (tests/conftest.py), and a product and a sum are then rounded one by one."""
+    return np.asarray(jax.jit(jax.vmap(function), compiler_options={"xla_backend_optimization_level": 3})(*own))
 
 
 ELEMENTWISE: dict[str, Function] = {
