@@ -14,6 +14,8 @@ from smajax.engine.memory import copy, in_memory, in_registers, row, write
 from smajax.engine.text import Array, Lane, Text, Unsupported, scalar_type
 from smajax.engine.values import SMALL, Filled, Held, Stored, Value, held, is_known, size_of
 
+ALIGNED_BY_ATTRIBUTE = 22  # major version of LLVM from which a masked load states its alignment beside the pointers
+
 # What only moves numbers about, and which of the arguments are the numbers; the others say where to. None: all are.
 MOVES: dict[str, tuple[int, ...] | None] = {
     "broadcast_in_dim": None,
@@ -236,12 +238,21 @@ def looked_up(text: Text, array: Value, index: Lane, dtype: str) -> Lane:
     ]
     name = f"llvm.masked.gather.v{text.lanes}{text.suffix(dtype)}.v{text.lanes}p0"
     pointers = f"<{text.lanes} x ptr>"
-    text.declare(name, text.vector(dtype), [pointers, text.vector("bool"), text.vector(dtype)])
-    arguments = (
-        f"{pointers} align {text.bytes(dtype)} {places}, {text.vector('bool')} splat (i1 true), "
-        f"{text.vector(dtype)} poison"
-    )
+    everywhere = f"{text.vector('bool')} splat (i1 true), {text.vector(dtype)} poison"
+    if llvm_version() >= ALIGNED_BY_ATTRIBUTE:
+        text.declare(name, text.vector(dtype), [pointers, text.vector("bool"), text.vector(dtype)])
+        arguments = f"{pointers} align {text.bytes(dtype)} {places}, {everywhere}"
+    else:
+        text.declare(name, text.vector(dtype), [pointers, "i32", text.vector("bool"), text.vector(dtype)])
+        arguments = f"{pointers} {places}, i32 {text.bytes(dtype)}, {everywhere}"
     return Lane(text.work([*lines, f"call {text.vector(dtype)} @{name}({arguments})"], dtype), dtype)
+
+
+def llvm_version() -> int:
+    """Major version of the LLVM that llvmlite brings."""
+    import llvmlite.binding as llvm
+
+    return int(llvm.llvm_version_info[0])
 
 
 def _concatenate(text: Text, params: Any, given: list[Value], out: Array, kinds: Any) -> Value:
