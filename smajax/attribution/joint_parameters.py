@@ -1,0 +1,163 @@
+"""Parameters of the joint fit: the experiment's unknowns, and the coefficients of all candidate effects with their priors.
+
+A coefficient is counted in widths of its prior from its base value, so that the numbers of all coefficients compare.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from types import MappingProxyType
+
+import numpy as np
+
+from smajax.core.parameters import parameters
+from smajax.data.experiment.record import Prior
+from smajax.fit.predicted import predicted_and_derivatives
+from smajax.fit.problem import Problem
+from smajax.model.effects.candidate import PRIOR_ODDS, Extent
+from smajax.model.effects.library import LIBRARY
+from smajax.model.effects.prior_width import CoefficientPrior, width_of
+from smajax.model.load.base import AbstractMovingLoad
+from smajax.model.load.force import force_at_rest
+
+NUDGE = 5e-4  # widths: how far an effect is switched on where its trace is taken; at zero some have no slope
+RANGES = 1e3  # width of an unknown without a prior, in ranges between its bounds
+
+
+@dataclass(frozen=True)
+class JointParameters:
+    """Which parameters a joint fit has, within which bounds, and what is known of them before it."""
+
+    problem: Problem
+    unknowns: tuple[str, ...]  # those of the experiment, and the values of presets that the runs may correct
+    bounds: Mapping[str, tuple[float, float]]
+    coefficients: Mapping[str, tuple[str, ...]]  # of each candidate effect, by full name
+    priors: Mapping[str, CoefficientPrior]  # of every coefficient, and of the values of presets
+    log_odds: Mapping[str, float]  # of each effect, before the runs were seen
+
+    @classmethod
+    def of(
+        cls,
+        problem: Problem,
+        unknowns: Sequence[str],
+        bounds: Mapping[str, tuple[float, float]],
+        candidates: Sequence[str],
+        extent: Extent,
+        presets: Mapping[str, CoefficientPrior] = MappingProxyType({}),
+    ) -> JointParameters:
+        """Of a problem whose model carries all `candidates` at their base values. `presets`: of `preset_priors`."""
+        at_rest = _load_at_rest(problem)
+        coefficients, log_odds = {}, {}
+        priors = dict(presets)
+        for effect in candidates:
+            kind = LIBRARY[effect]
+            names = tuple(name for name in problem.names if name.startswith(f"{effect}."))
+            coefficients[effect] = names
+            log_odds[effect] = math.log(PRIOR_ODDS[kind.candidate.prior_class])
+            for name in names:
+                priors[name] = width_of(kind, name.split(".", 1)[1], bounds[name], extent, at_rest)
+        return cls(problem, (*unknowns, *presets), bounds, coefficients, priors, log_odds)
+
+    @cached_property
+    def slots(self) -> dict[str, int]:
+        """Place of every parameter in the vector of all."""
+        return {name: slot for slot, name in enumerate(self.problem.names)}
+
+    @cached_property
+    def units(self) -> dict[str, str]:
+        """Unit of every parameter of the model."""
+        return {name: entry.unit for name, entry in parameters(self.problem.system).items()}
+
+    def switches(self, effect: str) -> tuple[str, ...]:
+        """Coefficients that are zero where the effect is off, by full name."""
+        return tuple(f"{effect}.{name}" for name in LIBRARY[effect].candidate.switches)
+
+    def free(self, effects: Sequence[str]) -> list[str]:
+        """Every free parameter of a model with `effects`, the unknowns first."""
+        return [*self.unknowns, *(name for effect in effects for name in self.coefficients[effect])]
+
+    def one_sided(self, name: str) -> bool:
+        """Whether a coefficient cannot fall below its base value: its prior is half a normal distribution."""
+        prior = self.priors.get(name)
+        return prior is not None and not prior.logarithmic and self.bounds[name][0] >= prior.base
+
+    def scale(self, name: str, value: float) -> float:
+        """What one width of the prior (one range, of an unknown) is at `value`, in the parameter's unit."""
+        prior = self.priors.get(name)
+        if prior is None:
+            low, high = self.bounds[name]
+            return high - low
+        return prior.sigma * value if prior.logarithmic else prior.sigma
+
+    def deviation(self, name: str, value: float) -> float:
+        """Widths from the base value; 0 of an unknown."""
+        prior = self.priors.get(name)
+        if prior is None:
+            return 0.0
+        if prior.logarithmic:
+            return math.log(max(value, 1e-300) / prior.base) / prior.sigma
+        return (value - prior.base) / prior.sigma
+
+    def precision(self, name: str) -> float:
+        """Of the prior, per squared width."""
+        return 1.0 if name in self.priors else RANGES**-2
+
+    def restricted(self, effects: Sequence[str]) -> tuple[Problem, np.ndarray]:
+        """The same runs by a model that carries, of the candidates, only `effects`, with priors; where its parameters are in ours.
+
+        An effect that is off costs time in every step.
+        """
+        own = self.problem.system
+        carried = tuple(
+            one for one in own.effects if one.effect_name in effects or one.effect_name not in self.coefficients
+        )
+        batch, sigma = self.problem.batch, self.problem.noise_sigma
+        priors = self.prior_records(effects)
+        problem = Problem.build(
+            dataclasses.replace(own, effects=carried), batch, sigma, self.problem.offset, priors=priors
+        )
+        return problem, np.asarray([self.slots[name] for name in problem.names])
+
+    def prior_records(self, effects: Sequence[str]) -> dict[str, Prior]:
+        """Priors of the free parameters of a model with `effects`, for a fit."""
+        return {name: Prior(*self.priors[name]) for name in self.free(effects) if name in self.priors}
+
+    def without(self, values: np.ndarray, effects: Sequence[str]) -> np.ndarray:
+        """`values` (P,) with all coefficients of the effects that are not in `effects` at their base."""
+        changed = np.array(values)
+        for effect, names in self.coefficients.items():
+            if effect not in effects:
+                changed[[self.slots[name] for name in names]] = [self.priors[name].base for name in names]
+        return changed
+
+    def ordered(self, effects: Sequence[str]) -> tuple[str, ...]:
+        """`effects` in the order of the library, in which they act on the model."""
+        return tuple(effect for effect in self.coefficients if effect in effects)
+
+
+def _load_at_rest(problem: Problem) -> float:
+    """Force of the load at its start, mean of the runs, N (N m on an arm); 0 of a coupon."""
+    load = problem.system.load
+    if not isinstance(load, AbstractMovingLoad):
+        return 0.0
+    inputs = problem.batch.inputs
+    forces = [
+        float(force_at_rest(load, {name: series[run, 0] for name, series in inputs.items()}))
+        for run in range(problem.batch.runs)
+    ]
+    return float(np.mean(forces))
+
+
+def residual_and_columns(
+    problem: Problem, values: np.ndarray, names: Sequence[str]
+) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """(measured minus predicted, derivative of the prediction by each of `names`), on the measured samples, SI."""
+    tangents = np.eye(len(values))[[problem.names.index(name) for name in names]]
+    (predicted,), (derivatives,) = predicted_and_derivatives(problem, np.asarray(values)[None], tangents[None])
+    keep = np.asarray(problem.batch.mask) > 0
+    columns = {name: problem.centred(one)[keep] for name, one in zip(names, derivatives, strict=True)}
+    return problem.centred(problem.measured - predicted)[keep], columns

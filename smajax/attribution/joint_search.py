@@ -1,0 +1,352 @@
+"""Which effects the runs need: sets of effects by their evidence in the linear model, the best fitted, and so on from the likeliest.
+
+Each round takes one Jacobian by the coefficients of all candidates at the likeliest fit so far, searches all sets of
+effects in the linear model about it (`subset_evidence`), and fits the few best sets that have not been fitted, all
+parameters together. A set counts by the evidence of its own fit (`laplace_evidence`), never by the linear model's. It
+ends where no fitted set is likelier than the present one and neither of its effects can be removed or replaced.
+
+What the present model leaves is what an independent sample may be off by: at first the residual of the base model, so
+only strong effects are added; the better the model, the finer the effects that it tells.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from scipy.stats import qmc
+
+from smajax.attribution.joint_parameters import JointParameters
+from smajax.attribution.laplace_evidence import FittedModel, fitted_model
+from smajax.attribution.subset_evidence import LinearModel, Subset, linear_model
+from smajax.attribution.traces import Traces, Variant, traces_at
+from smajax.core.progress import Stage
+from smajax.fit.levenberg_marquardt import FitSettings, levenberg_marquardt
+from smajax.fit.predicted import sums_of_squares
+from smajax.model.effects.candidate import Extent
+from smajax.model.effects.library import LIBRARY
+
+MOST_ROUNDS = 20  # the evidence rises in every one of them, so this only ends what should have ended
+FITTED = 4  # sets a round
+REACH = 5.0  # nats below the best set in the linear model, within which a set is worth a fit
+STEPS, TOLERANCE = 30, 1e-5  # of a fit whose evidence is compared
+LEAST_START, MOST_START = 0.02, 2.0  # widths from the base where a fit of a new coefficient begins
+PLACES = 16  # a power of two, for Sobol's points: of an effect with several local minima, simulated and the best fitted
+LARGEST_STEP = 0.2  # of its range that an unknown moves to the start of a fit
+SETTLED = 0.05  # relative change of the error of a sample
+NOISE_EXCESS = 1.05  # a residual up to so many noises is noise: its size is the noise's
+LEAST_NOISE = 0.3  # of a noise that was estimated: what the residual shows counts down to that
+DETECTABLE = 1.0  # standard errors that an effect of one width has to change the runs by to be looked for
+CERTAIN = 300.0  # nats that the linear model loses without an effect, beyond which no refit makes up for it
+CARRIED = 12  # likeliest sets of the linear model whose effects the program of the fits carries
+REPLACED = 2  # other effects that are tried in the place of each at the end
+
+
+@dataclass
+class JointSearch:
+    """Settings of the search, and every model fitted in it."""
+
+    joint: JointParameters
+    extent: Extent
+    settings: FitSettings
+    noise: float  # of a sample, SI
+    noise_given: bool = True  # by the experiment file; else estimated from neighbouring samples
+    fitted: dict[tuple[str, ...], FittedModel] = field(default_factory=dict)
+    trials: dict[tuple[str, ...], float] = field(
+        default_factory=dict
+    )  # error of a sample at which a set was fitted last
+    rounds: list[JointRound] = field(default_factory=list)
+    detectable: tuple[str, ...] = ()
+    carried: tuple[str, ...] = ()  # effects of the program that fits run in, which grows with what is tried
+    on_round: Callable[[JointRound], None] = lambda _: None
+
+    def error(self, model: FittedModel) -> float:
+        """What an independent sample may be off by, given what `model` leaves: the noise, or the residual where it is larger."""
+        if not self.noise_given:
+            return max(LEAST_NOISE * self.noise, model.rms * float(np.sqrt(model.correlation)))
+        level = model.rms if model.rms > NOISE_EXCESS * self.noise else self.noise
+        return max(self.noise, level * float(np.sqrt(model.correlation)))
+
+    def best(self, error: float) -> FittedModel:
+        """The likeliest model."""
+        return max(self.fitted.values(), key=lambda model: model.log_evidence(error**2))
+
+    def probabilities(self, error: float) -> dict[tuple[str, ...], float]:
+        """Of every fitted set, among these."""
+        values = np.asarray([model.log_evidence(error**2) for model in self.fitted.values()])
+        weights = np.exp(values - values.max())
+        return dict(zip(self.fitted, (weights / weights.sum()).tolist(), strict=True))
+
+
+@dataclass(frozen=True)
+class JointRound:
+    """One round: what was fitted, and what is likeliest since."""
+
+    error: float  # of an independent sample, SI
+    present: tuple[str, ...]
+    gains: tuple[tuple[tuple[str, ...], float, float], ...]  # (effects, log evidence over the present model's, rms SI)
+    best: tuple[str, ...]
+    best_gain: float  # log evidence of the best over the present model's
+
+
+def search_jointly(search: JointSearch, base: np.ndarray) -> FittedModel:
+    """The likeliest model, from the base model fitted at `base` (P,). Fills `search.fitted` and `search.rounds`."""
+    present = fitted_model(search.joint, (), base, ())
+    search.fitted[()] = present
+    error = search.error(present)
+    linear, traces = _linear(search, present, error)
+    _fit(search, [frozenset()], linear, traces, error, 0)  # what presets say is free as well
+    present = search.fitted[()]
+    error = search.error(present)
+    checked: set[tuple[str, ...]] = set()  # models whose effects were removed and replaced one by one
+    for number in range(MOST_ROUNDS):
+        linear, traces = _linear(search, present, error)
+        last = present.effects in checked
+        sets = _neighbours(linear, present) if last else _promising(search, linear, present, error)
+        if sets:
+            _fit(search, sets, linear, traces, error, number)
+        best, before = search.best(error), present.log_evidence(error**2)
+        gains = tuple(
+            (effects, search.fitted[effects].log_evidence(error**2) - before, search.fitted[effects].rms)
+            for effects in dict.fromkeys(_effects(search, one) for one in sets)
+        )
+        done = JointRound(error, present.effects, gains, best.effects, best.log_evidence(error**2) - before)
+        search.rounds.append(done)
+        search.on_round(done)
+        moved, present = best.effects != present.effects, best
+        now = search.error(present)
+        settled, error = abs(np.log(now / error)) < SETTLED, now
+        if not moved and settled:
+            if last or not present.effects:
+                break
+            checked.add(present.effects)
+    return present
+
+
+def _effects(search: JointSearch, subset: Subset) -> tuple[str, ...]:
+    return search.joint.ordered([variant.effect for variant in subset])
+
+
+def _linear(search: JointSearch, present: FittedModel, error: float) -> tuple[LinearModel, Traces]:
+    """The linear model at the present fit, searched from no effects and from the present ones."""
+    traces = traces_at(search.joint, present, search.extent)
+    if not search.detectable:
+        search.detectable = detectable(search.joint, traces, search.noise)
+    linear = linear_model(search.joint, traces, error**2, search.detectable)
+    here: Subset = frozenset(Variant(effect, -1) for effect in present.effects)
+    for start in {frozenset(), here}:
+        linear.climb(start)
+    return linear, traces
+
+
+def detectable(joint: JointParameters, traces: Traces, noise: float) -> tuple[str, ...]:
+    """Effects of which one width would change the runs by more than the noise hides, beside what the unknowns absorb.
+
+    The unknowns absorb within their priors: with the values of presets free, some combinations of them change next to
+    nothing, and without a prior the remainder of rounding along these would absorb everything.
+    """
+    columns = [
+        traces.columns[name] * joint.scale(name, float(traces.values[joint.slots[name]])) for name in joint.unknowns
+    ]
+    matrix = np.stack(columns, axis=1) if columns else np.zeros((len(traces.residual), 0))
+    precision = np.diag([joint.precision(name) for name in joint.unknowns])
+    normal = matrix.T @ matrix + noise**2 * precision
+    size = 1.0 / np.sqrt(np.diag(normal))
+    factor = np.linalg.cholesky(normal * np.outer(size, size))
+    found = []
+    for variant, own in traces.variants.items():
+        for name in joint.switches(variant.effect):
+            column = own[name] * joint.priors[name].sigma
+            absorbed = np.linalg.solve(factor, size * (matrix.T @ column))
+            left = np.sqrt(max(float(column @ column - absorbed @ absorbed), 0.0))
+            if variant.effect not in found and left > DETECTABLE * noise:
+                found.append(variant.effect)
+    return joint.ordered(found)
+
+
+def _promising(search: JointSearch, linear: LinearModel, present: FittedModel, error: float) -> list[Subset]:
+    """The likeliest sets of the linear model that were not fitted at this error."""
+    ranked = linear.ranked()
+    here = max(
+        (linear.log_evidence(one) for one in ranked if _effects(search, one) == present.effects), default=-np.inf
+    )
+    least = max(here, linear.log_evidence(ranked[0])) - REACH
+    sets: dict[tuple[str, ...], Subset] = {}
+    for subset in ranked:
+        effects = _effects(search, subset)
+        if linear.log_evidence(subset) < least or len(sets) == FITTED:
+            break
+        fresh = abs(np.log(search.trials.get(effects, np.inf) / error)) > 2.0 * SETTLED
+        if effects != present.effects and fresh:
+            sets.setdefault(effects, subset)
+    return list(sets.values())
+
+
+def _neighbours(linear: LinearModel, present: FittedModel) -> list[Subset]:
+    """The present model without each of its effects, and with the likeliest others in the place of each."""
+    here: Subset = frozenset(Variant(effect, -1) for effect in present.effects)
+    sets = []
+    for gone in here:
+        rest = here - {gone}
+        if linear.log_evidence(rest) > linear.log_evidence(here) - CERTAIN:
+            sets.append(rest)
+        others = [one for one in linear.places if one.effect not in present.effects]
+        likeliest = sorted(others, key=lambda one: -linear.log_evidence(rest | {one}))
+        sets += [
+            rest | {one}
+            for one in likeliest[:REPLACED]
+            if linear.log_evidence(rest | {one}) > linear.log_evidence(here) - CERTAIN
+        ]
+    return sets
+
+
+def _fit(
+    search: JointSearch, sets: Sequence[Subset], linear: LinearModel, traces: Traces, error: float, number: int
+) -> None:
+    """Fit the sets, all side by side, from the present values and from where the linear model points to."""
+    joint = search.joint
+    # The program that fits run in also carries what the next sets are likely to have: compiling costs as much as a round.
+    next_ones = [effect for one in linear.ranked()[:CARRIED] for effect in _effects(search, one)]
+    wanted = {*next_ones, *(effect for one in sets for effect in _effects(search, one))}
+    if not {effect for one in sets for effect in _effects(search, one)} <= set(search.carried):
+        search.carried = joint.ordered([*search.carried, *wanted])
+    problem, index = joint.restricted(search.carried)
+    problem = eqx.tree_at(lambda one: one.noise_sigma, problem, jnp.broadcast_to(error, problem.noise_sigma.shape))
+    points = [[one[index] for one in starts(joint, subset, linear, traces)] for subset in sets]
+    # Of the places where a fit could begin the one that is nearest to the runs.
+    every = [one for places in points for one in places]
+    prior = [float(np.sum(problem.priors.rows(one) ** 2)) for one in every]
+    costs = np.nan_to_num(sums_of_squares(problem, every) + prior, nan=np.inf)
+    tasks, owners, first = [], [], 0
+    for subset, places in zip(sets, points, strict=True):
+        effects = _effects(search, subset)
+        start = places[int(np.argmin(costs[first : first + len(places)]))]
+        first += len(places)
+        # And, where an effect is new, from its usual size: near zero the misfit may have a minimum of its own.
+        usual = [_at_usual_size(joint, subset, traces, start, index)] if set(effects) - set(traces.present) else []
+        for one in (start, *usual):
+            tasks.append(problem.task(joint.free(effects), joint.bounds, one))
+            owners.append(effects)
+    stage = f"round {number + 1}: fitting the likeliest sets of effects"
+    settings = dataclasses.replace(search.settings, max_steps=STEPS, tolerance=TOLERANCE, stage=stage)
+    search.settings.progress(Stage(stage, 0.0))
+    best: dict[tuple[str, ...], FittedModel] = {}
+    for effects, fit in zip(owners, levenberg_marquardt(problem, tasks, settings), strict=True):
+        if np.isfinite(fit.cost):
+            values = np.array(traces.values)
+            values[index] = fit.values
+            # Coefficients of other effects count for nothing in this model.
+            model = fitted_model(joint, effects, joint.without(values, effects), search.carried)
+            if effects not in best or model.log_evidence(error**2) > best[effects].log_evidence(error**2):
+                best[effects] = model
+    for effects, model in best.items():
+        old = search.fitted.get(effects)
+        if old is None or model.log_evidence(error**2) > old.log_evidence(error**2):
+            search.fitted[effects] = model
+        search.trials[effects] = error
+
+
+def refined(search: JointSearch, model: FittedModel, error: float) -> FittedModel:
+    """A fitted model taken to its optimum, which standard errors need; `error` of an independent sample, SI."""
+    joint = search.joint
+    problem, index = joint.restricted(model.effects)
+    problem = eqx.tree_at(lambda one: one.noise_sigma, problem, jnp.broadcast_to(error, problem.noise_sigma.shape))
+    task = problem.task(model.names, joint.bounds, model.values[index])
+    settings = dataclasses.replace(search.settings, stage="taking the model to its optimum")
+    (fit,) = levenberg_marquardt(problem, [task], settings)
+    values = np.array(model.values)
+    values[index] = fit.values
+    best = fitted_model(joint, model.effects, values, model.effects)
+    if not best.log_evidence(error**2) > model.log_evidence(error**2):
+        return model
+    search.fitted[model.effects] = best
+    return best
+
+
+def starts(joint: JointParameters, subset: Subset, linear: LinearModel, traces: Traces) -> list[np.ndarray]:
+    """Where a fit of a set may begin, (P,) each: new coefficients at their linear estimate, unknowns where they are and there too.
+
+    An effect with several local minima gives ranges of its coefficients (`Candidate.start_ranges`): it is tried all over them.
+    """
+    slots, estimate = joint.slots, linear.estimate(subset)
+    values = joint.without(traces.values, [variant.effect for variant in subset])
+    new = [variant for variant in subset if variant.effect not in traces.present]
+    for variant in new:
+        for name, value in _begin(joint, variant, traces, estimate.coefficients).items():
+            values[slots[name]] = value
+    moved = np.array(values)
+    for name, step in estimate.unknowns.items():
+        low, high = joint.bounds[name]
+        most = LARGEST_STEP * (high - low)
+        moved[slots[name]] = np.clip(values[slots[name]] + np.clip(step, -most, most), low, high)
+    points = [values, moved]
+    for variant in new:
+        points += _all_over(joint, variant.effect, moved)
+    return [_off_bounds(joint, one) for one in points]
+
+
+def _at_usual_size(
+    joint: JointParameters, subset: Subset, traces: Traces, start: np.ndarray, index: np.ndarray
+) -> np.ndarray:
+    """`start`, of the parameters `index`, with the switches of new effects at their initial guess, on the side where they are."""
+    place = {int(slot): k for k, slot in enumerate(index)}
+    changed = np.array(start)
+    for variant in subset:
+        if variant.effect in traces.present:
+            continue
+        guesses = LIBRARY[variant.effect].candidate.initial_guess
+        for name in joint.switches(variant.effect):
+            k, (low, high) = place[joint.slots[name]], joint.bounds[name]
+            base, guess = joint.priors[name].base, guesses.get(name.split(".", 1)[1], joint.priors[name].sigma)
+            changed[k] = np.clip(base + np.copysign(abs(guess - base), changed[k] - base), low, 0.5 * (base + high))
+    return changed
+
+
+def _begin(
+    joint: JointParameters, variant: Variant, traces: Traces, estimated: Mapping[str, float]
+) -> dict[str, float]:
+    """Values of a new effect's coefficients, by full name."""
+    switches = joint.switches(variant.effect)
+    guesses = LIBRARY[variant.effect].candidate.initial_guess
+    values = {}
+    for name in joint.coefficients[variant.effect]:
+        prior, bounds = joint.priors[name], joint.bounds[name]
+        value = traces.places.get(variant, {}).get(name, guesses.get(name.split(".", 1)[1], prior.base))
+        if name in switches:
+            size = float(np.clip(estimated[name] / prior.sigma, -MOST_START, MOST_START))
+            if abs(size) < LEAST_START:
+                size = float(np.copysign(LEAST_START, size)) if bounds[0] < prior.base else LEAST_START
+            value = prior.base + size * prior.sigma
+        values[name] = float(np.clip(value, *bounds))
+    return values
+
+
+def _all_over(joint: JointParameters, effect: str, values: np.ndarray) -> list[np.ndarray]:
+    """`values` with the coefficients of an effect at Sobol points of the ranges in which fits of it begin, by logarithm."""
+    sizes = {name.split(".", 1)[1]: abs(float(values[joint.slots[name]])) for name in joint.switches(effect)}
+    ranges = LIBRARY[effect].candidate.start_ranges(sizes)
+    if not ranges:
+        return []
+    low, high = np.log(np.asarray(list(ranges.values()))).T
+    points = []
+    for share in qmc.Sobol(len(ranges), seed=0).random(PLACES):
+        point = np.array(values)
+        for name, value in zip(ranges, np.exp(low + share * (high - low)), strict=True):
+            full = f"{effect}.{name}"
+            point[joint.slots[full]] = np.clip(value, *joint.bounds[full])
+        points.append(point)
+    return points
+
+
+def _off_bounds(joint: JointParameters, values: np.ndarray) -> np.ndarray:
+    """A parameter that begins on its bound stays there."""
+    changed = np.array(values)
+    for name in joint.unknowns:
+        low, high = joint.bounds[name]
+        room = 1e-3 * (high - low)
+        changed[joint.slots[name]] = np.clip(changed[joint.slots[name]], low + room, high - room)
+    return changed

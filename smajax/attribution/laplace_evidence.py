@@ -1,0 +1,91 @@
+r"""Evidence of a fitted model by Laplace's approximation.
+
+$$\ln p(y|S) \approx -\frac{|r|^2}{2 s^2} - \tfrac12 \sum x_i^2 - \tfrac12 \ln\det(J^T J/s^2 + \Lambda) + \tfrac12\ln\det\Lambda,$$
+
+with standardised coefficients $x$ (widths of their priors) at the fit (MacKay 1992). A coefficient that cannot fall
+below its base has half a normal distribution before, and what of the posterior lies above the base after.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy import stats
+
+from smajax.attribution.joint_parameters import JointParameters, residual_and_columns
+from smajax.core.whiteness import correlation_time, split_runs
+
+LONGEST = 50.0  # samples: beyond it the correlation of a residual is its own shape, and no property of a noise
+
+
+@dataclass(frozen=True)
+class FittedModel:
+    """One set of effects with its best values, and what its evidence takes."""
+
+    effects: tuple[str, ...]
+    values: np.ndarray  # (P,)
+    names: tuple[str, ...]  # of the free parameters
+    scales: np.ndarray  # widths of their priors at the fit, SI
+    squares: float  # sum of squared residuals, SI
+    gram: np.ndarray  # of the standardised columns, SI squared
+    precision: np.ndarray
+    log_prior: float  # of the coefficients' values and of the effects' odds
+    one_sided: tuple[tuple[int, float], ...]  # (place among `names`, widths from the base)
+    residual: np.ndarray  # (n,) on the measured samples, SI
+    rms: float  # of it, SI
+    correlation: float  # samples to an independent one
+
+    def log_evidence(self, variance: float) -> float:
+        """Log evidence plus log prior odds; `variance` of an independent sample, SI squared, the same for all models compared."""
+        matrix = self.gram / variance + np.diag(self.precision)
+        value = self.log_prior - 0.5 * self.squares / variance
+        value += 0.5 * float(np.log(self.precision).sum()) - 0.5 * float(np.linalg.slogdet(matrix)[1])
+        if self.one_sided:
+            deviation = np.sqrt(np.diag(np.linalg.inv(matrix)))
+            value += sum(float(np.log(2.0) + stats.norm.logcdf(at / deviation[k])) for k, at in self.one_sided)
+        return value
+
+    def standard_errors(self, variance: float) -> dict[str, float]:
+        """Posterior standard deviation of every free parameter, in its unit."""
+        deviation = np.sqrt(np.diag(np.linalg.inv(self.gram / variance + np.diag(self.precision))))
+        return dict(zip(self.names, (deviation * self.scales).tolist(), strict=True))
+
+    @cached_property
+    def count(self) -> int:
+        """Free parameters."""
+        return len(self.names)
+
+
+def fitted_model(
+    joint: JointParameters, effects: tuple[str, ...], values: np.ndarray, carried: Sequence[str]
+) -> FittedModel:
+    """`effects` at their fitted `values` (P,). `carried`: effects of the program that computes it, these among them."""
+    names = joint.free(effects)
+    problem, index = joint.restricted(carried)
+    residual, columns = residual_and_columns(problem, values[index], names)
+    at = {name: float(values[joint.slots[name]]) for name in names}
+    scales = np.asarray([joint.scale(name, at[name]) for name in names])
+    matrix = np.stack([columns[name] for name in names], axis=1) * scales
+    deviations = [joint.deviation(name, at[name]) for name in names]
+    log_prior = sum(joint.log_odds[effect] for effect in effects) - 0.5 * float(np.square(deviations).sum())
+    mask = np.asarray(joint.problem.batch.mask)
+    whole = np.zeros(mask.shape)
+    whole[mask > 0] = residual
+    correlation = min(correlation_time(split_runs(whole, mask)), LONGEST)
+    return FittedModel(
+        effects,
+        np.asarray(values),
+        tuple(names),
+        scales,
+        float(residual @ residual),
+        matrix.T @ matrix,
+        np.asarray([joint.precision(name) for name in names]),
+        log_prior,
+        tuple((k, deviations[k]) for k, name in enumerate(names) if joint.one_sided(name)),
+        residual,
+        float(np.sqrt(np.mean(residual**2))),
+        correlation,
+    )

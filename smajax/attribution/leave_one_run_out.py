@@ -1,0 +1,79 @@
+r"""Error on each run by a fit to the others, without a refit where one step is enough.
+
+At the optimum of all runs, taking run r away moves the parameters by one Gauss-Newton step with the normal equations of the
+others (infinitesimal jackknife; Giordano et al. 2019),
+
+$$\delta = -(H - H_r)^{-1} g_r,\quad H = J^T J/s^2 + \Lambda,\ g_r = J_r^T r_r/s^2.$$
+
+The run is then simulated at $\theta + \delta$, not extrapolated. Where the step makes the others worse by more than their
+noise it is too long to be believed, and those fits are made.
+"""
+
+from __future__ import annotations
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+
+from smajax.attribution.joint_parameters import JointParameters
+from smajax.attribution.laplace_evidence import FittedModel
+from smajax.fit.levenberg_marquardt import FitSettings, levenberg_marquardt
+from smajax.fit.predicted import misfits
+from smajax.fit.problem import Problem
+from smajax.fit.sensitivity import sensitivity
+
+BELIEVED = 2.0  # by how much the others' sum of squares over the error may rise, twice the log-likelihood
+MOST_PARTS = 12  # runs are left out one by one, or in so many parts
+STEPS, TOLERANCE = 20, 1e-4  # of the refits
+
+
+def left_out_misfit(joint: JointParameters, model: FittedModel, error: float) -> np.ndarray:
+    """Misfit (SI) of each run, (series, N), by the model without it; of a single run, by the fit to it.
+
+    `error`: of an independent sample, SI.
+    """
+    problem, index = joint.restricted(model.effects)
+    problem = eqx.tree_at(lambda one: one.noise_sigma, problem, jnp.broadcast_to(error, problem.noise_sigma.shape))
+    values = model.values[index]
+    runs = problem.batch.runs
+    whole = misfits(problem, [values])[0]
+    if runs < 2 or not model.names:
+        return whole
+    parts = np.arange(runs) % min(runs, MOST_PARTS)
+    points = _steps(joint, problem, model, values, parts)
+    found = misfits(problem, points)
+    others = np.asarray([_cost(one, error, parts != part) for part, one in enumerate(found)])
+    before = np.asarray([_cost(whole, error, parts != part) for part in range(len(points))])
+    doubtful = np.flatnonzero(~(others < before + BELIEVED))
+    if doubtful.size:
+        tasks = [problem.task(model.names, joint.bounds, values, (parts != part).astype(float)) for part in doubtful]
+        fits = levenberg_marquardt(problem, tasks, FitSettings(max_steps=STEPS, tolerance=TOLERANCE))
+        found[doubtful] = misfits(problem, [fit.values for fit in fits])
+    return np.stack([found[part, run] for run, part in enumerate(parts)])
+
+
+def _steps(
+    joint: JointParameters, problem: Problem, model: FittedModel, values: np.ndarray, parts: np.ndarray
+) -> list[np.ndarray]:
+    """The parameters (P,) without each part of the runs, within their bounds."""
+    at = sensitivity(problem, values, model.names)
+    series = len(problem.batch.outputs)
+    precision = np.diag(model.precision)
+    columns = -at.jacobian * model.scales
+    gram = np.einsum("snp,snq->spq", columns, columns)
+    gradient = np.einsum("snp,sn->sp", columns, at.misfit)
+    owner = np.repeat(parts, series)
+    slots = [problem.names.index(name) for name in model.names]
+    low, high = np.asarray([joint.bounds[name] for name in model.names]).T
+    points = []
+    for part in range(parts.max() + 1):
+        others = gram[owner != part].sum(axis=0) + precision
+        step = -np.linalg.solve(others, gradient[owner == part].sum(axis=0)) * model.scales
+        point = np.array(values)
+        point[slots] = np.clip(point[slots] + step, low, high)
+        points.append(point)
+    return points
+
+
+def _cost(misfit: np.ndarray, error: float, runs: np.ndarray) -> float:
+    return float(np.nan_to_num((misfit[runs] ** 2).sum() / error**2, nan=np.inf))

@@ -1,0 +1,96 @@
+"""Traces of all candidate effects in the runs, at one fitted model: derivatives of the outputs by every coefficient.
+
+A time, a width or a scale of an effect means nothing while the effect is off, but the trace of switching it on depends on
+it: an effect may give several places at which to look (`Candidate.grid`), and each is a variant of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from smajax.attribution.joint_parameters import NUDGE, JointParameters, residual_and_columns
+from smajax.attribution.laplace_evidence import FittedModel
+from smajax.fit.integration import with_integration
+from smajax.fit.predicted import predicted_and_derivatives
+from smajax.model.effects.candidate import Extent
+from smajax.model.effects.library import LIBRARY
+from smajax.simulation.steppers import ONE_STEP
+
+
+class Variant(NamedTuple):
+    """An effect, and at which of its places it is switched on; -1 where it is, or where it begins by itself."""
+
+    effect: str
+    place: int
+
+
+@dataclass(frozen=True)
+class Traces:
+    """At `values` (P,) of a model that has the effects `present`; columns are on the n measured samples, in SI."""
+
+    values: np.ndarray
+    present: tuple[str, ...]
+    residual: np.ndarray  # (n,) measured minus predicted
+    columns: Mapping[str, np.ndarray]  # (n,), by unknowns and coefficients
+    variants: Mapping[Variant, Mapping[str, np.ndarray]]  # columns of each variant's coefficients
+    places: Mapping[Variant, Mapping[str, float]]  # values there, by full name
+
+
+def traces_at(joint: JointParameters, model: FittedModel, extent: Extent) -> Traces:
+    """Residual of a fitted model and derivatives there; effects that are off are switched on by `NUDGE` for theirs.
+
+    Derivatives by one step of the integration a sample: they only say which sets of effects are worth a fit.
+    """
+    values, present = model.values, model.effects
+    absent = [effect for effect in joint.coefficients if effect not in present]
+    here = _nudged(joint, values, absent)
+    names = [*joint.unknowns, *(name for own in joint.coefficients.values() for name in own)]
+    _, columns = residual_and_columns(with_integration(joint.problem, ONE_STEP), here, names)
+    variants: dict[Variant, Mapping[str, np.ndarray]] = {
+        Variant(effect, -1): {name: columns[name] for name in own} for effect, own in joint.coefficients.items()
+    }
+    places: dict[Variant, Mapping[str, float]] = {}
+    for effect in absent:
+        for number, place in enumerate(LIBRARY[effect].candidate.grid(extent)):
+            places[Variant(effect, number)] = {
+                f"{effect}.{name}": float(np.clip(value, *joint.bounds[f"{effect}.{name}"]))
+                for name, value in place.items()
+            }
+    variants |= _elsewhere(joint, values, places)
+    return Traces(np.asarray(values), present, model.residual, columns, variants, places)
+
+
+def _elsewhere(
+    joint: JointParameters, values: np.ndarray, places: Mapping[Variant, Mapping[str, float]]
+) -> dict[Variant, Mapping[str, np.ndarray]]:
+    """Columns of the switches of effects that are off, at their places."""
+    points, tangents, owners = [], [], []
+    for variant, place in places.items():
+        point = np.array(values)
+        point[[joint.slots[name] for name in place]] = list(place.values())
+        point = _nudged(joint, point, [variant.effect])
+        for name in joint.switches(variant.effect):
+            points.append(point)
+            tangents.append(np.eye(len(values))[[joint.slots[name]]])
+            owners.append((variant, name))
+    if not points:
+        return {}
+    problem = with_integration(joint.problem, ONE_STEP)
+    keep = np.asarray(problem.batch.mask) > 0
+    _, derivatives = predicted_and_derivatives(problem, np.stack(points), np.stack(tangents))
+    found: dict[Variant, dict[str, np.ndarray]] = {}
+    for (variant, name), derivative in zip(owners, derivatives, strict=True):
+        found.setdefault(variant, {})[name] = problem.centred(derivative[0])[keep]
+    return dict(found)
+
+
+def _nudged(joint: JointParameters, values: np.ndarray, effects: Sequence[str]) -> np.ndarray:
+    changed = np.array(values)
+    for effect in effects:
+        for name in joint.switches(effect):
+            changed[joint.slots[name]] += NUDGE * joint.priors[name].sigma
+    return changed

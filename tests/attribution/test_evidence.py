@@ -1,0 +1,140 @@
+"""Evidence in closed form: against integration by quadrature, and Laplace's against the linear model's."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import integrate, stats
+
+from smajax.attribution.joint_parameters import JointParameters
+from smajax.attribution.laplace_evidence import FittedModel
+from smajax.attribution.preset_priors import RELATIVE, preset_priors
+from smajax.attribution.subset_evidence import LinearModel
+from smajax.attribution.traces import Variant
+from smajax.core.parameters import parameter_values, parameters
+from smajax.model.presets import LOADS, WIRES, build
+from tests.helpers.hot_weight import NOISE, hot_weight
+
+A, B = Variant("latent_heat", -1), Variant("rising_convection", -1)
+
+
+def _linear(one_sided: bool, sizes: tuple[float, float], seed: int = 0) -> tuple[LinearModel, np.ndarray, np.ndarray]:
+    """Two effects of one coefficient each, no unknowns, noise of one; columns (n, 2) and outputs (n,)."""
+    rng = np.random.default_rng(seed)
+    columns = rng.standard_normal((30, 2)) * 0.4
+    outputs = columns @ np.asarray(sizes) + rng.standard_normal(30)
+    search = hot_weight({})
+    return (
+        LinearModel(
+            None,  # type: ignore[arg-type]  # neither traces nor parameters are read for the evidence
+            search.joint,
+            [],
+            {A: [0], B: [1]},
+            ["a", "b"],
+            np.ones(2),
+            columns.T @ columns,
+            columns.T @ outputs,
+            np.ones(2),
+            np.asarray([one_sided, False]),
+            {A: np.log(0.1), B: np.log(0.03)},
+        ),
+        columns,
+        outputs,
+    )
+
+
+@pytest.mark.parametrize("one_sided", [False, True])
+@pytest.mark.parametrize("sizes", [(0.0, 0.0), (1.5, -1.0), (-0.5, 0.7)])
+def test_the_evidence_of_a_set_is_the_integral_over_its_parameters(one_sided: bool, sizes: tuple[float, float]) -> None:
+    linear, columns, outputs = _linear(one_sided, sizes)
+
+    def density(a: float, b: float) -> float:
+        prior = stats.norm.pdf(a) * stats.norm.pdf(b) * (2.0 * (a >= 0.0) if one_sided else 1.0)
+        return float(prior * np.exp(-0.5 * np.sum((outputs - columns @ [a, b]) ** 2) + 0.5 * np.sum(outputs**2)))
+
+    both = integrate.dblquad(density, -6.0, 6.0, 0.0 if one_sided else -6.0, 6.0, epsabs=1e-10)[0]
+    first = integrate.quad(lambda a: density(a, 0.0) / stats.norm.pdf(0.0), 0.0 if one_sided else -6.0, 6.0)[0]
+    none = linear.log_evidence(frozenset())
+    assert linear.log_evidence(frozenset({A})) - none == pytest.approx(np.log(first) + np.log(0.1), abs=1e-5)
+    # With two coefficients the half-normal one is taken by its own margin.
+    tolerance = 1e-5 if not one_sided else 0.05
+    assert linear.log_evidence(frozenset({A, B})) - none == pytest.approx(np.log(both) + np.log(0.003), abs=tolerance)
+
+
+def test_the_search_over_sets_ends_at_the_best_of_all() -> None:
+    for seed in range(10):
+        linear, _, _ = _linear(False, (1.5, -1.0), seed)
+        sets = [frozenset(), frozenset({A}), frozenset({B}), frozenset({A, B})]
+        best = max(sets, key=linear.log_evidence)
+        assert linear.climb(frozenset()) == best
+        assert linear.climb(frozenset({A, B})) == best
+
+
+def test_laplaces_evidence_is_the_linear_models_where_the_model_is_linear() -> None:
+    linear, columns, outputs = _linear(False, (1.5, -1.0))
+    estimate = np.linalg.solve(columns.T @ columns + np.eye(2), columns.T @ outputs)
+    residual = outputs - columns @ estimate
+
+    def model(
+        effects: tuple[str, ...], gram: np.ndarray, values: np.ndarray, left: np.ndarray, odds: float
+    ) -> FittedModel:
+        prior = odds - 0.5 * float(values @ values)
+        size = len(values)
+        return FittedModel(
+            effects,
+            values,
+            tuple("ab"[:size]),
+            np.ones(size),
+            float(left @ left),
+            gram,
+            np.ones(size),
+            prior,
+            (),
+            left,
+            1.0,
+            1.0,
+        )
+
+    both = model(("a", "b"), columns.T @ columns, estimate, residual, np.log(0.003))
+    none = model((), np.zeros((0, 0)), np.zeros(0), outputs, 0.0)
+    expected = linear.log_evidence(frozenset({A, B})) - linear.log_evidence(frozenset())
+    assert both.log_evidence(1.0) - none.log_evidence(1.0) == pytest.approx(expected, abs=1e-9)
+    np.testing.assert_allclose(
+        list(both.standard_errors(1.0).values()), np.sqrt(np.diag(np.linalg.inv(columns.T @ columns + np.eye(2))))
+    )
+
+
+def test_a_model_without_what_is_off_is_the_base_model() -> None:
+    joint: JointParameters = hot_weight({}).joint
+    values = joint.problem.start_values() + 1.0
+    base = joint.without(values, ())
+    for names in joint.coefficients.values():
+        assert [base[joint.slots[name]] for name in names] == [joint.priors[name].base for name in names]
+    assert base[joint.slots["convection_coefficient"]] == values[joint.slots["convection_coefficient"]]
+    assert joint.scale("convection_coefficient", 100.0) == pytest.approx(350.0)
+    assert joint.one_sided("latent_heat.enthalpy")
+    assert not joint.one_sided("phase_resistance.contrast")
+    assert NOISE > 0.0
+
+
+def test_what_a_preset_says_is_free_within_its_width_unless_it_was_given() -> None:
+    system = build("flexinol_table_3_2", "dead_weight", "voltage")
+    table, values = parameters(system), parameter_values(system)
+    free = preset_priors(table, values, frozenset({"damping"}))
+    assert "young_modulus_martensite" in free
+    assert "damping" not in free
+    for name, prior in free.items():
+        assert prior.base == values[name]
+        assert prior.logarithmic
+        assert 0.0 < prior.sigma <= 1.0
+    known = {name for wire in WIRES for load in LOADS for name in _names(wire, load)}
+    assert set(RELATIVE) <= known
+    assert all(source for _, source in RELATIVE.values())
+
+
+def _names(wire: str, load: str) -> set[str]:
+    drive = "none" if "coupon" in load else "voltage"
+    try:
+        return set(parameters(build(wire, load, drive)))
+    except ValueError:
+        return set()

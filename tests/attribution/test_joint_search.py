@@ -1,0 +1,104 @@
+"""The joint search: it names what a bench lacks, alone and beside another, and nothing where nothing is missing."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from smajax.attribution.joint_parameters import JointParameters
+from smajax.attribution.joint_search import JointSearch, detectable, search_jointly, starts
+from smajax.attribution.laplace_evidence import fitted_model
+from smajax.attribution.leave_one_run_out import left_out_misfit
+from smajax.attribution.preset_priors import preset_priors
+from smajax.attribution.subset_evidence import linear_model
+from smajax.attribution.traces import Variant, traces_at
+from smajax.core.parameters import parameter_values, parameters
+from smajax.fit.levenberg_marquardt import FitSettings, levenberg_marquardt
+from smajax.fit.predicted import misfits
+from tests.helpers.hot_weight import CANDIDATES, NOISE, UNKNOWNS, hot_weight
+
+
+def _found(truth: dict[str, float]) -> tuple[JointSearch, dict[str, float], dict[str, float]]:
+    search = hot_weight(truth)
+    model = search_jointly(search, search.joint.problem.start_values())
+    slots = search.joint.slots
+    values = {
+        name: float(model.values[slots[name]]) for effect in model.effects for name in search.joint.coefficients[effect]
+    }
+    return search, values, model.standard_errors(search.error(model) ** 2)
+
+
+def test_an_effect_that_is_there_is_found_with_its_size() -> None:
+    search, values, errors = _found({"latent_heat.enthalpy": 1.2e4})
+    assert set(values) == {"latent_heat.enthalpy"}
+    assert values["latent_heat.enthalpy"] == pytest.approx(1.2e4, abs=4.0 * errors["latent_heat.enthalpy"])
+    probabilities = search.probabilities(search.error(search.fitted[("latent_heat",)]))
+    assert sum(value for effects, value in probabilities.items() if "latent_heat" in effects) > 0.99
+
+
+def test_two_effects_are_found_together() -> None:
+    _, values, errors = _found(
+        {"latent_heat.enthalpy": 1.2e4, "sensor_gain.error": 0.05, "phase_resistance.contrast": -0.2}
+    )
+    assert {"latent_heat.enthalpy", "phase_resistance.contrast"} <= set(values)
+    assert values["phase_resistance.contrast"] == pytest.approx(-0.2, abs=5.0 * errors["phase_resistance.contrast"])
+    # The gain of the sensor and the recoverable strain, which is unknown, are nearly one.
+    assert "rising_convection.slope" not in values
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_nothing_is_named_where_nothing_is_missing(seed: int) -> None:
+    search = hot_weight({}, seed=seed)
+    model = search_jointly(search, search.joint.problem.start_values())
+    assert model.effects == ()
+    assert search.probabilities(search.error(model))[()] > 0.5
+
+
+def test_an_effect_that_these_runs_cannot_show_is_not_looked_for() -> None:
+    """Where the noise is a million times larger nothing can be shown."""
+    search = hot_weight({})
+    base = fitted_model(search.joint, (), search.joint.problem.start_values(), ())
+    traces = traces_at(search.joint, base, search.extent)
+    assert "latent_heat" in detectable(search.joint, traces, NOISE)
+    assert detectable(search.joint, traces, 1e6 * NOISE) == ()
+
+
+def test_values_of_presets_that_are_free_hide_no_effect() -> None:
+    """Some combinations of them change next to nothing; along these they absorb no more than their priors allow."""
+    search = hot_weight({})
+    table, values = parameters(search.joint.problem.system), parameter_values(search.joint.problem.system)
+    presets = preset_priors(table, values, frozenset())
+    joint = JointParameters.of(search.joint.problem, UNKNOWNS, search.joint.bounds, CANDIDATES, search.extent, presets)
+    base = fitted_model(joint, (), joint.problem.start_values(), ())
+    found = detectable(joint, traces_at(joint, base, search.extent), NOISE)
+    assert {"latent_heat", "rising_convection", "asymmetric_transformation"} <= set(found)
+
+
+def test_runs_left_out_without_refits_are_as_with_them() -> None:
+    search, _, _ = _found({"latent_heat.enthalpy": 1.2e4})
+    joint, model = search.joint, search.fitted[("latent_heat",)]
+    approximate = left_out_misfit(joint, model, NOISE)
+    problem, index = joint.restricted(model.effects)
+    keep = 1.0 - np.eye(problem.batch.runs)
+    tasks = [problem.task(model.names, joint.bounds, model.values[index], weights) for weights in keep]
+    fits = levenberg_marquardt(problem, tasks, FitSettings(max_steps=30, tolerance=1e-10))
+    exact = np.stack([one[run] for run, one in enumerate(misfits(problem, [fit.values for fit in fits]))])
+    np.testing.assert_allclose(approximate, exact, atol=0.1 * NOISE)
+
+
+@pytest.mark.parametrize("effect", ["stribeck_friction", "sensor_backlash"])
+def test_a_fit_of_an_effect_with_several_minima_may_begin_all_over_its_ranges(effect: str) -> None:
+    search = hot_weight({}, (effect,))
+    base = fitted_model(search.joint, (), search.joint.problem.start_values(), ())
+    traces = traces_at(search.joint, base, search.extent)
+    linear = linear_model(search.joint, traces, NOISE**2, (effect,))
+    subset = frozenset({Variant(effect, -1)})
+    points = np.asarray(starts(search.joint, subset, linear, traces))
+    assert len(points) > 10
+    for name in search.joint.coefficients[effect]:
+        values = points[:, search.joint.slots[name]]
+        low, high = search.joint.bounds[name]
+        assert low <= values.min()
+        assert values.max() <= high
+    name = search.joint.switches(effect)[0]
+    assert np.ptp(points[:, search.joint.slots[name]]) > 0.0
