@@ -238,7 +238,7 @@ def page(result: TuningResult, pictures: Mapping[str, bytes], command: str) -> s
     parts = [
         f"<h1>Gains of {say(settings.controller)}, tuned</h1>",
         bullets(conclusions(result)),
-        f"<p>TuningResult on {say(settings.plants_sentence(result.air))}. {say(settings.goal_sentence())}.</p>",
+        f"<p>Tuned on {say(settings.plants_sentence(result.air))}. {say(settings.goal_sentence())}.</p>",
         picture(
             pictures["before_after.png"],
             "angles and figures of merit before and after",
@@ -274,8 +274,8 @@ def loops(result: TuningResult) -> str:
     for name, check in result.checks.items():
         for which, when in enumerate(("before", "after")):
             for plant, figures in zip(check.scenarios.rows.tolist(), check.seen.exact[which], strict=True):
-                sentences = [_plain(result, term, value) for term, value in zip(TERMS, figures, strict=True)]
-                rows.append([name, when, *plant[:-1], float(np.degrees(plant[-1])), *sentences])
+                merits = [_plain(result, term, value) for term, value in zip(TERMS, figures, strict=True)]
+                rows.append([name, when, *plant[:-1], float(np.degrees(plant[-1])), *merits])
     terms = [heading(name, UNITS.get(term.unit, term.unit)) for name, term in TERMS.items()]
     return csv_text(["check", "gains", *(f"{name} ratio" for name in MISMATCHES), "set point [deg]", *terms], rows)
 

@@ -20,16 +20,16 @@ def before_after(result: TuningResult, upright: bool = False) -> bytes:
 
     upright: one below the other, for a telephone.
     """
-    limited = [name for name in ("settling_time", "overshoot", "steady_error") if name in TERMS]
+    terms = [name for name in ("settling_time", "overshoot", "steady_error") if name in TERMS]
     if upright:
         figure = new_figure(13.0, width=4.6)
-        left, right, *below = figure.subplots(2 + len(limited), 1)
+        left, right, *below = figure.subplots(2 + len(terms), 1)
         right.sharey(left)
     else:
         figure = new_figure(7.4, width=WIDE)
         top, bottom = np.asarray(figure.subfigures(2, 1, height_ratios=[1.15, 1.0]))
         left, right = top.subplots(1, 2, sharey=True)
-        below = list(bottom.subplots(1, len(limited)))
+        below = list(bottom.subplots(1, len(terms)))
     lines = result.lines
     alone = len(np.unique(lines.targets))
     for axes, angles, colour, name in (
@@ -56,7 +56,7 @@ def before_after(result: TuningResult, upright: bool = False) -> bytes:
         right.plot([], [], color=MEASURED, linewidth=1.5, label="plant as believed")
         right.plot([], [], color=MEASURED, linewidth=0.5, label="plants never seen")
         right.legend(frameon=False, fontsize=8, loc="lower right")
-    for axes, name in zip(below, limited, strict=True):
+    for axes, name in zip(below, terms, strict=True):
         _over_set_points(axes, result, name)
     return as_png(figure)
 
