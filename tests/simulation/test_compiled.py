@@ -130,9 +130,9 @@ def test_steps_of_its_own_are_told_apart_from_fixed_ones():
         simulate_compiled(system, {}, 0.1)
 
 
-@pytest.mark.parametrize("engine", ["auto", "native"])
-def test_a_program_is_traced_once_for_runs_of_one_kind(engine: Engine, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Other values trace nothing; another length of the series, or another effect, traces once more."""
+@pytest.fixture
+def traces(monkeypatch: pytest.MonkeyPatch) -> list[object]:
+    """One entry for each function that is traced, in a process that has no programs yet."""
     traces: list[object] = []
 
     class Counted(Traced):
@@ -142,6 +142,12 @@ def test_a_program_is_traced_once_for_runs_of_one_kind(engine: Engine, monkeypat
 
     monkeypatch.setattr(facade, "Traced", Counted)
     monkeypatch.setattr(facade, "_programs", {})
+    return traces
+
+
+@pytest.mark.parametrize("engine", ["auto", "native"])
+def test_a_program_is_traced_once_for_runs_of_one_kind(engine: Engine, traces: list[object]) -> None:
+    """Other values trace nothing; another length of the series, or another effect, traces once more."""
     system = build("flexinol_table_3_2", "dead_weight", "voltage")
     for volts, mass in ((4.0, 0.075), (5.0, 0.075), (5.0, 0.1)):
         heavier = set_parameters(system, {"load_mass": mass})
@@ -153,17 +159,8 @@ def test_a_program_is_traced_once_for_runs_of_one_kind(engine: Engine, monkeypat
     assert len(traces) == 3
 
 
-def test_batches_of_every_size_share_a_trace(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_batches_of_every_size_share_a_trace(traces: list[object]) -> None:
     """A sweep of three runs, of seventy and in chunks: one program."""
-    traces: list[object] = []
-
-    class Counted(Traced):
-        def __init__(self, *arguments: Any) -> None:
-            traces.append(arguments)
-            super().__init__(*arguments)
-
-    monkeypatch.setattr(facade, "Traced", Counted)
-    monkeypatch.setattr(facade, "_programs", {})
     system = build("flexinol_table_3_2", "dead_weight", "voltage")
     for count in (3, 70):
         batch = run_batch(
