@@ -11,6 +11,8 @@ import jax.numpy as jnp
 from jax import lax
 from jax.ad_checkpoint import checkpoint_name
 
+from smajax.core.where_tree import where_tree
+
 # A segment may be this many times longer or shorter than the best one, to divide the steps evenly.
 UNEVEN = 2.0
 SOLVED = "solved"
@@ -52,7 +54,7 @@ def checkpointed_scan(
     def alive(carry: Any, now: tuple[Any, Any]) -> tuple[Any, Any]:
         own, live = now
         new, out = body(carry, own)
-        return jax.tree.map(lambda one, other: jnp.where(live, one, other), new, carry), out
+        return where_tree(live, new, carry), out
 
     step, inputs = (alive, (xs, jnp.arange(length + spare) < length)) if spare else (body, xs)
 

@@ -11,10 +11,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import jax
 import jax.numpy as jnp
 from jax import lax
 
+from smajax.core.where_tree import where_tree
 from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.system import System
 from smajax.model.types import Inputs, Scalar, State
@@ -71,7 +71,7 @@ def advance(
         proposed = lax.stop_gradient(jnp.maximum(length * factor, shortest))
         # A step cut short by the end of the time says nothing against a longer one.
         following = jnp.where(good & (length < at.tried), jnp.maximum(at.tried, proposed), proposed)
-        state = jax.tree.map(lambda one, other: jnp.where(good, one, other), new, at.state)
+        state = where_tree(good, new, at.state)
         left = jnp.where(good, jnp.where(last, 0.0, at.left - length), at.left)
         return _At(state, left, following, at.taken + 1)
 

@@ -13,6 +13,7 @@ import jax
 import jax.numpy as jnp
 from jax import lax
 
+from smajax.core.where_tree import where_tree
 from smajax.model.drive.inputs import switched
 from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.system import System
@@ -130,27 +131,23 @@ class SwitchedSteps(eqx.Module):
         def advance(parts: Carry, now: tuple[Any, Scalar, Inputs]) -> Carry:
             number, length, command = now
             _, at = parts.state
-            start = _where(number == 1, at, _without_derivative(at_end & (number == 0), carry))
+            start = where_tree(number == 1, at, _without_derivative(at_end & (number == 0), carry))
             within, command = _without_derivative(at_end & (number < 2), (self.within, command))
             new = dataclasses.replace(within, dt=length)(start, command)
             # How long a step may be is not learned from a part of next to no length.
             none = length < SAYS_NOTHING * self.within.dt
-            return Carry((at, Carry(new.state, _where(none, start.memory, new.memory))))
+            return Carry((at, Carry(new.state, where_tree(none, start.memory, new.memory))))
 
         march = integrate(advance, Carry((carry, carry)), (jnp.arange(3), lengths, held), Schedule(3))
         split, whole = march.end.state
         moved = jax.tree.map(lambda alone, two: alone + (two - lax.stop_gradient(two)), whole, split)
-        return _where(at_end, moved, split)
-
-
-def _where(condition: Any, one: Any, other: Any) -> Any:
-    return jax.tree.map(lambda first, second: jnp.where(condition, first, second), one, other)
+        return where_tree(at_end, moved, split)
 
 
 def _without_derivative(condition: Any, tree: Any) -> Any:
     """`tree`, whose numbers have no derivative where the condition holds."""
     numbers, rest = eqx.partition(tree, eqx.is_inexact_array)
-    return eqx.combine(_where(condition, lax.stop_gradient(numbers), numbers), rest)
+    return eqx.combine(where_tree(condition, lax.stop_gradient(numbers), numbers), rest)
 
 
 Stepper = FixedStep | ErrorControlledSteps | CouponSubsteps | SwitchedSteps
