@@ -14,10 +14,9 @@ from types import MappingProxyType
 
 import numpy as np
 
-from smajax.core.parameters import parameters
 from smajax.data.experiment.record import Prior
-from smajax.fit.predicted import predicted_and_derivatives
 from smajax.fit.problem import Problem
+from smajax.fit.sensitivity import sensitivity
 from smajax.model.effects.candidate import PRIOR_ODDS, Extent
 from smajax.model.effects.library import LIBRARY
 from smajax.model.effects.prior_width import CoefficientPrior, width_of
@@ -66,11 +65,6 @@ class JointParameters:
     def slots(self) -> dict[str, int]:
         """Place of every parameter in the vector of all."""
         return {name: slot for slot, name in enumerate(self.problem.names)}
-
-    @cached_property
-    def units(self) -> dict[str, str]:
-        """Unit of every parameter of the model."""
-        return {name: entry.unit for name, entry in parameters(self.problem.system).items()}
 
     def switches(self, effect: str) -> tuple[str, ...]:
         """Coefficients that are zero where the effect is off, by full name."""
@@ -156,8 +150,7 @@ def residual_and_columns(
     problem: Problem, values: np.ndarray, names: Sequence[str]
 ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """(measured minus predicted, derivative of the prediction by each of `names`), on the measured samples, SI."""
-    tangents = np.eye(len(values))[[problem.names.index(name) for name in names]]
-    (predicted,), (derivatives,) = predicted_and_derivatives(problem, np.asarray(values)[None], tangents[None])
-    keep = np.asarray(problem.batch.mask) > 0
-    columns = {name: problem.centred(one)[keep] for name, one in zip(names, derivatives, strict=True)}
-    return problem.centred(problem.measured - predicted)[keep], columns
+    at = sensitivity(problem, np.asarray(values), names)
+    keep, noise = at.mask > 0, np.asarray(problem.noise)
+    columns = {name: -(at.jacobian[..., k] * noise)[keep] for k, name in enumerate(names)}
+    return (at.misfit * noise)[keep], columns

@@ -15,10 +15,7 @@ import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-import equinox as eqx
-import jax.numpy as jnp
 import numpy as np
-from scipy.stats import qmc
 
 from smajax.attribution.joint_parameters import JointParameters
 from smajax.attribution.laplace_evidence import FittedModel, fitted_model
@@ -27,6 +24,7 @@ from smajax.attribution.traces import Traces, Variant, traces_at
 from smajax.core.progress import Stage
 from smajax.fit.levenberg_marquardt import FitSettings, levenberg_marquardt
 from smajax.fit.predicted import sums_of_squares
+from smajax.fit.starts import logarithmic_points
 from smajax.model.effects.candidate import Extent
 from smajax.model.effects.library import LIBRARY
 
@@ -215,7 +213,7 @@ def _fit(
     if not {effect for one in sets for effect in _effects(search, one)} <= set(search.carried):
         search.carried = joint.ordered([*search.carried, *wanted])
     problem, index = joint.restricted(search.carried)
-    problem = eqx.tree_at(lambda one: one.noise_sigma, problem, jnp.broadcast_to(error, problem.noise_sigma.shape))
+    problem = problem.with_noise(error)
     points = [[one[index] for one in starts(joint, subset, linear, traces)] for subset in sets]
     # Of the places where a fit could begin the one that is nearest to the runs.
     every = [one for places in points for one in places]
@@ -254,7 +252,7 @@ def refined(search: JointSearch, model: FittedModel, error: float) -> FittedMode
     """A fitted model taken to its optimum, which standard errors need; `error` of an independent sample, SI."""
     joint = search.joint
     problem, index = joint.restricted(model.effects)
-    problem = eqx.tree_at(lambda one: one.noise_sigma, problem, jnp.broadcast_to(error, problem.noise_sigma.shape))
+    problem = problem.with_noise(error)
     task = problem.task(model.names, joint.bounds, model.values[index])
     settings = dataclasses.replace(search.settings, stage="taking the model to its optimum")
     (fit,) = levenberg_marquardt(problem, [task], settings)
@@ -331,11 +329,10 @@ def _all_over(joint: JointParameters, effect: str, values: np.ndarray) -> list[n
     ranges = LIBRARY[effect].candidate.start_ranges(sizes)
     if not ranges:
         return []
-    low, high = np.log(np.asarray(list(ranges.values()))).T
     points = []
-    for share in qmc.Sobol(len(ranges), seed=0).random(PLACES):
+    for drawn in logarithmic_points(ranges, PLACES):
         point = np.array(values)
-        for name, value in zip(ranges, np.exp(low + share * (high - low)), strict=True):
+        for name, value in drawn.items():
             full = f"{effect}.{name}"
             point[joint.slots[full]] = np.clip(value, *joint.bounds[full])
         points.append(point)

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from scipy import stats
@@ -52,11 +51,6 @@ class FittedModel:
         """Posterior standard deviation of every free parameter, in its unit."""
         deviation = np.sqrt(np.diag(np.linalg.inv(self.gram / variance + np.diag(self.precision))))
         return dict(zip(self.names, (deviation * self.scales).tolist(), strict=True))
-
-    @cached_property
-    def count(self) -> int:
-        """Free parameters."""
-        return len(self.names)
 
 
 def fitted_model(

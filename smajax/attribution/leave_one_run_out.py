@@ -11,8 +11,6 @@ noise it is too long to be believed, and those fits are made.
 
 from __future__ import annotations
 
-import equinox as eqx
-import jax.numpy as jnp
 import numpy as np
 
 from smajax.attribution.joint_parameters import JointParameters
@@ -33,7 +31,7 @@ def left_out_misfit(joint: JointParameters, model: FittedModel, error: float) ->
     `error`: of an independent sample, SI.
     """
     problem, index = joint.restricted(model.effects)
-    problem = eqx.tree_at(lambda one: one.noise_sigma, problem, jnp.broadcast_to(error, problem.noise_sigma.shape))
+    problem = problem.with_noise(error)
     values = model.values[index]
     runs = problem.batch.runs
     whole = misfits(problem, [values])[0]

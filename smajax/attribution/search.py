@@ -12,7 +12,6 @@ import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from scipy.stats import qmc
 
 from smajax.attribution.config import AttributionConfig
 from smajax.attribution.cross_validation import Evidence, Fitted, Model, Search, Start, base_value
@@ -29,6 +28,7 @@ from smajax.attribution.nuisance_grid import Scanned, scanned
 from smajax.attribution.score_test import Score, screen, significant, switches
 from smajax.attribution.step_size_check import gain_kept_at_half_step
 from smajax.fit.levenberg_marquardt import Fit
+from smajax.fit.starts import logarithmic_points
 from smajax.model.effects.library import LIBRARY
 
 
@@ -67,10 +67,9 @@ def all_starts(
         ranges = LIBRARY[effect].candidate.start_ranges(sizes)
         if not ranges:
             continue
-        low, high = np.log(np.asarray(list(ranges.values()))).T
-        for share in qmc.Sobol(len(ranges), seed=0).random(points):
+        for point in logarithmic_points(ranges, points):
             values = np.array(first)
-            for name, one in zip(ranges, np.exp(low + share * (high - low)), strict=True):
+            for name, one in point.items():
                 values[names.index(f"{effect}.{name}")] = np.clip(one, *bounds[f"{effect}.{name}"])
             found.append(values)
     return found

@@ -20,6 +20,7 @@ from scipy import linalg, stats
 
 from smajax.attribution.joint_parameters import JointParameters
 from smajax.attribution.traces import Traces, Variant
+from smajax.fit.uncertainty import at_bound
 
 Subset = frozenset[Variant]
 IMPOSSIBLE = 6.0  # standard errors on the wrong side of zero
@@ -122,7 +123,9 @@ class LinearModel:
 def linear_model(joint: JointParameters, traces: Traces, variance: float, candidates: Sequence[str]) -> LinearModel:
     """Of the effects among `candidates` and those that are present. `variance`: of an independent sample, SI squared."""
     values, slots = traces.values, joint.slots
-    held = {name for name in joint.unknowns if _at_bound(values[slots[name]], joint.bounds[name])}
+    held = {
+        name for name in joint.unknowns if at_bound(float(values[slots[name]]), *joint.bounds[name], FREE_OF_BOUNDS)
+    }
     unknowns = [name for name in joint.unknowns if name not in held]
     names, scales, columns = list(unknowns), [], []
     for name in unknowns:
@@ -164,8 +167,3 @@ def _odds(joint: JointParameters, places: Mapping[Variant, object]) -> dict[Vari
     for variant in places:
         count[variant.effect] = count.get(variant.effect, 0) + 1
     return {variant: joint.log_odds[variant.effect] - float(np.log(count[variant.effect])) for variant in places}
-
-
-def _at_bound(value: float, bounds: tuple[float, float]) -> bool:
-    room = FREE_OF_BOUNDS * (bounds[1] - bounds[0])
-    return value - bounds[0] < room or bounds[1] - value < room

@@ -7,7 +7,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
@@ -143,7 +142,7 @@ def fit_within_tolerance(setup: Setup, options: Options) -> tuple[Setup, Fitted,
     fitted = fit_unknowns(setup, options)
     error = _integration_error(setup, fitted)
     if not error.small:
-        at_fit = with_noise(setup.every_run, fitted.problem)
+        at_fit = setup.every_run.with_noise(fitted.problem.noise_sigma)
         finer = choose_integration(at_fit, _system(setup, fitted), _per_run(setup, fitted))
         if described(finer) != error.description:
             setup = setup.integrated(finer)
@@ -158,7 +157,7 @@ def _system(setup: Setup, fitted: Fitted) -> System:
 
 def _integration_error(setup: Setup, fitted: Fitted) -> IntegrationError:
     """Of every run, at the fit."""
-    at_fit = with_noise(setup.every_run, fitted.problem)
+    at_fit = setup.every_run.with_noise(fitted.problem.noise_sigma)
     return integration_error(at_fit, _system(setup, fitted), _per_run(setup, fitted))
 
 
@@ -166,11 +165,6 @@ def _per_run(setup: Setup, fitted: Fitted) -> np.ndarray:
     """Each run's own values at the fit."""
     values = _full_values(setup.every_run, fitted.problem, fitted.best.values, fitted.values_of_held_out_runs)
     return np.asarray(setup.every_run.per_run_at(jnp.asarray(values[: len(setup.every_run.names)])))
-
-
-def with_noise(problem: Problem, fitted: Problem) -> Problem:
-    """`problem` with the noise that was estimated in `fitted`."""
-    return eqx.tree_at(lambda one: one.noise_sigma, problem, fitted.noise_sigma)
 
 
 def fit_unknowns(setup: Setup, options: Options, initial_guess: np.ndarray | None = None) -> Fitted:
@@ -206,7 +200,7 @@ def fit_unknowns(setup: Setup, options: Options, initial_guess: np.ndarray | Non
 def statistics_at(setup: Setup, fitted: Fitted, options: Options) -> Statistics:
     """Whiteness of the residual, and the covariance of the estimates."""
     robust, names = options.robust, setup.names
-    every_run = with_noise(setup.every_run, fitted.problem)
+    every_run = setup.every_run.with_noise(fitted.problem.noise_sigma)
     values = _full_values(every_run, fitted.problem, fitted.best.values, fitted.values_of_held_out_runs)
     everywhere = sensitivity(every_run, values, names)
     at = _of_fit_runs(everywhere, setup)
@@ -267,7 +261,9 @@ def _values_of_held_out_runs(setup: Setup, problem: Problem, values: np.ndarray,
     runs = [run for run in experiment.runs if run.role != "fit"]
     if not runs or not problem.per_run.names:
         return {}
-    held_out = with_integration(with_noise(declared_problem(experiment, runs), problem), problem.batch.integration)
+    held_out = with_integration(
+        declared_problem(experiment, runs).with_noise(problem.noise_sigma), problem.batch.integration
+    )
     start = held_out.start_values()
     start[: len(held_out.shared)] = values[: len(held_out.shared)]
     free = held_out.per_run.full_names

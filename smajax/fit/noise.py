@@ -5,8 +5,6 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Sequence
 
-import equinox as eqx
-import jax.numpy as jnp
 import numpy as np
 
 from smajax.fit.levenberg_marquardt import Fit
@@ -55,7 +53,7 @@ def fit_with_noise(
         sigmas = np.where(which, residual_sigmas(problem, best.values, free, robust), before)
         if float(np.abs(sigmas / before - 1.0).max()) < SETTLED:
             break
-        problem = eqx.tree_at(lambda one: one.noise_sigma, problem, jnp.asarray(sigmas))
+        problem = problem.with_noise(sigmas)
         new = fit(problem, best.values)
         best = dataclasses.replace(new, steps=new.steps + best.steps)
     return problem, best

@@ -125,6 +125,10 @@ class Problem(eqx.Module):
         """The same with other measured outputs."""
         return eqx.tree_at(lambda one: one.batch.output, self, output)
 
+    def with_noise(self, sigma: float | np.ndarray | Array) -> Problem:
+        """The same with another noise: of the one output or all, or of each, SI."""
+        return eqx.tree_at(lambda one: one.noise_sigma, self, jnp.asarray(sigma))
+
     @property
     def measured(self) -> np.ndarray:
         """The outputs, (series, N), SI."""

@@ -31,6 +31,13 @@ def box_points(start: np.ndarray, columns: Sequence[int], box: np.ndarray, count
     return points
 
 
+def logarithmic_points(ranges: Mapping[str, tuple[float, float]], count: int) -> list[dict[str, float]]:
+    """Sobol points of positive ranges by name, by their logarithm; `count` a power of two."""
+    low, high = np.log(np.asarray(list(ranges.values()))).T
+    shares = qmc.Sobol(len(ranges), seed=0).random(count)
+    return [dict(zip(ranges, np.exp(low + share * (high - low)).tolist(), strict=True)) for share in shares]
+
+
 def _costs(problem: Problem, points: np.ndarray, cache: ResultCache) -> np.ndarray:
     """Sum of squares at every point; infinite where the model gives no number."""
     key = cache.key(problem, "costs", points)
