@@ -95,10 +95,7 @@ def search_jointly(search: JointSearch, base: np.ndarray) -> FittedModel:
     """The likeliest model, from the base model fitted at `base` (P,). Fills `search.fitted` and `search.rounds`."""
     present = fitted_model(search.joint, (), base, ())
     search.fitted[()] = present
-    error = search.error(present)
-    linear, traces = _linear(search, present, error)
-    _fit(search, [frozenset()], linear, traces, error, 0)  # what presets say is free as well
-    present = search.fitted[()]
+    present = refined(search, present, search.error(present))  # what presets say is free as well
     error = search.error(present)
     checked: set[tuple[str, ...]] = set()  # models whose effects were removed and replaced one by one
     for number in range(MOST_ROUNDS):
@@ -207,11 +204,11 @@ def _fit(
 ) -> None:
     """Fit the sets, all side by side, from the present values and from where the linear model points to."""
     joint = search.joint
-    # The program that fits run in also carries what the next sets are likely to have: compiling costs as much as a round.
-    next_ones = [effect for one in linear.ranked()[:CARRIED] for effect in _effects(search, one)]
-    wanted = {*next_ones, *(effect for one in sets for effect in _effects(search, one))}
-    if not {effect for one in sets for effect in _effects(search, one)} <= set(search.carried):
-        search.carried = joint.ordered([*search.carried, *wanted])
+    needed = {effect for one in sets for effect in _effects(search, one)}
+    if not needed <= set(search.carried):
+        # The program that fits run in also carries what the next sets are likely to have: compiling costs as much as a round.
+        likely = {effect for one in linear.ranked()[:CARRIED] for effect in _effects(search, one)}
+        search.carried = joint.ordered([*search.carried, *needed, *likely])
     problem, index = joint.restricted(search.carried)
     problem = problem.with_noise(error)
     points = [[one[index] for one in starts(joint, subset, linear, traces)] for subset in sets]
