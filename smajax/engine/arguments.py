@@ -31,8 +31,8 @@ def signature(model: Any) -> Signature:
 def _kind(leaf: Any) -> Hashable:
     if is_array(leaf):
         return leaf.shape, leaf.dtype
-    # To Python 1, 1.0 and True are one key; to a traced program they are not.
-    return (type(leaf), repr(leaf)) if isinstance(leaf, bool | int | float | complex) else leaf
+    # To Python 1, 1.0, True and numpy's int8(1) are one key; to a traced program they are not.
+    return (type(leaf), repr(leaf)) if isinstance(leaf, bool | int | float | complex | np.generic) else leaf
 
 
 def key_of(function: Hashable, model: Any, names: tuple[str, ...]) -> Hashable:

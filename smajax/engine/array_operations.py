@@ -105,6 +105,8 @@ def moved(
 
 def _reshape(text: Text, params: Any, given: list[Value], out: Array, kinds: Any) -> Value:
     one = given[0]
+    if params.get("dimensions") is not None:
+        raise Unsupported("the operation `reshape` in another order of the dimensions")
     if isinstance(one, Stored):
         return Stored(one.address, out.shape, one.dtype, one.own)
     return held(list(in_registers(text, one).ravel()), out.shape)

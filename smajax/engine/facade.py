@@ -11,7 +11,7 @@ import warnings
 from collections.abc import Callable, Hashable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
-from typing import Any, Literal, TypeVar, cast, get_args
+from typing import TYPE_CHECKING, Any, Literal, TypeVar, cast, get_args
 
 import jax
 import numpy as np
@@ -19,8 +19,11 @@ import numpy as np
 from smajax.engine import xla
 from smajax.engine.arguments import check_arguments, checked_threads, key_of, signature
 from smajax.engine.cache import versions
-from smajax.engine.native import Function, NativeProgram, Traced
 from smajax.engine.text import Unsupported
+from smajax.engine.traced import Function, Traced
+
+if TYPE_CHECKING:
+    from smajax.engine.native import NativeProgram
 
 Engine = Literal["auto", "native", "xla"]
 VARIABLE = "SMAJAX_ENGINE"
@@ -161,6 +164,9 @@ def _made(function: Function, model: Any, names: tuple[str, ...], alone: bool, e
         return Program(function, model, names, alone, None)
     traced = Traced(function, model, names)  # what goes wrong in here goes wrong by XLA too
     try:
+        # Imported here: the translator reads names of JAX that a release may move, and then XLA has to run all the same.
+        from smajax.engine.native import NativeProgram
+
         native = NativeProgram(traced, alone)
     except Exception as error:
         if engine == "native":
@@ -173,18 +179,29 @@ def _made(function: Function, model: Any, names: tuple[str, ...], alone: bool, e
 def reason(error: BaseException) -> str:
     """Why there is no machine code, with the operation at which it failed."""
     named = str(error) if isinstance(error, Unsupported) else f"{type(error).__name__}: {error}"
-    return ", ".join([named, *getattr(error, "__notes__", ())])
+    # JAX adds notes too, on its tracebacks.
+    return ", ".join(
+        [named, *(note for note in getattr(error, "__notes__", ()) if note.startswith("while the operation"))]
+    )
+
+
+_said: set[str] = set()  # Python forgets what it has shown wherever a library changes a filter
 
 
 def _warn(error: BaseException, what: str) -> None:
-    warnings.warn(
-        _message(error, what), EngineWarning, stacklevel=1
-    )  # of one place, so that Python shows each reason once
+    """Once in a process for each reason."""
+    message = _message(error, what)
+    if message not in _said:
+        warnings.warn(message, EngineWarning, stacklevel=1)
+        _said.add(message)
 
 
 def _message(error: BaseException, what: str) -> str:
-    if isinstance(error, ImportError):
-        return f"machine code needs llvmlite, which cannot be imported ({error}): XLA is used, several times slower."
+    if isinstance(error, ImportError) and (error.name or "").split(".")[0] == "llvmlite":
+        return (
+            f"machine code needs llvmlite, which cannot be imported ({error}): XLA is used, several times slower. "
+            "`pip install llvmlite` brings it; with SMAJAX_ENGINE=xla nothing is said."
+        )
     return (
         f"machine code of a program {what}, so XLA runs it, several times slower: {reason(error)} ({versions()}). Where the model "
         "is smajax's own, please report this line with what `smajax doctor --json` says. SMAJAX_ENGINE=xla takes XLA at once."

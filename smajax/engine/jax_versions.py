@@ -42,6 +42,7 @@ TABLE: Mapping[str, Mapping[str, tuple[Reading, ...]]] = {
     "random_bits": {"bit_width": ("bit_width",), "shape": ("shape",)},
     "random_split": {"shape": ("shape",)},
     "reduce_precision": {"exponent_bits": ("exponent_bits",), "mantissa_bits": ("mantissa_bits",)},
+    "reshape": {"dimensions": ("dimensions",)},
     "round": {"rounding_method": ("rounding_method",)},
     "scan": {
         "program": ("jaxpr",),
@@ -122,4 +123,7 @@ def expanded(equation: Any) -> Any | None:
     for one in equation.invars:
         shape, dtype = kind_of(one.aval)
         kinds.append(jax.ShapeDtypeStruct(shape, dtype, weak_type=getattr(one.aval, "weak_type", False)))
-    return jax.make_jaxpr(stands_for)(*kinds)
+    try:
+        return jax.make_jaxpr(stands_for)(*kinds)
+    except Exception as error:  # of JAX's own: it has a lowering there that is not meant for this primitive
+        raise Unsupported(f"the operation `{equation.primitive.name}`") from error

@@ -7,12 +7,14 @@ import struct
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from smajax.engine.text import NAME, Array
-from smajax.engine.translate import Translated
+
+if TYPE_CHECKING:
+    from smajax.engine.translate import Translated
 
 ALIGNED = 64  # bytes
 # Of LLVM; part of the key of a cached program. Every instruction is on a whole vector already, and a step is long enough as

@@ -2,45 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import equinox as eqx
 import jax
-import jax.numpy as jnp
 import numpy as np
 
 from smajax.core.compiling import compiling
 from smajax.engine import cache
 from smajax.engine.arguments import is_array
 from smajax.engine.kernel import Kernel, compiled, divides_slowly, has_wide_vectors, vector_bits
+from smajax.engine.traced import Traced, plain
 from smajax.engine.translate import VECTORS, Translated, translate
 
 BITS = 60  # of the number by which runs are put in order
 MOST_SORTED = 6  # numbers of a run that are looked at for that
-Function = Callable[[Any, Any], Any]
-
-
-class Traced:
-    """What JAX makes of `function(model, own)` for one run: the program, and how its results are put together."""
-
-    def __init__(self, function: Function, model: Any, names: tuple[str, ...]) -> None:
-        arrays, static = eqx.partition(model, is_array)
-        leaves, tree = jax.tree.flatten(arrays)
-        shape: list[Any] = []
-
-        def run(*flat: jax.Array) -> list[jax.Array]:
-            inputs = [_like(leaf, one) for leaf, one in zip(leaves, flat, strict=False)]
-            whole = eqx.combine(jax.tree.unflatten(tree, inputs), static)
-            result = function(whole, dict(zip(names, flat[len(leaves) :], strict=True)))
-            results, out = jax.tree.flatten(result)
-            shape[:] = [out]
-            return results
-
-        none = jnp.zeros(())
-        self.program = jax.make_jaxpr(run)(*map(_plain, leaves), *(none for _ in names))
-        self.names, self.shared, self.tree = names, len(leaves), shape[0]
-        self.number = np.dtype(none.dtype)
 
 
 class NativeProgram:
@@ -67,7 +44,7 @@ class NativeProgram:
         """What the function gives, every leaf with one row a run; `own` are arrays of shape (runs,)."""
         leaves = jax.tree.leaves(eqx.filter(model, is_array))
         shared = [
-            np.ascontiguousarray(_plain(leaf), dtype=dtype) for leaf, dtype in zip(leaves, self._shared, strict=True)
+            np.ascontiguousarray(plain(leaf), dtype=dtype) for leaf, dtype in zip(leaves, self._shared, strict=True)
         ]
         order = alike([own[name] for name in self._names])
         values = [np.ascontiguousarray(own[name][order], dtype=self._dtype) for name in self._names]
@@ -104,19 +81,6 @@ def alike(series: Sequence[np.ndarray]) -> np.ndarray:
         for bit in range(bits):
             code |= ((rank >> bit) & 1) << (bit * len(varied) + place)
     return np.argsort(code, kind="stable")
-
-
-def _is_key(leaf: Any) -> bool:
-    return jnp.issubdtype(leaf.dtype, jax.dtypes.prng_key)
-
-
-def _plain(leaf: Any) -> Any:
-    """The numbers of a random key; anything else as it is."""
-    return jax.random.key_data(leaf) if _is_key(leaf) else leaf
-
-
-def _like(leaf: Any, plain: Any) -> Any:
-    return jax.random.wrap_key_data(plain, impl=jax.random.key_impl(leaf)) if _is_key(leaf) else plain
 
 
 def lanes_of(dtypes: set[str]) -> int:

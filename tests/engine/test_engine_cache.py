@@ -154,6 +154,15 @@ def test_a_program_of_other_compile_options_is_not_used(programs: Path, monkeypa
     assert len(list(programs.iterdir())) == 2
 
 
+def test_a_program_of_another_processor_is_not_used(programs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A folder that machines share: what one runs may be an illegal instruction to another."""
+    _run()
+    facade._programs.clear()
+    monkeypatch.setattr(cache, "processor", lambda: "another")
+    _run()
+    assert len(list(programs.iterdir())) == 2
+
+
 @pytest.mark.parametrize("place", [None, "gs://bucket/programs"])
 def test_nothing_is_kept_without_a_folder_of_this_machine(place: str | None) -> None:
     with _programs_in(place):

@@ -327,3 +327,70 @@ def test_the_engine_knows_nothing_of_wires_files_or_reports() -> None:
     )
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
     assert {".".join(name.split(".")[:2]) for name in loaded} == {"smajax.core", "smajax.engine"}
+
+
+MOVED = """
+import sys, warnings
+import jax.{module}
+del jax.{module}.{name}
+import numpy as np
+import smajax as sma
+from smajax.engine import EngineWarning, program
+with warnings.catch_warnings(record=True) as told:
+    warnings.simplefilter("always")
+    run = program(lambda model, own: model * own["a"], np.float64(2.0), ("a",))
+    print(run(np.float64(2.0), dict(a=np.arange(3.0))).tolist(), [str(one.message) for one in told if one.category is EngineWarning])
+"""
+
+
+@pytest.mark.parametrize(
+    ("module", "name"), [("extend.random", "threefry_prng_impl"), ("interpreters.partial_eval", "dce_jaxpr")]
+)
+def test_a_name_that_jax_has_moved_leads_to_xla(module: str, name: str) -> None:
+    """The translator imports names of JAX that a release may move: nothing of smajax but machine code needs them."""
+    code = MOVED.format(module=module, name=name)
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, env={**os.environ, "SMAJAX_ENGINE": "auto"}
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("[0.0, 2.0, 4.0] [")
+    assert "machine code of a program could not be made" in done.stdout
+    assert name in done.stdout
+    assert "llvmlite, which cannot be imported" not in done.stdout
+
+
+@pytest.mark.usefixtures("forgetful")
+def test_a_reason_is_said_once_whatever_changes_the_filters(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Python's own memory of what was shown ends where any library changes a filter."""
+    monkeypatch.setattr(translate, "translate", _fails("out of step"))
+    monkeypatch.setattr(native, "translate", _fails("out of step"))
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        for value in (1.0, 2.0):  # a number is part of the program: two programs
+            compiled_program(_sum, value, ("a",))
+    assert len([one for one in told if one.category is EngineWarning]) == 1
+
+
+@pytest.mark.usefixtures("forgetful")
+def test_numbers_of_numpy_of_other_types_are_other_programs() -> None:
+    """int8(100) is equal to int64(100) and has its hash, but not its square."""
+    with np.errstate(over="ignore"):
+        found = [
+            float(
+                compiled_program(lambda model, own: own["a"] + model * model, one, ("a",))(one, {"a": np.zeros(2)})[0]
+            )
+            for one in (np.int64(100), np.int8(100))
+        ]
+    assert found == [10000.0, 16.0]
+
+
+@pytest.mark.usefixtures("forgetful")
+def test_an_array_read_in_another_order_of_its_dimensions() -> None:
+    matrix = np.arange(300.0).reshape(20, 15)
+
+    def turned(model: Any, own: Any) -> Any:
+        return jax.lax.reshape(model * own["a"], (300,), dimensions=(1, 0))
+
+    with pytest.warns(EngineWarning, match="`reshape` in another order of the dimensions"):
+        run = compiled_program(turned, matrix, ("a",))
+    np.testing.assert_allclose(run(matrix, {"a": np.ones(2)})[1], matrix.T.ravel())

@@ -13,7 +13,7 @@ import pytest
 
 from smajax.core.parameters import get_parameters, parameters, set_parameters, set_vector
 from smajax.engine import Engine, facade, program
-from smajax.engine.native import Traced
+from smajax.engine.traced import Traced
 from smajax.model.effects.library import LIBRARY
 from smajax.model.extended import extended
 from smajax.model.presets import build
