@@ -27,6 +27,7 @@ from smajax.attribution.findings import (
 from smajax.attribution.found import effects_found, parameters_found
 from smajax.attribution.held_out import Compared, validated
 from smajax.attribution.job import Job, job_of
+from smajax.attribution.joint_stage import search_by_evidence
 from smajax.attribution.neutral import check_neutral
 from smajax.attribution.outlier_run import outlier_runs
 from smajax.attribution.refusal import refuse_keys_of_identify
@@ -55,6 +56,7 @@ class Context:
     start: np.ndarray  # (P,), start values of the parameters of base model and library
     check: tuple[str, ...]
     seed: int
+    joint: bool
 
 
 @dataclass(frozen=True)
@@ -82,11 +84,14 @@ def close_loop(  # keywords, which a caller names one by one
     seed: int = SEED,
     compile_per_model: bool = False,
     config: AttributionConfig | None = None,
+    joint: bool = False,
     apart: bool | None = None,
 ) -> Findings:
     """Fit the base model, look at what it leaves, find what it lacks, and validate on runs the fit never saw.
 
     `memory` is a folder for finished fits: a loop that was interrupted resumes from there. `compile_per_model`: of `Search`.
+    `joint`: sets of effects are compared by their evidence in one joint fit, in the place of rounds that add one effect at a
+    time; a preview, which is to replace them.
     Held-out runs are simulated when the search is over: they reject what they do not validate, and nothing is added
     for them. The caller chooses precision; anything but float64 is refused with a ValueError, because the
     differences that decide here are far below float32's rounding over a run. Raises PluginError for an effect of another
@@ -104,12 +109,12 @@ def close_loop(  # keywords, which a caller names one by one
     check_neutral()
     cache = ResultCache(memory)
     settings = config or AttributionConfig()
-    context = prepared(experiment, cache, as_progress(progress), seed, compile_per_model, settings)
+    context = prepared(experiment, cache, as_progress(progress), seed, compile_per_model, settings, joint=joint)
     outcome = searched(context)
     finer = finer_integration(context.setting, outcome.final)
     if finer is not None:
         # Models are compared as one integration gives them: all of them again.
-        context = prepared(experiment, cache, as_progress(progress), seed, compile_per_model, settings, finer)
+        context = prepared(experiment, cache, as_progress(progress), seed, compile_per_model, settings, finer, joint)
         outcome = searched(context)
     outcome = against_an_unknown_term(context, outcome)
     outcome = against_an_outlier_run(context, outcome)
@@ -126,6 +131,7 @@ def prepared(  # the stage's inputs, each once
     compile_per_model: bool,
     config: AttributionConfig,
     integration: Integration | None = None,
+    joint: bool = False,
 ) -> Context:
     """The experiment as a problem, and what its runs determine, from the Jacobian at the start values."""
     job = job_of(experiment, integration)
@@ -146,12 +152,13 @@ def prepared(  # the stage's inputs, each once
     identifiable = identifiability(sensitivity(job.problem, start, job.unknowns), job.unknowns, job.bounds)
     progress(Stage(CHECKING, 1.0))
     report_checks(progress, experiment.warnings, identifiable)
-    return Context(job, setting, start, (*experiment.warnings, *identifiable), seed)
+    return Context(job, setting, start, (*experiment.warnings, *identifiable), seed, joint)
 
 
 def searched(context: Context) -> Outcome:
     """The base model and the one that the search ends with."""
-    return Outcome(*search(context.setting, context.setting.base(context.start, context.seed)))
+    search_from = search_by_evidence if context.joint else search
+    return Outcome(*search_from(context.setting, context.setting.base(context.start, context.seed)))
 
 
 def against_an_unknown_term(context: Context, outcome: Outcome) -> Outcome:

@@ -75,6 +75,7 @@ class Evidence:
     alone_left_out_rmse: float = float("nan")
     base_left_out_rmse: float = float("nan")  # the base model, on the same
     without_left_out_rmse: float = float("nan")  # the final model with this effect taken out again
+    probability: float = float("nan")  # posterior, by the joint search
 
 
 @dataclass

@@ -155,6 +155,22 @@ class Scored:
 
 
 @dataclass(frozen=True)
+class LikelierModel:
+    """A set of effects is likelier than the present one, by log evidence and prior odds."""
+
+    before: str  # effects joined by " + "
+    log_odds: float  # over the model before
+    compared: tuple[tuple[str, float, float], ...]  # (effects, log odds over the model before, rms SI on the fit runs)
+
+
+@dataclass(frozen=True)
+class NoLikelierModel:
+    """None of the sets of effects that were fitted is likelier than the present one."""
+
+    compared: tuple[tuple[str, float, float], ...]
+
+
+@dataclass(frozen=True)
 class RoundLimit:
     """The search ends after so many rounds, whatever more there may be."""
 
@@ -204,6 +220,8 @@ Reason: TypeAlias = (
     ResidualIsNoise
     | NothingSignificant
     | Scored
+    | LikelierModel
+    | NoLikelierModel
     | RoundLimit
     | NoLongerNeeded
     | PredictsTooLittle

@@ -78,6 +78,8 @@ def effects_found(
             "score_p_value_at_the_end": last[name].p_value if name in last else float("nan"),
             "score_gain_at_the_end": last[name].gain if name in last else float("nan"),
         }
+        if np.isfinite(seen.probability):
+            evidence["posterior_probability"] = seen.probability
         findings.append(
             EffectFinding(
                 name,

@@ -30,6 +30,7 @@ VERDICTS = {
 }
 # Headings of the evidence in the order of the stages; a number with no heading here is shown under its own name.
 EVIDENCE = {
+    "posterior_probability": "posterior probability",
     "score_gain": "score test: predicted gain",
     "score_p_value": "score p-value",
     "alone_rmse_fit": "fit runs, with it alone",

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+
 from smajax.attribution.findings import (
     Comparison,
     HeldOutWorse,
+    LikelierModel,
     NoiseWithoutRun,
+    NoLikelierModel,
     NoLongerNeeded,
     NothingSignificant,
     PredictsTooLittle,
@@ -54,6 +58,10 @@ def reason_text(reason: Reason, unit: str, quantity: str) -> str:
                 for one in step_dependent
             ]
             return "; ".join([*parts, *([comparison_text(comparison, unit, quantity)] if comparison else [])])
+        case LikelierModel(before, log_odds, compared):
+            return f"likelier than {before or 'the base model'} by {log_odds:.1f} in log odds; {_compared(compared, error)}"
+        case NoLikelierModel(compared):
+            return f"no other set of effects is likelier; {_compared(compared, error)}"
         case RoundLimit(rounds):
             return f"the search ends after {rounds} rounds, whatever more there may be"
         case NoLongerNeeded(comparison):
@@ -69,3 +77,11 @@ def reason_text(reason: Reason, unit: str, quantity: str) -> str:
             return f"set aside: {title} alone predicts left-out runs better than all of them, {error(effects)} -> {error(term)}"
         case HeldOutWorse(without, with_it):
             return f"set aside: error on the held-out runs {error(without)} without and {error(with_it)} with it"
+
+
+def _compared(compared: Sequence[tuple[str, float, float]], error: Callable[[float], str]) -> str:
+    """`fitted: latent_heat (+812.0, error 0.05 mm), ...`; log odds are over the model before."""
+    if not compared:
+        return "none was worth a fit"
+    parts = [f"{effects or 'the base model'} ({odds:+.1f}, error {error(rms)})" for effects, odds, rms in compared]
+    return f"fitted: {', '.join(parts)}"

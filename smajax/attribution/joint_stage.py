@@ -1,0 +1,100 @@
+"""The joint search as a stage of the loop: it takes the base fit, and gives the models that the later stages take.
+
+Effects whose gain is gone at half the step of the integration are excluded and the search is made again without them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from smajax.attribution.cross_validation import Evidence, Model, Search
+from smajax.attribution.findings import LikelierModel, NoLikelierModel, Round, StepDependent
+from smajax.attribution.joint_parameters import JointParameters
+from smajax.attribution.joint_search import JointRound, JointSearch, refined, search_jointly
+from smajax.attribution.laplace_evidence import FittedModel
+from smajax.attribution.leave_one_run_out import left_out_misfit
+from smajax.attribution.step_size_check import gain_kept_at_half_step
+from smajax.fit.levenberg_marquardt import Fit, FitSettings
+from smajax.model.effects.library import LIBRARY
+
+
+@dataclass
+class _Stage:
+    setting: Search
+    settings: FitSettings
+    excluded: list[StepDependent] = field(default_factory=list)
+
+    def joint_search(self) -> JointSearch:
+        """Among the candidates that were not excluded."""
+        setting = self.setting
+        gone = {effect for one in self.excluded for effect in one.effects.split(" + ")}
+        names = [name for name in setting.candidates if name not in gone]
+        joint = JointParameters.of(setting.problem, setting.unknowns, setting.bounds, names, setting.extent)
+        noise = float(setting.problem.noise_sigma)
+        return JointSearch(joint, setting.extent, self.settings, noise, setting.noise_given, on_round=self.note)
+
+    def note(self, done: JointRound) -> None:
+        """A round of the joint search, among those of the findings."""
+        compared = tuple((_joined(effects), gain, rms) for effects, gain, rms in done.gains)
+        number = len(self.setting.rounds) + 1
+        if done.best == done.present:
+            self.setting.note(Round(number, (), "", NoLikelierModel(compared)))
+        else:
+            reason = LikelierModel(_joined(done.present), done.best_gain, compared)
+            self.setting.note(Round(number, (), _joined(done.best), reason))
+
+
+def search_by_evidence(setting: Search, base: Fit) -> tuple[Model, Model]:
+    """(base model, likeliest model). Fills `setting.evidence` and `setting.rounds` on the way."""
+    settings = FitSettings(tolerance=setting.config.final_convergence, cache=setting.cache, progress=setting.progress)
+    stage = _Stage(setting, settings)
+    while True:
+        search = stage.joint_search()
+        found = search_jointly(search, base.values)
+        error = search.error(found)
+        best = refined(search, found, error)
+        first, final = (as_model(search, one, error) for one in (search.fitted[()], best))
+        kept = gain_kept_at_half_step(setting, final, first) if final.effects else 1.0
+        if kept >= setting.config.gain_kept_at_half_step:
+            break
+        jumping = [name for name in final.effects if LIBRARY[name].candidate.stick_slip]
+        stage.excluded.append(StepDependent(_joined(jumping), kept))
+    probabilities = effect_probabilities(search, error)
+    for effect in search.joint.coefficients:
+        seen = setting.evidence.setdefault(effect, Evidence())
+        seen.probability = probabilities.get(effect, 0.0)
+        if (effect,) in search.fitted:
+            seen.alone_rmse = search.fitted[(effect,)].rms
+    return first, final
+
+
+def effect_probabilities(search: JointSearch, error: float) -> dict[str, float]:
+    """Posterior probability of each effect among the models that were fitted; `error` of an independent sample, SI."""
+    found: dict[str, float] = {}
+    for effects, probability in search.probabilities(error).items():
+        for effect in effects:
+            found[effect] = found.get(effect, 0.0) + probability
+    return found
+
+
+def as_model(search: JointSearch, fitted: FittedModel, error: float) -> Model:
+    """A fitted model as the later stages take it, the effect that the evidence needs least at the end."""
+    misfit = left_out_misfit(search.joint, fitted, error)
+    rmse = float(np.sqrt((misfit**2).sum() / np.asarray(search.joint.problem.batch.mask).sum()))
+    effects = tuple(sorted(fitted.effects, key=lambda effect: -_needed(search, effect, fitted, error)))
+    return Model(effects, fitted.values, fitted.squares / search.noise**2, misfit, rmse)
+
+
+def _needed(search: JointSearch, effect: str, model: FittedModel, error: float) -> float:
+    """Log evidence of `model` over the likeliest fitted one without `effect`: of its own effects, where any was fitted."""
+    rest = tuple(name for name in model.effects if name != effect)
+    if rest not in search.fitted:
+        return np.inf  # the linear model is certain of it
+    return model.log_evidence(error**2) - search.fitted[rest].log_evidence(error**2)
+
+
+def _joined(effects: Sequence[str]) -> str:
+    return " + ".join(effects)
