@@ -84,14 +84,14 @@ def close_loop(  # keywords, which a caller names one by one
     seed: int = SEED,
     compile_per_model: bool = False,
     config: AttributionConfig | None = None,
-    joint: bool = False,
+    joint: bool = True,
     apart: bool | None = None,
 ) -> Findings:
     """Fit the base model, look at what it leaves, find what it lacks, and validate on runs the fit never saw.
 
     `memory` is a folder for finished fits: a loop that was interrupted resumes from there. `compile_per_model`: of `Search`.
-    `joint`: sets of effects are compared by their evidence in one joint fit, in the place of rounds that add one effect at a
-    time; a preview, which is to replace them.
+    `joint`: whole sets of effects are compared by their evidence, all parameters fitted together; else effects are added
+    round by round where they predict left-out runs better.
     Held-out runs are simulated when the search is over: they reject what they do not validate, and nothing is added
     for them. The caller chooses precision; anything but float64 is refused with a ValueError, because the
     differences that decide here are far below float32's rounding over a run. Raises PluginError for an effect of another
@@ -131,7 +131,7 @@ def prepared(  # the stage's inputs, each once
     compile_per_model: bool,
     config: AttributionConfig,
     integration: Integration | None = None,
-    joint: bool = False,
+    joint: bool = True,
 ) -> Context:
     """The experiment as a problem, and what its runs determine, from the Jacobian at the start values."""
     job = job_of(experiment, integration)

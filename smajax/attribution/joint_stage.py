@@ -11,11 +11,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from smajax.attribution.cross_validation import Evidence, Model, Search
-from smajax.attribution.findings import LikelierModel, NoLikelierModel, Round, StepDependent
+from smajax.attribution.findings import LikelierModel, NoLikelierModel, Round, Scored, StepDependent
 from smajax.attribution.joint_parameters import JointParameters
 from smajax.attribution.joint_search import JointRound, JointSearch, refined, search_jointly
 from smajax.attribution.laplace_evidence import FittedModel
 from smajax.attribution.leave_one_run_out import left_out_misfit
+from smajax.attribution.search import refined as at_optimum
 from smajax.attribution.step_size_check import gain_kept_at_half_step
 from smajax.fit.levenberg_marquardt import Fit, FitSettings
 from smajax.model.effects.library import LIBRARY
@@ -35,6 +36,12 @@ class _Stage:
         joint = JointParameters.of(setting.problem, setting.unknowns, setting.bounds, names, setting.extent)
         noise = float(setting.problem.noise_sigma)
         return JointSearch(joint, setting.extent, self.settings, noise, setting.noise_given, on_round=self.note)
+
+    def exclude(self, effects: Sequence[str], kept: float) -> None:
+        """Effects that keep only that share of their gain at half the step."""
+        self.excluded.append(StepDependent(_joined(effects), kept))
+        number = len(self.setting.rounds) + 1
+        self.setting.note(Round(number, (), "", Scored(None, (self.excluded[-1],))))
 
     def note(self, done: JointRound) -> None:
         """A round of the joint search, among those of the findings."""
@@ -57,11 +64,14 @@ def search_by_evidence(setting: Search, base: Fit) -> tuple[Model, Model]:
         error = search.error(found)
         best = refined(search, found, error)
         first, final = (as_model(search, one, error) for one in (search.fitted[()], best))
+        if (
+            final.effects
+        ):  # by the runs alone, from points nearby as well: what is reported is no compromise with a prior
+            final = at_optimum(setting, final)
         kept = gain_kept_at_half_step(setting, final, first) if final.effects else 1.0
         if kept >= setting.config.gain_kept_at_half_step:
             break
-        jumping = [name for name in final.effects if LIBRARY[name].candidate.stick_slip]
-        stage.excluded.append(StepDependent(_joined(jumping), kept))
+        stage.exclude([name for name in final.effects if LIBRARY[name].candidate.stick_slip], kept)
     probabilities = effect_probabilities(search, error)
     for effect in search.joint.coefficients:
         seen = setting.evidence.setdefault(effect, Evidence())

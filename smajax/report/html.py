@@ -240,6 +240,7 @@ def findings_to_html(findings: Findings, narrative: Narrative | None = None) -> 
         added=findings.added,
         ranked=pictures.ranked(findings.effects),
         evidence=_evidence(findings),
+        joint=any("posterior_probability" in effect.evidence for effect in findings.effects),
         columns=[name for name in _evidence(findings) if name not in ASIDE],
         known=lambda value: value is not None and math.isfinite(value),
         evidence_title=lambda name: EVIDENCE.get(name, label(name)),
@@ -253,7 +254,9 @@ def findings_to_html(findings: Findings, narrative: Narrative | None = None) -> 
         units=units,
         picture_errors=picture(pictures.errors_by_run(findings), "Error of each run before and after", "narrow"),
         picture_candidates=picture(
-            pictures.candidates_ranked(findings), "Base model and candidates by error", "narrow"
+            pictures.effect_probabilities(findings) or pictures.candidates_ranked(findings),
+            "Candidates by probability, or by error on runs left out",
+            "narrow",
         ),
         picture_phases=picture(pictures.residual_by_phase(findings), "Residual by phase of the wire"),
         picture_correlation=picture(pictures.residual_correlation(findings), "Autocorrelation of the residual"),

@@ -24,6 +24,7 @@ WIDTH = 6.6  # inches; with the text size below still readable on a telephone
 NARROW = 5.2  # for pictures of one simple panel
 DPI = 150
 SAMPLES_DRAWN = 3000  # per curve: more than the pixels across
+LEAST_PROBABILITY = 0.01  # of an effect that is drawn
 STRIPS = 3  # input channels drawn under one run
 
 
@@ -226,12 +227,51 @@ def _left_out(effect: EffectFinding, which: str = "leave_one_out_rmse") -> float
     return effect.evidence.get(which, float("nan"))
 
 
-def ranked(effects: Sequence[EffectFinding]) -> list[EffectFinding]:
-    """The added effects first, then by error on runs left out, then by the gain predicted by the score test; those not reached last."""
+def effect_probabilities(findings: Findings) -> bytes | None:
+    """Posterior probability of each effect that has any, the likeliest first; None without a joint search."""
+    shown = [
+        (effect, probability(effect))
+        for effect in ranked(findings.effects)
+        if effect.added or probability(effect) >= LEAST_PROBABILITY
+    ]
+    if not any(np.isfinite(value) for _, value in shown):
+        return None
+    figure = new_figure(1.2 + 0.32 * max(len(shown), 3), NARROW)
+    axes = figure.subplots()
+    places = np.arange(len(shown))[::-1]
+    axes.barh(
+        places, [value for _, value in shown], 0.62, color=[AFTER if effect.added else QUIET for effect, _ in shown]
+    )
+    axes.set_yticks(places, [label(effect.name) for effect, _ in shown])
+    for tick, (effect, _) in zip(axes.get_yticklabels(), shown, strict=True):
+        tick.set_fontweight("bold" if effect.added else "normal")
+    for name, colour in (("added", AFTER), ("not added", QUIET)):
+        axes.barh(0.0, np.nan, color=colour, label=name)
+    axes.set_xlabel("posterior probability", fontsize=9)
+    axes.set_xlim(0.0, 1.0)
+    axes.set_ylim(-0.6, len(shown) - 0.4)
+    figure.legend(loc="outside upper center", ncols=2, frameon=False, fontsize=9)
+    tidy(axes)
+    axes.grid(False, axis="y")
+    return as_png(figure)
 
-    def key(effect: EffectFinding) -> tuple[bool, float, float]:
+
+def probability(effect: EffectFinding) -> float:
+    """Posterior probability of an effect; NaN without a joint search."""
+    return effect.evidence.get("posterior_probability", float("nan"))
+
+
+def ranked(effects: Sequence[EffectFinding]) -> list[EffectFinding]:
+    """The added effects first, then by posterior probability, by error on runs left out, by the gain predicted by the score test; those not reached last."""
+
+    def key(effect: EffectFinding) -> tuple[bool, float, float, float]:
         error, gain = _left_out(effect), effect.evidence.get("score_gain", float("nan"))
-        return not effect.added, error if np.isfinite(error) else np.inf, -gain if np.isfinite(gain) else np.inf
+        return (
+            not effect.added,
+            -float(np.nan_to_num(probability(effect))),
+            error if np.isfinite(error) else np.inf,
+            -gain if np.isfinite(gain) else np.inf,
+        )
 
     return sorted(effects, key=key)
 

@@ -20,7 +20,7 @@ OWN = ("report.html", "report.json", "parameters.csv", "runs.csv", FITS)
 
 
 def run_close_loop(
-    experiment: Path, out: Path, command: str, overwrite: bool, show_hint: bool, joint: bool = False
+    experiment: Path, out: Path, command: str, overwrite: bool, show_hint: bool, joint: bool = True
 ) -> tuple[Findings, Path]:
     # Imported here so that `--help` does not wait for JAX; x64 is the caller's choice, and this is the caller.
     from smajax.core.runtime import prepare
@@ -65,9 +65,9 @@ def close_loop_command(
     joint: Annotated[
         bool,
         typer.Option(
-            "--joint", help="preview: compare sets of effects by their evidence in one joint fit, not round by round"
+            "--joint/--rounds", help="compare whole sets of effects by their evidence, or add one effect a round"
         ),
-    ] = False,
+    ] = True,
     overwrite: Overwrite = False,
     json_out: Json = False,
     open_page: Open = False,
@@ -79,7 +79,9 @@ def close_loop_command(
 
     Example:  smajax close-loop experiment.toml --out report
     """
-    command = f"smajax close-loop {shlex.quote(str(experiment))} --out {shlex.quote(str(out))}" + " --joint" * joint
+    command = f"smajax close-loop {shlex.quote(str(experiment))} --out {shlex.quote(str(out))}" + " --rounds" * (
+        not joint
+    )
     findings, page = run_close_loop(experiment, out, command, overwrite, not json_out, joint)
     if json_out:
         from smajax.report.json_file import findings_to_json

@@ -1,0 +1,70 @@
+"""The joint search as a stage of the loop: what is added, with which probability, and how the page says it."""
+
+from __future__ import annotations
+
+import dataclasses
+from importlib import resources
+
+import pytest
+
+import smajax.attribution.joint_stage
+from smajax.attribution.close_loop import close_loop
+from smajax.attribution.findings import Findings, LikelierModel, Scored
+from smajax.data.experiment.load import load_experiment
+from smajax.data.model_catalogue import CATALOGUE
+from smajax.report.html import findings_to_html
+from smajax.report.json_file import findings_to_json
+from smajax.report.narrative import narrate
+
+FEW = ("latent_heat", "sensor_gain", "radiation")
+
+
+def _found(effects: tuple[str, ...], runs: int = 6) -> Findings:
+    with resources.as_file(resources.files("smajax") / "data" / "demo" / "latent") as folder:
+        experiment = load_experiment(folder / "experiment.toml", CATALOGUE)
+    return close_loop(dataclasses.replace(experiment, effects_only=effects, runs=experiment.runs[:runs]))
+
+
+@pytest.fixture(scope="module")
+def latent() -> Findings:
+    return _found(FEW)
+
+
+def test_what_is_there_is_added_and_what_is_not_is_unlikely(latent: Findings) -> None:
+    assert [effect.name for effect in latent.added] == ["latent_heat"]
+    likely = {effect.name: effect.evidence["posterior_probability"] for effect in latent.effects}
+    assert likely.pop("latent_heat") > 0.99
+    assert max(likely.values()) < 0.5
+    assert latent.added[0].evidence["alone_rmse_fit"] == pytest.approx(latent.residual_after.rmse, rel=0.05)
+
+
+def test_the_page_and_the_record_say_which_sets_were_compared(latent: Findings) -> None:
+    first = latent.rounds[0]
+    assert first.chosen == "latent_heat"
+    assert isinstance(first.reason, LikelierModel)
+    assert first.reason.log_odds > 10.0
+    said = narrate(latent).rounds[0]
+    assert said.startswith("likelier than the base model by")
+    assert "latent_heat (+" in said
+    page = findings_to_html(latent)
+    assert said in page.replace("&#39;", "'")
+    assert "posterior probability" in page
+    record = findings_to_json(latent)
+    assert [one["added"] for one in record["effects"]].count(True) == 1
+    assert record["effects"][0]["evidence"]["posterior_probability"] > 0.99
+
+
+def test_an_effect_whose_gain_is_gone_at_half_the_step_is_excluded(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The latent heat passes for one with which the load jumps; the search is made again without it, and says so."""
+    kept = iter((0.1, 1.0))
+    candidate = smajax.attribution.joint_stage.LIBRARY["latent_heat"].candidate
+    monkeypatch.setattr(smajax.attribution.joint_stage, "gain_kept_at_half_step", lambda *_: next(kept, 1.0))
+    monkeypatch.setattr(
+        smajax.attribution.joint_stage.LIBRARY["latent_heat"],
+        "candidate",
+        dataclasses.replace(candidate, stick_slip=True),
+    )
+    found = _found(FEW[:2], runs=2)
+    assert "latent_heat" not in {effect.name for effect in found.added}
+    (excluded,) = [one.reason for one in found.rounds if isinstance(one.reason, Scored)]
+    assert excluded.step_dependent[0].effects == "latent_heat"
