@@ -12,6 +12,7 @@ from smajax.attribution.close_loop import close_loop
 from smajax.attribution.findings import Findings, LikelierModel, Scored
 from smajax.data.experiment.load import load_experiment
 from smajax.data.model_catalogue import CATALOGUE
+from smajax.model.effects.library import LIBRARY
 from smajax.report.html import findings_to_html
 from smajax.report.json_file import findings_to_json
 from smajax.report.narrative import narrate
@@ -57,10 +58,10 @@ def test_the_page_and_the_record_say_which_sets_were_compared(latent: Findings) 
 def test_an_effect_whose_gain_is_gone_at_half_the_step_is_excluded(monkeypatch: pytest.MonkeyPatch) -> None:
     """The latent heat passes for one with which the load jumps; the search is made again without it, and says so."""
     kept = iter((0.1, 1.0))
-    candidate = smajax.attribution.joint_stage.LIBRARY["latent_heat"].candidate
+    candidate = LIBRARY["latent_heat"].candidate
     monkeypatch.setattr(smajax.attribution.joint_stage, "gain_kept_at_half_step", lambda *_: next(kept, 1.0))
     monkeypatch.setattr(
-        smajax.attribution.joint_stage.LIBRARY["latent_heat"],
+        LIBRARY["latent_heat"],
         "candidate",
         dataclasses.replace(candidate, stick_slip=True),
     )

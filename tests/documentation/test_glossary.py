@@ -122,6 +122,7 @@ PLAIN = set(
         "input",
         "integration",
         "interval",
+        "joint",
         "json",
         "know",
         "largest",
