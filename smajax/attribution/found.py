@@ -54,6 +54,7 @@ def effects_found(
     left = [name for name in job.candidates if name not in final.effects]
     last = {score.effects[0]: score for score in scores_at(setting, final, left)[0]} if left else {}
     fitted = {parameter.name: parameter for parameter in after.parameters}
+    joint = any(np.isfinite(seen.probability) for seen in setting.evidence.values())
     findings = []
     for name in job.candidates:
         effect, seen = LIBRARY[name], setting.evidence.get(name, Evidence())
@@ -78,7 +79,7 @@ def effects_found(
             "score_p_value_at_the_end": last[name].p_value if name in last else float("nan"),
             "score_gain_at_the_end": last[name].gain if name in last else float("nan"),
         }
-        if np.isfinite(seen.probability):
+        if joint:
             evidence["posterior_probability"] = seen.probability
         findings.append(
             EffectFinding(

@@ -75,7 +75,7 @@ def search_by_evidence(setting: Search, base: Fit) -> tuple[Model, Model]:
     probabilities = effect_probabilities(search, error)
     for effect in search.joint.coefficients:
         seen = setting.evidence.setdefault(effect, Evidence())
-        seen.probability = probabilities.get(effect, 0.0)
+        seen.probability = probabilities.get(effect, float("nan"))  # in no set that was worth a fit
         if (effect,) in search.fitted:
             seen.alone_rmse = search.fitted[(effect,)].rms
     return first, final

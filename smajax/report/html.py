@@ -43,6 +43,7 @@ EVIDENCE = {
 ASIDE = {"leave_one_out_rmse_without", "score_gain_at_the_end"}
 # In the record only: the p-value says the same to a reader.
 RECORD_ONLY = {"leave_one_out_rmse_of_the_base_model", "score_statistic"}
+LEAST_SHOWN = 0.001  # of a probability: what is less depends on the few sets that were fitted
 # Shares of the residual's mean square.
 GAINS = {"score_gain", "score_gain_at_the_end"}
 
@@ -125,7 +126,12 @@ def _remarks(before: ParameterFinding | None, after: ParameterFinding | None) ->
 
 def _evidence(findings: Findings) -> list[str]:
     """The columns of evidence: those known, in a fixed order, then whatever else the record holds."""
-    held = dict.fromkeys(name for effect in findings.effects for name in effect.evidence if name not in RECORD_ONLY)
+    held = dict.fromkeys(
+        name
+        for effect in findings.effects
+        for name, value in effect.evidence.items()
+        if name not in RECORD_ONLY and not math.isnan(value)
+    )
     return [name for name in EVIDENCE if name in held] + [name for name in held if name not in EVIDENCE]
 
 
@@ -134,6 +140,8 @@ def _evidence_cell(findings: Findings, name: str, value: float) -> Shown:
         return shown(value, findings.output_unit, findings.output_name, 3, zeros=True)
     if name in GAINS:
         return Shown(share(value), value)
+    if name == "posterior_probability" and value < LEAST_SHOWN:
+        return Shown(f"< {LEAST_SHOWN}", value)
     return Shown(chance(value) if "p_value" in name else digits(value, 3, zeros=True), value)
 
 
