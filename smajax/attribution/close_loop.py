@@ -56,7 +56,6 @@ class Context:
     start: np.ndarray  # (P,), start values of the parameters of base model and library
     check: tuple[str, ...]
     seed: int
-    joint: bool
 
 
 @dataclass(frozen=True)
@@ -109,13 +108,13 @@ def close_loop(  # keywords, which a caller names one by one
     check_neutral()
     cache = ResultCache(memory)
     settings = config or AttributionConfig()
-    context = prepared(experiment, cache, as_progress(progress), seed, compile_per_model, settings, joint=joint)
-    outcome = searched(context)
+    context = prepared(experiment, cache, as_progress(progress), seed, compile_per_model, settings)
+    outcome = searched(context, joint)
     finer = finer_integration(context.setting, outcome.final)
     if finer is not None:
         # Models are compared as one integration gives them: all of them again.
-        context = prepared(experiment, cache, as_progress(progress), seed, compile_per_model, settings, finer, joint)
-        outcome = searched(context)
+        context = prepared(experiment, cache, as_progress(progress), seed, compile_per_model, settings, finer)
+        outcome = searched(context, joint)
     outcome = against_an_unknown_term(context, outcome)
     outcome = against_an_outlier_run(context, outcome)
     final, compared, rejected = validated(context.job, context.setting, outcome.base, outcome.final)
@@ -131,7 +130,6 @@ def prepared(  # the stage's inputs, each once
     compile_per_model: bool,
     config: AttributionConfig,
     integration: Integration | None = None,
-    joint: bool = True,
 ) -> Context:
     """The experiment as a problem, and what its runs determine, from the Jacobian at the start values."""
     job = job_of(experiment, integration)
@@ -152,12 +150,12 @@ def prepared(  # the stage's inputs, each once
     identifiable = identifiability(sensitivity(job.problem, start, job.unknowns), job.unknowns, job.bounds)
     progress(Stage(CHECKING, 1.0))
     report_checks(progress, experiment.warnings, identifiable)
-    return Context(job, setting, start, (*experiment.warnings, *identifiable), seed, joint)
+    return Context(job, setting, start, (*experiment.warnings, *identifiable), seed)
 
 
-def searched(context: Context) -> Outcome:
-    """The base model and the one that the search ends with."""
-    search_from = search_by_evidence if context.joint else search
+def searched(context: Context, joint: bool = True) -> Outcome:
+    """The base model and the one that the search ends with. `joint`: of `close_loop`."""
+    search_from = search_by_evidence if joint else search
     return Outcome(*search_from(context.setting, context.setting.base(context.start, context.seed)))
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from smajax.attribution.cross_validation import Evidence, Model, Search
-from smajax.attribution.findings import LikelierModel, NoLikelierModel, Round, Scored, StepDependent
+from smajax.attribution.findings import LikelierModel, NoLikelierModel, Reason, Round, Scored, StepDependent
 from smajax.attribution.joint_parameters import JointParameters
 from smajax.attribution.joint_search import JointRound, JointSearch, refined, search_jointly
 from smajax.attribution.laplace_evidence import FittedModel
@@ -26,32 +26,31 @@ from smajax.model.effects.library import LIBRARY
 class _Stage:
     setting: Search
     settings: FitSettings
-    excluded: list[StepDependent] = field(default_factory=list)
+    excluded: set[str] = field(default_factory=set)
 
     def joint_search(self) -> JointSearch:
         """Among the candidates that were not excluded."""
         setting = self.setting
-        gone = {effect for one in self.excluded for effect in one.effects.split(" + ")}
-        names = [name for name in setting.candidates if name not in gone]
+        names = [name for name in setting.candidates if name not in self.excluded]
         joint = JointParameters.of(setting.problem, setting.unknowns, setting.bounds, names, setting.extent)
         noise = float(setting.problem.noise_sigma)
         return JointSearch(joint, setting.extent, self.settings, noise, setting.noise_given, on_round=self.note)
 
     def exclude(self, effects: Sequence[str], kept: float) -> None:
         """Effects that keep only that share of their gain at half the step."""
-        self.excluded.append(StepDependent(_joined(effects), kept))
-        number = len(self.setting.rounds) + 1
-        self.setting.note(Round(number, (), "", Scored(None, (self.excluded[-1],))))
+        self.excluded |= set(effects)
+        self._note("", Scored(None, (StepDependent(_joined(effects), kept),)))
 
     def note(self, done: JointRound) -> None:
         """A round of the joint search, among those of the findings."""
         compared = tuple((_joined(effects), gain, rms) for effects, gain, rms in done.gains)
-        number = len(self.setting.rounds) + 1
         if done.best == done.present:
-            self.setting.note(Round(number, (), "", NoLikelierModel(compared)))
+            self._note("", NoLikelierModel(compared))
         else:
-            reason = LikelierModel(_joined(done.present), done.best_gain, compared)
-            self.setting.note(Round(number, (), _joined(done.best), reason))
+            self._note(_joined(done.best), LikelierModel(_joined(done.present), done.best_gain, compared))
+
+    def _note(self, chosen: str, reason: Reason) -> None:
+        self.setting.note(Round(len(self.setting.rounds) + 1, (), chosen, reason))
 
 
 def search_by_evidence(setting: Search, base: Fit) -> tuple[Model, Model]:
@@ -64,11 +63,9 @@ def search_by_evidence(setting: Search, base: Fit) -> tuple[Model, Model]:
         error = search.error(found)
         best = refined(search, found, error)
         first, final = (as_model(search, one, error) for one in (search.fitted[()], best))
-        if (
-            final.effects
-        ):  # by the runs alone, from points nearby as well: what is reported is no compromise with a prior
-            final = at_optimum(setting, final)
-        kept = gain_kept_at_half_step(setting, final, first) if final.effects else 1.0
+        # By the runs alone, from points nearby as well: what is reported is no compromise with a prior.
+        final = at_optimum(setting, final) if final.effects else final
+        kept = gain_kept_at_half_step(setting, final, first)
         if kept >= setting.config.gain_kept_at_half_step:
             break
         stage.exclude([name for name in final.effects if LIBRARY[name].candidate.stick_slip], kept)

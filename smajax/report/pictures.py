@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 
 from smajax.attribution.findings import EffectFinding, Findings, ResidualDiagnostics, RunFinding
 from smajax.core.display_units import Display, axis_label, display, label
@@ -208,11 +209,9 @@ def candidates_ranked(findings: Findings) -> bytes | None:
     axes.barh(places, [shown.of(error) for error in errors], 0.62, color=colours)
     names = [f"{label(effect.name)} alone" for effect in scored]
     axes.set_yticks(places, ["base model", *names])
-    for tick, effect in zip(axes.get_yticklabels()[1:], scored, strict=True):
-        tick.set_fontweight("bold" if effect.added else "normal")
+    _added_in_bold(axes.get_yticklabels()[1:], scored)
     axes.axvline(shown.of(findings.noise_sigma), color=MEASURED, linestyle="--", linewidth=1.0, label="noise")
-    for name, colour in (("added", AFTER), ("not added", QUIET)):
-        axes.barh(0.0, np.nan, color=colour, label=name)
+    _name_colours(axes)
     unit = f" ({shown.unit})" if shown.unit else ""
     axes.set_xlabel(f"rms error on runs left out in turn{unit}", fontsize=9)
     axes.set_xlim(left=0.0)
@@ -243,10 +242,8 @@ def effect_probabilities(findings: Findings) -> bytes | None:
         places, [value for _, value in shown], 0.62, color=[AFTER if effect.added else QUIET for effect, _ in shown]
     )
     axes.set_yticks(places, [label(effect.name) for effect, _ in shown])
-    for tick, (effect, _) in zip(axes.get_yticklabels(), shown, strict=True):
-        tick.set_fontweight("bold" if effect.added else "normal")
-    for name, colour in (("added", AFTER), ("not added", QUIET)):
-        axes.barh(0.0, np.nan, color=colour, label=name)
+    _added_in_bold(axes.get_yticklabels(), [effect for effect, _ in shown])
+    _name_colours(axes)
     axes.set_xlabel("posterior probability", fontsize=9)
     axes.set_xlim(0.0, 1.0)
     axes.set_ylim(-0.6, len(shown) - 0.4)
@@ -254,6 +251,17 @@ def effect_probabilities(findings: Findings) -> bytes | None:
     tidy(axes)
     axes.grid(False, axis="y")
     return as_png(figure)
+
+
+def _added_in_bold(ticks: Sequence[Text], effects: Sequence[EffectFinding]) -> None:
+    for tick, effect in zip(ticks, effects, strict=True):
+        tick.set_fontweight("bold" if effect.added else "normal")
+
+
+def _name_colours(axes: Axes) -> None:
+    """What the bars' colours say, for the legend."""
+    for name, colour in (("added", AFTER), ("not added", QUIET)):
+        axes.barh(0.0, np.nan, color=colour, label=name)
 
 
 def probability(effect: EffectFinding) -> float:

@@ -362,7 +362,6 @@ def test_a_name_that_jax_has_moved_leads_to_xla(module: str, name: str) -> None:
 @pytest.mark.usefixtures("forgetful")
 def test_a_reason_is_said_once_whatever_changes_the_filters(monkeypatch: pytest.MonkeyPatch) -> None:
     """Python's own memory of what was shown ends where any library changes a filter."""
-    monkeypatch.setattr(translate, "translate", _fails("out of step"))
     monkeypatch.setattr(native, "translate", _fails("out of step"))
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
