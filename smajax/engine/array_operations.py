@@ -10,10 +10,11 @@ import numpy as np
 
 from smajax.engine.arithmetic import ELEMENTWISE, select
 from smajax.engine.loop import Loop
-from smajax.engine.memory import copy, in_memory, in_registers, row, write
+from smajax.engine.memory import copy, in_memory, in_registers, mapped, row, write
 from smajax.engine.text import Array, Lane, Text, Unsupported, scalar_type
 from smajax.engine.values import SMALL, Filled, Held, Stored, Value, held, is_known, size_of
 
+LISTED = 8  # numbers among which one is selected, in the place of memory
 ALIGNED_BY_ATTRIBUTE = 22  # major version of LLVM from which a masked load states its alignment beside the pointers
 
 # What only moves numbers about, and which of the arguments are the numbers; the others say where to. None: all are.
@@ -202,16 +203,49 @@ def _dynamic_slice(text: Text, params: Any, given: list[Value], out: Array, kind
 
 def _gather(text: Text, params: Any, given: list[Value], out: Array, kinds: Any) -> Value:
     one, index = given
-    numbers = params["dimension_numbers"]
-    one_of_a_row = (
-        len(tuple(one.shape)) == 1
-        and tuple(params["slice_sizes"]) == (1,)
+    numbers, rest = params["dimension_numbers"], tuple(one.shape)[1:]
+    of_rows = (
+        tuple(params["slice_sizes"]) == (1, *rest)
         and tuple(numbers.start_index_map) == (0,)
-        and out.shape == ()
+        and tuple(numbers.collapsed_slice_dims) == (0,)
+        and tuple(numbers.offset_dims) == tuple(range(len(out.shape) - len(rest), len(out.shape)))
     )
-    if not one_of_a_row:
-        raise Unsupported("a gathering of more than one number")
-    return held(looked_up(text, one, in_registers(text, index).ravel()[0], kinds[0]))
+    if not of_rows:
+        raise Unsupported("a gathering of anything but rows of an array")
+    if is_known(index):
+        places = np.asarray(index).ravel()
+        if "FILL" in str(params["mode"]) and ((places < 0) | (places >= one.shape[0])).any():
+            raise Unsupported("a gathering that puts something in the place of what is beyond the ends")
+        rows = rows_at(text, one, np.clip(places, 0, one.shape[0] - 1), out)
+        if rows is not None:
+            return rows
+    if rest:
+        raise Unsupported("a gathering of rows of more than one number")
+    source = one if isinstance(one, Held) and one.size <= LISTED else in_memory(text, one, tuple(one.shape), kinds[0])
+
+    def at(place: Lane) -> Lane:
+        return looked_up(text, source, place, kinds[0])
+
+    if int(np.prod(out.shape)) <= SMALL:
+        return held([at(place) for place in in_registers(text, index).ravel()], out.shape)
+    room = Stored(text.reserve(int(np.prod(out.shape)), out.dtype), out.shape, out.dtype, own=True)
+    mapped(text, room, 0, at, [index])
+    return room
+
+
+def rows_at(text: Text, one: Value, places: np.ndarray, out: Array) -> Value | None:
+    """Rows of an array at places that are known, evenly spaced or few; JAX 0.7 writes `x[::2]` as that. None: neither."""
+    stored = in_memory(text, one, tuple(one.shape), out.dtype)
+    steps = set(np.diff(places).tolist())
+    if len(steps) == 1 and (stride := steps.pop()) > 0:
+        start = (int(places[0]), *(0 for _ in stored.shape[1:]))
+        return _slice(text, {"starts": start, "strides": (stride,)}, [stored], out, ())
+    if len(places) > SMALL:
+        return None
+    parts = [row(text, stored, str(place), stored.shape[1:], out.dtype) for place in places]
+    if int(np.prod(out.shape)) <= SMALL:
+        return held([lane for part in parts for lane in in_registers(text, part).ravel()], out.shape)
+    return joined(text, parts, 0, out)
 
 
 def looked_up(text: Text, array: Value, index: Lane, dtype: str) -> Lane:
@@ -221,7 +255,7 @@ def looked_up(text: Text, array: Value, index: Lane, dtype: str) -> Lane:
     most = text.constant(shape[0] - 1, index.dtype)
     low = ELEMENTWISE["max"](text, index.dtype, index, text.constant(0, index.dtype))
     low = ELEMENTWISE["min"](text, index.dtype, low, most)
-    if isinstance(array, Held) and array.size <= 8:
+    if isinstance(array, Held) and array.size <= LISTED:
         return select(text, dtype, low, *array.ravel()) if array.size > 1 else array.ravel()[0]
     stored = in_memory(text, array, shape, dtype)
     kind = scalar_type(dtype)

@@ -214,6 +214,23 @@ def _every_seventh(a: jax.Array) -> jax.Array:
     return kept[3:590:7] + jnp.arange(1200.0)[::2][3:590:7] + kept.reshape(300, 2)[::40].sum()
 
 
+def _gathered(a: jax.Array) -> jax.Array:
+    """Many numbers taken out of a long series at once: evenly spaced, out of order, each twice, and where each run says."""
+    kept = lax.scan(lambda c, x: (0.5 * c + x, c * a), a, jnp.arange(200.0) / 100.0)[1]
+    whole = (jnp.floor(a).astype(int) + jnp.arange(100)) % 200
+    few = (jnp.floor(a).astype(int) + jnp.arange(3)) % 200
+    small = jnp.stack([a, 2.0 * a, -a])
+
+    def at(x: jax.Array, places: jax.Array | np.ndarray, mode: str = "clip") -> jax.Array:
+        return x.at[places].get(mode=mode)
+
+    evenly = at(kept, np.arange(100) * 2, "promise_in_bounds") + at(kept, np.arange(100))
+    uneven = at(kept, np.arange(100) ** 2 % 200) + at(kept, np.repeat(np.arange(50), 2), "fill") + at(small, whole)
+    rows = [at(kept.reshape(100, 2), np.array([7, 3, 3])), at(kept.reshape(2, 100), np.array([1, 0, 1]))]
+    one_each = [at(kept, few), at(small, few), at(kept, np.array([9, 4]))]
+    return jnp.concatenate([evenly + uneven + at(kept, whole), *(one.ravel() for one in rows), *one_each])
+
+
 def _repeated(a: jax.Array) -> jax.Array:
     """A long series along every axis of a larger one, and what all share."""
     kept = lax.scan(lambda c, x: (0.5 * c + x, c * a), a, jnp.arange(100.0))[1]
@@ -234,7 +251,7 @@ def _folded(a: jax.Array) -> jax.Array:
 
 @pytest.mark.parametrize(
     "function",
-    [_newton, _long, _looked_up, _backwards, _every_seventh, _repeated, _placed, _folded],
+    [_newton, _long, _looked_up, _backwards, _every_seventh, _gathered, _repeated, _placed, _folded],
     ids=lambda one: one.__name__,
 )
 def test_loops_and_tables_agree(function):
@@ -245,6 +262,15 @@ def test_loops_and_tables_agree(function):
 def test_what_is_too_large_for_registers_and_no_plain_series_is_named():
     with pytest.raises(Unsupported, match=r"\(100,\)"):
         by_machine_code(_nested, np.ones(8))
+
+
+@pytest.mark.parametrize("places", [np.arange(0, 240, 2), jnp.arange(0, 240, 2), np.arange(100) - 240])
+def test_what_is_gathered_beyond_the_ends_and_replaced_there_is_named(places):
+    def function(a: jax.Array) -> jax.Array:
+        return (a * jnp.arange(200.0)).at[places].get(mode="fill", fill_value=-1.0)
+
+    with pytest.raises(Unsupported, match="beyond the ends"):
+        by_machine_code(function, np.ones(8))
 
 
 def _busy(a: jax.Array) -> jax.Array:
