@@ -75,6 +75,19 @@ TABLE: Mapping[str, Mapping[str, tuple[Reading, ...]]] = {
 }
 
 
+# Parameters of arithmetic that say where a result lies, or what its type already says.
+OF_PLACE_OR_TYPE = {"sharding", "out_sharding", "weak_type", "new_dtype"}
+
+
+def refuse_unread(equation: Any) -> None:
+    """Arithmetic asked for in a way that the translator does not read, by a parameter of a later release. Raises Unsupported."""
+    name = equation.primitive.name
+    read = {one for readings in TABLE.get(name, {}).values() for one in readings} | OF_PLACE_OR_TYPE
+    for parameter, value in equation.params.items():
+        if parameter not in read and value is not None:
+            raise Unsupported(f"the operation `{name}` with `{parameter}={value}`")
+
+
 def parameters_of(equation: Any) -> dict[str, Any]:
     """An equation's parameters by our names; empty for a primitive that needs none. Raises Unsupported."""
     name, given = equation.primitive.name, equation.params

@@ -26,7 +26,7 @@ from smajax.engine.array_operations import (
     whole_number,
 )
 from smajax.engine.expansions import EXPANSIONS
-from smajax.engine.jax_versions import TABLE, expanded, kind_of, opened, parameters_of
+from smajax.engine.jax_versions import TABLE, expanded, kind_of, opened, parameters_of, refuse_unread
 from smajax.engine.loop import Loop
 from smajax.engine.memory import in_memory, in_registers, mapped, row, write
 from smajax.engine.phases import laid_out
@@ -136,6 +136,8 @@ class _Translation:
         kinds = [str(one.aval.dtype) for one in equation.invars]
         if name == "exact_div" and not out.dtype.startswith("float"):
             name = "div"
+        if name in ELEMENTWISE or name in REDUCTIONS or name == "exact_div":
+            refuse_unread(equation)
         if name in ELEMENTWISE or name == "exact_div":
             return [self.elementwise(name, params, given, out)]
         if name == "gather" and "FILL" in str(params["mode"]) and not at_known_places(name, given):

@@ -393,3 +393,18 @@ def test_an_array_read_in_another_order_of_its_dimensions() -> None:
     with pytest.warns(EngineWarning, match="`reshape` in another order of the dimensions"):
         run = compiled_program(turned, matrix, ("a",))
     np.testing.assert_allclose(run(matrix, {"a": np.ones(2)})[1], matrix.T.ravel())
+
+
+@pytest.mark.usefixtures("forgetful")
+def test_arithmetic_with_a_parameter_that_is_not_read_is_done_by_xla(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As a later release may add one: machine code that passed it over would give other numbers."""
+    monkeypatch.setattr(
+        jax_versions, "TABLE", {**jax_versions.TABLE, "integer_pow": {}}
+    )  # its power is not read any more
+
+    def cubed(model: Any, own: Any) -> Any:
+        return model * jax.lax.integer_pow(own["a"], 3)
+
+    with pytest.warns(EngineWarning, match="`integer_pow` with `y=3`"):
+        run = compiled_program(cubed, np.array(2.0), ("a",))
+    np.testing.assert_allclose(run(np.array(2.0), {"a": np.array([1.0, 2.0])})[1], 16.0)
