@@ -83,10 +83,6 @@ class AttributionConfig:
 
     # Unknown terms
     terms_refitted: int = 6  # about one an equation
-    terms_scored: int = 6  # of them, taken to the left-out runs
-    term_standard_errors: float = (
-        2.0  # ahead of none, and of another: of a dozen tried the best is one ahead by chance alone
-    )
     term_start_share: float = 0.5  # of the score test's estimate: where a refit starts
     term_start_limit: float = 0.8  # of the largest coefficient: a start stays off the bound
     term_prior_sigma: float = (

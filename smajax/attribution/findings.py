@@ -200,12 +200,11 @@ class NoiseWithoutRun:
 
 
 @dataclass(frozen=True)
-class UnknownTermBetter:
-    """One unknown function in one equation predicts left-out runs better than all the effects."""
+class UnknownTermLikelier:
+    """One unknown function in one equation is likelier than all the effects."""
 
     title: str
-    rmse_effects: float  # SI
-    rmse_term: float
+    log_odds: float
 
 
 @dataclass(frozen=True)
@@ -226,7 +225,7 @@ Reason: TypeAlias = (
     | NoLongerNeeded
     | PredictsTooLittle
     | NoiseWithoutRun
-    | UnknownTermBetter
+    | UnknownTermLikelier
     | HeldOutWorse
 )
 
@@ -299,9 +298,9 @@ class UnknownTerm:
     state: str  # in words
     state_unit: str
     unit: str  # of the function
-    named: bool  # the one that predicts left-out runs best, better than the model without it beyond chance, and held-out ones better
-    indistinguishable: tuple[str, ...]  # terms that left-out runs do not distinguish from the named one
-    comparison: Comparison | None  # of the best one with none
+    named: bool  # the likeliest, likelier than none, which predicts runs left out and held out better than the model without it
+    indistinguishable: tuple[str, ...]  # terms that the runs do not distinguish from the named one
+    log_odds: float  # of the model with it over the one without
     score_gain: float
     left_out_before: float
     left_out_after: float

@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from smajax.attribution.joint_parameters import JointParameters
-from smajax.attribution.laplace_evidence import FittedModel, fitted_model
+from smajax.attribution.laplace_evidence import FittedModel, fitted_model, independent_error
 from smajax.attribution.subset_evidence import LinearModel, Subset, linear_model
 from smajax.attribution.traces import Traces, Variant, traces_at
 from smajax.core.progress import Stage
@@ -36,8 +36,6 @@ LEAST_START, MOST_START = 0.02, 2.0  # widths from the base where a fit of a new
 PLACES = 16  # a power of two, for Sobol's points: of an effect with several local minima, simulated and the best fitted
 LARGEST_STEP = 0.2  # of its range that an unknown moves to the start of a fit
 SETTLED = 0.05  # relative change of the error of a sample
-NOISE_EXCESS = 1.05  # a residual up to so many noises is noise: its size is the noise's
-LEAST_NOISE = 0.3  # of a noise that was estimated: what the residual shows counts down to that
 DETECTABLE = 1.0  # standard errors that an effect of one width has to change the runs by to be looked for
 CERTAIN = 300.0  # nats that the linear model loses without an effect, beyond which no refit makes up for it
 CARRIED = 12  # likeliest sets of the linear model whose effects the program of the fits carries
@@ -63,11 +61,8 @@ class JointSearch:
     on_round: Callable[[JointRound], None] = lambda _: None
 
     def error(self, model: FittedModel) -> float:
-        """What an independent sample may be off by, given what `model` leaves: the noise, or the residual where it is larger."""
-        if not self.noise_given:
-            return max(LEAST_NOISE * self.noise, model.rms * float(np.sqrt(model.correlation)))
-        level = model.rms if model.rms > NOISE_EXCESS * self.noise else self.noise
-        return max(self.noise, level * float(np.sqrt(model.correlation)))
+        """`independent_error` of what `model` leaves."""
+        return independent_error(model, self.noise, self.noise_given)
 
     def best(self, error: float) -> FittedModel:
         """The likeliest model."""

@@ -18,6 +18,8 @@ from smajax.attribution.joint_parameters import JointParameters, residual_and_co
 from smajax.core.whiteness import correlation_time, split_runs
 
 LONGEST = 50.0  # samples: beyond it the correlation of a residual is its own shape, and no property of a noise
+NOISE_EXCESS = 1.05  # a residual up to so many noises is noise: its size is the noise's
+LEAST_NOISE = 0.3  # of a noise that was estimated: what the residual shows counts down to that
 
 
 @dataclass(frozen=True)
@@ -62,7 +64,7 @@ def fitted_model(
     residual, columns = residual_and_columns(problem, values[index], names)
     at = {name: float(values[joint.slots[name]]) for name in names}
     scales = np.asarray([joint.scale(name, at[name]) for name in names])
-    matrix = np.stack([columns[name] for name in names], axis=1) * scales
+    matrix = np.stack([columns[name] for name in names], axis=1) * scales if names else np.zeros((len(residual), 0))
     deviations = [joint.deviation(name, at[name]) for name in names]
     log_prior = sum(joint.log_odds[effect] for effect in effects) - 0.5 * float(np.square(deviations).sum())
     mask = np.asarray(joint.problem.batch.mask)
@@ -83,3 +85,11 @@ def fitted_model(
         float(np.sqrt(np.mean(residual**2))),
         correlation,
     )
+
+
+def independent_error(model: FittedModel, noise: float, noise_given: bool) -> float:
+    """What an independent sample may be off by, given what `model` leaves: the noise, or the residual where it is larger; SI."""
+    if not noise_given:
+        return max(LEAST_NOISE * noise, model.rms * float(np.sqrt(model.correlation)))
+    level = model.rms if model.rms > NOISE_EXCESS * noise else noise
+    return max(noise, level * float(np.sqrt(model.correlation)))

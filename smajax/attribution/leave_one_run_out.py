@@ -11,6 +11,8 @@ noise it is too long to be believed, and those fits are made.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from smajax.attribution.joint_parameters import JointParameters
@@ -25,12 +27,14 @@ MOST_PARTS = 12  # runs are left out one by one, or in so many parts
 STEPS, TOLERANCE = 20, 1e-4  # of the refits
 
 
-def left_out_misfit(joint: JointParameters, model: FittedModel, error: float) -> np.ndarray:
+def left_out_misfit(
+    joint: JointParameters, model: FittedModel, error: float, carried: Sequence[str] | None = None
+) -> np.ndarray:
     """Misfit (SI) of each run, (series, N), by the model without it; of a single run, by the fit to it.
 
-    `error`: of an independent sample, SI.
+    `error`: of an independent sample, SI. `carried`: effects of the program that computes it; None: the model's own.
     """
-    problem, index = joint.restricted(model.effects)
+    problem, index = joint.restricted(model.effects if carried is None else carried)
     problem = problem.with_noise(error)
     values = model.values[index]
     runs = problem.batch.runs

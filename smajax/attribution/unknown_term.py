@@ -1,27 +1,31 @@
 """Where something is missing that no effect of the library accounts for: an unknown term in each equation in turn.
 
 Each term (`smajax.attribution.unknown.terms`) is a smooth function of one state. All are screened by the score test at the final
-model of the search; the best of each equation are refitted together with the model's parameters and cross-validated as effects
-are. The held-out runs can reject the best. What is learnt is a function: drawn over the states that the runs went through, and compared with
-simple formulas.
+model of the search; the best of each equation are fitted together with the model's parameters and compared by their evidence, as
+sets of effects are. The held-out runs can reject the likeliest. What is learnt is a function: drawn over the states that the runs
+went through, and compared with simple formulas.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import jax.numpy as jnp
 import numpy as np
 
-from smajax.attribution.cross_validation import Fitted, Model, Search, Start, paired
-from smajax.attribution.findings import UnknownTerm, UnknownTermBetter
+from smajax.attribution.cross_validation import Fitted, Model, Search, Start
+from smajax.attribution.findings import UnknownTerm, UnknownTermLikelier
 from smajax.attribution.formulas import formulas
+from smajax.attribution.joint_parameters import JointParameters
+from smajax.attribution.laplace_evidence import FittedModel, fitted_model, independent_error
+from smajax.attribution.leave_one_run_out import left_out_misfit
 from smajax.attribution.score_test import Score, screen
 from smajax.attribution.unknown.ranges import Sought, sought
-from smajax.attribution.unknown.spline import COUNT, design
-from smajax.attribution.unknown.terms import UNKNOWN, AbstractUnknown
+from smajax.attribution.unknown.spline import design
+from smajax.attribution.unknown.terms import UNKNOWN
 from smajax.core.parameters import parameters
 from smajax.core.progress import Stage
 from smajax.core.whiteness import correlation_time, split_runs
@@ -30,6 +34,10 @@ from smajax.fit.predicted import misfits
 from smajax.fit.problem import Problem
 from smajax.fit.sensitivity import sensitivity
 from smajax.fit.uncertainty import covariance_of, uncertainty
+from smajax.model.effects.candidate import PRIOR_ODDS
+from smajax.model.effects.prior_width import CoefficientPrior
+
+INDISTINGUISHABLE = 3.0  # in log odds: twenty to one
 
 
 @dataclass
@@ -87,61 +95,91 @@ def _best_of_each(scores: Sequence[Score], count: int) -> list[Score]:
 
 @dataclass(frozen=True)
 class Lacking:
-    """What was learnt of each term that came to the left-out runs, best first; the model with it if the first is named."""
+    """What was learnt of each term that was fitted, likeliest first; the first as it was fitted if it is named."""
 
     terms: tuple[UnknownTerm, ...] = ()
-    model: Model | None = None
+    likeliest: FittedModel | None = None
 
 
 def unknown_terms(setting: Search, final: Model) -> Lacking:
     """An unknown term in each equation in turn, beside `final`.
 
-    The first is `named` when it predicts left-out runs better than the final model does, by `Search.better` and
-    `term_standard_errors`, and the held-out runs better at all. Terms that do better than none, too, and that it is not as far ahead of, stand in `indistinguishable`.
+    The likeliest is `named` where it is likelier than none, predicts left-out runs better, and held-out runs too. Terms
+    that are likelier than none and less than `INDISTINGUISHABLE` behind it stand in `indistinguishable`.
     """
-    config = setting.config
     search, values, found = with_terms(setting, final)
     if not search.candidates:
         return Lacking()
     search.progress(Stage("looking for the equation that lacks something", 0.0))
     scores = screened(search, values)
-    chosen = _best_of_each(scores, config.terms_refitted)
+    chosen = _best_of_each(scores, setting.config.terms_refitted)
     search.progress(Stage("looking for the equation that lacks something", 1.0))
     if not chosen:
         return Lacking()
-    base = Fitted((), search.known(dataclasses.replace(final, values=values)))
-    fitted = refitted(search, chosen, values)[: config.terms_scored]
-    present = search.cross_validated([base])[0]
-    scored = sorted(search.cross_validated(fitted, present), key=lambda model: model.left_out_rmse)
-    best = scored[0]
-    enough, comparison = search.better(best, present, config.term_standard_errors)
-    # One run fits too well to name anything: there is none to predict.
-    enough = enough and len(present.left_out) > 1
-    held_out = _on_held_out(search, present, best) if enough and search.held_out is not None else None
-    enough = enough and (held_out is None or not held_out[1] >= held_out[0])
-    others = [
-        model
-        for model in scored[1:]
-        if model.left_out_rmse < present.left_out_rmse
-        and not search.better(best, model, config.term_standard_errors)[0]
+    joint = joint_with_terms(setting, search, final)
+    carried = tuple(joint.coefficients)
+    none = fitted_model(joint, final.effects, values, carried)
+    fitted = [
+        fitted_model(joint, (*final.effects, *one.effects), one.solution.values, carried)
+        for one in refitted(search, chosen, values)
     ]
-    terms = []
-    gains = {score.effects: score.gain for score in scores}
-    for model in scored:
-        ahead = model is best and enough
-        term = _learnt(search, found, model, present, gains[model.effects])
-        if model is best:
+    error = least_error(setting, [none, *fitted])
+    fitted.sort(key=lambda model: -model.log_evidence(error**2))
+    present, *models = (_predicting(joint, model, error, carried) for model in (none, *fitted))
+    log_odds = [one.log_evidence(error**2) - none.log_evidence(error**2) for one in fitted]
+    # One run fits too well to name anything: there is none to predict.
+    several = len(present.left_out) > 1
+    enough = log_odds[0] > 0.0 and several and models[0].left_out_rmse < present.left_out_rmse
+    held_out = _on_held_out(search, present, models[0]) if enough and search.held_out is not None else None
+    enough = enough and (held_out is None or not held_out[1] >= held_out[0])
+    alike = [
+        model.effects[-1]
+        for model, odds in zip(models[1:], log_odds[1:], strict=True)
+        if odds > max(0.0, log_odds[0] - INDISTINGUISHABLE)
+    ]
+    gains = {score.effects[0]: score.gain for score in scores}
+    terms: list[UnknownTerm] = []
+    for model, odds in zip(models, log_odds, strict=True):
+        term = _learnt(search, found, model, present, gains[model.effects[-1]], odds)
+        if not terms:
             before, after = held_out if held_out is not None else (None, None)
             term = dataclasses.replace(
                 term,
-                named=ahead,
-                indistinguishable=tuple(other.effects[0] for other in others) if ahead else (),
-                comparison=comparison,
+                named=enough,
+                indistinguishable=tuple(alike) if enough else (),
                 held_out_before=before,
                 held_out_after=after,
             )
         terms.append(term)
-    return Lacking(tuple(terms), best if enough else None)
+    return Lacking(tuple(terms), fitted[0] if enough else None)
+
+
+def joint_with_terms(setting: Search, search: Terms, final: Model) -> JointParameters:
+    """Parameters of models with the effects of `final` and one of the terms of `search`, with their priors."""
+    plain = JointParameters.of(setting.problem, setting.unknowns, setting.bounds, final.effects, setting.extent)
+    own = {term: tuple(search.coefficients(term)) for term in search.candidates}
+    width = CoefficientPrior(0.0, setting.config.term_prior_sigma, False)
+    return JointParameters(
+        search.problem,
+        setting.unknowns,
+        search.bounds,
+        {**plain.coefficients, **own},
+        {**plain.priors, **{name: width for names in own.values() for name in names}},
+        {**plain.log_odds, **dict.fromkeys(own, math.log(PRIOR_ODDS["event"]))},
+    )
+
+
+def least_error(setting: Search, models: Sequence[FittedModel]) -> float:
+    """What an independent sample may be off by, SI, given what the best of `models` leaves: all are compared with that."""
+    best = min(models, key=lambda model: model.rms)
+    return independent_error(best, float(setting.problem.noise_sigma), setting.noise_given)
+
+
+def _predicting(joint: JointParameters, model: FittedModel, error: float, carried: Sequence[str]) -> Model:
+    """A fitted model with its error on each run by the others."""
+    misfit = left_out_misfit(joint, model, error, carried)
+    rmse = float(np.sqrt((misfit**2).sum() / np.asarray(joint.problem.batch.mask).sum()))
+    return Model(model.effects, model.values, model.squares / float(joint.problem.noise_sigma) ** 2, misfit, rmse)
 
 
 def _on_held_out(search: Terms, *models: Model) -> list[float]:
@@ -154,20 +192,21 @@ def _on_held_out(search: Terms, *models: Model) -> list[float]:
 
 
 def in_place_of(setting: Search, first: Model, final: Model) -> Lacking | None:
-    """One unknown term in the base model `first` that predicts left-out runs better than all the effects of `final`.
+    """One unknown term in the base model `first` that is likelier than the base model with all the effects of `final`.
 
-    By `term_standard_errors`, or at all where it has no more coefficients than they have. Then these are what the
-    library has that comes near it, and none of them is missing: a round is noted in which they are removed.
+    Then these are what the library has that comes near it, and none of them is missing: a round is noted in which they are
+    removed.
     """
     found = unknown_terms(setting, first)
-    if found.model is None or found.model.left_out_rmse >= final.left_out_rmse:
+    if found.likeliest is None:
         return None
-    ahead = paired(final.left_out, found.model.left_out, np.asarray(setting.problem.batch.mask))
-    spent = sum(len(setting.coefficients(effect)) for effect in final.effects)
-    if ahead <= setting.config.term_standard_errors and spent < COUNT:
+    joint = JointParameters.of(setting.problem, setting.unknowns, setting.bounds, final.effects, setting.extent)
+    effects = fitted_model(joint, final.effects, final.values, final.effects)
+    error = least_error(setting, [effects, found.likeliest])
+    ahead = found.likeliest.log_evidence(error**2) - effects.log_evidence(error**2)
+    if ahead <= 0.0:
         return None
-    term = found.terms[0]
-    setting.set_aside(final, UnknownTermBetter(term.title, final.left_out_rmse, term.left_out_after))
+    setting.set_aside(final, UnknownTermLikelier(found.terms[0].title, ahead))
     return found
 
 
@@ -193,19 +232,16 @@ def refitted(search: Terms, chosen: Sequence[Score], values: np.ndarray) -> list
     return list(best.values())
 
 
-def _term(found: Sought, model: Model) -> AbstractUnknown:
-    return next(term for term in found.terms if term.effect_name == model.effects[0])
-
-
 def _learnt(
     search: Terms,
     found: Sought,
     model: Model,
     present: Model,
     gain: float,
+    log_odds: float,
 ) -> UnknownTerm:
     """The function, its band, where the runs went, and formulas for it."""
-    term = _term(found, model)
+    term = next(one for one in found.terms if one.effect_name == model.effects[-1])
     own = search.coefficients(term.effect_name)
     others = search.free(())
     at = model.values[[search.problem.names.index(name) for name in own]]
@@ -235,7 +271,7 @@ def _learnt(
         unit=unit,
         named=False,
         indistinguishable=(),
-        comparison=None,
+        log_odds=log_odds,
         score_gain=gain,
         left_out_before=present.left_out_rmse,
         left_out_after=model.left_out_rmse,

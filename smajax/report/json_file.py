@@ -118,6 +118,7 @@ def _unknown(term: UnknownTerm, why: str) -> dict[str, Any]:
         "named": term.named,
         "indistinguishable": term.indistinguishable,
         "why": why,
+        "log_odds": term.log_odds,
         "score_gain": term.score_gain,
         "leave_one_out_rmse_without": term.left_out_before,
         "leave_one_out_rmse": term.left_out_after,

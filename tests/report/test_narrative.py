@@ -29,7 +29,7 @@ from smajax.attribution.findings import (
     Scored,
     StepDependent,
     UnknownTerm,
-    UnknownTermBetter,
+    UnknownTermLikelier,
     Verdict,
     pooled_rmse,
 )
@@ -245,8 +245,8 @@ def test_an_outlier_beside_what_was_added_is_to_be_minded() -> None:
         ),
         (NoiseWithoutRun("a"), "set aside: without a what the base model leaves is noise"),
         (
-            UnknownTermBetter("a loss", 1e-3, 2e-4),
-            "set aside: a loss alone predicts left-out runs better than all of them, 1 mm -> 0.2 mm",
+            UnknownTermLikelier("a loss", 12.34),
+            "set aside: a loss alone is likelier than all of them by 12.3 in log odds",
         ),
         (HeldOutWorse(1e-3, 2e-3), "set aside: error on the held-out runs 1 mm without and 2 mm with it"),
     ],
@@ -266,7 +266,9 @@ def test_a_round_is_a_message_while_the_search_runs() -> None:
     ]
 
 
-def _with_terms(named: bool, *others: str, held_out: tuple[float, float] | None = None) -> tuple[str, ...]:
+def _with_terms(
+    named: bool, *others: str, held_out: tuple[float, float] | None = None, log_odds: float = 40.0
+) -> tuple[str, ...]:
     empty = np.zeros(0)
 
     def term(name: str, first: bool) -> UnknownTerm:
@@ -281,7 +283,7 @@ def _with_terms(named: bool, *others: str, held_out: tuple[float, float] | None 
             kind.unit,
             named and first,
             others if first else (),
-            BETTER if first else None,
+            log_odds if first else -9.0,
             0.5,
             2.0,
             1.0,
@@ -307,6 +309,10 @@ def test_an_equation_is_named_only_where_no_other_does_as_well() -> None:
     assert "or a stored heat" in _with_terms(True, "unknown_heat_of_fraction")[1]
     undecided = _with_terms(True, "unknown_reading_of_time")[1]
     assert "do not determine whether it is in the heat equation or the sensor equation" in undecided
-    assert "Nor do these runs determine in which equation" in _with_terms(False)[1]
+    assert "is likeliest, and predicts runs left out no better: likelier than none by 40.0" in _with_terms(False)[1]
+    none = _with_terms(False, log_odds=-2.0)[1]
+    assert "Nor do these runs determine in which equation" in none
+    assert "none is likelier than no function at all" in none
+    assert "less likely than none by 2.0 in log odds" in none
     assert "on those held out" in _with_terms(True, held_out=(2.0, 1.0))[1]
     assert "is not validated on the held-out runs" in _with_terms(False, held_out=(1.0, 2.0))[1]

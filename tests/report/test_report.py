@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from smajax.attribution.findings import Comparison, Findings, Formula, UnknownTerm
+from smajax.attribution.findings import Findings, Formula, UnknownTerm
 from smajax.core.display_units import correlation, digits, display, p_value, share, with_error
 from smajax.data.readers.read import read_table
 from smajax.fit.uncertainty import Remark, RemarkKind
@@ -356,7 +356,7 @@ def _unknown_term(name: str, named: bool, alike: tuple[str, ...] = ()) -> Unknow
         unit="W/m",
         named=named,
         indistinguishable=alike,
-        comparison=Comparison(1.8e-3, 2.0e-4, 0.99, 9.0, True) if named else None,
+        log_odds=31.4,
         score_gain=0.85,
         left_out_before=1.8e-3,
         left_out_after=2.0e-4,
@@ -381,11 +381,12 @@ def test_unknown_terms_are_told_drawn_and_recorded(findings, page):
     assert "What no effect of the library accounts for" not in " ".join(page.text)
     assert "1.27 (1 + tanh((T - T_inf - 52.4)/4.51))/2" in text
     assert "f in W/m, T - T_inf in K" in text
-    # The best and the one that is not distinguished from it are drawn, the third is a row of the table only.
+    # The likeliest and the one that is not distinguished from it are drawn, the third is a row of the table only.
     assert len(told.images()) == len(page.images()) + 2
-    assert text.count("not distinguished from the best") == 1
+    assert text.count("not distinguished from the likeliest") == 1
     record = json.loads(json.dumps(findings_to_json(with_terms), allow_nan=False))["unknown"]
     assert [one["named"] for one in record] == [True, False, False]
+    assert [one["log_odds"] for one in record] == [31.4, 31.4, 31.4]
     assert record[0]["function"]["values"] == pytest.approx(terms[0].values.tolist())
     assert record[0]["formulas"][0]["numbers"] == 2
     assert sum(record[0]["samples"]["counts"]) == 190

@@ -18,7 +18,7 @@ from smajax.attribution.findings import (
     Round,
     RoundLimit,
     Scored,
-    UnknownTermBetter,
+    UnknownTermLikelier,
 )
 from smajax.report.narrative.values import value_text
 
@@ -73,8 +73,8 @@ def reason_text(reason: Reason, unit: str, quantity: str) -> str:
             )
         case NoiseWithoutRun(run):
             return f"set aside: without {run} what the base model leaves is noise"
-        case UnknownTermBetter(title, effects, term):
-            return f"set aside: {title} alone predicts left-out runs better than all of them, {error(effects)} -> {error(term)}"
+        case UnknownTermLikelier(title, log_odds):
+            return f"set aside: {title} alone is likelier than all of them by {log_odds:.1f} in log odds"
         case HeldOutWorse(without, with_it):
             return f"set aside: error on the held-out runs {error(without)} without and {error(with_it)} with it"
 

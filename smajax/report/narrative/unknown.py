@@ -1,4 +1,4 @@
-"""Unknown terms in words: an equation is named only where left-out runs distinguish it from the others."""
+"""Unknown terms in words: an equation is named only where the runs distinguish it from the others."""
 
 from __future__ import annotations
 
@@ -6,15 +6,15 @@ from collections.abc import Sequence
 
 from smajax.attribution.findings import Findings, UnknownTerm
 from smajax.core.display_units import label
-from smajax.report.narrative.rounds import comparison_text
 from smajax.report.narrative.values import error_text
 
 
 def comparison_sentence(findings: Findings, term: UnknownTerm) -> str:
-    """How the best term compares with none; nothing for the others."""
-    if term.comparison is None:
-        return ""
-    text = comparison_text(term.comparison, findings.output_unit, findings.output_name)
+    """How a term compares with none."""
+    text = (
+        f"{'likelier' if term.log_odds > 0.0 else 'less likely'} than none by {abs(term.log_odds):.1f} in log odds; error on runs "
+        f"left out {error_text(findings, term.left_out_before)} -> {error_text(findings, term.left_out_after)}"
+    )
     before, after = term.held_out_before, term.held_out_after
     if before is not None and after is not None and after >= before:
         text += f"; but on the held-out runs {error_text(findings, before)} -> {error_text(findings, after)}"
@@ -40,16 +40,16 @@ def unknown_sentences(findings: Findings) -> tuple[str, ...]:
     if elsewhere:
         equations = " or ".join(f"the {label(one)} equation" for one in (best.equation, *elsewhere))
         return (
-            f"What is missing is not in the library, and runs left out do not determine whether it is in {equations}: "
-            f"of smooth unknown functions put into one equation in turn, {_or_listed([best, *others])} do equally well. "
-            f"Best is the first ({brought}).",
+            f"What is missing is not in the library, and these runs do not determine whether it is in {equations}: "
+            f"of smooth unknown functions put into one equation in turn, {_or_listed([best, *others])} are about equally likely. "
+            f"Likeliest is the first ({brought}).",
         )
     text = (
         f"What is missing is not in the library; it is in the {label(best.equation)} equation, as an unknown function put "
         f"there shows: {best.title}"
     )
     if others:
-        text += f", or {_or_listed(others)}, which runs left out do not distinguish from it"
+        text += f", or {_or_listed(others)}, which these runs do not distinguish from it"
     text += f" ({brought})."
     if not best.formulas:
         return (text,)
@@ -63,8 +63,10 @@ def _none_named(findings: Findings, best: UnknownTerm) -> str:
     )
     why = comparison_sentence(findings, best)
     if best.held_out_before is not None:
-        return f"{tried} {best.title} predicts runs left out best, and is not validated on the held-out runs: {why}."
-    return f"{tried} none is better beyond chance. The nearest is {best.title}: {why}."
+        return f"{tried} {best.title} is likeliest, and is not validated on the held-out runs: {why}."
+    if best.log_odds > 0.0:
+        return f"{tried} {best.title} is likeliest, and predicts runs left out no better: {why}."
+    return f"{tried} none is likelier than no function at all. The nearest is {best.title}: {why}."
 
 
 def _or_listed(terms: Sequence[UnknownTerm]) -> str:

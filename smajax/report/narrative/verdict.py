@@ -82,7 +82,7 @@ def _not_in_library(findings: Findings) -> str:
         titles = and_listed([effect.title for effect in findings.effects if effect.name in findings.superseded])
         return (
             f"Something is missing, and none of the {tried} candidate effects that were tried accounts for it: {titles} "
-            "comes nearest, and one unknown function in one equation predicts left-out runs better than that."
+            "comes nearest, and one unknown function in one equation is likelier than that."
         )
     if not tried:
         return "Something is missing, and no candidate effect was to be tried: the experiment file leaves none."
