@@ -37,6 +37,7 @@ class JointParameters:
     coefficients: Mapping[str, tuple[str, ...]]  # of each candidate effect, by full name
     priors: Mapping[str, CoefficientPrior]  # of every coefficient, and of the values of presets
     log_odds: Mapping[str, float]  # of each effect, before the runs were seen
+    width_factors: Mapping[str, float] = MappingProxyType({})  # of effects whose priors are wider than their files say
 
     @classmethod
     def of(
@@ -98,7 +99,11 @@ class JointParameters:
 
     def precision(self, name: str) -> float:
         """Of the prior, per squared width."""
-        return 1.0 if name in self.priors else RANGES**-2
+        return self._factor(name) ** -2 if name in self.priors else RANGES**-2
+
+    def _factor(self, name: str) -> float:
+        """By how much the prior of a coefficient is wider than its width."""
+        return self.width_factors.get(name.split(".")[0], 1.0)
 
     def restricted(self, effects: Sequence[str]) -> tuple[Problem, np.ndarray]:
         """The same runs by a model that carries, of the candidates, only `effects`, with priors; where its parameters are in ours.
@@ -118,7 +123,11 @@ class JointParameters:
 
     def prior_records(self, effects: Sequence[str]) -> dict[str, Prior]:
         """Priors of the free parameters of a model with `effects`, for a fit."""
-        return {name: Prior(*self.priors[name]) for name in self.free(effects) if name in self.priors}
+        return {
+            name: Prior(one.base, one.sigma * self._factor(name), one.logarithmic)
+            for name in self.free(effects)
+            if (one := self.priors.get(name)) is not None
+        }
 
     def without(self, values: np.ndarray, effects: Sequence[str]) -> np.ndarray:
         """`values` (P,) with all coefficients of the effects that are not in `effects` at their base."""
