@@ -12,7 +12,6 @@ import jax.numpy as jnp
 import numpy as np
 
 from smajax.attribution.assumed import assumed, expansion_not_given
-from smajax.attribution.bootstrap import bootstrap_intervals
 from smajax.attribution.config import AttributionConfig
 from smajax.attribution.confounders import confounders
 from smajax.attribution.cross_validation import Model, Search
@@ -27,11 +26,11 @@ from smajax.attribution.findings import (
 from smajax.attribution.found import effects_found, parameters_found
 from smajax.attribution.held_out import Compared, validated
 from smajax.attribution.job import Job, job_of
+from smajax.attribution.joint_search import JointSearch
 from smajax.attribution.joint_stage import search_by_evidence
 from smajax.attribution.neutral import check_neutral
 from smajax.attribution.outlier_run import outlier_runs
 from smajax.attribution.refusal import refuse_keys_of_identify
-from smajax.attribution.search import search
 from smajax.attribution.step_size_check import finer_integration, integration_error_of
 from smajax.attribution.unknown_term import Lacking, in_place_of, unknown_terms
 from smajax.attribution.verdict import verdict_of
@@ -62,6 +61,7 @@ class Context:
 class Outcome:
     """The models so far, and what the stages since the search have found out."""
 
+    search: JointSearch
     base: Model
     final: Model
     lacking: Lacking | None = None  # unknown terms, where they have been asked for
@@ -117,7 +117,7 @@ def close_loop(  # keywords, which a caller names one by one
         outcome = searched(context, joint)
     outcome = against_an_unknown_term(context, outcome)
     outcome = against_an_outlier_run(context, outcome)
-    final, compared, rejected = validated(context.job, context.setting, outcome.base, outcome.final)
+    final, compared, rejected = validated(context.job, context.setting, outcome.search, outcome.base, outcome.final)
     found = findings_of(context, replace(outcome, final=final), compared, rejected)
     return replace(found, provenance=_provenance(experiment, cache, command, seed, clock.monotonic() - began))
 
@@ -155,8 +155,7 @@ def prepared(  # the stage's inputs, each once
 
 def searched(context: Context, joint: bool = True) -> Outcome:
     """The base model and the one that the search ends with. `joint`: of `close_loop`."""
-    search_from = search_by_evidence if joint else search
-    return Outcome(*search_from(context.setting, context.setting.base(context.start, context.seed)))
+    return Outcome(*search_by_evidence(context.setting, context.setting.base(context.start, context.seed)))
 
 
 def against_an_unknown_term(context: Context, outcome: Outcome) -> Outcome:
@@ -208,8 +207,8 @@ def findings_of(context: Context, outcome: Outcome, compared: Compared, rejected
     setting.progress(Stage(WRITING, 0.0))
     before = parameters_found(job, setting, base, context.start)
     after = parameters_found(job, setting, final, context.start) if final.effects else before
-    effects = effects_found(job, setting, final, after, bootstrap_intervals(setting, final, context.seed))
-    mistaken = confounders(setting, final, job.fit_runs)
+    effects = effects_found(job, setting, final, after)
+    mistaken = confounders(outcome.search, setting, final, job.fit_runs)
     integration = integration_error_of(setting, final)
     setting.progress(Stage(WRITING, 1.0))
     verdict = verdict_of(final.effects, residual_after, setting.config)

@@ -70,15 +70,8 @@ class AttributionConfig:
         0.02  # by which their error may be larger with an effect beside others than without it, by chance
     )
 
-    # Bootstrap over runs
-    bootstrap_draws: int = 32  # three runs can be drawn in ten ways only: more draws tell no more
-    bootstrap_interval: tuple[float, float] = (2.5, 97.5)  # percentiles
-    bootstrap_least_runs: int = 3  # two can be drawn in three ways
-
     # Confounders
-    overlap_refitted: float = 0.7  # of an effect's trace: a candidate that overlaps less cannot take its place
-    confounders_refitted: int = 3  # of each effect
-    weight_draws: int = 2000  # of the Bayesian bootstrap; weights to 0.01
+    overlap_listed: float = 0.7  # of an effect's trace: a candidate that overlaps less hardly takes its place
     separating_weight: float = 0.01  # from which a run that separates the two is looked for
 
     # Unknown terms
@@ -104,4 +97,3 @@ class AttributionConfig:
     large_load_share: float = 0.2  # of the load, wrong or shifting: a size of the bench is as likely to be wrong
     expansion_cancelled: float = 0.3  # share of the preset's expansion to within which one found is its negative
     confounder_mentioned: float = 0.05  # weight from which a confounder is named
-    confounder_preferred: float = 0.5  # weight from which left-out runs prefer it

@@ -57,6 +57,7 @@ class Model:
     cost: float
     left_out: np.ndarray  # misfit (SI) of each fit run by the model fitted to the others, (R, N)
     left_out_rmse: float
+    left_out_values: np.ndarray | None = None  # (parts, P): fitted without each part of the runs
 
 
 class Fitted(NamedTuple):

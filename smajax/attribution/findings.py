@@ -82,7 +82,7 @@ class CoefficientFinding:
     value: float
     standard_error: float | None
     unit: str
-    by_runs: tuple[float, float] | None = None  # where 95 % of fits to runs drawn anew lie: no interval of confidence
+    by_runs: tuple[float, float] | None = None  # 95 % by the jackknife over runs
 
 
 @dataclass(frozen=True)
@@ -249,8 +249,10 @@ class Confounder:
     effect: str
     confounder: str
     overlap: float  # share of the effect's trace in these runs that the confounder could have left, 0..1
-    weight: float  # of the model that has it instead, among the model and all its confounders, 0..1
-    left_out_rmse: float  # SI
+    weight: (
+        float  # posterior probability of the model that has it instead, among the model and all its confounders, 0..1
+    )
+    rmse_fit: float  # of the model that has it instead, on the fit runs, SI
     separating_run: str  # the run on which the two fitted models differ most; "" where none was looked for
     separation: float  # by how many times the noise, rms
 

@@ -9,11 +9,15 @@ import numpy as np
 from smajax.attribution.cross_validation import Evidence, Model, Search
 from smajax.attribution.findings import CoefficientFinding, EffectFinding, ParameterFinding
 from smajax.attribution.job import Job
+from smajax.attribution.leave_one_run_out import jackknife_error
 from smajax.attribution.search import scores_at
 from smajax.core.parameters import parameters
 from smajax.fit.sensitivity import Sensitivity, sensitivity
 from smajax.fit.uncertainty import Uncertainty, uncertainty
 from smajax.model.effects.library import LIBRARY
+
+LEAST_RUNS = 3  # two can be left out in one way only
+NORMAL_95 = 1.96
 
 
 @dataclass(frozen=True)
@@ -47,9 +51,7 @@ def parameters_found(job: Job, setting: Search, model: Model, start: np.ndarray)
     )
 
 
-def effects_found(
-    job: Job, setting: Search, final: Model, after: ParametersFound, intervals: dict[str, tuple[float, float]]
-) -> tuple[EffectFinding, ...]:
+def effects_found(job: Job, setting: Search, final: Model, after: ParametersFound) -> tuple[EffectFinding, ...]:
     """Every candidate with its evidence: added ones first, the strongest of them at the head, then by score."""
     left = [name for name in job.candidates if name not in final.effects]
     last = {score.effects[0]: score for score in scores_at(setting, final, left)[0]} if left else {}
@@ -63,7 +65,7 @@ def effects_found(
                 fitted[full].value,
                 fitted[full].standard_error,
                 fitted[full].unit,
-                spread(intervals.get(full), fitted[full].standard_error),
+                over_runs(final, job.problem.names.index(full), fitted[full].standard_error),
             )
             for full in setting.coefficients(name)
             if full in fitted
@@ -100,9 +102,14 @@ def effects_found(
     return tuple(sorted(findings, key=strength))
 
 
-def spread(interval: tuple[float, float] | None, error: float | None) -> tuple[float, float] | None:
-    """The interval of fits to runs drawn anew, where it is wide enough to mean something.
+def over_runs(model: Model, place: int, error: float | None) -> tuple[float, float] | None:
+    """95 % of a parameter by the jackknife over runs, where it is wide enough to mean something.
 
-    Where it is narrower than the standard error either way the tie to the fit holds the value there, and not the runs.
+    None for fewer than `LEAST_RUNS` parts. Where it is narrower than the standard error either way, the prior or a bound holds
+    the value there, and not the runs.
     """
-    return None if interval is None or error is None or interval[1] - interval[0] < 2.0 * error else interval
+    found = model.left_out_values
+    if error is None or found is None or len(found) < LEAST_RUNS:
+        return None
+    half = NORMAL_95 * float(jackknife_error(found[:, [place]])[0])
+    return None if half < error else (float(model.values[place]) - half, float(model.values[place]) + half)

@@ -11,8 +11,9 @@ from smajax.attribution.config import AttributionConfig
 from smajax.attribution.cross_validation import Model, Search
 from smajax.attribution.findings import HeldOutWorse, Rejected, ResidualDiagnostics, RunFinding, pooled_rmse
 from smajax.attribution.job import Job
+from smajax.attribution.joint_search import JointSearch
+from smajax.attribution.joint_stage import without_last
 from smajax.attribution.residual_diagnostics import diagnosed
-from smajax.attribution.search import fewer
 from smajax.core.parameters import parameter_values
 from smajax.data.experiment.record import Run
 from smajax.fit.packed_runs import RunBatch, pack, simulate_batch
@@ -22,7 +23,9 @@ from smajax.model.types import Trajectory
 Compared = tuple[tuple[RunFinding, ...], ResidualDiagnostics, ResidualDiagnostics]
 
 
-def validated(job: Job, setting: Search, first: Model, final: Model) -> tuple[Model, Compared, Rejected | None]:
+def validated(
+    job: Job, setting: Search, search: JointSearch, first: Model, final: Model
+) -> tuple[Model, Compared, Rejected | None]:
     """What the held-out runs leave of `final`: (model, every run by it, what they rejected).
 
     No fit sees them and nothing is added for them. They reject the effect that came last first, as long as with it their
@@ -32,10 +35,11 @@ def validated(job: Job, setting: Search, first: Model, final: Model) -> tuple[Mo
     def held_out(compared: Compared, which: Literal["before", "after"] = "after") -> float:
         return pooled_rmse(compared[0], "held-out", which)
 
+    error = search.error(search.fitted[search.joint.ordered(final.effects)])
     compared = whole = compare(job, first, final, setting.config)
     left = final
     while left.effects:
-        rest = fewer(setting, left) if len(left.effects) > 1 else first
+        rest = without_last(search, setting, left, error) if len(left.effects) > 1 else first
         without = compare(job, first, rest, setting.config)
         now = held_out(compared)
         if not (

@@ -14,8 +14,8 @@ from smajax.attribution.cross_validation import Evidence, Model, Search
 from smajax.attribution.findings import LikelierModel, NoLikelierModel, Reason, Round, Scored, StepDependent
 from smajax.attribution.joint_parameters import JointParameters
 from smajax.attribution.joint_search import JointRound, JointSearch, refined, search_jointly
-from smajax.attribution.laplace_evidence import FittedModel
-from smajax.attribution.leave_one_run_out import left_out_misfit
+from smajax.attribution.laplace_evidence import FittedModel, fitted_model
+from smajax.attribution.leave_one_run_out import left_out
 from smajax.attribution.search import refined as at_optimum
 from smajax.attribution.step_size_check import gain_kept_at_half_step
 from smajax.fit.levenberg_marquardt import Fit, FitSettings
@@ -53,18 +53,16 @@ class _Stage:
         self.setting.note(Round(len(self.setting.rounds) + 1, (), chosen, reason))
 
 
-def search_by_evidence(setting: Search, base: Fit) -> tuple[Model, Model]:
-    """(base model, likeliest model). Fills `setting.evidence` and `setting.rounds` on the way."""
+def search_by_evidence(setting: Search, base: Fit) -> tuple[JointSearch, Model, Model]:
+    """(the search, base model, likeliest model). Fills `setting.evidence` and `setting.rounds` on the way."""
     settings = FitSettings(tolerance=setting.config.final_convergence, cache=setting.cache, progress=setting.progress)
     stage = _Stage(setting, settings)
     while True:
         search = stage.joint_search()
         found = search_jointly(search, base.values)
         error = search.error(found)
-        best = refined(search, found, error)
-        first, final = (as_model(search, one, error) for one in (search.fitted[()], best))
-        # By the runs alone, from points nearby as well: what is reported is no compromise with a prior.
-        final = at_optimum(setting, final) if final.effects else final
+        first = as_model(search, search.fitted[()], error)
+        final = final_model(search, setting, found, error)
         kept = gain_kept_at_half_step(setting, final, first)
         if kept >= setting.config.gain_kept_at_half_step:
             break
@@ -75,7 +73,27 @@ def search_by_evidence(setting: Search, base: Fit) -> tuple[Model, Model]:
         seen.probability = probabilities.get(effect, float("nan"))  # in no set that was worth a fit
         if (effect,) in search.fitted:
             seen.alone_rmse = search.fitted[(effect,)].rms
-    return first, final
+    return search, first, final
+
+
+def final_model(search: JointSearch, setting: Search, found: FittedModel, error: float) -> Model:
+    """A fitted model at its optimum by the runs alone, from points nearby as well: what is reported is no compromise with a prior."""
+    best = refined(search, found, error)
+    if not best.effects:
+        return as_model(search, best, error)
+    plain = at_optimum(setting, Model(best.effects, best.values, np.inf, np.zeros(0), np.inf))
+    return as_model(search, fitted_model(search.joint, best.effects, plain.values, best.effects), error)
+
+
+def without_last(search: JointSearch, setting: Search, model: Model, error: float) -> Model:
+    """`model` without the effect that the evidence needs least."""
+    rest = search.joint.ordered(model.effects[:-1])
+    if rest in search.fitted:
+        fitted = search.fitted[rest]
+    else:
+        values = search.joint.without(model.values, rest)
+        fitted = fitted_model(search.joint, rest, values, model.effects)
+    return final_model(search, setting, fitted, error)
 
 
 def effect_probabilities(search: JointSearch, error: float) -> dict[str, float]:
@@ -89,10 +107,10 @@ def effect_probabilities(search: JointSearch, error: float) -> dict[str, float]:
 
 def as_model(search: JointSearch, fitted: FittedModel, error: float) -> Model:
     """A fitted model as the later stages take it, the effect that the evidence needs least at the end."""
-    misfit = left_out_misfit(search.joint, fitted, error)
-    rmse = float(np.sqrt((misfit**2).sum() / np.asarray(search.joint.problem.batch.mask).sum()))
+    found = left_out(search.joint, fitted, error)
+    rmse = float(np.sqrt((found.misfit**2).sum() / np.asarray(search.joint.problem.batch.mask).sum()))
     effects = tuple(sorted(fitted.effects, key=lambda effect: -_needed(search, effect, fitted, error)))
-    return Model(effects, fitted.values, fitted.squares / search.noise**2, misfit, rmse)
+    return Model(effects, fitted.values, fitted.squares / search.noise**2, found.misfit, rmse, found.values)
 
 
 def _needed(search: JointSearch, effect: str, model: FittedModel, error: float) -> float:

@@ -12,6 +12,7 @@ noise it is too long to be believed, and those fits are made.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -27,10 +28,15 @@ MOST_PARTS = 12  # runs are left out one by one, or in so many parts
 STEPS, TOLERANCE = 20, 1e-4  # of the refits
 
 
-def left_out_misfit(
-    joint: JointParameters, model: FittedModel, error: float, carried: Sequence[str] | None = None
-) -> np.ndarray:
-    """Misfit (SI) of each run, (series, N), by the model without it; of a single run, by the fit to it.
+class LeftOut(NamedTuple):
+    """What the fits without each part of the runs say."""
+
+    misfit: np.ndarray  # SI, (series, N), of each run by the model without it; of a single run, by the fit to it
+    values: np.ndarray  # (parts, P), parameters of the problem whose joint fit it is, without each part of the runs
+
+
+def left_out(joint: JointParameters, model: FittedModel, error: float, carried: Sequence[str] | None = None) -> LeftOut:
+    """Each run by the model without it.
 
     `error`: of an independent sample, SI. `carried`: effects of the program that computes it; None: the model's own.
     """
@@ -40,7 +46,7 @@ def left_out_misfit(
     runs = problem.batch.runs
     whole = misfits(problem, [values])[0]
     if runs < 2 or not model.names:
-        return whole
+        return LeftOut(whole, model.values[None])
     parts = np.arange(runs) % min(runs, MOST_PARTS)
     points = _steps(joint, problem, model, values, parts)
     found = misfits(problem, points)
@@ -51,7 +57,17 @@ def left_out_misfit(
         tasks = [problem.task(model.names, joint.bounds, values, (parts != part).astype(float)) for part in doubtful]
         fits = levenberg_marquardt(problem, tasks, FitSettings(max_steps=STEPS, tolerance=TOLERANCE))
         found[doubtful] = misfits(problem, [fit.values for fit in fits])
-    return np.stack([found[part, run] for run, part in enumerate(parts)])
+        for part, fit in zip(doubtful, fits, strict=True):
+            points[part] = fit.values
+    every = np.tile(model.values, (len(points), 1))
+    every[:, index] = np.stack(points)
+    return LeftOut(np.stack([found[part, run] for run, part in enumerate(parts)]), every)
+
+
+def jackknife_error(values: np.ndarray) -> np.ndarray:
+    """Standard error of each parameter by how far it moves when a part of the runs is left out; `values` (parts, P)."""
+    parts = len(values)
+    return np.asarray(np.sqrt((parts - 1) / parts * ((values - values.mean(axis=0)) ** 2).sum(axis=0)))
 
 
 def _steps(

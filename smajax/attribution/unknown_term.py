@@ -21,7 +21,7 @@ from smajax.attribution.findings import UnknownTerm, UnknownTermLikelier
 from smajax.attribution.formulas import formulas
 from smajax.attribution.joint_parameters import JointParameters
 from smajax.attribution.laplace_evidence import FittedModel, fitted_model, independent_error
-from smajax.attribution.leave_one_run_out import left_out_misfit
+from smajax.attribution.leave_one_run_out import left_out
 from smajax.attribution.score_test import Score, screen
 from smajax.attribution.unknown.ranges import Sought, sought
 from smajax.attribution.unknown.spline import design
@@ -177,7 +177,7 @@ def least_error(setting: Search, models: Sequence[FittedModel]) -> float:
 
 def _predicting(joint: JointParameters, model: FittedModel, error: float, carried: Sequence[str]) -> Model:
     """A fitted model with its error on each run by the others."""
-    misfit = left_out_misfit(joint, model, error, carried)
+    misfit = left_out(joint, model, error, carried).misfit
     rmse = float(np.sqrt((misfit**2).sum() / np.asarray(joint.problem.batch.mask).sum()))
     return Model(model.effects, model.values, model.squares / float(joint.problem.noise_sigma) ** 2, misfit, rmse)
 

@@ -15,8 +15,9 @@ import pytest
 
 from smajax.attribution.assumed import assumed, expansion_not_given
 from smajax.attribution.close_loop import close_loop
+from smajax.attribution.cross_validation import Model
 from smajax.attribution.findings import Findings, pooled_rmse
-from smajax.attribution.found import spread
+from smajax.attribution.found import over_runs
 from smajax.core.parameters import get_parameters, parameters, set_parameters
 from smajax.data.experiment.load import load_experiment
 from smajax.data.experiment.record import Experiment
@@ -41,11 +42,17 @@ def test_a_parameter_that_the_log_gives_is_not_left_open() -> None:
     assert {"wire_length", "damping"} <= names
 
 
-def test_a_spread_over_runs_that_the_tie_holds_is_not_given() -> None:
-    assert spread((1.0, 2.0), 0.4) == (1.0, 2.0)
-    assert spread((1.0, 2.0), 0.6) is None
-    assert spread((1.0, 2.0), None) is None
-    assert spread(None, 0.1) is None
+def test_an_interval_over_runs_that_a_prior_holds_is_not_given() -> None:
+    """The jackknife of a mean is its standard error; narrower than that it says nothing of the runs."""
+    runs = np.asarray([1.0, 2.0, 3.0, 6.0])
+    without = np.asarray([[np.delete(runs, k).mean()] for k in range(4)])
+    error = runs.std(ddof=1) / 2.0
+    model = Model((), np.asarray([3.0]), 0.0, np.zeros((4, 1)), 0.0, without)
+    assert over_runs(model, 0, 0.4) == pytest.approx((3.0 - 1.96 * error, 3.0 + 1.96 * error))
+    assert over_runs(model, 0, 3.0) is None
+    assert over_runs(model, 0, None) is None
+    assert over_runs(dataclasses.replace(model, left_out_values=without[:2]), 0, 0.4) is None
+    assert over_runs(dataclasses.replace(model, left_out_values=None), 0, 0.4) is None
 
 
 def test_the_expansion_of_a_preset_that_the_file_does_not_give() -> None:

@@ -1,4 +1,4 @@
-"""What could be mistaken for an effect, and how far an estimate depends on which runs there happened to be."""
+"""What could be mistaken for an effect, how likely it is by the same runs, and which run separates the two."""
 
 from __future__ import annotations
 
@@ -8,15 +8,17 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from smajax.attribution.bootstrap import bootstrap_intervals
 from smajax.attribution.config import AttributionConfig
 from smajax.attribution.confounders import confounders, overlap, separating_run
-from smajax.attribution.cross_validation import Model, Search, Start
+from smajax.attribution.cross_validation import Model, Search
+from smajax.attribution.joint_parameters import JointParameters
+from smajax.attribution.joint_search import JointSearch, search_jointly
+from smajax.attribution.joint_stage import as_model
 from smajax.core.result_cache import ResultCache
 from smajax.data.experiment.record import Run
+from smajax.fit.levenberg_marquardt import FitSettings
 from smajax.fit.packed_runs import RunBatch, simulate_batch
 from smajax.fit.problem import Problem
-from smajax.fit.sensitivity import Sensitivity
 from smajax.model.extended import extended
 from smajax.model.presets import build
 
@@ -33,12 +35,12 @@ BOUNDS = {
 def test_overlap_is_the_share_of_a_trace_that_another_could_leave() -> None:
     rng = np.random.default_rng(0)
     fitted, trace, other = np.linalg.qr(rng.standard_normal((200, 3)))[0].T
-    columns = np.stack([fitted, 0.6 * trace + 0.8 * other + 3.0 * fitted, other, fitted], axis=1)
-    at = Sensitivity(("fitted", "mixed", "other", "same"), np.zeros((1, 200)), columns[None], np.ones((1, 200)))
-    assert overlap(at, 5.0 * trace + 7.0 * fitted, ["fitted"], ["mixed"]) == pytest.approx(0.6)
-    assert overlap(at, trace, ["fitted"], ["mixed", "other"]) == pytest.approx(1.0)
-    assert overlap(at, trace, ["fitted"], ["same"]) == 0.0
-    assert overlap(at, fitted, ["fitted"], ["mixed"]) == 0.0
+    mixed = 0.6 * trace + 0.8 * other + 3.0 * fitted
+    assert overlap(5.0 * trace + 7.0 * fitted, [fitted], [mixed]) == pytest.approx(0.6)
+    assert overlap(trace, [fitted], [mixed, other]) == pytest.approx(1.0)
+    assert overlap(trace, [fitted], [fitted]) == 0.0
+    assert overlap(fitted, [fitted], [mixed]) == 0.0
+    assert overlap(trace, [], [0.6 * trace + 0.8 * other]) == pytest.approx(0.6)
 
 
 def _setting() -> tuple[Search, Model, list[Run]]:
@@ -80,20 +82,36 @@ def at_base_of(setting: Search, model: Model) -> Model:
     return dataclasses.replace(model, effects=(), values=values)
 
 
-def test_a_confounder_is_refitted_and_weighed() -> None:
+def test_a_confounder_is_weighed_by_its_evidence() -> None:
     setting, model, runs = _setting()
-    setting.config = AttributionConfig(overlap_refitted=0.01)  # of two that these runs distinguish well
-    model = dataclasses.replace(model, values=setting.fit([Start(model.effects, model.values)], "fit")[0][0].values)
-    low, high = bootstrap_intervals(setting, model, seed=1)["latent_heat.enthalpy"]
-    assert 0.95 * TRUE < low <= high < 1.05 * TRUE
-    assert low < high
-    (found,) = confounders(setting, model, runs)
-    assert (found.effect, found.confounder) == ("latent_heat", "phase_resistance")
-    assert 0.01 < found.overlap < 0.1
+    setting.config = AttributionConfig(overlap_listed=0.01)  # of two that these runs distinguish well
+    joint = JointParameters.of(setting.problem, setting.unknowns, setting.bounds, setting.candidates, setting.extent)
+    search = JointSearch(joint, setting.extent, FitSettings(), NOISE)
+    found = search_jointly(search, at_base_of(setting, model).values)
+    assert found.effects == ("latent_heat",)
+    model = as_model(search, found, search.error(found))
+    (one,) = confounders(search, setting, model, runs)
+    assert (one.effect, one.confounder) == ("latent_heat", "phase_resistance")
+    assert 0.01 < one.overlap < 0.1
     # Latent heat is far stronger than the noise here: the other one does not do.
-    assert found.weight < 1e-3
-    assert found.left_out_rmse > 2.0 * NOISE
-    assert found.separating_run == ""
+    assert one.weight < 1e-3
+    assert one.rmse_fit > 2.0 * NOISE
+    assert one.separating_run == ""
     what, apart = separating_run(setting, model, at_base_of(setting, model), runs)
     assert what.startswith("voltage")
     assert apart > 10.0
+    assert confounders(search, setting, dataclasses.replace(model, effects=()), runs) == ()
+
+
+def test_of_two_effects_with_one_trace_either_may_be_it() -> None:
+    """As likely as the other, by the prior odds of each, which the same evidence leaves as they are."""
+    setting, model, runs = _setting()
+    joint = JointParameters.of(setting.problem, setting.unknowns, setting.bounds, setting.candidates, setting.extent)
+    search = JointSearch(joint, setting.extent, FitSettings(), NOISE)
+    found = search_jointly(search, at_base_of(setting, model).values)
+    model = as_model(search, found, search.error(found))
+    twin = dataclasses.replace(found, effects=("phase_resistance",), log_prior=found.log_prior - 1.0)
+    search.fitted[twin.effects] = twin
+    (one,) = confounders(search, setting, model, runs)
+    assert one.weight == pytest.approx(1.0 / (1.0 + np.e))
+    assert one.separating_run != ""

@@ -8,7 +8,7 @@ import pytest
 from smajax.attribution.joint_parameters import JointParameters
 from smajax.attribution.joint_search import JointSearch, detectable, search_jointly, starts
 from smajax.attribution.laplace_evidence import fitted_model
-from smajax.attribution.leave_one_run_out import left_out_misfit
+from smajax.attribution.leave_one_run_out import left_out
 from smajax.attribution.preset_priors import preset_priors
 from smajax.attribution.subset_evidence import linear_model
 from smajax.attribution.traces import Variant, traces_at
@@ -77,7 +77,7 @@ def test_values_of_presets_that_are_free_hide_no_effect() -> None:
 def test_runs_left_out_without_refits_are_as_with_them() -> None:
     search, _, _ = _found({"latent_heat.enthalpy": 1.2e4})
     joint, model = search.joint, search.fitted[("latent_heat",)]
-    approximate = left_out_misfit(joint, model, NOISE)
+    approximate = left_out(joint, model, NOISE).misfit
     problem, index = joint.restricted(model.effects)
     keep = 1.0 - np.eye(problem.batch.runs)
     tasks = [problem.task(model.names, joint.bounds, model.values[index], weights) for weights in keep]

@@ -112,15 +112,6 @@ def of_bounds(findings: Findings) -> Iterator[str]:
         )
 
 
-def of_confounders(findings: Findings) -> Iterator[str]:
-    """Candidates that left-out runs prefer to what was added."""
-    titles = {effect.name: effect.title for effect in findings.effects}
-    speak = "runs left out prefer" if findings.fit_runs > 1 else "the one fit run prefers"
-    for one in findings.confounders:
-        if one.weight > findings.config.confounder_preferred:
-            yield f"Mind: {speak} {titles[one.confounder]} to {titles[one.effect]} (weight {one.weight:.2f})."
-
-
 def of_the_preset(findings: Findings, effect: EffectFinding) -> str:
     """What an expansion says that takes back the one of the preset's theta_T: nothing of the wire, but of what was taken as known."""
     expansion = findings.preset_expansion

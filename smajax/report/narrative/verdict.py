@@ -26,7 +26,6 @@ def summary(findings: Findings) -> tuple[str, ...]:
         sentences.insert(0, _rejected(findings))
     sentences += _errors(findings)
     sentences += caveats.of_bounds(findings)
-    sentences += caveats.of_confounders(findings)
     for effect in findings.added:
         meaning = caveats.of_the_preset(findings, effect) or LIBRARY[effect.name].candidate.sentence
         sentences += [meaning, *caveats.of_a_size(findings, effect)]
