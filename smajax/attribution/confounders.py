@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from smajax.attribution.cross_validation import Fitted, Model, Search, Start, base_value, nudged
 from smajax.attribution.findings import Confounder
-from smajax.attribution.score_test import Score, scaled, switches
-from smajax.attribution.search import start_values
+from smajax.attribution.score_test import scaled, switches
 from smajax.core.whiteness import correlation_time, split_runs
 from smajax.data.experiment.record import Run
 from smajax.fit.design import candidate_problem
 from smajax.fit.predicted import predicted_at
 from smajax.fit.sensitivity import Sensitivity, sensitivity
+from smajax.model.effects.library import LIBRARY
 
 # Of itself: all that is left, by rounding, of a trace that other parameters make as well.
 ABSORBED = 1e-6
@@ -67,8 +67,7 @@ def confounders(setting: Search, model: Model, runs: Sequence[Run]) -> tuple[Con
         for name in setting.coefficients(effect):
             values[index(name)] = base_value(name)
         rest = tuple(name for name in model.effects if name != effect)
-        towards = Score((other,), 0.0, 0.0, 1.0, {})
-        starts.append(Start((*rest, other), start_values(values, names, towards, setting.bounds)))
+        starts.append(Start((*rest, other), switched_on(values, names, other, setting.bounds)))
     fits, _ = setting.fit(starts, "refitting what could be mistaken for it", hops=True)
     fitted = [Fitted(start.effects, one) for start, one in zip(starts, fits, strict=True)]
     whole = Fitted(model.effects, setting.known(model))
@@ -84,6 +83,20 @@ def confounders(setting: Search, model: Model, runs: Sequence[Run]) -> tuple[Con
         )
         result.append(Confounder(effect, other, alike, share, one.left_out_rmse, what, apart))
     return tuple(sorted(result, key=lambda one: -one.weight))
+
+
+def switched_on(
+    values: np.ndarray, names: Sequence[str], effect: str, bounds: Mapping[str, tuple[float, float]]
+) -> np.ndarray:
+    """`values` (P,) with the coefficients of an effect where fits of it begin."""
+    found = np.array(values)
+    for name, start in LIBRARY[effect].candidate.initial_guess.items():
+        full = f"{effect}.{name}"
+        low, high = bounds[full]
+        # Runs of a small stroke have small bounds.
+        outside = full in switches(effect) and not low < start < high
+        found[names.index(full)] = min(start, 0.5 * high) if outside else start
+    return found
 
 
 def blocks(left_out: Sequence[np.ndarray], mask: np.ndarray) -> np.ndarray:

@@ -8,11 +8,10 @@ import jax.numpy as jnp
 import numpy as np
 
 from smajax.attribution.config import AttributionConfig
-from smajax.attribution.cross_validation import Model, Search
+from smajax.attribution.cross_validation import Fitted, Model, Search, Start, base_value
 from smajax.attribution.findings import HeldOutWorse, Rejected, ResidualDiagnostics, RunFinding, pooled_rmse
 from smajax.attribution.job import Job
 from smajax.attribution.residual_diagnostics import diagnosed
-from smajax.attribution.search import fewer
 from smajax.core.parameters import parameter_values
 from smajax.data.experiment.record import Run
 from smajax.fit.packed_runs import RunBatch, pack, simulate_batch
@@ -49,6 +48,15 @@ def validated(job: Job, setting: Search, first: Model, final: Model) -> tuple[Mo
     without_them, with_them = held_out(compared), held_out(whole)
     setting.set_aside(final, HeldOutWorse(without_them, with_them), gone)
     return left, compared, Rejected(gone, without_them, with_them)
+
+
+def fewer(setting: Search, model: Model) -> Model:
+    """`model` without the effect that came last, fitted anew."""
+    rest, values = model.effects[:-1], np.array(model.values)
+    for name in setting.coefficients(model.effects[-1]):
+        values[setting.problem.names.index(name)] = base_value(name)
+    (fit,), _ = setting.fit([Start(rest, values)], "removing the last effect", hops=True)
+    return setting.cross_validated([Fitted(rest, fit)])[0]
 
 
 def _simulated(problem: Problem, values: np.ndarray, batch: RunBatch) -> Trajectory:
