@@ -27,7 +27,6 @@ class Score:
 
     effects: tuple[str, ...]
     gain: float  # share of the residual's square that the linear model would take away, 0..1
-    statistic: float  # gain in units of one independent sample's variance
     p_value: float
     coefficients: dict[str, float]  # linear estimate by parameter name, inside its bounds
 
@@ -64,11 +63,10 @@ def score_of(
     before = float(residual @ residual)
     after = residual - columns @ found
     gain = max(0.0, 1.0 - float(after @ after) / before) if before else 0.0
-    statistic = gain * len(residual) / correlation
+    statistic = gain * len(residual) / correlation  # in units of one independent sample's variance
     return Score(
         names,
         gain,
-        statistic,
         float(stats.chi2.sf(statistic, max(1, int(seen.sum())))),
         dict(zip(coefficients, found.tolist(), strict=True)),
     )

@@ -10,13 +10,14 @@ import pytest
 
 from smajax.attribution.bootstrap import bootstrap_intervals
 from smajax.attribution.config import AttributionConfig
-from smajax.attribution.confounders import confounders, overlap, separating_run
+from smajax.attribution.confounders import confounders, overlap, separating_run, switched_on
 from smajax.attribution.cross_validation import Model, Search, Start
 from smajax.core.result_cache import ResultCache
 from smajax.data.experiment.record import Run
 from smajax.fit.packed_runs import RunBatch, simulate_batch
 from smajax.fit.problem import Problem
 from smajax.fit.sensitivity import Sensitivity
+from smajax.model.effects.library import LIBRARY
 from smajax.model.extended import extended
 from smajax.model.presets import build
 
@@ -72,6 +73,16 @@ def _setting() -> tuple[Search, Model, list[Run]]:
         for k in range(3)
     ]
     return setting, model, runs
+
+
+def test_a_refit_begins_at_an_effects_usual_size_and_never_out_of_bounds() -> None:
+    """Runs of a small stroke have small bounds."""
+    name, usual = "sensor_backlash.half_width", LIBRARY["sensor_backlash"].candidate.initial_guess["half_width"]
+    begun = np.asarray([7.0, 0.0])
+    large, small = (switched_on(begun, ("other", name), "sensor_backlash", {name: (0.0, top)}) for top in (1.0, 5e-5))
+    assert large.tolist() == [7.0, usual]
+    assert small.tolist() == [7.0, 2.5e-5]
+    assert begun.tolist() == [7.0, 0.0]
 
 
 def at_base_of(setting: Search, model: Model) -> Model:
