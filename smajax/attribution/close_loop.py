@@ -83,14 +83,11 @@ def close_loop(  # keywords, which a caller names one by one
     seed: int = SEED,
     compile_per_model: bool = False,
     config: AttributionConfig | None = None,
-    joint: bool = True,
     apart: bool | None = None,
 ) -> Findings:
     """Fit the base model, look at what it leaves, find what it lacks, and validate on runs the fit never saw.
 
     `memory` is a folder for finished fits: a loop that was interrupted resumes from there. `compile_per_model`: of `Search`.
-    `joint`: whole sets of effects are compared by their evidence, all parameters fitted together; else effects are added
-    round by round where they predict left-out runs better.
     Held-out runs are simulated when the search is over: they reject what they do not validate, and nothing is added
     for them. The caller chooses precision; anything but float64 is refused with a ValueError, because the
     differences that decide here are far below float32's rounding over a run. Raises PluginError for an effect of another
@@ -109,12 +106,12 @@ def close_loop(  # keywords, which a caller names one by one
     cache = ResultCache(memory)
     settings = config or AttributionConfig()
     context = prepared(experiment, cache, as_progress(progress), seed, compile_per_model, settings)
-    outcome = searched(context, joint)
+    outcome = searched(context)
     finer = finer_integration(context.setting, outcome.final)
     if finer is not None:
         # Models are compared as one integration gives them: all of them again.
         context = prepared(experiment, cache, as_progress(progress), seed, compile_per_model, settings, finer)
-        outcome = searched(context, joint)
+        outcome = searched(context)
     outcome = against_an_unknown_term(context, outcome)
     outcome = against_an_outlier_run(context, outcome)
     final, compared, rejected = validated(context.job, context.setting, outcome.search, outcome.base, outcome.final)
@@ -153,8 +150,8 @@ def prepared(  # the stage's inputs, each once
     return Context(job, setting, start, (*experiment.warnings, *identifiable), seed)
 
 
-def searched(context: Context, joint: bool = True) -> Outcome:
-    """The base model and the one that the search ends with. `joint`: of `close_loop`."""
+def searched(context: Context) -> Outcome:
+    """The base model and the one that the search ends with."""
     return Outcome(*search_by_evidence(context.setting, context.setting.base(context.start, context.seed)))
 
 

@@ -30,8 +30,6 @@ class AttributionConfig:
 
     # Cross-validation: when is a model better?
     penalty: float = 0.01  # of the mean square on left-out runs that each coefficient has to gain
-    standard_errors: float = 0.5  # of the paired difference, too: with three or four runs that error is wide
-    standard_errors_one_run: float = 2.0  # with one run what is compared are fits to it
     effect_size_error: float = (
         1.0  # relative error to which the other runs determine an effect's size for a left-out run to count
     )
@@ -45,17 +43,8 @@ class AttributionConfig:
     convergence: float = 1e-5  # relative decrease of the cost at which a refit ends
     final_convergence: float = 1e-8  # of the final model: standard errors need the optimum
 
-    # Search
-    significance: float = 1e-3  # of the score tests of one round, counted together
-    gain_in_noise: float = 0.2  # of the residual's square: a slow effect as large as the noise may pass for slow noise
-    singles_refitted: int = 8  # effects in a round
-    pairs_refitted: int = 2  # pairs of effects in a round
-    cost_ratio: float = 2.0  # to the best: from the second round on a candidate farther behind is not cross-validated
-    most_rounds: int = 6  # a bench with more effects at once is not identifiable with a handful of runs
+    # Step-size check
     gain_kept_at_half_step: float = 0.5  # of an effect with which the load may jump; less is the integration's gain
-    sobol_starts: int = 32  # in the ranges of an effect with several local minima; a power of two, for Sobol's points
-    first_steps: int = 8  # from each start, before the worse ones are dropped
-    starts_continued: int = 4  # taken to convergence
 
     # Outlier run
     outlier_least_runs: int = 3  # of two runs that disagree either may be the wrong one

@@ -21,11 +21,11 @@ from smajax.attribution.every_effect import EVERY
 from smajax.attribution.findings import Comparison, Reason, Round
 from smajax.attribution.residual_diagnostics import all_noise
 from smajax.attribution.run_extent import extent_of
-from smajax.attribution.score_test import Score, scaled, switches
+from smajax.attribution.score_test import scaled, switches
 from smajax.core.progress import Progress, Result, quiet
 from smajax.core.result_cache import ResultCache
 from smajax.core.whiteness import correlation_time, split_runs
-from smajax.fit.levenberg_marquardt import MAX_STEPS, Fit, FitSettings, levenberg_marquardt
+from smajax.fit.levenberg_marquardt import Fit, FitSettings, levenberg_marquardt
 from smajax.fit.packed_runs import RunBatch
 from smajax.fit.predicted import misfits
 from smajax.fit.problem import Problem
@@ -71,12 +71,8 @@ class Fitted(NamedTuple):
 class Evidence:
     """What was learnt of one effect over the whole search."""
 
-    first_score: Score | None = None
-    alone_rmse: float = float("nan")  # fit runs, effect added alone in the first round
-    alone_left_out_rmse: float = float("nan")
-    base_left_out_rmse: float = float("nan")  # the base model, on the same
-    without_left_out_rmse: float = float("nan")  # the final model with this effect taken out again
-    probability: float = float("nan")  # posterior, by the joint search
+    alone_rmse: float = float("nan")  # fit runs, base model with the effect alone
+    probability: float = float("nan")  # posterior, of the fitted sets that have it
 
 
 @dataclass
@@ -97,7 +93,6 @@ class Search:
     config: AttributionConfig = DEFAULT
     evidence: dict[str, Evidence] = field(default_factory=dict)
     rounds: list[Round] = field(default_factory=list)
-    path: list[Model] = field(default_factory=list)  # the models that were added to, the base model first
 
     def note(self, done: Round) -> None:
         """Record a round and report it."""
@@ -158,28 +153,25 @@ class Search:
         *,
         enough: float | None = None,
         hops: bool = False,
-        resident: Sequence[str] = (),
-        most: int = MAX_STEPS,
     ) -> tuple[list[Fit], np.ndarray]:
         """Fit every start: (fits with full parameter vectors, misfit of all runs at each, (S, R, N)).
 
-        `hops`: each from points near its end as well (`fit.starts.perturbed_restarts`). `resident`: effects that the model holds besides,
-        as it did in the fits before, whose program then serves again. `most`: steps.
+        `hops`: each from points near its end as well (`fit.starts.perturbed_restarts`).
         """
         enough = self.config.convergence if enough is None else enough
         sets = sorted({start.effects for start in starts})
         if self.compile_per_model and len(sets) > 1:
             places = [[k for k, start in enumerate(starts) if start.effects == one] for one in sets]
-            parts = [self.fit([starts[k] for k in some], what, enough=enough, hops=hops, most=most) for some in places]
+            parts = [self.fit([starts[k] for k in some], what, enough=enough, hops=hops) for some in places]
             order = np.argsort(np.concatenate(places))
             together = [one for part, _ in parts for one in part]
             return [together[k] for k in order], np.concatenate([found for _, found in parts])[order]
-        problem, index = self.restricted([*resident, *(name for start in starts for name in start.effects)])
+        problem, index = self.restricted([name for start in starts for name in start.effects])
         tasks = [
             problem.task(self.free(start.effects), self.bounds, start.values[index], start.weights, start.tie)
             for start in starts
         ]
-        settings = FitSettings(most, enough, self.cache, self.progress, what)
+        settings = FitSettings(tolerance=enough, cache=self.cache, progress=self.progress, stage=what)
         fits = levenberg_marquardt(problem, tasks, settings)
         if hops:
             fits = perturbed_restarts(problem, tasks, fits, settings)
@@ -239,9 +231,7 @@ class Search:
         """Whether a model with that error explains enough of these runs for its effects to mean anything."""
         return self.explained_variance(left_out_rmse) > self.config.least_explained_variance
 
-    def cross_validated(
-        self, fitted: Sequence[Fitted], present: Model | None = None, resident: Sequence[str] = ()
-    ) -> list[Model]:
+    def cross_validated(self, fitted: Sequence[Fitted], present: Model | None = None) -> list[Model]:
         """Leave each fit run out in turn, refit to the others, and predict the one left out (of many, `most_folds` parts).
 
         A fold starts at the fit to all runs and is tied to it, each parameter to within about `fold_tie` of its logit in
@@ -251,7 +241,7 @@ class Search:
         A fold that follows all runs better than the fit to all has come to a better local minimum: that fit begins there again.
         """
         parts = self.parts()
-        folded = self.folded(fitted, resident)
+        folded = self.folded(fitted)
         better = {
             place: deeper.values
             for place, (entry, (_, deeper)) in enumerate(zip(fitted, folded, strict=True))
@@ -259,11 +249,11 @@ class Search:
         }
         if better:
             starts = [Start(fitted[place].effects, values) for place, values in better.items()]
-            again, _ = self.fit(starts, "refitting where a fold did better", hops=True, resident=resident)
+            again, _ = self.fit(starts, "refitting where a fold did better", hops=True)
             fitted, folded = list(fitted), list(folded)
             for place, fit in zip(better, again, strict=True):
                 fitted[place] = Fitted(fitted[place].effects, fit)
-            for place, one in zip(better, self.folded([fitted[place] for place in better], resident), strict=True):
+            for place, one in zip(better, self.folded([fitted[place] for place in better]), strict=True):
                 folded[place] = one
         models = []
         for entry, (own, _) in zip(fitted, folded, strict=True):
@@ -272,7 +262,7 @@ class Search:
             models.append(model if present is None else self.counted(entry, model, present))
         return models
 
-    def folded(self, fitted: Sequence[Fitted], resident: Sequence[str] = ()) -> list[tuple[np.ndarray, Fit]]:
+    def folded(self, fitted: Sequence[Fitted]) -> list[tuple[np.ndarray, Fit]]:
         """Every fit refitted without each part of the runs: the misfit of all runs at each fold, and the one best for all."""
         parts = self.parts()
         # With one run nothing can be left out: the fit itself is all there is, and the report says so.
@@ -283,7 +273,7 @@ class Search:
             for entry, level in zip(fitted, levels, strict=True)
             for weights in folds
         ]
-        fits, found = self.fit(starts, "predicting runs left out", resident=resident)
+        fits, found = self.fit(starts, "predicting runs left out")
         costs = np.nan_to_num((found**2).sum(axis=(1, 2)) / float(self.problem.noise_sigma) ** 2, nan=np.inf)
         folds_of_each = []
         for first in range(0, len(starts), len(folds)):
@@ -336,18 +326,15 @@ class Search:
         runs, most = self.problem.batch.runs, self.config.most_folds
         return np.eye(min(runs, most))[:, np.arange(runs) % most]
 
-    def better(self, new: Model, old: Model, chance: float | None = None) -> tuple[bool, Comparison]:
+    def better(self, new: Model, old: Model, chance: float) -> tuple[bool, Comparison]:
         """Does `new` predict left-out runs better, beyond its extra coefficients and beyond `chance` standard errors?"""
-        several = len(old.left_out) > 1
-        if chance is None:
-            chance = self.config.standard_errors if several else self.config.standard_errors_one_run
         extra = len(self.free(new.effects)) - len(self.free(old.effects))
         gain = 1.0 - (new.left_out_rmse / old.left_out_rmse) ** 2
         z = paired(old.left_out, new.left_out, np.asarray(self.problem.batch.mask))
         # The fit itself must gain as well: a left-out run of its own kind can favour a needless coefficient by luck.
         fitted = 1.0 - new.cost / old.cost if old.cost > 0.0 else 0.0
         enough = min(gain, fitted) > self.config.penalty * extra and z > chance
-        return enough, Comparison(old.left_out_rmse, new.left_out_rmse, gain, z, several)
+        return enough, Comparison(old.left_out_rmse, new.left_out_rmse, gain, z, len(old.left_out) > 1)
 
 
 def base_value(coefficient: str) -> float:

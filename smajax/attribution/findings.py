@@ -95,7 +95,7 @@ class EffectFinding:
     formula: str  # the change itself, plain text, with its source
     added: bool
     coefficients: dict[str, CoefficientFinding]
-    evidence: dict[str, float]  # score_statistic, score_p_value, leave_one_out_rmse, leave_one_out_gain, rmse_fit, ...
+    evidence: dict[str, float]  # posterior_probability, alone_rmse_fit, score_p_value_at_the_end, ...
 
 
 @dataclass(frozen=True)
@@ -126,32 +126,11 @@ class Comparison:
 
 
 @dataclass(frozen=True)
-class ResidualIsNoise:
-    """Nothing is looked for in noise."""
-
-
-@dataclass(frozen=True)
-class NothingSignificant:
-    """No candidate stands out in the score test."""
-
-    candidates: int
-    largest_gain: float  # share of the mean square that the best one promises
-
-
-@dataclass(frozen=True)
 class StepDependent:
     """Effects that lose their gain when the step is halved."""
 
     effects: str  # joined by " + "
     gain_kept: float  # share
-
-
-@dataclass(frozen=True)
-class Scored:
-    """The best candidate was compared with the model before; None where only step-dependent ones were left."""
-
-    comparison: Comparison | None
-    step_dependent: tuple[StepDependent, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -168,20 +147,6 @@ class NoLikelierModel:
     """None of the sets of effects that were fitted is likelier than the present one."""
 
     compared: tuple[tuple[str, float, float], ...]
-
-
-@dataclass(frozen=True)
-class RoundLimit:
-    """The search ends after so many rounds, whatever more there may be."""
-
-    rounds: int
-
-
-@dataclass(frozen=True)
-class NoLongerNeeded:
-    """An effect that the others have made needless: what it still brings is not enough."""
-
-    comparison: Comparison
 
 
 @dataclass(frozen=True)
@@ -216,13 +181,9 @@ class HeldOutWorse:
 
 
 Reason: TypeAlias = (
-    ResidualIsNoise
-    | NothingSignificant
-    | Scored
+    StepDependent
     | LikelierModel
     | NoLikelierModel
-    | RoundLimit
-    | NoLongerNeeded
     | PredictsTooLittle
     | NoiseWithoutRun
     | UnknownTermLikelier
@@ -232,13 +193,12 @@ Reason: TypeAlias = (
 
 @dataclass(frozen=True)
 class Round:
-    """One round of the search: what was tried and what it brought on runs left out in turn."""
+    """One round of the search, or what a later stage took out of the model that it ended with."""
 
     number: int
-    tried: tuple[tuple[str, float], ...]  # ("latent_heat + radiation", leave-one-out rmse)
-    chosen: str  # what was added, or taken out; "" when the search stopped here
+    tried: tuple[tuple[str, float], ...]  # what a later stage judged: ("latent_heat + radiation", leave-one-out rmse)
+    chosen: str  # the likeliest set, or what was taken out; "" where nothing changed
     reason: Reason
-    indistinguishable: tuple[str, ...] = ()  # what left-out runs do not distinguish from the chosen one
     removed: bool = False  # `chosen` was taken out
 
 

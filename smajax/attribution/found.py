@@ -10,7 +10,7 @@ from smajax.attribution.cross_validation import Evidence, Model, Search
 from smajax.attribution.findings import CoefficientFinding, EffectFinding, ParameterFinding
 from smajax.attribution.job import Job
 from smajax.attribution.leave_one_run_out import jackknife_error
-from smajax.attribution.search import scores_at
+from smajax.attribution.nuisance_grid import scores_at
 from smajax.core.parameters import parameters
 from smajax.fit.sensitivity import Sensitivity, sensitivity
 from smajax.fit.uncertainty import Uncertainty, uncertainty
@@ -52,11 +52,10 @@ def parameters_found(job: Job, setting: Search, model: Model, start: np.ndarray)
 
 
 def effects_found(job: Job, setting: Search, final: Model, after: ParametersFound) -> tuple[EffectFinding, ...]:
-    """Every candidate with its evidence: added ones first, the strongest of them at the head, then by score."""
+    """Every candidate with its evidence: added ones first, the strongest of them at the head, then the likeliest."""
     left = [name for name in job.candidates if name not in final.effects]
-    last = {score.effects[0]: score for score in scores_at(setting, final, left)[0]} if left else {}
+    last = {score.effects[0]: score for score in scores_at(setting, final, left)} if left else {}
     fitted = {parameter.name: parameter for parameter in after.parameters}
-    joint = any(np.isfinite(seen.probability) for seen in setting.evidence.values())
     findings = []
     for name in job.candidates:
         effect, seen = LIBRARY[name], setting.evidence.get(name, Evidence())
@@ -71,18 +70,11 @@ def effects_found(job: Job, setting: Search, final: Model, after: ParametersFoun
             if full in fitted
         }
         evidence = {
-            "score_gain": seen.first_score.gain if seen.first_score else float("nan"),
-            "score_statistic": seen.first_score.statistic if seen.first_score else float("nan"),
-            "score_p_value": seen.first_score.p_value if seen.first_score else float("nan"),
+            "posterior_probability": seen.probability,
             "alone_rmse_fit": seen.alone_rmse,
-            "leave_one_out_rmse": seen.alone_left_out_rmse,
-            "leave_one_out_rmse_of_the_base_model": seen.base_left_out_rmse,
-            "leave_one_out_rmse_without": seen.without_left_out_rmse,
             "score_p_value_at_the_end": last[name].p_value if name in last else float("nan"),
             "score_gain_at_the_end": last[name].gain if name in last else float("nan"),
         }
-        if joint:
-            evidence["posterior_probability"] = seen.probability
         findings.append(
             EffectFinding(
                 name,
@@ -97,7 +89,8 @@ def effects_found(job: Job, setting: Search, final: Model, after: ParametersFoun
 
     def strength(one: EffectFinding) -> tuple[bool, float, float]:
         alone = one.evidence["alone_rmse_fit"] if one.added else np.nan
-        return not one.added, float(np.nan_to_num(alone, nan=np.inf)), -float(np.nan_to_num(one.evidence["score_gain"]))
+        likely = float(np.nan_to_num(one.evidence["posterior_probability"]))
+        return not one.added, float(np.nan_to_num(alone, nan=np.inf)), -likely
 
     return tuple(sorted(findings, key=strength))
 

@@ -5,18 +5,18 @@ Effects whose gain is gone at half the step of the integration are excluded and 
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from smajax.attribution.cross_validation import Evidence, Model, Search
-from smajax.attribution.findings import LikelierModel, NoLikelierModel, Reason, Round, Scored, StepDependent
+from smajax.attribution.cross_validation import Evidence, Model, Search, Start
+from smajax.attribution.findings import LikelierModel, NoLikelierModel, Reason, Round, StepDependent
 from smajax.attribution.joint_parameters import JointParameters
 from smajax.attribution.joint_search import JointRound, JointSearch, refined, search_jointly
 from smajax.attribution.laplace_evidence import FittedModel, fitted_model
 from smajax.attribution.leave_one_run_out import left_out
-from smajax.attribution.search import refined as at_optimum
 from smajax.attribution.step_size_check import gain_kept_at_half_step
 from smajax.fit.levenberg_marquardt import Fit, FitSettings
 from smajax.model.effects.library import LIBRARY
@@ -39,7 +39,7 @@ class _Stage:
     def exclude(self, effects: Sequence[str], kept: float) -> None:
         """Effects that keep only that share of their gain at half the step."""
         self.excluded |= set(effects)
-        self._note("", Scored(None, (StepDependent(_joined(effects), kept),)))
+        self._note("", StepDependent(_joined(effects), kept))
 
     def note(self, done: JointRound) -> None:
         """A round of the joint search, among those of the findings."""
@@ -94,6 +94,14 @@ def without_last(search: JointSearch, setting: Search, model: Model, error: floa
         values = search.joint.without(model.values, rest)
         fitted = fitted_model(search.joint, rest, values, model.effects)
     return final_model(search, setting, fitted, error)
+
+
+def at_optimum(setting: Search, model: Model) -> Model:
+    """A model taken to the optimum of the runs alone, from where it is and from a little off its bounds: error bars want that."""
+    starts = [Start(model.effects, values) for values in (model.values, setting.inside(model))]
+    fits, _ = setting.fit(starts, "polishing the final model", enough=setting.config.final_convergence, hops=True)
+    best = min(fits, key=lambda one: one.cost)
+    return dataclasses.replace(model, values=best.values, cost=best.cost) if best.cost < model.cost else model
 
 
 def effect_probabilities(search: JointSearch, error: float) -> dict[str, float]:

@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from smajax.attribution.cross_validation import Search, nudged
-from smajax.attribution.score_test import samples_per_independent, score_of, switches, without
+from smajax.attribution.cross_validation import Model, Search, nudged
+from smajax.attribution.score_test import Score, ranked, samples_per_independent, score_of, switches, without
 from smajax.fit.predicted import predicted_and_derivatives
 from smajax.fit.sensitivity import Sensitivity, sensitivity
 from smajax.model.effects.library import LIBRARY
@@ -70,3 +70,14 @@ def scanned(setting: Search, values: np.ndarray, effects: Sequence[str], fitted:
             for k, name in own:
                 jacobian[..., at.names.index(name)] = columns[k]
     return found
+
+
+def scores_at(setting: Search, model: Model, left: Sequence[str]) -> list[Score]:
+    """Score tests of the effects not yet in `model`, at its fit, the largest gain first; having looked at several places counts against one."""
+    loose = setting.loose(model.effects, model.values)
+    looked = scanned(setting, model.values, left, loose)
+    scores = ranked(looked.at, loose, left, setting.bounds)
+    return [
+        dataclasses.replace(score, p_value=min(1.0, score.p_value * looked.looks.get(score.effects[0], 1)))
+        for score in scores
+    ]

@@ -5,15 +5,13 @@ what they can absorb is no evidence for an effect. What remains of the coefficie
 residual gives the gain that a small coefficient would bring, its sign, and a p-value under the hypothesis that nothing
 is missing: then the residual is noise, of as many independent samples as its autocorrelation leaves (`samples_per_independent`), and the
 statistic is chi-square. Where something is missing every effect
-that is not orthogonal to it stands out, so the p-value says *whether* to search; *what* is found is scored on runs
-left out.
+that is not orthogonal to it stands out, so the p-value says *whether* something is missing, and not *what*.
 """
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from scipy import optimize, stats
@@ -25,16 +23,12 @@ from smajax.fit.sensitivity import Sensitivity
 
 @dataclass(frozen=True)
 class Score:
-    """What the screening says of one effect or of two together."""
+    """What the screening says of an effect."""
 
     effects: tuple[str, ...]
     gain: float  # share of the residual's square that the linear model would take away, 0..1
-    statistic: float  # gain in units of one independent sample's variance
     p_value: float
     coefficients: dict[str, float]  # linear estimate by parameter name, inside its bounds
-    place: dict[str, float] = field(
-        default_factory=dict
-    )  # values of the coefficients that are no switches, if not `starts`
 
 
 def switches(effect: str) -> tuple[str, ...]:
@@ -50,7 +44,7 @@ def score_of(
     bounds: Mapping[str, tuple[float, float]],
     correlation: float,
 ) -> Score:
-    """Of one effect or two, in the residual and beside the directions of `without`; `correlation`: of `samples_per_independent`."""
+    """Of an effect, in the residual and beside the directions of `without`; `correlation`: of `samples_per_independent`."""
     coefficients = [name for effect in names for name in switches(effect)]
     # misfit = measured - model: a coefficient lowers it along minus its derivative.
     columns = -at.columns(coefficients)
@@ -69,26 +63,30 @@ def score_of(
     before = float(residual @ residual)
     after = residual - columns @ found
     gain = max(0.0, 1.0 - float(after @ after) / before) if before else 0.0
-    statistic = gain * len(residual) / correlation
+    statistic = gain * len(residual) / correlation  # in units of one independent sample's variance
     return Score(
         names,
         gain,
-        statistic,
         float(stats.chi2.sf(statistic, max(1, int(seen.sum())))),
         dict(zip(coefficients, found.tolist(), strict=True)),
     )
 
 
-def screen(
+def ranked(
     at: Sensitivity, fitted: Sequence[str], candidates: Sequence[str], bounds: Mapping[str, tuple[float, float]]
-) -> tuple[list[Score], list[Score]]:
-    """(single effects, pairs), each ranked by gain. `fitted` are the loose parameters at the present fit."""
+) -> list[Score]:
+    """Every effect's score, the largest gain first. `fitted` are the loose parameters at the present fit."""
     basis, residual = without(at, fitted)
     correlation = samples_per_independent(at)
-    singles = [score_of((name,), at, basis, residual, bounds, correlation) for name in candidates]
-    pairs = [score_of(two, at, basis, residual, bounds, correlation) for two in itertools.combinations(candidates, 2)]
-    rank = lambda score: -score.gain  # noqa: E731
-    return sorted(singles, key=rank), sorted(pairs, key=rank)
+    scores = [score_of((name,), at, basis, residual, bounds, correlation) for name in candidates]
+    return sorted(scores, key=lambda score: -score.gain)
+
+
+def screen(
+    at: Sensitivity, fitted: Sequence[str], candidates: Sequence[str], bounds: Mapping[str, tuple[float, float]]
+) -> tuple[list[Score]]:
+    """`ranked`, as the unknown terms still read it: the first of what is returned."""
+    return (ranked(at, fitted, candidates, bounds),)
 
 
 def without(at: Sensitivity, fitted: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
@@ -111,14 +109,3 @@ def scaled(columns: np.ndarray) -> np.ndarray:
     """The columns that are not all zero, each of length one."""
     norm = np.linalg.norm(columns, axis=0)
     return columns[:, norm > 0.0] / norm[norm > 0.0]
-
-
-def significant(scores: Sequence[Score], level: float, least_gain: float) -> bool:
-    """Does any score stand out among that many looks (Bonferroni), and promise more than `least_gain` a coefficient?
-
-    The second half keeps a search from starting for what it could not accept: many samples make the tiniest bias of
-    the integrator significant.
-    """
-    return any(
-        score.p_value * len(scores) < level and score.gain > least_gain * len(score.coefficients) for score in scores
-    )

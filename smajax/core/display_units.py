@@ -95,13 +95,6 @@ def correlation(value: float | None) -> str:
     return f"{value:.2f}" if abs(value) >= 0.005 else "0"
 
 
-def share(value: float | None) -> str:
-    """A share as per cent with one decimal; one that is too small to show is not nothing."""
-    if value is None or not math.isfinite(value):
-        return "–"
-    return "< 0.1" if 0.0 < value < 0.0005 else f"{100.0 * value:.1f}"
-
-
 def p_value(value: float | None) -> str:
     """`p = 0.41`, `p < 1e-300`."""
     text = chance(value)

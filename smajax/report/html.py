@@ -13,7 +13,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 from smajax.attribution.findings import Findings, ParameterFinding, Verdict
-from smajax.core.display_units import chance, correlation, digits, display, label, p_value, share, with_error
+from smajax.core.display_units import chance, correlation, digits, display, label, p_value, with_error
 from smajax.fit.uncertainty import RemarkKind
 from smajax.report import pictures
 from smajax.report.narrative import Narrative, narrate
@@ -31,21 +31,12 @@ VERDICTS = {
 # Headings of the evidence in the order of the stages; a number with no heading here is shown under its own name.
 EVIDENCE = {
     "posterior_probability": "posterior probability",
-    "score_gain": "score test: predicted gain",
-    "score_p_value": "score p-value",
     "alone_rmse_fit": "fit runs, with it alone",
-    "leave_one_out_rmse": "left-out runs, with it alone",
-    "leave_one_out_rmse_without": "left-out runs, final model without it",
-    "score_gain_at_the_end": "predicted gain at the end",
     "score_p_value_at_the_end": "p-value at the end",
 }
-# Said of the effects that were added, but no column of the table of all candidates.
-ASIDE = {"leave_one_out_rmse_without", "score_gain_at_the_end"}
-# In the record only: the p-value says the same to a reader.
-RECORD_ONLY = {"leave_one_out_rmse_of_the_base_model", "score_statistic"}
+# No column: the summary says the gain of a trace that is to be minded.
+RECORD_ONLY = {"score_gain_at_the_end"}
 LEAST_SHOWN = 0.001  # of a probability: what is less depends on the few sets that were fitted
-# Shares of the residual's mean square.
-GAINS = {"score_gain", "score_gain_at_the_end"}
 
 
 @dataclass(frozen=True)
@@ -138,16 +129,12 @@ def _evidence(findings: Findings) -> list[str]:
 def _evidence_cell(findings: Findings, name: str, value: float) -> Shown:
     if "rmse" in name:
         return shown(value, findings.output_unit, findings.output_name, 3, zeros=True)
-    if name in GAINS:
-        return Shown(share(value), value)
     if name == "posterior_probability" and value < LEAST_SHOWN:
         return Shown(f"< {LEAST_SHOWN}", value)
     return Shown(chance(value) if "p_value" in name else digits(value, 3, zeros=True), value)
 
 
 def _evidence_unit(findings: Findings, name: str) -> str:
-    if name in GAINS:
-        return "% of the mean square"
     return display(findings.output_unit, findings.output_name).unit if "rmse" in name else ""
 
 
@@ -244,12 +231,9 @@ def findings_to_html(findings: Findings, narrative: Narrative | None = None) -> 
         # Without offsets in the fit they are exactly zero.
         offsets=any(run.offset_before or run.offset_after for run in findings.runs),
         held_out=any(run.role == "held-out" for run in findings.runs),
-        left_out=findings.fit_runs > 1,
         added=findings.added,
         ranked=pictures.ranked(findings.effects),
         evidence=_evidence(findings),
-        joint=any("posterior_probability" in effect.evidence for effect in findings.effects),
-        columns=[name for name in _evidence(findings) if name not in ASIDE],
         known=lambda value: value is not None and math.isfinite(value),
         evidence_title=lambda name: EVIDENCE.get(name, label(name)),
         evidence_unit=lambda name: _evidence_unit(findings, name),
@@ -262,9 +246,7 @@ def findings_to_html(findings: Findings, narrative: Narrative | None = None) -> 
         units=units,
         picture_errors=picture(pictures.errors_by_run(findings), "Error of each run before and after", "narrow"),
         picture_candidates=picture(
-            pictures.effect_probabilities(findings) or pictures.candidates_ranked(findings),
-            "Candidates by probability, or by error on runs left out",
-            "narrow",
+            pictures.effect_probabilities(findings), "Candidates by posterior probability", "narrow"
         ),
         picture_phases=picture(pictures.residual_by_phase(findings), "Residual by phase of the wire"),
         picture_correlation=picture(pictures.residual_correlation(findings), "Autocorrelation of the residual"),

@@ -36,7 +36,6 @@ RENAMED: Mapping[tuple[str, str], str] = {
     ("confounders", "alike"): "overlap",
     ("outlier_runs", "noise"): "residual_is_noise",
     ("outlier_runs", "foretold"): "predicted_rmse",
-    ("rounds", "alike"): "indistinguishable",
     ("unknown", "alike"): "indistinguishable",
 }
 
@@ -152,7 +151,6 @@ def _round(entry: Round, why: str) -> dict[str, Any]:
         "tried": [{"model": model, "leave_one_out_rmse": rmse} for model, rmse in entry.tried],
         "chosen": chosen_text(entry),
         "why": why,
-        "indistinguishable": entry.indistinguishable,
     }
 
 

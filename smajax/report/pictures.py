@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.text import Text
 
 from smajax.attribution.findings import EffectFinding, Findings, ResidualDiagnostics, RunFinding
 from smajax.core.display_units import Display, axis_label, display, label
@@ -190,44 +189,8 @@ def _literal(text: str) -> str:
     return text.replace("$", r"\$")
 
 
-def candidates_ranked(findings: Findings) -> bytes | None:
-    """The error on runs left out in turn, per candidate, best first; None when no candidate came that far.
-
-    Above them the base model's, on the same runs.
-    """
-    scored = ranked(findings.effects)
-    scored = [effect for effect in scored if np.isfinite(_left_out(effect))]
-    if not scored:
-        return None
-    shown = display(findings.output_unit, findings.output_name)
-    figure = new_figure(1.2 + 0.32 * max(len(scored), 3), NARROW)
-    axes = figure.subplots()
-    places = np.arange(len(scored) + 1)[::-1]
-    colours = [BEFORE, *(AFTER if effect.added else QUIET for effect in scored)]
-    base = _left_out(scored[0], "leave_one_out_rmse_of_the_base_model")
-    errors = [base, *(_left_out(effect) for effect in scored)]
-    axes.barh(places, [shown.of(error) for error in errors], 0.62, color=colours)
-    names = [f"{label(effect.name)} alone" for effect in scored]
-    axes.set_yticks(places, ["base model", *names])
-    _added_in_bold(axes.get_yticklabels()[1:], scored)
-    axes.axvline(shown.of(findings.noise_sigma), color=MEASURED, linestyle="--", linewidth=1.0, label="noise")
-    _name_colours(axes)
-    unit = f" ({shown.unit})" if shown.unit else ""
-    axes.set_xlabel(f"rms error on runs left out in turn{unit}", fontsize=9)
-    axes.set_xlim(left=0.0)
-    axes.set_ylim(-0.6, len(scored) + 0.6)
-    figure.legend(loc="outside upper center", ncols=3, frameon=False, fontsize=9)
-    tidy(axes)
-    axes.grid(False, axis="y")
-    return as_png(figure)
-
-
-def _left_out(effect: EffectFinding, which: str = "leave_one_out_rmse") -> float:
-    return effect.evidence.get(which, float("nan"))
-
-
 def effect_probabilities(findings: Findings) -> bytes | None:
-    """Posterior probability of each effect that has any, the likeliest first; None without a joint search."""
+    """Posterior probability of each effect that has any, the likeliest first; None where no effect was in a fitted set."""
     shown = [
         (effect, probability(effect))
         for effect in ranked(findings.effects)
@@ -242,8 +205,10 @@ def effect_probabilities(findings: Findings) -> bytes | None:
         places, [value for _, value in shown], 0.62, color=[AFTER if effect.added else QUIET for effect, _ in shown]
     )
     axes.set_yticks(places, [label(effect.name) for effect, _ in shown])
-    _added_in_bold(axes.get_yticklabels(), [effect for effect, _ in shown])
-    _name_colours(axes)
+    for tick, (effect, _) in zip(axes.get_yticklabels(), shown, strict=True):
+        tick.set_fontweight("bold" if effect.added else "normal")
+    for name, colour in (("added", AFTER), ("not added", QUIET)):
+        axes.barh(0.0, np.nan, color=colour, label=name)
     axes.set_xlabel("posterior probability", fontsize=9)
     axes.set_xlim(0.0, 1.0)
     axes.set_ylim(-0.6, len(shown) - 0.4)
@@ -253,35 +218,14 @@ def effect_probabilities(findings: Findings) -> bytes | None:
     return as_png(figure)
 
 
-def _added_in_bold(ticks: Sequence[Text], effects: Sequence[EffectFinding]) -> None:
-    for tick, effect in zip(ticks, effects, strict=True):
-        tick.set_fontweight("bold" if effect.added else "normal")
-
-
-def _name_colours(axes: Axes) -> None:
-    """What the bars' colours say, for the legend."""
-    for name, colour in (("added", AFTER), ("not added", QUIET)):
-        axes.barh(0.0, np.nan, color=colour, label=name)
-
-
 def probability(effect: EffectFinding) -> float:
-    """Posterior probability of an effect; NaN without a joint search."""
+    """Posterior probability of an effect; NaN where it was in no fitted set."""
     return effect.evidence.get("posterior_probability", float("nan"))
 
 
 def ranked(effects: Sequence[EffectFinding]) -> list[EffectFinding]:
-    """The added effects first, then by posterior probability, by error on runs left out, by the gain predicted by the score test; those not reached last."""
-
-    def key(effect: EffectFinding) -> tuple[bool, float, float, float]:
-        error, gain = _left_out(effect), effect.evidence.get("score_gain", float("nan"))
-        return (
-            not effect.added,
-            -float(np.nan_to_num(probability(effect))),
-            error if np.isfinite(error) else np.inf,
-            -gain if np.isfinite(gain) else np.inf,
-        )
-
-    return sorted(effects, key=key)
+    """The added effects first, then by posterior probability; those that were in no fitted set last."""
+    return sorted(effects, key=lambda effect: (not effect.added, -float(np.nan_to_num(probability(effect), nan=-1.0))))
 
 
 def residual_by_phase(findings: Findings) -> bytes | None:

@@ -128,9 +128,6 @@ def judge(truth: Mapping[str, Any], report: Mapping[str, Any], seconds: float) -
     noise = report["output"]["noise_sigma"]
     added = tuple(effect["name"] for effect in report["effects"] if effect["added"])
     confounders = [one["confounder"] for one in report["confounders"] if one["weight"] >= CONFUSABLE]
-    # Of rounds that lasted: what was likened to an effect that was taken out again is on no page.
-    lasting = [entry for entry in report["rounds"] if set(entry["chosen"].split(" + ")) <= set(added)]
-    alike = [name for entry in lasting for model in entry["indistinguishable"] for name in model.split(" + ")]
     unknown = [term["equation"] for term in report["unknown"] if _told_among(term, report["unknown"])]
     return Judged(
         case=truth["case"],
@@ -142,7 +139,7 @@ def judge(truth: Mapping[str, Any], report: Mapping[str, Any], seconds: float) -
         equations=equations_of(truth),
         verdict=report["verdict"],
         added=added,
-        named=tuple(dict.fromkeys([*added, *confounders, *alike])),
+        named=tuple(dict.fromkeys([*added, *confounders])),
         where=tuple(dict.fromkeys([*(LIBRARY[name].candidate.equation for name in added), *unknown])),
         fit_before=_error(report["runs"], "fit", "before", noise),
         fit_after=_error(report["runs"], "fit", "after", noise),

@@ -11,7 +11,6 @@ import pytest
 from scipy.signal import lfilter
 
 from smajax.attribution.close_loop import close_loop
-from smajax.attribution.config import AttributionConfig
 from smajax.attribution.findings import HeldOutWorse
 from smajax.data.experiment.load import load_experiment
 from smajax.data.experiment.record import Experiment
@@ -100,7 +99,6 @@ def test_an_effect_that_a_short_log_cannot_tell_from_a_slow_noise_is_looked_into
     short = dataclasses.replace(_estimated(_thinned(whole, 4)), effects_only=FEW)
     findings = close_loop(short)
     assert [effect.name for effect in findings.effects if effect.added] == ["thermal_expansion"]
-    assert close_loop(short, config=AttributionConfig(gain_in_noise=np.inf), joint=False).verdict == "adequate"
 
 
 def test_what_the_held_out_runs_do_not_validate_is_not_named(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from smajax.attribution.joint_parameters import JointParameters
-from smajax.attribution.joint_search import JointSearch, detectable, search_jointly, starts
+from smajax.attribution.joint_search import PLACES, JointSearch, detectable, search_jointly, starts
 from smajax.attribution.laplace_evidence import fitted_model
 from smajax.attribution.leave_one_run_out import left_out
 from smajax.attribution.preset_priors import preset_priors
@@ -15,6 +15,8 @@ from smajax.attribution.traces import Variant, traces_at
 from smajax.core.parameters import parameter_values, parameters
 from smajax.fit.levenberg_marquardt import FitSettings, levenberg_marquardt
 from smajax.fit.predicted import misfits
+from smajax.fit.starts import logarithmic_points
+from smajax.model.effects.library import LIBRARY
 from tests.helpers.hot_weight import CANDIDATES, NOISE, UNKNOWNS, hot_weight
 
 
@@ -102,3 +104,25 @@ def test_a_fit_of_an_effect_with_several_minima_may_begin_all_over_its_ranges(ef
         assert values.max() <= high
     name = search.joint.switches(effect)[0]
     assert np.ptp(points[:, search.joint.slots[name]]) > 0.0
+
+
+def test_the_places_where_fits_of_a_friction_that_sticks_begin_lie_all_over_its_sizes_and_speeds() -> None:
+    """Jumps make valleys; where nothing is known of the size there is none to begin from."""
+    candidate = LIBRARY["stribeck_friction"].candidate
+    ranges = candidate.start_ranges({"limit": 0.05})
+    places = logarithmic_points(ranges, PLACES)
+    assert set(ranges) == {"limit", "sliding", "speed", "bend"}
+    for name, (low, high) in ranges.items():
+        share = np.log(np.asarray([place[name] for place in places]) / low) / np.log(high / low)
+        # Each quarter of the range, by logarithm, has its part of them.
+        np.testing.assert_array_equal(np.histogram(share, bins=4, range=(0.0, 1.0))[0], PLACES // 4)
+    assert candidate.start_ranges({"limit": 0.0}) == {}
+    assert LIBRARY["latent_heat"].candidate.start_ranges({"enthalpy": 6e3}) == {}
+
+
+def test_the_places_where_fits_of_a_play_begin_lie_beyond_its_linear_estimate() -> None:
+    """The estimate is that of a play taken up at once."""
+    ranges = LIBRARY["sensor_backlash"].candidate.start_ranges({"half_width": 0.01})
+    sizes = [place["half_width"] for place in logarithmic_points(ranges, 32)]
+    assert 0.01 <= min(sizes) < 0.012 < 0.12 < max(sizes) <= 0.16
+    assert LIBRARY["sensor_backlash"].candidate.start_ranges({"half_width": 0.0}) == {}

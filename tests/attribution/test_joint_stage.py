@@ -10,7 +10,7 @@ import pytest
 
 import smajax.attribution.joint_stage
 from smajax.attribution.close_loop import close_loop
-from smajax.attribution.findings import Findings, LikelierModel, Scored
+from smajax.attribution.findings import Findings, LikelierModel, StepDependent
 from smajax.data.experiment.load import load_experiment
 from smajax.data.model_catalogue import CATALOGUE
 from smajax.model.effects.library import LIBRARY
@@ -68,5 +68,5 @@ def test_an_effect_whose_gain_is_gone_at_half_the_step_is_excluded(monkeypatch: 
     )
     found = _found(FEW[:2], runs=2)
     assert "latent_heat" not in {effect.name for effect in found.added}
-    (excluded,) = [one.reason for one in found.rounds if isinstance(one.reason, Scored)]
-    assert excluded.step_dependent[0].effects == "latent_heat"
+    (excluded,) = [one.reason for one in found.rounds if isinstance(one.reason, StepDependent)]
+    assert excluded.effects == "latent_heat"

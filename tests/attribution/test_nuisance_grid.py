@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from smajax.attribution.cross_validation import Model, Search
-from smajax.attribution.nuisance_grid import scanned
+from smajax.attribution.nuisance_grid import scanned, scores_at
 from smajax.attribution.run_extent import extent_of
-from smajax.attribution.search import scores_at, start_values
 from smajax.core.parameters import parameters, set_parameters
 from smajax.core.result_cache import ResultCache
 from smajax.fit.packed_runs import RunBatch, simulate_batch
@@ -46,15 +45,12 @@ def _base(setting: Search) -> Model:
 def test_a_draught_is_looked_for_when_it_blew(time: float, lasting: float) -> None:
     setting = _setting(time, lasting)
     base = _base(setting)
-    singles, _ = scores_at(setting, base, EFFECTS)
-    best = singles[0]
+    best = scores_at(setting, base, EFFECTS)[0]
     assert best.effects == ("draught",)
     assert best.gain > 0.5
-    assert abs(best.place["draught.time"] - time) < 2.0
-    assert (best.place["draught.lasting"] < 30.0) == (lasting < 30.0)
-    names = setting.problem.names
-    start = start_values(base.values, names, best, setting.bounds)
-    assert start[names.index("draught.time")] == best.place["draught.time"]
+    place = scanned(setting, base.values, EFFECTS, ()).place["draught"]
+    assert abs(place["draught.time"] - time) < 2.0
+    assert (place["draught.lasting"] < 30.0) == (lasting < 30.0)
     # At the one place of before, two seconds into the run, there is next to nothing to see.
     assert best.gain > 2.0 * _gain_at_two_seconds(setting, base)
 

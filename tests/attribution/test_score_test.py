@@ -6,16 +6,10 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from smajax.attribution.config import AttributionConfig
 from smajax.attribution.residual_diagnostics import all_noise
-from smajax.attribution.score_test import Score, screen
-from smajax.attribution.search import all_starts, start_values
+from smajax.attribution.score_test import ranked
 from smajax.core.whiteness import correlation_time, whiteness_p_value
 from smajax.fit.sensitivity import Sensitivity
-from smajax.model.effects.library import LIBRARY
-from smajax.model.effects.stribeck_friction import all_over
-
-POINTS = AttributionConfig().sobol_starts
 
 NAMES = ("convection_coefficient", "latent_heat.enthalpy", "ambient_drift.rate", "sensor_lag.time_constant")
 BOUNDS = {NAMES[0]: (1.0, 500.0), NAMES[1]: (0.0, 6e4), NAMES[2]: (-0.1, 0.1), NAMES[3]: (0.0, 3.0)}
@@ -34,27 +28,26 @@ def test_the_effect_that_is_there_comes_first_with_its_size() -> None:
     rng = np.random.default_rng(1)
     columns = _columns(rng)
     misfit = -columns[:, 2] * 0.05 + 3.0 * columns[:, 0] + rng.normal(size=800)
-    singles, pairs = screen(_at(columns, misfit), NAMES[:1], EFFECTS, BOUNDS)
-    assert singles[0].effects == ("ambient_drift",)
-    assert singles[0].coefficients["ambient_drift.rate"] == pytest.approx(0.05, rel=0.1)
-    assert singles[0].p_value < 1e-6
-    assert min(score.p_value for score in singles[1:]) > 1e-3
-    assert "ambient_drift" in pairs[0].effects
+    scores = ranked(_at(columns, misfit), NAMES[:1], EFFECTS, BOUNDS)
+    assert scores[0].effects == ("ambient_drift",)
+    assert scores[0].coefficients["ambient_drift.rate"] == pytest.approx(0.05, rel=0.1)
+    assert scores[0].p_value < 1e-6
+    assert min(score.p_value for score in scores[1:]) > 1e-3
 
 
 def test_what_the_fitted_parameters_absorb_is_no_evidence() -> None:
     rng = np.random.default_rng(2)
     columns = _columns(rng)
     columns[:, 1] = 1e-4 * columns[:, 0]
-    singles, _ = screen(_at(columns, -3.0 * columns[:, 0]), NAMES[:1], EFFECTS, BOUNDS)
-    found = {score.effects[0]: score for score in singles}
+    scores = ranked(_at(columns, -3.0 * columns[:, 0]), NAMES[:1], EFFECTS, BOUNDS)
+    found = {score.effects[0]: score for score in scores}
     assert found["latent_heat"].gain < 1e-6
 
 
 def test_p_values_are_uniform_when_nothing_is_missing() -> None:
     rng = np.random.default_rng(3)
     small = [
-        screen(_at(_columns(rng), rng.normal(size=800)), NAMES[:1], ("ambient_drift",), BOUNDS)[0][0].p_value < 0.1
+        ranked(_at(_columns(rng), rng.normal(size=800)), NAMES[:1], ("ambient_drift",), BOUNDS)[0].p_value < 0.1
         for _ in range(300)
     ]
     assert np.mean(small) == pytest.approx(0.1, abs=0.06)
@@ -63,54 +56,9 @@ def test_p_values_are_uniform_when_nothing_is_missing() -> None:
 def test_a_coefficient_is_not_asked_to_leave_its_bounds() -> None:
     rng = np.random.default_rng(4)
     columns = _columns(rng)
-    singles, _ = screen(_at(columns, columns[:, 1] * 1e4), NAMES[:1], ("latent_heat",), BOUNDS)
-    assert singles[0].coefficients["latent_heat.enthalpy"] == pytest.approx(0.0, abs=1.0)
-    assert singles[0].gain < 1e-3
-
-
-@pytest.mark.parametrize(("score", "expected"), [(-0.01, -0.02), (0.3, 0.02), (0.0, 0.02)])
-def test_a_refit_starts_on_the_side_that_the_score_points_to(score: float, expected: float) -> None:
-    found = start_values(np.zeros(4), NAMES, Score(EFFECTS[1:2], 0.5, 9.0, 0.0, {NAMES[2]: score}), BOUNDS)
-    np.testing.assert_allclose(found[2], expected)
-    assert not found[[0, 1, 3]].any()
-
-
-def test_a_refit_never_starts_out_of_bounds() -> None:
-    found = start_values(np.zeros(4), NAMES, Score(EFFECTS[:1], 0.5, 9.0, 0.0, {NAMES[1]: -6e-8}), BOUNDS)
-    assert found[1] == LIBRARY["latent_heat"].candidate.initial_guess["enthalpy"]
-
-
-@pytest.mark.parametrize("score", [0.05, 0.0])
-def test_a_refit_of_a_friction_that_sticks_begins_from_all_over_its_sizes_and_speeds(score: float) -> None:
-    """Jumps make valleys; where the score test is silent on the size there is none to begin from."""
-    names = ("specific_heat", *(f"stribeck_friction.{name}" for name in ("limit", "sliding", "speed", "bend")))
-    bounds = dict(zip(names, [(100.0, 900.0), (0.0, 20.0), (0.0, 1.0), (1e-5, 1.0), (1e-6, 1e-3)], strict=True))
-    begun = np.asarray([450.0, 0.0, 0.5, 5e-3, 5e-5])
-    told = Score(("stribeck_friction",), 0.5, 9.0, 0.0, {names[1]: score})
-    first, *others = all_starts(begun, names, told, bounds)
-    np.testing.assert_array_equal(first, start_values(begun, names, told, bounds))
-    assert len(others) == (POINTS if score else 0)
-    if others:
-        places = np.asarray(others)
-        assert set(places[:, 0]) == {450.0}
-        for column, (low, high) in enumerate(all_over({"limit": score}, "limit").values(), 1):
-            share = np.log(places[:, column] / low) / np.log(high / low)
-            # Each quarter of the range, by logarithm, has its part of them.
-            np.testing.assert_array_equal(np.histogram(share, bins=4, range=(0.0, 1.0))[0], POINTS // 4)
-    latent = Score(("latent_heat",), 0.5, 9.0, 0.0, {NAMES[1]: 6e3})
-    assert len(all_starts(np.zeros(4), NAMES, latent, BOUNDS)) == 1
-
-
-def test_a_refit_of_a_play_begins_beyond_what_its_score_says() -> None:
-    """The score is that of a play taken up at once; and in runs of a small stroke none begins out of their bounds."""
-    names, small = ("sensor_backlash.half_width",), {"sensor_backlash.half_width": (0.0, 5e-5)}
-    told = Score(("sensor_backlash",), 0.1, 9.0, 0.0, {names[0]: 0.01})
-    places = np.asarray(all_starts(np.zeros(1), names, told, {names[0]: (0.0, 1.0)}))[:, 0]
-    assert places[0] == LIBRARY["sensor_backlash"].candidate.initial_guess["half_width"]
-    assert len(places) == POINTS + 1
-    assert 0.01 <= places[1:].min() < 0.012 < 0.12 < places.max() <= 0.16
-    silent = Score(("sensor_backlash",), 0.1, 9.0, 0.0, {names[0]: 0.0})
-    assert all_starts(np.zeros(1), names, silent, small) == [2.5e-5]
+    (score,) = ranked(_at(columns, columns[:, 1] * 1e4), NAMES[:1], ("latent_heat",), BOUNDS)
+    assert score.coefficients["latent_heat.enthalpy"] == pytest.approx(0.0, abs=1.0)
+    assert score.gain < 1e-3
 
 
 def test_whiteness_and_memory_of_noise() -> None:

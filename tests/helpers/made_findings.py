@@ -6,15 +6,15 @@ import numpy as np
 
 from smajax.attribution.findings import (
     CoefficientFinding,
-    Comparison,
     EffectFinding,
     Findings,
+    LikelierModel,
+    NoLikelierModel,
     ParameterFinding,
     ResidualDiagnostics,
     Role,
     Round,
     RunFinding,
-    Scored,
     Verdict,
 )
 from smajax.fit.integration import IntegrationError
@@ -95,7 +95,7 @@ def made_residual(rmse: float, white: bool, moved: float = 0.0) -> ResidualDiagn
     )
 
 
-def made_effect(name: str, title: str, equation: str, left_out: float, added: bool = False) -> EffectFinding:
+def made_effect(name: str, title: str, equation: str, alone: float, added: bool = False) -> EffectFinding:
     return EffectFinding(
         name=name,
         title=title,
@@ -104,12 +104,8 @@ def made_effect(name: str, title: str, equation: str, left_out: float, added: bo
         added=added,
         coefficients={"enthalpy": CoefficientFinding(24187.3, 210.6, "J/kg")} if added else {},
         evidence={
-            "score_gain": 0.761 if added else 0.003,
-            "score_statistic": 812.4 if added else 3.2,
-            "score_p_value": 3.1e-88 if added else 0.21,
-            "leave_one_out_rmse": left_out,
-            "leave_one_out_rmse_of_the_base_model": 0.9e-3,
-            "leave_one_out_gain": 0.95 if added else NAN,
+            "posterior_probability": 0.998 if added else 0.02 if np.isfinite(alone) else NAN,
+            "alone_rmse_fit": alone,
             "score_p_value_at_the_end": NAN if added else 2.0e-12,
             "score_gain_at_the_end": NAN if added else 0.004,
         },
@@ -153,13 +149,11 @@ def made_findings() -> Findings:
         rounds=(
             Round(
                 1,
-                (("base", 1.1e-3), ("latent_heat", 2.04e-5), ("radiation", 1.02e-3)),
+                (),
                 "latent_heat",
-                Scored(Comparison(1.1e-3, 2.04e-5, 0.9997, 41.0, True)),
+                LikelierModel("", 812.4, (("latent_heat", 812.4, 2.04e-5), ("radiation", 3.2, 1.02e-3))),
             ),
-            Round(
-                2, (("latent_heat + radiation", 2.05e-5),), "", Scored(Comparison(2.04e-5, 2.05e-5, -0.01, -0.3, True))
-            ),
+            Round(2, (), "", NoLikelierModel((("latent_heat + radiation", -4.1, 2.03e-5),))),
         ),
         explained_variance=0.998,
         step=0.02,

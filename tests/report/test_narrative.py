@@ -15,18 +15,15 @@ from smajax.attribution.findings import (
     Confounder,
     Findings,
     HeldOutWorse,
+    LikelierModel,
     NoiseWithoutRun,
-    NoLongerNeeded,
-    NothingSignificant,
+    NoLikelierModel,
     OutlierRun,
     ParameterFinding,
     PredictsTooLittle,
     Reason,
     Rejected,
-    ResidualIsNoise,
     Round,
-    RoundLimit,
-    Scored,
     StepDependent,
     UnknownTerm,
     UnknownTermLikelier,
@@ -52,7 +49,7 @@ def test_the_summary_of_an_effect_that_was_found() -> None:
     """A snapshot: the verdict, the errors, the noise, what the effect means."""
     assert narrate(made_findings()).summary == (
         "The base model lacks: latent heat of transformation. With it, what is left on the fit runs is measurement noise.",
-        "Mind: radiation to the surroundings leaves a trace in the score test (p = 4e-12 after 2 candidates) that would take 0.4% of the residual's square: smaller than what is looked into, so it was not fitted.",
+        "Mind: radiation to the surroundings leaves a trace in the score test (p = 4e-12 after 2 candidates) that would take 0.4% of the residual's square, but the model with it is no likelier.",
         "Error on the fit runs: 1.13 mm before, 0.0198 mm after.",
         "Error on the held-out runs: 1.18 mm before, 0.0202 mm after.",
         "Measurement noise: 0.02 mm (estimated from the flat part of the runs).",
@@ -65,20 +62,22 @@ def test_what_depends_on_the_step_or_hides_in_the_noise_is_said_at_the_top() -> 
     level = max(pooled_rmse(findings.runs, "fit", "after"), findings.noise_sigma)
     faint = made_effect("creep", "creep", "constitutive", 1e-9, added=False)
 
-    def said(verdict: Verdict, p_value: float, change: float, ratio: float = 1.0, gain: float = 0.03) -> str:
-        evidence = {**faint.evidence, "score_p_value_at_the_end": p_value, "score_gain_at_the_end": gain}
+    def said(verdict: Verdict, p_value: float, change: float, ratio: float = 1.0, **changed: Any) -> str:
+        evidence = {**faint.evidence, "score_p_value_at_the_end": p_value, "score_gain_at_the_end": 0.03}
         after = dataclasses.replace(made_residual(2e-5, ratio == 1.0), ratio=ratio)
         effects = (dataclasses.replace(faint, evidence=evidence),)
         rms = {"position": change}
         integration = IntegrationError(rms, rms, change / findings.noise_sigma, "one step a sample")
-        return _summary(verdict=verdict, effects=effects, residual_after=after, integration=integration)
+        return _summary(verdict=verdict, effects=effects, residual_after=after, integration=integration, **changed)
 
     adequate, missing = Verdict.ADEQUATE, Verdict.NOT_IN_LIBRARY
     assert "the integration leaves" in said(adequate, 0.5, 2.0 * level)
     assert "the integration leaves" not in said(adequate, 0.5, 0.1 * level)
     assert "creep leaves a trace in the score test (p = 1e-9 after 1 candidates)" in said(adequate, 1e-9, 0.0)
     assert "leaves a trace" not in said(adequate, 0.5, 0.0) + said(missing, 1e-9, 0.0)
-    assert "but runs left out are not predicted better" in said(adequate, 1e-9, 0.0, gain=0.3)
+    assert "square, but the model with it is no likelier" in said(adequate, 1e-9, 0.0)
+    rejected = Rejected(("creep",), 1e-3, 2e-3)
+    assert "square, but the held-out runs reject it" in said(adequate, 1e-9, 0.0, rejected=rejected)
     assert "autocorrelated, looks the same" in said(missing, 0.5, 0.0, 1.3)
     assert "looks the same" not in said(missing, 0.5, 0.0, 3.0) + said(adequate, 0.5, 0.0)
 
@@ -192,7 +191,7 @@ def _nothing_added() -> Findings:
 @pytest.mark.parametrize(
     ("changed", "said"),
     [
-        ({}, "none lowers the error enough, on runs left out as well as on the fit."),
+        ({}, "none of the 3 candidate effects that were tried accounts for it."),
         ({"effects": ()}, "no candidate effect was to be tried"),
         ({"explained_variance": 0.1}, "(explained variance 10% in runs left out)"),
         ({"superseded": ("radiation",)}, "radiation to the surroundings comes nearest, and one unknown function"),
@@ -215,25 +214,12 @@ def test_an_outlier_beside_what_was_added_is_to_be_minded() -> None:
 @pytest.mark.parametrize(
     ("reason", "text"),
     [
-        (ResidualIsNoise(), "what is left of the fit runs is measurement noise"),
+        (StepDependent("drag", -0.2), "drag keeps 0% of its gain at half the step and is not accepted"),
         (
-            NothingSignificant(7, 0.0042),
-            "no candidate stands out in the score test: none of 7 promises more than 0.4% of the mean square",
+            LikelierModel("", 12.34, (("drag", 12.34, 2e-4),)),
+            "likelier than the base model by 12.3 in log odds; fitted: drag (+12.3, error 0.2 mm)",
         ),
-        (
-            Scored(BETTER),
-            "error on left-out runs 1.8 mm -> 0.2 mm (+99% of its mean square, 8.1 standard errors)",
-        ),
-        (
-            Scored(None, (StepDependent("drag", -0.2),)),
-            "drag keeps 0% of its gain at half the step and is not accepted",
-        ),
-        (RoundLimit(6), "the search ends after 6 rounds, whatever more there may be"),
-        (
-            NoLongerNeeded(dataclasses.replace(BETTER, left_out=False)),
-            "removed again: error on the one fit run itself 1.8 mm -> 0.2 mm (+99% of its mean square, 8.1 standard errors) "
-            "with it is not enough",
-        ),
+        (NoLikelierModel(()), "no other set of effects is likelier; none was worth a fit"),
         (
             PredictsTooLittle(0.2, 0.5),
             "set aside: with it the model explains 20% of the motion in runs left out, and under 50% an effect means nothing",
@@ -254,10 +240,10 @@ def test_a_round_is_a_message_while_the_search_runs() -> None:
     events: list[Event] = []
     progress = narrated(events.append, "m", "position")
     progress(Stage("fitting", 0.5))
-    progress(Result(Round(2, (), "creep", ResidualIsNoise(), removed=True)))
+    progress(Result(Round(2, (), "creep", NoiseWithoutRun("a"), removed=True)))
     assert events == [
         Stage("fitting", 0.5),
-        Message("round 2: without creep; what is left of the fit runs is measurement noise"),
+        Message("round 2: without creep; set aside: without a what the base model leaves is noise"),
     ]
 
 

@@ -20,7 +20,7 @@ OWN = ("report.html", "report.json", "parameters.csv", "runs.csv", FITS)
 
 
 def run_close_loop(
-    experiment: Path, out: Path, command: str, overwrite: bool, show_hint: bool, joint: bool = True
+    experiment: Path, out: Path, command: str, overwrite: bool, show_hint: bool
 ) -> tuple[Findings, Path]:
     # Imported here so that `--help` does not wait for JAX; x64 is the caller's choice, and this is the caller.
     from smajax.core.runtime import prepare
@@ -43,7 +43,7 @@ def run_close_loop(
         displayed(console(), show_hint) as progress,
     ):
         in_words = narrated(progress, loaded.output_unit, loaded.output_name)
-        findings = close_loop(loaded, memory=out / "fits", progress=in_words, command=command, joint=joint)
+        findings = close_loop(loaded, memory=out / "fits", progress=in_words, command=command)
         return findings, write_report(findings, out)
 
 
@@ -62,12 +62,6 @@ def close_loop_command(
         Path,
         typer.Option(help="folder for report.html, report.json, its tables as CSV; finished fits are cached there too"),
     ] = Path("report"),
-    joint: Annotated[
-        bool,
-        typer.Option(
-            "--joint/--rounds", help="compare whole sets of effects by their evidence, or add one effect a round"
-        ),
-    ] = True,
     overwrite: Overwrite = False,
     json_out: Json = False,
     open_page: Open = False,
@@ -79,10 +73,8 @@ def close_loop_command(
 
     Example:  smajax close-loop experiment.toml --out report
     """
-    command = f"smajax close-loop {shlex.quote(str(experiment))} --out {shlex.quote(str(out))}" + " --rounds" * (
-        not joint
-    )
-    findings, page = run_close_loop(experiment, out, command, overwrite, not json_out, joint)
+    command = f"smajax close-loop {shlex.quote(str(experiment))} --out {shlex.quote(str(out))}"
+    findings, page = run_close_loop(experiment, out, command, overwrite, not json_out)
     if json_out:
         from smajax.report.json_file import findings_to_json
 

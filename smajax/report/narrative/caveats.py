@@ -66,15 +66,11 @@ def of_a_faint_trace(findings: Findings) -> list[str]:
     chance = min(1.0, len(left) * first.evidence["score_p_value_at_the_end"])
     if chance > findings.config.faint_p_value:
         return []
-    fitted = first.evidence["score_gain_at_the_end"] > findings.config.gain_in_noise
+    rejected = findings.rejected is not None and first.name in findings.rejected.effects
     return [
         f"Mind: {first.title} leaves a trace in the score test (p = {digits(chance, 2)} after {len(left)} candidates) that would take "
         f"{first.evidence['score_gain_at_the_end']:.1%} of the residual's square"
-        + (
-            ", but runs left out are not predicted better with it."
-            if fitted
-            else ": smaller than what is looked into, so it was not fitted."
-        )
+        + (", but the held-out runs reject it." if rejected else ", but the model with it is no likelier.")
     ]
 
 

@@ -13,7 +13,6 @@ from smajax.report.narrative.values import assumed_text, error_text
 def cannot_know(findings: Findings) -> tuple[str, ...]:
     """One sentence or two for each thing."""
     return (
-        *_ties(findings),
         *_confounders(findings),
         *_correlated(findings),
         *_remarks(findings),
@@ -30,22 +29,6 @@ def separated(findings: Findings) -> str:
         "separates them (another load, a slower or a hotter one): "
         f"`smajax identify {findings.source} --design` ranks such runs."
     )
-
-
-def _ties(findings: Findings) -> Iterator[str]:
-    titles = {effect.name: effect.title for effect in findings.effects}
-    added = {effect.name for effect in findings.added}
-
-    def named(model: str) -> str:
-        return " with ".join(titles[name] for name in model.split(" + "))
-
-    for entry in findings.rounds:
-        if entry.indistinguishable and not entry.removed and set(entry.chosen.split(" + ")) <= added:
-            others = " or ".join(named(model) for model in entry.indistinguishable)
-            yield (
-                f"Whether it is {named(entry.chosen)}, or {others}: runs left out do "
-                "not distinguish them. The one that predicts them best was accepted, or a part of it that does as well."
-            )
 
 
 def _confounders(findings: Findings) -> Iterator[str]:

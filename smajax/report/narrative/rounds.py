@@ -10,14 +10,10 @@ from smajax.attribution.findings import (
     LikelierModel,
     NoiseWithoutRun,
     NoLikelierModel,
-    NoLongerNeeded,
-    NothingSignificant,
     PredictsTooLittle,
     Reason,
-    ResidualIsNoise,
     Round,
-    RoundLimit,
-    Scored,
+    StepDependent,
     UnknownTermLikelier,
 )
 from smajax.report.narrative.values import value_text
@@ -45,27 +41,12 @@ def reason_text(reason: Reason, unit: str, quantity: str) -> str:
         return value_text(value, unit, quantity)
 
     match reason:
-        case ResidualIsNoise():
-            return "what is left of the fit runs is measurement noise"
-        case NothingSignificant(candidates, gain):
-            return (
-                f"no candidate stands out in the score test: none of {candidates} promises more than {gain:.1%} of "
-                "the mean square"
-            )
-        case Scored(comparison, step_dependent):
-            parts = [
-                f"{one.effects} keeps {max(one.gain_kept, 0.0):.0%} of its gain at half the step and is not accepted"
-                for one in step_dependent
-            ]
-            return "; ".join([*parts, *([comparison_text(comparison, unit, quantity)] if comparison else [])])
+        case StepDependent(effects, kept):
+            return f"{effects} keeps {max(kept, 0.0):.0%} of its gain at half the step and is not accepted"
         case LikelierModel(before, log_odds, compared):
             return f"likelier than {before or 'the base model'} by {log_odds:.1f} in log odds; {_compared(compared, error)}"
         case NoLikelierModel(compared):
             return f"no other set of effects is likelier; {_compared(compared, error)}"
-        case RoundLimit(rounds):
-            return f"the search ends after {rounds} rounds, whatever more there may be"
-        case NoLongerNeeded(comparison):
-            return f"removed again: {comparison_text(comparison, unit, quantity)} with it is not enough"
         case PredictsTooLittle(share, least):
             return (
                 f"set aside: with it the model explains {share:.0%} of the motion in runs left out, and under {least:.0%} "

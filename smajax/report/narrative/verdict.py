@@ -50,10 +50,6 @@ def _opening(findings: Findings) -> str:
             return _not_in_library(findings)
 
 
-def _assessed_on(findings: Findings) -> str:
-    return "on runs left out as well as on the fit" if findings.fit_runs > 1 else "on the one fit run itself"
-
-
 def _in_one_run(findings: Findings) -> list[OutlierRun]:
     """Runs without any one of which the base model leaves noise, where nothing was added."""
     alone = [one for one in findings.outlier_runs if one.residual_is_noise and not one.effects]
@@ -85,10 +81,7 @@ def _not_in_library(findings: Findings) -> str:
         )
     if not tried:
         return "Something is missing, and no candidate effect was to be tried: the experiment file leaves none."
-    return (
-        f"Something is missing, and none of the {tried} candidate effects that were tried accounts "
-        f"for it: none lowers the error enough, {_assessed_on(findings)}."
-    )
+    return f"Something is missing, and none of the {tried} candidate effects that were tried accounts for it."
 
 
 def _of_one_run(findings: Findings, alone: list[OutlierRun]) -> str:
@@ -114,8 +107,7 @@ def _partly(findings: Findings) -> str:
     if not others:
         return f"{text}. That explains part of the misfit: what is left is more than noise."
     return (
-        f"{text}. The error on {'runs left out' if findings.fit_runs > 1 else 'the one fit run'} is lowered further by "
-        f"{and_listed([effect.title for effect in others])}. More than noise is still left: "
+        f"{text}. The model is likelier still with {and_listed([effect.title for effect in others])}. More than noise is left all the same: "
         "something that the library does not hold may be missing too, and "
         f"{'these' if len(others) > 1 else 'this'} may in part stand in for it."
     )
@@ -141,7 +133,7 @@ def _rejected(findings: Findings) -> str:
         error_text(findings, one) for one in (findings.rejected.rmse_without, findings.rejected.rmse_with)
     )
     text = (
-        f"{named} would lower the error {_assessed_on(findings)}, but not on the runs that were held out ({without} without, "
+        f"{named} would lower the error on the fit runs, but not on the runs that were held out ({without} without, "
         f"{with_it} with): it is not confirmed, and not named."
     )
     return text[0].upper() + text[1:]

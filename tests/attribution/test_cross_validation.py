@@ -18,6 +18,7 @@ from smajax.model.extended import extended
 from smajax.model.presets import build
 
 DT, SAMPLES, NOISE = 0.1, 200, 1e-4
+CHANCE = 2.0  # standard errors
 BOUNDS = {"convection_coefficient": (50.0, 400.0), "latent_heat.enthalpy": (0.0, 6e4)}
 
 
@@ -69,10 +70,11 @@ def test_a_model_that_predicts_left_out_runs_worse_is_not_better() -> None:
     small, large = (size * rng.normal(size=(2, SAMPLES)) for size in (1e-4, 3e-4))
     old = Model((), setting.problem.start_values(), 2.0, small, setting.rmse(small))
     new = Model(("latent_heat",), setting.problem.start_values(), 1.0, large, setting.rmse(large))
-    assert not setting.better(new, old)[0]
+    assert not setting.better(new, old, CHANCE)[0]
     assert setting.better(
         Model(("latent_heat",), old.values, 0.1, small, setting.rmse(small)),
         Model((), old.values, 1.0, large, setting.rmse(large)),
+        CHANCE,
     )[0]
 
 
