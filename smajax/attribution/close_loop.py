@@ -14,7 +14,6 @@ import numpy as np
 from smajax.attribution.assumed import assumed, expansion_not_given
 from smajax.attribution.config import AttributionConfig
 from smajax.attribution.confounders import confounders
-from smajax.attribution.cross_validation import Model, Search
 from smajax.attribution.findings import (
     Findings,
     NoiseWithoutRun,
@@ -28,6 +27,7 @@ from smajax.attribution.held_out import Compared, validated
 from smajax.attribution.job import Job, job_of
 from smajax.attribution.joint_search import JointSearch
 from smajax.attribution.joint_stage import search_by_evidence
+from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.neutral import check_neutral
 from smajax.attribution.outlier_run import outlier_runs
 from smajax.attribution.refusal import refuse_keys_of_identify

@@ -28,14 +28,8 @@ class AttributionConfig:
     most_filter_noise: float = 2.0  # innovation over the estimate; 1.6 where the coefficient is near one
     least_independent: int = 50  # samples; with fewer the test cannot reject a first-order noise
 
-    # Cross-validation: when is a model better?
-    penalty: float = 0.01  # of the mean square on left-out runs that each coefficient has to gain
-    effect_size_error: float = (
-        1.0  # relative error to which the other runs determine an effect's size for a left-out run to count
-    )
-    fold_tie: float = 1.0  # how far a fold's parameters may move at no cost, in logits of the box
+    # Fits
     least_explained_variance: float = 0.5  # of the motion in left-out runs; below it the model's effects mean nothing
-    most_folds: int = 12  # parts of the runs left out in turn: one run each up to that many
     nudge: float = (
         1e-3  # share of an effect's start value at which its score is taken: at exactly zero some have no slope
     )

@@ -6,10 +6,10 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from smajax.attribution.cross_validation import Model, Search
 from smajax.attribution.findings import Confounder
 from smajax.attribution.joint_search import JointSearch
 from smajax.attribution.laplace_evidence import FittedModel
+from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.traces import Traces, traces_at
 from smajax.data.experiment.record import Run
 from smajax.fit.design import candidate_problem

@@ -115,17 +115,6 @@ class ResidualDiagnostics:
 
 
 @dataclass(frozen=True)
-class Comparison:
-    """Error on runs left out in turn (or on the one fit run) without something and with it."""
-
-    rmse_without: float  # SI
-    rmse_with: float
-    gain: float  # share of the mean square
-    standard_errors: float  # by which it is ahead
-    left_out: bool  # whether runs were left out
-
-
-@dataclass(frozen=True)
 class StepDependent:
     """Effects that lose their gain when the step is halved."""
 

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from smajax.attribution.cross_validation import Evidence, Model, Search
 from smajax.attribution.findings import CoefficientFinding, EffectFinding, ParameterFinding
 from smajax.attribution.job import Job
 from smajax.attribution.leave_one_run_out import jackknife_error
+from smajax.attribution.model_fits import Evidence, Model, Search
 from smajax.attribution.nuisance_grid import scores_at
 from smajax.core.parameters import parameters
 from smajax.fit.sensitivity import Sensitivity, sensitivity

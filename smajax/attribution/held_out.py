@@ -8,11 +8,11 @@ import jax.numpy as jnp
 import numpy as np
 
 from smajax.attribution.config import AttributionConfig
-from smajax.attribution.cross_validation import Model, Search
 from smajax.attribution.findings import HeldOutWorse, Rejected, ResidualDiagnostics, RunFinding, pooled_rmse
 from smajax.attribution.job import Job
 from smajax.attribution.joint_search import JointSearch
 from smajax.attribution.joint_stage import without_last
+from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.residual_diagnostics import diagnosed
 from smajax.core.parameters import parameter_values
 from smajax.data.experiment.record import Run

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from smajax.attribution.cross_validation import Model, Search, nudged
+from smajax.attribution.model_fits import Model, Search, nudged
 from smajax.attribution.score_test import Score, ranked, samples_per_independent, score_of, switches, without
 from smajax.fit.predicted import predicted_and_derivatives
 from smajax.fit.sensitivity import Sensitivity, sensitivity

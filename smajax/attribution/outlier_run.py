@@ -11,8 +11,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from smajax.attribution.cross_validation import Model, Search, Start
 from smajax.attribution.findings import OutlierRun
+from smajax.attribution.model_fits import Model, Search, Start
 from smajax.fit.predicted import misfits
 
 

@@ -82,13 +82,6 @@ def ranked(
     return sorted(scores, key=lambda score: -score.gain)
 
 
-def screen(
-    at: Sensitivity, fitted: Sequence[str], candidates: Sequence[str], bounds: Mapping[str, tuple[float, float]]
-) -> tuple[list[Score]]:
-    """`ranked`, as the unknown terms still read it: the first of what is returned."""
-    return (ranked(at, fitted, candidates, bounds),)
-
-
 def without(at: Sensitivity, fitted: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
     """(directions that the fitted parameters absorb, residual without them)."""
     residual = at.residual()

@@ -11,7 +11,7 @@ import dataclasses
 import jax.numpy as jnp
 import numpy as np
 
-from smajax.attribution.cross_validation import Model, Search, Start, base_value
+from smajax.attribution.model_fits import Model, Search, Start, base_value
 from smajax.fit.integration import IntegrationError, choose_integration, described, integration_error
 from smajax.fit.packed_runs import RunBatch, halved
 from smajax.fit.predicted import predicted_at

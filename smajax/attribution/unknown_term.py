@@ -16,13 +16,13 @@ from dataclasses import dataclass
 import jax.numpy as jnp
 import numpy as np
 
-from smajax.attribution.cross_validation import Fitted, Model, Search, Start
 from smajax.attribution.findings import UnknownTerm, UnknownTermLikelier
 from smajax.attribution.formulas import formulas
 from smajax.attribution.joint_parameters import JointParameters
 from smajax.attribution.laplace_evidence import FittedModel, fitted_model, independent_error
 from smajax.attribution.leave_one_run_out import left_out
-from smajax.attribution.score_test import Score, screen
+from smajax.attribution.model_fits import Model, Search, Start
+from smajax.attribution.score_test import Score, ranked
 from smajax.attribution.unknown.ranges import Sought, sought
 from smajax.attribution.unknown.spline import design
 from smajax.attribution.unknown.terms import UNKNOWN
@@ -30,6 +30,7 @@ from smajax.core.parameters import parameters
 from smajax.core.progress import Stage
 from smajax.core.whiteness import correlation_time, split_runs
 from smajax.data.experiment.record import Prior
+from smajax.fit.levenberg_marquardt import Fit
 from smajax.fit.predicted import misfits
 from smajax.fit.problem import Problem
 from smajax.fit.sensitivity import sensitivity
@@ -80,7 +81,7 @@ def with_terms(setting: Search, final: Model) -> tuple[Terms, np.ndarray, Sought
 def screened(setting: Terms, values: np.ndarray) -> list[Score]:
     """Every term's score test at the final model, best first."""
     at = sensitivity(setting.problem, values, setting.every)
-    return screen(at, setting.loose((), values), setting.candidates, setting.bounds)[0]
+    return ranked(at, setting.loose((), values), setting.candidates, setting.bounds)
 
 
 def _best_of_each(scores: Sequence[Score], count: int) -> list[Score]:
@@ -120,8 +121,8 @@ def unknown_terms(setting: Search, final: Model) -> Lacking:
     carried = tuple(joint.coefficients)
     none = fitted_model(joint, final.effects, values, carried)
     fitted = [
-        fitted_model(joint, (*final.effects, *one.effects), one.solution.values, carried)
-        for one in refitted(search, chosen, values)
+        fitted_model(joint, (*final.effects, term), at, carried)
+        for term, at in refitted(search, chosen, values).items()
     ]
     error = least_error(setting, [none, *fitted])
     fitted.sort(key=lambda model: -model.log_evidence(error**2))
@@ -210,8 +211,8 @@ def in_place_of(setting: Search, first: Model, final: Model) -> Lacking | None:
     return found
 
 
-def refitted(search: Terms, chosen: Sequence[Score], values: np.ndarray) -> list[Fitted]:
-    """Every chosen term fitted together with the model's parameters, best first.
+def refitted(search: Terms, chosen: Sequence[Score], values: np.ndarray) -> dict[str, np.ndarray]:
+    """Every chosen term fitted together with the model's parameters: parameters (P,) by term.
 
     Each from zero, where it cannot end worse than the model without it, and from some way towards what the score test
     says, because a run whose transformation begins elsewhere lies in another local minimum.
@@ -224,12 +225,13 @@ def refitted(search: Terms, chosen: Sequence[Score], values: np.ndarray) -> list
                 config.term_start_share * size, -config.term_start_limit, config.term_start_limit
             )
         starts += [Start(score.effects, values), Start(score.effects, ahead)]
-    solutions, _ = search.fit(starts, "refitting unknown terms")
-    every = sorted(zip(starts, solutions, strict=True), key=lambda pair: pair[1].cost)
-    best: dict[tuple[str, ...], Fitted] = {}
-    for start, solution in every:
-        best.setdefault(start.effects, Fitted(start.effects, solution))
-    return list(best.values())
+    fits, _ = search.fit(starts, "refitting unknown terms")
+    best: dict[str, Fit] = {}
+    for start, fit in zip(starts, fits, strict=True):
+        (term,) = start.effects
+        if term not in best or fit.cost < best[term].cost:
+            best[term] = fit
+    return {term: fit.values for term, fit in best.items()}
 
 
 def _learnt(

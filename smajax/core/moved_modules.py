@@ -36,7 +36,7 @@ PACKAGES = {
 MODULES = {
     "adaptive": "simulation.adaptive_steps",
     "attribution.extent": "attribution.run_extent",
-    "attribution.judging": "attribution.cross_validation",
+    "attribution.judging": "attribution.model_fits",
     "attribution.lone_run": "attribution.outlier_run",
     "attribution.places": "attribution.nuisance_grid",
     "attribution.rivals": "attribution.confounders",

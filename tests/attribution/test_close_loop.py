@@ -15,9 +15,9 @@ import pytest
 
 from smajax.attribution.assumed import assumed, expansion_not_given
 from smajax.attribution.close_loop import close_loop
-from smajax.attribution.cross_validation import Model
 from smajax.attribution.findings import Findings, pooled_rmse
 from smajax.attribution.found import over_runs
+from smajax.attribution.model_fits import Model
 from smajax.core.parameters import get_parameters, parameters, set_parameters
 from smajax.data.experiment.load import load_experiment
 from smajax.data.experiment.record import Experiment

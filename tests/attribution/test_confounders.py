@@ -10,10 +10,10 @@ import pytest
 
 from smajax.attribution.config import AttributionConfig
 from smajax.attribution.confounders import confounders, overlap, separating_run
-from smajax.attribution.cross_validation import Model, Search
 from smajax.attribution.joint_parameters import JointParameters
 from smajax.attribution.joint_search import JointSearch, search_jointly
 from smajax.attribution.joint_stage import as_model
+from smajax.attribution.model_fits import Model, Search
 from smajax.core.result_cache import ResultCache
 from smajax.data.experiment.record import Run
 from smajax.fit.levenberg_marquardt import FitSettings

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from smajax.attribution.cross_validation import Model, Search
+from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.nuisance_grid import scanned, scores_at
 from smajax.attribution.run_extent import extent_of
 from smajax.core.parameters import parameters, set_parameters

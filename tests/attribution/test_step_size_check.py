@@ -11,7 +11,7 @@ import pytest
 
 from smajax.attribution.close_loop import prepared
 from smajax.attribution.config import AttributionConfig
-from smajax.attribution.cross_validation import Model, Search
+from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.step_size_check import finer_integration, gain_kept_at_half_step, integration_error_of
 from smajax.core.parameters import parameters
 from smajax.core.progress import quiet

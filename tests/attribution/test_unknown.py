@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline
 
-from smajax.attribution.cross_validation import Model, Search
 from smajax.attribution.findings import UnknownTerm, UnknownTermLikelier
 from smajax.attribution.formulas import formulas
+from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.unknown.ranges import Sought
 from smajax.attribution.unknown.spline import COUNT, design, spline
 from smajax.attribution.unknown.terms import UNKNOWN

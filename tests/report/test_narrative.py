@@ -11,7 +11,6 @@ import pytest
 from smajax.attribution.findings import (
     AssumedParameter,
     CoefficientFinding,
-    Comparison,
     Confounder,
     Findings,
     HeldOutWorse,
@@ -37,8 +36,6 @@ from smajax.fit.uncertainty import Remark, RemarkKind
 from smajax.report.narrative import narrate, narrated
 from smajax.report.narrative.rounds import reason_text
 from tests.helpers.made_findings import made_effect, made_findings, made_residual
-
-BETTER = Comparison(1.8e-3, 0.2e-3, 0.988, 8.14, True)
 
 
 def _summary(**changed: Any) -> str:

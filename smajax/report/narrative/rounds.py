@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from smajax.attribution.findings import (
-    Comparison,
     HeldOutWorse,
     LikelierModel,
     NoiseWithoutRun,
@@ -22,16 +21,6 @@ from smajax.report.narrative.values import value_text
 def chosen_text(entry: Round) -> str:
     """`latent_heat + radiation`, `without creep`, or nothing."""
     return f"without {entry.chosen}" if entry.removed else entry.chosen
-
-
-def comparison_text(result: Comparison, unit: str, quantity: str) -> str:
-    """`error on left-out runs 1.8 mm -> 0.2 mm (+99% of its mean square, 8.1 standard errors)`."""
-    runs = "left-out runs" if result.left_out else "the one fit run itself"
-    without, with_it = (value_text(one, unit, quantity) for one in (result.rmse_without, result.rmse_with))
-    return (
-        f"error on {runs} {without} -> {with_it} "
-        f"({result.gain:+.0%} of its mean square, {result.standard_errors:.1f} standard errors)"
-    )
 
 
 def reason_text(reason: Reason, unit: str, quantity: str) -> str:

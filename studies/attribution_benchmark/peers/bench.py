@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from smajax.attribution.close_loop import SEED
-from smajax.attribution.cross_validation import Search
+from smajax.attribution.model_fits import Search
 from smajax.core.parameters import parameter_values, parameters
 from smajax.core.result_cache import ResultCache
 from smajax.data.experiment.load import load_experiment

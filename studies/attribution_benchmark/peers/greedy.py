@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from smajax.attribution.cross_validation import Model, Start
+from smajax.attribution.model_fits import Model, Start
 from smajax.attribution.score_test import switches
 from smajax.fit.levenberg_marquardt import Fit
 from smajax.model.effects.library import LIBRARY

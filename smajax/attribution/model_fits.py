@@ -1,8 +1,4 @@
-"""Models of one experiment with some effects of the library: fitted, and cross-validated.
-
-A model is scored by its error on each fit run in turn, fitted to the others; the held-out runs are not looked at. It is
-better than another when it predicts left-out runs better beyond a penalty per coefficient and beyond chance.
-"""
+"""Fits of one experiment by models with some effects of the library, and whether what they leave is noise."""
 
 from __future__ import annotations
 
@@ -10,7 +6,6 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -18,18 +13,17 @@ import numpy as np
 
 from smajax.attribution.config import AttributionConfig
 from smajax.attribution.every_effect import EVERY
-from smajax.attribution.findings import Comparison, Reason, Round
+from smajax.attribution.findings import Reason, Round
 from smajax.attribution.residual_diagnostics import all_noise
 from smajax.attribution.run_extent import extent_of
-from smajax.attribution.score_test import scaled, switches
+from smajax.attribution.score_test import switches
 from smajax.core.progress import Progress, Result, quiet
 from smajax.core.result_cache import ResultCache
-from smajax.core.whiteness import correlation_time, split_runs
+from smajax.core.whiteness import split_runs
 from smajax.fit.levenberg_marquardt import Fit, FitSettings, levenberg_marquardt
 from smajax.fit.packed_runs import RunBatch
 from smajax.fit.predicted import misfits
 from smajax.fit.problem import Problem
-from smajax.fit.sensitivity import sensitivity
 from smajax.fit.starts import multistart, perturbed_restarts
 from smajax.fit.uncertainty import at_bound
 from smajax.model.effects.candidate import Extent
@@ -45,7 +39,6 @@ class Start:
     effects: tuple[str, ...]
     values: np.ndarray  # (P,), in the order of the whole library's problem
     weights: np.ndarray | None = None  # of the runs, (R,); None: all alike
-    tie: float = 0.0  # of `Problem.task`
 
 
 @dataclass(frozen=True)
@@ -58,13 +51,6 @@ class Model:
     left_out: np.ndarray  # misfit (SI) of each fit run by the model fitted to the others, (R, N)
     left_out_rmse: float
     left_out_values: np.ndarray | None = None  # (parts, P): fitted without each part of the runs
-
-
-class Fitted(NamedTuple):
-    """A set of effects fitted to all runs."""
-
-    effects: tuple[str, ...]
-    solution: Fit
 
 
 @dataclass
@@ -168,8 +154,7 @@ class Search:
             return [together[k] for k in order], np.concatenate([found for _, found in parts])[order]
         problem, index = self.restricted([name for start in starts for name in start.effects])
         tasks = [
-            problem.task(self.free(start.effects), self.bounds, start.values[index], start.weights, start.tie)
-            for start in starts
+            problem.task(self.free(start.effects), self.bounds, start.values[index], start.weights) for start in starts
         ]
         settings = FitSettings(tolerance=enough, cache=self.cache, progress=self.progress, stage=what)
         fits = levenberg_marquardt(problem, tasks, settings)
@@ -202,11 +187,6 @@ class Search:
         values[np.asarray(index)] = found.values
         return dataclasses.replace(found, values=values)
 
-    @staticmethod
-    def known(model: Model) -> Fit:
-        """A fitted model as a fit that has ended."""
-        return Fit(model.values, model.cost, True, "", 0)
-
     def is_noise(self, values: np.ndarray) -> bool:
         """Whether what a model leaves of the fit runs is measurement noise."""
         (misfit,) = misfits(self.problem, [values])
@@ -231,131 +211,11 @@ class Search:
         """Whether a model with that error explains enough of these runs for its effects to mean anything."""
         return self.explained_variance(left_out_rmse) > self.config.least_explained_variance
 
-    def cross_validated(self, fitted: Sequence[Fitted], present: Model | None = None) -> list[Model]:
-        """Leave each fit run out in turn, refit to the others, and predict the one left out (of many, `most_folds` parts).
-
-        A fold starts at the fit to all runs and is tied to it, each parameter to within about `fold_tie` of its logit in
-        the box: else a direction that the others hardly determine runs wherever the last iteration happened to take it, and
-        with it the prediction. In such a direction the fold keeps what the run left out said: where the others do not
-        determine the size of what is new (`determined_without`), `present`'s error stands and the effect counts for nothing.
-        A fold that follows all runs better than the fit to all has come to a better local minimum: that fit begins there again.
-        """
-        parts = self.parts()
-        folded = self.folded(fitted)
-        better = {
-            place: deeper.values
-            for place, (entry, (_, deeper)) in enumerate(zip(fitted, folded, strict=True))
-            if deeper.cost < (1.0 - self.config.penalty) * entry.solution.cost
-        }
-        if better:
-            starts = [Start(fitted[place].effects, values) for place, values in better.items()]
-            again, _ = self.fit(starts, "refitting where a fold did better", hops=True)
-            fitted, folded = list(fitted), list(folded)
-            for place, fit in zip(better, again, strict=True):
-                fitted[place] = Fitted(fitted[place].effects, fit)
-            for place, one in zip(better, self.folded([fitted[place] for place in better]), strict=True):
-                folded[place] = one
-        models = []
-        for entry, (own, _) in zip(fitted, folded, strict=True):
-            left_out = np.stack([own[fold, run] for run, fold in enumerate(parts.argmax(axis=0))])
-            model = Model(entry.effects, entry.solution.values, entry.solution.cost, left_out, self.rmse(left_out))
-            models.append(model if present is None else self.counted(entry, model, present))
-        return models
-
-    def folded(self, fitted: Sequence[Fitted]) -> list[tuple[np.ndarray, Fit]]:
-        """Every fit refitted without each part of the runs: the misfit of all runs at each fold, and the one best for all."""
-        parts = self.parts()
-        # With one run nothing can be left out: the fit itself is all there is, and the report says so.
-        folds = list(1.0 - parts) if len(parts) > 1 else [np.ones(1)]
-        levels = self.levels(fitted)
-        starts = [
-            Start(entry.effects, entry.solution.values, weights, np.sqrt(level) / self.config.fold_tie)
-            for entry, level in zip(fitted, levels, strict=True)
-            for weights in folds
-        ]
-        fits, found = self.fit(starts, "predicting runs left out")
-        costs = np.nan_to_num((found**2).sum(axis=(1, 2)) / float(self.problem.noise_sigma) ** 2, nan=np.inf)
-        folds_of_each = []
-        for first in range(0, len(starts), len(folds)):
-            best = first + int(np.argmin(costs[first : first + len(folds)]))
-            folds_of_each.append(
-                (found[first : first + len(folds)], dataclasses.replace(fits[best], cost=float(costs[best])))
-            )
-        return folds_of_each
-
-    def levels(self, fitted: Sequence[Fitted]) -> list[float]:
-        """Variance that one effective sample of each fit's residual has, over the noise's: autocorrelation counts as noise."""
-        mask = np.asarray(self.problem.batch.mask)
-        found = misfits(self.problem, [entry.solution.values for entry in fitted]) / float(self.problem.noise_sigma)
-        return [float((one**2).sum() / mask.sum()) * correlation_time(split_runs(one, mask)) for one in found]
-
-    def counted(self, entry: Fitted, model: Model, present: Model) -> Model:
-        """`model` with `present`'s error on the runs that alone determine the size of what is new (`determined_without`)."""
-        if len(model.left_out) == 1:
-            return model
-        determined = self.determined_without(entry, present)
-        left_out = np.where(determined[:, None], model.left_out, present.left_out)
-        return dataclasses.replace(model, left_out=left_out, left_out_rmse=self.rmse(left_out))
-
-    def determined_without(self, entry: Fitted, present: Model) -> np.ndarray:
-        """Run by run: do the other runs determine the size of what is new against `present`? Shape (R,).
-
-        They do when the trace of the new coefficients in them, less what the other free parameters absorb, stands out
-        of the residual so far that its size is known to within `effect_size_error` of itself. Two new effects are taken together:
-        how they share a trace is no matter here.
-        """
-        index, values = self.problem.names.index, entry.solution.values
-        new = [effect for effect in entry.effects if effect not in present.effects]
-        own = [name for effect in new for name in self.coefficients(effect)]
-        size = np.asarray([values[index(name)] - base_value(name) for name in own])
-        others = [name for name in self.loose(entry.effects, values) if name not in own]
-        at = sensitivity(self.problem, values, [*own, *others])
-        level = float(np.mean(at.residual() ** 2)) * correlation_time(split_runs(at.misfit, at.mask))
-        determined = []
-        parts = self.parts()
-        for part in parts:
-            rest = dataclasses.replace(at, mask=at.mask * (1.0 - part)[:, None])
-            trace = rest.columns(own) @ size
-            basis = np.linalg.qr(scaled(rest.columns(others)))[0]
-            trace = trace - basis @ (basis.T @ trace)
-            determined.append(float(trace @ trace) * self.config.effect_size_error**2 > level)
-        return np.asarray(determined)[parts.argmax(axis=0)]
-
-    def parts(self) -> np.ndarray:
-        """Which runs are left out together, (parts, R) of zeros and ones: each alone, or every `most_folds`-th of many."""
-        runs, most = self.problem.batch.runs, self.config.most_folds
-        return np.eye(min(runs, most))[:, np.arange(runs) % most]
-
-    def better(self, new: Model, old: Model, chance: float) -> tuple[bool, Comparison]:
-        """Does `new` predict left-out runs better, beyond its extra coefficients and beyond `chance` standard errors?"""
-        extra = len(self.free(new.effects)) - len(self.free(old.effects))
-        gain = 1.0 - (new.left_out_rmse / old.left_out_rmse) ** 2
-        z = paired(old.left_out, new.left_out, np.asarray(self.problem.batch.mask))
-        # The fit itself must gain as well: a left-out run of its own kind can favour a needless coefficient by luck.
-        fitted = 1.0 - new.cost / old.cost if old.cost > 0.0 else 0.0
-        enough = min(gain, fitted) > self.config.penalty * extra and z > chance
-        return enough, Comparison(old.left_out_rmse, new.left_out_rmse, gain, z, len(old.left_out) > 1)
-
 
 def base_value(coefficient: str) -> float:
     """The value at which a coefficient such as `latent_heat.enthalpy` changes nothing."""
     effect, name = coefficient.split(".", 1)
     return float(getattr(EVERY[effect].base(), name))
-
-
-def paired(old: np.ndarray, new: np.ndarray, mask: np.ndarray) -> float:
-    """Mean drop of the squared error over its standard error, on blocks longer than the residual's correlation time.
-
-    All samples of a left-out run share the error of the one fit that predicts it, which blocks do not see. Over three or
-    four runs that is not distinguished from an effect that shows in one of them alone: the held-out runs have to.
-    """
-    gains, block = [], int(np.ceil(2.0 * correlation_time(split_runs(old, mask))))
-    for before, after, valid in zip(old, new, mask, strict=True):
-        drop = (before**2 - after**2)[valid > 0]
-        width = min(block, max(1, len(drop) // 4))
-        gains += [float(piece.mean()) for piece in np.array_split(drop, max(1, len(drop) // width))]
-    spread = np.std(gains, ddof=1) / np.sqrt(len(gains)) if len(gains) > 1 else np.inf
-    return float(np.mean(gains) / spread) if spread > 0.0 else 0.0
 
 
 def nudged(setting: Search, values: np.ndarray, effects: Sequence[str]) -> np.ndarray:
