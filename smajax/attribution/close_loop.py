@@ -38,6 +38,7 @@ from smajax.core.progress import Progress, Stage, as_progress, quiet, report_che
 from smajax.core.provenance import made_with
 from smajax.core.result_cache import ResultCache
 from smajax.data.experiment.record import Experiment
+from smajax.fit.levenberg_marquardt import Fit
 from smajax.fit.sensitivity import sensitivity
 from smajax.fit.uncertainty import identifiability
 from smajax.simulation.steppers import Integration
@@ -53,6 +54,7 @@ class Context:
     job: Job
     setting: Search
     start: np.ndarray  # (P,), start values of the parameters of base model and library
+    base: Fit  # the base model
     check: tuple[str, ...]
     seed: int
 
@@ -128,9 +130,8 @@ def prepared(  # the stage's inputs, each once
     config: AttributionConfig,
     integration: Integration | None = None,
 ) -> Context:
-    """The experiment as a problem, and what its runs determine, from the Jacobian at the start values."""
+    """The experiment as a problem, its base model fitted, and what its runs determine, from the Jacobian there."""
     job = job_of(experiment, integration)
-    progress(Stage(CHECKING, 0.0))
     start = job.problem.start_values()
     setting = Search(
         job.problem,
@@ -144,15 +145,20 @@ def prepared(  # the stage's inputs, each once
         compile_per_model,
         config,
     )
-    identifiable = identifiability(sensitivity(job.problem, start, job.unknowns), job.unknowns, job.bounds)
+    report_checks(progress, experiment.warnings, ())
+    base = setting.base(start, seed)
+    progress(Stage(CHECKING, 0.0))
+    problem, index = setting.restricted(())
+    at_fit = sensitivity(problem, base.values[np.asarray(index)], job.unknowns)
+    identifiable = identifiability(at_fit, job.unknowns, job.bounds, "at the base model's fit")
     progress(Stage(CHECKING, 1.0))
-    report_checks(progress, experiment.warnings, identifiable)
-    return Context(job, setting, start, (*experiment.warnings, *identifiable), seed)
+    report_checks(progress, (), identifiable)
+    return Context(job, setting, start, base, (*experiment.warnings, *identifiable), seed)
 
 
 def searched(context: Context) -> Outcome:
     """The base model and the one that the search ends with."""
-    return Outcome(*search_by_evidence(context.setting, context.setting.base(context.start, context.seed)))
+    return Outcome(*search_by_evidence(context.setting, context.base))
 
 
 def against_an_unknown_term(context: Context, outcome: Outcome) -> Outcome:

@@ -77,7 +77,7 @@ def search_by_evidence(setting: Search, base: Fit) -> tuple[JointSearch, Model, 
 
 
 def final_model(search: JointSearch, setting: Search, found: FittedModel, error: float) -> Model:
-    """A fitted model at its optimum by the runs alone, from points nearby as well: what is reported is no compromise with a prior."""
+    """A fitted model at its optimum by the runs alone: what is reported is no compromise with a prior."""
     best = refined(search, found, error)
     if not best.effects:
         return as_model(search, best, error)
@@ -97,11 +97,12 @@ def without_last(search: JointSearch, setting: Search, model: Model, error: floa
 
 
 def at_optimum(setting: Search, model: Model) -> Model:
-    """A model taken to the optimum of the runs alone, from where it is and from a little off its bounds: error bars want that."""
-    starts = [Start(model.effects, values) for values in (model.values, setting.inside(model))]
-    fits, _ = setting.fit(starts, "polishing the final model", enough=setting.config.final_convergence, hops=True)
-    best = min(fits, key=lambda one: one.cost)
-    return dataclasses.replace(model, values=best.values, cost=best.cost) if best.cost < model.cost else model
+    """A model taken to the optimum of the runs alone, from where it is: error bars want that."""
+    starts = [Start(model.effects, model.values)]
+    (fit,), _ = setting.fit(
+        starts, "taking the model to the optimum of the runs", enough=setting.config.final_convergence
+    )
+    return dataclasses.replace(model, values=fit.values, cost=fit.cost) if fit.cost < model.cost else model
 
 
 def effect_probabilities(search: JointSearch, error: float) -> dict[str, float]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import jax.numpy as jnp
@@ -21,7 +21,7 @@ from smajax.attribution.formulas import formulas
 from smajax.attribution.joint_parameters import JointParameters
 from smajax.attribution.laplace_evidence import FittedModel, fitted_model, independent_error
 from smajax.attribution.leave_one_run_out import left_out
-from smajax.attribution.model_fits import Model, Search, Start
+from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.score_test import Score, ranked
 from smajax.attribution.unknown.ranges import Sought, sought
 from smajax.attribution.unknown.spline import design
@@ -30,7 +30,7 @@ from smajax.core.parameters import parameters
 from smajax.core.progress import Stage
 from smajax.core.whiteness import correlation_time, split_runs
 from smajax.data.experiment.record import Prior
-from smajax.fit.levenberg_marquardt import Fit
+from smajax.fit.levenberg_marquardt import Fit, FitSettings, levenberg_marquardt
 from smajax.fit.predicted import misfits
 from smajax.fit.problem import Problem
 from smajax.fit.sensitivity import sensitivity
@@ -39,6 +39,9 @@ from smajax.model.effects.candidate import PRIOR_ODDS
 from smajax.model.effects.prior_width import CoefficientPrior
 
 INDISTINGUISHABLE = 3.0  # in log odds: twenty to one
+PASSES = 2  # the error of a sample is first that of the model without a term, then that of the best with one
+REACH = 30.0  # in log odds behind the likeliest, within which a term is fitted again with the smaller error
+STEPS, TOLERANCE = 30, 1e-5
 
 
 @dataclass
@@ -102,32 +105,68 @@ class Lacking:
     likeliest: FittedModel | None = None
 
 
+@dataclass(frozen=True)
+class TermFits:
+    """Models of one base with one of the terms each, fitted; likeliest first."""
+
+    search: Terms
+    sought: Sought
+    joint: JointParameters
+    none: FittedModel  # the base without a term
+    fitted: tuple[FittedModel, ...]
+    gains: Mapping[str, float]  # of the score test, by term
+
+    def log_odds(self, model: FittedModel, error: float) -> float:
+        """Of a model with a term over the one without."""
+        return model.log_evidence(error**2) - self.none.log_evidence(error**2)
+
+
+def fits_with_terms(setting: Search, final: Model) -> TermFits | None:
+    """The terms that promise most, each fitted beside `final`; those that are `REACH` behind the likeliest are left out.
+
+    None where none promises anything.
+    """
+    search, values, found = with_terms(setting, final)
+    if not search.candidates:
+        return None
+    search.progress(Stage("looking for the equation that lacks something", 0.0))
+    scores = screened(search, values)
+    chosen = _best_of_each(scores, setting.config.terms_refitted)
+    search.progress(Stage("looking for the equation that lacks something", 1.0))
+    if not chosen:
+        return None
+    joint = joint_with_terms(setting, search, final)
+    none = fitted_model(joint, final.effects, values, tuple(joint.coefficients))
+    error = least_error(setting, [none])
+    places = first_places(search, joint, chosen, values)
+    fitted: list[FittedModel] = []
+    for _ in range(PASSES):
+        fitted = fitted_terms(search, joint, final.effects, places, error)
+        error = least_error(setting, [none, *fitted])
+        fitted.sort(key=lambda model: -model.log_evidence(error**2))
+        least = fitted[0].log_evidence(error**2) - REACH
+        fitted = [one for one in fitted if one.log_evidence(error**2) >= least]
+        places = {one.effects[-1]: [one.values] for one in fitted}
+    gains = {score.effects[0]: score.gain for score in scores}
+    return TermFits(search, found, joint, none, tuple(fitted), gains)
+
+
 def unknown_terms(setting: Search, final: Model) -> Lacking:
     """An unknown term in each equation in turn, beside `final`.
 
     The likeliest is `named` where it is likelier than none, predicts left-out runs better, and held-out runs too. Terms
     that are likelier than none and less than `INDISTINGUISHABLE` behind it stand in `indistinguishable`.
     """
-    search, values, found = with_terms(setting, final)
-    if not search.candidates:
-        return Lacking()
-    search.progress(Stage("looking for the equation that lacks something", 0.0))
-    scores = screened(search, values)
-    chosen = _best_of_each(scores, setting.config.terms_refitted)
-    search.progress(Stage("looking for the equation that lacks something", 1.0))
-    if not chosen:
-        return Lacking()
-    joint = joint_with_terms(setting, search, final)
-    carried = tuple(joint.coefficients)
-    none = fitted_model(joint, final.effects, values, carried)
-    fitted = [
-        fitted_model(joint, (*final.effects, term), at, carried)
-        for term, at in refitted(search, chosen, values).items()
-    ]
-    error = least_error(setting, [none, *fitted])
-    fitted.sort(key=lambda model: -model.log_evidence(error**2))
-    present, *models = (_predicting(joint, model, error, carried) for model in (none, *fitted))
-    log_odds = [one.log_evidence(error**2) - none.log_evidence(error**2) for one in fitted]
+    fits = fits_with_terms(setting, final)
+    return Lacking() if fits is None else learnt(setting, fits)
+
+
+def learnt(setting: Search, fits: TermFits) -> Lacking:
+    """What the fitted terms say, and whether the likeliest is named."""
+    search, fitted = fits.search, fits.fitted
+    error = least_error(setting, [fits.none, *fitted])
+    present, *models = (_predicting(fits.joint, model, error) for model in (fits.none, *fitted))
+    log_odds = [fits.log_odds(one, error) for one in fitted]
     # One run fits too well to name anything: there is none to predict.
     several = len(present.left_out) > 1
     enough = log_odds[0] > 0.0 and several and models[0].left_out_rmse < present.left_out_rmse
@@ -138,10 +177,9 @@ def unknown_terms(setting: Search, final: Model) -> Lacking:
         for model, odds in zip(models[1:], log_odds[1:], strict=True)
         if odds > max(0.0, log_odds[0] - INDISTINGUISHABLE)
     ]
-    gains = {score.effects[0]: score.gain for score in scores}
     terms: list[UnknownTerm] = []
     for model, odds in zip(models, log_odds, strict=True):
-        term = _learnt(search, found, model, present, gains[model.effects[-1]], odds)
+        term = _learnt(search, fits.sought, model, present, fits.gains[model.effects[-1]], odds)
         if not terms:
             before, after = held_out if held_out is not None else (None, None)
             term = dataclasses.replace(
@@ -176,9 +214,9 @@ def least_error(setting: Search, models: Sequence[FittedModel]) -> float:
     return independent_error(best, float(setting.problem.noise_sigma), setting.noise_given)
 
 
-def _predicting(joint: JointParameters, model: FittedModel, error: float, carried: Sequence[str]) -> Model:
+def _predicting(joint: JointParameters, model: FittedModel, error: float) -> Model:
     """A fitted model with its error on each run by the others."""
-    misfit = left_out(joint, model, error, carried).misfit
+    misfit = left_out(joint, model, error, tuple(joint.coefficients)).misfit
     rmse = float(np.sqrt((misfit**2).sum() / np.asarray(joint.problem.batch.mask).sum()))
     return Model(model.effects, model.values, model.squares / float(joint.problem.noise_sigma) ** 2, misfit, rmse)
 
@@ -198,40 +236,60 @@ def in_place_of(setting: Search, first: Model, final: Model) -> Lacking | None:
     Then these are what the library has that comes near it, and none of them is missing: a round is noted in which they are
     removed.
     """
-    found = unknown_terms(setting, first)
-    if found.likeliest is None:
+    fits = fits_with_terms(setting, first)
+    if fits is None:
         return None
     joint = JointParameters.of(setting.problem, setting.unknowns, setting.bounds, final.effects, setting.extent)
     effects = fitted_model(joint, final.effects, final.values, final.effects)
-    error = least_error(setting, [effects, found.likeliest])
-    ahead = found.likeliest.log_evidence(error**2) - effects.log_evidence(error**2)
+    error = least_error(setting, [effects, *fits.fitted])
+    ahead = max(one.log_evidence(error**2) for one in fits.fitted) - effects.log_evidence(error**2)
     if ahead <= 0.0:
+        return None
+    found = learnt(setting, fits)
+    if found.likeliest is None:
         return None
     setting.set_aside(final, UnknownTermLikelier(found.terms[0].title, ahead))
     return found
 
 
-def refitted(search: Terms, chosen: Sequence[Score], values: np.ndarray) -> dict[str, np.ndarray]:
-    """Every chosen term fitted together with the model's parameters: parameters (P,) by term.
+def first_places(
+    search: Terms, joint: JointParameters, chosen: Sequence[Score], values: np.ndarray
+) -> dict[str, list[np.ndarray]]:
+    """Where fits of each chosen term begin, parameters (P,).
 
-    Each from zero, where it cannot end worse than the model without it, and from some way towards what the score test
-    says, because a run whose transformation begins elsewhere lies in another local minimum.
+    At zero, where a fit cannot end worse than the model without it, and some way towards what the score test says, because a
+    run whose transformation begins elsewhere lies in another local minimum.
     """
-    config, starts = search.config, []
+    config, places = search.config, {}
     for score in chosen:
         ahead = np.array(values)
         for name, size in score.coefficients.items():
-            ahead[search.problem.names.index(name)] = np.clip(
+            ahead[joint.slots[name]] = np.clip(
                 config.term_start_share * size, -config.term_start_limit, config.term_start_limit
             )
-        starts += [Start(score.effects, values), Start(score.effects, ahead)]
-    fits, _ = search.fit(starts, "refitting unknown terms")
+        places[score.effects[0]] = [values, ahead]
+    return places
+
+
+def fitted_terms(
+    search: Terms,
+    joint: JointParameters,
+    effects: tuple[str, ...],
+    places: Mapping[str, Sequence[np.ndarray]],
+    error: float,
+) -> list[FittedModel]:
+    """Every term fitted together with the parameters of the model with `effects`, from the best of its places."""
+    problem, _ = joint.restricted(tuple(joint.coefficients))
+    problem = problem.with_noise(error)
+    begun = [(term, at) for term, points in places.items() for at in points]
+    tasks = [problem.task(joint.free((*effects, term)), joint.bounds, at) for term, at in begun]
+    settings = FitSettings(STEPS, TOLERANCE, search.cache, search.progress, "fitting unknown terms")
     best: dict[str, Fit] = {}
-    for start, fit in zip(starts, fits, strict=True):
-        (term,) = start.effects
+    for (term, _), fit in zip(begun, levenberg_marquardt(problem, tasks, settings), strict=True):
         if term not in best or fit.cost < best[term].cost:
             best[term] = fit
-    return {term: fit.values for term, fit in best.items()}
+    carried = tuple(joint.coefficients)
+    return [fitted_model(joint, (*effects, term), fit.values, carried) for term, fit in best.items()]
 
 
 def _learnt(

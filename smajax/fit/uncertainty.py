@@ -244,10 +244,15 @@ def _rank_sentence(rank: int, unknowns: int, samples: int) -> str:
     )
 
 
-def identifiability(at: Sensitivity, names: Sequence[str], bounds: Mapping[str, tuple[float, float]]) -> list[str]:
-    """Which of `names` are identifiable from these runs, in sentences, before anything is fitted.
+def identifiability(
+    at: Sensitivity,
+    names: Sequence[str],
+    bounds: Mapping[str, tuple[float, float]],
+    where: str = "at the initial guess",
+) -> list[str]:
+    """Which of `names` are identifiable from these runs, in sentences.
 
-    From the Jacobian at the start values and the noise alone: it holds only for a model that lacks no effect.
+    From the Jacobian `where` it was taken and the noise alone: it holds only for a model that lacks no effect.
     """
     if not names:
         return ["Nothing is declared unknown: the base model is taken as it is."]
@@ -263,7 +268,7 @@ def identifiability(at: Sensitivity, names: Sequence[str], bounds: Mapping[str, 
     ]
     if without_effect:
         sentences.append(
-            "That holds at the initial guess: a wire that never transforms there shows no parameter of its transformation. Where that "
+            f"That holds {where}: a wire that never transforms there shows no parameter of its transformation. Where that "
             "is unexpected, check the bench's sizes, the drive and the initial guess first."
         )
     visible = [name for name in names if name not in without_effect]
