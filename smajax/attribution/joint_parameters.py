@@ -8,7 +8,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
 
@@ -37,7 +37,9 @@ class JointParameters:
     coefficients: Mapping[str, tuple[str, ...]]  # of each candidate effect, by full name
     priors: Mapping[str, CoefficientPrior]  # of every coefficient, and of the values of presets
     log_odds: Mapping[str, float]  # of each effect, before the runs were seen
-    width_factors: Mapping[str, float] = MappingProxyType({})  # of effects whose priors are wider than their files say
+    width_factors: Mapping[str, float] = field(
+        default_factory=dict
+    )  # of effects whose priors are wider than their files say
 
     @classmethod
     def of(
