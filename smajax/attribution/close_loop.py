@@ -56,7 +56,6 @@ class Context:
     start: np.ndarray  # (P,), start values of the parameters of base model and library
     base: Fit  # the base model
     check: tuple[str, ...]
-    seed: int
 
 
 @dataclass(frozen=True)
@@ -83,13 +82,13 @@ def close_loop(  # keywords, which a caller names one by one
     progress: Progress = quiet,
     command: str = "",
     seed: int = SEED,
-    compile_per_model: bool = False,
+    compile_per_model: bool | None = None,
     config: AttributionConfig | None = None,
     apart: bool | None = None,
 ) -> Findings:
     """Fit the base model, look at what it leaves, find what it lacks, and validate on runs the fit never saw.
 
-    `memory` is a folder for finished fits: a loop that was interrupted resumes from there. `compile_per_model`: of `Search`.
+    `memory` is a folder for finished fits: a loop that was interrupted resumes from there.
     Held-out runs are simulated when the search is over: they reject what they do not validate, and nothing is added
     for them. The caller chooses precision; anything but float64 is refused with a ValueError, because the
     differences that decide here are far below float32's rounding over a run. Raises PluginError for an effect of another
@@ -99,20 +98,21 @@ def close_loop(  # keywords, which a caller names one by one
         raise ValueError(
             "close_loop needs float64, but JAX runs in float32. Call `jax.config.update('jax_enable_x64', True)` first."
         )
-    if apart is not None:
-        warnings.warn("`apart` is `compile_per_model` now; it goes in version 0.3", DeprecationWarning, stacklevel=2)
-        compile_per_model = apart
+    for name, given in (("compile_per_model", compile_per_model), ("apart", apart)):
+        if given is not None:
+            text = f"`{name}` changes nothing: sets of effects share a program; it goes in version 0.3"
+            warnings.warn(text, DeprecationWarning, stacklevel=2)
     began = clock.monotonic()
     refuse_keys_of_identify(experiment)
     check_neutral()
     cache = ResultCache(memory)
     settings = config or AttributionConfig()
-    context = prepared(experiment, cache, as_progress(progress), seed, compile_per_model, settings)
+    context = prepared(experiment, cache, as_progress(progress), seed, settings)
     outcome = searched(context)
     finer = finer_integration(context.setting, outcome.final)
     if finer is not None:
         # Models are compared as one integration gives them: all of them again.
-        context = prepared(experiment, cache, as_progress(progress), seed, compile_per_model, settings, finer)
+        context = prepared(experiment, cache, as_progress(progress), seed, settings, finer)
         outcome = searched(context)
     outcome = against_an_unknown_term(context, outcome)
     outcome = against_an_outlier_run(context, outcome)
@@ -126,7 +126,6 @@ def prepared(  # the stage's inputs, each once
     cache: ResultCache,
     progress: Progress,
     seed: int,
-    compile_per_model: bool,
     config: AttributionConfig,
     integration: Integration | None = None,
 ) -> Context:
@@ -142,7 +141,6 @@ def prepared(  # the stage's inputs, each once
         progress,
         experiment.outputs[0].noise_given,
         job.held_out,
-        compile_per_model,
         config,
     )
     report_checks(progress, experiment.warnings, ())
@@ -153,7 +151,7 @@ def prepared(  # the stage's inputs, each once
     identifiable = identifiability(at_fit, job.unknowns, job.bounds, "at the base model's fit")
     progress(Stage(CHECKING, 1.0))
     report_checks(progress, (), identifiable)
-    return Context(job, setting, start, base, (*experiment.warnings, *identifiable), seed)
+    return Context(job, setting, start, base, (*experiment.warnings, *identifiable))
 
 
 def searched(context: Context) -> Outcome:

@@ -10,6 +10,7 @@ from smajax.attribution.findings import Confounder
 from smajax.attribution.joint_search import JointSearch
 from smajax.attribution.laplace_evidence import FittedModel
 from smajax.attribution.model_fits import Model, Search
+from smajax.attribution.score_test import scaled
 from smajax.attribution.traces import Traces, traces_at
 from smajax.data.experiment.record import Run
 from smajax.fit.design import candidate_problem
@@ -73,7 +74,7 @@ def _alike(search: JointSearch, traces: Traces, fitted: FittedModel, effect: str
 
 def overlap(trace: np.ndarray, absorbing: Sequence[np.ndarray], other: Sequence[np.ndarray]) -> float:
     """Share of a trace (n,), less what the columns `absorbing` absorb, that the columns of another effect could have made."""
-    basis = np.linalg.qr(_scaled(absorbing, len(trace)))[0]
+    basis = np.linalg.qr(scaled(np.stack(absorbing, axis=1)))[0] if absorbing else np.zeros((len(trace), 0))
     own = trace - basis @ (basis.T @ trace)
     columns = np.stack(other, axis=1)
     left = columns - basis @ (basis.T @ columns)
@@ -82,14 +83,8 @@ def overlap(trace: np.ndarray, absorbing: Sequence[np.ndarray], other: Sequence[
     size = float(np.linalg.norm(own))
     if not kept.any() or size <= ABSORBED * float(np.linalg.norm(trace)):
         return 0.0
-    directions = np.linalg.qr(_scaled(list(left[:, kept].T), len(trace)))[0]
+    directions = np.linalg.qr(scaled(left[:, kept]))[0]
     return float(np.linalg.norm(directions.T @ own)) / size
-
-
-def _scaled(columns: Sequence[np.ndarray], count: int) -> np.ndarray:
-    """The columns that are not all zero, each of length one, (count, columns)."""
-    kept = [one / size for one in columns if (size := float(np.linalg.norm(one))) > 0.0]
-    return np.stack(kept, axis=1) if kept else np.zeros((count, 0))
 
 
 def separating_run(setting: Search, one: Model, other: Model | FittedModel, runs: Sequence[Run]) -> tuple[str, float]:

@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from smajax.attribution.joint_parameters import JointParameters
-from smajax.attribution.laplace_evidence import FittedModel, fitted_model, independent_error, width_factors
+from smajax.attribution.laplace_evidence import FittedModel, fitted_model, independent_error
 from smajax.attribution.subset_evidence import LinearModel, Subset, linear_model
 from smajax.attribution.traces import Traces, Variant, traces_at
 from smajax.core.progress import Stage
@@ -94,7 +94,7 @@ def search_jointly(search: JointSearch, base: np.ndarray) -> FittedModel:
     error = search.error(present)
     checked: set[tuple[str, ...]] = set()  # models whose effects were removed and replaced one by one
     for number in range(MOST_ROUNDS):
-        search.joint = dataclasses.replace(search.joint, width_factors=width_factors(search.joint, present))
+        search.joint = dataclasses.replace(search.joint, width_factors=present.width_factors)
         linear, traces = _linear(search, present, error)
         last = present.effects in checked
         sets = _neighbours(linear, present) if last else _promising(search, linear, present, error)

@@ -15,7 +15,7 @@ from smajax.attribution.findings import LikelierModel, NoLikelierModel, Reason, 
 from smajax.attribution.joint_parameters import JointParameters
 from smajax.attribution.joint_search import JointRound, JointSearch, refined, search_jointly
 from smajax.attribution.laplace_evidence import FittedModel, fitted_model
-from smajax.attribution.leave_one_run_out import left_out
+from smajax.attribution.leave_one_run_out import predicting
 from smajax.attribution.model_fits import Evidence, Model, Search, Start
 from smajax.attribution.step_size_check import gain_kept_at_half_step
 from smajax.fit.levenberg_marquardt import Fit, FitSettings
@@ -81,8 +81,10 @@ def final_model(search: JointSearch, setting: Search, found: FittedModel, error:
     best = refined(search, found, error)
     if not best.effects:
         return as_model(search, best, error)
-    plain = at_optimum(setting, Model(best.effects, best.values, np.inf, np.zeros(0), np.inf))
-    return as_model(search, fitted_model(search.joint, best.effects, plain.values, best.effects), error)
+    start = Start(best.effects, best.values)
+    stage = "taking the model to the optimum of the runs"
+    (fit,), _ = setting.fit([start], stage, enough=setting.config.final_convergence)
+    return as_model(search, fitted_model(search.joint, best.effects, fit.values, best.effects), error)
 
 
 def without_last(search: JointSearch, setting: Search, model: Model, error: float) -> Model:
@@ -96,15 +98,6 @@ def without_last(search: JointSearch, setting: Search, model: Model, error: floa
     return final_model(search, setting, fitted, error)
 
 
-def at_optimum(setting: Search, model: Model) -> Model:
-    """A model taken to the optimum of the runs alone, from where it is: error bars want that."""
-    starts = [Start(model.effects, model.values)]
-    (fit,), _ = setting.fit(
-        starts, "taking the model to the optimum of the runs", enough=setting.config.final_convergence
-    )
-    return dataclasses.replace(model, values=fit.values, cost=fit.cost) if fit.cost < model.cost else model
-
-
 def effect_probabilities(search: JointSearch, error: float) -> dict[str, float]:
     """Posterior probability of each effect among the models that were fitted; `error` of an independent sample, SI."""
     found: dict[str, float] = {}
@@ -116,10 +109,8 @@ def effect_probabilities(search: JointSearch, error: float) -> dict[str, float]:
 
 def as_model(search: JointSearch, fitted: FittedModel, error: float) -> Model:
     """A fitted model as the later stages take it, the effect that the evidence needs least at the end."""
-    found = left_out(search.joint, fitted, error)
-    rmse = float(np.sqrt((found.misfit**2).sum() / np.asarray(search.joint.problem.batch.mask).sum()))
     effects = tuple(sorted(fitted.effects, key=lambda effect: -_needed(search, effect, fitted, error)))
-    return Model(effects, fitted.values, fitted.squares / search.noise**2, found.misfit, rmse, found.values)
+    return dataclasses.replace(predicting(search.joint, fitted, error, search.noise), effects=effects)
 
 
 def _needed(search: JointSearch, effect: str, model: FittedModel, error: float) -> float:

@@ -12,6 +12,7 @@ than usual is unlikely, by a few nats, but no other effects are likelier for tak
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -37,6 +38,7 @@ class FittedModel:
     squares: float  # sum of squared residuals, SI
     gram: np.ndarray  # of the standardised columns, SI squared
     precision: np.ndarray
+    width_factors: dict[str, float]  # by how much each effect's prior is wider than its file says
     log_prior: float  # of the coefficients' values and of the effects' odds
     one_sided: tuple[tuple[int, float], ...]  # (place among `names`, widths from the base)
     residual: np.ndarray  # (n,) on the measured samples, SI
@@ -71,12 +73,12 @@ def fitted_model(
     matrix = np.stack([columns[name] for name in names], axis=1) * scales if names else np.zeros((len(residual), 0))
     deviations = np.asarray([joint.deviation(name, at[name]) for name in names])
     precision = np.asarray([joint.precision(name) for name in names])
-    log_prior = sum(joint.log_odds[effect] for effect in effects)
+    factors = {}
     for effect in effects:
         own = [names.index(name) for name in joint.coefficients[effect]]
-        factor = width_factor(deviations[own])
-        precision[own] = factor**-2
-        log_prior -= 2.0 * float(np.log(factor))
+        factors[effect] = width_factor(deviations[own])
+        precision[own] = factors[effect] ** -2
+    log_prior = sum(joint.log_odds[effect] - 2.0 * math.log(factors[effect]) for effect in effects)
     log_prior -= 0.5 * float(np.sum(deviations**2 * precision))
     mask = np.asarray(joint.problem.batch.mask)
     whole = np.zeros(mask.shape)
@@ -90,6 +92,7 @@ def fitted_model(
         float(residual @ residual),
         matrix.T @ matrix,
         precision,
+        factors,
         log_prior,
         tuple((k, float(deviations[k])) for k, name in enumerate(names) if joint.one_sided(name)),
         residual,
@@ -101,18 +104,6 @@ def fitted_model(
 def width_factor(deviations: np.ndarray) -> float:
     """By how much the prior widths of one effect are widened: its coefficients lie so many widths from their base values."""
     return max(1.0, float(np.sqrt(np.mean(np.square(deviations))))) if len(deviations) else 1.0
-
-
-def width_factors(joint: JointParameters, model: FittedModel) -> dict[str, float]:
-    """`width_factor` of each effect of a fitted model."""
-    return {
-        effect: width_factor(
-            np.asarray(
-                [joint.deviation(name, float(model.values[joint.slots[name]])) for name in joint.coefficients[effect]]
-            )
-        )
-        for effect in model.effects
-    }
 
 
 def independent_error(model: FittedModel, noise: float, noise_given: bool) -> float:

@@ -18,6 +18,7 @@ import numpy as np
 
 from smajax.attribution.joint_parameters import JointParameters
 from smajax.attribution.laplace_evidence import FittedModel
+from smajax.attribution.model_fits import Model
 from smajax.fit.levenberg_marquardt import FitSettings, levenberg_marquardt
 from smajax.fit.predicted import misfits
 from smajax.fit.problem import Problem
@@ -62,6 +63,15 @@ def left_out(joint: JointParameters, model: FittedModel, error: float, carried: 
     every = np.tile(model.values, (len(points), 1))
     every[:, index] = np.stack(points)
     return LeftOut(np.stack([found[part, run] for run, part in enumerate(parts)]), every)
+
+
+def predicting(
+    joint: JointParameters, fitted: FittedModel, error: float, noise: float, carried: Sequence[str] | None = None
+) -> Model:
+    """A fitted model with its error on each run by the others; `noise` of a sample, SI, the rest as of `left_out`."""
+    found = left_out(joint, fitted, error, carried)
+    rmse = float(np.sqrt((found.misfit**2).sum() / np.asarray(joint.problem.batch.mask).sum()))
+    return Model(fitted.effects, fitted.values, fitted.squares / noise**2, found.misfit, rmse, found.values)
 
 
 def jackknife_error(values: np.ndarray) -> np.ndarray:

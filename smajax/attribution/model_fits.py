@@ -73,9 +73,6 @@ class Search:
     progress: Progress = quiet
     noise_given: bool = True  # by the experiment file; else estimated
     held_out: RunBatch | None = None  # which no fit sees, and which refuse an unknown term in the end
-    compile_per_model: bool = (
-        False  # a program for each set of effects: pays where many experiments of one kind follow each other
-    )
     config: AttributionConfig = DEFAULT
     evidence: dict[str, Evidence] = field(default_factory=dict)
     rounds: list[Round] = field(default_factory=list)
@@ -145,13 +142,6 @@ class Search:
         `hops`: each from points near its end as well (`fit.starts.perturbed_restarts`).
         """
         enough = self.config.convergence if enough is None else enough
-        sets = sorted({start.effects for start in starts})
-        if self.compile_per_model and len(sets) > 1:
-            places = [[k for k, start in enumerate(starts) if start.effects == one] for one in sets]
-            parts = [self.fit([starts[k] for k in some], what, enough=enough, hops=hops) for some in places]
-            order = np.argsort(np.concatenate(places))
-            together = [one for part, _ in parts for one in part]
-            return [together[k] for k in order], np.concatenate([found for _, found in parts])[order]
         problem, index = self.restricted([name for start in starts for name in start.effects])
         tasks = [
             problem.task(self.free(start.effects), self.bounds, start.values[index], start.weights) for start in starts

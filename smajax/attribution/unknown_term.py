@@ -20,7 +20,7 @@ from smajax.attribution.findings import UnknownTerm, UnknownTermLikelier
 from smajax.attribution.formulas import formulas
 from smajax.attribution.joint_parameters import JointParameters
 from smajax.attribution.laplace_evidence import FittedModel, fitted_model, independent_error
-from smajax.attribution.leave_one_run_out import left_out
+from smajax.attribution.leave_one_run_out import predicting
 from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.score_test import Score, ranked
 from smajax.attribution.unknown.ranges import Sought, sought
@@ -44,19 +44,11 @@ REACH = 30.0  # in log odds behind the likeliest, within which a term is fitted 
 STEPS, TOLERANCE = 30, 1e-5
 
 
-@dataclass
-class Terms(Search):
-    """A search among unknown terms.
+def with_terms(setting: Search, final: Model) -> tuple[Search, np.ndarray, Sought]:
+    """(search among the terms that the runs can show, the final model's values in its order, what is sought).
 
-    One model carries them all, so that one compiled program serves the screening, every refit and every left-out run.
+    One model carries them all, so that one compiled program serves the screening, every fit and every left-out run.
     """
-
-    def restricted(self, effects: Sequence[str]) -> tuple[Problem, list[int]]:
-        return self.problem, list(range(len(self.problem.names)))
-
-
-def with_terms(setting: Search, final: Model) -> tuple[Terms, np.ndarray, Sought]:
-    """(search among the terms that the runs can show, the final model's values in its order, what is sought)."""
     plain, index = setting.restricted(final.effects)
     system = plain.system_at(jnp.asarray(final.values[index]))
     found = sought(system, plain.batch)
@@ -67,7 +59,7 @@ def with_terms(setting: Search, final: Model) -> tuple[Terms, np.ndarray, Sought
     problem = Problem.build(whole, plain.batch, plain.noise_sigma, plain.offset, priors=known)
     bounds = {**setting.bounds, **dict.fromkeys(own, (-1.0, 1.0))}
     unknowns = tuple(setting.free(final.effects))
-    search = Terms(
+    search = Search(
         problem,
         unknowns,
         bounds,
@@ -81,7 +73,7 @@ def with_terms(setting: Search, final: Model) -> tuple[Terms, np.ndarray, Sought
     return search, problem.start_values(), found
 
 
-def screened(setting: Terms, values: np.ndarray) -> list[Score]:
+def screened(setting: Search, values: np.ndarray) -> list[Score]:
     """Every term's score test at the final model, best first."""
     at = sensitivity(setting.problem, values, setting.every)
     return ranked(at, setting.loose((), values), setting.candidates, setting.bounds)
@@ -109,7 +101,7 @@ class Lacking:
 class TermFits:
     """Models of one base with one of the terms each, fitted; likeliest first."""
 
-    search: Terms
+    search: Search
     sought: Sought
     joint: JointParameters
     none: FittedModel  # the base without a term
@@ -154,7 +146,7 @@ def fits_with_terms(setting: Search, final: Model) -> TermFits | None:
 def unknown_terms(setting: Search, final: Model) -> Lacking:
     """An unknown term in each equation in turn, beside `final`.
 
-    The likeliest is `named` where it is likelier than none, predicts left-out runs better, and held-out runs too. Terms
+    The likeliest is `named` where it is likelier than none, predicts left-out runs better, and held-out runs too. Search
     that are likelier than none and less than `INDISTINGUISHABLE` behind it stand in `indistinguishable`.
     """
     fits = fits_with_terms(setting, final)
@@ -165,7 +157,8 @@ def learnt(setting: Search, fits: TermFits) -> Lacking:
     """What the fitted terms say, and whether the likeliest is named."""
     search, fitted = fits.search, fits.fitted
     error = least_error(setting, [fits.none, *fitted])
-    present, *models = (_predicting(fits.joint, model, error) for model in (fits.none, *fitted))
+    noise, carried = float(search.problem.noise_sigma), tuple(fits.joint.coefficients)
+    present, *models = (predicting(fits.joint, model, error, noise, carried) for model in (fits.none, *fitted))
     log_odds = [fits.log_odds(one, error) for one in fitted]
     # One run fits too well to name anything: there is none to predict.
     several = len(present.left_out) > 1
@@ -193,7 +186,7 @@ def learnt(setting: Search, fits: TermFits) -> Lacking:
     return Lacking(tuple(terms), fitted[0] if enough else None)
 
 
-def joint_with_terms(setting: Search, search: Terms, final: Model) -> JointParameters:
+def joint_with_terms(setting: Search, search: Search, final: Model) -> JointParameters:
     """Parameters of models with the effects of `final` and one of the terms of `search`, with their priors."""
     plain = JointParameters.of(setting.problem, setting.unknowns, setting.bounds, final.effects, setting.extent)
     own = {term: tuple(search.coefficients(term)) for term in search.candidates}
@@ -214,14 +207,7 @@ def least_error(setting: Search, models: Sequence[FittedModel]) -> float:
     return independent_error(best, float(setting.problem.noise_sigma), setting.noise_given)
 
 
-def _predicting(joint: JointParameters, model: FittedModel, error: float) -> Model:
-    """A fitted model with its error on each run by the others."""
-    misfit = left_out(joint, model, error, tuple(joint.coefficients)).misfit
-    rmse = float(np.sqrt((misfit**2).sum() / np.asarray(joint.problem.batch.mask).sum()))
-    return Model(model.effects, model.values, model.squares / float(joint.problem.noise_sigma) ** 2, misfit, rmse)
-
-
-def _on_held_out(search: Terms, *models: Model) -> list[float]:
+def _on_held_out(search: Search, *models: Model) -> list[float]:
     """Rms error of each model on the held-out runs, SI."""
     problem, batch = search.problem, search.held_out
     assert batch is not None
@@ -253,7 +239,7 @@ def in_place_of(setting: Search, first: Model, final: Model) -> Lacking | None:
 
 
 def first_places(
-    search: Terms, joint: JointParameters, chosen: Sequence[Score], values: np.ndarray
+    search: Search, joint: JointParameters, chosen: Sequence[Score], values: np.ndarray
 ) -> dict[str, list[np.ndarray]]:
     """Where fits of each chosen term begin, parameters (P,).
 
@@ -272,7 +258,7 @@ def first_places(
 
 
 def fitted_terms(
-    search: Terms,
+    search: Search,
     joint: JointParameters,
     effects: tuple[str, ...],
     places: Mapping[str, Sequence[np.ndarray]],
@@ -293,7 +279,7 @@ def fitted_terms(
 
 
 def _learnt(
-    search: Terms,
+    search: Search,
     found: Sought,
     model: Model,
     present: Model,
@@ -355,7 +341,7 @@ def _mean(curve: np.ndarray, share: np.ndarray) -> float:
     return float(np.interp(share, np.linspace(0.0, 1.0, len(curve)), curve).mean())
 
 
-def _covariance(search: Terms, model: Model, own: Sequence[str], names: Sequence[str]) -> np.ndarray:
+def _covariance(search: Search, model: Model, own: Sequence[str], names: Sequence[str]) -> np.ndarray:
     """Of the coefficients `own`, (K, K), in shares of the largest, where all of `names` are free.
 
     A coefficient at a bound is as open as before the runs.

@@ -235,13 +235,14 @@ def _gather(text: Text, params: Any, given: list[Value], out: Array, kinds: Any)
 
 def rows_at(text: Text, one: Value, places: np.ndarray, out: Array) -> Value | None:
     """Rows of an array at places that are known, evenly spaced or few; JAX 0.7 writes `x[::2]` as that. None: neither."""
-    stored = in_memory(text, one, tuple(one.shape), out.dtype)
     steps = set(np.diff(places).tolist())
-    if len(steps) == 1 and (stride := steps.pop()) > 0:
+    stride = steps.pop() if len(steps) == 1 else 0
+    if stride <= 0 and len(places) > SMALL:
+        return None
+    stored = in_memory(text, one, tuple(one.shape), out.dtype)
+    if stride > 0:
         start = (int(places[0]), *(0 for _ in stored.shape[1:]))
         return _slice(text, {"starts": start, "strides": (stride,)}, [stored], out, ())
-    if len(places) > SMALL:
-        return None
     parts = [row(text, stored, str(place), stored.shape[1:], out.dtype) for place in places]
     if int(np.prod(out.shape)) <= SMALL:
         return held([lane for part in parts for lane in in_registers(text, part).ravel()], out.shape)

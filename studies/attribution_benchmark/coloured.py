@@ -67,7 +67,7 @@ def closed(experiment: Experiment) -> dict[str, Any]:
     """What the loop says: verdict, effects, what is left over the estimate, what such a filter keeps."""
     from smajax.attribution.close_loop import close_loop
 
-    found = close_loop(experiment, compile_per_model=True)
+    found = close_loop(experiment)
     residual = found.residual_after
     return {
         "verdict": found.verdict,

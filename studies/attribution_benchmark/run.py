@@ -50,7 +50,7 @@ def closed(case: Case, out: Path) -> Judged:
     truth = json.loads((out / "cases" / "truth" / f"{case.name}.json").read_text(encoding="utf-8"))
     experiment = load_experiment(folder / "experiment.toml", CATALOGUE)
     began = clock.monotonic()
-    findings = close_loop(experiment, memory=None, compile_per_model=True)
+    findings = close_loop(experiment, memory=None)
     seconds = clock.monotonic() - began
     report = findings_to_json(findings)
     (out / "reports").mkdir(exist_ok=True)

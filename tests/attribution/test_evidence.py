@@ -88,6 +88,7 @@ def test_laplaces_evidence_is_the_linear_models_where_the_model_is_linear() -> N
             float(left @ left),
             gram,
             np.ones(size),
+            {},
             prior,
             (),
             left,

@@ -92,7 +92,7 @@ def test_a_gain_that_hangs_on_the_step_is_not_kept(setting: Search) -> None:
 def test_an_effect_that_asks_for_a_finer_integration_than_the_base_model_gets_it() -> None:
     """The demo logs at 100 ms; under Liang's conditions its branches end more sharply than those of the base model."""
     experiment = open_experiment(DEMO)
-    context = prepared(experiment, ResultCache(), quiet, 1, False, AttributionConfig())
+    context = prepared(experiment, ResultCache(), quiet, 1, AttributionConfig())
     setting = context.setting
     base, liang = _model(setting, ()), _model(setting, ("liang_conditions",), share=1.0)
     assert integration_error_of(setting, base).small
@@ -100,7 +100,7 @@ def test_an_effect_that_asks_for_a_finer_integration_than_the_base_model_gets_it
     assert not integration_error_of(setting, liang).small
     finer = finer_integration(setting, liang)
     assert finer is not None
-    again = prepared(experiment, ResultCache(), quiet, 1, False, AttributionConfig(), finer)
+    again = prepared(experiment, ResultCache(), quiet, 1, AttributionConfig(), finer)
     assert integration_error_of(again.setting, liang).small
     assert again.job.held_out is not None
     assert described(again.job.held_out.integration) == described(finer)

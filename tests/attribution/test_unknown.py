@@ -18,7 +18,7 @@ from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.unknown.ranges import Sought
 from smajax.attribution.unknown.spline import COUNT, design, spline
 from smajax.attribution.unknown.terms import UNKNOWN
-from smajax.attribution.unknown_term import Terms, in_place_of, unknown_terms, with_terms
+from smajax.attribution.unknown_term import in_place_of, unknown_terms, with_terms
 from smajax.core.parameters import parameters
 from smajax.core.result_cache import ResultCache
 from smajax.fit.levenberg_marquardt import FitSettings, levenberg_marquardt
@@ -111,7 +111,7 @@ def _fitted(search: Search, effects: tuple[str, ...], start: np.ndarray) -> Mode
 
 
 @cache
-def _screened() -> tuple[Terms, np.ndarray, Sought]:
+def _screened() -> tuple[Search, np.ndarray, Sought]:
     return with_terms(*_setting())
 
 
