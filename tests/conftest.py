@@ -14,6 +14,8 @@ from typing import Any
 import pytest
 
 from smajax.core.runtime import prepare
+from smajax.engine import kernel
+from smajax.engine.facade import _programs
 from tests.helpers.in_browser import FLAGS, NONE, chromium
 
 CACHE = "JAX_COMPILATION_CACHE_DIR"
@@ -30,6 +32,11 @@ if UNOPTIMISED.split("=")[0] not in os.environ.get("XLA_FLAGS", ""):
     os.environ["XLA_FLAGS"] = f"{os.environ.get('XLA_FLAGS', '')} {UNOPTIMISED}".strip()
 
 prepare()
+
+# Machine code as well: LLVM's optimisation took a fifth of the time of all tests. Those of the engine have it (`optimised`).
+UNOPTIMISED_LEVELS = {"codegen_level": 0, "speed_level": 0}
+OPTIMISED_LEVELS = {name: kernel.COMPILE_OPTIONS[name] for name in UNOPTIMISED_LEVELS}
+kernel.COMPILE_OPTIONS.update(UNOPTIMISED_LEVELS)
 
 # Tracing makes millions of small objects that live: the collector looked at them again and again, a tenth of the time.
 gc.set_threshold(100_000, 20, 50)
@@ -57,6 +64,19 @@ LONGEST = (
     "cli/",
     "simulation/",
 )
+
+
+@pytest.fixture(scope="module")
+def optimised() -> Iterator[None]:
+    """Machine code as users have it, and no program that was compiled without optimisation."""
+    with pytest.MonkeyPatch.context() as patch:
+        for name, level in OPTIMISED_LEVELS.items():
+            patch.setitem(kernel.COMPILE_OPTIONS, name, level)
+        remembered = dict(_programs)
+        _programs.clear()
+        yield
+    _programs.clear()
+    _programs.update(remembered)
 
 
 @pytest.fixture(scope="session")

@@ -48,7 +48,7 @@ def test_a_renamed_name_works_and_warns(monkeypatch: pytest.MonkeyPatch) -> None
         "from smajax.attribution.close_loop import close_loop;",
     ],
 )
-def test_a_function_goes_before_the_module_of_its_name(first: str) -> None:
+def test_a_public_function_hides_the_module_of_its_name(first: str) -> None:
     code = f"{first}import smajax as sma; from smajax import simulate; from smajax.simulation.simulate import DEFAULT_STEP;"
     code += "print(callable(sma.simulate), callable(simulate), callable(sma.identify), callable(sma.close_loop))"
     told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)
@@ -134,7 +134,7 @@ def test_a_loop_is_composed_in_a_line_and_run_in_another() -> None:
     np.testing.assert_allclose([*wanted[199:201], wanted[-1]], [0.0, 10.0, 10.0], atol=1e-12)
 
 
-def test_what_a_composed_loop_refuses() -> None:
+def test_a_composed_loop_refuses_wrong_parts_and_times() -> None:
     arm = ("niti_table_3_1", "arm", "amplified_voltage")
     loop = sma.compose(*arm, controller="pid")
     with pytest.raises(KeyError, match="no controller 'pdi'; did you mean 'pid'"):
@@ -151,7 +151,7 @@ def test_what_a_composed_loop_refuses() -> None:
         sma.simulate_loop_dataset(loop, "40 degC", seconds=1.0)
 
 
-def test_simulate_is_pure_inside_anybodys_transformations() -> None:
+def test_simulate_works_inside_jit_vmap_and_grad() -> None:
     coupon = sma.build("flexinol_isobaric", "coupon", "none")
     inputs = {"temperature": jnp.linspace(30.0, 95.0, 66), "stress": jnp.full(66, 100e6)}
 

@@ -59,7 +59,7 @@ def test_a_package_of_an_extra_is_not_imported_before_it_is_used() -> None:
                 assert not set(imports(node)) & OF_EXTRAS, file
 
 
-def test_the_guide_says_of_every_package_what_it_is_for() -> None:
+def test_the_guide_lists_the_use_of_every_package() -> None:
     guide = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
     section = guide.partition("\n## Dependencies\n")[2].partition("\n## ")[0]
     rows = [line for line in section.splitlines() if line.startswith("| ")]
@@ -83,15 +83,13 @@ def test_a_missing_package_is_named_with_its_extra(
         use()
 
 
-def test_a_posterior_without_its_package_is_an_input_that_cannot_be_used(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_posterior_without_its_package_is_an_input_error(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "blackjax", None)
     with pytest.raises(ValueError, match=r"a posterior needs blackjax: pip install 'smajax\[bayes\]'"):
         posterior.library()
 
 
-def test_a_package_that_is_there_and_broken_is_not_called_missing(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_a_broken_package_is_not_reported_as_missing(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     (tmp_path / "half_installed.py").write_text("import no_such_package\n")
     monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(ModuleNotFoundError, match="no_such_package") as caught:

@@ -6,19 +6,22 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from smajax.core.parameters import parameter
-from smajax.model.types import Scalar, State
+from smajax.model.types import Sampled, Scalar, State
 
 
 class MeasuredState(eqx.Module):
-    """Position and what an estimator makes of it. A controller that measures the position only reads nothing else."""
+    """Position and what an estimator makes of it. A controller that measures the position only reads nothing else.
 
-    position: Scalar  # rad, m
-    velocity: Scalar  # rad/s, m/s
-    stress: Scalar  # Pa
-    temperature: Scalar  # C
-    martensite_fraction: Scalar  # -
-    xi_M: Scalar  # amplitude of the heating curve in force (eq. 3.3)
-    xi_A: Scalar  # floor of the cooling curve in force (eq. 3.5)
+    Of one period, or arrays of shape (n,) of a run.
+    """
+
+    position: Sampled  # rad, m
+    velocity: Sampled  # rad/s, m/s
+    stress: Sampled  # Pa
+    temperature: Sampled  # C
+    martensite_fraction: Sampled  # -
+    xi_M: Sampled  # amplitude of the heating curve in force (eq. 3.3)
+    xi_A: Sampled  # floor of the cooling curve in force (eq. 3.5)
 
 
 def truth(state: State) -> MeasuredState:

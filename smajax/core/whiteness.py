@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy import fft, stats
+from scipy import fft, special
 
 LAGS = 20
 # Products from which on sums over lags are taken by Fourier transform: they grow as the square of the samples.
@@ -38,7 +38,7 @@ def whiteness_p_value(runs: Sequence[np.ndarray], lags: int = LAGS) -> float:
     as lags were taken over all runs.
     """
     statistic, freedom = _ljung_box(runs, lags)
-    return float(stats.chi2.sf(statistic, freedom)) if freedom else 1.0
+    return float(special.chdtrc(freedom, statistic)) if freedom else 1.0
 
 
 def _ljung_box(runs: Sequence[np.ndarray], lags: int) -> tuple[float, int]:
@@ -73,7 +73,7 @@ def first_order(runs: Sequence[np.ndarray], lags: int = LAGS) -> FirstOrder:
     innovations = [run[1:] - coefficient * run[:-1] for run in centred]
     statistic, freedom = _ljung_box(innovations, lags)
     sigma = float(np.sqrt(np.mean(np.concatenate(innovations) ** 2)))
-    return FirstOrder(coefficient, sigma, float(stats.chi2.sf(statistic, freedom - 1)) if freedom > 1 else 1.0)
+    return FirstOrder(coefficient, sigma, float(special.chdtrc(freedom - 1, statistic)) if freedom > 1 else 1.0)
 
 
 def correlation_time(runs: Sequence[np.ndarray]) -> float:

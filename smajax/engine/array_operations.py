@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from math import prod
 from typing import Any
 
 import jax
@@ -53,7 +54,7 @@ def only_lane(value: Value) -> Lane | None:
 
 
 def filled(lane: Lane, shape: tuple[int, ...]) -> Value:
-    size = int(np.prod(shape))
+    size = prod(shape)
     return held([lane] * size, shape) if size <= SMALL else Filled(lane, shape)
 
 
@@ -123,7 +124,7 @@ def _expand_dims(text: Text, params: Any, given: list[Value], out: Array, kinds:
 
 def _broadcast_in_dim(text: Text, params: Any, given: list[Value], out: Array, kinds: Any) -> Value:
     one, dims = given[0], params["broadcast_dimensions"]
-    if size_of(one) == int(np.prod(out.shape)) and list(dims) == sorted(dims):
+    if size_of(one) == prod(out.shape) and list(dims) == sorted(dims):
         return _reshape(text, params, given, out, kinds)
     if size_of(one) == 1:
         return Filled(in_registers(text, one).ravel()[0], out.shape)
@@ -134,16 +135,16 @@ def spread(text: Text, one: Value, dims: Sequence[int], out: Array, dtype: str) 
     """A large array that repeats another along some of its axes: axis k of that is axis `dims[k]` of this."""
     shape = tuple(one.shape)
     source = in_memory(text, one, shape, dtype)
-    room = Stored(text.reserve(int(np.prod(out.shape)), dtype), out.shape, dtype, own=True)
+    room = Stored(text.reserve(prod(out.shape), dtype), out.shape, dtype, own=True)
     loop = Loop(text, [], "spread")
     at = "0"
     for axis, size in enumerate(shape):
         if size == 1:
             continue
-        behind = int(np.prod(out.shape[dims[axis] + 1 :]))
+        behind = prod(out.shape[dims[axis] + 1 :])
         place = text.assign(f"udiv i64 {loop.count}, {behind}")
         place = text.assign(f"urem i64 {place}, {size}")
-        place = text.assign(f"mul i64 {place}, {int(np.prod(shape[axis + 1 :]))}")
+        place = text.assign(f"mul i64 {place}, {prod(shape[axis + 1 :])}")
         at = text.assign(f"add i64 {at}, {place}")
     write(text, room, loop.count, row(text, source, at, (), dtype))
     loop.end_after(room.size)
@@ -158,7 +159,7 @@ def _slice(text: Text, params: Any, given: list[Value], out: Array, kinds: Any) 
             raise Unsupported("a part of a large array that is not whole rows")
         if (params["strides"] or (1,))[0] != 1:
             return every_few(text, one, starts[0], params["strides"][0], out)
-        first = starts[0] * int(np.prod(one.shape[1:])) * (text.room if one.own else 1)
+        first = starts[0] * prod(one.shape[1:]) * (text.room if one.own else 1)
         part = Stored(text.address(one.address, str(first), one.dtype), out.shape, one.dtype, one.own)
         return in_registers(text, part) if part.size <= SMALL else part
     raise AssertionError("a small array is moved")
@@ -166,8 +167,8 @@ def _slice(text: Text, params: Any, given: list[Value], out: Array, kinds: Any) 
 
 def every_few(text: Text, one: Stored, start: int, stride: int, out: Array) -> Value:
     """Rows of a large array, one in so many."""
-    size = int(np.prod(out.shape[1:]))
-    room = Stored(text.reserve(int(np.prod(out.shape)), out.dtype), out.shape, out.dtype, own=True)
+    size = prod(out.shape[1:])
+    room = Stored(text.reserve(prod(out.shape), out.dtype), out.shape, out.dtype, own=True)
     loop = Loop(text, [], "few")
     source = text.assign(f"add i64 {text.assign(f'mul i64 {loop.count}, {stride}')}, {start}")
     taken = row(text, one, source, out.shape[1:], out.dtype)
@@ -196,7 +197,7 @@ def _dynamic_slice(text: Text, params: Any, given: list[Value], out: Array, kind
     if all(is_known(start) for start in starts):
         begin = [min(max(whole_number(s), 0), n - m) for s, n, m in zip(starts, shape, out.shape, strict=True)]
         return _slice(text, {"starts": begin, "strides": None}, [one], out, kinds)
-    if len(shape) != 1 or int(np.prod(out.shape)) != 1:
+    if len(shape) != 1 or prod(out.shape) != 1:
         raise Unsupported("a part of an array that begins where each run says")
     return held(looked_up(text, one, in_registers(text, starts[0]).ravel()[0], kinds[0]), out.shape)
 
@@ -226,9 +227,9 @@ def _gather(text: Text, params: Any, given: list[Value], out: Array, kinds: Any)
     def at(place: Lane) -> Lane:
         return looked_up(text, source, place, kinds[0])
 
-    if int(np.prod(out.shape)) <= SMALL:
+    if prod(out.shape) <= SMALL:
         return held([at(place) for place in in_registers(text, index).ravel()], out.shape)
-    room = Stored(text.reserve(int(np.prod(out.shape)), out.dtype), out.shape, out.dtype, own=True)
+    room = Stored(text.reserve(prod(out.shape), out.dtype), out.shape, out.dtype, own=True)
     mapped(text, room, 0, at, [index])
     return room
 
@@ -244,7 +245,7 @@ def rows_at(text: Text, one: Value, places: np.ndarray, out: Array) -> Value | N
         start = (int(places[0]), *(0 for _ in stored.shape[1:]))
         return _slice(text, {"starts": start, "strides": (stride,)}, [stored], out, ())
     parts = [row(text, stored, str(place), stored.shape[1:], out.dtype) for place in places]
-    if int(np.prod(out.shape)) <= SMALL:
+    if prod(out.shape) <= SMALL:
         return held([lane for part in parts for lane in in_registers(text, part).ravel()], out.shape)
     return joined(text, parts, 0, out)
 
@@ -316,7 +317,7 @@ def joined(text: Text, given: list[Value], axis: int, out: Array) -> Value:
         raise Unsupported("large arrays put together along another axis than the first")
     if len(given) == 1:
         return _reshape(text, {}, given, out, ())
-    room = Stored(text.reserve(int(np.prod(out.shape)), out.dtype), out.shape, out.dtype, own=True)
+    room = Stored(text.reserve(prod(out.shape), out.dtype), out.shape, out.dtype, own=True)
     start = 0
     for one in given:
         copy(text, room, start, one)
@@ -360,7 +361,7 @@ def _dot_general(text: Text, params: Any, given: list[Value], out: Array, kinds:
     if left_batch or right_batch or set(kinds) != {out.dtype} or out.dtype == "bool":
         raise Unsupported("products of matrices in batches, of truth values, or of different kinds of numbers")
     left, right = (np.asarray(in_registers(text, one)) for one in given)
-    count = int(np.prod([left.shape[axis] for axis in left_axes]))
+    count = prod([left.shape[axis] for axis in left_axes])
     rows = np.moveaxis(left, left_axes, range(-len(left_axes), 0)).reshape(-1, count)
     columns = np.moveaxis(right, right_axes, range(len(right_axes))).reshape(count, -1)
     put = ELEMENTWISE

@@ -13,6 +13,7 @@ import jax
 
 from smajax.engine.expansions import EXPANSIONS
 from smajax.engine.text import Unsupported
+from smajax.engine.values import name_of
 
 Parameters = Mapping[str, Any]
 Reading = str | Callable[[Parameters], Any]  # the name that JAX has for it, or how it follows from the others
@@ -114,7 +115,7 @@ def opened(program: Any) -> tuple[Any, list[Any]]:
 
 def kind_of(aval: Any) -> tuple[tuple[int, ...], str]:
     """(shape, kind of number) of a value; a random key is its two words. Raises Unsupported for keys of another kind."""
-    shape, dtype = tuple(aval.shape), str(aval.dtype)
+    shape, dtype = tuple(aval.shape), name_of(aval.dtype)
     if not dtype.startswith("key<"):
         return shape, dtype
     if dtype != "key<fry>":

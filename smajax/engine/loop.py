@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-
-import numpy as np
+from math import prod
 
 from smajax.engine.text import Text
 from smajax.engine.values import Held, held
@@ -26,7 +25,7 @@ class Loop:
     def carried(self) -> list[Held]:
         """What it carries, here and now: within a round that of its beginning, after the loop what is left."""
         lanes = iter([self.text.present(cell) for cell in self.cells])
-        return [held([next(lanes) for _ in range(int(np.prod(shape)))], shape) for shape in self.shapes]
+        return [held([next(lanes) for _ in range(prod(shape))], shape) for shape in self.shapes]
 
     def again(self, end: Sequence[Held]) -> None:
         """Back to the top with `end` as the carry."""

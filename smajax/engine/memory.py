@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from math import prod
 
 import numpy as np
 
 from smajax.engine.loop import Loop
 from smajax.engine.text import Lane, Text, Unsupported
-from smajax.engine.values import SMALL, Filled, Held, Stored, Value, held, is_known, size_of
+from smajax.engine.values import SMALL, Filled, Held, Stored, Value, held, is_known, name_of, size_of
 
 
 def _element(text: Text, value: Stored, index: str) -> Lane:
@@ -29,13 +30,13 @@ def in_registers(text: Text, value: Value) -> Held:
         return held([value.lane] * size_of(value), value.shape)
     if isinstance(value, Stored):
         return held([_element(text, value, str(k)) for k in range(value.size)], value.shape)
-    dtype = str(value.dtype)
+    dtype = name_of(value.dtype)
     return held([text.constant(one, dtype) for one in value.ravel()], value.shape)
 
 
 def table(text: Text, value: np.ndarray) -> Stored:
     """A known array as a constant of the program."""
-    dtype = str(value.dtype)
+    dtype = name_of(value.dtype)
     stored = value.astype("int8") if dtype == "bool" else value
     name = f"@known{len(text.globals)}"
     raw = "".join(f"\\{byte:02X}" for byte in np.ascontiguousarray(stored).tobytes())
@@ -61,10 +62,10 @@ def in_memory(text: Text, value: Value, shape: tuple[int, ...], dtype: str) -> S
 def row(text: Text, value: Value, index: str, shape: tuple[int, ...], dtype: str) -> Value:
     """`value[index]`, an array of `shape`, for an index (an i64) that is known when the program runs."""
     if isinstance(value, Filled):
-        size = int(np.prod(shape))
+        size = prod(shape)
         return held([value.lane] * size, shape) if size <= SMALL else Filled(value.lane, shape)
     stored = in_memory(text, value, (0, *shape), dtype)
-    size = int(np.prod(shape))
+    size = prod(shape)
     first = index if size == 1 else text.assign(f"mul i64 {index}, {size}")
     if shape == ():
         return held(_element(text, stored, first))

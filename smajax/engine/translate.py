@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import prod
 from typing import Any
 
 import jax
@@ -31,7 +32,7 @@ from smajax.engine.loop import Loop
 from smajax.engine.memory import in_memory, in_registers, mapped, row, write
 from smajax.engine.phases import laid_out
 from smajax.engine.text import NAME, Array, Lane, Text, Unsupported, scalar_type
-from smajax.engine.values import SMALL, Filled, Held, Stored, Value, held, is_known, size_of
+from smajax.engine.values import SMALL, Filled, Held, Stored, Value, held, is_known, name_of, size_of
 
 VECTORS = 8  # of a group: while one waits for a result others go on
 CALLS = {
@@ -79,6 +80,12 @@ def _constants(consts: Sequence[Any]) -> list[Value]:
         return [_numbers(one) for one in consts]
     except TypeError:
         raise Unsupported("a constant that is no array of numbers") from None
+
+
+def _as_shape(lanes: Held, shape: tuple[int, ...]) -> np.ndarray:
+    """The lanes of an array of that shape, one after the other."""
+    alike = lanes if lanes.shape == shape else np.broadcast_to(np.asarray(lanes), shape)
+    return alike.ravel()
 
 
 class _Translation:
@@ -133,7 +140,7 @@ class _Translation:
                 result = equation.primitive.bind(*given, **equation.params)
             return [_numbers(one) for one in (result if equation.primitive.multiple_results else [result])]
         out = _array(equation.outvars[0].aval)
-        kinds = [str(one.aval.dtype) for one in equation.invars]
+        kinds = [name_of(one.aval.dtype) for one in equation.invars]
         if name == "exact_div" and not out.dtype.startswith("float"):
             name = "div"
         if name in ELEMENTWISE or name in REDUCTIONS or name == "exact_div":
@@ -145,9 +152,9 @@ class _Translation:
         if name in REDUCTIONS:
             return [reduced(self.text, REDUCTIONS[name], given, params["axes"], out)]
         small = all(size_of(one) <= SMALL for one in given)
-        small &= all(int(np.prod(one.aval.shape)) <= SMALL for one in equation.outvars)
+        small &= all(prod(one.aval.shape) <= SMALL for one in equation.outvars)
         if name in MOVES and small and at_known_places(name, given):
-            keys = [str(one.aval.dtype).startswith("key<") for one in equation.invars]
+            keys = [name_of(one.aval.dtype).startswith("key<") for one in equation.invars]
             return moved(self.text, equation.primitive, equation.params, given, keys)
         if name in MOVES and len(set(map(only_lane, given[: 1 if MOVES[name] else None]))) == 1:
             lane = only_lane(given[0])
@@ -166,7 +173,7 @@ class _Translation:
     # Arithmetic, and the shapes of arrays.
 
     def elementwise(self, name: str, params: dict[str, Any], given: list[Value], out: Array) -> Value:
-        size = int(np.prod(out.shape))
+        size = prod(out.shape)
         scalar_type(out.dtype)
         if name == "convert_element_type" and isinstance(given[0], Stored) and given[0].dtype == out.dtype:
             return given[0]
@@ -193,7 +200,7 @@ class _Translation:
             mapped(self.text, room, 0, put, given)
             return room
         # A predicate, the ends of `clamp` and axes of length one may stand for all.
-        flat = [np.broadcast_to(np.asarray(in_registers(self.text, one)), out.shape).ravel() for one in given]
+        flat = [_as_shape(in_registers(self.text, one), out.shape) for one in given]
         return held([put(*(one[k] for one in flat)) for k in range(size)], out.shape)
 
     # Loops.
@@ -219,9 +226,7 @@ class _Translation:
             one if isinstance(one, Filled) else in_memory(text, one, (length, *kind.shape), kind.dtype)
             for one, kind in zip(series, kinds, strict=True)
         ]
-        rooms = [
-            Stored(text.reserve(int(np.prod(one.shape)), one.dtype), one.shape, one.dtype, True) for one in stacked
-        ]
+        rooms = [Stored(text.reserve(prod(one.shape), one.dtype), one.shape, one.dtype, True) for one in stacked]
         loop = Loop(text, start, "scan")
         index = loop.count
         if backward:
@@ -349,7 +354,7 @@ def translate(
 
 def _leave(text: Text, pointer: str, first: str, result: Array, value: Value) -> None:
     """A result where the caller finds it: runs one after the other."""
-    size = int(np.prod(result.shape))
+    size = prod(result.shape)
     if size == 0:
         return
     if size == 1:

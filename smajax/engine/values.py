@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -27,7 +29,7 @@ class Stored:
 
     @property
     def size(self) -> int:
-        return int(np.prod(self.shape))
+        return prod(self.shape)
 
 
 @dataclass(frozen=True)
@@ -40,6 +42,12 @@ class Filled:
 
 # Known before the program runs; or one of the above.
 Value = np.ndarray | Held | Stored | Filled
+
+
+@cache
+def name_of(dtype: Any) -> str:
+    """`str(dtype)`, for which NumPy takes ten times as long, and a translation asks once an operation."""
+    return str(dtype)
 
 
 def held(lanes: Any, shape: tuple[int, ...] = ()) -> Held:
@@ -56,4 +64,4 @@ def is_known(value: Value) -> bool:
 
 
 def size_of(value: Value) -> int:
-    return value.size if isinstance(value, np.ndarray | Stored) else int(np.prod(value.shape))
+    return value.size if isinstance(value, np.ndarray | Stored) else prod(value.shape)

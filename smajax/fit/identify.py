@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from scipy import stats
+import scipy  # its parts are imported when they are first used
 
 from smajax.core.progress import Progress, as_progress, quiet
 from smajax.core.provenance import made_with
@@ -176,7 +176,7 @@ def _decorrelated(runs: Sequence[np.ndarray], step: float) -> np.ndarray:
 
 def _normality(samples: np.ndarray) -> float:
     """The probability of such skewness and kurtosis in normal samples (n,); NaN of too few for the test."""
-    return float(stats.normaltest(samples).pvalue) if samples.size >= LEAST_FOR_SHAPE else np.nan
+    return float(scipy.stats.normaltest(samples).pvalue) if samples.size >= LEAST_FOR_SHAPE else np.nan
 
 
 def _outputs(setup: Setup, fitted: Fitted, statistics: Statistics, robust: bool) -> tuple[IdentifiedOutput, ...]:

@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from scipy.stats import qmc
+import scipy  # its parts are imported when they are first used
 
 from smajax.core.progress import Stage
 from smajax.core.result_cache import ResultCache
@@ -25,7 +25,7 @@ RESTARTS = 4  # a power of two, for Sobol's points
 
 def box_points(start: np.ndarray, columns: Sequence[int], box: np.ndarray, count: int, seed: int) -> np.ndarray:
     """`start` (P,) with its `columns` at Sobol points of `box` (C, 2): shape (count, P)."""
-    sobol = qmc.Sobol(len(columns), seed=seed).random(count)
+    sobol = scipy.stats.qmc.Sobol(len(columns), seed=seed).random(count)
     points = np.tile(start, (count, 1))
     points[:, columns] = box[:, 0] + (MARGIN + (1.0 - 2.0 * MARGIN) * sobol) * (box[:, 1] - box[:, 0])
     return points
@@ -34,7 +34,7 @@ def box_points(start: np.ndarray, columns: Sequence[int], box: np.ndarray, count
 def logarithmic_points(ranges: Mapping[str, tuple[float, float]], count: int) -> list[dict[str, float]]:
     """Sobol points of positive ranges by name, by their logarithm; `count` a power of two."""
     low, high = np.log(np.asarray(list(ranges.values()))).T
-    shares = qmc.Sobol(len(ranges), seed=0).random(count)
+    shares = scipy.stats.qmc.Sobol(len(ranges), seed=0).random(count)
     return [dict(zip(ranges, np.exp(low + share * (high - low)).tolist(), strict=True)) for share in shares]
 
 
@@ -64,7 +64,7 @@ def perturbed_restarts(
         if not len(task.slots):
             continue
         y = (fit.values[task.slots] - task.low) / (task.high - task.low)
-        offsets = PERTURBATION * (2.0 * qmc.Sobol(len(task.slots), seed=k).random(RESTARTS) - 1.0)
+        offsets = PERTURBATION * (2.0 * scipy.stats.qmc.Sobol(len(task.slots), seed=k).random(RESTARTS) - 1.0)
         restarts += [task._replace(values=task.values_at(np.clip(y + offset, 0.0, 1.0))) for offset in offsets]
         owner += [k] * RESTARTS
     best = list(ended)

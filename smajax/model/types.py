@@ -10,6 +10,7 @@ from jaxtyping import Array, Float
 
 Scalar = Float[Array, ""]
 Series = Float[Array, " time"]
+Sampled = Float[Array, "*time"]  # of one instant, or of all of them
 Inputs = Mapping[str, Scalar]  # one value per input channel, SI, held over one step
 
 

@@ -33,7 +33,7 @@ STUDIES = Path(__file__).parents[2] / "studies"
 BENCH = STUDIES / "bias_spring_bench"
 
 
-def test_a_parameter_that_the_log_gives_is_not_left_open() -> None:
+def test_a_parameter_that_the_log_gives_is_not_assumed() -> None:
     """The demo's mass is logged, so the preset's is used nowhere; its length is the preset's."""
     with resources.as_file(resources.files("smajax") / "data" / "demo" / "latent") as folder:
         experiment = load_experiment(folder / "experiment.toml", CATALOGUE)
@@ -42,7 +42,7 @@ def test_a_parameter_that_the_log_gives_is_not_left_open() -> None:
     assert {"wire_length", "damping"} <= names
 
 
-def test_an_interval_over_runs_that_a_prior_holds_is_not_given() -> None:
+def test_an_interval_over_runs_that_a_prior_narrows_is_not_given() -> None:
     """The jackknife of a mean is its standard error; narrower than that it says nothing of the runs."""
     runs = np.asarray([1.0, 2.0, 3.0, 6.0])
     without = np.asarray([[np.delete(runs, k).mean()] for k in range(4)])
@@ -55,7 +55,7 @@ def test_an_interval_over_runs_that_a_prior_holds_is_not_given() -> None:
     assert over_runs(dataclasses.replace(model, left_out_values=None), 0, 0.4) is None
 
 
-def test_the_expansion_of_a_preset_that_the_file_does_not_give() -> None:
+def test_an_expansion_of_the_preset_is_reported_when_the_file_does_not_give_it() -> None:
     """As found of two benches whose wires have none, with the preset's theta_T of 0.55 MPa/K left as it is."""
     with resources.as_file(resources.files("smajax") / "data" / "demo" / "latent") as folder:
         experiment = load_experiment(folder / "experiment.toml", CATALOGUE)
@@ -68,7 +68,7 @@ def test_the_expansion_of_a_preset_that_the_file_does_not_give() -> None:
     assert preset(thermal_modulus=0.4e6) is None
 
 
-def test_sizes_of_the_bench_that_were_never_given() -> None:
+def test_sizes_of_the_bench_that_the_file_does_not_give_are_listed() -> None:
     """The demo without its declared parameters gives none of its sizes; one that gives them all has none left."""
     with resources.as_file(resources.files("smajax") / "data" / "demo" / "latent") as folder:
         experiment = load_experiment(folder / "experiment.toml", CATALOGUE)
@@ -82,7 +82,7 @@ def test_sizes_of_the_bench_that_were_never_given() -> None:
     assert sizes(wire_diameter=1e-3, wire_length=1e-3) == []
 
 
-def test_a_parameter_that_ends_at_a_bound_is_said_at_the_top(tmp_path: Path) -> None:
+def test_a_parameter_at_its_bound_is_reported_at_the_top(tmp_path: Path) -> None:
     """The stroke of the log asks for more strain than the box has; the noise hides the rest, so that no search follows."""
     before, _, rest = small_bench.BENCH.partition("[unknown]")
     known = """[model.parameters]
@@ -147,7 +147,7 @@ def test_demo_with_nothing_missing_is_adequate(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow  # two minutes, nearly all of it compilation
-def test_one_run_no_unknown_and_no_candidate_still_give_an_answer(tmp_path: Path) -> None:
+def test_one_run_without_unknowns_and_candidates_still_gives_a_verdict(tmp_path: Path) -> None:
     """The base model taken as it is, on one run: said to be off, and that nothing could be tried or left out."""
     with resources.as_file(resources.files("smajax") / "data" / "demo" / "complete") as folder:
         head, *runs = (folder / "experiment.toml").read_text().split("[[runs]]")
@@ -186,7 +186,9 @@ def _events_of_step02(time: np.ndarray, series: dict[str, np.ndarray]) -> None:
 
 
 @pytest.mark.slow
-def test_bias_spring_bench(measured_data: Path, tmp_path: Path) -> None:
+def test_the_measured_bias_spring_bench_is_partly_explained_within_its_errors(
+    measured_data: Path, tmp_path: Path
+) -> None:
     """Below 0.12 mm on the fit runs and 0.55 mm on the run that was held out, and both events of Step02 right in sign."""
     assert measured_data.is_dir()
     findings = close_loop(load_experiment(BENCH / "experiment.toml", CATALOGUE), memory=tmp_path)
@@ -227,7 +229,7 @@ def _as_told(folder: Path) -> tuple[Experiment, dict[str, np.ndarray], dict[str,
     return experiment, readings, {which: float(np.sqrt(np.mean(squares))) for which, squares in error.items()}
 
 
-def test_the_models_told_of_the_bias_spring_bench_do_what_is_told(measured_data: Path) -> None:
+def test_the_recorded_models_of_the_bias_spring_bench_give_the_recorded_errors(measured_data: Path) -> None:
     """The fast setting of the bench."""
     assert measured_data.is_dir()
     experiment, readings, rms = _as_told(BENCH)
@@ -244,7 +246,9 @@ def test_the_models_told_of_the_bias_spring_bench_do_what_is_told(measured_data:
     ("study", "most"),
     [("flexinol_isobaric", (0.05e-2, 0.06e-2)), ("nitihf_isobaric", (0.07e-2, 0.08e-2))],
 )
-def test_the_models_told_of_coupons_do_what_is_told(study: str, most: tuple[float, float], measured_data: Path) -> None:
+def test_the_recorded_models_of_coupons_give_the_recorded_errors(
+    study: str, most: tuple[float, float], measured_data: Path
+) -> None:
     """The fast setting of both; `most`: on the fit runs and on the stress that was held out, from above 0.12 % of strain."""
     assert measured_data.is_dir()
     _, _, rms = _as_told(STUDIES / study)
@@ -254,7 +258,7 @@ def test_the_models_told_of_coupons_do_what_is_told(study: str, most: tuple[floa
 
 
 @pytest.mark.slow
-def test_isobaric_flexinol(measured_data: Path, tmp_path: Path) -> None:
+def test_the_held_out_stress_of_isobaric_flexinol_is_predicted(measured_data: Path, tmp_path: Path) -> None:
     """The held-out stress of 172 MPa at most 0.06 % strain off, from about 0.165."""
     assert measured_data.is_dir()
     findings = close_loop(

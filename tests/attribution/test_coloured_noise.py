@@ -57,14 +57,14 @@ def _estimated(experiment: Experiment) -> Experiment:
 
 
 @pytest.mark.parametrize("seed", range(2))
-def test_a_noise_that_is_autocorrelated_gets_no_effect(seed: int, tmp_path: Path) -> None:
+def test_autocorrelated_noise_leads_to_no_effect(seed: int, tmp_path: Path) -> None:
     findings = close_loop(_coupon(tmp_path, seed))
     assert not any(effect.added for effect in findings.effects)
     assert not any(term.named for term in findings.unknown)
 
 
 @pytest.mark.parametrize("memory", [pytest.param(0.6, marks=pytest.mark.slow), 0.9])
-def test_autocorrelated_noise_that_was_not_declared_is_noise(memory: float, tmp_path: Path) -> None:
+def test_undeclared_autocorrelated_noise_is_recognised_as_noise(memory: float, tmp_path: Path) -> None:
     findings = close_loop(_estimated(_coupon(tmp_path, 0, memory=memory)))
     assert findings.residual_after.ratio > 1.5
     assert findings.verdict == "adequate"
@@ -73,7 +73,7 @@ def test_autocorrelated_noise_that_was_not_declared_is_noise(memory: float, tmp_
 
 
 @pytest.mark.slow  # a loop with one effect to find
-def test_what_is_missing_is_found_beside_autocorrelated_noise_that_was_not_declared(tmp_path: Path) -> None:
+def test_a_missing_effect_is_found_beside_undeclared_autocorrelated_noise(tmp_path: Path) -> None:
     findings = close_loop(_estimated(_coupon(tmp_path, 0, memory=0.6, name=LACKING)))
     assert [effect.name for effect in findings.effects if effect.added] == ["thermal_expansion"]
     assert findings.verdict == "explained"
@@ -94,14 +94,14 @@ def _thinned(experiment: Experiment, by: int) -> Experiment:
 
 
 @pytest.mark.parametrize("seed", range(2))
-def test_an_effect_that_a_short_log_cannot_tell_from_a_slow_noise_is_looked_into(seed: int, tmp_path: Path) -> None:
+def test_an_effect_that_a_short_log_confuses_with_slow_noise_is_still_tested(seed: int, tmp_path: Path) -> None:
     whole = _coupon(tmp_path, seed, memory=0.5, name=WEAK)
     short = dataclasses.replace(_estimated(_thinned(whole, 4)), effects_only=FEW)
     findings = close_loop(short)
     assert [effect.name for effect in findings.effects if effect.added] == ["thermal_expansion"]
 
 
-def test_what_the_held_out_runs_do_not_validate_is_not_named(tmp_path: Path) -> None:
+def test_an_effect_that_the_held_out_runs_reject_is_not_named(tmp_path: Path) -> None:
     """All fit runs drift upwards and the held-out ones downwards: a drift that is found is no property of the bench."""
     findings = close_loop(_coupon(tmp_path, 0, trend=12.0))
     assert not any(effect.added for effect in findings.effects)
@@ -114,7 +114,7 @@ def test_what_the_held_out_runs_do_not_validate_is_not_named(tmp_path: Path) -> 
     assert all(run.rmse_after == run.rmse_before for run in held_out)
 
 
-def test_a_right_effect_outlives_its_wrong_companion(tmp_path: Path) -> None:
+def test_a_right_effect_is_kept_when_the_wrong_one_beside_it_is_rejected(tmp_path: Path) -> None:
     """The same drift beside an effect that is there: the held-out runs reject the drift alone."""
     findings = close_loop(_coupon(tmp_path, 0, trend=20.0, name=LACKING))
     assert [effect.name for effect in findings.effects if effect.added] == ["thermal_expansion"]

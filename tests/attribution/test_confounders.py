@@ -103,7 +103,7 @@ def test_a_confounder_is_weighed_by_its_evidence() -> None:
     assert confounders(search, setting, dataclasses.replace(model, effects=()), runs) == ()
 
 
-def test_of_two_effects_with_one_trace_either_may_be_it() -> None:
+def test_two_effects_with_the_same_trace_are_weighed_by_their_prior_odds() -> None:
     """As likely as the other, by the prior odds of each, which the same evidence leaves as they are."""
     setting, model, runs = _setting()
     joint = JointParameters.of(setting.problem, setting.unknowns, setting.bounds, setting.candidates, setting.extent)

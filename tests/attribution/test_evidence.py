@@ -105,7 +105,7 @@ def test_laplaces_evidence_is_the_linear_models_where_the_model_is_linear() -> N
     )
 
 
-def test_a_model_without_what_is_off_is_the_base_model() -> None:
+def test_a_model_whose_effects_are_off_is_the_base_model() -> None:
     joint: JointParameters = hot_weight({}).joint
     values = joint.problem.start_values() + 1.0
     base = joint.without(values, ())
@@ -118,7 +118,7 @@ def test_a_model_without_what_is_off_is_the_base_model() -> None:
     assert NOISE > 0.0
 
 
-def test_what_a_preset_says_is_free_within_its_width_unless_it_was_given() -> None:
+def test_values_of_a_preset_are_free_within_their_widths_unless_the_file_gives_them() -> None:
     system = build("flexinol_table_3_2", "dead_weight", "voltage")
     table, values = parameters(system), parameter_values(system)
     free = preset_priors(table, values, frozenset({"damping"}))

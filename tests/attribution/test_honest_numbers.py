@@ -67,7 +67,7 @@ def _whole_box(system: System, count: int, seed: int) -> dict[str, np.ndarray]:
 @pytest.mark.filterwarnings("ignore:The balance properties of Sobol:UserWarning")
 @pytest.mark.parametrize("count", [FAST, pytest.param(SLOW, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("rig", RIGS)
-def test_no_point_of_the_declared_box_gives_a_number_that_is_none(rig: str, count: int) -> None:
+def test_every_point_of_the_declared_box_gives_finite_numbers(rig: str, count: int) -> None:
     """Nor a fraction outside of 0 to 1, nor a wire that pushes. Wires that melt are told, and melt by the power they get."""
     system, channel, top = RIGS[rig]
     levels = np.zeros(400)
@@ -174,7 +174,7 @@ def test_the_heat_balance_closes(rig: str, effects: bool, shares: list[float], l
 
 @settings(max_examples=20, deadline=None)
 @given(rig=st.sampled_from(sorted(RIGS)), shares=SHARES)
-def test_nothing_grows_without_power(rig: str, shares: list[float]) -> None:
+def test_without_power_nothing_heats_up_and_no_swing_grows(rig: str, shares: list[float]) -> None:
     """A cold wire stays cold, and what swings at its start swings less; a heated one that is switched off cools all the way."""
     system, channel, top = RIGS[rig]
     system = _spread(system, shares)
@@ -273,7 +273,7 @@ def _mismatched(experiment: Experiment, shuffled: bool) -> Experiment:
 
 @pytest.mark.slow  # a loop each
 @pytest.mark.parametrize("shuffled", [True, False])
-def test_data_that_do_not_belong_together_are_not_explained(tmp_path: Path, shuffled: bool) -> None:
+def test_inconsistent_data_are_not_explained(tmp_path: Path, shuffled: bool) -> None:
     """Neither shuffled samples nor runs with each other's outputs get an effect or an equation."""
     findings = close_loop(_mismatched(_demo("complete"), shuffled), memory=tmp_path)
     assert findings.verdict == "not in the library"

@@ -49,7 +49,7 @@ def test_two_effects_are_found_together() -> None:
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_nothing_is_named_where_nothing_is_missing(seed: int) -> None:
+def test_without_a_missing_effect_none_is_named(seed: int) -> None:
     search = hot_weight({}, seed=seed)
     model = search_jointly(search, search.joint.problem.start_values())
     assert model.effects == ()
@@ -65,7 +65,7 @@ def test_an_effect_that_these_runs_cannot_show_is_not_looked_for() -> None:
     assert detectable(search.joint, traces, 1e6 * NOISE) == ()
 
 
-def test_values_of_presets_that_are_free_hide_no_effect() -> None:
+def test_free_values_of_presets_hide_no_effect() -> None:
     """Some combinations of them change next to nothing; along these they absorb no more than their priors allow."""
     search = hot_weight({})
     table, values = parameters(search.joint.problem.system), parameter_values(search.joint.problem.system)
@@ -76,7 +76,7 @@ def test_values_of_presets_that_are_free_hide_no_effect() -> None:
     assert {"latent_heat", "rising_convection", "asymmetric_transformation"} <= set(found)
 
 
-def test_runs_left_out_without_refits_are_as_with_them() -> None:
+def test_errors_on_runs_left_out_agree_with_refits() -> None:
     search, _, _ = _found({"latent_heat.enthalpy": 1.2e4})
     joint, model = search.joint, search.fitted[("latent_heat",)]
     approximate = left_out(joint, model, NOISE).misfit
@@ -89,7 +89,7 @@ def test_runs_left_out_without_refits_are_as_with_them() -> None:
 
 
 @pytest.mark.parametrize("effect", ["stribeck_friction", "sensor_backlash"])
-def test_a_fit_of_an_effect_with_several_minima_may_begin_all_over_its_ranges(effect: str) -> None:
+def test_fits_of_an_effect_with_several_minima_start_all_over_its_ranges(effect: str) -> None:
     search = hot_weight({}, (effect,))
     base = fitted_model(search.joint, (), search.joint.problem.start_values(), ())
     traces = traces_at(search.joint, base, search.extent)
@@ -106,7 +106,7 @@ def test_a_fit_of_an_effect_with_several_minima_may_begin_all_over_its_ranges(ef
     assert np.ptp(points[:, search.joint.slots[name]]) > 0.0
 
 
-def test_the_places_where_fits_of_a_friction_that_sticks_begin_lie_all_over_its_sizes_and_speeds() -> None:
+def test_starts_of_a_stribeck_friction_cover_its_sizes_and_speeds() -> None:
     """Jumps make valleys; where nothing is known of the size there is none to begin from."""
     candidate = LIBRARY["stribeck_friction"].candidate
     ranges = candidate.start_ranges({"limit": 0.05})
@@ -120,7 +120,7 @@ def test_the_places_where_fits_of_a_friction_that_sticks_begin_lie_all_over_its_
     assert LIBRARY["latent_heat"].candidate.start_ranges({"enthalpy": 6e3}) == {}
 
 
-def test_the_places_where_fits_of_a_play_begin_lie_beyond_its_linear_estimate() -> None:
+def test_starts_of_a_backlash_lie_beyond_its_linear_estimate() -> None:
     """The estimate is that of a play taken up at once."""
     ranges = LIBRARY["sensor_backlash"].candidate.start_ranges({"half_width": 0.01})
     sizes = [place["half_width"] for place in logarithmic_points(ranges, 32)]

@@ -9,9 +9,13 @@ import numpy as np
 import pytest
 
 import smajax.attribution.joint_stage
-from smajax.attribution.close_loop import close_loop
+from smajax.attribution.close_loop import close_loop, prepared, searched
+from smajax.attribution.config import AttributionConfig
 from smajax.attribution.findings import Findings, LikelierModel, StepDependent
+from smajax.core.progress import quiet
+from smajax.core.result_cache import ResultCache
 from smajax.data.experiment.load import load_experiment
+from smajax.data.experiment.record import Experiment
 from smajax.data.model_catalogue import CATALOGUE
 from smajax.model.effects.library import LIBRARY
 from smajax.report.html import findings_to_html
@@ -21,18 +25,18 @@ from smajax.report.narrative import narrate
 FEW = ("latent_heat", "sensor_gain", "radiation")
 
 
-def _found(effects: tuple[str, ...], runs: int = 6) -> Findings:
+def _demo(effects: tuple[str, ...], runs: int = 6) -> Experiment:
     with resources.as_file(resources.files("smajax") / "data" / "demo" / "latent") as folder:
         experiment = load_experiment(folder / "experiment.toml", CATALOGUE)
-    return close_loop(dataclasses.replace(experiment, effects_only=effects, runs=experiment.runs[:runs]))
+    return dataclasses.replace(experiment, effects_only=effects, runs=experiment.runs[:runs])
 
 
 @pytest.fixture(scope="module")
 def latent() -> Findings:
-    return _found(FEW)
+    return close_loop(_demo(FEW))
 
 
-def test_what_is_there_is_added_and_what_is_not_is_unlikely(latent: Findings) -> None:
+def test_an_effect_that_is_there_is_added_and_all_others_are_unlikely(latent: Findings) -> None:
     assert [effect.name for effect in latent.added] == ["latent_heat"]
     likely = {effect.name: effect.evidence["posterior_probability"] for effect in latent.effects}
     assert likely.pop("latent_heat") > 0.99
@@ -40,7 +44,7 @@ def test_what_is_there_is_added_and_what_is_not_is_unlikely(latent: Findings) ->
     assert latent.added[0].evidence["alone_rmse_fit"] == pytest.approx(latent.residual_after.rmse, rel=0.05)
 
 
-def test_the_page_and_the_record_say_which_sets_were_compared(latent: Findings) -> None:
+def test_the_page_and_the_record_list_the_sets_that_were_compared(latent: Findings) -> None:
     first = latent.rounds[0]
     assert first.chosen == "latent_heat"
     assert isinstance(first.reason, LikelierModel)
@@ -56,7 +60,7 @@ def test_the_page_and_the_record_say_which_sets_were_compared(latent: Findings) 
     assert record["effects"][0]["evidence"]["posterior_probability"] > 0.99
 
 
-def test_an_effect_whose_gain_is_gone_at_half_the_step_is_excluded(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_effect_that_gains_nothing_at_half_the_step_is_excluded(monkeypatch: pytest.MonkeyPatch) -> None:
     """The latent heat passes for one with which the load jumps; the search is made again without it, and says so."""
     kept = iter((0.1, 1.0))
     candidate = LIBRARY["latent_heat"].candidate
@@ -66,7 +70,7 @@ def test_an_effect_whose_gain_is_gone_at_half_the_step_is_excluded(monkeypatch: 
         "candidate",
         dataclasses.replace(candidate, stick_slip=True),
     )
-    found = _found(FEW[:2], runs=2)
-    assert "latent_heat" not in {effect.name for effect in found.added}
-    (excluded,) = [one.reason for one in found.rounds if isinstance(one.reason, StepDependent)]
+    context = prepared(_demo(FEW[:2], runs=2), ResultCache(), quiet, 1, AttributionConfig())
+    assert "latent_heat" not in searched(context).final.effects
+    (excluded,) = [one.reason for one in context.setting.rounds if isinstance(one.reason, StepDependent)]
     assert excluded.effects == "latent_heat"

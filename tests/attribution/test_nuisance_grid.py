@@ -42,7 +42,7 @@ def _base(setting: Search) -> Model:
 
 
 @pytest.mark.parametrize(("time", "lasting"), [(12.0, 7.5), (22.0, 1000.0)], ids=["for a while", "to the end"])
-def test_a_draught_is_looked_for_when_it_blew(time: float, lasting: float) -> None:
+def test_a_draught_is_scanned_over_its_time(time: float, lasting: float) -> None:
     setting = _setting(time, lasting)
     base = _base(setting)
     best = scores_at(setting, base, EFFECTS)[0]
@@ -61,7 +61,7 @@ def _gain_at_two_seconds(setting: Search, base: Model) -> float:
     return float((column @ residual) ** 2 / (column @ column) / (residual @ residual))
 
 
-def test_having_looked_at_many_places_counts_against_a_score() -> None:
+def test_a_score_is_corrected_for_the_number_of_places_scanned() -> None:
     setting = _setting(12.0, 7.5)
     looked = scanned(setting, _base(setting).values, EFFECTS, ())
     assert looked.looks["draught"] > 5

@@ -35,7 +35,7 @@ def test_the_effect_that_is_there_comes_first_with_its_size() -> None:
     assert min(score.p_value for score in scores[1:]) > 1e-3
 
 
-def test_what_the_fitted_parameters_absorb_is_no_evidence() -> None:
+def test_what_fitted_parameters_absorb_does_not_count_as_evidence() -> None:
     rng = np.random.default_rng(2)
     columns = _columns(rng)
     columns[:, 1] = 1e-4 * columns[:, 0]
@@ -53,7 +53,7 @@ def test_p_values_are_uniform_when_nothing_is_missing() -> None:
     assert np.mean(small) == pytest.approx(0.1, abs=0.06)
 
 
-def test_a_coefficient_is_not_asked_to_leave_its_bounds() -> None:
+def test_a_score_does_not_take_a_coefficient_out_of_its_bounds() -> None:
     rng = np.random.default_rng(4)
     columns = _columns(rng)
     (score,) = ranked(_at(columns, columns[:, 1] * 1e4), NAMES[:1], ("latent_heat",), BOUNDS)
@@ -61,7 +61,7 @@ def test_a_coefficient_is_not_asked_to_leave_its_bounds() -> None:
     assert score.gain < 1e-3
 
 
-def test_whiteness_and_memory_of_noise() -> None:
+def test_white_and_autocorrelated_noise_are_distinguished() -> None:
     rng = np.random.default_rng(5)
     white = [rng.normal(size=500) for _ in range(3)]
     smooth = [np.convolve(run, np.ones(10) / 10, mode="valid") for run in white]
@@ -72,13 +72,13 @@ def test_whiteness_and_memory_of_noise() -> None:
 
 
 @pytest.mark.parametrize(("size", "noise"), [(1.0, True), (2.0, True), (20.0, False)])
-def test_what_is_white_is_noise_unless_it_is_far_above_it(size: float, noise: bool) -> None:
+def test_a_white_residual_is_noise_unless_it_is_far_above_the_noise(size: float, noise: bool) -> None:
     """Shuffled samples leave no memory, and no model can be content with them."""
     left = [size * np.random.default_rng(seed).normal(size=400) for seed in range(3)]
     assert all_noise(left, 1.0) == noise
 
 
-def test_noise_with_a_memory_may_miss_its_level_by_what_its_memory_accounts_for() -> None:
+def test_autocorrelated_noise_may_miss_its_level_by_what_its_correlation_accounts_for() -> None:
     rng = np.random.default_rng(1)
     drawn = rng.normal(size=(40, 4, 900))
     slow = lfilter([0.6], [1.0, -0.8], drawn, axis=2)[..., 500:]  # of size one, and eight samples of memory

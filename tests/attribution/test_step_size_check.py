@@ -62,17 +62,17 @@ def _by_chance(setting: Search, model: Model, share: float) -> Model:
     return Model(model.effects, model.values, share * model.cost, lucky, setting.rmse(lucky))
 
 
-def test_a_friction_that_is_there_keeps_its_gain(setting: Search) -> None:
+def test_a_true_friction_keeps_its_gain_at_half_the_step(setting: Search) -> None:
     base, rubbing = _model(setting, ()), _model(setting, FRICTION, **TRUE)
     assert gain_kept_at_half_step(setting, rubbing, base) == pytest.approx(1.0, abs=0.02)
 
 
-def test_what_cannot_jump_is_not_asked(setting: Search) -> None:
+def test_an_effect_without_jumps_is_not_checked_at_half_the_step(setting: Search) -> None:
     base = _model(setting, ())
     assert gain_kept_at_half_step(setting, _by_chance(setting, _model(setting, HEAT), 0.01), base) == 1.0
 
 
-def test_a_partner_that_gains_lends_nothing_to_a_friction_that_does_not(setting: Search) -> None:
+def test_a_friction_without_a_gain_is_not_saved_by_the_gain_of_another_effect(setting: Search) -> None:
     """Of both together more than half would be left at half the step: all of it is the partner's."""
     base = _model(setting, ())
     both = _model(setting, FRICTION + HEAT, **{**TRUE, "limit": 0.0})
@@ -83,15 +83,15 @@ def test_a_partner_that_gains_lends_nothing_to_a_friction_that_does_not(setting:
     assert gain_kept_at_half_step(setting, alone, apart) > 0.7
 
 
-def test_a_gain_that_hangs_on_the_step_is_not_kept(setting: Search) -> None:
+def test_a_gain_that_depends_on_the_step_is_lost_at_half_the_step(setting: Search) -> None:
     base = _model(setting, ())
     lucky = _by_chance(setting, _model(setting, FRICTION, **{**TRUE, "limit": 0.0}), 0.01)
     assert gain_kept_at_half_step(setting, lucky, base) < 0.1
 
 
-def test_an_effect_that_asks_for_a_finer_integration_than_the_base_model_gets_it() -> None:
+def test_an_effect_that_needs_a_finer_integration_than_the_base_model_gets_it() -> None:
     """The demo logs at 100 ms; under Liang's conditions its branches end more sharply than those of the base model."""
-    experiment = open_experiment(DEMO)
+    experiment = dataclasses.replace(open_experiment(DEMO), effects_only=("liang_conditions",))
     context = prepared(experiment, ResultCache(), quiet, 1, AttributionConfig())
     setting = context.setting
     base, liang = _model(setting, ()), _model(setting, ("liang_conditions",), share=1.0)

@@ -115,7 +115,7 @@ def _screened() -> tuple[Search, np.ndarray, Sought]:
     return with_terms(*_setting())
 
 
-def test_a_spline_of_seven_coefficients_is_de_boors() -> None:
+def test_the_spline_equals_de_boors() -> None:
     step = 1.0 / (COUNT - 3)
     knots = step * np.arange(-3, COUNT + 1)
     coefficients = np.random.default_rng(1).normal(size=COUNT)
@@ -126,7 +126,7 @@ def test_a_spline_of_seven_coefficients_is_de_boors() -> None:
     np.testing.assert_allclose(found, [expected[0], *expected, expected[-1]], atol=1e-12)
 
 
-def test_terms_at_zero_leave_the_model_as_it_is() -> None:
+def test_unknown_terms_at_zero_are_the_base_model() -> None:
     search, values, found = _screened()
     assert {term.effect_name for term in found.terms} == set(UNKNOWN)
     alone, _ = _setting()
@@ -135,7 +135,7 @@ def test_terms_at_zero_leave_the_model_as_it_is() -> None:
     np.testing.assert_allclose(with_all, without, rtol=0.0, atol=1e-11)
 
 
-def test_derivatives_by_every_coefficient_are_those_of_differences() -> None:
+def test_derivatives_by_every_coefficient_agree_with_differences() -> None:
     """Away from zero, where every term bends the runs."""
     search, values, _ = _screened()
     names = [name for name in search.problem.names if name.split(".")[0] in UNKNOWN]
@@ -174,7 +174,7 @@ def _found(equation: str) -> tuple[UnknownTerm, ...]:
 
 
 @pytest.mark.parametrize(("equation", "level"), [("heat", 2.0), ("constitutive", 1.1), ("sensor", 1.1)])
-def test_the_equation_that_something_is_hidden_in_comes_first(equation: str, level: float) -> None:
+def test_the_equation_of_a_hidden_term_is_ranked_first(equation: str, level: float) -> None:
     """Down to so many times the noise on runs left out, from at least 1.2 times it, and no other equation as well."""
     terms = _found(equation)
     best = terms[0]
@@ -187,7 +187,7 @@ def test_the_equation_that_something_is_hidden_in_comes_first(equation: str, lev
     assert best.samples.sum() == len(LEVELS) * SAMPLES
 
 
-def test_the_function_learnt_is_the_one_hidden() -> None:
+def test_the_learnt_function_is_the_hidden_one() -> None:
     """The bent scale of a sensor, but for what a stroke that is a little longer takes over: the line in it."""
     best = _found("sensor")[0]
     truth = 8e-4 * np.sin(best.at / 4e-3)
@@ -201,7 +201,7 @@ def test_the_function_learnt_is_the_one_hidden() -> None:
 
 
 @pytest.mark.parametrize("hidden", ["sensor", "latent_heat"])
-def test_effects_that_are_less_likely_than_one_unknown_function_give_way_to_it(hidden: str) -> None:
+def test_an_unknown_function_replaces_effects_that_are_less_likely(hidden: str) -> None:
     """A latent heat, fitted to runs in which the sensor's scale is bent, and to runs in which there is one."""
     there = LIBRARY["latent_heat"](enthalpy=20e3) if hidden == "latent_heat" else HIDDEN[hidden].base()
     setting, first = _setting(there, library=("latent_heat",))
@@ -235,14 +235,14 @@ def test_held_out_runs_validate_a_term_or_reject_it(there: bool) -> None:
     assert (best.held_out_after < best.held_out_before) == there
 
 
-def test_where_nothing_is_missing_no_term_is_better_than_none() -> None:
+def test_without_a_missing_effect_no_unknown_term_is_named() -> None:
     terms = unknown_terms(*_setting()).terms
     assert terms
     assert not any(term.named for term in terms)
     assert all(term.log_odds < 0.0 for term in terms)
 
 
-def test_a_formula_that_is_in_the_dictionary_is_found_and_one_that_is_too_long_is_not() -> None:
+def test_a_formula_of_the_dictionary_is_found_and_a_longer_one_is_not() -> None:
     low, width = 0.0, 80.0
     share = np.linspace(0.0, 1.0, 201)
     x = low + width * share
@@ -257,7 +257,7 @@ def test_a_formula_that_is_in_the_dictionary_is_found_and_one_that_is_too_long_i
         np.testing.assert_allclose(best.curve, truth, atol=0.1 * np.max(truth))
 
 
-def test_a_formula_is_of_the_function_even_where_the_parameters_could_take_it_over() -> None:
+def test_a_formula_describes_the_function_even_where_the_parameters_could_absorb_it() -> None:
     """A resistance scaled as a whole is a convection scaled: that way lies R = 0, which is no formula for its bend."""
     share = np.linspace(0.0, 1.0, 201)
     truth = 0.1 * np.cos(4.0 * share)
@@ -272,7 +272,7 @@ def test_a_formula_is_of_the_function_even_where_the_parameters_could_take_it_ov
 
 @pytest.mark.parametrize("size", [0.0, 1e-12, 1e12, np.nan])
 @pytest.mark.parametrize("width", [0.0, 1e-9, 1e9])
-def test_no_function_is_too_small_or_too_narrow_for_formulas(size: float, width: float) -> None:
+def test_formulas_are_found_for_small_and_narrow_functions(size: float, width: float) -> None:
     """One that stayed at zero, over a state that did not move: there is no formula, and no end of the loop."""
     coefficients = size * np.random.default_rng(0).normal(size=COUNT)
     found = formulas(0.3 * width, width, coefficients, 1e-4 * np.eye(COUNT), 100.0, "T")

@@ -170,7 +170,7 @@ SIMULATE = {
 
 
 @pytest.mark.parametrize("name", SIMULATE)
-def test_a_simulation_that_cannot_be(tmp_path: Path, name: str) -> None:
+def test_an_impossible_simulation_is_refused(tmp_path: Path, name: str) -> None:
     words, expected = SIMULATE[name]
     path = log(tmp_path / "a.csv")
     said = refused("simulate", *[one.format(log=path) for one in words], "--out", tmp_path / "out")
@@ -196,7 +196,7 @@ GAINS = {
 
 
 @pytest.mark.parametrize("name", GAINS)
-def test_gains_that_are_none(tmp_path: Path, name: str) -> None:
+def test_a_file_without_gains_is_refused(tmp_path: Path, name: str) -> None:
     content, expected = GAINS[name]
     (tmp_path / "gains.json").write_text(content)
     for words in (["simulate", "--gains"], ["sweep", "--gains"], ["tune", "pid", "--start"]):
@@ -251,13 +251,13 @@ LONG = {
 
 
 @pytest.mark.parametrize("words", LONG)
-def test_long_work_that_cannot_be(tmp_path: Path, words: str) -> None:
+def test_impossible_options_of_long_work_are_refused(tmp_path: Path, words: str) -> None:
     said = refused(*words.split(), "--out", tmp_path / "out")
     assert LONG[words] in said
     assert not (tmp_path / "out").exists()
 
 
-def test_a_new_experiment_of_what_is_no_log(tmp_path: Path) -> None:
+def test_a_new_experiment_of_a_file_that_is_no_log_is_refused(tmp_path: Path) -> None:
     out = tmp_path / "experiment.toml"
     for name, content, expected in (
         ("no.csv", None, "there is no such file"),
@@ -294,7 +294,7 @@ def test_a_logs_name_cannot_become_a_section(tmp_path: Path) -> None:
     assert (tmp_path / "experiment.toml").read_text().count("\n[model]") == 1
 
 
-def test_a_melting_wire_is_told(tmp_path: Path) -> None:
+def test_a_melting_wire_is_reported(tmp_path: Path) -> None:
     ended = smajax("simulate", *WIRE, "--step", "1000000V:1s", "--out", tmp_path / "out")
     assert ended.code == 0
     assert "The wire reaches" in ended.said

@@ -81,7 +81,7 @@ def test_inputs_that_are_no_finite_numbers_are_named(run) -> None:
         run(SYSTEM, {"voltage": "5 V"})
 
 
-def test_values_that_cannot_be_are_named_before_a_run() -> None:
+def test_impossible_values_are_named_before_a_run() -> None:
     with pytest.raises(ValueError, match="`martensite_finish` = 70 degC is not below `martensite_start`"):
         simulate_dataset(set_parameters(SYSTEM, {"martensite_finish": 70.0}), VOLTAGE)
     with pytest.raises(ValueError, match=r"No parameter `austenite_strat`; did you mean 'austenite_start'"):
@@ -103,7 +103,7 @@ def test_a_known_parameter_out_of_its_bounds_is_refused_and_a_traced_one_is_not(
     def end(share: jax.Array) -> jax.Array:
         return simulate(set_parameters(SYSTEM, {"start_fraction": share}), VOLTAGE).reading[-1]
 
-    assert jnp.isfinite(jax.vmap(jax.grad(end))(jnp.array([0.5, 1.5]))).all()
+    assert jnp.isfinite(jax.jit(jax.vmap(jax.grad(end)))(jnp.array([0.5, 1.5]))).all()
 
 
 def test_a_loop_around_a_plant_out_of_its_bounds_is_refused() -> None:
@@ -113,12 +113,12 @@ def test_a_loop_around_a_plant_out_of_its_bounds_is_refused() -> None:
         simulate_closed_loop(beyond, loop.controller, jnp.full(3, 0.5), 0.01)
 
 
-def test_a_parameter_beside_values_is_sent_there() -> None:
+def test_a_parameter_passed_beside_values_is_an_error_that_names_values() -> None:
     with pytest.raises(TypeError, match=r"no argument 'damping'; a parameter goes into values=\{'damping': 100.0\}"):
         compose("flexinol_table_3_2", "dead_weight", "voltage", damping=100.0)
 
 
-def test_a_gradient_through_machine_code_is_sent_to_simulate() -> None:
+def test_a_gradient_through_machine_code_is_an_error_that_names_simulate() -> None:
     def last(volts: jax.Array) -> jax.Array:
         return simulate_compiled(SYSTEM, {"voltage": jnp.full(20, volts)}).reading[-1]
 
@@ -130,7 +130,7 @@ def test_a_gradient_through_machine_code_is_sent_to_simulate() -> None:
 
 
 @pytest.mark.parametrize("run", [simulate, simulate_compiled, simulate_dataset])
-def test_what_is_no_system_and_no_inputs_is_said(run) -> None:
+def test_a_wrong_type_of_system_or_inputs_is_an_error(run) -> None:
     with pytest.raises(TypeError, match="`inputs` is ndarray; expected channel -> series"):
         run(SYSTEM, np.ones(50))
     with pytest.raises(TypeError, match="a run is of a `System`, as `compose` makes it, not of str"):
@@ -148,7 +148,7 @@ def test_one_sample_is_the_start_in_machine_code_too() -> None:
     assert float(one.stress[0]) == float(other.stress[0])
 
 
-def test_things_in_the_wrong_place_are_sent_to_theirs() -> None:
+def test_arguments_of_a_wrong_kind_are_errors_that_say_what_is_expected() -> None:
     with pytest.raises(TypeError, match="`axes` is dict; expected what `grid`, `zipped` or `sampled` gives"):
         run_batch(SYSTEM, {"voltage": 5.0}, {"load_mass": [0.1]}, seconds=0.1)  # type: ignore[arg-type]
     with pytest.raises(TypeError, match="`measures` holds 'position'; expected measures"):

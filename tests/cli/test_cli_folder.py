@@ -25,7 +25,7 @@ def _done(out: Path, command: str = "simulate", asked: object = 1) -> None:
         (out / "simulate.csv").write_text(str(asked))
 
 
-def test_the_same_work_goes_on_and_another_is_refused(tmp_path: Path) -> None:
+def test_the_same_command_resumes_in_its_folder_and_another_is_refused(tmp_path: Path) -> None:
     out = tmp_path / "out"
     _done(out)
     _done(out)
@@ -36,7 +36,7 @@ def test_the_same_work_goes_on_and_another_is_refused(tmp_path: Path) -> None:
     assert (out / "simulate.csv").read_text() == "1"
 
 
-def test_what_differs_is_said_and_no_more_of_it_than_a_reader_needs(tmp_path: Path) -> None:
+def test_a_refusal_lists_what_differs_in_short(tmp_path: Path) -> None:
     before = {"gone": 1, "experiment file": {f"key{k}": k for k in range(9)}}
     with claimed(tmp_path, "identify", before, []):
         pass
@@ -52,7 +52,7 @@ def test_what_differs_is_said_and_no_more_of_it_than_a_reader_needs(tmp_path: Pa
         pass
 
 
-def test_overwriting_leaves_what_is_not_ours(tmp_path: Path) -> None:
+def test_overwriting_leaves_files_of_the_user(tmp_path: Path) -> None:
     out = tmp_path / "out"
     _done(out)
     (out / "thesis.tex").write_text("mine")
@@ -138,7 +138,7 @@ def test_work_that_fails_leaves_no_folder_behind(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("command", "file"), [("close-loop", "identify.html"), ("figures", "sweep.json"), ("identify", "report.html")]
 )
-def test_folders_without_a_mark_are_known_by_their_files(tmp_path: Path, command: str, file: str) -> None:
+def test_a_folder_without_a_mark_is_refused_if_it_holds_a_result(tmp_path: Path, command: str, file: str) -> None:
     (tmp_path / file).write_text("a result")
     with pytest.raises(FolderTaken, match=file), claimed(tmp_path, command, {}, []):
         pass
@@ -176,7 +176,7 @@ def test_a_figure_beside_others_stays_on_the_page(tmp_path: Path, monkeypatch: p
     assert (tmp_path / "mine.png").exists()
 
 
-def test_every_command_has_an_example_and_machines_are_answered(tmp_path: Path) -> None:
+def test_every_command_has_an_example_and_a_json_output(tmp_path: Path) -> None:
     told = run.invoke(app, ["--help"])
     assert "Exit codes: 0 success" in told.output
     commands = [one.name or one.callback.__name__.replace("_", "-") for one in app.registered_commands if one.callback]

@@ -40,7 +40,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-def test_the_run_is_that_of_the_model(folder: Path) -> None:
+def test_the_files_hold_the_run_of_the_model(folder: Path) -> None:
     system = set_parameters(build(*HANGING), {"convection_coefficient": 80.0})
     voltage = jnp.where(jnp.arange(301) < 200, 5.0, 0.0)
     expected = simulate_compiled(system, {"voltage": voltage}, 0.01)
@@ -68,7 +68,7 @@ def test_the_run_is_that_of_the_model(folder: Path) -> None:
         assert getattr(film, "n_frames", 1) > 40
 
 
-def test_what_happened_is_told_in_words() -> None:
+def test_the_page_describes_the_run_in_words() -> None:
     told = " ".join(conclusions(run_closed(RunRequest(dt=0.01), LoopRequest("pid", "30deg:6s"))))
     assert "It transforms: the martensite fraction lies between 0.42 and 1.00, at the end 0.42." in told
     assert "The angle starts at -45 deg, lies between -45 deg and 30 deg, and ends at 30 deg." in told
@@ -106,7 +106,7 @@ def test_each_set_point_has_its_own_figures_of_merit(tmp_path: Path) -> None:
     assert page.count("<td class=n>never</td>") == 2
 
 
-def test_a_set_point_beyond_the_stops_is_told_and_several_stand_in_a_table(tmp_path: Path) -> None:
+def test_a_set_point_beyond_the_stops_is_reported_and_several_are_a_table(tmp_path: Path) -> None:
     words = ["simulate", "--controller", "pid", "--dt", "10ms", "--out", str(tmp_path / "loop"), "--set-point"]
     told = run.invoke(app, [*words, "20deg:1s,400deg:1s"])
     assert told.exit_code == 0, told.output
@@ -117,7 +117,7 @@ def test_a_set_point_beyond_the_stops_is_told_and_several_stand_in_a_table(tmp_p
     assert len({len(line) for line in lines[at : at + 3]}) == 1
 
 
-def test_what_the_controller_believes_stands_beside_what_the_plant_has(tmp_path: Path) -> None:
+def test_the_page_shows_the_controllers_model_beside_the_plant(tmp_path: Path) -> None:
     words = ["simulate", "--controller", "pid", "--dt", "10ms", "--set-point", "10deg:1s"]
     wrong = ["convection_coefficient=80", "latent_heat.enthalpy=20 J/g", "payload_mass=57.19 g"]  # the mass as believed
     wrong.append("ambient=+10%")
@@ -144,7 +144,7 @@ def test_what_the_controller_believes_stands_beside_what_the_plant_has(tmp_path:
     assert "not in its model" in page
 
 
-def test_a_change_is_one_of_what_the_controller_believes() -> None:
+def test_a_mismatch_is_relative_to_the_controllers_model() -> None:
     """Of the preset's value or the one put in its place, of an effect that is believed, of the law that a controller is for."""
     changes = {"convection": "+20%", "latent_heat.enthalpy": "-50%", "ambient_temperature": "+10 %", "inertia": "1.5"}
     asked = RunRequest(dt=0.01, values={"convection_coefficient": "80", "latent_heat.enthalpy": "20 J/g"})
@@ -161,7 +161,7 @@ def test_a_change_is_one_of_what_the_controller_believes() -> None:
         )
 
 
-def test_a_sweep_and_a_run_mean_the_same_plant_by_a_mismatch() -> None:
+def test_a_mismatch_is_the_same_plant_in_a_sweep_and_a_run() -> None:
     believed = build("niti_table_3_1", "arm", "amplified_voltage")
     swept = perturbed_plant(believed, dict.fromkeys(MISMATCHES, jnp.asarray(0.8)))
     asked = compose("niti_table_3_1", "arm", "amplified_voltage", values=dict.fromkeys(MISMATCHES, "-20%"))
@@ -177,7 +177,7 @@ def test_a_set_point_that_moves_all_the_time_has_no_figures_of_merit(tmp_path: P
     assert any("50 at most: this reference has 100." in note for note in found.notes)
 
 
-def test_what_was_written_is_an_input_again(folder: Path, tmp_path: Path) -> None:
+def test_a_written_run_can_be_an_input(folder: Path, tmp_path: Path) -> None:
     words = [
         "simulate",
         *HANGING,
@@ -194,7 +194,7 @@ def test_what_was_written_is_an_input_again(folder: Path, tmp_path: Path) -> Non
     np.testing.assert_allclose(again["series"]["position"], first["series"]["position"], rtol=1e-6)
 
 
-def test_the_same_run_may_be_shown_again_and_another_goes_elsewhere(folder: Path) -> None:
+def test_the_same_run_may_be_repeated_and_another_needs_its_own_folder(folder: Path) -> None:
     words = ["simulate", *HANGING, "--step", "5V:2s,0V:1s", "--dt", "10ms", "--out", str(folder)]
     again = run.invoke(app, [*words, "--set", "wire.heat.convection_coefficient=80", "--json"])
     assert again.exit_code == 0, again.output
@@ -237,7 +237,7 @@ def test_a_gains_file_closes_the_loop(tmp_path: Path) -> None:
         (["--input", "voltage=nowhere.csv:U"], "no such file"),
     ],
 )
-def test_mistakes_are_answered_and_leave_no_folder(words: list[str], told: str, tmp_path: Path) -> None:
+def test_mistakes_are_errors_and_leave_no_folder(words: list[str], told: str, tmp_path: Path) -> None:
     out = tmp_path / "deep" / "out"
     ended = run.invoke(app, ["simulate", *words, "--out", str(out)])
     said = " ".join((ended.output + str(ended.exception)).replace("│", " ").split())
@@ -268,7 +268,7 @@ def test_levels_hold_until_the_next(tmp_path: Path) -> None:
         levels("6V:0s", "V")
 
 
-def test_a_quantity_says_its_unit_or_has_that_of_its_option(tmp_path: Path) -> None:
+def test_a_quantity_without_a_unit_has_that_of_its_option(tmp_path: Path) -> None:
     """The same run in both ways, of every option that takes one."""
 
     def asked(name: str, *words: str) -> tuple[dict[str, list[float]], str]:
@@ -323,6 +323,7 @@ def test_a_coupon_is_given_its_temperature_and_stress(tmp_path: Path) -> None:
     assert record["series"]["reading"][0] - record["series"]["reading"][-1] == pytest.approx(0.04, abs=5e-3)
 
 
+@pytest.mark.usefixtures("drawn")
 @pytest.mark.parametrize(
     ("load", "values", "beside"),
     [
@@ -362,7 +363,7 @@ def test_a_moving_load_has_its_position_on_its_page_and_a_reading_that_differs(
     assert {"reading"} & rows == beside
 
 
-def test_a_stop_and_a_slack_wire_are_told() -> None:
+def test_a_stop_and_a_slack_wire_are_reported() -> None:
     told = " ".join(conclusions(run_open(RunRequest(dt=0.01, inputs={"voltage": "9V:5s,0V:5s"}))))
     assert "It runs into its upper stop, first 1.8" in told
     assert "The wire goes slack, first 1.8" in told

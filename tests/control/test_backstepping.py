@@ -141,7 +141,7 @@ def test_a_moving_set_point_is_followed() -> None:
     assert error[1].max() > 8.0
 
 
-def test_the_law_read_backwards_is_the_plant() -> None:
+def test_the_inverse_wire_gives_the_fraction_and_temperature_of_the_plant() -> None:
     """Along a run, angle and stress give the fraction (eq. 4.72), and that the temperature (eq. 4.73, 4.74)."""
     loops = batch([TWO] * 6, [40.0, 60.0, 20.0, -20.0, 0.0, 10.0], [0.01] * 6, [(0.0, 0.0)] * 6)
     run = loops.run
@@ -180,7 +180,9 @@ def _there_and_back(fraction: Any, stress: Any, share: Any, heating: Any) -> Any
 
 @SETTINGS
 @given(st.floats(0.02, 0.98), st.floats(0.0, 3e8), st.floats(0.1, 0.9), st.booleans())
-def test_fraction_to_temperature_and_back(fraction: float, stress: float, share: float, heating: bool) -> None:
+def test_the_temperature_of_a_fraction_inverts_the_kinetics(
+    fraction: float, stress: float, share: float, heating: bool
+) -> None:
     again, slope, central = _there_and_back(fraction, stress, share, heating)
     assert abs(float(again) - fraction) < 1e-9
     assert abs(float(slope - central)) < 1e-5 * abs(float(central))
@@ -267,7 +269,7 @@ ENDS = st.sampled_from([0.0, 1.0, 0.5, 1e-12, 1.0 - 1e-12]) | st.floats(0.0, 1.0
     ENDS,
     st.floats(-0.8, 1.7),
 )
-def test_any_state_has_a_voltage_with_derivatives(
+def test_every_state_has_a_finite_voltage_and_derivatives(
     which: str,
     position: float,
     velocity: float,
@@ -287,7 +289,7 @@ def test_any_state_has_a_voltage_with_derivatives(
         assert np.isfinite(np.asarray(leaf)).all(), slopes
 
 
-def test_the_gains_have_the_derivatives_of_a_run() -> None:
+def test_derivatives_in_the_gains_agree_with_differences_of_runs() -> None:
     """Along the whole loop, the voltage inside its limits and on one curve: against central differences."""
     start = on_heating_curve(PLANT, jnp.asarray(-0.2), jnp.zeros(()))
     names = ("damping_gain", "temperature_gain")
@@ -308,7 +310,7 @@ def test_the_gains_have_the_derivatives_of_a_run() -> None:
         assert abs(slope - central) < 1e-4 * abs(central) + 1e-9, (names[k], slope, central)
 
 
-def test_without_h_0_the_arm_is_held_at_its_set_point_and_with_it_let_fall() -> None:
+def test_without_h_0_the_set_point_is_held_and_with_h_0_the_arm_falls() -> None:
     """Eq. 4.70's h_0 makes the stress zero where the arm's weight is to be held."""
     target = jnp.asarray(0.3)
     wanted = Reference(target, jnp.zeros(()), jnp.zeros(()))

@@ -49,7 +49,7 @@ VOLTS = jnp.asarray(np.random.default_rng(1).uniform(0.0, 9.0, 201))
 
 
 @pytest.mark.parametrize(("every", "delay"), [(1, 0), (4, 0), (1, 3), (4, 2)])
-def test_a_command_is_held_and_comes_late(every: int, delay: int) -> None:
+def test_a_command_is_held_for_a_period_and_delayed(every: int, delay: int) -> None:
     loop = RUN(ARM, Played(), VOLTS, DT, every, delay=delay)
     asked = np.asarray(VOLTS)[:-1:every]
     late = np.concatenate([np.zeros(delay), asked])[: len(asked)]
@@ -60,7 +60,7 @@ def test_a_command_is_held_and_comes_late(every: int, delay: int) -> None:
     np.testing.assert_allclose(loop.run.position, alone.position, rtol=0.0, atol=1e-12)
 
 
-def test_a_duty_cycle_heats_as_the_voltage_does() -> None:
+def test_a_loop_of_a_duty_cycle_heats_as_one_of_the_voltage() -> None:
     """A supply behind an amplifier of gain 1 gives the same power by its duty, until there is no more of it."""
     supply = System(ARM.wire, ARM.load, Duty(supply_voltage=16.2))
     volts = jnp.linspace(0.0, 20.0, 201)
@@ -69,7 +69,7 @@ def test_a_duty_cycle_heats_as_the_voltage_does() -> None:
     np.testing.assert_allclose(by_duty.run.temperature, direct.run.temperature, rtol=0.0, atol=1e-9)
 
 
-def test_a_sensor_counts_and_shakes() -> None:
+def test_a_sensor_quantises_and_adds_white_noise() -> None:
     target = constant(clock(3.0, DT), 0.2)
     counted = RUN(ARM, pid(ARM), target, DT, sensor=Sensor(quantum=0.01), key=jax.random.key(0))
     counts = np.asarray(counted.measured.position) / 0.01
@@ -83,7 +83,7 @@ def test_a_sensor_counts_and_shakes() -> None:
         simulate_closed_loop(ARM, pid(ARM), target, DT, sensor=Sensor())
 
 
-def test_disturbances_reach_the_plant_and_integral_action_takes_them_out() -> None:
+def test_integral_action_rejects_disturbances() -> None:
     time = clock(12.0, DT)
     target = constant(time, 0.2)
     pushed = jnp.where(time < 6.0, 0.0, 4e-3)
@@ -129,7 +129,7 @@ def test_references_have_the_derivatives_of_their_positions() -> None:
     np.testing.assert_array_equal(resting(VOLTS).velocity, np.zeros(201))
 
 
-def test_a_reference_from_a_file(tmp_path: Path) -> None:
+def test_a_reference_is_read_from_a_file(tmp_path: Path) -> None:
     path = tmp_path / "path.csv"
     path.write_text("time,angle\n0,0\n1,90\n3,-90\n", encoding="utf-8")
     lines = read_reference(path, "time", "angle", "deg", 0.5)
@@ -143,7 +143,7 @@ def test_a_reference_from_a_file(tmp_path: Path) -> None:
         read_reference(path, "time", "angle", "volt", 0.5)
 
 
-def test_figures_of_merit_of_a_known_run() -> None:
+def test_figures_of_merit_of_a_known_run_are_right() -> None:
     """A hand-made trajectory: rises to 1.1, back to 1 within the band from 3 s on; the command turns back once."""
     loop = RUN(ARM, Played(), jnp.ones(501), DT)
     time = loop.run.time
@@ -163,7 +163,7 @@ def test_figures_of_merit_of_a_known_run() -> None:
     assert np.isinf(float(merit(never, ARM).settling_time))
 
 
-def test_figures_of_merit_in_awkward_cases() -> None:
+def test_figures_of_merit_of_cycles_chatter_and_runs_that_never_arrive_are_right() -> None:
     loop = RUN(ARM, Played(), jnp.ones(501), DT)
     time = loop.run.time
 
@@ -187,7 +187,7 @@ def test_figures_of_merit_in_awkward_cases() -> None:
     assert float(fall.reach_time) == pytest.approx(1.0, abs=1.5 * DT)
 
 
-def test_the_band_of_a_length_is_a_share_of_its_stroke() -> None:
+def test_the_settling_band_of_a_length_is_a_share_of_its_stroke() -> None:
     hanging = build("flexinol_table_3_2", "dead_weight", "flexinol_voltage")
     assert float(band_of(hanging)) == pytest.approx(0.01 * 0.02475)
     assert float(band_of(ARM)) == pytest.approx(np.radians(1.0))
@@ -196,7 +196,7 @@ def test_the_band_of_a_length_is_a_share_of_its_stroke() -> None:
 @pytest.mark.parametrize(
     ("name", "engine"), [("sld", "xla"), ("sld", "native"), ("backstepping1", "native"), ("backstepping2", "native")]
 )
-def test_a_bad_gain_fails_its_own_run_and_no_other(name: str, engine: Engine) -> None:
+def test_a_wrong_gain_of_a_batch_makes_only_its_own_run_nan(name: str, engine: Engine) -> None:
     """In a batch, where no error can be raised: a gain that is no number, and one out of its bounds."""
     controller = CONTROLLERS[name].make(ARM)
     gain = CONTROLLERS[name].main_gain
@@ -215,7 +215,7 @@ def test_a_bad_gain_fails_its_own_run_and_no_other(name: str, engine: Engine) ->
         run(None, {gain: -good})
 
 
-def test_what_a_loop_refuses() -> None:
+def test_a_closed_loop_refuses_wrong_lengths_delays_and_nan() -> None:
     with pytest.raises(ValueError, match="multiple of 4"):
         simulate_closed_loop(ARM, Played(), jnp.ones(100), DT, 4)
     with pytest.raises(ValueError, match="delay"):

@@ -149,7 +149,7 @@ finite = some.floats(0.1, 100.0)
 
 @settings(deadline=None)  # the first call compiles
 @given(finite, finite, finite)
-def test_the_layer_is_one_falling_line_from_high_to_low(high: float, low: float, boundary: float) -> None:
+def test_the_boundary_layer_falls_linearly_from_high_to_low(high: float, low: float, boundary: float) -> None:
     high, low = max(high, low), min(high, low)
     edge = jnp.asarray(boundary)
     ends = jnp.asarray(high), jnp.asarray(low)
@@ -231,7 +231,7 @@ def test_nvsc_without_a_band_is_vsc3_to_the_bit() -> None:
     assert float(AsPrintedBand().share(zero, zero + 1e-9, zero)) == 1.0, "as printed, at rest too"
 
 
-def test_nvsc_takes_over_in_passing_only_and_cools_what_is_too_hot() -> None:
+def test_nvsc_acts_only_while_the_arm_moves_past_and_cools_a_wire_that_is_too_hot() -> None:
     nvsc: TemperatureVsc = dataclasses.replace(temperature_vsc(SYSTEM), temperature_gain=2.0)
     stress, finish = 100e6, 78.0 + 100e6 / 10.3e6
     one, zero = jnp.asarray(1.0), jnp.zeros(())
@@ -270,7 +270,7 @@ SMOOTH = {
 
 
 @pytest.mark.parametrize("name", SMOOTH)
-def test_derivatives_in_the_gains_are_differences(name: str) -> None:
+def test_derivatives_in_the_gains_agree_with_differences(name: str) -> None:
     controller, degrees = SMOOTH[name][0], jnp.asarray(SMOOTH[name][1])
     names, rows = lanes(controller)
     at, count = rows[0], len(names)

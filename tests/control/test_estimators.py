@@ -52,7 +52,7 @@ SEEN, Q, R = np.array([1.0, 0.0, 0.5]), np.diag([1e-3, 2e-2, 5e-3]), 0.04
 
 
 @pytest.mark.parametrize("prediction", [Linearised(), Unscented()], ids=["extended", "unscented"])
-def test_on_a_linear_system_both_are_the_kalman_filter(prediction: AbstractPrediction) -> None:
+def test_on_a_linear_system_both_filters_equal_the_kalman_filter(prediction: AbstractPrediction) -> None:
     """Against the textbook's (I - K H) P in numpy, and against the steady gain of the Riccati equation."""
     rng = np.random.default_rng(3)
     mean, covariance = np.array([0.2, -0.1, 0.4]), np.diag([1.0, 0.5, 2.0])
@@ -146,7 +146,7 @@ def test_a_wrong_start_temperature_is_corrected_faster_than_the_wire_forgets_it(
 
 
 @pytest.mark.slow
-def test_believed_too_cold_the_points_see_what_the_derivative_does_not() -> None:
+def test_at_a_stop_the_unscented_filter_corrects_what_the_linearised_one_cannot() -> None:
     """The believed arm rests on its stop, where the derivative is zero and only points on the other side move."""
     believed = set_parameters(MODEL, {"start_temperature": 5.0, "start_temperature_error": 15.0})
     extended, unscented = (
@@ -157,7 +157,7 @@ def test_believed_too_cold_the_points_see_what_the_derivative_does_not() -> None
 
 
 @pytest.mark.slow
-def test_the_study_runs_in_its_fast_setting() -> None:
+def test_the_estimator_study_runs_in_its_fast_setting() -> None:
     from studies.estimators import main
 
     table = main(fast=True)
@@ -169,7 +169,7 @@ def test_the_study_runs_in_its_fast_setting() -> None:
         assert 0.5 < table[f"extended, {plant}, walks x 1"]["innovation"] < 1.5
 
 
-def test_the_model_filter_follows_everything() -> None:
+def test_the_model_filter_follows_every_state() -> None:
     _, told = followed(MODEL, READINGS, VOLTS)
     assert _rms(told.position, TRUTH.position) < 0.8 * NOISE
     assert _rms(told.velocity, TRUTH.velocity) < 0.05
@@ -203,7 +203,7 @@ def test_the_printed_filter_follows_angle_rate_stress_and_temperature_on_the_way
     assert abs(float(told.stress[3] - TRUTH.stress[3])) < 15e6
 
 
-def test_the_two_jacobians_of_the_printed_filter() -> None:
+def test_the_jacobians_of_the_printed_filter_agree_with_differences_and_with_its_equations() -> None:
     """The whole one against differences, and the printed one against eq. 4.29 and 4.30 worked out by hand."""
     at, period, volts = jnp.asarray([0.3, 0.7, 120.0, 50.0, 0.29, 0.6]), jnp.asarray(PERIOD), jnp.asarray(8.0)
     memory, _ = PRINTED.start(jnp.asarray(0.3))
@@ -252,7 +252,7 @@ def test_a_corrected_fraction_does_not_jump_back() -> None:
     assert float(after.wire.xi_M) == float(moving.wire.xi_M)
 
 
-def test_a_step_down_a_cliff_stays_on_the_ground() -> None:
+def test_a_steep_fall_of_the_fraction_stays_in_its_bounds() -> None:
     """A curve laid with nothing of its range left falls in 1e-4 C; the step's second derivative must not lead its value."""
     rest = initial_state(ARM, {"voltage": jnp.zeros(())})
     wire = dataclasses.replace(
@@ -336,7 +336,7 @@ def _missed(estimator, names, at, direction):
     ],
     ids=["model", "printed"],
 )
-def test_derivatives_by_the_filters_gains_and_what_it_believes(estimator, names) -> None:
+def test_derivatives_in_the_filters_gains_and_model_agree_with_differences(estimator, names) -> None:
     """Those of the model filter's gains pass through the second derivative of the simulator's step."""
     at = get_parameters(estimator, names)
     for index, name in enumerate(names):
@@ -348,7 +348,7 @@ def test_derivatives_by_the_filters_gains_and_what_it_believes(estimator, names)
         assert float(jnp.abs(slope).max()) > 1e-4, f"{name} does nothing"
 
 
-def test_in_a_closed_loop() -> None:
+def test_sliding_control_on_the_estimated_stress_settles() -> None:
     """Sliding control on the filter's stress settles as on the true one; noise on the readings shakes the voltage."""
     target, run = jnp.full(1001, jnp.radians(30.0)), by_machine_code(simulate_closed_loop)
     late, loops = slice(900, None), []
@@ -363,7 +363,7 @@ def test_in_a_closed_loop() -> None:
     assert 0.5 < float(noisy.voltage[late].std()) < 2.0
 
 
-def test_what_is_refused() -> None:
+def test_unsuitable_readings_and_loads_are_refused() -> None:
     with pytest.raises(ValueError, match="one length"):
         estimate(PRINTED, jnp.zeros(3), jnp.zeros(4), PERIOD)
     with pytest.raises(ValueError, match="DeadWeight"):

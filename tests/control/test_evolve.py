@@ -44,19 +44,19 @@ def searched(goal: Goal, generations: int = 30, **given: Any) -> tuple[CmaEsStat
     return evolve(SearchTask(rig, goal, SCENARIOS), START, generations=generations, seed=3, **given), rig
 
 
-def test_the_least_of_the_largest_is_found_where_slopes_jump() -> None:
+def test_the_minimum_of_the_maximum_is_found_at_a_kink() -> None:
     found, rig = searched(Goal(weights={"settling_time": 1.0}))
     np.testing.assert_allclose(found.best, [0.4, 0.6], atol=0.01)
     assert rig.simulations == found.ran[-1] == 30 * POPULATION * SCENARIOS.size
 
 
-def test_a_limit_comes_before_the_cost() -> None:
+def test_a_limit_takes_precedence_over_the_cost() -> None:
     found, _ = searched(Goal(weights={"settling_time": 1.0}, limits={"overshoot": 0.8}))
     assert found.best[1] <= 0.4
     np.testing.assert_allclose(found.best, [0.4, 0.4], atol=0.02)
 
 
-def test_what_was_seen_is_not_run_again_and_the_end_is_the_same(tmp_path: Path) -> None:
+def test_a_stopped_search_resumes_without_repeating_simulations(tmp_path: Path) -> None:
     goal = Goal(weights={"settling_time": 1.0})
     whole, _ = searched(goal)
     searched(goal, 12)[0].save(tmp_path / "finish.npz")
@@ -68,7 +68,7 @@ def test_what_was_seen_is_not_run_again_and_the_end_is_the_same(tmp_path: Path) 
     assert rig.simulations == 30 * POPULATION * SCENARIOS.size
 
 
-def test_what_was_seen_from_another_start_is_of_no_use() -> None:
+def test_results_of_another_start_are_not_used() -> None:
     goal = Goal(weights={"settling_time": 1.0})
     other = CmaEsState.none(START + 0.01).after(
         np.full((POPULATION, 2), 0.4), np.zeros(POPULATION), np.zeros(POPULATION), 7
@@ -80,7 +80,7 @@ def test_what_was_seen_from_another_start_is_of_no_use() -> None:
     np.testing.assert_array_equal(again.points, searched(goal, 3)[0].points)
 
 
-def test_a_search_at_rest_begins_anew_around_the_best(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_converged_search_restarts_around_the_best_point(monkeypatch: pytest.MonkeyPatch) -> None:
     begun: list[np.ndarray] = []
     search = module._search
 
@@ -95,7 +95,7 @@ def test_a_search_at_rest_begins_anew_around_the_best(monkeypatch: pytest.Monkey
     np.testing.assert_allclose(found.best, [0.4, 0.6], atol=0.01)
 
 
-def test_loops_whose_numbers_are_none_come_last(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_loops_with_nan_are_ranked_last(monkeypatch: pytest.MonkeyPatch) -> None:
     evaluate = Kinks.evaluate
 
     def lost(self: Kinks, points: np.ndarray, scenarios: Scenarios) -> Any:
@@ -108,7 +108,7 @@ def test_loops_whose_numbers_are_none_come_last(monkeypatch: pytest.MonkeyPatch)
     np.testing.assert_allclose(found.best, [0.4, 0.6], atol=0.01)
 
 
-def test_a_damaged_file_is_none(tmp_path: Path) -> None:
+def test_a_damaged_file_is_ignored(tmp_path: Path) -> None:
     (tmp_path / "finish.npz").write_bytes(b"PK\x03\x04 no more")
     assert load(tmp_path / "finish.npz") is None
     assert load(tmp_path / "nothing.npz") is None

@@ -29,6 +29,7 @@ from smajax.model.rigs import arm
 from smajax.model.system import System
 from smajax.report.sweep_folder import write_sweep
 from tests.helpers.in_browser import HOSTILE, faults
+from tests.helpers.machine_code import by_machine_code
 
 RATIOS = ("payload_ratio", "supply_ratio")
 SETTINGS = SweepSettings(("vsc3",), "payload", "supply", 2, (0.0, 30.0), (1.0,), seconds=3.0)
@@ -45,7 +46,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-def test_a_run_is_the_single_loop_of_that_plant(folder: Path) -> None:
+def test_a_run_of_a_sweep_equals_the_single_loop(folder: Path) -> None:
     with (folder / "vsc3.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == 2 * 2 * 2
@@ -63,7 +64,7 @@ def test_a_run_is_the_single_loop_of_that_plant(folder: Path) -> None:
     assert float(row["peak_temperature_degC"]) == pytest.approx(float(one.peak_temperature), rel=1e-5)
 
 
-def test_the_folder_is_whole(folder: Path) -> None:
+def test_the_folder_has_page_pictures_tables_and_record(folder: Path) -> None:
     page = (folder / "index.html").read_text(encoding="utf-8")
     assert page.count('src="data:image/png;base64,') == page.count('srcset="data:image/png;base64,') == 3
     assert 'href="vsc3.csv"' in page
@@ -105,7 +106,7 @@ def test_one_mismatch_alone_is_swept_as_a_curve(tmp_path: Path, folder: Path, br
     believed = np.asarray(get_parameters(system, ["payload_mass"]))[0]
     plant = set_parameters(system, {"payload_mass": 2.0 * believed})
     controller = CONTROLLERS["vsc3"].make(system)
-    loop = eqx.filter_jit(simulate_closed_loop)(plant, controller, constant(clock(3.0, 0.01), np.radians(30.0)), 0.01)
+    loop = by_machine_code(simulate_closed_loop)(plant, controller, constant(clock(3.0, 0.01), np.radians(30.0)), 0.01)
     assert float(rows[-1]["energy_J"]) == pytest.approx(float(merit(loop, plant).energy), rel=1e-5)
     with xr.open_dataset(tmp_path / "sweep.nc", engine="scipy") as found:
         assert found["energy"].dims == ("controller", "payload_ratio", "set_point", "gain_ratio")
@@ -118,11 +119,11 @@ def test_one_mismatch_alone_is_swept_as_a_curve(tmp_path: Path, folder: Path, br
     assert faults(browser, tmp_path / "index.html") == []
 
 
-def test_the_page_in_a_browser(folder: Path, browser: Any) -> None:
+def test_the_page_has_no_fault_in_a_browser(folder: Path, browser: Any) -> None:
     assert faults(browser, folder / "index.html") == []
 
 
-def test_what_is_finished_is_cached(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_finished_controllers_are_cached(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     before = (folder / "vsc3.csv").read_bytes()
 
     def never(*_: object, **__: object) -> None:
@@ -173,7 +174,7 @@ def test_noise_sample_time_and_delay_reach_the_loop() -> None:
     plain = closed_loops(setup, rows).merits
     key = jax.random.fold_in(jax.random.key(5), 0)
     wanted = constant(clock(2.0, 0.01), 0.3)
-    loop = eqx.filter_jit(simulate_closed_loop)(
+    loop = by_machine_code(simulate_closed_loop)(
         system, controller, wanted, 0.01, every, sensor=sensor, key=key, delay=3
     )
     # Judged while it runs, as its trajectory is afterwards.
@@ -185,7 +186,7 @@ def test_noise_sample_time_and_delay_reach_the_loop() -> None:
     assert abs(float(found.energy[0]) / float(plain.energy[0]) - 1.0) > 1e-3
 
 
-def test_a_period_between_two_steps_is_answered(tmp_path: Path) -> None:
+def test_a_period_that_is_no_multiple_of_the_step_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="whole number"):
         run_sweep(arm(), dataclasses.replace(SETTINGS, period=0.015), tmp_path)
 

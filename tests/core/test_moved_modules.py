@@ -87,7 +87,7 @@ for name in sma.NAMES:
     assert ended.returncode == 0, ended.stderr
 
 
-def test_what_is_gone_says_where_it_went_and_a_misspelt_module_is_not_found() -> None:
+def test_a_removed_module_names_its_successor_and_a_misspelt_one_is_not_found() -> None:
     assert "smajax_studies of a wheel" in run("import smajax.figures.row").stderr
     assert "No module named 'smajax.model.effects.no_such'" in run("import smajax.effects.no_such").stderr
     assert "No module named 'smajax.no_such'" in run("import smajax.no_such").stderr

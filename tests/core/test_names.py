@@ -29,7 +29,7 @@ EFFECTS = ("radiation", "coulomb_friction", "latent_heat", "rising_convection")
         ("Pair[2]", ("Pair[1]", "Pair[3]"), "Pair[1]"),
     ],
 )
-def test_the_nearest_name(name: str, known: tuple[str, ...], suggested: str) -> None:
+def test_the_nearest_name_is_suggested(name: str, known: tuple[str, ...], suggested: str) -> None:
     assert nearest(name, known) == f"; did you mean {suggested!r}?"
 
 
@@ -40,7 +40,7 @@ def test_nothing_is_suggested_where_nothing_is_near(name: str, known: tuple[str,
     assert nearest(name, known) == ""
 
 
-def test_the_sentence_with_and_without_a_suggestion() -> None:
+def test_the_sentence_lists_the_names_with_and_without_a_suggestion() -> None:
     assert close_matches("dutty", ("duty", "power"), "there are") == "; did you mean 'duty'? There are: duty, power"
     assert close_matches("zzz", ("duty", "power"), "there are") == "; there are: duty, power"
     assert close_matches("dutty", ("duty", "power"), "there are", ["power"]) == "; there are: duty, power"
@@ -51,7 +51,7 @@ def test_every_name_is_listed() -> None:
     assert listed(()) == "none"
 
 
-def test_of_very_many_the_nearest_three_are_named_and_what_lists_all() -> None:
+def test_of_very_many_names_the_nearest_three_and_the_listing_command_are_named() -> None:
     many = ("martensite_start", "martensite_finish", "austenite_start", "latent_heat.enthalpy", "wire_length")
     assert of_many("wire_lenght", many, "`x` lists all") == "; did you mean 'wire_length'? `x` lists all"
     told = of_many("martensite", many, "all: `x`")
@@ -61,7 +61,7 @@ def test_of_very_many_the_nearest_three_are_named_and_what_lists_all() -> None:
     assert of_many("zeta", (), "`x` lists all") == "; `x` lists all"
 
 
-def test_a_misspelt_parameter_is_answered_with_its_neighbours_and_not_with_all_there_are() -> None:
+def test_a_misspelt_parameter_is_answered_with_close_matches_only() -> None:
     arm = ("niti_table_3_1", "arm", "amplified_voltage")
     system = compose(*arm, effects=["latent_heat"])
     there = CATALOGUE.describe(*arm, "").parameters

@@ -99,6 +99,6 @@ def test_arrays_keep_their_shape() -> None:
 
 
 @pytest.mark.parametrize("text", ["0,31 mm", "1,5", "-2,5e1 V"])
-def test_a_decimal_comma_is_told_as_such(text: str) -> None:
+def test_a_decimal_comma_in_a_quantity_is_named(text: str) -> None:
     with pytest.raises(UnitError, match=f"expected a decimal point; write '{re.escape(text.replace(',', '.'))}'"):
         parse_quantity(text, "mm")

@@ -51,14 +51,14 @@ def test_the_weighted_sum_is_what_its_formula_says() -> None:
     np.testing.assert_allclose(bartlett_sum(some, 4), said, rtol=1e-12)
 
 
-def test_nothing_is_read_into_a_constant_or_a_single_sample() -> None:
+def test_a_constant_and_a_single_sample_count_as_white() -> None:
     constant, single = np.full(50, 0.1), np.array([3.0])
     assert whiteness_p_value([constant]) == 1.0
     assert whiteness_p_value([single]) == 1.0
     assert correlation_time([constant]) == correlation_time([single]) == 1.0
 
 
-def test_the_noise_of_a_first_order_filter_is_told_from_a_trend() -> None:
+def test_filtered_noise_is_distinguished_from_a_trend() -> None:
     """The AR(1) that made a noise is found, nothing is left beyond; a slow trace beside white noise is no such noise."""
     random = np.random.default_rng(7)
     made = [lfilter([0.3], [1.0, -0.8], random.normal(size=1200))[200:] for _ in range(3)]

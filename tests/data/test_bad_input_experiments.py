@@ -113,7 +113,7 @@ REFUSED = {
 
 @pytest.mark.parametrize("name", REFUSED)
 @pytest.mark.parametrize("command", ["close-loop", "identify"])
-def test_what_cannot_be_is_refused(tmp_path: Path, name: str, command: str) -> None:
+def test_an_impossible_experiment_is_refused(tmp_path: Path, name: str, command: str) -> None:
     change, words = REFUSED[name]
     experiment = bench(tmp_path / "bench", change)
     said = refused(command, experiment, "--out", tmp_path / "out")
@@ -122,7 +122,7 @@ def test_what_cannot_be_is_refused(tmp_path: Path, name: str, command: str) -> N
     assert not (tmp_path / "out").exists()
 
 
-def test_identify_says_when_nothing_is_unknown_and_what_cannot_be_profiled(tmp_path: Path) -> None:
+def test_identify_reports_that_nothing_is_unknown_and_what_cannot_be_profiled(tmp_path: Path) -> None:
     experiment = bench(tmp_path / "bench")
     said = refused("identify", experiment, "--out", tmp_path / "out", "--profile", "convecton_coefficient")
     assert "no profile of convecton_coefficient: not fitted; fitted are convection_coefficient" in said
@@ -133,7 +133,7 @@ def test_identify_says_when_nothing_is_unknown_and_what_cannot_be_profiled(tmp_p
     )
 
 
-def test_a_handful_of_samples_says_nothing_of_their_distribution(tmp_path: Path) -> None:
+def test_few_samples_give_no_warning_of_their_distribution(tmp_path: Path) -> None:
     experiment = bench(tmp_path / "bench")
     log(experiment.parent / "a.csv", seconds=0.5)
     with warnings.catch_warnings():
@@ -154,7 +154,7 @@ def test_the_sound_experiment_is_warned_of_its_few_runs_alone(tmp_path: Path) ->
     assert few.startswith("only 1 fit run")
 
 
-def test_a_duty_declared_as_a_voltage_is_told_by_its_heat(tmp_path: Path) -> None:
+def test_a_duty_declared_as_a_voltage_is_detected_by_its_heat(tmp_path: Path) -> None:
     experiment = bench(tmp_path)
     log(tmp_path / "a.csv", top=100.0)
     assert _warned(
@@ -163,7 +163,7 @@ def test_a_duty_declared_as_a_voltage_is_told_by_its_heat(tmp_path: Path) -> Non
     assert _warned(experiment, "such as a duty in percent?")
 
 
-def test_an_input_that_heats_nothing_is_told(tmp_path: Path) -> None:
+def test_an_input_that_heats_nothing_is_a_warning(tmp_path: Path) -> None:
     experiment = bench(tmp_path, ('unit = "V"', 'unit = "mV"'))
     assert _warned(experiment, "the input 'voltage' at its highest, held for ever, would warm the wire by")
 
@@ -175,12 +175,12 @@ def test_an_input_that_heats_nothing_is_told(tmp_path: Path) -> None:
         ("um", "was the wire heated at all?"),
     ],
 )
-def test_a_stroke_in_another_unit_is_told_by_the_wires_length(tmp_path: Path, unit: str, words: str) -> None:
+def test_a_stroke_in_a_wrong_unit_is_detected_by_the_wires_length(tmp_path: Path, unit: str, words: str) -> None:
     changes = (('unit = "mm"', f'unit = "{unit}"'), ('noise = "0.1 mm"', 'noise = "estimate"'))
     assert _warned(bench(tmp_path, *changes), words)
 
 
-def test_exchanged_columns_are_told(tmp_path: Path) -> None:
+def test_exchanged_columns_are_a_warning(tmp_path: Path) -> None:
     changes = (('column = "U"', 'column = "y"'), ('column = "x"', 'column = "U"'), ('column = "y"', 'column = "x"'))
     words = "the output 'position' rests at a few levels and the input 'voltage' moves all the time; are the two columns exch"
     assert _warned(bench(tmp_path, *changes), words)
@@ -188,7 +188,7 @@ def test_exchanged_columns_are_told(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("shuffled", [True, False])
-def test_an_output_that_does_not_follow_the_heat_is_told(tmp_path: Path, shuffled: bool) -> None:
+def test_an_output_that_does_not_follow_the_heat_is_a_warning(tmp_path: Path, shuffled: bool) -> None:
     """Samples in an order of chance, and the log of a sensor that was at another bench."""
     experiment = bench(tmp_path)
     for number, name in enumerate(("a.csv", "b.csv")):
@@ -201,7 +201,7 @@ def test_an_output_that_does_not_follow_the_heat_is_told(tmp_path: Path, shuffle
 
 
 @pytest.mark.parametrize("name", DEMOS)
-def test_a_sensor_with_a_turned_sign_is_told_and_turned_back(tmp_path: Path, name: str) -> None:
+def test_a_sensor_of_reversed_sign_is_a_warning_and_can_be_reversed(tmp_path: Path, name: str) -> None:
     shutil.copytree(Path(str(resources.files("smajax") / "data" / "demo" / name)), tmp_path / name)
     experiment = tmp_path / name / "experiment.toml"
     before = load_experiment(experiment, CATALOGUE)
@@ -230,7 +230,7 @@ def test_only_an_output_can_be_reversed(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("load", [name for name in LOADS if "coupon" not in name])
-def test_heat_moves_outputs_as_the_check_of_signs_has_it(load: str) -> None:
+def test_the_sign_check_agrees_with_the_model_for_every_output(load: str) -> None:
     system = (
         build("flexinol_table_3_2", load, "flexinol_voltage")
         if load != "arm"
@@ -242,7 +242,7 @@ def test_heat_moves_outputs_as_the_check_of_signs_has_it(load: str) -> None:
         assert BY_HEAT[name] * (shown[-1] - shown[900]) > 0.0, (load, name)
 
 
-def test_a_constant_or_cut_off_channel_is_told(tmp_path: Path) -> None:
+def test_a_constant_or_clipped_channel_is_a_warning(tmp_path: Path) -> None:
     experiment = bench(tmp_path)
     t = np.arange(0.0, 20.0, 0.05)
     u, x = np.where(t < 10.0, 5.0, 0.0), 18.0 * np.sin(t / 3.0) ** 2
@@ -261,7 +261,7 @@ def test_a_constant_or_cut_off_channel_is_told(tmp_path: Path) -> None:
     assert not _warned(experiment, "never changes")
 
 
-def test_a_run_or_a_step_against_the_dynamics_is_told(tmp_path: Path) -> None:
+def test_a_run_too_short_or_a_step_too_long_for_the_dynamics_is_a_warning(tmp_path: Path) -> None:
     experiment = bench(tmp_path, ('step = "100 ms"', 'step = "5 ms"'))
     log(tmp_path / "a.csv", seconds=0.4, interval=0.005)
     words = (
@@ -274,7 +274,7 @@ def test_a_run_or_a_step_against_the_dynamics_is_told(tmp_path: Path) -> None:
     )
 
 
-def test_two_sampling_rates_and_two_lengths_are_told(tmp_path: Path) -> None:
+def test_two_sampling_rates_and_two_lengths_are_a_warning(tmp_path: Path) -> None:
     both = ('file = "a.csv"', 'files = { voltage = "a.csv", position = "x.csv" }')
     experiment = bench(tmp_path, both)
     log(tmp_path / "x.csv", interval=0.5)
@@ -291,7 +291,7 @@ def test_two_sampling_rates_and_two_lengths_are_told(tmp_path: Path) -> None:
     )
 
 
-def test_gaps_and_repeated_samples_are_told(tmp_path: Path) -> None:
+def test_gaps_and_repeated_samples_are_a_warning(tmp_path: Path) -> None:
     experiment = bench(tmp_path)
     lines = (tmp_path / "a.csv").read_text().splitlines()
     (tmp_path / "a.csv").write_text("\n".join(lines[:100] + lines[150:]) + "\n")
@@ -300,7 +300,7 @@ def test_gaps_and_repeated_samples_are_told(tmp_path: Path) -> None:
     assert _warned(experiment, "1 sample of 'voltage' and 'position' at a time that another one has was taken out")
 
 
-def test_an_effect_that_the_load_cannot_show_is_told(tmp_path: Path) -> None:
+def test_an_effect_that_the_load_cannot_show_is_a_warning(tmp_path: Path) -> None:
     experiment = bench(tmp_path, ("[sampling]", '[effects]\nonly = ["nonlinear_spring", "latent_heat"]\n[sampling]'))
     assert _warned(experiment, "effects.only names 'nonlinear_spring', which changes nothing of this load and drive")
     assert not _warned(experiment, "effects.only names 'latent_heat'")

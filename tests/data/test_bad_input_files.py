@@ -116,7 +116,7 @@ TOMLS = {
 
 
 @pytest.mark.parametrize("name", TOMLS)
-def test_an_experiment_file_that_is_none_is_named(tmp_path: Path, name: str) -> None:
+def test_a_file_that_is_no_experiment_is_named(tmp_path: Path, name: str) -> None:
     content, words = TOMLS[name]
     (tmp_path / "experiment.toml").write_bytes(content)
     said = refused("close-loop", tmp_path, "--out", tmp_path / "out")
@@ -125,13 +125,13 @@ def test_an_experiment_file_that_is_none_is_named(tmp_path: Path, name: str) -> 
     assert len(said) < 1500
 
 
-def test_an_editors_byte_order_mark_is_no_mistake(tmp_path: Path) -> None:
+def test_a_byte_order_mark_is_accepted(tmp_path: Path) -> None:
     experiment = bench(tmp_path / "bench", ('unit = "V"', 'unit = "Vlt"'))
     experiment.write_bytes(b"\xef\xbb\xbf" + experiment.read_bytes())
     assert "channels.voltage.unit: unit 'Vlt' is not known" in refused("close-loop", experiment)
 
 
-def test_what_is_no_file_is_not_waited_for(tmp_path: Path) -> None:
+def test_a_named_pipe_is_refused_and_not_waited_for(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "experiment.toml")
     assert "is no file; expected an experiment file" in refused("close-loop", tmp_path / "experiment.toml")
     experiment = bench(tmp_path / "bench")
@@ -215,7 +215,7 @@ def test_a_long_log_is_read_in_little_memory(tmp_path: Path) -> None:
     assert grown < 4 * kept + 60e6, f"{grown / 1e6:.0f} MB for a file of {size / 1e6:.0f} MB"
 
 
-def test_too_little_memory_is_said(tmp_path: Path) -> None:
+def test_too_little_memory_is_reported(tmp_path: Path) -> None:
     """A cap on memory while the log is read: one message, no traceback."""
     experiment, small = bench(tmp_path / "bench"), bench(tmp_path / "small")
     (experiment.parent / "a.csv").write_text("t,U,x\n" + "".join(f"{k},5,1\n" for k in range(2_500_000)))

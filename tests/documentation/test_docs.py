@@ -47,7 +47,7 @@ def run(page: Path, folder: Path, only: str = "", without: str = "\0") -> None:
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
-def test_the_code_of_a_page_runs_and_prints_what_it_says(
+def test_the_code_of_a_page_runs_and_prints_the_output_shown(
     page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -63,7 +63,7 @@ def test_a_page_with_a_fit_runs_to_its_end(page: Path, tmp_path: Path, monkeypat
     run(page, tmp_path)
 
 
-def test_the_first_example_of_the_readme_prints_what_it_says(tmp_path: Path) -> None:
+def test_the_first_example_of_the_readme_prints_the_output_shown(tmp_path: Path) -> None:
     run(ROOT / "README.md", tmp_path, only="np.full(2001, 8.0)")
 
 
@@ -106,7 +106,7 @@ def test_the_reference_names_no_module_that_is_gone() -> None:
             assert place.is_dir() or place.with_suffix(".py").is_file(), f"{page.name}: {name}"
 
 
-def test_the_reference_has_every_public_name_and_every_effect_as_the_package_tells_them() -> None:
+def test_the_reference_has_every_public_name_and_every_effect_of_the_package() -> None:
     """`python -m studies.make_reference` writes the pages anew."""
     from studies.make_reference import FOLDER, PAGES
 
@@ -144,7 +144,7 @@ def test_every_page_is_in_the_sites_list() -> None:
     assert [page.name for page in docs.rglob("*.md") if page.relative_to(docs).as_posix() not in listed] == []
 
 
-def test_what_is_cited_is_this_version() -> None:
+def test_the_citation_file_has_this_version() -> None:
     assert f"\nversion: {__version__}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
 
 

@@ -5,17 +5,17 @@ from __future__ import annotations
 from smajax.engine.xla import ENOUGH_TO_COMPILE, BlockLengths
 
 
-def test_what_was_compiled_for_few_runs_serves_for_more() -> None:
+def test_a_program_compiled_for_few_runs_serves_for_more() -> None:
     blocks = BlockLengths()
     assert [blocks.of(count) for count in (7, 1, 94, 94)] == [8, 8, 8, 8]
 
 
-def test_what_was_compiled_for_many_runs_serves_for_one() -> None:
+def test_a_program_compiled_for_many_runs_serves_for_one() -> None:
     blocks = BlockLengths()
     assert [blocks.of(count) for count in (110, 1, 55)] == [64, 64, 64]
 
 
-def test_a_length_that_is_asked_for_often_is_compiled() -> None:
+def test_a_block_length_that_is_used_often_is_compiled() -> None:
     blocks = BlockLengths()
     blocks.of(1)
     lengths = [blocks.of(512) for _ in range(1000)]
@@ -26,7 +26,7 @@ def test_a_length_that_is_asked_for_often_is_compiled() -> None:
     assert blocks.of(1) == 8
 
 
-def test_few_lengths_whatever_the_numbers() -> None:
+def test_few_block_lengths_serve_any_number_of_runs() -> None:
     blocks = BlockLengths()
     found = {blocks.of(count) for _ in range(50) for count in (1, 3, 60, 200, 512, 513, 5000)}
     assert found <= {8, 64, 512}

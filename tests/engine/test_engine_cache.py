@@ -55,7 +55,7 @@ def _same(one: Trajectory, other: Trajectory) -> bool:
     return all(np.array_equal(a, b) for a, b in zip(jax.tree.leaves(one), jax.tree.leaves(other), strict=True))
 
 
-def test_what_is_kept_is_read_and_is_the_same_to_the_bit(programs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_cached_program_is_read_and_gives_the_same_bits(programs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     made = _run()
     assert len(list(programs.iterdir())) == 1
     facade._programs.clear()
@@ -69,7 +69,7 @@ def test_what_is_kept_is_read_and_is_the_same_to_the_bit(programs: Path, monkeyp
     assert _same(made, read)
 
 
-def test_another_process_reads_it_too(programs: Path) -> None:
+def test_another_process_reads_the_cached_program(programs: Path) -> None:
     code = (
         "import numpy as np, jax.numpy as jnp\nfrom smajax.core.runtime import prepare\nprepare()\n"
         "from smajax.simulation.compiled import simulate_compiled\nfrom smajax.model.presets import build\n"
@@ -86,7 +86,7 @@ def test_another_process_reads_it_too(programs: Path) -> None:
 
 
 @pytest.mark.parametrize("spoilt", ["cut", "changed", "empty", "of a later version"])
-def test_a_damaged_program_is_made_anew(programs: Path, spoilt: str) -> None:
+def test_a_damaged_cached_program_is_compiled_again(programs: Path, spoilt: str) -> None:
     made = _run()
     (path,) = programs.iterdir()
     raw = path.read_bytes()
@@ -103,7 +103,7 @@ def test_a_damaged_program_is_made_anew(programs: Path, spoilt: str) -> None:
     assert path.read_bytes() == raw
 
 
-def test_one_programs_file_is_never_anothers(programs: Path) -> None:
+def test_the_cached_file_of_another_program_is_not_used(programs: Path) -> None:
     _run(OTHER)
     (other,) = programs.iterdir()
     kept = other.read_bytes()
@@ -164,12 +164,12 @@ def test_a_program_of_another_processor_is_not_used(programs: Path, monkeypatch:
 
 
 @pytest.mark.parametrize("place", [None, "gs://bucket/programs"])
-def test_nothing_is_kept_without_a_folder_of_this_machine(place: str | None) -> None:
+def test_nothing_is_cached_without_a_cache_folder(place: str | None) -> None:
     with _programs_in(place):
         assert cache.folder() is None
 
 
-def test_the_oldest_programs_make_room(programs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_oldest_cached_programs_are_removed_first(programs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     _run()
     (first,) = programs.iterdir()
     os.utime(first, (1.0, 1.0))

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from jax import lax
 
-from tests.engine.test_engine import by_machine_code, by_xla
+from tests.helpers.engine_results import by_machine_code, by_xla
 
 MEMBERS = 77  # fill no vector and no group of vectors
 KINDS = ("float64", "int64", "int8", "bool")
@@ -160,12 +160,12 @@ def _agree(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", [0, 1, 3, 4, 5, 239])
-def test_a_program_drawn_at_random_is_that_of_xla(seed: int) -> None:
+def test_a_random_program_equals_xla(seed: int) -> None:
     _agree(seed)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("first", range(100, 400, 50))
-def test_many_programs_drawn_at_random_are_those_of_xla(first: int) -> None:
+def test_many_random_programs_equal_xla(first: int) -> None:
     for seed in range(first, first + 50):
         _agree(seed)

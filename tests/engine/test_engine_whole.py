@@ -19,7 +19,7 @@ from smajax.model.rigs import arm
 from smajax.simulation.batch.axes import sampled
 from smajax.simulation.batch.chunks import chunks
 from smajax.simulation.batch.run_batch import run_batch
-from tests.engine.test_engine import same_batch
+from tests.helpers.engine_results import same_batch
 from tests.model.test_every_effect import RIGS, _rig
 
 pytestmark = pytest.mark.slow
@@ -52,17 +52,17 @@ HERE = [
 
 
 @pytest.mark.parametrize("effect", HERE)
-def test_a_batch_with_each_effect_is_that_of_xla(effect: str) -> None:
+def test_a_batch_with_each_effect_equals_xla(effect: str) -> None:
     same_batch(*both(_rig(effect), (effect,), None), 1e-9)
 
 
 @pytest.mark.parametrize("rig", sorted(RIGS))
-def test_steps_of_their_own_are_those_of_xla(rig: str) -> None:
+def test_error_controlled_steps_equal_xla(rig: str) -> None:
     same_batch(*both(rig, (), 1e-4), 1e-6)
 
 
 @pytest.mark.parametrize("controller", sorted(CONTROLLERS))
-def test_every_controller_in_its_loop_is_that_of_xla(controller: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_loop_of_every_controller_equals_xla(controller: str, monkeypatch: pytest.MonkeyPatch) -> None:
     members = tuned_on([0.0, 30.0], {"damping": 0.2, "convection": 0.1}, 0)
     rig = TuningProblem(CONTROLLERS[controller], arm(), seconds=2.0, loops=16)
     points = rig.before + np.asarray([[0.0], [-0.02], [0.03]])

@@ -25,8 +25,8 @@ from smajax.model.presets import build
 from smajax.report.identify_page import page
 from smajax.report.identify_record import record
 from smajax.report.identify_words import conclusions
+from smajax.simulation.compiled import simulate_compiled
 from smajax.simulation.sensors import sensor_output
-from smajax.simulation.simulate import simulate
 from tests.helpers import hung_weight
 from tests.helpers.hung_weight import PULSED, STAIRS, SWITCHED, HungRun
 
@@ -87,7 +87,7 @@ def coupon_file(
         wire = set_parameters(build("flexinol_table_3_2", "coupon", "none"), {**TRUTH, **(own or {}).get(name, {})})
         celsius = np.interp(time, [0.0, 50.0, 100.0, 120.0], [25.0, top, 30.0, 80.0])
         inputs = {"temperature": jnp.asarray(celsius), "stress": jnp.full(SAMPLES, stress * 1e6)}
-        run = SIMULATED(wire, inputs, 0.5)
+        run = simulate_compiled(wire, inputs, 0.5)
         shown = {"e": ("strain", NOISE["strain"]), "R": ("resistance", NOISE["resistance"])}
         columns = {"t": time, "T": celsius, "s": np.full(SAMPLES, stress)}
         for column, (sensor, noise) in shown.items():
@@ -106,7 +106,6 @@ def coupon_file(
 
 
 STUDIES = Path(__file__).parents[2] / "studies"
-SIMULATED = eqx.filter_jit(simulate)
 
 
 def _loaded(path: Path) -> Experiment:
@@ -130,7 +129,7 @@ def _error(found: Identified, name: str) -> float:
     return error
 
 
-def test_a_second_sensor_tells_more_and_the_noise_of_each_is_found(tmp_path: Path) -> None:
+def test_a_second_sensor_narrows_the_errors_and_the_noise_of_each_is_found(tmp_path: Path) -> None:
     estimate = 'noise = "estimate"\n'
     alone = _found(tmp_path, unknown_section() + STRAIN + estimate)
     both = _found(tmp_path, unknown_section() + STRAIN + estimate + OHMS + estimate)
@@ -182,7 +181,7 @@ def test_missing_samples_are_left_out(tmp_path: Path) -> None:
         _loaded(tmp_path / "experiment.toml")
 
 
-def test_a_prior_pulls_by_what_it_knows(tmp_path: Path) -> None:
+def test_a_prior_counts_by_its_width(tmp_path: Path) -> None:
     """Bayes's rule for normal distributions: means weighed by one over the variance, and the variances' sum of inverses."""
     plain = _found(tmp_path, unknown_section() + STRAIN + KNOWN)
     value, error = _by_name(plain)["recoverable_strain"].value, _error(plain, "recoverable_strain")
@@ -205,7 +204,7 @@ def test_a_prior_pulls_by_what_it_knows(tmp_path: Path) -> None:
     assert _by_name(logarithmic)["recoverable_strain"].value - value == pytest.approx(expected - value, rel=0.05)
 
 
-def test_what_no_run_shows_is_known_from_its_prior(tmp_path: Path) -> None:
+def test_a_parameter_that_no_run_determines_has_the_error_of_its_prior(tmp_path: Path) -> None:
     box = 'convection_coefficient = { low = "50 W/m^2/K", high = "400 W/m^2/K", start = "80 W/m^2/K", '
     silent = box + 'prior = { mean = "120 W/m^2/K", log_sigma = 0.2 } }\n'
     found = _by_name(_found(tmp_path, unknown_section() + silent + STRAIN + KNOWN))["convection_coefficient"]
@@ -214,7 +213,7 @@ def test_what_no_run_shows_is_known_from_its_prior(tmp_path: Path) -> None:
     assert "prior" in found.remark
 
 
-def test_a_value_of_each_run_and_one_that_is_held(tmp_path: Path) -> None:
+def test_an_initial_fraction_of_each_run_is_found_beside_a_fixed_parameter(tmp_path: Path) -> None:
     own = {"a": {"start_fraction": 0.8}, "b": {"start_fraction": 0.55}, "c": {"start_fraction": 0.7}}
     start = '[nuisance]\ninitial_martensite_fraction = { low = "0.1", high = "1", start = "0.9" }\n'
     held = unknown_section(austenite_start=", fixed = true").replace('"60 degC"', '"70 degC"')
@@ -231,7 +230,7 @@ def test_a_value_of_each_run_and_one_that_is_held(tmp_path: Path) -> None:
     assert "found for the held-out runs from themselves" in page(found)
 
 
-def test_a_parameter_of_each_run(tmp_path: Path) -> None:
+def test_a_parameter_with_a_value_for_each_run_is_found(tmp_path: Path) -> None:
     per_run = unknown_section(austenite_start=", per_run = true")
     apart = {"a": {"austenite_start": 70.0}, "b": {"austenite_start": 64.0}, "c": {"austenite_start": 66.0}}
     estimates = _by_name(_found(tmp_path, per_run + BOTH, own=apart))
@@ -245,7 +244,7 @@ class Stopped(Exception):
     """In the middle of a fit, as a kill would."""
 
 
-def test_a_killed_identification_goes_on_to_the_same_end(tmp_path: Path) -> None:
+def test_a_killed_identification_resumes_to_the_same_result(tmp_path: Path) -> None:
     path = coupon_file(tmp_path, unknown_section() + BOTH)
     experiment = _loaded(path)
     seen: list[str] = []
@@ -297,7 +296,7 @@ def test_a_killed_identification_goes_on_to_the_same_end(tmp_path: Path) -> None
         ),
     ],
 )
-def test_what_close_loop_would_pass_over_it_refuses(tmp_path: Path, more: str, words: str) -> None:
+def test_close_loop_refuses_keys_that_only_identify_uses(tmp_path: Path, more: str, words: str) -> None:
     noise = "" if "noise" in more else 'noise = "estimate"\n'
     with pytest.raises(ExperimentError, match=words):
         close_loop(_loaded(coupon_file(tmp_path, more + noise)), memory=tmp_path / "fits")
@@ -318,7 +317,7 @@ def test_sensors_and_starts_are_those_of_scipys_integration(tmp_path: Path) -> N
 
 
 @pytest.mark.slow  # two minutes of compilation; the fast ones fit a coupon
-def test_a_hung_weight_with_three_sensors_of_another_codes_making(tmp_path: Path) -> None:
+def test_a_hung_weight_simulated_by_scipy_is_identified_from_three_sensors(tmp_path: Path) -> None:
     """Truth within the errors, each noise within 10 %, each run's start found; fewer sensors tell less."""
     runs = (
         HungRun("warm", SWITCHED.volts, celsius=50.0),
@@ -342,7 +341,7 @@ def test_a_hung_weight_with_three_sensors_of_another_codes_making(tmp_path: Path
 
 
 @pytest.mark.parametrize(("study", "unknowns"), [("flexinol_isobaric", 16), ("bias_spring_bench", 15)])
-def test_the_kept_files_for_measured_runs_are_whole(measured_data: Path, study: str, unknowns: int) -> None:
+def test_the_stored_experiment_files_of_measured_runs_load(measured_data: Path, study: str, unknowns: int) -> None:
     assert measured_data.is_dir()
     experiment = _loaded(STUDIES / study / "identify.toml")
     assert len(experiment.unknowns) == unknowns

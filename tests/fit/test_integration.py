@@ -49,7 +49,7 @@ def test_the_error_that_is_reported_is_that_against_the_reference(rigs: dict[str
     assert reported.description == "one step a sample"
 
 
-def test_where_one_step_a_sample_is_enough_nothing_finer_is_paid_for(rigs: dict[str, study.Rig]) -> None:
+def test_one_step_a_sample_is_chosen_when_it_is_accurate_enough(rigs: dict[str, study.Rig]) -> None:
     problem = study._problem(rigs["dead weight"], 0.005)
     assert described(choose_integration(problem, problem.system)) == "one step a sample"
 
@@ -65,7 +65,7 @@ def test_less_noise_asks_for_a_finer_integration(rigs: dict[str, study.Rig]) -> 
 
 
 @pytest.mark.parametrize("name", ["arm", "dead weight"])
-def test_derivatives_of_error_controlled_steps(rigs: dict[str, study.Rig], name: str) -> None:
+def test_derivatives_of_error_controlled_steps_agree_with_differences(rigs: dict[str, study.Rig], name: str) -> None:
     """Those of differences of the same integration, and of fine equal steps, through every change of branch of the run."""
     problem = with_integration(study._problem(rigs[name], 0.05), Integration(jnp.asarray(1e-5)))
     fine = study._problem(rigs[name], 0.001)

@@ -130,7 +130,7 @@ def test_equations_that_are_singular_to_rounding_are_no_error() -> None:
         assert np.isfinite(step(jnp.asarray(np.inf), state)[0]).all()
 
 
-def test_two_that_act_by_their_product_are_no_parameters_without_effect() -> None:
+def test_two_parameters_that_act_by_their_product_are_not_without_influence() -> None:
     column = np.random.default_rng(0).standard_normal(300)
     at = Sensitivity(("a", "b"), np.zeros((1, 300)), np.stack([column, column], axis=1)[None], np.ones((1, 300)))
     sentences = weak_combinations(directions(at, ("a", "b"), {"a": 1.0, "b": 1.0}, 1.0))
@@ -139,7 +139,7 @@ def test_two_that_act_by_their_product_are_no_parameters_without_effect() -> Non
     assert not any("Nothing" in sentence for sentence in sentences)
 
 
-def test_the_variance_of_a_robust_mean_is_what_repeated_ones_have() -> None:
+def test_the_variance_of_a_robust_mean_is_that_of_repeated_ones() -> None:
     """Huber's mean of samples of which a tenth is far off: its variance over repetitions."""
     rng = np.random.default_rng(3)
     means, predicted = [], []

@@ -53,7 +53,7 @@ def test_three_parameters_of_which_two_combinations_are_identifiable_have_no_sta
     assert all("combination" in found.remark[name] for name in "abc")
 
 
-def test_a_parameter_that_nothing_depends_on_is_said() -> None:
+def test_a_parameter_without_influence_is_reported() -> None:
     rng = np.random.default_rng(4)
     columns = rng.normal(size=(500, 2)) * [1.0, 0.0]
     at = _sensitivity(columns, rng.normal(size=500))
@@ -123,7 +123,7 @@ def test_groups_of_correlated_parameters_are_separated() -> None:
     assert found.remark["a"] == "correlated with b"
 
 
-def test_six_correlated_ones_are_one_line_and_short_remarks() -> None:
+def test_six_correlated_parameters_are_one_line_and_short_remarks() -> None:
     lines, remark = _correlated(_estimates_with(0.01 * np.eye(6) + 0.99, 8))
     assert lines == [
         "a, b, c, d, e and f are correlated in these runs (correlation up to 0.990): fix one of them or measure runs that "
@@ -156,7 +156,7 @@ def test_a_chain_is_one_group_though_its_ends_differ() -> None:
         ),
     ],
 )
-def test_how_many_unknowns_are_identifiable_is_said_first(names: str, rank: int, sentence: str) -> None:
+def test_the_number_of_identifiable_unknowns_is_reported_first(names: str, rank: int, sentence: str) -> None:
     rng = np.random.default_rng(3)
     columns = rng.normal(size=(500, rank)) @ np.eye(rank, len(names))
     columns[:, rank:] = columns[:, :1] if rank else 0.0

@@ -130,7 +130,7 @@ def test_effects_at_their_base_value_are_the_base_model_and_each_off_it_is_not(r
 
 
 @pytest.mark.parametrize("rig", RIGS)
-def test_derivatives_are_the_differences_and_the_score_test_sees_every_switch(rig):
+def test_derivatives_agree_with_differences_and_every_switch_has_a_score(rig):
     """Of the mean reading over parts of a run, by every coefficient: switched on, and where the score is taken."""
     system, inputs, names = RIGS[rig]
     full = extended(system, names)
@@ -167,7 +167,7 @@ def test_derivatives_are_the_differences_and_the_score_test_sees_every_switch(ri
             assert np.abs(slope).max() > 1e-6 * np.abs(here).max() * step, f"the score test does not see {key}"
 
 
-def test_steps_of_their_own_carry_what_effects_remember():
+def test_error_controlled_steps_carry_the_history_of_effects():
     """The same readings by steps of its own as by short fixed ones, with a lag, a backlash and a late transformation."""
     names = ("lagging_transformation", "sensor_lag", "sensor_gain", "sensor_backlash")
     on = {key: value for name in names for key, value in _starts(name).items()}
@@ -178,7 +178,7 @@ def test_steps_of_their_own_carry_what_effects_remember():
     assert np.abs(own.reading - fixed.reading[::10]).max() < 2e-2 * np.ptp(fixed.reading)
 
 
-def test_a_share_of_one_is_the_other_law_and_one_of_zero_is_the_models_own():
+def test_a_share_of_one_is_the_other_law_and_a_share_of_zero_the_models_own():
     """On the weights of M13 and on a coupon, where the stress falls while the temperature falls or stands still."""
     cooler = _inputs(
         temperature=_ramps(23.0, 84.0, 80.0, 80.0, 23.0), stress=1e6 * _ramps(60.0, 60.0, 20.0, 60.0, 60.0)
@@ -255,7 +255,7 @@ def test_a_held_load_creeps_by_j_times_its_change():
     np.testing.assert_allclose(run.strain - plain.strain, expected, atol=1e-13)
 
 
-def test_martensite_that_creeps_more_goes_on_after_the_transformation():
+def test_martensite_that_creeps_more_creeps_on_after_the_transformation():
     """Heated through its range at constant stress: retarded strain follows (J_A + (J_M - J_A) xi) sigma with a lag."""
     temperature = np.concatenate([_ramps(20.0, 120.0, each=401), np.full(400, 120.0)])
     inputs = _inputs(temperature=temperature, stress=np.full(temperature.size, 80e6))
@@ -364,7 +364,7 @@ def test_a_small_loop_may_end_where_the_full_one_does_and_the_smallest_be_shifte
         assert reached(run, share * left) == pytest.approx(start + width * (z * (1.0 + early) - early), abs=0.05)
 
 
-def test_a_sensor_shows_what_its_faults_make_of_the_position():
+def test_a_reading_is_the_position_changed_by_the_sensors_faults():
     """Gain, drift, zero and backlash in the library's order, from the first sample on."""
     names = ("sensor_gain", "sensor_drift", "sensor_offset", "sensor_backlash")
     on = {
@@ -381,7 +381,7 @@ def test_a_sensor_shows_what_its_faults_make_of_the_position():
     np.testing.assert_allclose(run.reading, known, atol=1e-14)
 
 
-def test_a_state_that_remembers_other_things_is_refused():
+def test_a_state_with_the_history_of_other_effects_is_refused():
     plain = initial_state(DEAD_WEIGHT, {name: values[0] for name, values in STROKES.items()})
     late = extended(DEAD_WEIGHT, ("lagging_transformation",))
     for tolerance in (None, 1e-4):

@@ -133,7 +133,7 @@ def _told(effect: str) -> _Told:
 
 
 @pytest.mark.parametrize("effect", sorted(LIBRARY))
-def test_an_experiment_file_can_say_its_coefficients(effect: str) -> None:
+def test_an_experiment_file_can_give_the_coefficients_of_every_effect(effect: str) -> None:
     """Their units are ones that the reader knows, and `switches` and `starts` name coefficients within their bounds."""
     table = parameters(LIBRARY[effect].base())
     for name, entry in table.items():
@@ -146,7 +146,7 @@ def test_an_experiment_file_can_say_its_coefficients(effect: str) -> None:
 @pytest.mark.parametrize(
     "effect", sorted(name for name, one in LIBRARY.items() if one.candidate.bounds(Extent(1.0, 1.0, 0.0)))
 )
-def test_what_is_in_the_unit_of_the_reading_is_bounded_by_the_runs(effect: str) -> None:
+def test_a_coefficient_in_the_unit_of_the_reading_is_bounded_by_the_runs(effect: str) -> None:
     """An arm turns by radians where a slider moves by millimetres: a bound in metres is none in radians."""
     table = {_short(name): entry for name, entry in parameters(LIBRARY[effect].base()).items()}
     arm, slider = (
@@ -167,14 +167,14 @@ def _short(name: str) -> str:
 
 
 @pytest.mark.parametrize("effect", HERE)
-def test_at_its_base_the_model_is_the_base_model(effect: str) -> None:
+def test_every_effect_at_its_base_value_is_the_base_model(effect: str) -> None:
     plain = _plain(_rig(effect))
     # The same equations in another program: products and sums are put together otherwise, to the last bit but one.
     np.testing.assert_allclose(_told(effect).at_base, plain, rtol=0.0, atol=1e-10 * np.ptp(plain))
 
 
 @pytest.mark.parametrize("effect", HERE)
-def test_at_its_start_it_can_be_seen(effect: str) -> None:
+def test_every_effect_at_its_initial_guess_changes_the_reading(effect: str) -> None:
     told = _told(effect)
     assert np.abs(told.at_starts - told.at_base).max() > 1e-4 * np.ptp(told.at_base)
 
@@ -185,7 +185,7 @@ STAIRS = {"sensor_resolution.increment", "sensor_resolution.zero"}
 
 @pytest.mark.parametrize("share", [NUDGE, 1.0], ids=["next to nothing", "switched on"])
 @pytest.mark.parametrize("effect", HERE)
-def test_its_derivatives_are_the_differences(effect: str, share: float) -> None:
+def test_derivatives_of_every_effect_agree_with_differences(effect: str, share: float) -> None:
     """Where its score is taken, and where a refit begins: at exactly zero a tail has no derivative (see `scores_at`)."""
     told = _told(effect)
     for k, name in enumerate(told.names):

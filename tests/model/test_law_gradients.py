@@ -72,14 +72,14 @@ GRID = [
 
 
 @pytest.mark.parametrize(("law", "load"), GRID)
-def test_every_parameter_of_a_moving_load(law: str, load: str) -> None:
+def test_derivatives_in_every_parameter_of_a_moving_load_agree_with_differences(law: str, load: str) -> None:
     wire, name, drive, top, wanted = MOVING[load]
     compare(_under(law, wire, name, drive), _moved(top, wanted))
 
 
 @pytest.mark.parametrize("law", NAMES)
 @pytest.mark.parametrize("load", ["coupon", "strain_coupon"])
-def test_every_parameter_of_a_coupon(law: str, load: str) -> None:
+def test_derivatives_in_every_parameter_of_a_coupon_agree_with_differences(law: str, load: str) -> None:
     """A path on which temperature and load change together, with a reversal inside each range."""
     system = _under(law, "flexinol_table_3_2", load, "none")
     n = 300
@@ -183,7 +183,7 @@ def test_a_clipped_voltage_has_the_derivative_of_the_limit() -> None:
     assert all(np.isfinite(float(value)) for value in slope(jnp.asarray(5.0), jnp.asarray(5.0)))
 
 
-def test_a_parameter_walks_across_a_branch_change() -> None:
+def test_derivatives_agree_with_differences_across_a_branch_change() -> None:
     """From a voltage that never reaches A_s' to one that transforms to the end: the derivative follows the path."""
     weight = build("flexinol_table_3_2", "dead_weight", "voltage")
 
@@ -230,7 +230,7 @@ def _mean_stress(load: str) -> Callable[[jax.Array], jax.Array]:
 
 
 @pytest.mark.slow  # a filter's derivative, one of second order too, is in test_estimators
-def test_a_second_derivative_along_a_line() -> None:
+def test_a_second_derivative_along_a_line_agrees_with_differences() -> None:
     """A filter's gains are first derivatives, so its own derivative is a second one."""
     mean, along, step = _mean_stress("arm"), jnp.asarray([1.0, -0.7, 0.4]), 1e-5
 
@@ -243,7 +243,7 @@ def test_a_second_derivative_along_a_line() -> None:
     np.testing.assert_allclose(second, (first(step) - first(-step)) / (2 * step), rtol=1e-5, atol=1e-7)
 
 
-def test_a_second_derivative_by_reverse_mode() -> None:
+def test_a_second_derivative_by_reverse_mode_agrees_with_differences() -> None:
     """Forward over reverse: where JAX computes what is known beforehand it goes through the solution, not by its rule."""
     system = _under("liang", "flexinol_table_3_2", "dead_weight", "voltage")
     names = ["convection_coefficient"]
@@ -263,7 +263,7 @@ def test_a_second_derivative_by_reverse_mode() -> None:
 
 @pytest.mark.slow  # a minute to compile
 @pytest.mark.parametrize("load", list(SECOND))
-def test_second_derivatives(load: str) -> None:
+def test_second_derivatives_agree_with_differences(load: str) -> None:
     """All of them, forward over reverse."""
     mean, one, step = _mean_stress(load), jnp.ones(3), 1e-5
     second = np.asarray(jax.jit(jax.hessian(mean))(one))

@@ -275,7 +275,7 @@ def test_zero_voltage_rests_for_a_thousand_seconds(rig: str, law: str) -> None:
 
 @settings(max_examples=8, deadline=None)
 @given(levels=st.lists(st.floats(0.0, 12.0), min_size=4, max_size=4), law=st.sampled_from(NAMES))
-def test_no_wire_gets_colder_than_its_air(levels: list[float], law: str) -> None:
+def test_no_wire_cools_below_the_ambient_temperature(levels: list[float], law: str) -> None:
     system = _with(build("flexinol_table_3_2", "dead_weight", "voltage"), law)
     volts = jnp.repeat(jnp.asarray(levels), 100)
     assert float(RUN(system, {"voltage": volts}, 0.02).temperature.min()) >= 23.0 - 1e-9

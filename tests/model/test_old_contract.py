@@ -53,7 +53,7 @@ def test_three_methods_of_the_heat_balance_are_one_loss() -> None:
     assert term.stored_heat(WIRE, AT.temperature, AT.fraction) == 0.0
 
 
-def test_what_it_kept_is_history() -> None:
+def test_kept_values_of_an_old_effect_are_history() -> None:
     effect = _old(
         kept_at_start=lambda self, temperature, stress, fraction: {"q": temperature + fraction},
         kept_after=lambda self, old, temperature, stress, fraction: {"q": old.kept["q"] + fraction},
@@ -72,7 +72,7 @@ def test_what_it_kept_is_history() -> None:
     np.testing.assert_allclose(strain, 1e-3 + 1e-6 * (float(at.temperature) + 1.0), rtol=1e-12)
 
 
-def test_frictions_and_changes_of_the_load_are_by_the_load() -> None:
+def test_old_frictions_and_load_changes_belong_to_the_load() -> None:
     effect = _old(friction_share=lambda self: self.x, load_change=lambda self, time: 0.1 * time)
     terms = grouped([effect])
     np.testing.assert_allclose(terms.friction[0].friction_limit(jnp.asarray(3.0)), 1.5)
@@ -98,7 +98,7 @@ def test_a_supply_loses_a_share_of_its_voltage() -> None:
     assert float(term.history_after_supply(circuit, STATE)["i"]) == 1.0
 
 
-def test_half_a_pair_leaves_the_other_as_it_is() -> None:
+def test_an_old_effect_with_one_method_of_a_pair_leaves_the_other_unchanged() -> None:
     (term,) = grouped([_old(heating_shape=lambda self, z, remaining: 0.5 * remaining)]).kinetics.shapes
     assert (float(term.heating_shape(AT.fraction, AT.fraction)), float(term.cooling_shape(AT.time, AT.fraction))) == (
         0.2,
@@ -106,7 +106,7 @@ def test_half_a_pair_leaves_the_other_as_it_is() -> None:
     )
 
 
-def test_an_effect_of_today_is_left_alone_without_a_warning() -> None:
+def test_a_current_effect_is_unchanged_and_gives_no_warning() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         grouped([])

@@ -38,7 +38,7 @@ def _constitutive(system: System, **changed: object) -> System:
 
 
 @pytest.mark.parametrize(("form", "constant"), [(RateForm(), True), (IntegratedForm(), False)])
-def test_with_it_one_modulus_becomes_the_mixture_of_two(form: AbstractForm, constant: bool) -> None:
+def test_the_effect_turns_one_modulus_into_the_mixture_of_two(form: AbstractForm, constant: bool) -> None:
     inputs = {"duty": 0.35 * jnp.concatenate([jnp.ones(150), 0.5 * jnp.ones(50), jnp.ones(50), jnp.zeros(200)])}
     two = _constitutive(_moduli(RIG, AUSTENITE), form=form)
     one = _constitutive(_moduli(RIG, AUSTENITE if constant else MARTENSITE), form=form)
@@ -52,12 +52,12 @@ def test_with_it_one_modulus_becomes_the_mixture_of_two(form: AbstractForm, cons
     assert float(jnp.abs(plain.reading - asked.reading).max()) > 1e-2 * stroke
 
 
-def test_a_wire_of_two_moduli_has_no_such_candidate() -> None:
+def test_a_wire_of_two_moduli_does_not_have_the_candidate() -> None:
     assert "phase_modulus" not in candidates(RIG, None, ())
     assert "phase_modulus" in candidates(_moduli(RIG, MARTENSITE), None, ())
 
 
-def test_under_a_given_stress_the_rate_form_has_no_such_candidate() -> None:
+def test_a_coupon_under_stress_by_the_rate_form_does_not_have_the_candidate() -> None:
     """It leaves no elastic mismatch there; the integrated form does."""
     coupon = _moduli(build("flexinol_isobaric", "coupon", "none"), MARTENSITE)
     assert "phase_modulus" not in candidates(_constitutive(coupon, form=RateForm()), None, ())
@@ -65,7 +65,7 @@ def test_under_a_given_stress_the_rate_form_has_no_such_candidate() -> None:
 
 
 @pytest.mark.slow  # a loop
-def test_it_is_found_where_the_experiment_has_one_modulus(tmp_path: Path) -> None:
+def test_a_phase_modulus_is_found_when_the_experiment_has_one_modulus(tmp_path: Path) -> None:
     name = "bias_spring-null-0-00"
     true = write(next(case for case in cases() if case.name == name), tmp_path)
     assert (true.wire.young_modulus_austenite, true.wire.young_modulus_martensite) == (AUSTENITE, MARTENSITE)

@@ -131,7 +131,7 @@ def _stripped(effect: str, **changed: Any) -> Any:
         ("minor_loops", "pinned", CoefficientPrior(0.0, 0.25, False)),  # from 0 on
     ],
 )
-def test_an_effect_that_says_nothing_of_its_widths_has_some(
+def test_an_effect_without_declared_widths_has_default_ones(
     effect: str, coefficient: str, expected: CoefficientPrior
 ) -> None:
     bare = _stripped(effect)

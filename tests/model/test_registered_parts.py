@@ -25,7 +25,7 @@ def test_an_effect_of_the_library_is_held_to_what_a_plug_in_is(name: str) -> Non
     assert _wrong(name, _OWN[name]) == ""
 
 
-def test_a_misspelt_method_is_a_fault() -> None:
+def test_a_misspelt_method_of_an_effect_is_an_error() -> None:
     latent = _OWN["latent_heat"]
 
     class Misspelt(AbstractEffect, HeatTerm):
@@ -40,7 +40,7 @@ def test_a_misspelt_method_is_a_fault() -> None:
         dataclasses.replace(build("niti_table_3_1", "arm", "voltage"), effects=(Misspelt(),))
 
 
-def test_an_effect_without_a_contract_is_told_which_has_its_method() -> None:
+def test_an_effect_without_a_contract_is_an_error_that_names_the_contract_of_its_method() -> None:
     """It would be ignored without a word; a method that a contract has names that contract alone."""
 
     class Bare(AbstractEffect):
@@ -70,7 +70,7 @@ def test_a_part_in_a_file_of_its_own_is_one_line_of_a_table() -> None:
         resolved({"antagonist": "smajax.model.load.dead_weight:Antagonist"})
 
 
-def test_a_load_says_itself_where_its_numbers_come_from() -> None:
+def test_a_load_states_the_sources_of_its_numbers() -> None:
     class Blade(DeadWeight):
         origins: ClassVar[dict[str, str]] = {
             "load_mass": "chosen: of the bench",
@@ -94,7 +94,7 @@ def test_a_load_says_itself_where_its_numbers_come_from() -> None:
         ),
     ],
 )
-def test_a_prior_that_cannot_be_read_is_a_fault(changed: dict[str, Any], message: str) -> None:
+def test_a_prior_that_cannot_be_read_is_an_error(changed: dict[str, Any], message: str) -> None:
     latent = _OWN["latent_heat"]
 
     class Changed(latent):  # type: ignore[misc, valid-type]
@@ -104,7 +104,7 @@ def test_a_prior_that_cannot_be_read_is_a_fault(changed: dict[str, Any], message
 
 
 @pytest.mark.parametrize("name", [*WIRES, *_LOADS])
-def test_a_preset_says_where_its_numbers_come_from(name: str) -> None:
+def test_a_preset_states_the_sources_of_its_numbers(name: str) -> None:
     made = (WIRES | _LOADS)[name]()
     entries = parameters(made)
     origins = origins_of(name, made)

@@ -31,17 +31,17 @@ def _found(answer: dict[str, Any]) -> None:
 
 
 @pytest.mark.slow  # the notebook of the same is run by `test_notebooks`, enhanced conditions included
-def test_the_stress_rate_is_found_among_what_resembles_it(tmp_path: Path) -> None:
+def test_the_stress_rate_is_found_among_similar_effects(tmp_path: Path) -> None:
     """Among the three candidates that leave the most similar traces, and one that everybody thinks of."""
     _found(_closed(tmp_path, "liang", '"enhanced_conditions", "minor_loops", "phase_resistance", "latent_heat"'))
 
 
 @pytest.mark.slow
-def test_the_stress_rate_is_found_among_all(tmp_path: Path) -> None:
+def test_the_stress_rate_is_found_among_all_effects(tmp_path: Path) -> None:
     _found(_closed(tmp_path, "liang"))
 
 
 @pytest.mark.slow
-def test_the_enhanced_conditions_lack_nothing(tmp_path: Path) -> None:
+def test_a_wire_with_the_enhanced_conditions_lacks_no_effect(tmp_path: Path) -> None:
     answer = _closed(tmp_path, "enhanced")
     assert (answer["verdict"], answer["added"]) == ("adequate", [])

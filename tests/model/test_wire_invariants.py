@@ -138,7 +138,7 @@ def test_one_step_satisfies_the_constitutive_increment() -> None:
     np.testing.assert_allclose(jnp.cumsum(increment), run.stress[1:] - run.stress[0], rtol=1e-8, atol=1.0)
 
 
-def test_at_base_refuses_an_unknown_effect() -> None:
+def test_an_unknown_effect_has_no_base_value() -> None:
     with pytest.raises(KeyError, match="latent_heat"):
         at_base(("latent_heet",))
 

@@ -53,7 +53,7 @@ def test_an_arm_moves_beside_its_phase_diagram(up_and_down: Trajectory, tmp_path
     assert drawn[-1] > 1.2 * drawn[0]
 
 
-def test_upright_it_fits_a_telephone_and_says_how_far_it_is(up_and_down: Trajectory, tmp_path: Path) -> None:
+def test_an_upright_animation_is_narrow_and_reports_its_progress(up_and_down: Trajectory, tmp_path: Path) -> None:
     stages: list[Stage] = []
 
     def progress(event: Event) -> None:
@@ -75,7 +75,7 @@ def test_upright_it_fits_a_telephone_and_says_how_far_it_is(up_and_down: Traject
     assert shares[-1] == 1.0
 
 
-def test_a_weight_is_drawn_from_its_inputs(tmp_path: Path) -> None:
+def test_the_animation_of_a_weight_is_drawn(tmp_path: Path) -> None:
     system = build("flexinol_table_3_2", "dead_weight", "flexinol_voltage")
     path = animate_run(system, {"voltage": jnp.full(401, 5.5)}, tmp_path / "weight.gif", 0.02, frames=4)
     pictures = frames(path)
@@ -83,7 +83,7 @@ def test_a_weight_is_drawn_from_its_inputs(tmp_path: Path) -> None:
     assert np.abs(pictures[-1] - pictures[0]).max() > 50.0
 
 
-def test_the_ranges_are_where_the_kinetics_has_them() -> None:
+def test_the_drawn_transformation_ranges_are_those_of_the_kinetics() -> None:
     law = ARM.wire.kinetics
     stress = np.asarray([0.0, 75e6, 200e6])
     found = ranges(law, stress)
@@ -92,7 +92,7 @@ def test_the_ranges_are_where_the_kinetics_has_them() -> None:
         assert found["M_s'"][at] == pytest.approx(float(law.martensite_start) + pulled / 10.3e6)
 
 
-def test_what_cannot_be_drawn_is_told(up_and_down: Trajectory, tmp_path: Path) -> None:
+def test_a_load_that_cannot_be_animated_is_an_error(up_and_down: Trajectory, tmp_path: Path) -> None:
     coupon = build("niti_table_3_1", "coupon", "none")
     with pytest.raises(ValueError, match="Coupon moves nothing"):
         animate(coupon, up_and_down, tmp_path / "a.gif")

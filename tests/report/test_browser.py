@@ -1,6 +1,6 @@
 """Pages in a browser: whole, readable on a telephone and on a desk, asking nobody for anything; and each fault is seen.
 
-Those of `identify`, `sweep` and `tune` are looked at where they are made: test_identify, test_sweep, test_tune.
+Those of `identify`, `sweep` and `tune` are looked at where they are made: test_identify, test_sweep, test_tuning_folder; of figures: test_figures_page.
 """
 
 from __future__ import annotations
@@ -14,52 +14,27 @@ import numpy as np
 from PIL import Image
 
 from smajax.control.run_request import LoopRequest, RunRequest, run_closed
-from smajax.core.progress import quiet
 from smajax.report.plain_page import table, whole
 from smajax.report.simulate_page import write_run
 from smajax.report.write import write_report
-from studies.source.catalogue import CHAPTERS
-from studies.source.write import Drawn, as_page, draw, lying_in
 from tests.helpers.in_browser import HOSTILE, faults
 from tests.helpers.made_findings import made_findings
 
 
-def test_the_report_of_a_closed_loop(browser: Any, tmp_path: Path) -> None:
+def test_the_report_has_no_fault_in_a_browser(browser: Any, tmp_path: Path) -> None:
     found = made_findings()
     names = ("step", HOSTILE, "sine")
     runs = tuple(dataclasses.replace(run, name=name) for run, name in zip(found.runs, names, strict=True))
     assert faults(browser, write_report(dataclasses.replace(found, title=HOSTILE, runs=runs), tmp_path)) == []
 
 
-def test_the_page_of_a_run(browser: Any, tmp_path: Path) -> None:
+def test_the_page_of_a_run_has_no_fault_in_a_browser(browser: Any, tmp_path: Path) -> None:
     several = LoopRequest("pid", "30deg:3s,10deg:3s", mismatch={"convection_coefficient": "120"})
     ran = run_closed(RunRequest(dt=0.01), several)
     assert faults(browser, write_run(ran, tmp_path, HOSTILE, f"smajax simulate --out {HOSTILE}", animated=True)) == []
 
 
-def test_pictures_of_figures_fit_a_telephone(browser: Any, tmp_path: Path) -> None:
-    """Drawn here the panels stand below one another; a folder that an older version wrote has the wide picture alone."""
-    (row,) = [row for row in CHAPTERS["chapter3"] if row.name == "M8"]
-    page = tmp_path / "index.html"
-    page.write_text(as_page(draw([row], tmp_path, True, quiet), tmp_path), encoding="utf-8")
-    shown = browser.new_page(viewport={"width": 400, "height": 900})
-    wider = "() => [...document.querySelectorAll('.scroll:has(img)')].map(box => box.scrollWidth - box.clientWidth)"
-    shown.goto(page.as_uri())
-    assert shown.evaluate(wider) == [0]
-    (tmp_path / "M8.upright.png").unlink()
-    page.write_text(as_page(lying_in(tmp_path), tmp_path), encoding="utf-8")
-    shown.reload()
-    assert shown.evaluate(wider)[0] > 100
-
-
-def test_the_page_of_figures(browser: Any, tmp_path: Path) -> None:
-    drawn = [Drawn(row, True, HOSTILE, HOSTILE) for row in CHAPTERS["chapter3"][:4]]
-    page = as_page(drawn, Path(__file__).parents[2] / "studies" / "chapter3")
-    (tmp_path / "index.html").write_text(page, encoding="utf-8")
-    assert faults(browser, tmp_path / "index.html") == []
-
-
-def test_a_table_that_moves_sideways_shows_it(browser: Any, tmp_path: Path) -> None:
+def test_a_table_that_continues_sideways_has_an_edge(browser: Any, tmp_path: Path) -> None:
     """A grey edge on the side where there is more, of tables that are wider than a telephone; none at their ends."""
     loop = LoopRequest("pid", "30deg:1s,10deg:1s")
     shown = browser.new_page(viewport={"width": 400, "height": 900})
@@ -111,7 +86,7 @@ FAULTS = {
 }
 
 
-def test_a_fault_is_seen(browser: Any, tmp_path: Path) -> None:
+def test_each_fault_of_a_page_is_detected(browser: Any, tmp_path: Path) -> None:
     # The last two columns are numbers, as which they are not marked.
     rows = [["b", "2", "9 ± 1", "never"], ["a", "10", "10 ± 1", "1e-5"], ["c", "", "–", "3 … 4"]]
     page, good = tmp_path / "page.html", table(["name", "value", "both", "box"], rows, (1,))

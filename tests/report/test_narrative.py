@@ -54,7 +54,7 @@ def test_the_summary_of_an_effect_that_was_found() -> None:
     )
 
 
-def test_what_depends_on_the_step_or_hides_in_the_noise_is_said_at_the_top() -> None:
+def test_effects_that_depend_on_the_step_or_hide_in_the_noise_are_reported_at_the_top() -> None:
     findings = made_findings()
     level = max(pooled_rmse(findings.runs, "fit", "after"), findings.noise_sigma)
     faint = made_effect("creep", "creep", "constitutive", 1e-9, added=False)
@@ -79,7 +79,7 @@ def test_what_depends_on_the_step_or_hides_in_the_noise_is_said_at_the_top() -> 
     assert "looks the same" not in said(missing, 0.5, 0.0, 3.0) + said(adequate, 0.5, 0.0)
 
 
-def test_an_expansion_that_takes_back_the_presets_says_so_and_nothing_of_the_wire() -> None:
+def test_an_expansion_that_cancels_the_presets_is_reported_as_such_and_not_as_the_wires() -> None:
     """As found of two benches whose wires have none, with the preset's theta_T of 0.55 MPa/K left as it is."""
     preset = (0.55e6 / 28e9, 0.55e6 / 75e9)
 
@@ -97,7 +97,7 @@ def test_an_expansion_that_takes_back_the_presets_says_so_and_nothing_of_the_wir
     assert "takes back" not in said(1.88e-5, 7.4e-6, None)
 
 
-def test_a_load_far_off_may_be_a_size_of_the_bench_that_was_never_given() -> None:
+def test_a_load_far_off_is_reported_with_the_sizes_that_were_not_given() -> None:
     """A bench that gives them all, or a share that is small, has the one reading."""
 
     def said(share: float, given: bool) -> str:
@@ -147,7 +147,7 @@ def test_each_cluster_of_correlated_parameters_has_one_line_with_advice() -> Non
     assert any(one.startswith("damping: determined by its prior") for one in limits)
 
 
-def test_a_parameter_at_a_bound_is_said_at_the_top() -> None:
+def test_a_parameter_at_its_bound_is_reported_at_the_top() -> None:
     one = ParameterFinding("recoverable_strain", "-", 0.02, None, 0.01, 0.02, 0.015, Remark(RemarkKind.UPPER_BOUND))
     coefficient = ParameterFinding(
         "latent_heat.enthalpy", "J/kg", 1e5, None, 0.0, 1e5, 1e4, Remark(RemarkKind.UPPER_BOUND)
@@ -196,11 +196,11 @@ def _nothing_added() -> Findings:
         ({"outlier_runs": (OutlierRun("step 6 V", (), True, 1e-3, 2e-5, 3e-3),)}, "in one run alone: without step 6 V"),
     ],
 )
-def test_nothing_is_named_for_a_reason(changed: dict[str, Any], said: str) -> None:
+def test_a_verdict_without_a_named_effect_gives_the_reason(changed: dict[str, Any], said: str) -> None:
     assert said in narrate(dataclasses.replace(_nothing_added(), **changed)).summary[0]
 
 
-def test_an_outlier_beside_what_was_added_is_to_be_minded() -> None:
+def test_an_outlier_run_beside_an_added_effect_is_reported() -> None:
     one = OutlierRun("step 6 V", ("latent_heat",), False, 1e-3, 2e-4, 3e-3)
     assert (
         "Mind: step 6 V does not agree with the others. Fitted without it, the error of the extended model"
@@ -229,11 +229,11 @@ def test_an_outlier_beside_what_was_added_is_to_be_minded() -> None:
         (HeldOutWorse(1e-3, 2e-3), "set aside: error on the held-out runs 1 mm without and 2 mm with it"),
     ],
 )
-def test_why_a_round_ended(reason: Reason, text: str) -> None:
+def test_the_reason_why_the_search_ended_is_reported(reason: Reason, text: str) -> None:
     assert reason_text(reason, "m", "position") == text
 
 
-def test_a_round_is_a_message_while_the_search_runs() -> None:
+def test_progress_of_the_search_is_a_message() -> None:
     events: list[Event] = []
     progress = narrated(events.append, "m", "position")
     progress(Stage("fitting", 0.5))
@@ -281,7 +281,7 @@ def _with_terms(
     return narrate(dataclasses.replace(_nothing_added(), unknown=terms)).summary
 
 
-def test_an_equation_is_named_only_where_no_other_does_as_well() -> None:
+def test_an_equation_is_named_only_if_no_other_explains_as_much() -> None:
     assert "it is in the heat equation" in _with_terms(True)[1]
     assert "it is in the heat equation" in _with_terms(True, "unknown_heat_of_fraction")[1]
     assert "or a stored heat" in _with_terms(True, "unknown_heat_of_fraction")[1]

@@ -95,7 +95,7 @@ def test_the_scheme_is_of_order_three_where_nothing_bends():
     assert errors[1] / errors[2] > 6.0
 
 
-def test_the_estimate_is_of_the_size_of_the_error():
+def test_the_error_estimate_has_the_size_of_the_error():
     """Over 40 ms of an arm on its way, at several moments."""
 
     def run(model, own):
@@ -110,7 +110,7 @@ def test_the_estimate_is_of_the_size_of_the_error():
     assert np.abs(error).max() > 0.0
 
 
-def test_time_ends_where_it_was_asked_to_and_measures_are_kept():
+def test_error_controlled_batches_have_the_requested_samples_and_measures():
     found = run_batch(
         arm(), {}, zipped(voltage=[6.0, 8.0]), seconds=1.0, dt=0.1, measures=(Last("position"),), tolerance=1e-3
     )
@@ -119,7 +119,7 @@ def test_time_ends_where_it_was_asked_to_and_measures_are_kept():
     assert found.attrs["tolerance"] == "0.001"
 
 
-def test_a_series_of_inputs_is_met_at_every_sample():
+def test_error_controlled_steps_meet_every_sample_of_the_inputs():
     """A voltage that is off every second tenth of a second."""
     series = np.where(np.arange(41) % 2 == 0, 7.0, 0.0)
     ours = run_batch(arm(), {"voltage": jnp.asarray(series)}, zipped(payload_mass=[0.06]), dt=0.1, tolerance=1e-5)
@@ -129,6 +129,6 @@ def test_a_series_of_inputs_is_met_at_every_sample():
 
 
 @pytest.mark.parametrize("tolerance", [0.0, -1e-4])
-def test_no_tolerance_at_all_is_refused(tolerance):
+def test_a_tolerance_that_is_not_positive_is_refused(tolerance):
     with pytest.raises(ValueError, match="1e-4"):
         run_batch(arm(), {}, zipped(voltage=[6.0]), seconds=1.0, tolerance=tolerance)

@@ -11,7 +11,7 @@ from smajax.core.parameters import set_parameters
 from smajax.model.presets import build
 from smajax.model.system import System, initial_state
 from smajax.model.wire.conditions import Liang
-from smajax.simulation.simulate import simulate
+from smajax.simulation.compiled import simulate_compiled
 from studies.reference.wire_reference import (
     ArmParameters,
     DeadWeightParameters,
@@ -19,7 +19,7 @@ from studies.reference.wire_reference import (
     simulate_dead_weight,
 )
 
-RUN = eqx.filter_jit(simulate)
+RUN = simulate_compiled
 EVERY = 0.05  # s between compared samples
 
 
@@ -50,7 +50,7 @@ def _ours(volts: float, seconds: float, dt: float):
     return run, slice(None, None, every)
 
 
-def test_partial_transformation_at_7_2_volt() -> None:
+def test_partial_transformation_at_7_2_volt_agrees_with_the_reference() -> None:
     """M2: nothing transforms below A_s', the steady temperature lies inside the range, the fraction stays between."""
     reference = _reference_arm(7.2, 30.0)
     run, at = _ours(7.2, 30.0, 0.005)
@@ -62,7 +62,7 @@ def test_partial_transformation_at_7_2_volt() -> None:
     assert 0.2 < run.martensite_fraction[-1] < 0.9
 
 
-def test_full_transformation_at_7_3_volt(arm_73: dict[str, np.ndarray]) -> None:
+def test_full_transformation_at_7_3_volt_agrees_with_the_reference(arm_73: dict[str, np.ndarray]) -> None:
     """M3: past the angle of greatest stress the range falls through the temperature; the arm ends near 90 degrees."""
     run, at = _ours(7.3, 30.0, 0.005)
     assert np.degrees(np.abs(run.position[at] - arm_73["angle"])).max() < 0.05
@@ -109,7 +109,7 @@ def _swapped_mass(system: System, dt: float):
     return RUN(system, {"voltage": jnp.full(len(time), 7.95), "mass": jnp.asarray(mass)}, dt)
 
 
-def test_mass_removed_and_put_back() -> None:
+def test_removing_and_replacing_the_mass_agrees_with_the_reference() -> None:
     """M13: removing mass transforms further and putting it back leaves the wire shorter, as the reference has it."""
     times = np.arange(0.0, 50.0 + 1e-9, EVERY)
     reference = simulate_dead_weight(DeadWeightParameters(), SWAP, times)

@@ -40,7 +40,7 @@ def _batch(axes: Axes = AXES, **more: object) -> xr.Dataset:
     return run_batch(ARM, {}, axes, seconds=SECONDS, dt=DT, **more)  # type: ignore[arg-type]
 
 
-def test_a_member_is_the_single_run() -> None:
+def test_a_run_of_a_batch_is_the_single_run() -> None:
     found = _batch(every=5)
     assert found.sizes == {"voltage": 3, "payload_mass": 2, "time": 21}
     assert found["position"].attrs["units"] == "rad"
@@ -54,14 +54,14 @@ def test_a_member_is_the_single_run() -> None:
     assert "All 6 runs" in status_summary(found)
 
 
-def test_a_shared_series_and_a_varied_parameter() -> None:
+def test_a_shared_series_and_a_varied_parameter_give_the_single_runs() -> None:
     volts = jnp.concatenate([jnp.full(60, 8.0), jnp.zeros(41)])
     found = run_batch(ARM, {"voltage": volts}, zipped(convection_coefficient=[60.0, 80.0]), dt=DT)
     one = simulate(set_parameters(ARM, {"convection_coefficient": 80.0}), {"voltage": volts}, DT)
     np.testing.assert_allclose(found["temperature"][1], one.temperature, rtol=1e-9)
 
 
-def test_measures_are_those_of_the_trajectory_and_nothing_else_is_kept() -> None:
+def test_measures_are_those_of_the_trajectory_which_is_not_stored() -> None:
     measures = (
         Last("position"),
         Largest("stress"),
@@ -125,7 +125,7 @@ def test_a_cost_of_a_batch_is_differentiated_in_reverse() -> None:
     assert float(by_machine_code(jax.grad(cost))(one) @ along) == pytest.approx(float(forward), rel=1e-9)
 
 
-def test_samples_fill_the_box_and_come_again() -> None:
+def test_samples_fill_the_box_and_repeat_for_a_seed() -> None:
     box = {"voltage": (5.0, 9.0), "payload_mass": (0.04, 0.07)}
     for method in ("sobol", "latin-hypercube", "random"):
         one, other = (sampled(33, box, method=method, seed=3) for _ in range(2))
@@ -137,7 +137,7 @@ def test_samples_fill_the_box_and_come_again() -> None:
     assert (grid(a=[1, 2]) * sampled(5, b=(0.0, 1.0))).shape == (2, 5)
 
 
-def test_members_of_a_slice_are_those_of_the_whole() -> None:
+def test_runs_of_a_slice_are_those_of_the_whole() -> None:
     axes = grid(a=[1.0, 2.0, 3.0]) * zipped(b=[4.0, 5.0], c=[6.0, 7.0])
     whole = axes.runs(0, axes.size)
     assert [*zip(*(whole[name] for name in "abc"), strict=True)][:3] == [(1, 4, 6), (1, 5, 7), (2, 4, 6)]
@@ -166,7 +166,7 @@ def small_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("smajax.simulation.batch.run_batch.chunk_size", lambda *_: 4)
 
 
-def test_chunks_change_nothing(small_chunks: None) -> None:
+def test_the_size_of_chunks_changes_no_number(small_chunks: None) -> None:
     axes = grid(voltage=np.linspace(5.0, 9.0, 11))
     some = _batch(axes)
     np.testing.assert_allclose(
@@ -176,7 +176,7 @@ def test_chunks_change_nothing(small_chunks: None) -> None:
     )
 
 
-def test_what_was_stopped_goes_on_to_the_same_bytes(small_chunks: None, tmp_path: Path) -> None:
+def test_a_stopped_batch_resumes_to_the_same_bytes(small_chunks: None, tmp_path: Path) -> None:
     axes = grid(voltage=np.linspace(5.0, 9.0, 11))
     whole = _batch(axes, out=tmp_path / "whole")
     with pytest.raises(KeyboardInterrupt):
@@ -213,7 +213,7 @@ def test_another_batch_in_the_folder_is_not_touched(tmp_path: Path) -> None:
     assert _files(tmp_path / "batch") == before
 
 
-def test_members_that_go_wrong_are_told_and_disturb_nobody() -> None:
+def test_runs_that_go_wrong_are_reported_and_change_no_other() -> None:
     """A negative loss heats without end; a negative mass of no size at all divides by zero."""
     axes = zipped(convection_coefficient=[70.0, -3000.0, 90.0])
     with pytest.warns(UserWarning, match="1 of 3 values of `convection_coefficient` are out of its bounds, 1 to 5000"):
@@ -245,13 +245,13 @@ def test_members_that_go_wrong_are_told_and_disturb_nobody() -> None:
         (grid(voltage=[6.0]), {"measures": (MeanSquare("position", jnp.zeros((1, 101))),)}, "batches of their own"),
     ],
 )
-def test_what_does_not_fit_together_is_told(axes: Axes, more: dict[str, object], told: str) -> None:
+def test_arguments_that_do_not_fit_together_are_errors(axes: Axes, more: dict[str, object], told: str) -> None:
     with pytest.raises(ValueError, match=told):
         run_batch(ARM, axes=axes, **{"inputs": {}, "seconds": SECONDS, "dt": DT, **more})  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("axes", [AXES, zipped(payload_mass=[0.05, 0.06], voltage=[6.0, 7.0])])
-def test_what_is_varied_has_its_unit_in_memory_and_on_disk(axes: Axes, tmp_path: Path) -> None:
+def test_a_varied_parameter_has_its_unit_in_memory_and_on_disk(axes: Axes, tmp_path: Path) -> None:
     here = _batch(axes, keep=(), measures=(Last("position"),))
     _batch(axes, keep=(), measures=(Last("position"),), out=tmp_path / "batch")
     for found in (here, opened(tmp_path / "batch")):
@@ -259,7 +259,7 @@ def test_what_is_varied_has_its_unit_in_memory_and_on_disk(axes: Axes, tmp_path:
         assert found["payload_mass"].attrs["units"] == "kg"
 
 
-def test_wrong_values_are_told() -> None:
+def test_wrong_values_of_axes_are_errors() -> None:
     with pytest.raises(ValueError, match="one length"):
         zipped(a=[1.0, 2.0], b=[1.0])
     with pytest.raises(ValueError, match="value 1 of `a`"):
@@ -285,7 +285,7 @@ np.save(sys.argv[2], _batch(grid(voltage=np.linspace(5.0, 9.0, 13)))["position"]
 """
 
 
-def test_devices_change_nothing(tmp_path: Path) -> None:
+def test_the_number_of_devices_changes_no_number(tmp_path: Path) -> None:
     folder = Path(__file__).parents[2]
     for count in (1, 4):
         subprocess.run(

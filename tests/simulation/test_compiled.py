@@ -24,6 +24,7 @@ from smajax.simulation.batch.run_batch import run_batch
 from smajax.simulation.compiled import simulate_compiled
 from smajax.simulation.simulate import simulate
 
+pytestmark = pytest.mark.usefixtures("optimised")  # machine code as users have it
 SAMPLES, DT = 241, 0.025
 RIGS = {
     "arm": (build("niti_table_3_1", "arm", "amplified_voltage"), "voltage", 8.0),
@@ -56,7 +57,7 @@ def _same(system: System, inputs: dict[str, jax.Array]) -> None:
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_every_law_is_that_of_xla(law):
+def test_every_law_equals_xla(law):
     system, channel, top = RIGS["arm"]
     _same(dataclasses.replace(system, wire=under_law(system.wire, law)), _inputs(channel, top))
 
@@ -83,7 +84,7 @@ ON_A_WEIGHT = (
         pytest.param("bias_spring", set(LIBRARY), id="bias_spring, all", marks=pytest.mark.slow),
     ],
 )
-def test_every_effect_is_that_of_xla(rig, names):
+def test_every_effect_equals_xla(rig, names):
     """Many effects of the library at once, each a little on."""
     system, channel, top = RIGS[rig]
     full = extended(system, tuple(name for name in LIBRARY if name in names))
@@ -94,7 +95,7 @@ def test_every_effect_is_that_of_xla(rig, names):
     _same(set_parameters(full, on), _inputs(channel, top))
 
 
-def test_derivatives_along_any_direction_are_the_differences():
+def test_derivatives_along_any_direction_agree_with_differences():
     """Forward mode through the whole run, by machine code: every parameter of the arm at once."""
     system, channel, top = RIGS["arm"]
     names = tuple(parameters(system))
@@ -118,7 +119,7 @@ def test_derivatives_along_any_direction_are_the_differences():
     assert close.mean() > 0.98
 
 
-def test_steps_of_its_own_are_told_apart_from_fixed_ones():
+def test_error_controlled_and_fixed_steps_are_programs_of_their_own():
     system, channel, _ = RIGS["arm"]
     few, many = np.full(31, 7.0), np.full(301, 7.0)
     own = simulate_compiled(system, {channel: jnp.asarray(few)}, 0.1, 1e-4)

@@ -48,7 +48,7 @@ ENGINES: dict[str, Engine] = {"arm": "xla"}  # one rig by the other engine
 @pytest.mark.parametrize(
     "case", [pytest.param(case, marks=() if case in OFTEN else pytest.mark.slow) for case in sorted(CASES)]
 )
-def test_every_base_parameter(case: str) -> None:
+def test_derivatives_in_every_base_parameter_agree_with_differences(case: str) -> None:
     compare(CASES[case][0], open_loop(CASES[case][1], DT), engine=ENGINES.get(case, "native"))
 
 
@@ -63,7 +63,7 @@ def test_reverse_mode_agrees_with_forward_mode() -> None:
     assert float(jax.jit(jax.grad(final))(at)) == pytest.approx(float(jax.jit(jax.jacfwd(final))(at)), rel=1e-9)
 
 
-def test_problem_slots_reach_the_parameter_they_name() -> None:
+def test_each_slot_of_a_problem_changes_the_parameter_that_it_names() -> None:
     """A fit that frees one parameter changes that one and nothing else."""
     from smajax.fit.packed_runs import RunBatch
 

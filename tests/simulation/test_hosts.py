@@ -76,7 +76,7 @@ def test_two_processes_give_what_one_gives(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_one_of_four_is_killed_and_the_run_goes_on_with_two(tmp_path: Path) -> None:
+def test_a_run_whose_process_is_killed_resumes_with_fewer_processes(tmp_path: Path) -> None:
     address = _address()
     running = [_start(tmp_path / "killed", address, 4, process, slow="2") for process in range(4)]
     assert running[2].stdout is not None

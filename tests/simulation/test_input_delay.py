@@ -47,7 +47,7 @@ def _late(clock: float, delay: float) -> tuple[np.ndarray, np.ndarray, np.ndarra
 
 
 @pytest.mark.parametrize("clock", [0.02, 0.1])
-def test_a_delay_of_a_part_of_a_step(clock: float) -> None:
+def test_a_delay_of_a_part_of_a_step_agrees_with_scipy(clock: float) -> None:
     """Held over the step, the mean command left 5 noises at 20 ms and 22 at 100 ms."""
     times, position, _ = _late(clock, 0.03)
     assert np.abs(position - _exact(times, 0.03)).max() < 0.1 * NOISE
@@ -55,7 +55,7 @@ def test_a_delay_of_a_part_of_a_step(clock: float) -> None:
 
 # At no delay, where a score test takes it, the first part of the step has no length.
 @pytest.mark.parametrize("delay", [0.0, 0.03])
-def test_the_derivative_by_the_delay(delay: float) -> None:
+def test_the_derivative_in_the_delay_agrees_with_differences(delay: float) -> None:
     times, _, slope = _late(0.1, delay)
     low, high = max(delay - 1e-4, 0.0), delay + 1e-4
     exact = (_exact(times, high) - _exact(times, low)) / (high - low)
@@ -63,7 +63,7 @@ def test_the_derivative_by_the_delay(delay: float) -> None:
     assert np.sqrt(np.mean((slope - exact) ** 2)) < 2e-3 * np.sqrt(np.mean(exact**2))
 
 
-def test_a_constant_command_is_not_late() -> None:
+def test_a_constant_command_has_no_delay() -> None:
     """A batch over levels of the voltage has no series of it."""
     system = extended(build("flexinol_table_3_2", "dead_weight", "voltage"), ("input_delay",))
     levels = zipped({"voltage": [4.0, 6.0], "input_delay.delay": [0.0, 0.03]})

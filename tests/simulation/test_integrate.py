@@ -115,7 +115,7 @@ def test_a_control_acts_once_a_period_and_holds(every: int) -> None:
     assert int(calls) == int(run.control) == 12 // every
 
 
-def test_nothing_else_marches_in_time() -> None:
+def test_only_integrate_marches_in_time() -> None:
     """Scans of these rooms: `integrate`, the stages of one step, and the delay of input series."""
     root = Path(smajax.__file__).parent
     scanning = {

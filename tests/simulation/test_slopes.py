@@ -22,7 +22,7 @@ from smajax.simulation.batch.recipe import BatchSettings, recipe_of
 from smajax.simulation.batch.run_batch import run_batch
 from smajax.simulation.batch.single_run import Recipe, slope_name, without_slopes
 from smajax.simulation.measures import AbstractMeasure, Last, Mean, MeanSquare, TimeAbove
-from tests.engine.test_engine import same_batch
+from tests.helpers.engine_results import same_batch
 from tests.model.test_every_effect import RIGS, _rig
 
 ARM = build("niti_table_3_1", "arm", "amplified_voltage")
@@ -71,12 +71,12 @@ def _same_as_forward(
         )
 
 
-def test_backwards_it_is_what_it_is_forwards() -> None:
+def test_reverse_mode_slopes_agree_with_forward_mode() -> None:
     axes = sampled(13, voltage=(5.5, 8.5), payload_mass=(0.05, 0.09), seed=1)
     _same_as_forward(ARM, {}, axes, (TRACKED, Mean("temperature")), BY, seconds=2.0, dt=0.02)
 
 
-def test_they_are_those_of_differences() -> None:
+def test_slopes_agree_with_differences() -> None:
     change = 1e-4
     volts, mass = np.array([6.0, 7.0, 8.0]), np.array([0.05, 0.06, 0.07])
     found = run_batch(ARM, {}, zipped(voltage=volts, payload_mass=mass), measures=(TRACKED,), slopes=BY, **SPREAD)
@@ -95,7 +95,7 @@ def test_they_are_those_of_differences() -> None:
         )
 
 
-def test_they_have_the_unit_of_the_measure_over_that_of_the_parameter() -> None:
+def test_slopes_have_the_unit_of_the_measure_over_that_of_the_parameter() -> None:
     measures = (Last("position"), Last("velocity"), Mean("temperature"), TRACKED)
     by = (*BY, "convection_coefficient", "start_fraction")
     recipe = recipe_of(ARM, {}, grid(voltage=[6.0]), BatchSettings(measures=measures, slopes=by, **SPREAD))
@@ -109,7 +109,7 @@ def test_they_have_the_unit_of_the_measure_over_that_of_the_parameter() -> None:
     assert convert(1.0, units["mean_temperature_by_convection_coefficient"], "K m^2 K/mW") == pytest.approx(1e-3)
 
 
-def test_they_are_streamed_with_all_else_and_gone_on_with(tmp_path: Path) -> None:
+def test_slopes_are_streamed_to_disk_and_resumed(tmp_path: Path) -> None:
     axes = sampled(40, voltage=(5.5, 8.5), seed=2)
     asked: dict[str, Any] = {"measures": (Last("position"),), "slopes": ("voltage", "damping"), **SPREAD}
     here = run_batch(ARM, {}, axes, **asked)
@@ -136,12 +136,12 @@ def test_they_are_streamed_with_all_else_and_gone_on_with(tmp_path: Path) -> Non
         ({"slopes": ("ambient_temperature",), "inputs": {"ambient_temperature": 25.0}}, "stands in for the parameter"),
     ],
 )
-def test_what_has_no_slopes_is_told(more: dict[str, Any], told: str) -> None:
+def test_measures_and_settings_without_slopes_are_errors(more: dict[str, Any], told: str) -> None:
     with pytest.raises(ValueError, match=told):
         run_batch(ARM, axes=grid(voltage=[6.0]), **{"inputs": {}, "measures": (TRACKED,), **SPREAD, **more})
 
 
-def test_a_member_gone_wrong_spoils_no_other() -> None:
+def test_a_run_that_goes_wrong_spoils_no_slope_of_another() -> None:
     """A wire that melts has no slopes to trust; those beside it are as without it."""
     asked: dict[str, Any] = {"measures": (Last("temperature"),), "slopes": ("voltage",), **SPREAD}
     alone = run_batch(ARM, {}, zipped(voltage=[6.0, 7.0]), **asked)
@@ -151,7 +151,7 @@ def test_a_member_gone_wrong_spoils_no_other() -> None:
 
 
 @pytest.mark.slow
-def test_they_are_those_of_xla() -> None:
+def test_slopes_equal_xla() -> None:
     axes = sampled(13, voltage=(5.5, 8.5), payload_mass=(0.05, 0.09), seed=1)
     asked: dict[str, Any] = {"measures": (TRACKED, Mean("temperature")), "slopes": BY, **SPREAD}
     same_batch(
@@ -164,7 +164,7 @@ def test_they_are_those_of_xla() -> None:
     "effect",
     [name for name in sorted(LIBRARY) if any(LIBRARY[name].candidate.applies(rig[0]) for rig in RIGS.values())],
 )
-def test_with_each_effect_backwards_is_what_it_is_forwards(effect: str) -> None:
+def test_with_each_effect_reverse_mode_agrees_with_forward_mode(effect: str) -> None:
     system, channel, top = RIGS[_rig(effect)]
     full = extended(system, (effect,))
     table = parameters(full)

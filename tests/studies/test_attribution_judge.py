@@ -83,7 +83,7 @@ CASES = {
 
 
 @pytest.mark.parametrize("case", sorted(CASES))
-def test_what_counts_as_right(case: str) -> None:
+def test_an_answer_counts_as_right_for_its_effect_and_its_equation(case: str) -> None:
     one, effect, equation = CASES[case]
     assert (one.effect_right, one.equation_right) == (effect, equation)
 
@@ -113,7 +113,7 @@ def test_errors_are_pooled_in_noises_and_kept_whole(tmp_path: Path) -> None:
     assert load(tmp_path / "one.json") == one
 
 
-def test_tables_and_picture(tmp_path: Path) -> None:
+def test_the_benchmarks_tables_and_picture_are_written(tmp_path: Path) -> None:
     cases: list[Judged] = [one for one, _, _ in CASES.values()]
     cases.append(judge(_truth("null", {}, strength=0.0), _report("adequate", []), 130.0))
     rows, columns, counts = confusion(cases)

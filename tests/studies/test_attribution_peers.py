@@ -98,7 +98,7 @@ def test_what_a_peer_is_handed_leaves_out_what_is_true(bench: Bench, base: Answe
         assert not [name for name in kept.files if any(effect in name for effect in LIBRARY)]
 
 
-def test_an_answer_is_kept_whole(tmp_path: Path) -> None:
+def test_an_answer_is_stored_whole(tmp_path: Path) -> None:
     one = dataclasses.replace(PLAIN, added=("creep",), values={"specific_heat": 0.1})
     save_answer(one, tmp_path / "new" / "one.json")
     assert load(tmp_path / "new" / "one.json") == one
@@ -154,7 +154,7 @@ def _given(weight: float) -> Given:
     return Given("coupon", 0.03, tuple(_series(f"run {k}", k < 4, k, weight) for k in range(6)))
 
 
-def test_states_are_scaled_and_each_is_there_once() -> None:
+def test_states_are_scaled_and_unique() -> None:
     names, states = states_of(_given(0.0))
     # The command of a coupon is its temperature; a constant stress says nothing.
     assert {"temperature", "martensite_fraction", "output", "time"} <= set(names)

@@ -159,7 +159,7 @@ def test_a_log_has_the_times_and_commands_of_the_simulation(name: str) -> None:
         np.testing.assert_allclose(logged[:, 1], run.command, rtol=1e-5)
 
 
-def test_what_is_called_absorbed_is_another_value_of_the_unknowns() -> None:
+def test_an_absorbed_case_is_another_value_of_the_unknowns() -> None:
     """Gain of the voltage and loss to the ends: the same readings as other h_c and c_p without them."""
     rig, run = _short("arm")
     run, rig = replace(run, command=1.1 * run.command[:61]), replace(rig, clock=replace(SHORT, count=61))

@@ -30,7 +30,7 @@ def given(tmp_path_factory: pytest.TempPathFactory) -> tracking.Tracking:
     return made
 
 
-def test_ours_is_the_same_problem(given: tracking.Tracking) -> None:
+def test_the_benchmark_of_smajax_is_the_same_problem(given: tracking.Tracking) -> None:
     # One slope of each member, by all parameters together: a gradient takes ten times as long to compile.
     cost = gradient.cost_of(gradient.tracked_arm(given), given.names, round(tracking.SECONDS / DEFAULT_STEP))
     at = jnp.asarray(given.vector)
@@ -45,7 +45,7 @@ def test_ours_is_the_same_problem(given: tracking.Tracking) -> None:
     assert (np.abs(slope - given.slopes @ np.asarray(ahead)) < tracking.LIMIT * norm).all()
 
 
-def test_an_error_of_one_slope_is_seen(given: tracking.Tracking) -> None:
+def test_an_error_of_one_slope_is_detected(given: tracking.Tracking) -> None:
     for name in ("amplifier_gain", tracking.UNKNOWN):
         off = given.slopes.copy()
         off[1, given.names.index(name)] *= 1.1
@@ -54,13 +54,15 @@ def test_an_error_of_one_slope_is_seen(given: tracking.Tracking) -> None:
     assert given.error(np.full_like(given.slopes, np.nan)) == float("inf")
 
 
-def test_slopes_do_not_hang_on_the_differences(given: tracking.Tracking, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_slopes_do_not_depend_on_the_steps_of_differences(
+    given: tracking.Tracking, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(tracking, "DIFFERENCE", 3e-5)
     _, slopes = tracking._solved(given.constants, given.solved)
     assert given.error(slopes) < 1e-2 * tracking.LIMIT
 
 
-def test_page_tells_of_every_way(tmp_path: Path) -> None:
+def test_the_page_lists_every_way(tmp_path: Path) -> None:
     by = {
         "members": 100,
         "ways": [
@@ -88,7 +90,7 @@ def test_page_tells_of_every_way(tmp_path: Path) -> None:
     assert "0.2 ms (tsit5_replay) a run more" in page
 
 
-def test_page_without_these_parts_says_so() -> None:
+def test_a_page_without_these_parts_says_so() -> None:
     page = told(MACHINE, {"numba": {"peer": "numba", "reason": "not installed here: set IT"}})
     assert "| numba, float64 | not installed here: set IT | | | | |" in page
     assert "beside others" not in page

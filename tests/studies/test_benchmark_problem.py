@@ -66,7 +66,7 @@ def test_numbas_program_is_as_accurate_as_asked(exact: Given) -> None:
     assert not exact.meets(coarse)
 
 
-def test_fewer_members_are_the_first_of_more() -> None:
+def test_a_smaller_batch_is_the_beginning_of_a_larger_one() -> None:
     few, many = problem.members(5), problem.members(64)
     assert all(np.array_equal(few[name], many[name][:5]) for name in few)
 

@@ -63,7 +63,7 @@ def _simulated(system: System, members: np.ndarray) -> Trajectory:
 
 
 @pytest.mark.parametrize("build", [arm, _swinging])
-def test_every_sample_agrees(program: Path, build: Callable[[], System]):
+def test_every_sample_of_the_cpp_program_agrees(program: Path, build: Callable[[], System]):
     members = _members(8)
     ours = _simulated(build(), members)
     theirs = cpp.run(program, build(), members, DT, STEPS, recorded=len(members))

@@ -28,7 +28,7 @@ MARKED = [
 
 
 @pytest.mark.parametrize("row", MARKED)
-def test_the_claim_holds(row: Row) -> None:
+def test_the_claim_of_each_figure_holds(row: Row) -> None:
     result = row.work(True)
     assert result.holds != (row.name in CONTRADICTED), f"{row.claim}: {result.found}; {result.numbers}"
     assert result.holds or result.caveat
@@ -43,7 +43,7 @@ def test_the_claim_holds(row: Row) -> None:
     assert {axes.get_subplotspec().get_gridspec().ncols for axes in upright.axes} == {1}, row.name  # type: ignore[union-attr]
 
 
-def test_chapter_three_is_whole() -> None:
+def test_every_figure_of_chapter_three_has_a_row() -> None:
     assert [row.name for row in CHAPTERS["chapter3"]] == [f"M{k}" for k in range(1, 20)]
 
 

@@ -82,7 +82,7 @@ def test_the_worst_plant_is_the_one_that_fails_at_most_set_points() -> None:
     assert (told["fails"], told["of"]) == (85, 126)
 
 
-def test_what_is_kept_is_not_run_again(results: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_stored_results_are_not_computed_again(results: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def never(*_: object) -> None:
         raise AssertionError("run again")
 
@@ -90,7 +90,7 @@ def test_what_is_kept_is_not_run_again(results: Path, monkeypatch: pytest.Monkey
     run.compare(results, (run.FAST_PROBLEM,), CANDIDATES, again=False, seeds_of=run.FAST_WAYS)
 
 
-def test_the_kept_results_are_whole() -> None:
+def test_the_stored_results_are_complete() -> None:
     """The README's tables are of these: every problem by every way, and every controller."""
     whole = kept(record.HERE / "results.json")
     names = {f"{one.name}; {way}; {seed}" for one in PROBLEMS for way, seeds in run.WAYS.items() for seed in seeds}

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.stats import qmc
+import scipy  # its parts are imported when they are first used
 
 from smajax.control.tune import adam, trust
 from smajax.control.tune.evaluate import TuningProblem
@@ -98,7 +98,7 @@ def begin(
     """The starts: `first` (a point of the cube), and the best of the points tried."""
     gains, wanted = len(problem.names), effort.starts - (first is not None)
     count = max(effort.tried, wanted, 1)
-    drawn = qmc.Sobol(gains, rng=effort.seed).random_base2(int(np.ceil(np.log2(count))))[:count]
+    drawn = scipy.stats.qmc.Sobol(gains, rng=effort.seed).random_base2(int(np.ceil(np.log2(count))))[:count]
     drawn = EDGE + (1.0 - 2.0 * EDGE) * drawn
     if 0 < wanted < len(drawn):
         some = Scenarios(scenarios.rows[scenarios.nominal], scenarios.nominal[scenarios.nominal])

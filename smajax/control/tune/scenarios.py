@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import qmc
+import scipy  # its parts are imported when they are first used
 
 from smajax.control.mismatch import MISMATCHES
 from smajax.control.sweep.grid import loop_rows
@@ -79,7 +79,7 @@ def tuned_on(targets: Sequence[float], variation: Mapping[str, float], seed: int
 
 
 def _drawn(variation: Mapping[str, float], count: int, seed: int) -> list[dict[str, float]]:
-    shares = qmc.Sobol(len(variation), rng=seed).random_base2(int(np.ceil(np.log2(count))))[:count]
+    shares = scipy.stats.qmc.Sobol(len(variation), rng=seed).random_base2(int(np.ceil(np.log2(count))))[:count]
     return [
         {name: 1.0 + (2.0 * one - 1.0) * share for one, (name, share) in zip(row, variation.items(), strict=True)}
         for row in shares

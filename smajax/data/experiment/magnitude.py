@@ -6,8 +6,7 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
 import numpy as np
-from scipy.signal import lfilter
-from scipy.stats import spearmanr
+import scipy  # its parts are imported when they are first used
 
 from smajax.data.experiment.column_guess import in_levels
 from smajax.data.experiment.model_description import Scale
@@ -163,9 +162,9 @@ def _following(
             if len(given) < len(heats) or there.sum() < LEAST or np.ptp(output[there]) == 0.0:
                 continue
             power = scale.warming(given)
-            warm = [lfilter([share], [1.0, share - 1.0], power)[there] for share in shares]
+            warm = [scipy.signal.lfilter([share], [1.0, share - 1.0], power)[there] for share in shares]
             if np.ptp(warm[0]) > 0.0:
-                result.append(np.asarray([spearmanr(one, output[there]).statistic for one in warm]))
+                result.append(np.asarray([scipy.stats.spearmanr(one, output[there]).statistic for one in warm]))
         if result:
             following[name] = result
     return following

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import qmc
+import scipy  # its parts are imported when they are first used
 
 METHODS = ("sobol", "latin-hypercube", "random")
 
@@ -119,9 +119,9 @@ def sampled(
     low, high = (np.asarray([pair[side] for pair in box.values()], dtype=float) for side in (0, 1))
     if method == "sobol":
         # Drawn up to a power of two, where the sequence is balanced, and cut: scipy warns of any other count.
-        shares = qmc.Sobol(len(box), rng=seed).random_base2(int(np.ceil(np.log2(count))))[:count]
+        shares = scipy.stats.qmc.Sobol(len(box), rng=seed).random_base2(int(np.ceil(np.log2(count))))[:count]
     elif method == "latin-hypercube":
-        shares = qmc.LatinHypercube(len(box), rng=seed).random(count)
+        shares = scipy.stats.qmc.LatinHypercube(len(box), rng=seed).random(count)
     elif method == "random":
         shares = np.random.default_rng(seed).random((count, len(box)))
     else:

@@ -1,12 +1,9 @@
-"""`smajax doctor`, `bench` and `new-experiment`: what they say is so."""
+"""`smajax new-experiment`: an experiment file generated from logs loads without edits, and says what is missing."""
 
 from __future__ import annotations
 
 import json
-import os
 import re
-import subprocess
-import sys
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
@@ -17,9 +14,6 @@ import scipy.io
 import xarray as xr
 from typer.testing import CliRunner
 
-from smajax.cli import installation as doctor
-from smajax.cli.benchmark import benchmark
-from smajax.cli.commands.bench import as_lines
 from smajax.cli.main import app
 from smajax.core.parameters import parameter_values
 from smajax.data.experiment.column_guess import columns_of
@@ -31,72 +25,9 @@ from smajax.data.readers.read import read_table
 from smajax.data.readers.table import MeasuredDataError
 from smajax.fit.base_model import base_model
 from smajax.model.presets import build
+from tests.helpers.command_line import DEMO
 
 run = CliRunner()
-PLAIN = {name: value for name, value in os.environ.items() if name != "JAX_ENABLE_X64"}
-DEMO = Path(__file__).parents[2] / "smajax" / "data" / "demo" / "latent"
-
-
-def test_the_doctor_finds_what_is_missing() -> None:
-    found = doctor.examine()
-    assert found["float64"]
-    assert found["engine"] == {"runs": "native", "why": "", "vector_bits": found["engine"]["vector_bits"]}
-    assert found["engine"]["vector_bits"] in (128, 256, 512)
-    assert found["packages"]["jax"]
-    assert found["memory"]["available_bytes"] is None or found["memory"]["available_bytes"] > 1 << 20
-    ill = {**found, "float64": False, "packages": {**found["packages"], "optax": ""}}
-    ill["compiled programs"] = {**found["compiled programs"], "writable": False}
-    told = " ".join(doctor.remarks(ill))
-    assert "optax is not installed" in told
-    assert "jax_enable_x64" in told
-    assert "JAX_COMPILATION_CACHE_DIR" in told
-
-
-def test_the_doctor_asks_nobody_for_the_tools_of_developers(monkeypatch: pytest.MonkeyPatch) -> None:
-    lines = [
-        "jax>=0.7",
-        "h5py>=3.11; extra == 'dev'",
-        "h5py>=3.11; extra == 'formats'",
-        "jax[cuda12]>=0.7; extra == 'cuda12'",
-    ]
-    lines += ["mkdocs<2; extra == 'docs'", 'no-such-tool>=9.0; python_version > "3" and extra == "dev"']
-    monkeypatch.setattr("importlib.metadata.requires", lambda package: lines)
-    found = doctor.examine(engine=False)
-    assert set(found["packages"]) == {"jax"}
-    assert set(found["packages of extras"]) == {"h5py"}
-
-
-def test_the_doctor_speaks_of_float64_in_the_commands_and_in_a_program() -> None:
-    """Without what it says to do, a program of one's own has float32; with it, float64."""
-    told = run.invoke(app, ["doctor"]).output
-    assert "float64: on in the commands; a program of your own switches it on itself" in told
-    assert "smajax.prepare()" in told
-    shown = "print(jax.numpy.zeros(1).dtype)"
-    for lines, expected in ((shown, "float32"), (f"smajax.prepare(); {shown}", "float64")):
-        words = [sys.executable, "-c", f"import jax, smajax; {lines}"]
-        ended = subprocess.run(words, capture_output=True, text=True, timeout=120, check=True, env=PLAIN)
-        assert ended.stdout.strip() == expected
-
-
-def test_only_compiled_programs_are_cleared(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("JAX_COMPILATION_CACHE_DIR", str(tmp_path))
-    (tmp_path / "jit_f-abc-cache").write_bytes(b"x" * 1000)
-    (tmp_path / "lanes").mkdir()
-    (tmp_path / "lanes" / ("0a" * 32)).write_bytes(b"x" * 500)
-    (tmp_path / "lanes" / "notes").write_text("mine")
-    (tmp_path / "native").mkdir()
-    (tmp_path / "native" / ("0b" * 32)).write_bytes(b"x" * 500)
-    (tmp_path / "thesis.tex").write_text("mine")
-    assert doctor.clear_cache() == 2000
-    assert sorted(one.name for one in tmp_path.rglob("*")) == ["lanes", "native", "notes", "thesis.tex"]
-
-
-def test_the_bench_compares_the_same_trajectories() -> None:
-    found = benchmark(count=64, peers=2)
-    assert found["agree"]
-    assert 0.0 < found["largest_difference_degrees"] < 0.1
-    assert found["ratio"] == pytest.approx(found["scipy_ms"] / found["smajax_ms"])
-    assert found["machine"]["processor"] in as_lines(found)[0]
 
 
 def test_a_template_loads_as_it_is(tmp_path: Path) -> None:
@@ -115,7 +46,7 @@ def test_a_template_loads_as_it_is(tmp_path: Path) -> None:
     ("heading", "asked"),
     [("displacement [mm]", "damping"), ("angle [deg]", "pulley_radius"), ("mass [g]", "wire_length")],
 )
-def test_a_template_lists_what_a_bench_should_tell(tmp_path: Path, heading: str, asked: str) -> None:
+def test_a_template_lists_the_sizes_that_a_bench_should_give(tmp_path: Path, heading: str, asked: str) -> None:
     """With the preset's values, which may be taken as they stand."""
     headings = ["time [s]", "U [V]", heading] + ["displacement [mm]"] * heading.startswith("mass")
     rows = [[k / 10, 5.0 * (k % 20 > 9), *[3.0 + np.sin(k / 9)] * (len(headings) - 2)] for k in range(200)]
@@ -136,7 +67,7 @@ def test_a_template_lists_what_a_bench_should_tell(tmp_path: Path, heading: str,
         assert after[name] == pytest.approx(before[name], rel=1e-3)
 
 
-def test_a_template_sends_nobody_to_a_file_that_is_not_installed(tmp_path: Path) -> None:
+def test_a_template_refers_only_to_installed_files(tmp_path: Path) -> None:
     log = _bench_log(tmp_path / "log.csv", "Zeit/ms;U/V;Weg/mm", lambda k: str(100 * k))
     text = draft([log], tmp_path / "e.toml").text
     (page,) = re.findall("the page '(.*)'", text)
@@ -160,7 +91,7 @@ def test_the_other_load_can_be_asked_for_and_a_wrong_one_is_refused(tmp_path: Pa
     assert not (tmp_path / "f.toml").exists()
 
 
-def test_a_log_of_commas_before_three_decimals_is_begun_with_its_mark(tmp_path: Path) -> None:
+def test_a_log_of_ambiguous_commas_gets_a_decimal_key(tmp_path: Path) -> None:
     rows = [f"{k};{5 * (k % 20 > 9)};{k // 100 + 1},{k % 100:03}" for k in range(200)]
     (tmp_path / "log.csv").write_text("\n".join(["time [s];U [V];displacement [mm]", *rows]))
     asked = ["new-experiment", str(tmp_path / "log.csv"), "--out", str(tmp_path / "e.toml")]
@@ -183,7 +114,7 @@ def _angle_log(path: Path) -> Path:
     return path
 
 
-def test_the_boxes_are_those_of_the_wire_that_is_asked_for(tmp_path: Path) -> None:
+def test_bounds_are_those_of_the_chosen_wire(tmp_path: Path) -> None:
     log, out = str(_angle_log(tmp_path / "log.csv")), tmp_path / "e.toml"
     chosen = ["--wire", "flexinol_table_3_2", "--drive", "amplified_voltage"]
     told = run.invoke(app, ["new-experiment", log, *chosen, "--out", str(out)])
@@ -196,7 +127,7 @@ def test_the_boxes_are_those_of_the_wire_that_is_asked_for(tmp_path: Path) -> No
     assert not any("box" in one for one in loaded.warnings)
 
 
-def test_boxes_that_stay_when_the_wire_is_changed_are_told(tmp_path: Path) -> None:
+def test_bounds_of_another_wire_are_a_warning(tmp_path: Path) -> None:
     """With the value, the box and the command that writes others."""
     text = draft([_angle_log(tmp_path / "log.csv")], tmp_path / "e.toml").text
     (tmp_path / "e.toml").write_text(text.replace("niti_table_3_1", "flexinol_table_3_2"))
@@ -360,7 +291,7 @@ def test_times_and_units_as_german_loggers_write_them(
 
 
 @pytest.mark.parametrize("end", ["\nEnde;5;1", "\n3;5;1"])
-def test_a_time_that_cannot_be_read_is_said_first(tmp_path: Path, end: str) -> None:
+def test_an_unreadable_time_is_reported_first(tmp_path: Path, end: str) -> None:
     log = _bench_log(tmp_path / "log.csv", "Zeit;U [V];x [mm]", lambda k: str(k / 10), end)
     told = run.invoke(app, ["new-experiment", str(log), "--out", str(tmp_path / "e.toml")])
     first, *_, last = told.output.splitlines()
@@ -377,7 +308,7 @@ def test_a_time_that_cannot_be_read_is_said_first(tmp_path: Path, end: str) -> N
     assert why in " ".join(told.output.splitlines()[1:])
 
 
-def test_a_unit_that_there_is_none_of_is_said_of_its_column(tmp_path: Path) -> None:
+def test_an_unknown_unit_is_reported_with_its_column(tmp_path: Path) -> None:
     log = _bench_log(tmp_path / "log.csv", "t/s;U/V;disp [furlonx]", lambda k: str(k / 10))
     told = draft([log], tmp_path / "e.toml").messages
     assert any(
@@ -395,7 +326,7 @@ def test_every_column_that_is_left_out_is_listed_with_its_line(tmp_path: Path) -
     assert any("note: left out (line 2, column 'note': 'warm' is not a number" in line for line in told)
 
 
-def test_files_that_began_at_different_clock_times_are_laid_side_by_side(tmp_path: Path) -> None:
+def test_files_that_began_at_different_clock_times_are_aligned(tmp_path: Path) -> None:
     for name, late in (("U [V]", 0), ("x [mm]", 20)):
         rows = [f"10:00:{(k + late) // 10:02}.{(k + late) % 10};{np.sin((k + late) / 9):.3f}" for k in range(60)]
         (tmp_path / f"{name[0]}.csv").write_text("\n".join([f"time;{name}", *rows]))
@@ -409,7 +340,7 @@ def test_files_that_began_at_different_clock_times_are_laid_side_by_side(tmp_pat
         load_experiment(tmp_path / "e.toml", CATALOGUE)
 
 
-def test_what_the_model_needs_and_no_column_gives_is_said(tmp_path: Path) -> None:
+def test_an_input_that_no_column_gives_is_reported(tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text("time,displacement\n" + "\n".join(f"{k / 10},{np.sin(k / 9)}" for k in range(60)))
     guessed = draft([tmp_path / "log.csv"], tmp_path / "e.toml")
     assert any("voltage: MISSING" in line for line in guessed.messages)

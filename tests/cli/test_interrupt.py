@@ -1,0 +1,70 @@
+"""Ctrl-C ends a command and says what is cached."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+
+def test_ctrl_c_ends_a_command_with_130(tmp_path: Path) -> None:
+    command = [
+        sys.executable,
+        "-c",
+        "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); from smajax.cli.main import main; main()",
+        "demo",
+        "--only",
+        "complete",
+        "--out",
+        "out",
+    ]
+    # A shell that runs its tests in the background has them ignore Ctrl-C, and what they start as well.
+    with subprocess.Popen(
+        command,
+        cwd=tmp_path,
+        stderr=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        text=True,
+        env={**os.environ, "SMAJAX_PROGRESS": "lines"},
+    ) as run:
+        assert run.stderr is not None
+        assert "points of the box" in run.stderr.readline()  # the base fit has begun
+        run.send_signal(signal.SIGINT)
+        said = run.stderr.read()
+    assert run.returncode == 130, said
+    assert "Interrupted. Nothing was finished: the same command starts from the beginning." in said
+
+
+@pytest.mark.parametrize("finished", [True, False])
+def test_an_interrupted_command_mentions_cached_work_only_if_there_is_some(tmp_path: Path, finished: bool) -> None:
+    (tmp_path / "fits").mkdir()
+    if finished:
+        (tmp_path / "fits" / f"{'0f' * 16}.npz").write_text("")
+    code = (
+        "import pathlib, sys\nfrom smajax.cli.options import FITS\nfrom smajax.cli.terminal import resumable\n"
+        "with resumable('Kept.', pathlib.Path(sys.argv[1]), FITS):\n    raise KeyboardInterrupt"
+    )
+    told = subprocess.run([sys.executable, "-c", code, str(tmp_path)], capture_output=True, text=True, check=False)
+    assert told.returncode == 130
+    assert ("Interrupted. Kept." in told.stderr) is finished
+
+
+def test_ctrl_c_while_garbage_is_collected_ends_the_command() -> None:
+    """What a callback of the collector raises is dropped by Python: Ctrl-C is given again until it is answered."""
+    code = (
+        "import gc, os, signal, time\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        "from smajax.cli.terminal import resumable\n"
+        "def swallow(phase, info):\n    gc.callbacks.remove(swallow)\n    os.kill(os.getpid(), signal.SIGINT)\n"
+        "    time.sleep(0.1)\n"
+        "with resumable():\n    gc.callbacks.append(swallow)\n    gc.collect()\n    print('went on', flush=True)\n"
+        "    time.sleep(20)"
+    )
+    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert "Exception ignored" in told.stderr
+    assert told.stdout == "went on\n"
+    assert told.returncode == 130
+    assert "Interrupted." in told.stderr

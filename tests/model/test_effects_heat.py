@@ -1,0 +1,78 @@
+"""Effects of the heat balance against closed forms."""
+
+from __future__ import annotations
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from smajax.model.effects.end_conduction import DEPTH, EndConduction
+from smajax.model.extended import extended
+from smajax.model.wire.heat import mass_per_metre
+from smajax.simulation.compiled import simulate_compiled
+from tests.helpers.effect_rigs import DT, RIGS, heat_lost, resistance, settled
+
+
+def test_a_draught_cools_from_its_time_on() -> None:
+    draught = {"draught.change": 0.5, "draught.time": 20.0, "draught.width": 0.1}
+    system = extended(RIGS["dead_weight"][0], ("draught",), draught)
+    run = simulate_compiled(system, {"voltage": jnp.full(801, 5.0)}, DT)
+    calm, blown = (heat_lost(system, float(run.temperature[at])) for at in (360, 800))
+    # Martensite all the time, so that the power is the same: the loss is it in both cases.
+    assert run.martensite_fraction.min() > 0.999
+    assert 1.5 * blown == pytest.approx(calm, rel=1e-6)
+
+
+def test_a_specific_heat_by_phase_changes_the_time_and_not_the_end_state() -> None:
+    plain, other = (settled("phase_specific_heat", {"contrast": a}, voltage=8.0)[1] for a in (0.0, 0.3))
+    assert plain.martensite_fraction < 1e-6
+    assert other.temperature == pytest.approx(plain.temperature, rel=1e-6)
+    # All austenite, cooled from there: the time constant m c_p/(h_c pi d) is longer by the contrast.
+    system = RIGS["dead_weight"][0]
+    inputs = {"voltage": jnp.where(jnp.arange(1001) < 600, 8.0, 0.0)}
+    rates = []
+    for a in (0.0, 0.3):
+        run = simulate_compiled(
+            extended(system, ("phase_specific_heat",), {"phase_specific_heat.contrast": a}), inputs, 0.02
+        )
+        assert run.martensite_fraction[604] < 1e-6
+        rates.append(np.log((run.temperature[604] - 23.0) / (run.temperature[600] - 23.0)))
+    assert rates[0] / rates[1] == pytest.approx(1.3, rel=1e-3)
+
+
+@pytest.mark.parametrize("share", [0.0, 1.0])
+def test_the_latent_heat_is_constant_or_follows_kirchhoff(share: float) -> None:
+    """Heat put in over a transformation: that of the phases' specific heats on the way, and k times Kirchhoff's change."""
+    system = RIGS["dead_weight"][0]
+    on = {"phase_specific_heat.contrast": 0.3, "phase_specific_heat.kirchhoff": share}
+    dt, volts = 2e-3, 8.0
+    run = simulate_compiled(
+        extended(system, ("phase_specific_heat",), on), {"voltage": jnp.full(round(20.0 / dt) + 1, volts)}, dt
+    )
+    wire = system.wire
+    assert run.martensite_fraction[-1] < 1e-6
+    temperature, fraction = np.asarray(run.temperature), np.asarray(run.martensite_fraction)
+    power = volts**2 / np.asarray([resistance(system, one) for one in fraction]) / float(wire.wire_length)
+    given = float(np.trapezoid(power - np.asarray([heat_lost(system, one) for one in temperature]), dx=dt))
+    m_c = float(mass_per_metre(wire) * wire.heat.specific_heat)
+    law = wire.kinetics
+    neutral = 0.5 * float(law.martensite_start + law.austenite_finish)
+    own = m_c * np.trapezoid(1.0 + 0.3 * (1.0 - fraction), temperature)
+    change = -0.3 * m_c * np.trapezoid(temperature - neutral, fraction)
+    assert abs(change) > 0.01 * own
+    assert given == pytest.approx(own + share * change, rel=1e-3)
+
+
+def test_heat_lost_to_the_ends_is_that_of_a_fin() -> None:
+    """Pieces of the two zones against the fin's own profile: the mean austenite of a wire whose pieces switch at z = 1/2."""
+    half = 30.0  # mu l_0/2
+    share = DEPTH / half
+    effect = EndConduction(share=share, above_air_heating=5.0, above_air_cooling=3.0)
+    for z in (2.0, 4.0, 8.0, 15.0):
+        s = np.linspace(0.0, half, 200_001)
+        own = (z + 5.0) * (1.0 - np.cosh(s) / np.cosh(half)) - 5.0
+        exact = float(np.mean(1.0 / (1.0 + np.exp(np.clip(2.0 * np.pi * (own - 0.5), -700, 700)))))
+        found = float(effect.heating_shape(jnp.asarray(z), jnp.zeros(())))
+        # Four pieces: within a piece of the exact mean.
+        assert abs(found - exact) < share / 4
+        assert found > 0.0
