@@ -8,7 +8,7 @@ READY := $(VENV)/.ready
 # The demo's pages are opened where a person looks, not in a build.
 OPEN = $$(test -t 2 && test -z "$$CI" && echo --open)
 
-.PHONY: demo test test-studies test-all coverage audit docs lint format package clean
+.PHONY: demo test pytest test-studies test-all coverage audit docs lint format package clean
 
 demo: $(READY)
 	SMAJAX_PROGRESS=lines $(BIN)/smajax demo --out demo-report $(OPEN)
@@ -17,7 +17,11 @@ demo: $(READY)
 PYTEST = $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 STUDIES = tests/studies tests/documentation/test_notebooks.py
 
-test: lint
+# Beside one another: mypy takes half a minute on one core.
+test: $(READY)
+	@$(MAKE) --no-print-directory -j 2 lint pytest
+
+pytest: $(READY)
 	$(PYTEST) $(STUDIES:%=--ignore=%)
 
 # What was found with the package rather than the package: the source's figures, the studies' records, the notebooks.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import atexit
 import gc
+import io
 import os
 import shutil
 import tempfile
@@ -12,6 +13,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from matplotlib.figure import Figure
+from PIL import Image
 
 from smajax.core.runtime import prepare
 from smajax.engine import kernel
@@ -44,24 +47,29 @@ gc.set_threshold(100_000, 20, 50)
 # Files that take longest, longest first (CPU time of a run without cached programs). A worker takes a whole file, in which the
 # tests of a rig share traced and compiled programs; a long one begun last would keep one worker busy alone.
 LONGEST = (
-    "attribution/test_close_loop",
-    "model/test_law_gradients",
     "attribution/test_coloured_noise",
-    "attribution/test_honest_numbers",
-    "attribution/test_search",
+    "simulation/test_compiled",
+    "model/test_law_gradients",
+    "model/test_plugins",
+    "attribution/test_unknown",
+    "cli/test_faults",
+    "report/test_browser",
+    "control/test_estimators",
+    "engine/test_engine_facade",
+    "cli/test_cli_simulate",
+    "fit/test_integration",
+    "model/test_laws",
+    "simulation/test_batch",
+    "attribution/test_joint_stage",
+    "control/test_backstepping",
+    "cli/test_no_network",
     "studies/test_figures",
     "documentation/test_notebooks",
-    "simulation/test_compiled",
-    "model/test_laws",
-    "control/test_estimators",
-    "simulation/test_batch",
-    "control/test_controllers",
-    "model/test_every_effect",
-    "control/test_tune",
-    "control/test_closed_loop",
-    "engine/test_engine_facade",
+    "attribution/",
     "fit/",
-    "cli/",
+    "control/",
+    "model/",
+    "engine/",
     "simulation/",
 )
 
@@ -86,6 +94,25 @@ def measured_data() -> Path:
     if not folder.is_dir():
         pytest.skip(f"no measured data at {folder}: set SMAJAX_DATA to the folder that holds them")
     return folder
+
+
+@pytest.fixture
+def drawn() -> None:
+    """Pictures are drawn in this test, in a file in which others do without (`blank_pictures`)."""
+
+
+@pytest.fixture
+def blank_pictures(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A page's pictures are blank, for tests of its words and numbers: to draw them took more than half of their time."""
+    if {"drawn", "browser"} & set(request.fixturenames):
+        return
+    picture = io.BytesIO()
+    Image.new("RGB", (2, 2), "white").save(picture, format="png")
+
+    def savefig(_: Figure, stream: io.BytesIO, **__: Any) -> None:
+        stream.write(picture.getvalue())
+
+    monkeypatch.setattr(Figure, "savefig", savefig)
 
 
 @pytest.fixture

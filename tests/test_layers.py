@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -31,7 +32,10 @@ def imported(module: str) -> Iterator[str]:
         yield from (name for name in names if name in MODULES and name != module)
 
 
-IMPORTS = {module: set(imported(module)) for module in MODULES}
+@cache
+def imports() -> dict[str, set[str]]:
+    """Of each module; every worker collects this file, and one runs it."""
+    return {module: set(imported(module)) for module in MODULES}
 
 
 def place(module: str) -> float:
@@ -42,13 +46,13 @@ def place(module: str) -> float:
 
 def test_imports_point_to_rooms_on_the_left():
     rooms = {module for module in MODULES if module.split(".")[1:2] and module.split(".")[1] in ORDER}
-    up = {(module, other) for module in rooms for other in IMPORTS[module] if place(other) > place(module)}
+    up = {(module, other) for module in rooms for other in imports()[module] if place(other) > place(module)}
     assert not up, f"the order is {' < '.join(ORDER)}"
 
 
 def test_no_circle_among_modules():
     try:
-        TopologicalSorter(IMPORTS).prepare()
+        TopologicalSorter(imports()).prepare()
     except CycleError as circle:
         raise AssertionError(" -> ".join(reversed(circle.args[1]))) from None
 
@@ -69,7 +73,7 @@ def test_imports_within_the_model_point_to_the_left():
     level = {name: k for k, names in enumerate(MODEL) for name in names.split()}
     inside = [module for module in MODULES if module.startswith("smajax.model.")]
     at = {module: level[module.split(".")[2]] for module in inside}
-    up = [(module, other) for module in inside for other in IMPORTS[module] & at.keys() if at[other] > at[module]]
+    up = [(module, other) for module in inside for other in imports()[module] & at.keys() if at[other] > at[module]]
     assert not up, f"the order is {' < '.join(MODEL)}"
 
 

@@ -8,6 +8,8 @@ import pytest
 
 from tests.helpers.small_bench import log, refused, smajax
 
+pytestmark = pytest.mark.usefixtures("blank_pictures")
+
 WIRE = ("flexinol_table_3_2", "dead_weight", "flexinol_voltage")
 SIMULATE = {
     "a wire there is none of": (

@@ -17,6 +17,8 @@ from studies.source.write import MARK as FIGURES_MARK
 from studies.source.write import draw, lying_in, write_pages
 from tests.helpers.small_bench import bench, log, smajax
 
+pytestmark = pytest.mark.usefixtures("blank_pictures")
+
 run = CliRunner()
 
 

@@ -27,6 +27,8 @@ from smajax.model.presets import build
 from smajax.report.simulate_page import as_csv, conclusions, summary_rows, write_run
 from smajax.simulation.compiled import simulate_compiled
 
+pytestmark = pytest.mark.usefixtures("blank_pictures")
+
 run = CliRunner()
 HANGING = ("flexinol_table_3_2", "dead_weight", "flexinol_voltage")
 

@@ -17,6 +17,8 @@ from smajax.core.files import replace, writing
 from smajax.core.result_cache import ResultCache
 from tests.helpers.small_bench import bench, log, refused, smajax
 
+pytestmark = pytest.mark.usefixtures("blank_pictures")
+
 WIRE = ("flexinol_table_3_2", "dead_weight", "flexinol_voltage", "--step", "5V:1s")
 
 

@@ -19,6 +19,8 @@ from smajax.control.tune.terms import TERMS
 from smajax.core.parameters import parameter_values
 from tests.helpers.command_line import DEMO
 
+pytestmark = pytest.mark.usefixtures("blank_pictures")
+
 
 @pytest.mark.parametrize("command", ["simulate", "sweep", "tune", "identify", "close-loop", "figures", "bench"])
 def test_every_option_that_takes_a_quantity_says_its_unit(command: str) -> None:

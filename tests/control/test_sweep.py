@@ -31,6 +31,8 @@ from smajax.report.sweep_folder import write_sweep
 from tests.helpers.in_browser import HOSTILE, faults
 from tests.helpers.machine_code import by_machine_code
 
+pytestmark = pytest.mark.usefixtures("blank_pictures")
+
 RATIOS = ("payload_ratio", "supply_ratio")
 SETTINGS = SweepSettings(("vsc3",), "payload", "supply", 2, (0.0, 30.0), (1.0,), seconds=3.0)
 

@@ -43,6 +43,8 @@ from tests.helpers.in_browser import HOSTILE, faults
 from tests.helpers.small_bench import refused
 from tests.helpers.tuning_rig import ROWS, SECONDS, SETTINGS
 
+pytestmark = pytest.mark.usefixtures("blank_pictures")
+
 COMMAND = f"smajax tune --out {HOSTILE}"  # what somebody typed
 
 

@@ -32,6 +32,8 @@ from smajax.simulation.compiled import simulate_compiled
 from tests.helpers.in_browser import HOSTILE, faults
 from tests.helpers.small_bench import refused
 
+pytestmark = pytest.mark.usefixtures("blank_pictures")
+
 TRUTH = {"austenite_start": 70.0, "austenite_finish": 82.0, "martensite_start": 55.0, "recoverable_strain": 0.044}
 NOISE = 2e-4
 FILE = """

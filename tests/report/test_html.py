@@ -17,6 +17,8 @@ from smajax.report.narrative import narrate
 from tests.helpers.made_findings import NAN
 from tests.helpers.report_page import Page, made_unknown_term
 
+pytestmark = pytest.mark.usefixtures("blank_pictures")
+
 NO_REMARK = Remark()
 
 
@@ -92,6 +94,7 @@ def test_the_offset_of_held_out_runs_is_reported_if_there_is_one(findings, offse
     assert ("only their offset is fitted to them" in text) is told
 
 
+@pytest.mark.usefixtures("drawn")
 def test_a_model_that_lacks_nothing_has_one_column(findings):
     effects = tuple(dataclasses.replace(effect, added=False) for effect in findings.effects)
     runs = tuple(dataclasses.replace(run, after=run.before, rmse_after=run.rmse_before) for run in findings.runs)
@@ -105,6 +108,7 @@ def test_a_model_that_lacks_nothing_has_one_column(findings):
     assert all(image.std() > 5.0 for image in page.images())
 
 
+@pytest.mark.usefixtures("drawn")
 def test_a_diverged_model_is_still_drawn(findings):
     run = dataclasses.replace(findings.runs[0], before=np.full(1200, NAN), rmse_before=NAN)
     broken = dataclasses.replace(findings, runs=(run, *findings.runs[1:]))
