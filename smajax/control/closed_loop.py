@@ -34,7 +34,7 @@ from smajax.simulation.integrate import (
 )
 from smajax.simulation.observers import StateTrace
 from smajax.simulation.simulate import DEFAULT_STEP, check_finite, check_step, trajectory
-from smajax.simulation.steppers import FixedStep
+from smajax.simulation.steppers import ONE_STEP, Integration, stepper_of
 
 
 class ClosedLoop(eqx.Module):
@@ -71,6 +71,7 @@ class ClosedLoopSetup(eqx.Module):
     delay: int = eqx.field(static=True, default=0)
     disturbance: Mapping[str, Series] | None = None
     initial: State | None = None
+    integration: Integration = ONE_STEP  # how finely between two samples
 
     @property
     def samples(self) -> int:
@@ -190,6 +191,7 @@ def simulate_closed_loop(  # the public form: what goes inwards is a `ClosedLoop
     delay: int = 0,
     disturbance: Mapping[str, Series] | None = None,
     initial: State | None = None,
+    integration: Integration = ONE_STEP,
 ) -> ClosedLoop:
     """Simulate over the samples of `wanted` (rad or m), `dt` seconds apart; the controller is called `every` samples.
 
@@ -199,12 +201,13 @@ def simulate_closed_loop(  # the public form: what goes inwards is a `ClosedLoop
     later. Without an `estimator` it measures the true state, with the position as `sensor` (with noise drawn from `key`)
     reads it. `disturbance` are further inputs of the system, such as `load_torque` or `ambient_temperature`, each of
     shape (n,). A plain array for `wanted` means set points (`reference.resting`). `initial` defaults to rest.
+    `integration`: how finely between two samples; error-controlled steps have derivatives in forward mode alone.
 
     Raises ValueError when a gain, a parameter or the sensor's noise lies outside its bounds, when `dt` is not positive or a set point
     not finite (where values are known: outside of `jit`), when `wanted` is not a whole number of control periods and one sample more, and when noise has no `key`.
     """
-    setup = ClosedLoopSetup(system, controller, wanted, dt, every, estimator, sensor, key, delay, disturbance, initial)
-    return stored_loop(setup)
+    between = (estimator, sensor, key, delay, disturbance)
+    return stored_loop(ClosedLoopSetup(system, controller, wanted, dt, every, *between, initial, integration))
 
 
 def stored_loop(setup: ClosedLoopSetup) -> ClosedLoop:
@@ -224,7 +227,7 @@ def observe_closed_loop(observer: AbstractObserver, setup: ClosedLoopSetup) -> t
 
 def _march(setup: ClosedLoopSetup, observers: Sequence[AbstractObserver]) -> March:
     setup.check()
-    plant = FixedStep(setup.system, setup.dt)
+    plant = stepper_of(setup.system, setup.dt, setup.integration)
 
     def advance(carry: Carry, inputs: Controlled) -> Carry:
         return plant(carry, {**inputs.held.inputs, **inputs.now})

@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from smajax.control.closed_loop import ClosedLoop, ClosedLoopSetup, check_answers
-from smajax.control.compiled_loop import evaluated_loop_compiled
+from smajax.control.compiled_loop import measured_loop
 from smajax.control.controllers.base import AbstractController
 from smajax.control.interface import check_interface
 from smajax.control.reference import Reference, resting
@@ -21,6 +21,7 @@ from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.system import System
 from smajax.model.wire.order import check_order
 from smajax.simulation.dataset import labelled_run
+from smajax.simulation.integration_error import AUTO, IntegrationError, Tolerance
 from smajax.simulation.simulate import DEFAULT_STEP
 
 PERIOD = 0.01  # s, of the controller
@@ -33,13 +34,15 @@ class Loop(eqx.Module):
     controller: AbstractController
 
 
-def labelled_loop(system: System, loop: ClosedLoop, **settings: object) -> xr.Dataset:
+def labelled_loop(
+    system: System, loop: ClosedLoop, error: IntegrationError | None = None, **settings: object
+) -> xr.Dataset:
     """A closed loop as `labelled_run`, with the command `voltage` (V) and the position `wanted`.
 
     A mapping among the settings, such as `gains`, becomes JSON.
     """
     attributes = {name: json.dumps(dict(one)) if isinstance(one, Mapping) else one for name, one in settings.items()}
-    result = labelled_run(system, loop.run, {"voltage": loop.voltage}, **attributes)
+    result = labelled_run(system, loop.run, {"voltage": loop.voltage}, error, **attributes)
     position = result["position"].attrs["units"]
     result["wanted"] = ("time", np.asarray(loop.wanted.position), {"units": position, "long_name": "set point"})
     return result
@@ -51,12 +54,14 @@ def simulate_loop_dataset(
     seconds: float | None = None,
     dt: float = DEFAULT_STEP,
     period: float = PERIOD,
+    tolerance: Tolerance = AUTO,
 ) -> xr.Dataset:
     """Run a loop from rest: an `xarray.Dataset` over time (s), with the command `voltage` (V) and the position `wanted`.
 
     set_point: a number (rad or m), text with a unit (`"40 deg"`), levels each with its time (`"40deg:5s,10deg:5s"`, which
     need no `seconds`), or a `Reference` of samples `dt` apart, which has its own length. The controller is called every
     `period` seconds and measures the true state; noise, a filter, delays and disturbances are `simulate_closed_loop`'s.
+    `tolerance`, and what the integration leaves in the result, as `simulate_dataset`'s.
 
     Raises TypeError for what is no `Loop` (a system without a controller), UnitError for a unit of another kind, ValueError
     for a coupon, a parameter or gain out of its bounds, a period that is no multiple of `dt`, a run without a length or
@@ -80,10 +85,16 @@ def simulate_loop_dataset(
     if samples <= every:
         raise ValueError(f"the run is shorter than one control period of {period:g} s.")
     wanted = Reference(wanted.position[:samples], wanted.velocity[:samples], wanted.acceleration[:samples])
-    run, _ = evaluated_loop_compiled(ClosedLoopSetup(system, controller, wanted, dt, every))
+    run, _, error = measured_loop(ClosedLoopSetup(system, controller, wanted, dt, every), tolerance)
     check_answers(run)
     return labelled_loop(
-        system, run, dt=dt, period=period, controller=type(controller).__name__, gains=parameter_values(controller)
+        system,
+        run,
+        error,
+        dt=dt,
+        period=period,
+        controller=type(controller).__name__,
+        gains=parameter_values(controller),
     )
 
 

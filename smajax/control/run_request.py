@@ -16,7 +16,7 @@ import numpy as np
 import xarray as xr
 
 from smajax.control.closed_loop import ClosedLoopSetup, check_answers
-from smajax.control.compiled_loop import evaluated_loop_compiled
+from smajax.control.compiled_loop import measured_loop
 from smajax.control.compose import compose, with_values
 from smajax.control.figures_of_merit import SetPointMerit, merit_by_set_point, set_point_spans
 from smajax.control.gains_file import Gains, read_gains
@@ -34,6 +34,7 @@ from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.load.coupon import AbstractCoupon
 from smajax.model.system import System
 from smajax.simulation.dataset import simulate_dataset
+from smajax.simulation.integration_error import AUTO, Tolerance
 from smajax.simulation.simulate import DEFAULT_STEP
 
 MOST_RESTS = 50  # set points; more are a ramp or a sine of a file
@@ -69,7 +70,7 @@ class RunRequest:
     time: str = ""  # the time column of files
     seconds: float | None = None
     dt: float = DEFAULT_STEP
-    tolerance: float | None = None
+    tolerance: Tolerance = AUTO  # as `simulate_dataset`'s
 
     def system(self) -> System:
         """The model. Raises KeyError and ValueError as `compose`, RequestError of `values`."""
@@ -240,12 +241,18 @@ def run_closed(request: RunRequest, loop: LoopRequest) -> RunResult:
         key=None if interface.sensor is None else jax.random.key(loop.seed),
         delay=interface.delay,
     )
-    run, merits = evaluated_loop_compiled(setup)
+    run, merits, error = measured_loop(setup, request.tolerance)
     # As in `run_open`.
     run = eqx.tree_at(lambda one: one.run.time, run, jnp.asarray(clock))
     between = between_in_words(loop.estimator, loop.noise, loop.period, loop.delay)
     data = labelled_loop(
-        plant, run, dt=request.dt, controller=gains.controller, gains=parameter_values(controller), between=between
+        plant,
+        run,
+        error,
+        dt=request.dt,
+        controller=gains.controller,
+        gains=parameter_values(controller),
+        between=between,
     )
     notes = _notes(data)
     try:

@@ -51,17 +51,22 @@ def sweep_up(folder: Path) -> None:
                 one.unlink()
 
 
+def _finite(part: Any) -> Any:
+    if isinstance(part, dict):
+        return {key: _finite(one) for key, one in part.items()}
+    if isinstance(part, list | tuple):
+        return [_finite(one) for one in part]
+    return None if isinstance(part, float) and not math.isfinite(part) else part
+
+
 def json_text(value: Any) -> str:
     """JSON in which a number that is none is null."""
+    return json.dumps(_finite(value), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
-    def plain(part: Any) -> Any:
-        if isinstance(part, dict):
-            return {key: plain(one) for key, one in part.items()}
-        if isinstance(part, list | tuple):
-            return [plain(one) for one in part]
-        return None if isinstance(part, float) and not math.isfinite(part) else part
 
-    return json.dumps(plain(value), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+def json_line(value: Any) -> str:
+    """The same in one line, for an attribute."""
+    return json.dumps(_finite(value), ensure_ascii=False, allow_nan=False)
 
 
 def csv_text(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:

@@ -45,6 +45,7 @@ def git_state() -> str:
     return commit + ("+changes" if commit and asked("status", "--porcelain", "-uno") else "")
 
 
+@lru_cache(maxsize=1)
 def versions() -> dict[str, str]:
     return {name: metadata.version(name) for name in PACKAGES} | {"python": platform.python_version()}
 

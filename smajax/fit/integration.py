@@ -7,81 +7,24 @@ measured, at the values a fit starts from and again at those it ends at, against
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Any
 
-import jax.numpy as jnp
 import numpy as np
 
 from smajax.fit.packed_runs import RunBatch, predict_compiled
 from smajax.fit.problem import Problem
-from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.system import System
+from smajax.simulation.integration_error import IntegrationError as IntegrationError
+from smajax.simulation.integration_error import coarse_to_fine, finest
+from smajax.simulation.integration_error import described as described
 from smajax.simulation.steppers import ONE_STEP, Integration
 
 LARGEST = 0.1  # of an output's noise: the error, rms over a run, that integration may leave in it
 MARGIN = 0.5  # of that, at the start: by the end of a fit its values have moved
-# One step a sample first: it is a scheme of order 2 with two stages, the others are of order 3 with three or more.
-TOLERANCES = (1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6)
-FINEST = 1e-8  # what the others are measured against
-SUBSTEPS = (1, 2, 4, 8, 16)
-MOST_SUBSTEPS = 64
-
-
-@dataclass(frozen=True)
-class IntegrationError:
-    """What an integration leaves in the outputs, by output name, at the worst run: SI, an offset that is fitted taken off.
-
-    share: the largest root mean square, over the output's noise. description: how the runs were integrated.
-    """
-
-    rms: dict[str, float]
-    largest: dict[str, float]
-    share: float
-    description: str
-
-    def record(self) -> dict[str, Any]:
-        """For JSON."""
-        return {
-            "how": self.description,
-            "outputs": {name: {"rms": rms, "largest": self.largest[name]} for name, rms in self.rms.items()},
-            "largest_rms_over_noise": self.share,
-        }
-
-    @property
-    def small(self) -> bool:
-        """Whether it is below a tenth of the noise in every output."""
-        return self.share <= LARGEST
-
-
-def described(integration: Integration) -> str:
-    """In words, for a record."""
-    if integration.tolerance is not None:
-        return f"error-controlled steps, tolerance {float(integration.tolerance):g}"
-    return "one step a sample" if integration.substeps == 1 else f"{integration.substeps} steps a sample"
 
 
 def with_integration(problem: Problem, integration: Integration) -> Problem:
     """The problem with its runs integrated in that way."""
     return dataclasses.replace(problem, batch=dataclasses.replace(problem.batch, integration=integration))
-
-
-def _tolerance(value: float) -> Integration:
-    return Integration(tolerance=jnp.asarray(value, dtype=float))
-
-
-def _choices(system: System) -> Iterator[Integration]:
-    """From the cheapest to the finest."""
-    yield ONE_STEP
-    if isinstance(system.load, AbstractMovingLoad):
-        yield from map(_tolerance, TOLERANCES)
-    else:
-        yield from (Integration(substeps=number) for number in SUBSTEPS[1:])
-
-
-def _reference(system: System) -> Integration:
-    return _tolerance(FINEST) if isinstance(system.load, AbstractMovingLoad) else Integration(substeps=MOST_SUBSTEPS)
 
 
 def _predicted(problem: Problem, system: System, integration: Integration, per_run: np.ndarray) -> np.ndarray:
@@ -106,14 +49,15 @@ def _error(problem: Problem, difference: np.ndarray, integration: Integration) -
     by_output = {name: float(rms[k :: len(names)].max()) for k, name in enumerate(names)}
     largest = {name: float(np.abs(centred[k :: len(names)]).max()) for k, name in enumerate(names)}
     # A state that is not finite is as wrong as can be.
-    return IntegrationError(by_output, largest, share if np.isfinite(share) else np.inf, described(integration))
+    share = share if np.isfinite(share) else np.inf
+    return IntegrationError(by_output, largest, share, described(integration), limit=LARGEST)
 
 
 def integration_error(problem: Problem, system: System, per_run: np.ndarray | None = None) -> IntegrationError:
     """What the integration of `problem` leaves in the outputs of `system`, with each run's own values `per_run`."""
     own = np.asarray(problem.per_run.start if per_run is None else per_run)
     chosen = problem.batch.integration
-    exact = _predicted(problem, system, _reference(system), own)
+    exact = _predicted(problem, system, finest(system), own)
     return _error(problem, _predicted(problem, system, chosen, own) - exact, chosen)
 
 
@@ -126,9 +70,9 @@ def choose_integration(
     where friction lets a load jump, no step length settles which sample it jumps at.
     """
     own = np.asarray(problem.per_run.start if per_run is None else per_run)
-    exact = _predicted(problem, system, _reference(system), own)
+    exact = _predicted(problem, system, finest(system), own)
     best, least = ONE_STEP, np.inf
-    for choice in _choices(system):
+    for choice in coarse_to_fine(system):
         error = _error(problem, _predicted(problem, system, choice, own) - exact, choice).share
         if error <= largest:
             return choice

@@ -24,11 +24,13 @@ from smajax.model.load.base import AbstractMovingLoad
 from smajax.report.animation import moving
 from smajax.report.drawing import BLUE, GREY, RED, UPRIGHT, named, panels
 from smajax.report.html import picture
+from smajax.report.integration_words import integration_sentence
 from smajax.report.plain_page import bullets, table, whole
 
 AT_STOP = 1e-3  # of the way moved: nearer is at a stop
 STILL = 1e-3  # a smaller change of the martensite fraction is no transformation
 ROUNDING = 1e-9  # of the way moved: nearer to zero is a rounding error
+APART = ("parameters (SI)", "integration_error")  # attributes that a record and a page have in their own place
 PLAIN = ("temperature", "martensite_fraction", "stress")
 
 
@@ -44,7 +46,8 @@ def record(result: RunResult, command: str, series: bool = True) -> dict[str, An
     data = result.data
     return {
         "command": command,
-        "provenance": {name: _plain(name, text) for name, text in data.attrs.items() if name != "parameters (SI)"},
+        "provenance": {name: _plain(name, text) for name, text in data.attrs.items() if name not in APART},
+        "integration_error": integration_error(data),
         "parameters": parameter_values(result.system),
         "mismatch": {
             # `believed` is the old name of `assumed`, until version 0.3.
@@ -74,6 +77,22 @@ def record(result: RunResult, command: str, series: bool = True) -> dict[str, An
             for name, one in data.data_vars.items()
         },
         "series": {str(name): data[name].to_numpy().tolist() for name in ("time", *data.data_vars)} if series else {},
+    }
+
+
+def integration_error(data: xr.Dataset) -> dict[str, Any]:
+    """What the integration leaves in the variables, as `IntegrationError.record`; empty where nothing is known of it."""
+    return dict(json.loads(data.attrs.get("integration_error", "{}")))
+
+
+def error_rows(data: xr.Dataset) -> dict[str, str]:
+    """What the integration leaves in each variable of `summary_rows` by its label, root mean square, in the unit that is shown."""
+    shown = {str(name): one.attrs for name, one in data.data_vars.items()}
+    return {
+        label(name): digits(display(of["units"], name).of(of["integration_error"]), 2)
+        if "integration_error" in of
+        else ""
+        for name, of in shown.items()
     }
 
 
@@ -307,10 +326,16 @@ def page(result: RunResult, image: bytes, title: str, command: str, animations: 
         parts.append(table(head, rows, range(len(head))))
         parts.append("<p class=quiet>Each from its start to the next one; times count from its start.</p>")
     animation, upright = animations or (None, None)
+    errors = error_rows(result.data)
     parts += [
         str(picture(image, "the run over time", "panels", picture_of(result.data, upright=True))),
         str(picture(animation, "the load moving, beside the wire's path through its phase diagram", "panels", upright)),
-        table(["variable", "least", "greatest", "last", "unit"], summary_rows(result.data), (1, 2, 3)),
+        table(
+            ["variable", "least", "greatest", "last", "integration error", "unit"],
+            [[*row[:-1], errors.get(row[0], ""), row[-1]] for row in summary_rows(result.data)],
+            (1, 2, 3, 4),
+        ),
+        f"<p class=quiet>{html.escape(integration_sentence(integration_error(result.data)))}</p>",
         "<h2>Parameters (SI, temperatures in °C, angles in rad)</h2>",
         table(["parameter", "value", "unit", "what it is"], values, (1,)),
         "<h2>Provenance</h2>",
@@ -318,7 +343,7 @@ def page(result: RunResult, image: bytes, title: str, command: str, animations: 
             ["", ""],
             [
                 ["command", command],
-                *([k, str(v)] for k, v in result.data.attrs.items() if v and k != "parameters (SI)"),
+                *([k, str(v)] for k, v in result.data.attrs.items() if v and k not in APART),
             ],
         ),
         "<p class=quiet>The same numbers: simulate.csv, simulate.nc, simulate.json.</p>",

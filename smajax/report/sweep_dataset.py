@@ -9,6 +9,7 @@ import xarray as xr
 
 from smajax.control.figures_of_merit import MERIT_UNITS
 from smajax.control.sweep.run_sweep import SweepResults
+from smajax.core.files import json_line
 from smajax.core.provenance import made_with
 
 
@@ -40,4 +41,5 @@ def as_dataset(results: SweepResults, command: str) -> xr.Dataset:
     }
     gains = "; ".join(f"{one.name}: {one.main_gain}" for one in sweeps)
     attributes = {"command": command, "between": results.settings.between, "main gains": gains, **made_with()}
+    attributes["integration_error"] = json_line({one.name: one.integration_error for one in sweeps})
     return xr.Dataset(variables, axes, {name: str(value) for name, value in attributes.items()})

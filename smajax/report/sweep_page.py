@@ -19,6 +19,7 @@ from smajax.core.files import replace
 from smajax.core.provenance import made_with
 from smajax.core.wording import and_listed, counted
 from smajax.report.html import picture
+from smajax.report.integration_words import integration_sentence
 from smajax.report.plain_page import bullets, table, whole
 from smajax.report.sweep_pictures import ROUNDING, SHOWN, merit_values, nominal_gain
 
@@ -82,7 +83,7 @@ def _controller_part(results: SweepResults, sweep: ControllerSweep, pictures: Pi
     say, settings = html.escape, results.settings
     return (
         f"<h3>{say(sweep.name)}</h3><p>{counted(settings.grid.size, 'closed loop')} of {settings.seconds:g} s; {failures(sweep)}. "
-        f"{say(description(sweep.name))} "
+        f"{say(description(sweep.name))} {say(integration_sentence(sweep.integration_error))} "
         f'<a href="{sweep.name}.csv">every loop as CSV</a></p>'
         + _panels(pictures, f"{sweep.name}_maps.png", f"maps of {sweep.name}")
         + _panels(pictures, f"{sweep.name}_lines.png", f"lines of {sweep.name}")
@@ -174,6 +175,7 @@ def as_json(results: SweepResults, command: str = "") -> str:
             "loops": grid.size,
             "failed": {one.name: int(np.isfinite(one.failed_at).sum()) for one in results.sweeps},
         },
+        "integration_error": {one.name: one.integration_error for one in results.sweeps},
         "command": command,
         "made_with": made_with(),
     }

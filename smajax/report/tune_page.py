@@ -19,6 +19,7 @@ from smajax.core.files import csv_text, heading
 from smajax.core.provenance import made_with
 from smajax.core.wording import and_listed, counted
 from smajax.report.html import picture
+from smajax.report.integration_words import integration_sentence
 from smajax.report.plain_page import bullets, table, whole
 from smajax.report.tune_pictures import before_after
 
@@ -260,7 +261,7 @@ def page(result: TuningResult, pictures: Mapping[str, bytes], command: str) -> s
     parts += [
         "<h2>The search</h2>",
         picture(pictures["descent.png"], "cost over closed loops"),
-        f"<p class=quiet>{say(settings.between_in_words())}</p>",
+        f"<p class=quiet>{say(settings.between_in_words())} {say(integration_sentence(result.integration.record()))}</p>",
         "<h2>Provenance</h2>",
         table(["", ""], [["command", command], *map(list, made_with().items())]),
         "<p class=quiet>The same numbers: tune.json, and loops.csv with every closed loop before and after.</p>",
@@ -310,6 +311,7 @@ def record(result: TuningResult, command: str) -> dict[str, Any]:
             }
             for name, one in result.checks.items()
         },
+        "integration_error": result.integration.record(),
         "moves": _moves(result.moves),
         "search": {
             "closed_loops": result.simulations,

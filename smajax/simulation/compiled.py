@@ -16,6 +16,16 @@ from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.system import System
 from smajax.model.types import Scalar, Series, State, Trajectory
 from smajax.simulation.input_delay import acting_inputs
+from smajax.simulation.integration_error import (
+    AUTO,
+    IntegrationError,
+    Outputs,
+    Tolerance,
+    alone,
+    integrated,
+)
+from smajax.simulation.measures import SHOWN
+from smajax.simulation.sensors import SENSORS, sensor_output
 from smajax.simulation.simulate import (
     DEFAULT_STEP,
     check_inputs,
@@ -69,11 +79,49 @@ def simulate_compiled(
     check_inputs(system, inputs)
     check_scalars(system, dt, initial)
     check_bounds(system)
-    if tolerance is not None and (not tolerance > 0.0 or not isinstance(system.load, AbstractMovingLoad)):
-        raise ValueError(f"`tolerance` is a positive number, for a load that moves; got {tolerance}. Take 1e-4.")
+    check_tolerance(system, tolerance)
     return compiled_run(
         system, inputs, dt, Integration(None if tolerance is None else jnp.asarray(tolerance)), initial, engine
     )
+
+
+def check_tolerance(system: System, tolerance: Tolerance) -> None:
+    """ValueError for a tolerance that is none, or of a load that does not move."""
+    if tolerance is None or tolerance == AUTO:
+        return
+    given: Any = tolerance  # a text too, of whoever does not check types
+    if isinstance(given, str) or not given > 0.0 or not isinstance(system.load, AbstractMovingLoad):
+        raise ValueError(
+            f"`tolerance` is a positive number, a share of 1 C and of 1 % strain a step, for a load that moves; got {tolerance} and "
+            f'{type(system.load).__name__}. Take 1e-4, "auto" where the error is to choose, or None for one step a sample.'
+        )
+
+
+def measured_run(
+    system: System,
+    inputs: Mapping[str, Series],
+    dt: float = DEFAULT_STEP,
+    tolerance: Tolerance = AUTO,
+    initial: State | None = None,
+    engine: Engine = "auto",
+) -> tuple[Trajectory, IntegrationError]:
+    """A run, and what its integration leaves in the states and sensors.
+
+    With "auto" that is less than 3e-4 of a whole transformation where any tolerance comes so far; a number is taken as it is, and None
+    is one step a sample, of which nothing is measured. Raises as `simulate_compiled`.
+    """
+    check_inputs(system, inputs)
+    check_scalars(system, dt, initial)
+    check_bounds(system)
+    check_tolerance(system, tolerance)
+
+    def run(integration: Integration) -> tuple[Trajectory, Outputs]:
+        found = compiled_run(system, inputs, dt, integration, initial, engine)
+        outputs = {name: np.asarray(getattr(found, name))[None] for name in SHOWN}
+        return found, outputs | {name: np.asarray(sensor_output(system, found, name))[None] for name in SENSORS}
+
+    _, error, found = integrated(run, system, tolerance, alone(system))
+    return found, error
 
 
 def compiled_run(

@@ -27,7 +27,7 @@ class Integration(eqx.Module):
     """How finely a run is integrated between two samples of its clock; by default one step.
 
     tolerance: of a moving load, the error of a step, as a share of 1 C and of 1 % strain; None: one step, whatever its error.
-    substeps: of a coupon, whose temperature and stress (or strain) follow straight lines between two samples.
+    substeps: equal steps, where there is no tolerance; a coupon's temperature and stress (or strain) follow straight lines between two samples.
     """
 
     tolerance: Scalar | None = None
@@ -54,6 +54,23 @@ class FixedStep(eqx.Module):
 
     def __call__(self, carry: Carry, inputs: Inputs) -> Carry:
         return Carry(step(self.system, carry.state, inputs, self.dt, self.once))
+
+
+class EqualSteps(eqx.Module):
+    """So many equal steps in `dt` (s), of a moving load, with the inputs held."""
+
+    system: System
+    dt: Scalar | float
+    substeps: int = eqx.field(static=True)
+    once: bool = eqx.field(static=True, default=False)
+
+    def start(self, state: State, inputs: Inputs) -> Carry:
+        """What a run from `state` begins with; `inputs` are those at its start."""
+        return Carry(state)
+
+    def __call__(self, carry: Carry, inputs: Inputs) -> Carry:
+        one = FixedStep(self.system, self.dt / self.substeps, self.once)
+        return integrate(lambda at, _: one(at, inputs), carry, None, Schedule(self.substeps)).end
 
 
 class ErrorControlledSteps(eqx.Module):
@@ -105,7 +122,7 @@ class SwitchedSteps(eqx.Module):
     that without a delay the run is that of the model without the effect; its derivative by the time is that at `SHORTEST_PART`.
     """
 
-    within: FixedStep | ErrorControlledSteps
+    within: FixedStep | EqualSteps | ErrorControlledSteps
 
     @property
     def system(self) -> System:
@@ -150,13 +167,15 @@ def _without_derivative(condition: Any, tree: Any) -> Any:
     return eqx.combine(where_tree(condition, lax.stop_gradient(numbers), numbers), rest)
 
 
-Stepper = FixedStep | ErrorControlledSteps | CouponSubsteps | SwitchedSteps
+Stepper = FixedStep | EqualSteps | ErrorControlledSteps | CouponSubsteps | SwitchedSteps
 
 
 def stepper_of(system: System, dt: Scalar | float, integration: Integration = ONE_STEP, once: bool = False) -> Stepper:
     """The stepper that `integration` asks for of this load."""
     if isinstance(system.load, AbstractMovingLoad):
-        whole: FixedStep | ErrorControlledSteps = FixedStep(system, dt, once)
+        whole: FixedStep | EqualSteps | ErrorControlledSteps = FixedStep(system, dt, once)
+        if integration.substeps > 1:
+            whole = EqualSteps(system, dt, integration.substeps, once)
         if integration.tolerance is not None:
             whole = ErrorControlledSteps(system, jnp.asarray(dt, dtype=float), integration.tolerance, once)
         return SwitchedSteps(whole) if system.terms.input_lag and system.drive.inputs_required else whole

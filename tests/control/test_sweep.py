@@ -34,7 +34,8 @@ from tests.helpers.machine_code import by_machine_code
 pytestmark = pytest.mark.usefixtures("blank_pictures")
 
 RATIOS = ("payload_ratio", "supply_ratio")
-SETTINGS = SweepSettings(("vsc3",), "payload", "supply", 2, (0.0, 30.0), (1.0,), seconds=3.0)
+# One step a sample, so that a loop is that of `simulate_closed_loop`.
+SETTINGS = SweepSettings(("vsc3",), "payload", "supply", 2, (0.0, 30.0), (1.0,), seconds=3.0, tolerance=None)
 
 
 def run_sweep(system: System, settings: SweepSettings, out: Path, command: str = "") -> None:

@@ -161,7 +161,8 @@ def test_a_sweep_uses_the_tuned_gains(folder: Path, tmp_path: Path) -> None:
     names = list(written)
     np.testing.assert_array_equal(get_parameters(tuned, names), [written[name]["value"] for name in names])
     assert {name: written[name]["unit"] for name in names} == {name: parameters(tuned)[name].unit for name in names}
-    settings = SweepSettings(("vsc3",), "payload", "supply", 2, (0.0, 30.0), (1.0,), seconds=SECONDS, tuned=(gains,))
+    one_step = {"seconds": SECONDS, "tuned": (gains,), "tolerance": None}
+    settings = SweepSettings(("vsc3",), "payload", "supply", 2, (0.0, 30.0), (1.0,), **one_step)  # type: ignore[arg-type]
     write_sweep(arm(), settings, sweep_controllers(arm(), settings, progress=silent), tmp_path)
     record = json.loads((tmp_path / "sweep.json").read_text(encoding="utf-8"))
     assert "gains from a file" in record["between"]
@@ -251,3 +252,10 @@ def test_a_tuning_with_a_lost_or_edited_file_is_computed_again(folder: Path, tmp
 def test_a_wrong_name_ends_the_command_with_2(tmp_path: Path) -> None:
     assert "did you mean 'pid'" in refused("tune", "pdi", "--out", tmp_path / "out")
     assert not (tmp_path / "out").exists()
+
+
+def test_the_record_says_what_the_integration_leaves_with_the_tuned_gains(folder: Path) -> None:
+    error = json.loads((folder / "tune.json").read_text(encoding="utf-8"))["integration_error"]
+    assert 0.0 < error["largest_rms_over_stroke"] < 0.01
+    assert error["outputs"]["position"]["largest"] >= error["outputs"]["position"]["rms"] > 0.0
+    assert error["how"] in (folder / "tune.html").read_text(encoding="utf-8")

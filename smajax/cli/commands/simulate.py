@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,6 +16,7 @@ from smajax.cli.terminal import browse, command_line, console, resumable
 
 if TYPE_CHECKING:
     from smajax.control.run_request import LoopRequest, RunRequest, RunResult
+    from smajax.simulation.integration_error import Tolerance
 
 SHOWN = 7  # columns of a table of set points on a terminal
 OPTIONS = {"values": "--set", "mismatch": "--mismatch", "set_points": "--set-point"}  # part of a run -> its option
@@ -32,13 +34,27 @@ def _inputs(option: str, several: Sequence[str] | None) -> dict[str, str]:
     return result
 
 
+def _tolerance(text: str) -> Tolerance:
+    """`auto`, `none` (None) or a number above zero. Raises typer.BadParameter."""
+    if text in ("auto", "none"):
+        return "auto" if text == "auto" else None
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0.0 < value < math.inf:
+        raise typer.BadParameter(
+            f"`auto`, `none` or a number above 0 such as 1e-4, not `{text}`", param_hint="--tolerance"
+        )
+    return value
+
+
 @dataclass(frozen=True)
 class _Options:
     """Options that decide together which run it is."""
 
     step: str | None
     inputs: Mapping[str, str]
-    tolerance: float | None
     gains: Path | None
     controller: str
     set_point: str | None
@@ -59,10 +75,8 @@ class _Options:
         if self.closed != (self.set_point is not None):
             lacking = "--set-point" if self.closed else "--gains or --controller beside --set-point"
             raise typer.BadParameter(f"a closed loop needs {lacking}.")
-        if self.closed and (self.inputs or self.step or self.tolerance is not None):
-            raise typer.BadParameter(
-                "in a closed loop the controller gives the voltage: leave --step, --input and --tolerance out."
-            )
+        if self.closed and (self.inputs or self.step):
+            raise typer.BadParameter("in a closed loop the controller gives the voltage: leave --step and --input out.")
         texts = [*self.inputs.values(), *([self.set_point] if self.set_point is not None else [])]
         if self.time and not any(map(reads_file, texts)):
             raise typer.BadParameter(
@@ -122,11 +136,19 @@ def _run(options: _Options, request: RunRequest, loop: LoopRequest) -> tuple[Run
 def _print(result: RunResult, title: str) -> None:
     """The run for a terminal."""
     from smajax.core.wording import aligned
-    from smajax.report.simulate_page import merit_rows, mismatch_rows, set_point_rows, summary_rows
+    from smajax.report.integration_words import integration_sentence
+    from smajax.report.simulate_page import (
+        integration_error,
+        merit_rows,
+        mismatch_rows,
+        set_point_rows,
+        summary_rows,
+    )
 
     typer.echo(title)
     for row in summary_rows(result.data):
         typer.echo(f"  {row[0]:<28} {row[1]:>11} … {row[2]:<11} last {row[3]:<11} {row[4]}")
+    typer.echo(f"  {integration_sentence(integration_error(result.data))}")
     for row in mismatch_rows(result):
         unit, ratio = f" {row[3]}" * (row[3] != "-"), f", {row[4]}" * bool(row[4])
         typer.echo(f"  {row[0]:<28} assumed {row[1]} -> true {row[2]}{unit}{ratio}")
@@ -184,8 +206,12 @@ def simulate(
     ] = None,
     dt: Annotated[float, quantity("time between samples", "s", above=0.0, like="5ms")] = 0.005,
     tolerance: Annotated[
-        float | None, typer.Option(help="adaptive steps between samples, to this error (1e-4 is good); moving loads")
-    ] = None,
+        str,
+        typer.Option(
+            help="error of a step between samples: `auto` chooses it so that the result has less than 3e-4 of a whole transformation; a "
+            "number such as 1e-4 (moving loads); or `none`, one step a sample, not checked",
+        ),
+    ] = "auto",
     gains: Annotated[
         Path | None, typer.Option(help="gains.json of `smajax tune`: a closed loop of the arm by that controller")
     ] = None,
@@ -249,9 +275,10 @@ def simulate(
     check_path(out)
     perturbed = texts("--mismatch", mismatch, VALUES)
     series = _inputs("--input", inputs)
-    options = _Options(step, series, tolerance, gains, controller, set_point, perturbed, time, gif)
+    options = _Options(step, series, gains, controller, set_point, perturbed, time, gif)
     options.check(load)
-    request = RunRequest(wire, load, drive, law, texts("--set", values, VALUES), series, time, seconds, dt, tolerance)
+    changed, finely = texts("--set", values, VALUES), _tolerance(tolerance)
+    request = RunRequest(wire, load, drive, law, changed, series, time, seconds, dt, finely)
     loop = LoopRequest(controller, set_point or "", gains, perturbed, estimator, noise, period, delay, seed)
     request, result = _run(options, request, loop)
     command = command_line()

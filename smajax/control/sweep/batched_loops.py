@@ -6,6 +6,7 @@ air's temperature is multiplied in degrees Celsius: 20 C becomes 10 to 40 C.
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -26,10 +27,20 @@ from smajax.model.system import System
 from smajax.model.types import Scalar, Series
 from smajax.simulation.batch.axes import zipped
 from smajax.simulation.batch.chunks import Function, chunks
+from smajax.simulation.integration_error import (
+    IntegrationError,
+    Outputs,
+    Tolerance,
+    coarse_to_fine,
+    integrated,
+)
+from smajax.simulation.steppers import ONE_STEP, Integration
 
 # Names of a batch's axes, beside those of `MISMATCHES`.
 TARGET, GAIN, NUMBER = "set point", "share of the gain", "number"
 CHUNK = 1024  # loops between two reports of progress
+MEASURED = 16  # loops on which the error of the integration is measured
+SMALL = 1e-3  # of a whole transformation: a tenth of the degree within which an angle counts as there
 IDEAL_INTERFACE = Interface()  # the true state, at every step, without delay
 
 
@@ -44,6 +55,7 @@ class LoopSetup:
     dt: float = 0.01  # s
     interface: Interface = IDEAL_INTERFACE
     seed: int = 0
+    integration: Integration = ONE_STEP  # how finely between two samples
 
 
 class Outcome(NamedTuple):
@@ -61,6 +73,7 @@ class _Setup(eqx.Module):
     time: Series
     interface: Interface
     key: jax.Array
+    integration: Integration
     main_gain: str = eqx.field(static=True)
 
 
@@ -70,7 +83,8 @@ def _loop(setup: _Setup, values: dict[str, Scalar]) -> ClosedLoopSetup:
     interface = setup.interface.settings(setup.time[1] - setup.time[0], setup.key, values[NUMBER])
     controller = set_vector(setup.controller, [setup.main_gain], gain)
     plant = perturbed_plant(setup.system, values)
-    return ClosedLoopSetup(plant, controller, constant(setup.time, values[TARGET]), **interface)
+    wanted = constant(setup.time, values[TARGET])
+    return ClosedLoopSetup(plant, controller, wanted, integration=setup.integration, **interface)
 
 
 def _merits(setup: _Setup, values: dict[str, Scalar]) -> dict[str, Any]:
@@ -84,7 +98,7 @@ def _position(setup: _Setup, values: dict[str, Scalar]) -> dict[str, Any]:
 
 def _run(function: Function, setup: LoopSetup, rows: np.ndarray, progress: Progress) -> Any:
     time, key = clock(setup.seconds, setup.dt), jax.random.key(setup.seed)
-    common = _Setup(setup.system, setup.controller, time, setup.interface, key, setup.main_gain)
+    common = _Setup(setup.system, setup.controller, time, setup.interface, key, setup.integration, setup.main_gain)
     columns = dict(zip((*MISMATCHES, TARGET, GAIN), rows.T, strict=True))
     axes = zipped({**columns, NUMBER: np.arange(len(rows))})
     count = -(-len(rows) // CHUNK)
@@ -104,3 +118,16 @@ def closed_loops(setup: LoopSetup, rows: np.ndarray, progress: Progress = quiet)
 def positions(setup: LoopSetup, rows: np.ndarray) -> np.ndarray:
     """Positions over time of every row of `grid.loop_rows`, (L, time), rad or m: for the few that are drawn."""
     return _run(_position, setup, rows, quiet)["position"]
+
+
+def integrated_setup(setup: LoopSetup, rows: np.ndarray, tolerance: Tolerance) -> tuple[LoopSetup, IntegrationError]:
+    """(the setup with the integration that `tolerance` asks for, what that leaves in the positions): of some of the rows."""
+    some = rows[np.unique(np.linspace(0, len(rows) - 1, MEASURED).astype(int))]
+
+    def run(integration: Integration) -> tuple[None, Outputs]:
+        if tolerance is None:
+            return None, {}
+        return None, {"position": positions(dataclasses.replace(setup, integration=integration), some)}
+
+    integration, error, _ = integrated(run, setup.system, tolerance, coarse_to_fine(setup.system), limit=SMALL)
+    return dataclasses.replace(setup, integration=integration), error

@@ -16,15 +16,16 @@ from smajax.control.gains_file import Gains
 from smajax.control.interface import between_in_words, check_interface, check_set_points, interface_of
 from smajax.control.mismatch import MISMATCHES
 from smajax.control.presets import CONTROLLERS
-from smajax.control.sweep.batched_loops import LoopSetup, closed_loops, positions
+from smajax.control.sweep.batched_loops import LoopSetup, closed_loops, integrated_setup, positions
 from smajax.control.sweep.grid import Grid, loop_rows, sweep_ratios
-from smajax.core.files import writing
+from smajax.core.files import json_line, writing
 from smajax.core.names import close_matches
 from smajax.core.parameters import get_parameters
 from smajax.core.progress import Event, Progress, Stage, quiet
 from smajax.core.provenance import digest
 from smajax.core.result_cache import arrays
 from smajax.model.system import System
+from smajax.simulation.integration_error import AUTO, Tolerance
 
 LINES = (0.5, 0.8, 1.0, 1.25, 2.0)  # ratios of which the angle over time is stored
 LINE_TARGET = 40.0  # deg
@@ -49,6 +50,7 @@ class SweepSettings:
     period: float = 0.01  # s, sample time of the controller, a whole number of `dt`
     delay: int = 0  # control periods until a command reaches the amplifier
     tuned: tuple[Gains, ...] = ()  # in place of the presets'
+    tolerance: Tolerance = AUTO  # as `run_batch`'s; None is one step a sample
 
     @property
     def grid(self) -> Grid:
@@ -98,6 +100,7 @@ class ControllerSweep:
     failed_at: np.ndarray  # s, of the grid's shape; infinity where no loop failed
     lines: Mapping[str, np.ndarray]  # mismatch -> (len(LINES), time), rad, at the set point LINE_TARGET
     nominal: Merit  # of the unperturbed plant, arrays (set points,)
+    integration_error: Mapping[str, Any]  # what the integration leaves in the positions, as `IntegrationError.record`
 
 
 @dataclass(frozen=True)
@@ -164,6 +167,7 @@ def _sweep(
         saved["failed"],
         {mismatch: saved[f"line_{mismatch}"] for mismatch in MISMATCHES},
         Merit(**{field: saved[f"nominal_{field}"] for field in FIELDS}),
+        json.loads(str(saved["integration_error"])),
     )
 
 
@@ -184,12 +188,15 @@ def _computed(plant: System, name: str, settings: SweepSettings, progress: Progr
         interface_of(plant, settings.estimator, settings.noise, settings.period, settings.dt, settings.delay),
     )
     # One batch, one program.
-    outcome = closed_loops(setup, np.concatenate([grid.rows(), loop_rows({}, grid.targets)]), relabelled)
+    whole = np.concatenate([grid.rows(), loop_rows({}, grid.targets)])
+    setup, error = integrated_setup(setup, whole, settings.tolerance)
+    outcome = closed_loops(setup, whole, relabelled)
     target = float(np.radians(LINE_TARGET))
     rows = np.concatenate([loop_rows({one: np.asarray(LINES)}, target) for one in MISMATCHES])
     angles = positions(setup, rows).reshape(len(MISMATCHES), len(LINES), -1)
     inside, nominal = slice(grid.size), grid.size + np.arange(len(grid.targets))
     result: dict[str, Any] = {"failed": outcome.failed_at[inside].reshape(grid.shape)}
+    result["integration_error"] = np.asarray(json_line(error.record()))
     for field in FIELDS:
         values = np.asarray(getattr(outcome.merits, field))
         result[f"grid_{field}"], result[f"nominal_{field}"] = values[inside].reshape(grid.shape), values[nominal]

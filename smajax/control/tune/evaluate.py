@@ -31,6 +31,7 @@ from smajax.model.system import System
 from smajax.model.types import Scalar, Series
 from smajax.simulation.batch.axes import zipped
 from smajax.simulation.batch.chunks import Function, chunks
+from smajax.simulation.steppers import ONE_STEP, Integration
 
 LOOPS = 256  # at most, in a batch: between two batches a run can be interrupted
 STEP = 0.01  # s, of the simulation while tuning
@@ -65,6 +66,7 @@ class _Problem(eqx.Module):
     softness: Scalar
     interface: Interface
     key: jax.Array
+    integration: Integration
     names: tuple[str, ...] = eqx.field(static=True)
     smoothed: Callable[[AbstractController, Scalar], AbstractController] | None = eqx.field(static=True)
 
@@ -80,7 +82,8 @@ def _loop(problem: _Problem, values: dict[str, Scalar], point: Scalar) -> tuple[
         controller = problem.smoothed(controller, problem.softness)
     observer = term_observer(merit_observer(plant, wanted), problem.softness)
     settings = problem.interface.settings(problem.time[1] - problem.time[0], problem.key, values[NUMBER])
-    return observe_closed_loop(observer, ClosedLoopSetup(plant, controller, wanted, **settings))[0]
+    setup = ClosedLoopSetup(plant, controller, wanted, integration=problem.integration, **settings)
+    return observe_closed_loop(observer, setup)[0]
 
 
 def _valued(problem: _Problem, values: dict[str, Scalar]) -> dict[str, Any]:
@@ -130,6 +133,7 @@ class TuningProblem:
         self._low, self._width = low, high - low
         self.seconds, self.interface, self.seed, self.loops = seconds, interface or Interface(), seed, loops
         self.simulations = 0
+        self.integration = ONE_STEP  # how finely between two samples
 
     @property
     def before(self) -> np.ndarray:
@@ -172,6 +176,7 @@ class TuningProblem:
             jnp.asarray(softness),
             interface,
             jax.random.key(self.seed),
+            self.integration,
             self.names,
             self.preset.smoothed if smooth else None,
         )

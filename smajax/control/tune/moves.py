@@ -65,6 +65,7 @@ def moved(rig: TuningProblem, pair: Sequence[AbstractController], set_points: Se
             sensor=rig.interface.sensor,
             key=None if rig.interface.sensor is None else jax.random.key(rig.seed),
             delay=rig.interface.delay,
+            integration=rig.integration,
         )
         ran, _ = evaluated_loop_compiled(setup)
         several.append(merit_by_set_point(ran, rig.system)[1:])

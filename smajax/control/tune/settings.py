@@ -16,6 +16,7 @@ from smajax.control.tune.scenarios import BESIDE, check_variation
 from smajax.control.tune.terms import TERMS
 from smajax.core.names import close_matches
 from smajax.model.system import System
+from smajax.simulation.integration_error import AUTO, Tolerance
 
 
 @dataclass(frozen=True)
@@ -41,6 +42,7 @@ class TuneSettings:
     seed: int = 0
     unseen: int = 32  # plants of the check
     start: Mapping[str, float] = field(default_factory=dict)  # gains to begin from in the place of the preset's
+    tolerance: Tolerance = AUTO  # as `run_batch`'s; None is one step a sample
 
     @property
     def goal(self) -> Goal:
@@ -135,4 +137,5 @@ class TuneSettings:
             "seed": self.seed,
             "plants_of_the_check": self.unseen,
             "start": dict(self.start),
+            "tolerance": self.tolerance,
         }

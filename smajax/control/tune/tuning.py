@@ -8,13 +8,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from smajax.control.controllers.base import AbstractController
 from smajax.control.gains_file import Gains
 from smajax.control.interface import interface_of
 from smajax.control.mismatch import MISMATCHES
 from smajax.control.presets import CONTROLLERS
-from smajax.control.sweep.batched_loops import LoopSetup, positions
+from smajax.control.sweep.batched_loops import LoopSetup, integrated_setup, positions
 from smajax.control.tune.cma_es import CmaEsState, SearchTask, evolve
-from smajax.control.tune.evaluate import LOOPS, STEP, Evaluation, TuningProblem
+from smajax.control.tune.evaluate import FINE, LOOPS, STEP, Evaluation, TuningProblem
 from smajax.control.tune.moves import Moves, moved
 from smajax.control.tune.multistart import MultistartState, begin, next_round
 from smajax.control.tune.objective import rank
@@ -23,6 +24,7 @@ from smajax.control.tune.settings import TuneSettings
 from smajax.core.parameters import get_parameters, parameters
 from smajax.core.progress import Progress, Stage, quiet
 from smajax.model.system import System
+from smajax.simulation.integration_error import IntegrationError
 
 LEAST_LOOPS = 8
 DRAWN = 8  # plants never seen that are drawn over time
@@ -63,6 +65,7 @@ class TuningResult:
     lines: Lines
     moves: Moves | None
     air: float  # degC, as the controller believes it
+    integration: IntegrationError  # what the integration leaves in the positions with the tuned gains
 
     @property
     def within_limits(self) -> bool:
@@ -105,6 +108,7 @@ def tune(
     scenarios = tuned_on(settings.set_points, settings.variation, settings.seed)
     task = SearchTask(problem_of(system, settings), settings.goal, scenarios)
     problem, name = task.problem, f"tuning {settings.controller}"
+    _integrated(problem, settings, problem.controller, scenarios, STEP)
     descent = _by_gradient(task, settings, after, save, progress)
     progress(Stage("evaluating", 0.0))
     # Rounds evaluate at a coarse time step; of their results the best at a finer one is taken. The preset's gains and the
@@ -166,13 +170,15 @@ def _validated(
     pair = np.stack([problem.before, problem.point(best)])
     held = held_out(settings.set_points, settings.variation, settings.unseen, settings.seed)
     checks: dict[str, Check] = {}
+    tuned = Gains(settings.controller, best)
+    # What is small for the preset's gains need not be for those that were found.
+    error = _integrated(problem, settings, tuned.put(problem.system), task.scenarios, FINE)
     for name, scenarios in {"tuned on": task.scenarios, **held}.items():
         checks[name] = Check(scenarios, problem.evaluate(pair, scenarios))
         progress(Stage("evaluating", len(checks) / (len(held) + 2)))
     cost = goal.cost(checks["tuned on"].seen.exact, task.scenarios)
     excesses = {name: goal.excess(one.seen.exact) for name, one in checks.items()}
     table = parameters(problem.controller)
-    tuned = Gains(settings.controller, best)
     lines = _lines(problem, settings, tuned, held["inside"])
     moves = moved(problem, (problem.controller, tuned.put(problem.system)), settings.set_points)
     progress(Stage("evaluating", 1.0))
@@ -192,7 +198,32 @@ def _validated(
         lines,
         moves,
         float(get_parameters(problem.system, [MISMATCHES["ambient"]])[0]),
+        error,
     )
+
+
+def _integrated(
+    problem: TuningProblem,
+    settings: TuneSettings,
+    controller: AbstractController,
+    scenarios: Scenarios,
+    dt: float,
+) -> IntegrationError:
+    """Let `problem` integrate as the settings ask for, measured on loops of this controller; what is left in the positions."""
+    every = problem.interface.every * round(STEP / dt)
+    setup = LoopSetup(
+        problem.system,
+        controller,
+        problem.preset.main_gain,
+        settings.seconds,
+        dt,
+        dataclasses.replace(problem.interface, every=every),
+        settings.seed,
+    )
+    rows = np.column_stack([scenarios.rows, np.ones(scenarios.size)])
+    chosen, error = integrated_setup(setup, rows, settings.tolerance)
+    problem.integration = chosen.integration
+    return error
 
 
 def _best_of(task: SearchTask, points: Sequence[np.ndarray]) -> dict[str, float]:
@@ -217,6 +248,7 @@ def _lines(problem: TuningProblem, settings: TuneSettings, tuned: Gains, inside:
         STEP,
         problem.interface,
         settings.seed,
+        problem.integration,
     )
     angles = [
         positions(dataclasses.replace(setup, controller=controller), rows)

@@ -19,8 +19,9 @@ from smajax.model.system import System
 from smajax.model.types import Series
 from smajax.simulation.batch.axes import Axes
 from smajax.simulation.batch.chunks import chunk_size
+from smajax.simulation.batch.integration import as_stored
 from smajax.simulation.batch.recipe import BatchSettings, recipe_of
-from smajax.simulation.batch.run_batch import BUDGET, created_or_opened, fill, opened
+from smajax.simulation.batch.run_batch import BUDGET, begun, created_or_opened, fill, opened
 from smajax.simulation.batch.single_run import single_run
 from smajax.simulation.batch.store import Store
 from smajax.simulation.simulate import DEFAULT_STEP
@@ -59,12 +60,18 @@ def run_batch_here(  # the public form, as `run_batch`
     """
     progress = as_progress(progress)
     folder = Path(out)
-    recipe = recipe_of(system, inputs, axes, BatchSettings(dt=dt, **settings))
+    asked = BatchSettings(dt=dt, **settings)
+    recipe = recipe_of(system, inputs, axes, asked)
     devices = tuple(jax.local_devices())
     size = chunk_size(single_run, recipe, axes, budget, devices)
     # Several chunks a process, so that a lost one takes little with it; the size must not depend on the process.
     size = min(size, max(1, -(-axes.size // (CHUNKS * processes))))
-    store = created_or_opened(folder, recipe, axes, size) if process == 0 else _awaited(folder)
+    if process == 0:
+        recipe, how = begun(recipe, axes, asked.tolerance, folder)
+        store = created_or_opened(folder, recipe, axes, size, how)
+    else:  # as process 0 chose to integrate
+        store = _awaited(folder)
+        recipe, _ = as_stored(recipe, dict(store.group.attrs))
     wanted = [number for number in store.missing() if number % processes == process]
     fill(store, recipe, None, wanted, progress)
     return opened(folder)

@@ -11,14 +11,16 @@ import numpy as np
 
 from smajax.core.names import listed
 from smajax.core.parameters import Parameter, check_bounds, parameters
-from smajax.model.load.coupon import AbstractCoupon
 from smajax.model.system import System
 from smajax.model.types import Scalar, Series
 from smajax.model.wire.order import check_order
 from smajax.simulation.batch.axes import Axes
 from smajax.simulation.batch.single_run import Recipe
+from smajax.simulation.compiled import check_tolerance
+from smajax.simulation.integration_error import AUTO, Tolerance, with_tolerance
 from smajax.simulation.measures import SHOWN, AbstractMeasure
 from smajax.simulation.simulate import DEFAULT_STEP, check_kinds, check_scalars
+from smajax.simulation.steppers import ONE_STEP
 
 STORED = ("position", "temperature", "martensite_fraction", "stress")
 Parameters = Mapping[str, Parameter]
@@ -33,7 +35,7 @@ class BatchSettings:
     every: int = 1
     keep: Sequence[str] = STORED
     measures: Sequence[AbstractMeasure] = ()
-    tolerance: float | None = None
+    tolerance: Tolerance = AUTO
     slopes: Sequence[str] = ()
 
 
@@ -52,7 +54,10 @@ class _Inputs:
 def recipe_of(
     system: System, inputs: Mapping[str, Series | float], axes: Axes, settings: BatchSettings = DEFAULTS
 ) -> Recipe:
-    """What `run_batch` runs. Raises ValueError naming what does not fit together, TypeError for what is of another kind."""
+    """What `run_batch` runs, with one step a sample where the error is to choose (`batch.integration`).
+
+    Raises ValueError naming what does not fit together, TypeError for what is of another kind.
+    """
     check_kinds(system, inputs)
     _check_axes(axes)
     _check_measures(settings.measures)
@@ -64,7 +69,7 @@ def recipe_of(
     sorted_inputs = _sorted_inputs(system, inputs, axes, table)
     steps = _steps(sorted_inputs.series, settings)
     _check_stored(settings, steps)
-    _check_tolerance(system, settings.tolerance)
+    check_tolerance(system, settings.tolerance)
     _check_slopes(settings, table, sorted_inputs.channels, inputs)
     return Recipe(
         system=system,
@@ -72,7 +77,7 @@ def recipe_of(
         constants=sorted_inputs.constants,
         dt=jnp.asarray(settings.dt, dtype=float),
         measures=tuple(settings.measures),
-        tolerance=None if settings.tolerance is None else jnp.asarray(settings.tolerance, dtype=float),
+        integration=ONE_STEP if settings.tolerance in (None, AUTO) else with_tolerance(float(settings.tolerance)),
         channels=sorted_inputs.channels,
         steps=steps,
         every=settings.every,
@@ -165,14 +170,6 @@ def _check_stored(settings: BatchSettings, steps: int) -> None:
         one.check(steps)
 
 
-def _check_tolerance(system: System, tolerance: float | None) -> None:
-    if tolerance is not None and (not tolerance > 0.0 or isinstance(system.load, AbstractCoupon)):
-        raise ValueError(
-            f"`tolerance` is a share of 1 C and of 1 % strain a step, for a load that moves; got {tolerance} and "
-            f"{type(system.load).__name__}. Take 1e-4, or leave it out."
-        )
-
-
 def _check_slopes(settings: BatchSettings, table: Parameters, channels: Sequence[str], inputs: Collection[str]) -> None:
     slopes, measures = settings.slopes, settings.measures
     wrong = [name for name in slopes if name not in table and name not in channels]
@@ -193,8 +190,8 @@ def _check_slopes(settings: BatchSettings, table: Parameters, channels: Sequence
         raise ValueError(f"{listed(jumping)} moves by whole steps and has no slope: leave it out, or `slopes`.")
     if slopes and not measures:
         raise ValueError("`slopes` are those of measures: give `measures`, as `smajax.simulation.measures.MeanSquare`.")
-    if slopes and settings.tolerance is not None:
+    if slopes and settings.tolerance not in (None, AUTO):
         raise ValueError(
             "slopes are found backwards through fixed steps, and a `tolerance` makes their number depend on the parameters: "
-            "leave `tolerance` out, or `slopes`."
+            "leave `tolerance` out (equal steps are chosen then), or `slopes`."
         )

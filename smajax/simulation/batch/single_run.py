@@ -29,7 +29,7 @@ class Recipe(eqx.Module):
     constants: dict[str, Scalar]  # inputs that do not change
     dt: Scalar
     measures: tuple[AbstractMeasure, ...]
-    tolerance: Scalar | None  # of error-controlled steps; None: one step of `dt` each
+    integration: Integration  # how finely between two samples
     channels: tuple[str, ...] = eqx.field(static=True)  # varied names that are input channels
     steps: int = eqx.field(static=True)
     every: int = eqx.field(static=True)  # one state in so many is stored
@@ -95,7 +95,7 @@ def without_slopes(recipe: Recipe, values: Values) -> dict[str, jax.Array]:
     constants = recipe.constants | {name: values[name] for name in recipe.channels}
     acting = acting_inputs(system, recipe.series, recipe.dt)
     first = {**constants, **{name: series[0] for name, series in acting.items()}}
-    stepper = stepper_of(system, recipe.dt, Integration(recipe.tolerance), once=bool(recipe.slopes))
+    stepper = stepper_of(system, recipe.dt, recipe.integration, once=bool(recipe.slopes))
 
     def advance(carry: Carry, now: dict[str, Scalar]) -> Carry:
         return stepper(carry, {**constants, **now})
