@@ -78,7 +78,7 @@ def integrated_recipe(recipe: Recipe, axes: Axes, tolerance: Tolerance) -> tuple
         if tolerance is None:
             return None, {}
         own = dataclasses.replace(plain, integration=integration)
-        return None, _outputs(program(single_run, own, tuple(axes.names))(own, some), names)
+        return None, _outputs(program(single_run, own, tuple(axes.names))(own, some, threads=1), names)
 
     choices = coarse_to_fine(recipe.system, bool(recipe.slopes))
     integration, error, _ = integrated(run, recipe.system, tolerance, choices, ways)
