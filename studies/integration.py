@@ -233,26 +233,28 @@ def _compiled_seconds(rig: Rig, clock: float, integration: Integration) -> float
     return min(times[1:])
 
 
-def _off(rig: Rig, reading: Any, times: np.ndarray) -> float:
-    difference = np.asarray(reading) - rig.exact(times)
+def _off(rig: Rig, reading: Any, exact: np.ndarray) -> float:
+    difference = np.asarray(reading) - exact
     return float(np.sqrt(np.mean((difference - difference[0]) ** 2))) / rig.noise
 
 
-def simulated(rig: Rig, clock: float, compare: bool = True) -> dict[str, Any]:
-    """What a simulation at this clock leaves by default, in noises, and the equal steps a sample that leave no more."""
-    times = np.arange(round(SECONDS / clock) + 1) * clock
-    inputs: Any = rig.inputs(times)
+def simulated(rig: Rig, clock: float, exact: np.ndarray, compare: bool = True) -> dict[str, Any]:
+    """What a simulation at this clock leaves by default, in noises, and the equal steps a sample that leave no more.
+
+    exact: the reading at every sample.
+    """
+    inputs: Any = rig.inputs(np.arange(round(SECONDS / clock) + 1) * clock)
     found = simulate_dataset(rig.system, inputs, clock)
     error = json.loads(found.attrs["integration_error"])
     chosen = next(one for one in alone(rig.system) if described(one) == error["how"])
-    rms = _off(rig, found["reading"].to_numpy(), times)
+    rms = _off(rig, found["reading"].to_numpy(), exact)
     row: dict[str, Any] = {
         "how": error["how"],
         "rms": rms,
         "reported rms": error["outputs"]["reading"]["rms"] / rig.noise,
         "ms": 1e3 * _compiled_seconds(rig, clock, chosen),
         "one step": {
-            "rms": _off(rig, compiled_run(rig.system, inputs, clock, ONE_STEP).reading, times),
+            "rms": _off(rig, compiled_run(rig.system, inputs, clock, ONE_STEP).reading, exact),
             "ms": 1e3 * _compiled_seconds(rig, clock, ONE_STEP),
         },
         "equal steps as exact": None,
@@ -260,7 +262,7 @@ def simulated(rig: Rig, clock: float, compare: bool = True) -> dict[str, Any]:
     number = 2
     while compare and chosen.tolerance is not None and number <= MOST_EQUAL:
         equal = Integration(substeps=number)
-        if _off(rig, compiled_run(rig.system, inputs, clock, equal).reading, times) <= rms:
+        if _off(rig, compiled_run(rig.system, inputs, clock, equal).reading, exact) <= rms:
             row["equal steps as exact"] = {"number": number, "ms": 1e3 * _compiled_seconds(rig, clock, equal)}
             break
         number *= 2
@@ -280,7 +282,7 @@ def measured(rig: Rig, clock: float, compare: bool = True) -> dict[str, Any]:
     }
     equal = _equal_steps(rig, problem, clock, rms) if compare and chosen is not ONE_STEP else None
     row["equal steps as exact"] = None if equal is None else {"number": equal[0], "ms": 1e3 * equal[1]}
-    row["simulated"] = simulated(rig, clock, compare)
+    row["simulated"] = simulated(rig, clock, np.asarray(problem.batch.output)[0], compare)
     return row
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
-    pass
+    from smajax.simulation.integration_error import Tolerance
 
 DEMOS = ("latent", "complete")  # the benches of `smajax demo`
 UNMET = 3  # exit code: the command is done and its result does not meet a request
@@ -24,6 +24,14 @@ Overwrite = Annotated[
 ]
 Json = Annotated[bool, typer.Option("--json", help="print the result on stdout as JSON instead of text")]
 Open = Annotated[bool, typer.Option("--open/--no-open", help="open the page in a browser when it is done")]
+
+Finely = Annotated[
+    str,
+    typer.Option(
+        help="how finely between two samples: `auto` until the error is below 3e-4 of a whole transformation (1e-3 of many loops); a number "
+        "such as 1e-4, the error of a step (moving loads); or `none`, one step a sample, not checked",
+    ),
+]
 
 
 def quantity(
@@ -77,6 +85,21 @@ def numbers(option: str, text: str, unit: str = "1") -> tuple[float, ...]:
         raise typer.BadParameter(
             f"finite numbers with commas between them, not `{text}`: {error}", param_hint=option
         ) from None
+
+
+def tolerance_of(text: str) -> Tolerance:
+    """`auto`, `none` (None) or a number above zero. Raises typer.BadParameter."""
+    if text in ("auto", "none"):
+        return "auto" if text == "auto" else None
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0.0 < value < math.inf:
+        raise typer.BadParameter(
+            f"`auto`, `none` or a number above 0 such as 1e-4, not `{text}`", param_hint="--tolerance"
+        )
+    return value
 
 
 def within(low: float, high: float = math.inf) -> Callable[[float | None], float | None]:

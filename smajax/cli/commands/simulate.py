@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,12 +10,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from smajax.cli import completion
-from smajax.cli.options import Json, Open, Overwrite, quantity, texts, within
+from smajax.cli.options import Finely, Json, Open, Overwrite, quantity, texts, tolerance_of, within
 from smajax.cli.terminal import browse, command_line, console, resumable
 
 if TYPE_CHECKING:
     from smajax.control.run_request import LoopRequest, RunRequest, RunResult
-    from smajax.simulation.integration_error import Tolerance
 
 SHOWN = 7  # columns of a table of set points on a terminal
 OPTIONS = {"values": "--set", "mismatch": "--mismatch", "set_points": "--set-point"}  # part of a run -> its option
@@ -32,21 +30,6 @@ def _inputs(option: str, several: Sequence[str] | None) -> dict[str, str]:
             raise typer.BadParameter(f"each name once, as in `name=text`, not `{part}`", param_hint=option)
         result[name.strip()] = text.strip()
     return result
-
-
-def _tolerance(text: str) -> Tolerance:
-    """`auto`, `none` (None) or a number above zero. Raises typer.BadParameter."""
-    if text in ("auto", "none"):
-        return "auto" if text == "auto" else None
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not 0.0 < value < math.inf:
-        raise typer.BadParameter(
-            f"`auto`, `none` or a number above 0 such as 1e-4, not `{text}`", param_hint="--tolerance"
-        )
-    return value
 
 
 @dataclass(frozen=True)
@@ -205,13 +188,7 @@ def simulate(
         float | None, quantity("length of the run; default: that of the inputs", "s", above=0.0, like="10s")
     ] = None,
     dt: Annotated[float, quantity("time between samples", "s", above=0.0, like="5ms")] = 0.005,
-    tolerance: Annotated[
-        str,
-        typer.Option(
-            help="error of a step between samples: `auto` chooses it so that the result has less than 3e-4 of a whole transformation; a "
-            "number such as 1e-4 (moving loads); or `none`, one step a sample, not checked",
-        ),
-    ] = "auto",
+    tolerance: Finely = "auto",
     gains: Annotated[
         Path | None, typer.Option(help="gains.json of `smajax tune`: a closed loop of the arm by that controller")
     ] = None,
@@ -277,7 +254,7 @@ def simulate(
     series = _inputs("--input", inputs)
     options = _Options(step, series, gains, controller, set_point, perturbed, time, gif)
     options.check(load)
-    changed, finely = texts("--set", values, VALUES), _tolerance(tolerance)
+    changed, finely = texts("--set", values, VALUES), tolerance_of(tolerance)
     request = RunRequest(wire, load, drive, law, changed, series, time, seconds, dt, finely)
     loop = LoopRequest(controller, set_point or "", gains, perturbed, estimator, noise, period, delay, seed)
     request, result = _run(options, request, loop)

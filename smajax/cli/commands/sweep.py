@@ -2,14 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from smajax.cli import completion
-from smajax.cli.options import Json, Open, Overwrite, alone, numbers, quantity, understood, within
+from smajax.cli.options import (
+    Finely,
+    Json,
+    Open,
+    Overwrite,
+    alone,
+    numbers,
+    quantity,
+    tolerance_of,
+    understood,
+    within,
+)
 from smajax.cli.terminal import browse, command_line, console, resumable
 
 if TYPE_CHECKING:
@@ -129,6 +140,7 @@ def sweep(
     noise: Annotated[float, quantity("noise of the angle's readings (1 sigma)", "deg", 0.0, 360.0)] = 0.0,
     period: Annotated[float, quantity("sample time of the controller, a multiple of 10 ms", "s")] = 0.01,
     delay: Annotated[int, typer.Option(callback=within(0), help="control periods until a command arrives")] = 0,
+    tolerance: Finely = "auto",
     out: Annotated[
         Path,
         typer.Option(
@@ -163,7 +175,7 @@ def sweep(
     from smajax.report.sweep_folder import as_text, files_of, write_sweep
 
     options = _Options(controllers, over, points, set_points, tuple(gains or ()), gain_ratios, fast)
-    settings = options.settings(seconds, estimator, noise, period, delay)
+    settings = replace(options.settings(seconds, estimator, noise, period, delay), tolerance=tolerance_of(tolerance))
     for sentence in (
         understood("Set points", set_points, settings.set_points, "deg"),
         understood("Ratios of the main gain", gain_ratios, settings.gain_ratios),

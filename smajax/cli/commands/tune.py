@@ -10,7 +10,21 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from smajax.cli import completion
-from smajax.cli.options import UNMET, Json, Open, Overwrite, alone, numbers, pairs, quantity, texts, understood, within
+from smajax.cli.options import (
+    UNMET,
+    Finely,
+    Json,
+    Open,
+    Overwrite,
+    alone,
+    numbers,
+    pairs,
+    quantity,
+    texts,
+    tolerance_of,
+    understood,
+    within,
+)
 from smajax.cli.terminal import browse, command_line, console, resumable
 
 if TYPE_CHECKING:
@@ -159,6 +173,7 @@ def tune(
     period: Annotated[float, quantity("sample time of the controller, a multiple of 10 ms", "s")] = 0.01,
     delay: Annotated[int, typer.Option(callback=within(0), help="control periods until a command arrives")] = 0,
     seed: Annotated[int, typer.Option(callback=within(0), help="of starting points, plants and noise")] = 0,
+    tolerance: Finely = "auto",
     out: Annotated[Path, typer.Option(help="folder for gains.json, the page, the pictures and the numbers")] = Path(
         "tune"
     ),
@@ -207,6 +222,7 @@ def tune(
         delay=delay,
         seed=seed,
         start={} if initial is None else initial.values,
+        tolerance=tolerance_of(tolerance),
         **_Search(starts, rounds, finish, fast).effort(),
     )
     sentence = understood("Set points", set_points, settings.set_points, "deg")
