@@ -18,6 +18,7 @@ from smajax.core.where_tree import where_tree
 from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.system import System
 from smajax.model.types import Inputs, Scalar, State
+from smajax.simulation.observers import HOTTEST
 from smajax.simulation.step import step_and_error
 
 SAFETY = 0.9
@@ -61,8 +62,9 @@ def advance(
         length = jnp.where(last, at.left, lax.stop_gradient(jnp.minimum(at.tried, 0.5 * at.left)))
         new, error = step_and_error(system, at.state, inputs, length, once)
         worst = lax.stop_gradient(_relative(system, error, tolerance))
-        # A state that is not finite goes to the end at once: no shorter step mends it.
-        lost = ~jnp.isfinite(at.state.wire.temperature + at.state.motion.position + at.state.wire.stress)
+        # A state that is not finite, or of a wire that has molten, goes to the end at once: no shorter step mends it.
+        degrees = at.state.wire.temperature
+        lost = ~jnp.isfinite(degrees + at.state.motion.position + at.state.wire.stress) | (degrees > HOTTEST)
         length = jnp.where(lost, at.left, length)
         last = last | lost
         good = (worst <= 1.0) | (length <= shortest) | lost
