@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import equinox as eqx
@@ -22,6 +22,7 @@ from smajax.simulation.integration_error import (
     Outputs,
     Tolerance,
     alone,
+    coarse_to_fine,
     integrated,
 )
 from smajax.simulation.measures import SHOWN
@@ -110,6 +111,30 @@ def measured_run(
     With "auto" that is less than 3e-4 of a whole transformation where any tolerance comes so far; a number is taken as it is, and None
     is one step a sample, of which nothing is measured. Raises as `simulate_compiled`.
     """
+    _, error, found = _measured(system, inputs, dt, tolerance, alone(system), initial, engine)
+    return found, error
+
+
+def chosen_integration(
+    system: System, inputs: Mapping[str, Series], dt: float, reverse: bool = False
+) -> tuple[Integration, IntegrationError]:
+    """The cheapest `integration` for `simulate` of such runs that leaves little in them, and its error: chosen outside of `jit`, fixed inside.
+
+    `reverse`: one that `jax.grad` goes back through, of equal steps. Raises as `simulate_compiled`.
+    """
+    integration, error, _ = _measured(system, inputs, dt, AUTO, coarse_to_fine(system, reverse), None, "auto")
+    return integration, error
+
+
+def _measured(  # as `measured_run`, of which it is the work, with the choices
+    system: System,
+    inputs: Mapping[str, Series],
+    dt: float,
+    tolerance: Tolerance,
+    choices: Iterator[Integration],
+    initial: State | None,
+    engine: Engine,
+) -> tuple[Integration, IntegrationError, Trajectory]:
     check_inputs(system, inputs)
     check_scalars(system, dt, initial)
     check_bounds(system)
@@ -120,8 +145,7 @@ def measured_run(
         outputs = {name: np.asarray(getattr(found, name))[None] for name in SHOWN}
         return found, outputs | {name: np.asarray(sensor_output(system, found, name))[None] for name in SENSORS}
 
-    _, error, found = integrated(run, system, tolerance, alone(system))
-    return found, error
+    return integrated(run, system, tolerance, choices)
 
 
 def compiled_run(

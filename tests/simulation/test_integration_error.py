@@ -18,6 +18,7 @@ from smajax.core.parameters import parameter_values, set_parameters
 from smajax.model.rigs import arm
 from smajax.simulation.batch.axes import grid
 from smajax.simulation.batch.run_batch import run_batch
+from smajax.simulation.compiled import chosen_integration
 from smajax.simulation.dataset import simulate_dataset
 from smajax.simulation.integration_error import LARGEST, whole_transformation
 from smajax.simulation.measures import Last, MeanSquare
@@ -93,6 +94,7 @@ def test_a_batch_takes_one_step_a_sample_where_that_is_enough() -> None:
     off = float(np.abs(coarse["last_position"] - exact["last_position"]).max())
     assert _reached(coarse)["last_position"]["rms"] == pytest.approx(off, rel=1e-6)
     assert off < LARGEST * whole_transformation(arm())["position"]
+    assert coarse["last_position"].attrs["integration_error"] == _reached(coarse)["last_position"]["rms"]
 
 
 def test_slopes_of_a_coarse_clock_are_found_through_equal_steps() -> None:
@@ -123,6 +125,7 @@ def test_a_batch_on_disk_keeps_the_integration_that_it_was_begun_with(tmp_path: 
     first = run_batch(arm(), {}, grid(voltage=[6.0, 7.0]), **settings)
     again = run_batch(arm(), {}, grid(voltage=[6.0, 7.0]), **settings)
     assert again.attrs["integration_error"] == first.attrs["integration_error"]
+    assert again["position"].attrs["integration_error"] == _reached(again)["position"]["rms"]
     assert _reached(again)["position"]["rms"] < LARGEST * whole_transformation(arm())["position"]
     np.testing.assert_array_equal(again["position"], first["position"])
 
@@ -159,3 +162,18 @@ def test_derivatives_of_a_closed_loop_with_error_controlled_steps() -> None:
     difference = (value(1.0 + 1e-4, steps) - value(1.0 - 1e-4, steps)) / 2e-4
     assert float(difference) == pytest.approx(found, rel=0.01)
     assert abs(found) > 1e-3
+
+
+def test_an_integration_is_chosen_before_a_program_is_traced() -> None:
+    """What `simulate` takes inside of `jit`: equal steps where a gradient goes back through it, otherwise error-controlled ones."""
+    clock, wave = 5.0 * CLOCK, {"voltage": jnp.asarray(ON_AND_OFF)}
+    exact = simulate_dataset(arm(), wave, clock, tolerance=1e-8)["position"].to_numpy()
+    ways = whole_transformation(arm())
+    for reverse in (False, True):
+        chosen, error = chosen_integration(arm(), wave, clock, reverse)
+        assert (chosen.tolerance is None) is reverse
+        assert error.small
+        found = jax.jit(lambda volts, how=chosen: simulate(arm(), {"voltage": volts}, clock, integration=how).position)
+        off = np.asarray(found(wave["voltage"])) - exact
+        assert float(np.sqrt(np.mean(off**2))) < LARGEST * ways["position"]
+        assert float(np.sqrt(np.mean(off**2))) == pytest.approx(error.rms["position"], rel=0.02)
