@@ -124,4 +124,4 @@ def initial_state(system: System, inputs: Inputs) -> State:
     wire = start(system.wire, temperature, stress, strain, fraction, terms.kinetics, terms.history)
     reading, sensor = first_reading(terms.sensor, reading, zero)
     friction = {term.effect_name: zero for term in terms.friction}
-    return State(zero, wire, Motion(position, zero, friction), reading, sensor)
+    return State(zero, wire, Motion(position, zero, friction), reading, sensor, zero)

@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Mapping
 
 import equinox as eqx
+import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 Scalar = Float[Array, ""]
@@ -53,6 +54,7 @@ class State(eqx.Module):
     motion: Motion
     reading: Scalar  # what the sensor shows: m, rad, or - (strain)
     sensor: dict[str, Scalar] = eqx.field(default_factory=dict)  # its history (`sensor_reading.py`); mostly empty
+    unsolved: Scalar = eqx.field(default_factory=lambda: jnp.zeros(()))  # stages so far that did not converge
 
 
 class Trajectory(eqx.Module):
@@ -69,3 +71,4 @@ class Trajectory(eqx.Module):
     position: Series
     velocity: Series
     reading: Series
+    unsolved: Series  # stages until then whose solver did not converge: 0 in a run to rely on

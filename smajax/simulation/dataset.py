@@ -44,7 +44,8 @@ def labelled_run(
     """A trajectory as a data set over `time` (s), every variable with `units` (SI, degC, rad) and `long_name`.
 
     inputs: series of shape (n,) that are stored beside it. error: of the integration, which becomes attributes (`with_error`).
-    settings: attributes, such as `dt`. Force on the wire (N) and its resistance (ohm) are computed from the states.
+    settings: attributes, such as `dt`; `unsolved_stages` counts the stages that did not converge. Force on the wire (N) and its
+    resistance (ohm) are computed from the states.
     """
     units = _units(system)
     names = [name for name in units if hasattr(run, name)]
@@ -56,6 +57,7 @@ def labelled_run(
         name: ("time", values, {"units": units[name], "long_name": LABELS.get(name, name.replace("_", " "))})
         for name, values in {**columns_in, **columns}.items()
     }
+    settings = {"unsolved_stages": int(np.asarray(run.unsolved)[-1]), **settings}
     time = ("time", np.asarray(run.time), {"units": "s", "long_name": "time"})
     result = xr.Dataset(data, {"time": time}, provenance(system, **settings))
     return result if error is None else with_error(result, error)

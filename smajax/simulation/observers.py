@@ -13,7 +13,7 @@ from smajax.simulation.integrate import AbstractObserver, Observed, Period, Step
 from smajax.simulation.measures import AbstractMeasure, value_of
 
 # Status codes of a run.
-GOOD, NOT_FINITE, RUNAWAY = 0, 1, 2
+GOOD, NOT_FINITE, RUNAWAY, UNSOLVED = 0, 1, 2, 3
 HOTTEST = 3000.0  # C: no wire is hotter, it has molten long before
 COLDEST = -273.15  # C
 
@@ -62,21 +62,28 @@ class Measures(AbstractObserver):
 
 
 class Status(AbstractObserver):
-    """`status` (a code) and `first_bad_time` (s; infinite where nothing went wrong)."""
+    """`status` (a code) and `first_bad_time` (s; infinite where nothing went wrong).
 
-    def init(self, state: State) -> tuple[Scalar, Scalar]:
-        return jnp.full_like(state.time, jnp.inf), jnp.zeros_like(state.time, int)
+    A run with a stage that did not converge (`UNSOLVED`) goes on, and may go wrong in another way, which counts for more.
+    """
 
-    def update(self, memory: tuple[Scalar, Scalar], step: Step) -> tuple[Scalar, Scalar]:
-        first, status = memory
+    def init(self, state: State) -> tuple[Scalar, Scalar, Scalar]:
+        never = jnp.full_like(state.time, jnp.inf)
+        return never, jnp.zeros_like(state.time, int), never
+
+    def update(self, memory: tuple[Scalar, Scalar, Scalar], step: Step) -> tuple[Scalar, Scalar, Scalar]:
+        first, status, unsolved = memory
         state: State = step.after
         not_finite, runaway = _wrong(state)
         code = jnp.where(not_finite, NOT_FINITE, jnp.where(runaway, RUNAWAY, GOOD))
         fresh = (status == GOOD) & (code != GOOD)
-        return jnp.where(fresh, state.time, first), jnp.where(fresh, code, status)
+        unsolved = jnp.where((unsolved == jnp.inf) & (state.unsolved > 0.0), state.time, unsolved)
+        return jnp.where(fresh, state.time, first), jnp.where(fresh, code, status), unsolved
 
     def result(self, run: Observed) -> dict[str, Scalar]:
-        first, status = run.memory
+        first, status, unsolved = run.memory
+        alone = (status == GOOD) & (unsolved < jnp.inf)
+        status, first = jnp.where(alone, UNSOLVED, status), jnp.where(alone, unsolved, first)
         return {"status": status.astype("int8"), "first_bad_time": first}
 
 

@@ -136,7 +136,8 @@ def simulate(
     """Simulate over the samples of `inputs`, each of shape (n,), SI, `dt` seconds apart.
 
     The result holds the states at t_0 ... t_{n-1}; input i is held from t_i to t_{i+1} (a coupon's inputs are values
-    at t_i). `initial` defaults to rest with the first inputs. Raises ValueError for missing or ill-shaped inputs, for one
+    at t_i). `unsolved` counts the stages until then whose solver did not converge: 0, or take a shorter step. `initial` defaults to rest
+    with the first inputs. Raises ValueError for missing or ill-shaped inputs, for one
     that is not finite and a parameter out of its bounds, unless the value is not known yet (`jit`, `vmap`, `grad`).
     `integration`: how finely between two samples, by default one step, for what is traced cannot look at its own error:
     `compiled.chosen_integration` looks before. Error-controlled steps have derivatives in forward mode alone.
@@ -181,4 +182,5 @@ def trajectory(states: State) -> Trajectory:
         position=m.position,
         velocity=m.velocity,
         reading=states.reading,
+        unsolved=states.unsolved,
     )

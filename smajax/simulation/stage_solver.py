@@ -59,6 +59,7 @@ class Solution(NamedTuple):
     z: Unknowns
     branch: Branch
     free: Scalar  # position without end stops
+    unsolved: Scalar  # 1 where `MOST_ITERATIONS` were not enough, else 0
 
 
 class _Iterate(NamedTuple):
@@ -219,4 +220,4 @@ def solve(system: System, stage: Stage, inputs: Inputs) -> Solution:
     at = lax.while_loop(
         lambda now: ~now.enough & (now.iterations < MOST_ITERATIONS), lambda now: iterate(now, None), at
     )
-    return Solution(at.z, at.branch, at.free)
+    return Solution(at.z, at.branch, at.free, jnp.where(at.enough, 0.0, jnp.ones_like(xi)))

@@ -128,17 +128,17 @@ def _differentiable(given: tuple[System, Stage, Inputs]) -> Solution:
         return rough
 
     z = lax.custom_root(all_four, result.z, as_found if stage.once else corrected, linear)
-    return Solution(z, result.branch, result.free)
+    return Solution(z, result.branch, result.free, result.unsolved)
 
 
-def _ended(system: System, stage: Stage, inputs: Inputs) -> tuple[WireState, Scalar, Scalar]:
-    """Solve one stage: (the wire at its end, the position, the position without end stops)."""
+def _ended(system: System, stage: Stage, inputs: Inputs) -> tuple[WireState, Scalar, Scalar, Scalar]:
+    """Solve one stage: (the wire at its end, the position, the position without end stops, 1 where it did not converge)."""
     wire, terms, old = system.wire, system.terms, stage.old.wire
-    z, branch, free = _solved((system, stage, dict(inputs)))
+    z, branch, free, unsolved = _solved((system, stage, dict(inputs)))
     at = z.temperature, jnp.maximum(z.stress, 0.0)
     xi, parts = settled(wire.kinetics, terms.kinetics, old, branch, z.temperature, z.stress, z.fraction)
     new = reached(wire, terms.constitutive, old, *at, xi)
-    return with_amplitudes(wire.kinetics, terms.kinetics, old, branch, new, parts), z.position, free
+    return with_amplitudes(wire.kinetics, terms.kinetics, old, branch, new, parts), z.position, free, unsolved
 
 
 def _stage(system: System, stage: Stage, inputs: Inputs) -> tuple[State, Scalar, Scalar, Scalar]:
@@ -147,7 +147,7 @@ def _stage(system: System, stage: Stage, inputs: Inputs) -> tuple[State, Scalar,
     assert isinstance(load, AbstractMovingLoad)
     terms, old = system.terms, over(stage.old.wire, stage.time - stage.old.time)
     stage = dataclasses.replace(stage, old=dataclasses.replace(stage.old, wire=old))
-    wire, position, free = _ended(system, stage, inputs)
+    wire, position, free, unsolved = _ended(system, stage, inputs)
     wire = with_supply_history(system, inputs, old, wire)
     lower, upper = load.limits()
     below, above = free < lower, free > upper
@@ -162,7 +162,10 @@ def _stage(system: System, stage: Stage, inputs: Inputs) -> tuple[State, Scalar,
     before = stage.old.motion
     rubs = rubbing(load, terms.friction, before, stage.velocity, inputs)
     friction = {one.name: in_use(one, before, position) for one in rubs}
-    new = State(stage.time, wire, Motion(position, velocity, friction), stage.old.reading, stage.old.sensor)
+    motion = Motion(position, velocity, friction)
+    new = dataclasses.replace(
+        stage.old, time=stage.time, wire=wire, motion=motion, unsolved=stage.old.unsolved + lax.stop_gradient(unsolved)
+    )
     return new, heating, velocity, acceleration
 
 
@@ -197,7 +200,7 @@ def _moving_step(
     end, _ = lax.scan(recomputed(body), _Bases(first, list(start), none), (times, *shares))
     old = end.stage.old
     heat, position, velocity = end.error
-    return State(end.stage.time, old.wire, old.motion, old.reading, old.sensor), (heat, position, velocity)
+    return dataclasses.replace(old, time=end.stage.time), (heat, position, velocity)
 
 
 @traced_once
@@ -209,7 +212,7 @@ def _coupon_step(system: System, state: State, inputs: Inputs, dt: Scalar) -> St
     branch = choose_branch(law, changed, old, open_branches(law, changed, old), *at)
     xi, parts = settled(law, changed, old, branch, *at, curve_on(law, changed, old, branch, *at))
     new = with_amplitudes(law, changed, old, branch, reached(wire, terms.constitutive, old, *at, xi), parts)
-    return State(state.time + dt, new, state.motion, state.reading, state.sensor)
+    return dataclasses.replace(state, time=state.time + dt, wire=new)
 
 
 @traced_once
@@ -239,7 +242,7 @@ def _strain_coupon_step(system: System, state: State, inputs: Inputs, dt: Scalar
     new = reached(wire, terms.constitutive, old, temperature, stress_of(xi), xi)
     new = with_amplitudes(law, changed, old, branch, new, parts)
     still = jnp.zeros_like(strain)
-    return State(state.time + dt, new, Motion(-strain, still), state.reading, state.sensor)
+    return dataclasses.replace(state, time=state.time + dt, wire=new, motion=Motion(-strain, still))
 
 
 def step(system: System, state: State, inputs: Inputs, dt: Scalar | float, once: bool = False) -> State:
@@ -284,4 +287,5 @@ def _read(system: System, old: State, new: State, shown: tuple[Scalar, Scalar], 
         lags = lag > SHORTEST_LAG * dt
         left = jnp.where(lags, jnp.exp(-dt / jnp.where(lags, lag, dt)), 0.0)
         late = after - behind + (followed(old) - before + behind) * left
-    return State(new.time, new.wire, new.motion, *reading_of(system.terms.sensor, late, new.time, old.sensor))
+    reading, sensor = reading_of(system.terms.sensor, late, new.time, old.sensor)
+    return dataclasses.replace(new, reading=reading, sensor=sensor)

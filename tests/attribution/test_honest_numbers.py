@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from importlib import resources
 from pathlib import Path
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -74,9 +75,8 @@ def test_every_point_of_the_declared_box_gives_finite_numbers(rig: str, count: i
     levels[50:200], levels[250:300] = top, 0.5 * top
     box = _whole_box(system, count, 1 if count == FAST else 2)
     measures = [kind(of) for of in ("martensite_fraction", "temperature", "position") for kind in (Smallest, Largest)]
-    found = run_batch(
-        system, {channel: jnp.asarray(levels)}, zipped(box), dt=0.02, keep=(), measures=(*measures, Smallest("stress"))
-    )
+    settings: dict[str, Any] = {"dt": 0.02, "tolerance": None, "keep": (), "measures": (*measures, Smallest("stress"))}
+    found = run_batch(system, {channel: jnp.asarray(levels)}, zipped(box), **settings)  # fixed steps, as the limits say
     status = found["status"].values
     assert not (status == NOT_FINITE).any()
     for name in found.data_vars:
@@ -104,10 +104,7 @@ def test_every_point_of_the_declared_box_gives_finite_numbers(rig: str, count: i
     rounding = 1e-6 * (1.0 + np.abs(ambient)) + 1e-9 * np.abs(warmest)
     # A wire that runs away is one that its highest input would bring there.
     assert np.all(hottest[(status == RUNAWAY) & slow & (coldest > COLDEST)] > HOTTEST)
-    # Nor where the phases' resistances differ much more than any alloy's: then a stage, in which power and fraction hang on each
-    # other, has had a root beyond (docs/robustness.md).
-    ratio = box["resistivity_martensite"] / box["resistivity_austenite"]
-    well = (status == GOOD) & slow & (ratio > 0.2) & (ratio < 5.0)
+    well = (status == GOOD) & slow
     assert np.all((ambient - coldest <= rounding)[well])
     assert np.all((warmest - np.maximum(hottest, ambient) <= rounding)[well])
     assert slow.mean() > 0.5

@@ -40,7 +40,8 @@ def with_vector(system: System, state: State, vector: Corrected) -> State:
     strain = -load.contraction(wire) * (position - load.start())
     stress = stress_at(wire, terms.constitutive, old, strain, temperature, old.stress, fraction)
     new = moved(terms.kinetics, old, reached(wire, terms.constitutive, old, temperature, stress, fraction))
-    return State(state.time, new, Motion(position, velocity, state.motion.friction), state.reading, state.sensor)
+    motion = Motion(position, velocity, state.motion.friction)
+    return dataclasses.replace(state, wire=new, motion=motion)
 
 
 def with_correction(system: System, state: State, vector: Corrected, transforming: Bool[Array, ""]) -> State:

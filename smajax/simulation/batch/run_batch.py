@@ -73,7 +73,7 @@ def run_batch(  # the public form: what goes inwards is a `BatchSettings`
     parameters together in less than four times the time of the run, those of each further measure in two or three times more, in memory
     that grows as the square root of its steps. Those of a run that went wrong mean nothing: `good` leaves them out.
 
-    The result has the dimensions of `axes` and `time`, `status` (0 good, 1 a number that is not finite, 2 runaway heat) and
+    The result has the dimensions of `axes` and `time`, `status` (0 good, 1 a number that is not finite, 2 runaway heat, 3 a stage that did not converge) and
     `first_bad_time`. Results take a quarter of `budget` bytes at a time, or of half of the memory that is left. With `out` they are streamed to a Zarr group
     there, and the same call resumes where an earlier one was stopped; the data set returned then reads from disk, as
     `smajax.simulation.batch.run_batch.opened(out)` does by itself.
