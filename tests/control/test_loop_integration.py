@@ -27,7 +27,7 @@ def test_loops_of_a_coarse_clock_take_finer_steps_until_the_error_is_small() -> 
     setup = LoopSetup(plant, controller, CONTROLLERS["sld"].main_gain, SECONDS, dt=0.05)
     chosen, error = integrated_setup(setup, rows, "auto")
     exact = positions(
-        LoopSetup(plant, controller, setup.main_gain, SECONDS, 0.05, integration=with_tolerance(1e-8)), rows
+        LoopSetup(plant, controller, setup.main_gain, SECONDS, 0.05, integration=with_tolerance(1e-7)), rows
     )
 
     def worst(one: LoopSetup) -> float:
