@@ -18,6 +18,7 @@ Compilation takes one second of processor time for each multiple of `PADDING` fr
 
 from __future__ import annotations
 
+import dataclasses
 import enum
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -56,10 +57,17 @@ class Fit:
 
 @dataclass(frozen=True)
 class FitSettings:
-    """How fits are run. `stage`: the name under which `progress` reports them."""
+    """How fits are run. `stage`: the name under which `progress` reports them.
+
+    A fit ends where a step lowers its cost by less than `tolerance` of it, or by less than `absolute_tolerance`, and
+    predicted no more. Of `allowed_excess`, (steps, cost) each: after so many steps a fit ends whose cost is above the least
+    of all by more than that.
+    """
 
     max_steps: int = MAX_STEPS
     tolerance: float = TOLERANCE
+    absolute_tolerance: float = 0.0
+    allowed_excess: tuple[tuple[int, float], ...] = ()
     cache: ResultCache = field(default_factory=ResultCache)
     progress: Progress = quiet
     stage: str = "fitting"
@@ -73,6 +81,7 @@ class Status(enum.IntEnum):
     NO_DESCENT = 2
     NOT_FINITE = 3
     NOTHING_FREE = 4
+    EXCEEDED = 5
 
 
 class LMState(eqx.Module):
@@ -128,9 +137,16 @@ def _initial_state(task: FitTask, size: int) -> LMState:
 
 @jax.jit
 def _advance(
-    state: LMState, f: Float[Array, ""], gradient: Float[Array, " y"], hessian: Float[Array, "y y"], tolerance: float
+    state: LMState,
+    f: Float[Array, ""],
+    gradient: Float[Array, " y"],
+    hessian: Float[Array, "y y"],
+    tolerances: tuple[float, float],
 ) -> LMState:
-    """Accept or reject `y_eval` by the normal equations there, end the fit or take the next step."""
+    """Accept or reject `y_eval` by the normal equations there, end the fit or take the next step.
+
+    `tolerances`: of f, as a share of it and itself.
+    """
 
     def information(f: Array, gradient: Array, hessian: Array) -> optx.FunctionInfo.EvalGradHessian:
         return optx.FunctionInfo.EvalGradHessian(
@@ -144,7 +160,8 @@ def _advance(
         lambda new, old: jnp.where(accept, new, old), DESCENT.query(state.y_eval, there, state.descent), state.descent
     )
     y, f_new = jnp.where(accept, state.y_eval, state.y), jnp.where(accept, f, state.f)
-    status = _status(first, accept, here.f, search, tolerance)
+    relative, absolute = tolerances
+    status = _status(first, accept, search, jnp.maximum(relative * here.f, absolute))
     finite = jnp.isfinite(f) & jnp.all(jnp.isfinite(gradient)) & jnp.all(jnp.isfinite(hessian))
     status = jnp.where(first & ~finite, Status.NOT_FINITE, jnp.where(first, state.status, status))
     step, _ = DESCENT.step(step_size, descent)
@@ -153,11 +170,11 @@ def _advance(
 
 
 def _status(
-    first: Bool[Array, ""], accept: Bool[Array, ""], f: Float[Array, ""], search: SearchState, tolerance: float
+    first: Bool[Array, ""], accept: Bool[Array, ""], search: SearchState, least: Float[Array, ""]
 ) -> Int[Array, ""]:
-    """A fit ends at a step that gained and predicted next to nothing, and where no step lowers the cost."""
-    small = (search.predicted > 0.0) & (search.predicted < tolerance * f)
-    converged = small & (search.actual < tolerance * (f - search.actual))
+    """A fit ends at a step that gained and predicted less than `least`, and where no step lowers the cost."""
+    small = (search.predicted > 0.0) & (search.predicted < least)
+    converged = small & (search.actual < least)
     ended = small | (search.damping > MAX_DAMPING)
     return jnp.where(
         accept,
@@ -166,13 +183,13 @@ def _status(
     )
 
 
-def _advanced(state: LMState, equations: NormalEquations, tolerance: float) -> LMState:
+def _advanced(state: LMState, equations: NormalEquations, tolerances: tuple[float, float]) -> LMState:
     """`_advance` with equations padded to the state's size."""
     cost, gradient, hessian = equations
     size, free = state.y.size, len(gradient)
     padded, square = np.zeros(size), np.zeros((size, size))
     padded[:free], square[:free, :free] = gradient, hessian
-    return jax.device_get(_advance(state, np.asarray(0.5 * cost), padded, square, tolerance))
+    return jax.device_get(_advance(state, np.asarray(0.5 * cost), padded, square, tolerances))
 
 
 def _packed(states: Sequence[LMState], rounds: int) -> dict[str, np.ndarray]:
@@ -216,12 +233,12 @@ def levenberg_marquardt(
             ys = [np.asarray(states[k].y_eval)[: len(tasks[k].slots)] for k in part]
             equations = _normal_equations(problem, [tasks[k] for k in part], ys, measured)
             for k, at in zip(part, equations, strict=True):
-                states[k] = _advanced(states[k], at, settings.tolerance)
+                states[k] = _advanced(states[k], at, (settings.tolerance, 0.5 * settings.absolute_tolerance))
 
     def running() -> list[int]:
         return [k for k, state in enumerate(states) if state.status == Status.RUNNING]
 
-    settled = settings.max_steps, settings.tolerance
+    settled = settings.max_steps, settings.tolerance, settings.absolute_tolerance, settings.allowed_excess
     key = cache.key((problem, list(tasks)), "levenberg_marquardt", outputs if outputs is not None else "", *settled)
     cached = cache.load(key)
     if cached is not None:
@@ -236,9 +253,22 @@ def levenberg_marquardt(
         if not going:
             break
         advance(going)
+        states = _without_exceeding(states, number + 1, settings.allowed_excess)
     cache.save(key, _packed(states, settings.max_steps))
     progress(Stage(settings.stage, 1.0))
     return [_ended(task, state, settings) for task, state in zip(tasks, states, strict=True)]
+
+
+def _without_exceeding(states: Sequence[LMState], steps: int, allowed: Sequence[tuple[int, float]]) -> list[LMState]:
+    """Fits end that after these steps are too far above the least cost."""
+    excess = min((0.5 * most for least, most in allowed if steps >= least), default=np.inf)
+    limit = min((float(state.f) for state in states), default=np.inf) + excess
+    return [
+        dataclasses.replace(state, status=np.asarray(int(Status.EXCEEDED)))
+        if state.status == Status.RUNNING and float(state.f) > limit
+        else state
+        for state in states
+    ]
 
 
 def _ended(task: FitTask, state: LMState, settings: FitSettings) -> Fit:
@@ -248,7 +278,8 @@ def _ended(task: FitTask, state: LMState, settings: FitSettings) -> Fit:
         Status.NO_DESCENT: "it has converged, no step lowers the cost any more",
         Status.NOT_FINITE: "the model gives no number at the start",
         Status.NOTHING_FREE: "no parameter is free",
+        Status.EXCEEDED: "other fits were far better after as many steps",
     }[Status(int(state.status))]
     cost = 2.0 * float(state.f)
-    converged = int(state.status) != Status.RUNNING and bool(np.isfinite(cost))
+    converged = int(state.status) not in (Status.RUNNING, Status.EXCEEDED) and bool(np.isfinite(cost))
     return Fit(task.values_at(np.asarray(state.y)[: len(task.slots)]), cost, converged, reason, int(state.steps))

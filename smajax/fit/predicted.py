@@ -123,6 +123,13 @@ def sums_of_squares(problem: Problem, points: Sequence[np.ndarray] | np.ndarray)
     return np.concatenate([(misfit**2).sum(axis=(1, 2)) for misfit in scaled])
 
 
+def total_costs(problem: Problem, points: Sequence[np.ndarray] | np.ndarray) -> np.ndarray:
+    """Sum of squares at every point, (M,), the priors' with it."""
+    rows = np.asarray(points, dtype=float)
+    prior = np.asarray([float(np.sum(problem.priors.rows(point) ** 2)) for point in rows])
+    return sums_of_squares(problem, rows) + prior
+
+
 def predicted_and_derivatives(
     problem: Problem, points: np.ndarray, tangents: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:

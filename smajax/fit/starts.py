@@ -11,7 +11,7 @@ import scipy  # its parts are imported when they are first used
 from smajax.core.progress import Stage
 from smajax.core.result_cache import ResultCache
 from smajax.fit.levenberg_marquardt import Fit, FitSettings, levenberg_marquardt
-from smajax.fit.predicted import sums_of_squares
+from smajax.fit.predicted import total_costs
 from smajax.fit.problem import FitTask, Problem
 
 MARGIN = 0.02  # share of the range that starts keep from its bounds
@@ -44,8 +44,7 @@ def _costs(problem: Problem, points: np.ndarray, cache: ResultCache) -> np.ndarr
     cached = cache.load(key)
     if cached is not None:
         return cached["cost"]
-    prior = np.stack([problem.priors.rows(point) for point in points]) ** 2
-    cost = np.nan_to_num(sums_of_squares(problem, points) + prior.sum(axis=1), nan=np.inf)
+    cost = np.nan_to_num(total_costs(problem, points), nan=np.inf)
     cache.save(key, {"cost": cost})
     return cost
 

@@ -27,10 +27,13 @@ from smajax.fit.levenberg_marquardt import (
     Status,
     _advanced,
     _initial_state,
+    _without_exceeding,
 )
 from smajax.fit.problem import FitTask
 from smajax.fit.robust import robust_variance
 from smajax.fit.sensitivity import Sensitivity
+
+TOLERANCES = TOLERANCE, 0.0
 
 
 class _BoundedLevenbergMarquardt(optx.AbstractGaussNewton):
@@ -61,7 +64,7 @@ def _fitted(columns: np.ndarray, target: np.ndarray, start: np.ndarray) -> LMSta
     while state.status == Status.RUNNING and state.steps < MAX_STEPS:
         residual = columns @ np.asarray(state.y_eval)[: len(start)] - target
         equations = float(residual @ residual), columns.T @ residual, columns.T @ columns
-        state = _advanced(state, equations, TOLERANCE)
+        state = _advanced(state, equations, TOLERANCES)
     return state
 
 
@@ -110,14 +113,35 @@ def test_within_optimistixs_own_loop_the_end_is_scipys() -> None:
         np.testing.assert_allclose(solution.value, exact.x, atol=1e-5)
 
 
+def test_a_fit_ends_where_its_cost_falls_by_less_than_the_absolute_tolerance() -> None:
+    state = _initial_state(_task(np.full(1, 0.5)), 8)
+    falling = [(1.0, np.ones(1)), (0.9, np.ones(1)), (0.8999, np.full(1, 1e-3))]
+    ended = []
+    for cost, gradient in falling:
+        state = _advanced(state, (cost, gradient, np.eye(1) * 1e3), (0.0, 0.01))
+        ended.append(int(state.status))
+    assert ended == [Status.RUNNING, Status.RUNNING, Status.CONVERGED]
+
+
+def test_fits_far_above_the_best_end_after_as_many_steps_as_allowed() -> None:
+    near, far = (
+        _advanced(_initial_state(_task(np.full(1, 0.5)), 8), (cost, np.ones(1), np.eye(1)), TOLERANCES)
+        for cost in (10.0, 200.0)
+    )
+    allowed = ((3, 400.0), (6, 100.0))
+    for steps, expected in ((2, Status.RUNNING), (3, Status.RUNNING), (6, Status.EXCEEDED)):
+        states = _without_exceeding([near, far], steps, allowed)
+        assert [int(state.status) for state in states] == [Status.RUNNING, expected]
+
+
 def test_a_step_to_a_jacobian_that_is_not_finite_is_rejected() -> None:
-    state = _advanced(_initial_state(_task(np.full(2, 0.5)), 8), (1.0, np.ones(2), np.eye(2)), TOLERANCE)
+    state = _advanced(_initial_state(_task(np.full(2, 0.5)), 8), (1.0, np.ones(2), np.eye(2)), TOLERANCES)
     assert not np.array_equal(state.y_eval, state.y)
-    after = _advanced(state, (0.5, np.array([np.nan, 1.0]), np.eye(2)), TOLERANCE)
+    after = _advanced(state, (0.5, np.array([np.nan, 1.0]), np.eye(2)), TOLERANCES)
     np.testing.assert_array_equal(after.y, state.y)
     assert after.status == Status.RUNNING
     lost: NormalEquations = (np.nan, np.ones(2), np.eye(2))
-    assert _advanced(_initial_state(_task(np.full(2, 0.5)), 8), lost, TOLERANCE).status == Status.NOT_FINITE
+    assert _advanced(_initial_state(_task(np.full(2, 0.5)), 8), lost, TOLERANCES).status == Status.NOT_FINITE
 
 
 def test_equations_that_are_singular_to_rounding_are_no_error() -> None:
