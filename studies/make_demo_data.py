@@ -174,6 +174,14 @@ drive = "voltage"
 ambient_temperature = "{ambient:g} degC"
 wire_diameter = "0.31 mm"
 damping = "{damping:g} N s/m"
+# Data sheet of the wire; resistivities from the ohms of its length. Without these lines they are fitted as well.
+young_modulus_austenite = "75 GPa"
+young_modulus_martensite = "28 GPa"
+stress_slope_austenite = "6.89 MPa/K"
+stress_slope_martensite = "6.89 MPa/K"
+thermal_modulus = "0.55 MPa/K"
+resistivity_austenite = "84 uohm cm"
+resistivity_martensite = "76 uohm cm"
 
 [unknown]  # fitted: bounds and start
 convection_coefficient = {{ low = "30 W/m^2/K", high = "300 W/m^2/K", start = "120 W/m^2/K" }}

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
+from types import MappingProxyType
+
 import numpy as np
 
 from smajax.attribution.findings import AssumedParameter
@@ -13,11 +16,11 @@ from smajax.fit.base_model import base_model
 LOGGED = {"mass": "load_mass", "ambient_temperature": "ambient_temperature"}  # input channel -> what it replaces
 
 
-def assumed(job: Job) -> tuple[AssumedParameter, ...]:
-    """Parameters of the base model that are not fitted and that no log gives."""
+def assumed(job: Job, presets: Collection[str] = ()) -> tuple[AssumedParameter, ...]:
+    """Parameters of the base model that are not fitted and that no log gives. `presets`: those of presets that are fitted."""
     experiment, model = job.experiment, base_model(job.experiment)
     logged = {own for channel, own in LOGGED.items() if all(channel in run.inputs for run in experiment.runs)}
-    table = {name: entry for name, entry in parameters(model).items() if name not in {*job.unknowns, *logged}}
+    table = {name: entry for name, entry in parameters(model).items() if name not in {*job.unknowns, *logged, *presets}}
     values = np.asarray(get_parameters(model, list(table))) if table else ()
     own = set.intersection(*({*run.parameters} for run in experiment.runs))
     return tuple(
@@ -31,15 +34,16 @@ def assumed(job: Job) -> tuple[AssumedParameter, ...]:
     )
 
 
-def expansion_not_given(job: Job) -> tuple[float, float] | None:
-    """Thermal expansion (martensite, austenite, 1/K) that the base model has by its preset's theta_T alone, as a size: theta_T / E.
+def expansion_not_given(job: Job, fitted: Mapping[str, float] = MappingProxyType({})) -> tuple[float, float] | None:
+    """Thermal expansion (martensite, austenite, 1/K) that the model has by its preset's theta_T alone, as a size: theta_T / E.
 
-    None where the experiment file gives theta_T, or fits it, or the model has none.
+    `fitted`: values of presets that the runs have corrected. None where the experiment file gives theta_T, or fits it, or the model has none.
     """
     experiment, model = job.experiment, base_model(job.experiment)
     names = ("thermal_modulus", "young_modulus_martensite", "young_modulus_austenite")
     own = {*experiment.parameters, *job.unknowns, *(name for run in experiment.runs for name in run.parameters)}
     if not set(names) <= parameters(model).keys() or names[0] in own:
         return None
-    modulus, martensite, austenite = (float(value) for value in get_parameters(model, names))
+    held = dict(zip(names, get_parameters(model, names), strict=True))
+    modulus, martensite, austenite = (float(fitted.get(name, held[name])) for name in names)
     return (modulus / martensite, modulus / austenite) if modulus else None

@@ -12,6 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from smajax.attribution.assumed import assumed, expansion_not_given
+from smajax.attribution.averaged_prediction import averaged
 from smajax.attribution.config import AttributionConfig
 from smajax.attribution.confounders import confounders
 from smajax.attribution.findings import (
@@ -23,13 +24,14 @@ from smajax.attribution.findings import (
     Verdict,
 )
 from smajax.attribution.found import effects_found, parameters_found
-from smajax.attribution.held_out import Compared, validated
+from smajax.attribution.held_out import Compared, every_run, validated
 from smajax.attribution.job import Job, job_of
 from smajax.attribution.joint_search import JointSearch
 from smajax.attribution.joint_stage import search_by_evidence
 from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.neutral import check_neutral
 from smajax.attribution.outlier_run import outlier_runs
+from smajax.attribution.preset_priors import visible
 from smajax.attribution.refusal import refuse_keys_of_identify
 from smajax.attribution.step_size_check import finer_integration, integration_error_of
 from smajax.attribution.unknown_term import Lacking, in_place_of, unknown_terms
@@ -147,7 +149,9 @@ def prepared(  # the stage's inputs, each once
     base = setting.base(start, seed)
     progress(Stage(CHECKING, 0.0))
     problem, index = setting.restricted(())
-    at_fit = sensitivity(problem, base.values[np.asarray(index)], job.unknowns)
+    at_fit = sensitivity(problem, base.values[np.asarray(index)], [*job.unknowns, *job.presets])
+    values = dict(zip(job.problem.names, base.values.tolist(), strict=True))
+    setting.presets = visible(at_fit, values, job.presets)
     identifiable = identifiability(at_fit, job.unknowns, job.bounds, "at the base model's fit")
     progress(Stage(CHECKING, 1.0))
     report_checks(progress, (), identifiable)
@@ -162,7 +166,7 @@ def searched(context: Context) -> Outcome:
 def against_an_unknown_term(context: Context, outcome: Outcome) -> Outcome:
     """Evidence, where more than noise is left: one unknown function, or nothing at all, in the place of the effects."""
     setting, base, final = context.setting, outcome.base, outcome.final
-    if not final.effects or setting.is_noise(final.values):
+    if not final.effects or setting.is_noise(final):
         return outcome
     lacking = in_place_of(setting, base, final)
     if lacking is not None:
@@ -177,7 +181,7 @@ def against_an_unknown_term(context: Context, outcome: Outcome) -> Outcome:
 def against_an_outlier_run(context: Context, outcome: Outcome) -> Outcome:
     """Evidence, where more than noise is left: one run that does not agree with the others, in the place of the effects."""
     setting, base, final = context.setting, outcome.base, outcome.final
-    if setting.is_noise(final.values):
+    if setting.is_noise(final):
         return outcome
     names = [run.name for run in context.job.fit_runs]
     outcome = replace(outcome, outliers=outlier_runs(setting, base, names))
@@ -206,9 +210,13 @@ def findings_of(context: Context, outcome: Outcome, compared: Compared, rejected
     base, final = outcome.base, outcome.final
     runs, residual_before, residual_after = compared
     setting.progress(Stage(WRITING, 0.0))
-    before = parameters_found(job, setting, base, context.start)
-    after = parameters_found(job, setting, final, context.start) if final.effects else before
+    before, after = (
+        parameters_found(job, setting, model, context.start, outcome.search.error_of(model.effects))
+        for model in (base, final)
+    )
     effects = effects_found(job, setting, final, after)
+    average = averaged(setting, outcome.search, final, every_run(job))
+    runs = tuple(replace(run, average=one) for run, one in zip(runs, average.runs, strict=True))
     mistaken = confounders(outcome.search, setting, final, job.fit_runs)
     integration = integration_error_of(setting, final)
     setting.progress(Stage(WRITING, 1.0))
@@ -238,8 +246,11 @@ def findings_of(context: Context, outcome: Outcome, compared: Compared, rejected
         wire=experiment.wire,
         load=experiment.load,
         declared=tuple(experiment.parameters),
-        assumed=assumed(job),
-        preset_expansion=expansion_not_given(job),
+        assumed=assumed(job, setting.presets),
+        preset_expansion=expansion_not_given(
+            job, {one.name: one.value for one in after.parameters if one.name in setting.presets}
+        ),
+        averaged=average.models,
         correlated=after.uncertainty.correlated_groups,
         confounders=mistaken,
         superseded=superseded,

@@ -46,6 +46,7 @@ class AttributionConfig:
         4  # where the others are not noise without it: a model fits any two runs far better than three
     )
     influential_ratio: float = 2.0  # by which the error on the other runs then falls
+    outlier_reach: float = 2.0  # by which the error of a fit without a run falls at most in other local minima
     outlier_most_runs: int = 12  # looked at, those of the largest residual first: each costs a refit
 
     # Held-out runs

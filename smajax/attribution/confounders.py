@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -35,17 +36,21 @@ def confounders(search: JointSearch, setting: Search, model: Model, runs: Sequen
     variance = search.error(fitted) ** 2
     here = fitted.log_evidence(variance)
     traces = traces_at(search.joint, fitted, search.extent)
-    found = []
+    found: list[Confounder] = []
+    likely: list[tuple[int, FittedModel]] = []  # (place in `found`, model with a confounder that runs may separate)
     for effect in own:
         likened = list(_in_place_of(search, own, effect))
         odds = np.exp([min(one.log_evidence(variance) - here, 500.0) for _, one in likened])
         for (other, one), share in zip(likened, odds / (1.0 + odds.sum()), strict=True):
-            what, apart = "", float("nan")
-            if share > setting.config.separating_weight:
-                what, apart = separating_run(setting, model, one, runs)
             alike = _alike(search, traces, fitted, effect, other)
-            if max(alike - setting.config.overlap_listed, share - setting.config.separating_weight) > 0.0:
-                found.append(Confounder(effect, other, alike, float(share), one.rms, what, apart))
+            if share > setting.config.separating_weight:
+                likely.append((len(found), one))
+            elif not alike > setting.config.overlap_listed:
+                continue
+            found.append(Confounder(effect, other, alike, float(share), one.rms, "", float("nan")))
+    separated = separating_runs(setting, model, [one for _, one in likely], runs)
+    for (place, _), (what, apart) in zip(likely, separated, strict=True):
+        found[place] = dataclasses.replace(found[place], separating_run=what, separation=apart)
     return tuple(sorted(found, key=lambda one: -one.weight))
 
 
@@ -87,13 +92,21 @@ def overlap(trace: np.ndarray, absorbing: Sequence[np.ndarray], other: Sequence[
     return float(np.linalg.norm(directions.T @ own)) / size
 
 
-def separating_run(setting: Search, one: Model, other: Model | FittedModel, runs: Sequence[Run]) -> tuple[str, float]:
-    """(the candidate run on which two fitted models differ most, rms difference over the noise); "" without a candidate."""
-    problem, index = setting.restricted((*one.effects, *other.effects))
+def separating_runs(
+    setting: Search, one: Model, others: Sequence[Model | FittedModel], runs: Sequence[Run]
+) -> list[tuple[str, float]]:
+    """Of each of `others`: (the candidate run on which it differs most from `one`, rms difference over the noise).
+
+    "" without a candidate. One program simulates all models.
+    """
+    problem, index = setting.restricted([effect for model in (one, *others) for effect in model.effects])
     candidates, there = candidate_problem(problem, one.values[index], runs)
-    if not candidates:
-        return "", float("nan")
-    first, second = predicted_at(there, [model.values[index] for model in (one, other)])
-    apart = np.sqrt(np.mean(there.centred(first - second) ** 2, axis=1)) / float(setting.problem.noise_sigma)
-    best = int(np.argmax(np.nan_to_num(apart, nan=-1.0)))
-    return list(candidates)[best], float(apart[best])
+    if not candidates or not others:
+        return [("", float("nan"))] * len(others)
+    first, *rest = predicted_at(there, [model.values[index] for model in (one, *others)])
+    found = []
+    for second in rest:
+        apart = np.sqrt(np.mean(there.centred(first - second) ** 2, axis=1)) / float(setting.problem.noise_sigma)
+        best = int(np.argmax(np.nan_to_num(apart, nan=-1.0)))
+        found.append((list(candidates)[best], float(apart[best])))
+    return found

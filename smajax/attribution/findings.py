@@ -31,6 +31,24 @@ class Verdict(StrEnum):
 
 
 @dataclass(frozen=True)
+class AveragedModel:
+    """A model that predictions are averaged over."""
+
+    effects: tuple[str, ...]
+    weight: float  # posterior probability, 0..1; those of all of them sum to one
+
+
+@dataclass(frozen=True)
+class AveragedRun:
+    """One run by the average of the likely models, arrays of shape (n,), SI."""
+
+    reading: np.ndarray
+    half_width: np.ndarray  # of the band about it in which nine of ten measured samples are expected
+    rmse: float
+    coverage: float  # share of the measured samples inside the band
+
+
+@dataclass(frozen=True)
 class RunFinding:
     """One measured run beside the two models; every array has shape (n,) on the same clock."""
 
@@ -46,6 +64,7 @@ class RunFinding:
     offset_after: float
     rmse_before: float
     rmse_after: float
+    average: AveragedRun | None = None
 
 
 @dataclass(frozen=True)
@@ -307,6 +326,7 @@ class Findings:
     preset_expansion: tuple[float, float] | None = (
         None  # 1/K, martensite and austenite, that the preset's theta_T alone gives
     )
+    averaged: tuple[AveragedModel, ...] = ()  # the likely models, over which `average` of each run is taken
     correlated: tuple[tuple[str, ...], ...] = ()  # clusters of parameters whose estimates are correlated
     confounders: tuple[Confounder, ...] = ()
     superseded: tuple[str, ...] = ()  # effects that one unknown term supersedes
@@ -351,3 +371,10 @@ def pooled_rmse(runs: Sequence[RunFinding], role: Role, which: Literal["before",
     squares = [getattr(run, f"rmse_{which}") ** 2 * len(run.time) for run in runs if run.role == role]
     samples = [len(run.time) for run in runs if run.role == role]
     return float(np.sqrt(sum(squares) / sum(samples))) if samples else float("nan")
+
+
+def coverage(findings: Findings) -> float | None:
+    """Share of the held-out samples inside the band of the averaged prediction; None without any."""
+    averages = [run.average for run in findings.runs if run.role == "held-out" and run.average is not None]
+    samples = sum(len(one.reading) for one in averages)
+    return sum(one.coverage * len(one.reading) for one in averages) / samples if samples else None

@@ -12,6 +12,8 @@ from smajax.attribution.leave_one_run_out import jackknife_error
 from smajax.attribution.model_fits import Evidence, Model, Search
 from smajax.attribution.nuisance_grid import scores_at
 from smajax.core.parameters import parameters
+from smajax.data.experiment.record import Prior
+from smajax.fit.problem import Problem
 from smajax.fit.sensitivity import Sensitivity, sensitivity
 from smajax.fit.uncertainty import Uncertainty, uncertainty
 from smajax.model.effects.library import LIBRARY
@@ -26,11 +28,17 @@ class ParametersFound:
     uncertainty: Uncertainty
 
 
-def parameters_found(job: Job, setting: Search, model: Model, start: np.ndarray) -> ParametersFound:
-    """Every free parameter of `model` with its standard error and remark."""
-    names = setting.free(model.effects)
+def parameters_found(job: Job, setting: Search, model: Model, start: np.ndarray, error: float) -> ParametersFound:
+    """Every free parameter of `model`, values of presets among them, with its standard error and remark.
+
+    `error`: what an independent sample may be off by, SI, against which the priors of the presets count.
+    """
+    names = [*setting.free(model.effects), *setting.presets]
     index = job.problem.names.index
-    at: Sensitivity = sensitivity(job.problem, model.values, names)
+    own, slots = setting.restricted(model.effects)
+    priors = {name: Prior(one.base, one.sigma, one.logarithmic) for name, one in setting.presets.items()}
+    problem = Problem.build(own.system, own.batch, error, own.offset, priors=priors)
+    at: Sensitivity = sensitivity(problem, model.values[slots], names)
     values = {name: float(model.values[index(name)]) for name in names}
     known = uncertainty(at, names, values, job.bounds)
     table = parameters(job.problem.system)

@@ -7,7 +7,6 @@ from typing import Literal
 import jax.numpy as jnp
 import numpy as np
 
-from smajax.attribution.config import AttributionConfig
 from smajax.attribution.findings import HeldOutWorse, Rejected, ResidualDiagnostics, RunFinding, pooled_rmse
 from smajax.attribution.job import Job
 from smajax.attribution.joint_search import JointSearch
@@ -17,7 +16,6 @@ from smajax.attribution.residual_diagnostics import diagnosed
 from smajax.core.parameters import parameter_values
 from smajax.data.experiment.record import Run
 from smajax.fit.packed_runs import RunBatch, pack, simulate_batch
-from smajax.fit.problem import Problem
 from smajax.model.types import Trajectory
 
 Compared = tuple[tuple[RunFinding, ...], ResidualDiagnostics, ResidualDiagnostics]
@@ -35,12 +33,12 @@ def validated(
     def held_out(compared: Compared, which: Literal["before", "after"] = "after") -> float:
         return pooled_rmse(compared[0], "held-out", which)
 
-    error = search.error(search.fitted[search.joint.ordered(final.effects)])
-    compared = whole = compare(job, first, final, setting.config)
+    error = search.error_of(final.effects)
+    compared = whole = compare(job, setting, first, final)
     left = final
     while left.effects:
         rest = without_last(search, setting, left, error) if len(left.effects) > 1 else first
-        without = compare(job, first, rest, setting.config)
+        without = compare(job, setting, first, rest)
         now = held_out(compared)
         if not (
             now >= held_out(compared, "before") or now > (1.0 + setting.config.held_out_tolerance) * held_out(without)
@@ -55,16 +53,22 @@ def validated(
     return left, compared, Rejected(gone, without_them, with_them)
 
 
-def _simulated(problem: Problem, values: np.ndarray, batch: RunBatch) -> Trajectory:
-    return simulate_batch(problem.system_at(jnp.asarray(values)), batch)
+def _simulated(setting: Search, model: Model, batch: RunBatch) -> Trajectory:
+    problem, index = setting.restricted(model.effects)
+    return simulate_batch(problem.system_at(jnp.asarray(model.values[index])), batch)
 
 
-def compare(job: Job, first: Model, final: Model, config: AttributionConfig) -> Compared:
+def every_run(job: Job) -> RunBatch:
+    """All runs, held-out ones included, integrated as finely as in the fits."""
+    experiment, integration = job.experiment, job.problem.batch.integration
+    return pack(experiment.runs, experiment.step, parameter_values(job.problem.system), integration)
+
+
+def compare(job: Job, setting: Search, first: Model, final: Model) -> Compared:
     """Every run, held-out ones included, by both models; and the diagnostics of the fit runs' residuals."""
-    experiment = job.experiment
-    batch = pack(experiment.runs, experiment.step, parameter_values(job.problem.system))
-    before = _simulated(job.problem, first.values, batch)
-    after = _simulated(job.problem, final.values, batch)
+    experiment, batch = job.experiment, every_run(job)
+    before = _simulated(setting, first, batch)
+    after = _simulated(setting, final, batch)
     runs = []
     residuals: dict[str, list[np.ndarray]] = {"before": [], "after": []}
     states: dict[str, list[dict[str, np.ndarray]]] = {"before": [], "after": []}
@@ -102,8 +106,8 @@ def compare(job: Job, first: Model, final: Model, config: AttributionConfig) -> 
     noise = experiment.noise_sigma, experiment.outputs[0].noise_given
     return (
         tuple(runs),
-        diagnosed(residuals["before"], states["before"], *noise, config),
-        diagnosed(residuals["after"], states["after"], *noise, config),
+        diagnosed(residuals["before"], states["before"], *noise, setting.config),
+        diagnosed(residuals["after"], states["after"], *noise, setting.config),
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from smajax.attribution.preset_priors import preset_bounds, preset_priors
 from smajax.attribution.run_extent import extent_of
 from smajax.core.parameters import parameter_values, parameters
 from smajax.data.experiment.record import Experiment, Run
@@ -13,6 +14,7 @@ from smajax.fit.integration import choose_integration, with_integration
 from smajax.fit.packed_runs import RunBatch, pack
 from smajax.fit.problem import Problem
 from smajax.model.effects.library import LIBRARY
+from smajax.model.effects.prior_width import CoefficientPrior
 from smajax.model.extended import extended
 from smajax.simulation.steppers import Integration
 
@@ -28,6 +30,7 @@ class Job:
     unknowns: tuple[str, ...]
     bounds: dict[str, tuple[float, float]]
     candidates: tuple[str, ...]
+    presets: dict[str, CoefficientPrior]  # of the values that the experiment does not give
 
 
 def job_of(experiment: Experiment, integration: Integration | None = None) -> Job:
@@ -58,4 +61,8 @@ def job_of(experiment: Experiment, integration: Integration | None = None) -> Jo
     bounds |= {unknown.name: (unknown.low, unknown.high) for unknown in experiment.unknowns}
     others = tuple(run for run in experiment.runs if run.role != "fit")
     held_out = pack(others, experiment.step, parameter_values(full), integration) if others else None
-    return Job(experiment, runs, problem, held_out, tuple(u.name for u in experiment.unknowns), bounds, names)
+    unknowns = tuple(unknown.name for unknown in experiment.unknowns)
+    given = frozenset({*experiment.parameters, *unknowns, *problem.batch.override_names})
+    presets = preset_priors(parameters(base), parameter_values(base), given)
+    bounds |= preset_bounds(presets, bounds)
+    return Job(experiment, runs, problem, held_out, unknowns, bounds, names, presets)

@@ -23,7 +23,7 @@ from smajax.attribution.subset_evidence import LinearModel, Subset, linear_model
 from smajax.attribution.traces import Traces, Variant, traces_at
 from smajax.core.progress import Stage
 from smajax.fit.levenberg_marquardt import FitSettings, levenberg_marquardt
-from smajax.fit.predicted import sums_of_squares
+from smajax.fit.predicted import total_costs
 from smajax.fit.starts import logarithmic_points
 from smajax.model.effects.candidate import Extent
 from smajax.model.effects.library import LIBRARY
@@ -31,15 +31,23 @@ from smajax.model.effects.library import LIBRARY
 MOST_ROUNDS = 20  # the evidence rises in every one of them, so this only ends what should have ended
 FITTED = 4  # sets a round
 REACH = 5.0  # nats below the best set in the linear model, within which a set is worth a fit
-STEPS, TOLERANCE = 30, 1e-5  # of a fit whose evidence is compared
+STEPS = 30  # of a fit whose evidence is compared
+SETTLED_COST = 0.02  # a hundredth in log evidence, by which a step of such a fit may still lower the cost
+ALLOWED_EXCESS = (
+    (4, 300.0),
+    (7, 100.0),
+    (12, 50.0),
+)  # after so many steps fits end whose cost is so far above the least
 LEAST_START, MOST_START = 0.02, 2.0  # widths from the base where a fit of a new coefficient begins
 PLACES = 16  # a power of two, for Sobol's points: of an effect with several local minima, simulated and the best fitted
 LARGEST_STEP = 0.2  # of its range that an unknown moves to the start of a fit
 SETTLED = 0.05  # relative change of the error of a sample
 DETECTABLE = 1.0  # standard errors that an effect of one width has to change the runs by to be looked for
-CERTAIN = 300.0  # nats that the linear model loses without an effect, beyond which no refit makes up for it
-CARRIED = 12  # likeliest sets of the linear model whose effects the program of the fits carries
+CERTAIN = 100.0  # nats that the linear model loses without an effect, beyond which no refit makes up for it
+CARRIED = 40  # likeliest sets of the linear model whose effects the program of the fits carries
 REPLACED = 2  # other effects that are tried in the place of each at the end
+NEIGHBOURS = 12  # of these sets and those without an effect, the likeliest in the linear model
+SETTLED_ODDS = 1.0  # log odds: a model that is likelier by less is as likely, and the average has both
 
 
 @dataclass
@@ -58,11 +66,17 @@ class JointSearch:
     rounds: list[JointRound] = field(default_factory=list)
     detectable: tuple[str, ...] = ()
     carried: tuple[str, ...] = ()  # effects of the program that fits run in, which grows with what is tried
+    rounds_before: int = 0  # of an earlier search, from whose models this one begins
+    thorough: bool = True  # ends only where no effect of the likeliest model can be removed or replaced
     on_round: Callable[[JointRound], None] = lambda _: None
 
     def error(self, model: FittedModel) -> float:
         """`independent_error` of what `model` leaves."""
         return independent_error(model, self.noise, self.noise_given)
+
+    def error_of(self, effects: Sequence[str]) -> float:
+        """`error` of the fitted model with these effects."""
+        return self.error(self.fitted[self.joint.ordered(effects)])
 
     def best(self, error: float) -> FittedModel:
         """The likeliest model."""
@@ -86,11 +100,17 @@ class JointRound:
     best_gain: float  # log evidence of the best over the present model's
 
 
-def search_jointly(search: JointSearch, base: np.ndarray) -> FittedModel:
-    """The likeliest model, from the base model fitted at `base` (P,). Fills `search.fitted` and `search.rounds`."""
-    present = fitted_model(search.joint, (), base, ())
-    search.fitted[()] = present
-    present = refined(search, present, search.error(present))  # what presets say is free as well
+def search_jointly(search: JointSearch, starts: Mapping[tuple[str, ...], np.ndarray]) -> FittedModel:
+    """The likeliest model, from fits of some sets of effects that end about `starts` (P,), the base model's, (), among them.
+
+    Fills `search.fitted` and `search.rounds`.
+    """
+    search.carried = search.joint.ordered([effect for effects in starts for effect in effects])
+    for effects, values in starts.items():
+        search.fitted[effects] = fitted_model(search.joint, effects, values, search.carried)
+    error = min(search.error(model) for model in search.fitted.values())
+    _fit_side_by_side(search, list(starts.items()), error, "fitting what the search begins with")
+    present = search.best(error)
     error = search.error(present)
     checked: set[tuple[str, ...]] = set()  # models whose effects were removed and replaced one by one
     for number in range(MOST_ROUNDS):
@@ -111,8 +131,9 @@ def search_jointly(search: JointSearch, base: np.ndarray) -> FittedModel:
         moved, present = best.effects != present.effects, best
         now = search.error(present)
         settled, error = abs(np.log(now / error)) < SETTLED, now
-        if not moved and settled:
-            if last or not present.effects:
+        alike = last and done.best_gain < SETTLED_ODDS
+        if alike or (not moved and settled):
+            if last or not present.effects or not search.thorough:
                 break
             checked.add(present.effects)
     return present
@@ -192,7 +213,7 @@ def _neighbours(linear: LinearModel, present: FittedModel) -> list[Subset]:
             for one in likeliest[:REPLACED]
             if linear.log_evidence(rest | {one}) > linear.log_evidence(here) - CERTAIN
         ]
-    return sets
+    return sorted(sets, key=lambda one: -linear.log_evidence(one))[:NEIGHBOURS]
 
 
 def _fit(
@@ -206,39 +227,54 @@ def _fit(
         likely = {effect for one in linear.ranked()[:CARRIED] for effect in _effects(search, one)}
         search.carried = joint.ordered([*search.carried, *needed, *likely])
     problem, index = joint.restricted(search.carried)
-    problem = problem.with_noise(error)
-    points = [[one[index] for one in starts(joint, subset, linear, traces)] for subset in sets]
+    points = [starts(joint, subset, linear, traces) for subset in sets]
     # Of the places where a fit could begin the one that is nearest to the runs.
-    every = [one for places in points for one in places]
-    prior = [float(np.sum(problem.priors.rows(one) ** 2)) for one in every]
-    costs = np.nan_to_num(sums_of_squares(problem, every) + prior, nan=np.inf)
-    tasks, owners, first = [], [], 0
+    every = [one[index] for places in points for one in places]
+    costs = iter(np.nan_to_num(total_costs(problem.with_noise(error), every), nan=np.inf))
+    begun: list[tuple[tuple[str, ...], np.ndarray]] = []
     for subset, places in zip(sets, points, strict=True):
         effects = _effects(search, subset)
-        start = places[int(np.argmin(costs[first : first + len(places)]))]
-        first += len(places)
-        # And, where an effect is new, from its usual size: near zero the misfit may have a minimum of its own.
-        usual = [_at_usual_size(joint, subset, traces, start, index)] if set(effects) - set(traces.present) else []
-        for one in (start, *usual):
-            tasks.append(problem.task(joint.free(effects), joint.bounds, one))
-            owners.append(effects)
-    stage = f"round {number + 1}: fitting the likeliest sets of effects"
-    settings = dataclasses.replace(search.settings, max_steps=STEPS, tolerance=TOLERANCE, stage=stage)
+        start = min(places, key=lambda _: next(costs))
+        begun.append((effects, start))
+        if set(effects) - set(traces.present):
+            # And, where an effect is new, from its usual size: near zero the misfit may have a minimum of its own.
+            begun.append((effects, _at_usual_size(joint, subset, traces, start)))
+    _fit_side_by_side(
+        search, begun, error, f"round {search.rounds_before + number + 1}: fitting the likeliest sets of effects"
+    )
+
+
+def _fit_side_by_side(
+    search: JointSearch, begun: Sequence[tuple[tuple[str, ...], np.ndarray]], error: float, stage: str
+) -> None:
+    """Fit sets of effects from values (P,), in the program of `search.carried`; the likelier of two fits of one set counts."""
+    joint = search.joint
+    problem, index = joint.restricted(search.carried)
+    problem = problem.with_noise(error)
+    tasks = [problem.task(joint.free(effects), joint.bounds, values[index]) for effects, values in begun]
     search.settings.progress(Stage(stage, 0.0))
-    best: dict[tuple[str, ...], FittedModel] = {}
-    for effects, fit in zip(owners, levenberg_marquardt(problem, tasks, settings), strict=True):
+    fits = levenberg_marquardt(problem, tasks, comparison_settings(search.settings, stage))
+    for (effects, start), fit in zip(begun, fits, strict=True):
+        search.trials[effects] = error
         if np.isfinite(fit.cost):
-            values = np.array(traces.values)
+            values = np.array(start)
             values[index] = fit.values
             # Coefficients of other effects count for nothing in this model.
             model = fitted_model(joint, effects, joint.without(values, effects), search.carried)
-            if effects not in best or model.log_evidence(error**2) > best[effects].log_evidence(error**2):
-                best[effects] = model
-    for effects, model in best.items():
-        old = search.fitted.get(effects)
-        if old is None or model.log_evidence(error**2) > old.log_evidence(error**2):
-            search.fitted[effects] = model
-        search.trials[effects] = error
+            old = search.fitted.get(effects)
+            if old is None or model.log_evidence(error**2) > old.log_evidence(error**2):
+                search.fitted[effects] = model
+
+
+def comparison_settings(settings: FitSettings, stage: str) -> FitSettings:
+    """Of fits whose evidence is compared: those that fall far behind end early."""
+    return dataclasses.replace(
+        settings,
+        max_steps=STEPS,
+        absolute_tolerance=SETTLED_COST,
+        allowed_excess=ALLOWED_EXCESS,
+        stage=stage,
+    )
 
 
 def refined(search: JointSearch, model: FittedModel, error: float) -> FittedModel:
@@ -280,18 +316,15 @@ def starts(joint: JointParameters, subset: Subset, linear: LinearModel, traces: 
     return [_off_bounds(joint, one) for one in points]
 
 
-def _at_usual_size(
-    joint: JointParameters, subset: Subset, traces: Traces, start: np.ndarray, index: np.ndarray
-) -> np.ndarray:
-    """`start`, of the parameters `index`, with the switches of new effects at their initial guess, on the side where they are."""
-    place = {int(slot): k for k, slot in enumerate(index)}
+def _at_usual_size(joint: JointParameters, subset: Subset, traces: Traces, start: np.ndarray) -> np.ndarray:
+    """`start` (P,) with the switches of new effects at their initial guess, on the side where they are."""
     changed = np.array(start)
     for variant in subset:
         if variant.effect in traces.present:
             continue
         guesses = LIBRARY[variant.effect].candidate.initial_guess
         for name in joint.switches(variant.effect):
-            k, (low, high) = place[joint.slots[name]], joint.bounds[name]
+            k, (low, high) = joint.slots[name], joint.bounds[name]
             base, guess = joint.priors[name].base, guesses.get(name.split(".", 1)[1], joint.priors[name].sigma)
             changed[k] = np.clip(base + np.copysign(abs(guess - base), changed[k] - base), low, 0.5 * (base + high))
     return changed

@@ -6,7 +6,7 @@ Effects whose gain is gone at half the step of the integration are excluded and 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -20,6 +20,10 @@ from smajax.attribution.model_fits import Evidence, Model, Search, Start
 from smajax.attribution.step_size_check import gain_kept_at_half_step
 from smajax.fit.levenberg_marquardt import Fit, FitSettings
 from smajax.model.effects.library import LIBRARY
+from smajax.model.effects.prior_width import CoefficientPrior
+
+LIKELIEST = 4  # sets of effects from which the search goes on with the values of presets free
+SETTLED_COST = 1e-4  # of twice the log-likelihood: the optimum to within a hundredth of a standard error
 
 
 @dataclass
@@ -28,13 +32,41 @@ class _Stage:
     settings: FitSettings
     excluded: set[str] = field(default_factory=set)
 
-    def joint_search(self) -> JointSearch:
+    def joint_search(self, presets: Mapping[str, CoefficientPrior]) -> JointSearch:
         """Among the candidates that were not excluded."""
         setting = self.setting
         names = [name for name in setting.candidates if name not in self.excluded]
-        joint = JointParameters.of(setting.problem, setting.unknowns, setting.bounds, names, setting.extent)
+        joint = JointParameters.of(setting.problem, setting.unknowns, setting.bounds, names, setting.extent, presets)
         noise = float(setting.problem.noise_sigma)
-        return JointSearch(joint, setting.extent, self.settings, noise, setting.noise_given, on_round=self.note)
+        before = len(setting.rounds)
+        return JointSearch(
+            joint,
+            setting.extent,
+            self.settings,
+            noise,
+            setting.noise_given,
+            rounds_before=before,
+            thorough=bool(presets) or not setting.presets,  # the last search
+            on_round=self.note,
+        )
+
+    def searched(self, base: np.ndarray) -> tuple[JointSearch, FittedModel]:
+        """(the search, likeliest model), from the base model fitted at `base` (P,).
+
+        First with the values of presets held, then, from the likeliest sets of effects, with these free as well: from the
+        base model alone fits that free them too end in local minima.
+        """
+        search = self.joint_search({})
+        found = search_jointly(search, {(): base})
+        presets = self.setting.presets
+        if not presets:
+            return search, found
+        error = search.error(found)
+        likeliest = sorted(search.fitted.values(), key=lambda model: -model.log_evidence(error**2))[:LIKELIEST]
+        alone = [search.fitted[one,] for one in found.effects if (one,) in search.fitted]
+        starts = {model.effects: model.values for model in (search.fitted[()], *alone, *likeliest)}
+        freed = self.joint_search(presets)
+        return freed, search_jointly(freed, starts)
 
     def exclude(self, effects: Sequence[str], kept: float) -> None:
         """Effects that keep only that share of their gain at half the step."""
@@ -58,8 +90,7 @@ def search_by_evidence(setting: Search, base: Fit) -> tuple[JointSearch, Model, 
     settings = FitSettings(tolerance=setting.config.final_convergence, cache=setting.cache, progress=setting.progress)
     stage = _Stage(setting, settings)
     while True:
-        search = stage.joint_search()
-        found = search_jointly(search, base.values)
+        search, found = stage.searched(base.values)
         error = search.error(found)
         first = as_model(search, search.fitted[()], error)
         final = final_model(search, setting, found, error)
@@ -83,7 +114,9 @@ def final_model(search: JointSearch, setting: Search, found: FittedModel, error:
         return as_model(search, best, error)
     start = Start(best.effects, best.values)
     stage = "taking the model to the optimum of the runs"
-    (fit,), _ = setting.fit([start], stage, enough=setting.config.final_convergence)
+    settled = SETTLED_COST * (error / search.noise) ** 2  # the cost counts noises here
+    (fit,), _ = setting.fit([start], stage, enough=setting.config.final_convergence, settled=settled)
+    search.fitted.setdefault(best.effects, best)
     return as_model(search, fitted_model(search.joint, best.effects, fit.values, best.effects), error)
 
 

@@ -22,6 +22,7 @@ from scipy import stats
 from smajax.attribution.joint_parameters import JointParameters, residual_and_columns
 from smajax.core.whiteness import correlation_time, split_runs
 
+ROUNDING = 1e-14  # of an eigenvalue of a matrix whose diagonal is one
 LONGEST = 50.0  # samples: beyond it the correlation of a residual is its own shape, and no property of a noise
 NOISE_EXCESS = 1.05  # a residual up to so many noises is noise: its size is the noise's
 LEAST_NOISE = 0.3  # of a noise that was estimated: what the residual shows counts down to that
@@ -47,17 +48,30 @@ class FittedModel:
 
     def log_evidence(self, variance: float) -> float:
         """Log evidence plus log prior odds; `variance` of an independent sample, SI squared, the same for all models compared."""
-        matrix = self.gram / variance + np.diag(self.precision)
+        eigenvalues, _, size = self._decomposed(variance)
         value = self.log_prior - 0.5 * self.squares / variance
-        value += 0.5 * float(np.log(self.precision).sum()) - 0.5 * float(np.linalg.slogdet(matrix)[1])
+        value += 0.5 * float(np.log(self.precision).sum() - np.log(eigenvalues).sum()) + float(np.log(size).sum())
         if self.one_sided:
-            deviation = np.sqrt(np.diag(np.linalg.inv(matrix)))
+            deviation = np.sqrt(np.diag(self.covariance(variance)))
             value += sum(float(np.log(2.0) + stats.norm.logcdf(at / deviation[k])) for k, at in self.one_sided)
         return value
 
+    def covariance(self, variance: float) -> np.ndarray:
+        """Posterior covariance of the free parameters, in widths of their priors."""
+        values, vectors, size = self._decomposed(variance)
+        return np.asarray((vectors / values) @ vectors.T * np.outer(size, size))
+
+    def _decomposed(self, variance: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """(eigenvalues, eigenvectors, size) of the posterior precision, scaled to a diagonal of one by `size`."""
+        matrix = self.gram / variance + np.diag(self.precision)
+        size = 1.0 / np.sqrt(np.diag(matrix))
+        values, vectors = np.linalg.eigh(matrix * np.outer(size, size))
+        # Where columns are one to rounding an eigenvalue comes out as zero or less.
+        return np.maximum(values, ROUNDING), vectors, size
+
     def standard_errors(self, variance: float) -> dict[str, float]:
         """Posterior standard deviation of every free parameter, in its unit."""
-        deviation = np.sqrt(np.diag(np.linalg.inv(self.gram / variance + np.diag(self.precision))))
+        deviation = np.sqrt(np.diag(self.covariance(variance)))
         return dict(zip(self.names, (deviation * self.scales).tolist(), strict=True))
 
 

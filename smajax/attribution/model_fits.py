@@ -28,6 +28,7 @@ from smajax.fit.starts import multistart, perturbed_restarts
 from smajax.fit.uncertainty import at_bound
 from smajax.model.effects.candidate import Extent
 from smajax.model.effects.library import LIBRARY
+from smajax.model.effects.prior_width import CoefficientPrior
 
 DEFAULT = AttributionConfig()
 
@@ -76,6 +77,7 @@ class Search:
     config: AttributionConfig = DEFAULT
     evidence: dict[str, Evidence] = field(default_factory=dict)
     rounds: list[Round] = field(default_factory=list)
+    presets: Mapping[str, CoefficientPrior] = field(default_factory=dict)  # values that the user did not give
 
     def note(self, done: Round) -> None:
         """Record a round and report it."""
@@ -135,18 +137,22 @@ class Search:
         what: str,
         *,
         enough: float | None = None,
+        settled: float = 0.0,
         hops: bool = False,
     ) -> tuple[list[Fit], np.ndarray]:
         """Fit every start: (fits with full parameter vectors, misfit of all runs at each, (S, R, N)).
 
-        `hops`: each from points near its end as well (`fit.starts.perturbed_restarts`).
+        `enough`, `settled`: relative and absolute tolerance of the cost. `hops`: each from points near its end as well
+        (`fit.starts.perturbed_restarts`).
         """
         enough = self.config.convergence if enough is None else enough
         problem, index = self.restricted([name for start in starts for name in start.effects])
         tasks = [
             problem.task(self.free(start.effects), self.bounds, start.values[index], start.weights) for start in starts
         ]
-        settings = FitSettings(tolerance=enough, cache=self.cache, progress=self.progress, stage=what)
+        settings = FitSettings(
+            tolerance=enough, absolute_tolerance=settled, cache=self.cache, progress=self.progress, stage=what
+        )
         fits = levenberg_marquardt(problem, tasks, settings)
         if hops:
             fits = perturbed_restarts(problem, tasks, fits, settings)
@@ -177,10 +183,11 @@ class Search:
         values[np.asarray(index)] = found.values
         return dataclasses.replace(found, values=values)
 
-    def is_noise(self, values: np.ndarray) -> bool:
+    def is_noise(self, model: Model) -> bool:
         """Whether what a model leaves of the fit runs is measurement noise."""
-        (misfit,) = misfits(self.problem, [values])
-        return self.all_noise(misfit, np.asarray(self.problem.batch.mask))
+        problem, index = self.restricted(model.effects)
+        (misfit,) = misfits(problem, [model.values[index]])
+        return self.all_noise(misfit, np.asarray(problem.batch.mask))
 
     def all_noise(self, misfit: np.ndarray, mask: np.ndarray) -> bool:
         """Whether a misfit (SI) is measurement noise, as far as `mask` goes, both (R, N)."""

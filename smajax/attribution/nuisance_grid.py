@@ -15,9 +15,11 @@ import numpy as np
 
 from smajax.attribution.model_fits import Model, Search, nudged
 from smajax.attribution.score_test import Score, ranked, samples_per_independent, score_of, switches, without
+from smajax.fit.integration import with_integration
 from smajax.fit.predicted import predicted_and_derivatives
 from smajax.fit.sensitivity import Sensitivity, sensitivity
 from smajax.model.effects.library import LIBRARY
+from smajax.simulation.steppers import ONE_STEP
 
 
 @dataclass(frozen=True)
@@ -34,7 +36,8 @@ def scanned(setting: Search, values: np.ndarray, effects: Sequence[str], fitted:
 
     `effects`, which are off, are each at the place whose trace promises most beside what the fitted parameters absorb.
     """
-    at = sensitivity(setting.problem, nudged(setting, values, effects), setting.every)
+    problem = with_integration(setting.problem, ONE_STEP)  # the program of the search's traces
+    at = sensitivity(problem, nudged(setting, values, effects), setting.every)
     options = [
         (effect, {f"{effect}.{name}": one for name, one in place.items()})
         for effect in effects
@@ -52,8 +55,8 @@ def scanned(setting: Search, values: np.ndarray, effects: Sequence[str], fitted:
             points.append(here)
             towards.append(np.eye(len(values))[[index(name)]])
             whose.append((number, name))
-    _, slopes = predicted_and_derivatives(setting.problem, np.stack(points), np.stack(towards))
-    columns = -setting.problem.centred(slopes[:, 0]) / np.asarray(setting.problem.noise)
+    _, slopes = predicted_and_derivatives(problem, np.stack(points), np.stack(towards))
+    columns = -problem.centred(slopes[:, 0]) / np.asarray(problem.noise)
     jacobian = at.jacobian.copy()
     found = Scanned(dataclasses.replace(at, jacobian=jacobian))
     basis, residual = without(at, fitted)

@@ -15,6 +15,8 @@ from smajax.attribution.findings import OutlierRun
 from smajax.attribution.model_fits import Model, Search, Start
 from smajax.fit.predicted import misfits
 
+SETTLED = 0.02  # of what one sample adds to the cost
+
 
 def outlier_runs(setting: Search, model: Model, names: Sequence[str]) -> tuple[OutlierRun, ...]:
     """The fit runs without any one of which `model`, fitted anew, leaves noise in all the others; most influential first.
@@ -34,7 +36,14 @@ def outlier_runs(setting: Search, model: Model, names: Sequence[str]) -> tuple[O
     if not model.effects:
         places.append(problem.start_values())
     starts = [Start(model.effects, place, (everyone != run).astype(float)) for run in worst for place in places]
-    fits, found = setting.fit(starts, "leaving out each run for good", hops=True)
+    stage = "leaving out each run for good"
+    settled = SETTLED * float((whole**2).sum() / mask.sum()) / float(problem.noise_sigma) ** 2
+    fits, found = setting.fit(starts, stage, settled=settled)
+    near = [k for k, start in enumerate(starts) if _near(setting, found[k], start, whole)]
+    if near:
+        again, misfit = setting.fit([starts[k] for k in near], stage, hops=True)
+        for k, fit, one in zip(near, again, misfit, strict=True):
+            fits[k], found[k] = fit, one
     outliers = []
     for first, run in zip(range(0, len(starts), len(places)), worst, strict=True):
         best = min(range(first, first + len(places)), key=lambda k: fits[k].cost)
@@ -56,6 +65,19 @@ def outlier_runs(setting: Search, model: Model, names: Sequence[str]) -> tuple[O
         and outliers[0].others_without * config.influential_ratio < outliers[0].others_with
     )
     return noise or (outliers[0],) * influential
+
+
+def _near(setting: Search, left: np.ndarray, start: Start, whole: np.ndarray) -> bool:
+    """Whether a fit is within `outlier_reach` of noise in the runs that it has, or of an influential run's fall of their error."""
+    config = setting.config
+    assert start.weights is not None
+    others = start.weights > 0.0
+    mask = np.asarray(setting.problem.batch.mask)[others]
+    error = _rms(left[others], mask) / config.outlier_reach
+    influential = len(left) >= config.influential_least_runs and error * config.influential_ratio < _rms(
+        whole[others], mask
+    )
+    return influential or error < config.white_noise_ratio * float(setting.problem.noise_sigma)
 
 
 def _rms(misfit: np.ndarray, mask: np.ndarray) -> float:

@@ -5,10 +5,17 @@ A fit may correct them within what data sheets and tables leave open; what the f
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
+import numpy as np
+
 from smajax.core.parameters import Parameter
+from smajax.fit.sensitivity import Sensitivity
 from smajax.model.effects.prior_width import CoefficientPrior
+
+WIDTHS = 3.0  # of its prior that a fit may move a value of a preset
+VISIBLE = 1.0  # noises, over all samples
 
 # Relative widths (of the natural logarithm), and where they come from.
 RELATIVE: Mapping[str, tuple[float, str]] = {
@@ -16,7 +23,10 @@ RELATIVE: Mapping[str, tuple[float, str]] = {
     "young_modulus_martensite": (0.25, "NiTi data sheets: 28 to 41 GPa, and 20 to 50 GPa measured"),
     "stress_slope_austenite": (0.2, "NiTi: 5 to 8 MPa/K by Clausius-Clapeyron, Elahinia 2004 has 6.89 and 10.3"),
     "stress_slope_martensite": (0.2, "NiTi: 5 to 8 MPa/K by Clausius-Clapeyron, Elahinia 2004 has 6.89 and 10.3"),
-    "thermal_modulus": (0.7, "Elahinia 2004, Table 3.1: 0.55 MPa/K, from expansions that differ by a factor of two"),
+    "thermal_modulus": (
+        0.2,
+        "Elahinia 2004, Table 3.1: 0.55 MPa/K; expansions that differ by more are the candidate `thermal_expansion`",
+    ),
     "resistivity_austenite": (0.1, "wire data sheets: ohms per metre to 10 %"),
     "resistivity_martensite": (0.1, "wire data sheets: ohms per metre to 10 %"),
     "damping": (1.0, "no sheet gives it"),
@@ -34,4 +44,27 @@ def preset_priors(
         name: CoefficientPrior(float(values[name]), sigma, True)
         for name, (sigma, _) in RELATIVE.items()
         if name in table and name not in given and values[name] > 0.0
+    }
+
+
+def preset_bounds(
+    presets: Mapping[str, CoefficientPrior], bounds: Mapping[str, tuple[float, float]]
+) -> dict[str, tuple[float, float]]:
+    """Within so many widths: a value at zero has no logarithm, and a fit does not leave it again."""
+    found = {}
+    for name, prior in presets.items():
+        factor = math.exp(WIDTHS * prior.sigma)
+        low, high = bounds[name]
+        found[name] = max(low, prior.base / factor), min(high, prior.base * factor)
+    return found
+
+
+def visible(
+    at: Sensitivity, values: Mapping[str, float], presets: Mapping[str, CoefficientPrior]
+) -> dict[str, CoefficientPrior]:
+    """Those of `presets` (logarithmic priors) of which one width changes the runs by more than the noise, by the Jacobian at the base fit."""
+    return {
+        name: one
+        for name, one in presets.items()
+        if np.linalg.norm(at.columns([name])) * one.sigma * values[name] > VISIBLE
     }

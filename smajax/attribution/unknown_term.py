@@ -19,6 +19,7 @@ import numpy as np
 from smajax.attribution.findings import UnknownTerm, UnknownTermLikelier
 from smajax.attribution.formulas import formulas
 from smajax.attribution.joint_parameters import JointParameters
+from smajax.attribution.joint_search import comparison_settings
 from smajax.attribution.laplace_evidence import FittedModel, fitted_model, independent_error
 from smajax.attribution.leave_one_run_out import predicting
 from smajax.attribution.model_fits import Model, Search
@@ -30,8 +31,8 @@ from smajax.core.parameters import parameters
 from smajax.core.progress import Stage
 from smajax.core.whiteness import correlation_time, split_runs
 from smajax.data.experiment.record import Prior
-from smajax.fit.levenberg_marquardt import Fit, FitSettings, levenberg_marquardt
-from smajax.fit.predicted import misfits
+from smajax.fit.levenberg_marquardt import FitSettings, levenberg_marquardt
+from smajax.fit.predicted import misfits, total_costs
 from smajax.fit.problem import Problem
 from smajax.fit.sensitivity import sensitivity
 from smajax.fit.uncertainty import covariance_of, uncertainty
@@ -40,8 +41,7 @@ from smajax.model.effects.prior_width import CoefficientPrior
 
 INDISTINGUISHABLE = 3.0  # in log odds: twenty to one
 PASSES = 2  # the error of a sample is first that of the model without a term, then that of the best with one
-REACH = 30.0  # in log odds behind the likeliest, within which a term is fitted again with the smaller error
-STEPS, TOLERANCE = 30, 1e-5
+REACH = 10.0  # in log odds behind the likeliest, within which a term is fitted again with the smaller error
 
 
 def with_terms(setting: Search, final: Model) -> tuple[Search, np.ndarray, Sought]:
@@ -225,7 +225,7 @@ def in_place_of(setting: Search, first: Model, final: Model) -> Lacking | None:
     fits = fits_with_terms(setting, first)
     if fits is None:
         return None
-    joint = JointParameters.of(setting.problem, setting.unknowns, setting.bounds, final.effects, setting.extent)
+    joint = JointParameters.of(setting.problem, setting.unknowns, setting.bounds, setting.candidates, setting.extent)
     effects = fitted_model(joint, final.effects, final.values, final.effects)
     error = least_error(setting, [effects, *fits.fitted])
     ahead = max(one.log_evidence(error**2) for one in fits.fitted) - effects.log_evidence(error**2)
@@ -267,15 +267,14 @@ def fitted_terms(
     """Every term fitted together with the parameters of the model with `effects`, from the best of its places."""
     problem, _ = joint.restricted(tuple(joint.coefficients))
     problem = problem.with_noise(error)
-    begun = [(term, at) for term, points in places.items() for at in points]
-    tasks = [problem.task(joint.free((*effects, term)), joint.bounds, at) for term, at in begun]
-    settings = FitSettings(STEPS, TOLERANCE, search.cache, search.progress, "fitting unknown terms")
-    best: dict[str, Fit] = {}
-    for (term, _), fit in zip(begun, levenberg_marquardt(problem, tasks, settings), strict=True):
-        if term not in best or fit.cost < best[term].cost:
-            best[term] = fit
+    every = [at for points in places.values() for at in points]
+    costs = iter(np.nan_to_num(total_costs(problem, every), nan=np.inf))
+    begun = {term: min(points, key=lambda _: next(costs)) for term, points in places.items()}
+    tasks = [problem.task(joint.free((*effects, term)), joint.bounds, at) for term, at in begun.items()]
+    settings = comparison_settings(FitSettings(cache=search.cache, progress=search.progress), "fitting unknown terms")
+    fits = dict(zip(begun, levenberg_marquardt(problem, tasks, settings), strict=True))
     carried = tuple(joint.coefficients)
-    return [fitted_model(joint, (*effects, term), fit.values, carried) for term, fit in best.items()]
+    return [fitted_model(joint, (*effects, term), fit.values, carried) for term, fit in fits.items()]
 
 
 def _learnt(

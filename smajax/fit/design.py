@@ -103,7 +103,9 @@ def candidate_problem(
     overrides = jnp.repeat(jnp.concatenate([batch.overrides[:1], mean], axis=1), len(series), axis=0)
     inputs = {name: jnp.asarray(np.stack([one[name] for one in series])) for name in batch.inputs}
     overridden = (*batch.override_names, *problem.per_run.names)
-    runs_to_try = RunBatch(inputs, blank, jnp.ones_like(blank), overrides, overridden, batch.dt, outputs=batch.outputs)
+    runs_to_try = RunBatch(
+        inputs, blank, jnp.ones_like(blank), overrides, overridden, batch.dt, batch.outputs, batch.integration
+    )
     system = problem.system_at(jnp.asarray(values))
     return candidates, Problem.build(system, runs_to_try, problem.noise_sigma, problem.offset)
 

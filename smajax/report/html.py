@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,7 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
-from smajax.attribution.findings import Findings, ParameterFinding, Verdict
+from smajax.attribution.findings import Findings, ParameterFinding, Role, Verdict, coverage, pooled_rmse
 from smajax.core.display_units import chance, correlation, digits, display, label, p_value, with_error
 from smajax.fit.uncertainty import RemarkKind
 from smajax.report import pictures
@@ -171,6 +171,26 @@ def _correlations(findings: Findings) -> list[dict[str, Any]]:
     ]
 
 
+def _figures(findings: Findings, output: Callable[[float | None], Shown]) -> list[dict[str, str]]:
+    """The numbers of the first screen: the error before and after, times the noise, and how the band does."""
+    unit = display(findings.output_unit, findings.output_name).unit
+    single = pictures.nothing_added(findings)
+    figures = []
+    roles: tuple[Role, ...] = ("fit", "held-out")
+    for role in roles:
+        before, after = (pooled_rmse(findings.runs, role, which) for which in ("before", "after"))
+        if math.isfinite(after):
+            text = output(after).text if single else f"{output(before).text} → {output(after).text}"
+            figures.append({"caption": f"error on the {role} runs", "text": f"{text} {unit}".strip()})
+    if findings.noise_sigma > 0.0:
+        ratio = pooled_rmse(findings.runs, "fit", "after") / findings.noise_sigma
+        figures.append({"caption": "error on the fit runs over the noise", "text": digits(ratio, 3)})
+    inside = coverage(findings)
+    if inside is not None:
+        figures.append({"caption": "held-out samples in the 90 % band", "text": f"{inside:.0%}"})
+    return figures
+
+
 def _runs(findings: Findings) -> list[dict[str, Any]]:
     """Every run with its numbers and its pictures."""
     return [
@@ -230,6 +250,7 @@ def findings_to_html(findings: Findings, narrative: Narrative | None = None) -> 
         single=pictures.nothing_added(findings),
         # Without offsets in the fit they are exactly zero.
         offsets=any(run.offset_before or run.offset_after for run in findings.runs),
+        averaged=findings.averaged and all(run.average is not None for run in findings.runs),
         held_out=any(run.role == "held-out" for run in findings.runs),
         added=findings.added,
         ranked=pictures.ranked(findings.effects),
@@ -244,6 +265,10 @@ def findings_to_html(findings: Findings, narrative: Narrative | None = None) -> 
         correlations=_correlations(findings),
         unknown=_unknown(findings),
         units=units,
+        figures=_figures(findings, output),
+        picture_held_out=picture(
+            pictures.held_out_bands(findings), "Held-out runs: measured, predicted, and the 90 % band", "narrow"
+        ),
         picture_errors=picture(pictures.errors_by_run(findings), "Error of each run before and after", "narrow"),
         picture_candidates=picture(
             pictures.effect_probabilities(findings), "Candidates by posterior probability", "narrow"

@@ -72,6 +72,8 @@ def _run(run: RunFinding) -> dict[str, Any]:
         "rmse_after": run.rmse_after,
         "offset_before": run.offset_before,
         "offset_after": run.offset_after,
+        "rmse_average": None if run.average is None else run.average.rmse,
+        "band_coverage": None if run.average is None else run.average.coverage,
     }
 
 
@@ -171,6 +173,7 @@ def findings_to_json(findings: Findings, narrative: Narrative | None = None) -> 
         },
         "integration_error": findings.integration.record(),
         "runs": [_run(run) for run in findings.runs],
+        "averaged_models": [{"effects": list(one.effects), "weight": one.weight} for one in findings.averaged],
         "before": {"parameters": {result.name: _parameter(result) for result in findings.before}},
         "after": {"parameters": {result.name: _parameter(result) for result in findings.after}},
         "effects": [_effect(effect, words) for effect in findings.effects],

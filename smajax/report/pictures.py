@@ -14,7 +14,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from smajax.attribution.findings import EffectFinding, Findings, ResidualDiagnostics, RunFinding
+from smajax.attribution.findings import AveragedRun, EffectFinding, Findings, ResidualDiagnostics, RunFinding
 from smajax.core.display_units import Display, axis_label, display, label
 from smajax.model.channels import channel
 
@@ -25,6 +25,7 @@ NARROW = 5.2  # for pictures of one simple panel
 DPI = 150
 SAMPLES_DRAWN = 3000  # per curve: more than the pixels across
 LEAST_PROBABILITY = 0.01  # of an effect that is drawn
+BANDS = 2  # held-out runs on the first screen
 STRIPS = 3  # input channels drawn under one run
 
 
@@ -111,7 +112,10 @@ def panels_done(figure: Figure, rows: list[Axes], columns: int) -> bytes:
 
 
 def run_over_time(findings: Findings, run: RunFinding) -> bytes:
-    """Output measured, before and after; the residuals with the noise band; the varying inputs on thin strips."""
+    """Output measured, before and after; the residuals with the noise band; the varying inputs on thin strips.
+
+    Of a held-out run also the band of the averaged prediction.
+    """
     shown = display(findings.output_unit, findings.output_name)
     figure, rows = run_panels(run.time, run.inputs, findings.output_name, shown)
     output, residual = rows[:2]
@@ -119,9 +123,18 @@ def run_over_time(findings: Findings, run: RunFinding) -> bytes:
     for name, values, colour in _models(findings, run):
         output.plot(*extremes(run.time, shown.of(values)), color=colour, linewidth=1.2, label=name)
         residual.plot(*extremes(run.time, shown.of(run.measured - values)), color=colour, linewidth=0.9)
+    if run.role == "held-out" and run.average is not None:
+        _draw_band(output, run.time, run.average, shown)
     band = 2.0 * shown.of(findings.noise_sigma)
     residual.axhspan(-band, band, color=NOISE, zorder=0, label="noise, ± 2 σ")
-    return panels_done(figure, rows, 4)
+    return panels_done(figure, rows, 5)
+
+
+def _draw_band(axes: Axes, time: np.ndarray, average: AveragedRun, shown: Display) -> None:
+    thin = _thinned(len(time))
+    low, high = average.reading - average.half_width, average.reading + average.half_width
+    style: dict[str, Any] = {"color": AFTER, "alpha": 0.22, "linewidth": 0.0, "label": "90 % band"}
+    axes.fill_between(time[thin], shown.of(low[thin]), shown.of(high[thin]), **style)
 
 
 def run_hysteresis(findings: Findings, run: RunFinding) -> bytes | None:
@@ -177,6 +190,28 @@ def errors_by_run(findings: Findings) -> bytes:
     figure.legend(loc="outside upper center", ncols=3, frameon=False, fontsize=9)
     tidy(axes)
     axes.grid(False, axis="y")
+    return as_png(figure)
+
+
+def held_out_bands(findings: Findings) -> bytes | None:
+    """The first held-out runs, measured, by the average of the likely models, and its 90 % band; None without any."""
+    runs = [run for run in findings.runs if run.role == "held-out" and run.average is not None][:BANDS]
+    if not runs:
+        return None
+    shown = display(findings.output_unit, findings.output_name)
+    figure = new_figure(0.9 + 1.75 * len(runs), NARROW)
+    for axes, run in zip(figure.subplots(len(runs), 1, squeeze=False)[:, 0], runs, strict=True):
+        average = run.average
+        assert average is not None
+        axes.plot(*extremes(run.time, shown.of(run.measured)), **THICK, label="measured")
+        axes.plot(*extremes(run.time, shown.of(average.reading)), color=AFTER, linewidth=1.2, label="predicted")
+        _draw_band(axes, run.time, average, shown)
+        axes.set_title(f"{_literal(_short(run.name))} (held out)", fontsize=9, loc="left")
+        axes.set_ylabel(axis_label(findings.output_name, shown), fontsize=9)
+        axes.margins(x=0.01)
+        tidy(axes)
+    axes.set_xlabel("time (s)", fontsize=9)
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside upper center", ncols=3, frameon=False, fontsize=9)
     return as_png(figure)
 
 

@@ -17,6 +17,7 @@ from smajax.attribution.assumed import assumed, expansion_not_given
 from smajax.attribution.close_loop import close_loop
 from smajax.attribution.findings import Findings, pooled_rmse
 from smajax.attribution.found import over_runs
+from smajax.attribution.job import job_of
 from smajax.attribution.model_fits import Model
 from smajax.core.parameters import get_parameters, parameters, set_parameters
 from smajax.data.experiment.load import load_experiment
@@ -24,6 +25,7 @@ from smajax.data.experiment.record import Experiment
 from smajax.data.model_catalogue import CATALOGUE
 from smajax.fit.base_model import base_model
 from smajax.fit.packed_runs import pack, simulate_batch
+from smajax.model.effects.library import LIBRARY
 from smajax.model.extended import extended
 from smajax.report.narrative import narrate
 from smajax.report.write import write_report
@@ -139,7 +141,9 @@ def test_demo_with_nothing_missing_is_adequate(tmp_path: Path) -> None:
     assert findings.verdict == "adequate"
     assert _added(findings) == set()
     assert pooled_rmse(findings.runs, "held-out", "before") < 1.1 * findings.noise_sigma
-    for parameter in findings.before:
+    declared = [parameter for parameter in findings.before if parameter.name in truth]
+    assert len(declared) == len(truth)
+    for parameter in declared:
         assert parameter.value == pytest.approx(truth[parameter.name], rel=0.03), parameter.name
         assert parameter.standard_error is not None
         # Four standard errors and the integrator's own error at this step.
@@ -189,14 +193,15 @@ def _events_of_step02(time: np.ndarray, series: dict[str, np.ndarray]) -> None:
 def test_the_measured_bias_spring_bench_is_partly_explained_within_its_errors(
     measured_data: Path, tmp_path: Path
 ) -> None:
-    """Below 0.12 mm on the fit runs and 0.55 mm on the run that was held out, and both events of Step02 right in sign."""
+    """At most 0.085 mm on the fit runs and 0.52 mm on the run that was held out, both events of Step02, and no event is named."""
     assert measured_data.is_dir()
     findings = close_loop(load_experiment(BENCH / "experiment.toml", CATALOGUE), memory=tmp_path)
-    assert 0.40e-3 < pooled_rmse(findings.runs, "fit", "before") < 0.50e-3
-    assert pooled_rmse(findings.runs, "fit", "after") < 0.12e-3
-    assert pooled_rmse(findings.runs, "held-out", "after") < 0.55e-3
+    assert 0.20e-3 < pooled_rmse(findings.runs, "fit", "before") < 0.30e-3
+    assert pooled_rmse(findings.runs, "fit", "after") < 0.085e-3
+    assert pooled_rmse(findings.runs, "held-out", "after") < 0.52e-3
     assert findings.verdict == "partly explained"
     assert "thermal_expansion" in _added(findings)
+    assert all(LIBRARY[name].candidate.prior_class != "event" for name in _added(findings))
     step = next(run for run in findings.runs if run.name == "Step02")
     _events_of_step02(step.time, {"measured": step.measured, "before": step.before, "after": step.after})
 
@@ -213,10 +218,10 @@ def _as_told(folder: Path) -> tuple[Experiment, dict[str, np.ndarray], dict[str,
     before = {name: told["value"] for name, told in report["before"]["parameters"].items()}
     base = base_model(experiment)
     full = set_parameters(extended(base, [effect["name"] for effect in added]), values)
-    readings = {}
+    readings, integration = {}, job_of(experiment).problem.batch.integration
     for which, model in (("before", set_parameters(base, before)), ("after", full)):
         defaults = {name: float(get_parameters(model, [name])[0]) for name in parameters(model)}
-        batch = pack(experiment.runs, experiment.step, defaults)
+        batch = pack(experiment.runs, experiment.step, defaults, integration)
         readings[which] = np.asarray(simulate_batch(model, batch).reading)
     error: dict[str, list[float]] = {}
     for index, run in enumerate(experiment.runs):
@@ -233,9 +238,9 @@ def test_the_recorded_models_of_the_bias_spring_bench_give_the_recorded_errors(m
     """The fast setting of the bench."""
     assert measured_data.is_dir()
     experiment, readings, rms = _as_told(BENCH)
-    assert 0.40e-3 < rms["fit before"] < 0.50e-3
-    assert rms["fit after"] < 0.12e-3
-    assert rms["held-out after"] < 0.55e-3
+    assert 0.20e-3 < rms["fit before"] < 0.30e-3
+    assert rms["fit after"] < 0.085e-3
+    assert rms["held-out after"] < 0.52e-3
     place = [run.name for run in experiment.runs].index("Step02")
     step = experiment.runs[place]
     series = {which: reading[place, : len(step.time)] for which, reading in readings.items()}
@@ -244,7 +249,7 @@ def test_the_recorded_models_of_the_bias_spring_bench_give_the_recorded_errors(m
 
 @pytest.mark.parametrize(
     ("study", "most"),
-    [("flexinol_isobaric", (0.05e-2, 0.06e-2)), ("nitihf_isobaric", (0.07e-2, 0.08e-2))],
+    [("flexinol_isobaric", (0.045e-2, 0.045e-2)), ("nitihf_isobaric", (0.05e-2, 0.035e-2))],
 )
 def test_the_recorded_models_of_coupons_give_the_recorded_errors(
     study: str, most: tuple[float, float], measured_data: Path
@@ -259,13 +264,13 @@ def test_the_recorded_models_of_coupons_give_the_recorded_errors(
 
 @pytest.mark.slow
 def test_the_held_out_stress_of_isobaric_flexinol_is_predicted(measured_data: Path, tmp_path: Path) -> None:
-    """The held-out stress of 172 MPa at most 0.06 % strain off, from about 0.165."""
+    """The held-out stress of 172 MPa at most 0.045 % strain off, from about 0.15."""
     assert measured_data.is_dir()
     findings = close_loop(
         load_experiment(STUDIES / "flexinol_isobaric" / "experiment.toml", CATALOGUE), memory=tmp_path
     )
     assert pooled_rmse(findings.runs, "held-out", "before") > 0.12e-2
-    assert pooled_rmse(findings.runs, "held-out", "after") < 0.06e-2
+    assert pooled_rmse(findings.runs, "held-out", "after") < 0.045e-2
     assert _added(findings)
     # More than noise is left, and the unknown terms have been asked. The best is less than two standard errors ahead.
     assert findings.verdict == "partly explained"

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from smajax.attribution.config import AttributionConfig
-from smajax.attribution.confounders import confounders, overlap, separating_run
+from smajax.attribution.confounders import confounders, overlap, separating_runs
 from smajax.attribution.joint_parameters import JointParameters
 from smajax.attribution.joint_search import JointSearch, search_jointly
 from smajax.attribution.joint_stage import as_model
@@ -87,7 +87,7 @@ def test_a_confounder_is_weighed_by_its_evidence() -> None:
     setting.config = AttributionConfig(overlap_listed=0.01)  # of two that these runs distinguish well
     joint = JointParameters.of(setting.problem, setting.unknowns, setting.bounds, setting.candidates, setting.extent)
     search = JointSearch(joint, setting.extent, FitSettings(), NOISE)
-    found = search_jointly(search, at_base_of(setting, model).values)
+    found = search_jointly(search, {(): at_base_of(setting, model).values})
     assert found.effects == ("latent_heat",)
     model = as_model(search, found, search.error(found))
     (one,) = confounders(search, setting, model, runs)
@@ -97,7 +97,7 @@ def test_a_confounder_is_weighed_by_its_evidence() -> None:
     assert one.weight < 1e-3
     assert one.rmse_fit > 2.0 * NOISE
     assert one.separating_run == ""
-    what, apart = separating_run(setting, model, at_base_of(setting, model), runs)
+    ((what, apart),) = separating_runs(setting, model, [at_base_of(setting, model)], runs)
     assert what.startswith("voltage")
     assert apart > 10.0
     assert confounders(search, setting, dataclasses.replace(model, effects=()), runs) == ()
@@ -108,7 +108,7 @@ def test_two_effects_with_the_same_trace_are_weighed_by_their_prior_odds() -> No
     setting, model, runs = _setting()
     joint = JointParameters.of(setting.problem, setting.unknowns, setting.bounds, setting.candidates, setting.extent)
     search = JointSearch(joint, setting.extent, FitSettings(), NOISE)
-    found = search_jointly(search, at_base_of(setting, model).values)
+    found = search_jointly(search, {(): at_base_of(setting, model).values})
     model = as_model(search, found, search.error(found))
     twin = dataclasses.replace(found, effects=("phase_resistance",), log_prior=found.log_prior - 1.0)
     search.fitted[twin.effects] = twin

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
@@ -9,8 +10,8 @@ import pytest
 from scipy import integrate
 
 from smajax.attribution.joint_parameters import JointParameters
-from smajax.attribution.laplace_evidence import FittedModel
-from smajax.attribution.preset_priors import RELATIVE, preset_priors
+from smajax.attribution.laplace_evidence import FittedModel, fitted_model
+from smajax.attribution.preset_priors import RELATIVE, preset_bounds, preset_priors
 from smajax.attribution.subset_evidence import LinearModel
 from smajax.attribution.traces import Variant
 from smajax.core.parameters import parameter_values, parameters
@@ -123,6 +124,17 @@ def test_a_model_whose_effects_are_off_is_the_base_model() -> None:
     assert NOISE > 0.0
 
 
+def test_of_two_columns_that_are_one_to_rounding_the_covariance_has_no_negative_variance() -> None:
+    """Their sum is known, each of them as little as before."""
+    joint = hot_weight({}).joint
+    model = fitted_model(joint, ("latent_heat",), joint.problem.start_values(), ("latent_heat",))
+    column = np.asarray([1.0, 1.0, 1.0 + 1e-9])
+    known = dataclasses.replace(model, gram=1e12 * np.outer(column, column), precision=np.full(3, 1e-6))
+    covariance = known.covariance(1.0)
+    assert (np.diag(covariance) > 0.0).all()
+    assert np.isfinite(known.log_evidence(1.0))
+
+
 def test_values_of_a_preset_are_free_within_their_widths_unless_the_file_gives_them() -> None:
     system = build("flexinol_table_3_2", "dead_weight", "voltage")
     table, values = parameters(system), parameter_values(system)
@@ -133,6 +145,10 @@ def test_values_of_a_preset_are_free_within_their_widths_unless_the_file_gives_t
         assert prior.base == values[name]
         assert prior.logarithmic
         assert 0.0 < prior.sigma <= 1.0
+    boxes = preset_bounds(free, {name: (table[name].low, table[name].high) for name in free})
+    for name, (low, high) in boxes.items():
+        assert max(0.0, table[name].low) <= low < values[name] < high <= table[name].high
+    assert boxes["thermal_modulus"][0] > 0.0  # at zero there is no logarithm
     known = {name for wire in WIRES for load in LOADS for name in _names(wire, load)}
     assert set(RELATIVE) <= known
     assert all(source for _, source in RELATIVE.values())

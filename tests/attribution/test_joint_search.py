@@ -22,7 +22,7 @@ from tests.helpers.hot_weight import CANDIDATES, NOISE, UNKNOWNS, hot_weight
 
 def _found(truth: dict[str, float]) -> tuple[JointSearch, dict[str, float], dict[str, float]]:
     search = hot_weight(truth)
-    model = search_jointly(search, search.joint.problem.start_values())
+    model = search_jointly(search, {(): search.joint.problem.start_values()})
     slots = search.joint.slots
     values = {
         name: float(model.values[slots[name]]) for effect in model.effects for name in search.joint.coefficients[effect]
@@ -51,7 +51,7 @@ def test_two_effects_are_found_together() -> None:
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_without_a_missing_effect_none_is_named(seed: int) -> None:
     search = hot_weight({}, seed=seed)
-    model = search_jointly(search, search.joint.problem.start_values())
+    model = search_jointly(search, {(): search.joint.problem.start_values()})
     assert model.effects == ()
     assert search.probabilities(search.error(model))[()] > 0.5
 

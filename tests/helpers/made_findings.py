@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from smajax.attribution.findings import (
+    AveragedModel,
+    AveragedRun,
     CoefficientFinding,
     EffectFinding,
     Findings,
@@ -60,6 +62,9 @@ def made_run(name: str, role: Role, seed: int, samples: int = 1200) -> RunFindin
         offset_after=2.5e-6,
         rmse_before=float(np.sqrt(np.mean((measured - before) ** 2))),
         rmse_after=float(np.sqrt(np.mean((measured - after) ** 2))),
+        average=AveragedRun(
+            after, np.full(samples, 2.0 * NOISE), float(np.sqrt(np.mean((measured - after) ** 2))), 0.93
+        ),
     )
 
 
@@ -144,6 +149,7 @@ def made_findings() -> Findings:
             made_effect("latent_heat", "latent heat of transformation", "heat", 2.04e-5, added=True),
             made_effect("sensor_lag", "lag of the sensor", "sensor", NAN),
         ),
+        averaged=(AveragedModel(("latent_heat",), 0.9), AveragedModel(("latent_heat", "radiation"), 0.1)),
         residual_before=made_residual(1.1e-3, False),
         residual_after=made_residual(2.0e-5, True, moved=60.0),
         rounds=(

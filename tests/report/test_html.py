@@ -9,7 +9,7 @@ import re
 import numpy as np
 import pytest
 
-from smajax.attribution.findings import Findings
+from smajax.attribution.findings import Findings, coverage, pooled_rmse
 from smajax.fit.uncertainty import Remark, RemarkKind
 from smajax.report.html import findings_to_html
 from smajax.report.json_file import findings_to_json
@@ -42,6 +42,19 @@ def test_the_verdict_comes_first(page, findings):
     )
 
 
+def test_the_first_screen_has_the_errors_before_and_after_and_how_the_band_does(findings):
+    source = findings_to_html(findings)
+    figures = re.findall(r"<dt>(.*?)</dt><dd>(.*?)</dd>", source[: source.index("<nav")])
+    shown = {caption: text for caption, text in figures}
+    before, after = (1e3 * pooled_rmse(findings.runs, "held-out", which) for which in ("before", "after"))
+    assert shown["error on the held-out runs"] == f"{before:.3g} → {after:.3g} mm"
+    assert shown["held-out samples in the 90 % band"] == "93%"
+    without = dataclasses.replace(findings, runs=tuple(run for run in findings.runs if run.role == "fit"))
+    plain = findings_to_html(without)
+    assert "held-out" not in plain[plain.index("<dl") : plain.index("</dl>")]
+    assert coverage(without) is None
+
+
 def test_every_contents_entry_leads_somewhere(page):
     targets = set(re.findall(r'id="([^"]+)"', page.source))
     links = set(re.findall(r'href="#([^"]+)"', page.source))
@@ -51,7 +64,7 @@ def test_every_contents_entry_leads_somewhere(page):
 
 def test_no_picture_is_blank(page, findings):
     images = page.images()
-    assert len(images) == 2 * len(findings.runs) + 4
+    assert len(images) == 2 * len(findings.runs) + 5
     for image in images:
         assert image.shape[1] > 500
         assert image.std() > 10.0

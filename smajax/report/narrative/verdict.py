@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from smajax.attribution.findings import Findings, OutlierRun, Role, Verdict, pooled_rmse
+from smajax.attribution.findings import Findings, OutlierRun, Role, Verdict, coverage, pooled_rmse
 from smajax.core.wording import and_listed
 from smajax.model.effects.library import LIBRARY
 from smajax.report.narrative import caveats
@@ -139,6 +139,21 @@ def _rejected(findings: Findings) -> str:
     return text[0].upper() + text[1:]
 
 
+def _of_the_band(findings: Findings) -> list[str]:
+    """How the average of the likely models does on the held-out runs."""
+    inside = coverage(findings)
+    if inside is None:
+        return []
+    averages = [run.average for run in findings.runs if run.role == "held-out" and run.average is not None]
+    samples = sum(len(one.reading) for one in averages)
+    error = float(np.sqrt(sum(one.rmse**2 * len(one.reading) for one in averages) / samples))
+    count = len(findings.averaged)
+    who = f"the average of the {count} likely models" if count > 1 else "the model"
+    return [
+        f"On the held-out runs {who} is off by {error_text(findings, error)}, and {inside:.0%} of the samples lie in its 90 % band."
+    ]
+
+
 def _errors(findings: Findings) -> list[str]:
     """Of fit runs and held-out runs, before and after; and the noise."""
     roles: tuple[Role, ...] = ("fit", "held-out")
@@ -152,4 +167,5 @@ def _errors(findings: Findings) -> list[str]:
                 + (f" before, {error_text(findings, after)} after" if findings.added else "")
                 + (" (no fit saw them, but they decided what is not named)." if decided else ".")
             )
+    sentences += _of_the_band(findings)
     return [*sentences, f"Measurement noise: {error_text(findings, findings.noise_sigma)} ({findings.noise_how})."]

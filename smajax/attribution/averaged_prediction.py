@@ -1,0 +1,108 @@
+r"""Prediction by the average of the likely models, with a band in which nine of ten measured samples are expected.
+
+Every run is predicted by each model whose posterior probability is at least `LEAST_PROBABILITY`, and the predictions are
+averaged with these probabilities (Hoeting et al. 1999). The half-width of the band is
+
+$$\sqrt{z^2 (\mathrm{var}_\theta + \mathrm{var}_M) + q^2},$$
+
+the variance by the parameters' posterior, $J \Sigma J^T$ of each model, that between the models, and what all of them miss: $q$
+is the share `BAND` of the absolute errors on runs left out (Lei et al. 2018; Barber et al. 2021), which has the noise, the
+discrepancy, and how well the bench repeats itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from smajax.attribution.findings import AveragedModel, AveragedRun
+from smajax.attribution.joint_search import JointSearch
+from smajax.attribution.laplace_evidence import FittedModel
+from smajax.attribution.model_fits import Model, Search
+from smajax.fit.packed_runs import RunBatch
+from smajax.fit.predicted import predicted_and_derivatives
+from smajax.fit.problem import Problem
+
+BAND = 0.9
+LEAST_PROBABILITY = 0.02
+MOST_MODELS = 6
+
+
+@dataclass(frozen=True)
+class Averaged:
+    """The models that were averaged, and every run by their average."""
+
+    models: tuple[AveragedModel, ...]
+    runs: tuple[AveragedRun, ...]
+
+
+def likely_models(search: JointSearch, final: Model) -> list[tuple[FittedModel, float]]:
+    """(model, weight): those of the search with a probability that counts, where `final` is the likeliest; else `final` alone."""
+    own = search.joint.ordered(final.effects)
+    probability = search.probabilities(search.error_of(own))
+    ranked = sorted(probability, key=lambda effects: -probability[effects])[:MOST_MODELS]
+    # What held-out runs or an unknown term reject is not averaged with.
+    chosen = [one for one in ranked if probability[one] >= LEAST_PROBABILITY] if ranked[0] == own else [own]
+    total = sum(probability[one] for one in chosen)
+    return [(search.fitted[one], probability[one] / total) for one in chosen]
+
+
+def averaged(setting: Search, search: JointSearch, final: Model, batch: RunBatch) -> Averaged:
+    """Every run of `batch`, held-out ones included, by the average of the likely models. Of one output, as the search."""
+    models = likely_models(search, final)
+    problem, index = setting.restricted([effect for model, _ in models for effect in model.effects])
+    problem = Problem.build(problem.system, batch, problem.noise_sigma, problem.offset)
+    mask = np.asarray(batch.mask)
+    offset = np.sum(problem.measured * mask, axis=1, keepdims=True) / np.maximum(mask.sum(axis=1, keepdims=True), 1.0)
+    offset = offset if any(problem.offset) else np.zeros_like(offset)
+    own = search.joint.ordered(final.effects)
+    readings, variances = [], []
+    for model, _ in models:
+        values = (final if model.effects == own else model).values[index]
+        reading, variance = _predicted(problem, model, values, search.error(model) ** 2)
+        readings.append(reading)
+        variances.append(variance)
+    weights = np.asarray([weight for _, weight in models])
+    mean = np.tensordot(weights, np.stack(readings), 1)
+    between = np.tensordot(weights, (np.stack(readings) - mean) ** 2, 1)
+    missed = _missed(setting, final)
+    normal = float(stats.norm.ppf(0.5 + 0.5 * BAND))
+    half = np.sqrt(normal**2 * (np.tensordot(weights, np.stack(variances), 1) + between) + missed**2)
+    return Averaged(
+        tuple(AveragedModel(model.effects, weight) for model, weight in models),
+        tuple(
+            _run(problem.measured[run], mean[run] + offset[run], half[run], mask[run] > 0)
+            for run in range(len(problem.measured))
+        ),
+    )
+
+
+def _predicted(
+    problem: Problem, model: FittedModel, values: np.ndarray, variance: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """(reading, its variance by the parameters' posterior), (R, N) each, each run's mean taken off where it has an offset."""
+    tangents = np.zeros((1, len(model.names), len(values)))
+    for row, name in enumerate(model.names):
+        tangents[0, row, problem.names.index(name)] = model.scales[row]
+    predicted, derivatives = predicted_and_derivatives(problem, values[None], tangents)
+    columns = problem.centred(derivatives[0])
+    spread = np.einsum("psn,pq,qsn->sn", columns, model.covariance(variance), columns)
+    return problem.centred(predicted[0]), np.maximum(spread, 0.0)
+
+
+def _missed(setting: Search, final: Model) -> float:
+    """The absolute error that the share `BAND` of the samples of runs left out stays below, SI."""
+    mask = np.asarray(setting.problem.batch.mask) > 0
+    return float(np.quantile(np.abs(final.left_out[mask]), BAND))
+
+
+def _run(measured: np.ndarray, reading: np.ndarray, half: np.ndarray, present: np.ndarray) -> AveragedRun:
+    error = (measured - reading)[present]
+    return AveragedRun(
+        reading[present],
+        half[present],
+        float(np.sqrt(np.mean(error**2))),
+        float(np.mean(np.abs(error) <= half[present])),
+    )

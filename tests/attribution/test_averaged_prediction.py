@@ -1,0 +1,106 @@
+"""Prediction by the average of the likely models: its band holds nine of ten samples of runs that no fit saw."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from smajax.attribution.averaged_prediction import BAND, averaged, likely_models
+from smajax.attribution.joint_search import JointSearch, search_jointly
+from smajax.attribution.joint_stage import as_model
+from smajax.attribution.model_fits import Model, Search
+from smajax.core.result_cache import ResultCache
+from smajax.fit.packed_runs import RunBatch
+from tests.helpers.hot_weight import CANDIDATES, NOISE, UNKNOWNS, hot_weight
+
+TRUTH = {"latent_heat.enthalpy": 1.2e4}
+
+
+def _fitted() -> tuple[Search, JointSearch, Model]:
+    search = hot_weight(TRUTH)
+    problem = search.joint.problem
+    found = search_jointly(search, {(): problem.start_values()})
+    setting = Search(problem, UNKNOWNS, search.joint.bounds, CANDIDATES, ResultCache())
+    return setting, search, as_model(search, found, search.error(found))
+
+
+@pytest.fixture(scope="module")
+def fitted() -> tuple[Search, JointSearch, Model]:
+    return _fitted()
+
+
+def _fresh_runs() -> RunBatch:
+    """The same bench with another noise."""
+    return hot_weight(TRUTH, seed=77).joint.problem.batch
+
+
+def test_nine_of_ten_samples_of_fresh_runs_lie_in_the_band(fitted: tuple[Search, JointSearch, Model]) -> None:
+    setting, search, final = fitted
+    found = averaged(setting, search, final, _fresh_runs())
+    inside = np.mean([run.coverage for run in found.runs])
+    assert inside == pytest.approx(BAND, abs=0.05)
+    assert np.sqrt(np.mean([run.rmse**2 for run in found.runs])) == pytest.approx(NOISE, rel=0.1)
+    assert sum(one.weight for one in found.models) == pytest.approx(1.0)
+
+
+def test_the_band_is_wider_where_the_parameters_are_less_certain(fitted: tuple[Search, JointSearch, Model]) -> None:
+    setting, search, final = fitted
+    narrow = averaged(setting, search, final, _fresh_runs())
+    loose = dataclasses.replace(search, fitted={})
+    for effects, model in search.fitted.items():
+        loose.fitted[effects] = dataclasses.replace(model, gram=model.gram / 100.0)
+    wide = averaged(setting, loose, final, _fresh_runs())
+    for one, other in zip(wide.runs, narrow.runs, strict=True):
+        assert (one.half_width >= other.half_width).all()  # equal where no parameter shows, as at rest
+    mean_wide, mean_narrow = (np.mean([run.half_width for run in one.runs]) for one in (wide, narrow))
+    assert mean_wide > 1.1 * mean_narrow
+
+
+def test_models_are_weighed_by_their_probability_and_the_average_lies_between(
+    fitted: tuple[Search, JointSearch, Model],
+) -> None:
+    setting, search, final = fitted
+    best = search.fitted[search.joint.ordered(final.effects)]
+    other = np.array(best.values)
+    other[search.joint.slots["latent_heat.enthalpy"]] *= 1.5
+    rival = dataclasses.replace(
+        best, effects=("latent_heat", "sensor_gain"), values=other, log_prior=best.log_prior - np.log(3.0)
+    )
+    two = dataclasses.replace(search, fitted={best.effects: best, rival.effects: rival})
+    models = likely_models(two, final)
+    assert [weight for _, weight in models] == pytest.approx([0.75, 0.25])
+    batch = _fresh_runs()
+    mean = averaged(setting, two, final, batch)
+    ends = [
+        averaged(
+            setting,
+            dataclasses.replace(search, fitted={best.effects: one}),
+            dataclasses.replace(final, values=one.values),
+            batch,
+        )
+        for one in (best, dataclasses.replace(best, values=other))
+    ]
+    for run, first, second in zip(mean.runs, *(end.runs for end in ends), strict=True):
+        np.testing.assert_allclose(run.reading, 0.75 * first.reading + 0.25 * second.reading, atol=1e-9)
+        assert (run.half_width >= first.half_width).all()
+
+
+def test_a_model_that_was_rejected_is_not_averaged_with(fitted: tuple[Search, JointSearch, Model]) -> None:
+    """Held-out runs rejected all that was added: the base model alone predicts."""
+    _, search, _ = fitted
+    base = as_model(search, search.fitted[()], search.error_of(()))
+    assert [(model.effects, weight) for model, weight in likely_models(search, base)] == [((), 1.0)]
+
+
+def test_each_run_keeps_its_own_offset(fitted: tuple[Search, JointSearch, Model]) -> None:
+    setting, search, final = fitted
+    batch = _fresh_runs()
+    shifted = dataclasses.replace(batch, output=batch.output + 1e-3 * jnp.arange(batch.runs)[:, None])
+    free = dataclasses.replace(setting, problem=dataclasses.replace(setting.problem, offset=(True,)))
+    plain, moved = (averaged(free, search, final, one) for one in (batch, shifted))
+    for run, (one, other) in enumerate(zip(plain.runs, moved.runs, strict=True)):
+        np.testing.assert_allclose(other.reading - one.reading, 1e-3 * run, atol=1e-12)
+        assert other.rmse == pytest.approx(one.rmse)
