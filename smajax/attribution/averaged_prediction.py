@@ -34,8 +34,8 @@ MOST_MODELS = 6
 class Averaged:
     """The models that were averaged, and every run by their average."""
 
-    models: tuple[AveragedModel, ...]
-    runs: tuple[AveragedRun, ...]
+    models: tuple[AveragedModel, ...] = ()
+    runs: tuple[AveragedRun, ...] = ()
 
 
 def likely_models(search: JointSearch, final: Model) -> list[tuple[FittedModel, float]]:
@@ -44,7 +44,9 @@ def likely_models(search: JointSearch, final: Model) -> list[tuple[FittedModel, 
     probability = search.probabilities(search.error_of(own))
     ranked = sorted(probability, key=lambda effects: -probability[effects])[:MOST_MODELS]
     # What held-out runs or an unknown term reject is not averaged with.
-    chosen = [one for one in ranked if probability[one] >= LEAST_PROBABILITY] if ranked[0] == own else [own]
+    chosen = [one for one in ranked if probability[one] >= LEAST_PROBABILITY or one == own]
+    if own != search.winner or own not in chosen:
+        chosen = [own]
     total = sum(probability[one] for one in chosen)
     return [(search.fitted[one], probability[one] / total) for one in chosen]
 

@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from smajax.attribution.assumed import assumed, expansion_not_given
-from smajax.attribution.averaged_prediction import averaged
+from smajax.attribution.averaged_prediction import Averaged, averaged
 from smajax.attribution.config import AttributionConfig
 from smajax.attribution.confounders import confounders
 from smajax.attribution.findings import (
@@ -215,8 +215,10 @@ def findings_of(context: Context, outcome: Outcome, compared: Compared, rejected
         for model in (base, final)
     )
     effects = effects_found(job, setting, final, after)
-    average = averaged(setting, outcome.search, final, every_run(job))
-    runs = tuple(replace(run, average=one) for run, one in zip(runs, average.runs, strict=True))
+    average = Averaged()
+    if len(job.fit_runs) > 1:  # else none can be left out, which the band is made of
+        average = averaged(setting, outcome.search, final, every_run(job))
+        runs = tuple(replace(run, average=one) for run, one in zip(runs, average.runs, strict=True))
     mistaken = confounders(outcome.search, setting, final, job.fit_runs)
     integration = integration_error_of(setting, final)
     setting.progress(Stage(WRITING, 1.0))

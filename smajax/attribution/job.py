@@ -62,7 +62,8 @@ def job_of(experiment: Experiment, integration: Integration | None = None) -> Jo
     others = tuple(run for run in experiment.runs if run.role != "fit")
     held_out = pack(others, experiment.step, parameter_values(full), integration) if others else None
     unknowns = tuple(unknown.name for unknown in experiment.unknowns)
-    given = frozenset({*experiment.parameters, *unknowns, *problem.batch.override_names})
+    of_runs = {name for run in experiment.runs for name in run.parameters}
+    given = frozenset({*experiment.parameters, *unknowns, *of_runs})
     presets = preset_priors(parameters(base), parameter_values(base), given)
     bounds |= preset_bounds(presets, bounds)
     return Job(experiment, runs, problem, held_out, unknowns, bounds, names, presets)

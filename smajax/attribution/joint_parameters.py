@@ -24,7 +24,7 @@ from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.load.force import force_at_rest
 
 NUDGE = 5e-4  # widths: how far an effect is switched on where its trace is taken; at zero some have no slope
-RANGES = 1e3  # width of an unknown without a prior, in ranges between its bounds
+RANGES = 1.0  # width of an unknown without a prior, in ranges between its bounds: it lies within them
 
 
 @dataclass(frozen=True)

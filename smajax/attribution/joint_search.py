@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from smajax.attribution.joint_parameters import JointParameters
-from smajax.attribution.laplace_evidence import FittedModel, fitted_model, independent_error
+from smajax.attribution.laplace_evidence import ROUNDING, FittedModel, fitted_model, independent_error
 from smajax.attribution.subset_evidence import LinearModel, Subset, linear_model
 from smajax.attribution.traces import Traces, Variant, traces_at
 from smajax.core.progress import Stage
@@ -34,9 +34,9 @@ REACH = 5.0  # nats below the best set in the linear model, within which a set i
 STEPS = 30  # of a fit whose evidence is compared
 SETTLED_COST = 0.02  # a hundredth in log evidence, by which a step of such a fit may still lower the cost
 ALLOWED_EXCESS = (
-    (4, 300.0),
-    (7, 100.0),
-    (12, 50.0),
+    (4, 400.0),
+    (8, 200.0),
+    (14, 100.0),
 )  # after so many steps fits end whose cost is so far above the least
 LEAST_START, MOST_START = 0.02, 2.0  # widths from the base where a fit of a new coefficient begins
 PLACES = 16  # a power of two, for Sobol's points: of an effect with several local minima, simulated and the best fitted
@@ -66,6 +66,7 @@ class JointSearch:
     rounds: list[JointRound] = field(default_factory=list)
     detectable: tuple[str, ...] = ()
     carried: tuple[str, ...] = ()  # effects of the program that fits run in, which grows with what is tried
+    winner: tuple[str, ...] = ()  # effects of the likeliest model when the search had ended
     rounds_before: int = 0  # of an earlier search, from whose models this one begins
     thorough: bool = True  # ends only where no effect of the likeliest model can be removed or replaced
     on_round: Callable[[JointRound], None] = lambda _: None
@@ -109,7 +110,8 @@ def search_jointly(search: JointSearch, starts: Mapping[tuple[str, ...], np.ndar
     for effects, values in starts.items():
         search.fitted[effects] = fitted_model(search.joint, effects, values, search.carried)
     error = min(search.error(model) for model in search.fitted.values())
-    _fit_side_by_side(search, list(starts.items()), error, "fitting what the search begins with")
+    # All to their end, however far behind: the base model is what every result is held against.
+    _fit_side_by_side(search, list(starts.items()), error, "fitting what the search begins with", ())
     present = search.best(error)
     error = search.error(present)
     checked: set[tuple[str, ...]] = set()  # models whose effects were removed and replaced one by one
@@ -136,6 +138,7 @@ def search_jointly(search: JointSearch, starts: Mapping[tuple[str, ...], np.ndar
             if last or not present.effects or not search.thorough:
                 break
             checked.add(present.effects)
+    search.winner = present.effects
     return present
 
 
@@ -168,12 +171,14 @@ def detectable(joint: JointParameters, traces: Traces, noise: float) -> tuple[st
     precision = np.diag([joint.precision(name) for name in joint.unknowns])
     normal = matrix.T @ matrix + noise**2 * precision
     size = 1.0 / np.sqrt(np.diag(normal))
-    factor = np.linalg.cholesky(normal * np.outer(size, size))
+    # Unknowns of which the runs show the product alone have one column to rounding: an eigenvalue may come out below zero.
+    eigenvalues, vectors = np.linalg.eigh(normal * np.outer(size, size))
+    root = np.sqrt(np.maximum(eigenvalues, ROUNDING))
     found = []
     for variant, own in traces.variants.items():
         for name in joint.switches(variant.effect):
             column = own[name] * joint.priors[name].sigma
-            absorbed = np.linalg.solve(factor, size * (matrix.T @ column))
+            absorbed = (vectors.T @ (size * (matrix.T @ column))) / root
             left = np.sqrt(max(float(column @ column - absorbed @ absorbed), 0.0))
             if variant.effect not in found and left > DETECTABLE * noise:
                 found.append(variant.effect)
@@ -183,6 +188,8 @@ def detectable(joint: JointParameters, traces: Traces, noise: float) -> tuple[st
 def _promising(search: JointSearch, linear: LinearModel, present: FittedModel, error: float) -> list[Subset]:
     """The likeliest sets of the linear model that were not fitted at this error."""
     ranked = linear.ranked()
+    if not ranked:
+        return []
     here = max(
         (linear.log_evidence(one) for one in ranked if _effects(search, one) == present.effects), default=-np.inf
     )
@@ -245,7 +252,11 @@ def _fit(
 
 
 def _fit_side_by_side(
-    search: JointSearch, begun: Sequence[tuple[tuple[str, ...], np.ndarray]], error: float, stage: str
+    search: JointSearch,
+    begun: Sequence[tuple[tuple[str, ...], np.ndarray]],
+    error: float,
+    stage: str,
+    allowed_excess: tuple[tuple[int, float], ...] = ALLOWED_EXCESS,
 ) -> None:
     """Fit sets of effects from values (P,), in the program of `search.carried`; the likelier of two fits of one set counts."""
     joint = search.joint
@@ -253,7 +264,8 @@ def _fit_side_by_side(
     problem = problem.with_noise(error)
     tasks = [problem.task(joint.free(effects), joint.bounds, values[index]) for effects, values in begun]
     search.settings.progress(Stage(stage, 0.0))
-    fits = levenberg_marquardt(problem, tasks, comparison_settings(search.settings, stage))
+    settings = dataclasses.replace(comparison_settings(search.settings, stage), allowed_excess=allowed_excess)
+    fits = levenberg_marquardt(problem, tasks, settings)
     for (effects, start), fit in zip(begun, fits, strict=True):
         search.trials[effects] = error
         if np.isfinite(fit.cost):

@@ -92,7 +92,8 @@ def search_by_evidence(setting: Search, base: Fit) -> tuple[JointSearch, Model, 
     while True:
         search, found = stage.searched(base.values)
         error = search.error(found)
-        first = as_model(search, search.fitted[()], error)
+        base_model = refined(search, search.fitted[()], search.error_of(()))
+        first = as_model(search, base_model, error)
         final = final_model(search, setting, found, error)
         kept = gain_kept_at_half_step(setting, final, first)
         if kept >= setting.config.gain_kept_at_half_step:

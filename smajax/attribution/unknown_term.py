@@ -188,12 +188,14 @@ def learnt(setting: Search, fits: TermFits) -> Lacking:
 
 def joint_with_terms(setting: Search, search: Search, final: Model) -> JointParameters:
     """Parameters of models with the effects of `final` and one of the terms of `search`, with their priors."""
-    plain = JointParameters.of(setting.problem, setting.unknowns, setting.bounds, final.effects, setting.extent)
+    plain = JointParameters.of(
+        setting.problem, setting.unknowns, setting.bounds, final.effects, setting.extent, setting.presets
+    )
     own = {term: tuple(search.coefficients(term)) for term in search.candidates}
     width = CoefficientPrior(0.0, setting.config.term_prior_sigma, False)
     return JointParameters(
         search.problem,
-        setting.unknowns,
+        plain.unknowns,
         search.bounds,
         {**plain.coefficients, **own},
         {**plain.priors, **{name: width for names in own.values() for name in names}},
@@ -225,7 +227,9 @@ def in_place_of(setting: Search, first: Model, final: Model) -> Lacking | None:
     fits = fits_with_terms(setting, first)
     if fits is None:
         return None
-    joint = JointParameters.of(setting.problem, setting.unknowns, setting.bounds, setting.candidates, setting.extent)
+    joint = JointParameters.of(
+        setting.problem, setting.unknowns, setting.bounds, setting.candidates, setting.extent, setting.presets
+    )
     effects = fitted_model(joint, final.effects, final.values, final.effects)
     error = least_error(setting, [effects, *fits.fitted])
     ahead = max(one.log_evidence(error**2) for one in fits.fitted) - effects.log_evidence(error**2)

@@ -126,3 +126,19 @@ def test_starts_of_a_backlash_lie_beyond_its_linear_estimate() -> None:
     sizes = [place["half_width"] for place in logarithmic_points(ranges, 32)]
     assert 0.01 <= min(sizes) < 0.012 < 0.12 < max(sizes) <= 0.16
     assert LIBRARY["sensor_backlash"].candidate.start_ranges({"half_width": 0.0}) == {}
+
+
+def test_unknowns_of_which_the_runs_show_the_product_alone_end_no_search() -> None:
+    """Density and specific heat have one column to rounding."""
+    search = hot_weight({"latent_heat.enthalpy": 1.2e4})
+    problem, table = search.joint.problem, parameters(search.joint.problem.system)
+    both = ("density", "specific_heat")
+    bounds = {**search.joint.bounds, **{name: (table[name].low, table[name].high) for name in both}}
+    joint = JointParameters.of(problem, both, bounds, CANDIDATES, search.extent)
+    base = fitted_model(joint, (), problem.start_values(), ())
+    traces = traces_at(joint, base, search.extent)
+    found = detectable(joint, traces, NOISE)
+    assert "latent_heat" in found
+    linear = linear_model(joint, traces, NOISE**2, found)
+    assert "latent_heat" in {variant.effect for variant in linear.climb(frozenset())}
+    assert all(error > 0.0 for error in base.standard_errors(NOISE**2).values())

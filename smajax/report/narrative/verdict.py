@@ -60,6 +60,8 @@ def _not_in_library(findings: Findings) -> str:
     """What stands in the way of a name, the strongest reason first."""
     tried = len(findings.effects)
     alone = _in_one_run(findings)
+    if not tried:
+        return "Something is missing, and no candidate effect was to be tried: the experiment file leaves none."
     if alone:
         return _of_one_run(findings, alone)
     if findings.rejected is not None:
@@ -79,8 +81,6 @@ def _not_in_library(findings: Findings) -> str:
             f"Something is missing, and none of the {tried} candidate effects that were tried accounts for it: {titles} "
             "comes nearest, and one unknown function in one equation is likelier than that."
         )
-    if not tried:
-        return "Something is missing, and no candidate effect was to be tried: the experiment file leaves none."
     return f"Something is missing, and none of the {tried} candidate effects that were tried accounts for it."
 
 
