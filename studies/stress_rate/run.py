@@ -34,6 +34,15 @@ STRESS = 104e6  # Pa, of the heavy one
 WIRE = dataclasses.replace(DEAD_WEIGHT.wire, convection_coefficient=138.0, recoverable_strain=0.044)
 RIG = dataclasses.replace(DEAD_WEIGHT, clock=CLOCK)
 SEED = 316
+GIVEN = {  # what a data sheet gives: the source's wire is known
+    "young_modulus_austenite": "Pa",
+    "young_modulus_martensite": "Pa",
+    "stress_slope_austenite": "Pa/K",
+    "stress_slope_martensite": "Pa/K",
+    "thermal_modulus": "Pa/K",
+    "resistivity_austenite": "ohm m",
+    "resistivity_martensite": "ohm m",
+}
 NET = (0.32e-3, 0.27e-3, 0.28e-3)  # m, eq. 3.16: measured for 96 g taken off and put back
 
 
@@ -67,7 +76,9 @@ def write(out: Path, law: str) -> Path:
         read = show(RIG, WIRE, run, {})
         noisy = read + random.normal(0.0, RIG.noise, read.size)
         (out / f"{run.name}.csv").write_text(table_text(RIG, run, noisy), encoding="utf-8")
-    text = experiment_text(RIG, made).replace("[model.parameters]", f'law = "{law}"\n\n[model.parameters]')
+    given = "\n".join(f'{name} = "{getattr(WIRE, name):.6g} {unit}"' for name, unit in GIVEN.items())
+    text = experiment_text(RIG, made)
+    text = text.replace("[model.parameters]", f'law = "{law}"\n\n[model.parameters]\n{given}')
     (out / "experiment.toml").write_text(text, encoding="utf-8")
     return out / "experiment.toml"
 
