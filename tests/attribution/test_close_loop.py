@@ -141,9 +141,7 @@ def test_demo_with_nothing_missing_is_adequate(tmp_path: Path) -> None:
     assert findings.verdict == "adequate"
     assert _added(findings) == set()
     assert pooled_rmse(findings.runs, "held-out", "before") < 1.1 * findings.noise_sigma
-    declared = [parameter for parameter in findings.before if parameter.name in truth]
-    assert len(declared) == len(truth)
-    for parameter in declared:
+    for parameter in findings.before:
         assert parameter.value == pytest.approx(truth[parameter.name], rel=0.03), parameter.name
         assert parameter.standard_error is not None
         # Four standard errors and the integrator's own error at this step.
