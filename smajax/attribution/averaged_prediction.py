@@ -56,9 +56,7 @@ def averaged(setting: Search, search: JointSearch, final: Model, batch: RunBatch
     models = likely_models(search, final)
     problem, index = setting.restricted([effect for model, _ in models for effect in model.effects])
     problem = Problem.build(problem.system, batch, problem.noise_sigma, problem.offset)
-    mask = np.asarray(batch.mask)
-    offset = np.sum(problem.measured * mask, axis=1, keepdims=True) / np.maximum(mask.sum(axis=1, keepdims=True), 1.0)
-    offset = offset if any(problem.offset) else np.zeros_like(offset)
+    offset = problem.measured - problem.centred(problem.measured)
     own = search.joint.ordered(final.effects)
     readings, variances = [], []
     for model, _ in models:
@@ -75,8 +73,7 @@ def averaged(setting: Search, search: JointSearch, final: Model, batch: RunBatch
     return Averaged(
         tuple(AveragedModel(model.effects, weight) for model, weight in models),
         tuple(
-            _run(problem.measured[run], mean[run] + offset[run], half[run], mask[run] > 0)
-            for run in range(len(problem.measured))
+            _run(*one) for one in zip(problem.measured, mean + offset, half, np.asarray(batch.mask) > 0, strict=True)
         ),
     )
 

@@ -210,10 +210,9 @@ def findings_of(context: Context, outcome: Outcome, compared: Compared, rejected
     base, final = outcome.base, outcome.final
     runs, residual_before, residual_after = compared
     setting.progress(Stage(WRITING, 0.0))
-    before, after = (
-        parameters_found(job, setting, model, context.start, outcome.search.error_of(model.effects))
-        for model in (base, final)
-    )
+    error_of = outcome.search.error_of
+    before = parameters_found(job, setting, base, context.start, error_of(()))
+    after = parameters_found(job, setting, final, context.start, error_of(final.effects)) if final.effects else before
     effects = effects_found(job, setting, final, after)
     average = Averaged()
     if len(job.fit_runs) > 1:  # else none can be left out, which the band is made of

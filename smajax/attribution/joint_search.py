@@ -3,7 +3,8 @@
 Each round takes one Jacobian by the coefficients of all candidates at the likeliest fit so far, searches all sets of
 effects in the linear model about it (`subset_evidence`), and fits the few best sets that have not been fitted, all
 parameters together. A set counts by the evidence of its own fit (`laplace_evidence`), never by the linear model's. It
-ends where no fitted set is likelier than the present one and neither of its effects can be removed or replaced.
+ends where no fitted set is likelier than the present one, and none is by more than `SETTLED_ODDS` in which one of its effects
+is removed or replaced.
 
 What the present model leaves is what an independent sample may be off by: at first the residual of the base model, so
 only strong effects are added; the better the model, the finer the effects that it tells.
@@ -18,13 +19,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from smajax.attribution.joint_parameters import JointParameters
-from smajax.attribution.laplace_evidence import ROUNDING, FittedModel, fitted_model, independent_error
+from smajax.attribution.laplace_evidence import FittedModel, decomposed, fitted_model, independent_error
 from smajax.attribution.subset_evidence import LinearModel, Subset, linear_model
 from smajax.attribution.traces import Traces, Variant, traces_at
 from smajax.core.progress import Stage
 from smajax.fit.levenberg_marquardt import FitSettings, levenberg_marquardt
-from smajax.fit.predicted import total_costs
-from smajax.fit.starts import logarithmic_points
+from smajax.fit.starts import logarithmic_points, nearest
 from smajax.model.effects.candidate import Extent
 from smajax.model.effects.library import LIBRARY
 
@@ -170,10 +170,8 @@ def detectable(joint: JointParameters, traces: Traces, noise: float) -> tuple[st
     matrix = np.stack(columns, axis=1) if columns else np.zeros((len(traces.residual), 0))
     precision = np.diag([joint.precision(name) for name in joint.unknowns])
     normal = matrix.T @ matrix + noise**2 * precision
-    size = 1.0 / np.sqrt(np.diag(normal))
-    # Unknowns of which the runs show the product alone have one column to rounding: an eigenvalue may come out below zero.
-    eigenvalues, vectors = np.linalg.eigh(normal * np.outer(size, size))
-    root = np.sqrt(np.maximum(eigenvalues, ROUNDING))
+    eigenvalues, vectors, size = decomposed(normal)
+    root = np.sqrt(eigenvalues)
     found = []
     for variant, own in traces.variants.items():
         for name in joint.switches(variant.effect):
@@ -235,13 +233,10 @@ def _fit(
         search.carried = joint.ordered([*search.carried, *needed, *likely])
     problem, index = joint.restricted(search.carried)
     points = [starts(joint, subset, linear, traces) for subset in sets]
-    # Of the places where a fit could begin the one that is nearest to the runs.
-    every = [one[index] for places in points for one in places]
-    costs = iter(np.nan_to_num(total_costs(problem.with_noise(error), every), nan=np.inf))
+    chosen = nearest(problem.with_noise(error), points, index)
     begun: list[tuple[tuple[str, ...], np.ndarray]] = []
-    for subset, places in zip(sets, points, strict=True):
+    for subset, start in zip(sets, chosen, strict=True):
         effects = _effects(search, subset)
-        start = min(places, key=lambda _: next(costs))
         begun.append((effects, start))
         if set(effects) - set(traces.present):
             # And, where an effect is new, from its usual size: near zero the misfit may have a minimum of its own.

@@ -12,7 +12,6 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from smajax.attribution.findings import LikelierModel, NoLikelierModel, Reason, Round, StepDependent
-from smajax.attribution.joint_parameters import JointParameters
 from smajax.attribution.joint_search import JointRound, JointSearch, refined, search_jointly
 from smajax.attribution.laplace_evidence import FittedModel, fitted_model
 from smajax.attribution.leave_one_run_out import predicting
@@ -36,7 +35,7 @@ class _Stage:
         """Among the candidates that were not excluded."""
         setting = self.setting
         names = [name for name in setting.candidates if name not in self.excluded]
-        joint = JointParameters.of(setting.problem, setting.unknowns, setting.bounds, names, setting.extent, presets)
+        joint = setting.joint(names, presets)
         noise = float(setting.problem.noise_sigma)
         before = len(setting.rounds)
         return JointSearch(
@@ -94,7 +93,7 @@ def search_by_evidence(setting: Search, base: Fit) -> tuple[JointSearch, Model, 
         error = search.error(found)
         base_model = refined(search, search.fitted[()], search.error_of(()))
         first = as_model(search, base_model, error)
-        final = final_model(search, setting, found, error)
+        final = final_model(search, setting, found, error) if found.effects else first
         kept = gain_kept_at_half_step(setting, final, first)
         if kept >= setting.config.gain_kept_at_half_step:
             break

@@ -48,11 +48,11 @@ class FittedModel:
 
     def log_evidence(self, variance: float) -> float:
         """Log evidence plus log prior odds; `variance` of an independent sample, SI squared, the same for all models compared."""
-        eigenvalues, _, size = self._decomposed(variance)
+        eigenvalues, vectors, size = self._decomposed(variance)
         value = self.log_prior - 0.5 * self.squares / variance
         value += 0.5 * float(np.log(self.precision).sum() - np.log(eigenvalues).sum()) + float(np.log(size).sum())
         if self.one_sided:
-            deviation = np.sqrt(np.diag(self.covariance(variance)))
+            deviation = size * np.sqrt((vectors**2 / eigenvalues).sum(axis=1))
             value += sum(float(np.log(2.0) + stats.norm.logcdf(at / deviation[k])) for k, at in self.one_sided)
         return value
 
@@ -62,17 +62,23 @@ class FittedModel:
         return np.asarray((vectors / values) @ vectors.T * np.outer(size, size))
 
     def _decomposed(self, variance: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """(eigenvalues, eigenvectors, size) of the posterior precision, scaled to a diagonal of one by `size`."""
-        matrix = self.gram / variance + np.diag(self.precision)
-        size = 1.0 / np.sqrt(np.diag(matrix))
-        values, vectors = np.linalg.eigh(matrix * np.outer(size, size))
-        # Where columns are one to rounding an eigenvalue comes out as zero or less.
-        return np.maximum(values, ROUNDING), vectors, size
+        return decomposed(self.gram / variance + np.diag(self.precision))
 
     def standard_errors(self, variance: float) -> dict[str, float]:
         """Posterior standard deviation of every free parameter, in its unit."""
         deviation = np.sqrt(np.diag(self.covariance(variance)))
         return dict(zip(self.names, (deviation * self.scales).tolist(), strict=True))
+
+
+def decomposed(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(eigenvalues, eigenvectors, size) of normal equations, scaled to a diagonal of one by `size`.
+
+    Where columns are one to rounding, as of unknowns of which the runs show the product alone, an eigenvalue comes out as zero or less:
+    it is taken as `ROUNDING`.
+    """
+    size = 1.0 / np.sqrt(np.diag(matrix))
+    values, vectors = np.linalg.eigh(matrix * np.outer(size, size))
+    return np.maximum(values, ROUNDING), vectors, size
 
 
 def fitted_model(

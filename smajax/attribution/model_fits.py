@@ -14,6 +14,7 @@ import numpy as np
 from smajax.attribution.config import AttributionConfig
 from smajax.attribution.every_effect import EVERY
 from smajax.attribution.findings import Reason, Round
+from smajax.attribution.joint_parameters import JointParameters
 from smajax.attribution.residual_diagnostics import all_noise
 from smajax.attribution.run_extent import extent_of
 from smajax.attribution.score_test import switches
@@ -107,6 +108,11 @@ class Search:
     def every(self) -> list[str]:
         """Unknowns and all coefficients of all candidates: one Jacobian serves every question."""
         return self.free(self.candidates)
+
+    def joint(self, effects: Sequence[str], presets: Mapping[str, CoefficientPrior] | None = None) -> JointParameters:
+        """Parameters of joint fits of models with some of `effects`. `presets`: those of the search, unless others are given."""
+        free = self.presets if presets is None else presets
+        return JointParameters.of(self.problem, self.unknowns, self.bounds, effects, self.extent, free)
 
     def coefficients(self, effect: str) -> list[str]:
         return [name for name in self.problem.names if name.startswith(f"{effect}.")]

@@ -32,9 +32,10 @@ from smajax.core.progress import Stage
 from smajax.core.whiteness import correlation_time, split_runs
 from smajax.data.experiment.record import Prior
 from smajax.fit.levenberg_marquardt import FitSettings, levenberg_marquardt
-from smajax.fit.predicted import misfits, total_costs
+from smajax.fit.predicted import misfits
 from smajax.fit.problem import Problem
 from smajax.fit.sensitivity import sensitivity
+from smajax.fit.starts import nearest
 from smajax.fit.uncertainty import covariance_of, uncertainty
 from smajax.model.effects.candidate import PRIOR_ODDS
 from smajax.model.effects.prior_width import CoefficientPrior
@@ -146,7 +147,7 @@ def fits_with_terms(setting: Search, final: Model) -> TermFits | None:
 def unknown_terms(setting: Search, final: Model) -> Lacking:
     """An unknown term in each equation in turn, beside `final`.
 
-    The likeliest is `named` where it is likelier than none, predicts left-out runs better, and held-out runs too. Search
+    The likeliest is `named` where it is likelier than none, predicts left-out runs better, and held-out runs too. Terms
     that are likelier than none and less than `INDISTINGUISHABLE` behind it stand in `indistinguishable`.
     """
     fits = fits_with_terms(setting, final)
@@ -188,9 +189,7 @@ def learnt(setting: Search, fits: TermFits) -> Lacking:
 
 def joint_with_terms(setting: Search, search: Search, final: Model) -> JointParameters:
     """Parameters of models with the effects of `final` and one of the terms of `search`, with their priors."""
-    plain = JointParameters.of(
-        setting.problem, setting.unknowns, setting.bounds, final.effects, setting.extent, setting.presets
-    )
+    plain = setting.joint(final.effects)
     own = {term: tuple(search.coefficients(term)) for term in search.candidates}
     width = CoefficientPrior(0.0, setting.config.term_prior_sigma, False)
     return JointParameters(
@@ -227,9 +226,7 @@ def in_place_of(setting: Search, first: Model, final: Model) -> Lacking | None:
     fits = fits_with_terms(setting, first)
     if fits is None:
         return None
-    joint = JointParameters.of(
-        setting.problem, setting.unknowns, setting.bounds, setting.candidates, setting.extent, setting.presets
-    )
+    joint = setting.joint(setting.candidates)
     effects = fitted_model(joint, final.effects, final.values, final.effects)
     error = least_error(setting, [effects, *fits.fitted])
     ahead = max(one.log_evidence(error**2) for one in fits.fitted) - effects.log_evidence(error**2)
@@ -271,9 +268,7 @@ def fitted_terms(
     """Every term fitted together with the parameters of the model with `effects`, from the best of its places."""
     problem, _ = joint.restricted(tuple(joint.coefficients))
     problem = problem.with_noise(error)
-    every = [at for points in places.values() for at in points]
-    costs = iter(np.nan_to_num(total_costs(problem, every), nan=np.inf))
-    begun = {term: min(points, key=lambda _: next(costs)) for term, points in places.items()}
+    begun = dict(zip(places, nearest(problem, list(places.values())), strict=True))
     tasks = [problem.task(joint.free((*effects, term)), joint.bounds, at) for term, at in begun.items()]
     settings = comparison_settings(FitSettings(cache=search.cache, progress=search.progress), "fitting unknown terms")
     fits = dict(zip(begun, levenberg_marquardt(problem, tasks, settings), strict=True))

@@ -38,6 +38,16 @@ def logarithmic_points(ranges: Mapping[str, tuple[float, float]], count: int) ->
     return [dict(zip(ranges, np.exp(low + share * (high - low)).tolist(), strict=True)) for share in shares]
 
 
+def nearest(
+    problem: Problem, groups: Sequence[Sequence[np.ndarray]], index: np.ndarray | None = None
+) -> list[np.ndarray]:
+    """Of each group of points the one that is nearest to the runs. `index`: of the problem's parameters in a point; None: all."""
+    every = np.stack([point for group in groups for point in group])
+    costs = np.nan_to_num(total_costs(problem, every if index is None else every[:, index]), nan=np.inf)
+    ends = np.cumsum([len(group) for group in groups])[:-1]
+    return [group[int(np.argmin(own))] for group, own in zip(groups, np.split(costs, ends), strict=True)]
+
+
 def _costs(problem: Problem, points: np.ndarray, cache: ResultCache) -> np.ndarray:
     """Sum of squares at every point; infinite where the model gives no number."""
     key = cache.key(problem, "costs", points)

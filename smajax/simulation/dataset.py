@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+import json
 from collections.abc import Mapping
 
 import jax
@@ -69,9 +69,15 @@ def with_error(result: xr.Dataset, error: IntegrationError) -> xr.Dataset:
     A temperature's is in K.
     """
     result.attrs["integration_error"] = json_line(error.record())
-    for name, rms in error.rms.items():
-        if name in result and math.isfinite(rms):
-            result[name].attrs["integration_error"] = rms
+    return errors_by_variable(result)
+
+
+def errors_by_variable(result: xr.Dataset) -> xr.Dataset:
+    """The root mean squares of the attribute `integration_error` as attributes of the variables too."""
+    error = json.loads(result.attrs.get("integration_error", "{}"))
+    for name, one in error.get("outputs", {}).items():
+        if name in result and one["rms"] is not None:
+            result[name].attrs["integration_error"] = one["rms"]
     return result
 
 

@@ -14,12 +14,10 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from studies.attribution_benchmark.cases import Case, true_wire
-from studies.attribution_benchmark.rigs import ARM, DEAD_WEIGHT, Rig, show
+from studies.attribution_benchmark.rigs import ARM, DEAD_WEIGHT, Rig
 from studies.attribution_benchmark.runs import Clock, powered
-from studies.attribution_benchmark.write import LARGEST_OFFSET, experiment_text, table_text
+from studies.attribution_benchmark.write import experiment_text, readings, table_text
 
 CLOCKS = (5, 20, 50, 100)  # ms
 STRESSES: dict[str, tuple[float, float, tuple[float, ...]]] = {
@@ -39,14 +37,12 @@ def at_clock(rig: Rig, step: float) -> Rig:
 def written(rig: Rig, number: int, folder: Path) -> None:
     """One null as an experiment."""
     case = Case(rig.name, (), 0.0, number)
-    wire, random = true_wire(case), np.random.default_rng([case.seed, 1])
+    wire = true_wire(case)
+    read = readings(rig, wire, {}, case.seed)
     folder.mkdir(parents=True)
     runs = rig.runs(wire)
     for run in runs:
-        shown = show(rig, wire, run, {})
-        zero = random.uniform(-LARGEST_OFFSET, LARGEST_OFFSET) * rig.noise
-        read = shown + zero + random.normal(0.0, rig.noise, shown.size)
-        (folder / f"{run.name}.csv").write_text(table_text(rig, run, read))
+        (folder / f"{run.name}.csv").write_text(table_text(rig, run, read[run.name]))
     (folder / "experiment.toml").write_text(experiment_text(rig, runs))
 
 

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from studies.attribution_benchmark.cases import Case, Truth, cases, truth
 from studies.attribution_benchmark.effects import EFFECTS
+from studies.attribution_benchmark.parameters import Wire
 from studies.attribution_benchmark.rigs import Rig, show
 from studies.attribution_benchmark.runs import Run
 
@@ -56,11 +57,16 @@ AROUND = 20.0  # K: bounds of the transformation temperatures about their nomina
 
 
 def measure(case: Case, true: Truth) -> dict[str, Vector]:
-    """Readings of all runs: what the rig shows, a zero of each run's own, white noise."""
-    random, rig = np.random.default_rng([case.seed, 1]), true.rig
+    """Readings of all runs of a case."""
+    return readings(true.rig, true.wire, true.effects, case.seed)
+
+
+def readings(rig: Rig, wire: Wire, effects: dict[str, float], seed: int) -> dict[str, Vector]:
+    """Of all runs: what the rig shows, a zero of each run's own, white noise."""
+    random = np.random.default_rng([seed, 1])
     read = {}
-    for run in rig.runs(true.wire):
-        shown = show(rig, true.wire, run, true.effects)
+    for run in rig.runs(wire):
+        shown = show(rig, wire, run, effects)
         zero = random.uniform(-LARGEST_OFFSET, LARGEST_OFFSET) * rig.noise
         read[run.name] = shown + zero + random.normal(0.0, rig.noise, shown.size)
     return read

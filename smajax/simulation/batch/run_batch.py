@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -19,10 +18,11 @@ from smajax.model.system import System
 from smajax.model.types import Series
 from smajax.simulation.batch.axes import Axes
 from smajax.simulation.batch.chunks import chunk_size, chunks, result_shapes
-from smajax.simulation.batch.integration import ERROR, INTEGRATION, as_stored, attributes_of, integrated_recipe
+from smajax.simulation.batch.integration import INTEGRATION, as_stored, attributes_of, integrated_recipe
 from smajax.simulation.batch.recipe import STORED, BatchSettings, recipe_of
 from smajax.simulation.batch.single_run import Recipe, single_run
 from smajax.simulation.batch.store import DIGEST, Store
+from smajax.simulation.dataset import errors_by_variable
 from smajax.simulation.integration_error import AUTO, Tolerance
 from smajax.simulation.measures import AbstractMeasure
 from smajax.simulation.observers import GOOD
@@ -204,16 +204,7 @@ def labelled(
     clash = sorted(set(coordinates) & set(data))
     coordinates = {f"axis_{name}" if name in clash else name: entry for name, entry in coordinates.items()}
     result = xr.Dataset(data, coordinates, dict(attributes))
-    return _with_error(result).set_coords(["status", "first_bad_time"])
-
-
-def _with_error(result: xr.Dataset) -> xr.Dataset:
-    """Of each variable what the integration leaves in it as its own attribute: the root mean square of the worst run looked at, in its unit."""
-    error = json.loads(result.attrs.get(ERROR, "{}"))
-    for name, one in error.get("outputs", {}).items():
-        if name in result and one["rms"] is not None:
-            result[name].attrs[ERROR] = one["rms"]
-    return result
+    return errors_by_variable(result).set_coords(["status", "first_bad_time"])
 
 
 def opened(folder: Path | str) -> xr.Dataset:
@@ -233,7 +224,7 @@ def opened(folder: Path | str) -> xr.Dataset:
         if "time" in result.dims:
             result = result.assign_coords(time=("time", time, {"units": "s"}))
         result.attrs = attributes
-        return _with_error(result).set_coords(["status", "first_bad_time"])
+        return errors_by_variable(result).set_coords(["status", "first_bad_time"])
     units = store.axis_units | {name: str(group[name].attrs["units"]) for name in store.names()}
     return labelled({name: np.asarray(group[name][:]) for name in store.names()}, axes, units, time, attributes)
 
