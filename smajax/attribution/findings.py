@@ -15,6 +15,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 
 from smajax.attribution.config import AttributionConfig
+from smajax.data.model_file.record import ActuatorModel
 from smajax.fit.integration import IntegrationError
 from smajax.fit.uncertainty import Remark
 
@@ -335,6 +336,8 @@ class Findings:
     outlier_runs: tuple[OutlierRun, ...] = ()
     config: AttributionConfig = field(default_factory=AttributionConfig)
     provenance: dict[str, str] = field(default_factory=dict)  # versions, seed, data hashes, command, seconds
+    base_model: ActuatorModel | None = None  # as they are saved
+    extended_model: ActuatorModel | None = None
 
     @property
     def integration_error(self) -> float:

@@ -253,7 +253,11 @@ def load_experiment(path: str | Path, catalogue: Catalogue) -> Experiment:
     path = Path(path)
     if path.is_dir():
         path = path / "experiment.toml"
-    file = read_schema(path)
+    return experiment_of(path, read_schema(path), catalogue)
+
+
+def experiment_of(path: Path, file: ExperimentFile, catalogue: Catalogue) -> Experiment:
+    """The experiment that `file` says, read from `path`, with its runs. Raises ExperimentError as `load_experiment` does."""
     model = _describe(path, file, catalogue)
     fixed = given_parameters(path, "model.parameters", file.model.parameters, file, model.parameters)
     every = unknowns(path, file, model.parameters)
@@ -320,4 +324,5 @@ def load_experiment(path: str | Path, catalogue: Catalogue) -> Experiment:
         effects_excluded=tuple(file.effects.exclude),
         runs=tuple(read.run for read in runs),
         warnings=tuple(warnings),
+        log_format=file.log_format,
     )

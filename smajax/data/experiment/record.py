@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 
+from smajax.data.experiment.schema import LogFormat
 from smajax.data.readers.table import Array
 
 # What a run may start with that no parameter of the model says: the name in the file -> the parameter, if it is one.
@@ -101,6 +102,7 @@ class Experiment:
     effects_excluded: tuple[str, ...]
     runs: tuple[Run, ...]
     warnings: tuple[str, ...]
+    log_format: LogFormat | None = None  # how the logs of its runs were read
 
     @property
     def offset(self) -> bool:
