@@ -36,8 +36,8 @@ if TYPE_CHECKING:
     from smajax.core.parameters import parameter_values as parameter_values
     from smajax.core.parameters import set_parameters as set_parameters
     from smajax.core.runtime import prepare as prepare
+    from smajax.data.model_file.actuator_model import ActuatorModel as ActuatorModel
     from smajax.data.model_file.read import load_model as load_model
-    from smajax.data.model_file.record import ActuatorModel as ActuatorModel
     from smajax.data.open_experiment import open_experiment as open_experiment
     from smajax.fit.identify import identify as identify
     from smajax.fit.predict import predict as predict
@@ -77,7 +77,7 @@ NAMES = {
     "AbstractController": ("smajax.control.controllers.base", "AbstractController"),
     "AbstractEffect": ("smajax.model.effects.base", "AbstractEffect"),
     "AbstractMovingLoad": ("smajax.model.load.base", "AbstractMovingLoad"),
-    "ActuatorModel": ("smajax.data.model_file.record", "ActuatorModel"),
+    "ActuatorModel": ("smajax.data.model_file.actuator_model", "ActuatorModel"),
     "CONTROLLERS": ("smajax.control.presets", "CONTROLLERS"),
     "DRIVES": ("smajax.model.presets", "DRIVES"),
     "EFFECTS": ("smajax.model.effects.library", "LIBRARY"),

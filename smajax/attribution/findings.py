@@ -15,7 +15,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 
 from smajax.attribution.config import AttributionConfig
-from smajax.data.model_file.record import ActuatorModel
+from smajax.data.model_file.actuator_model import ActuatorModel
 from smajax.fit.integration import IntegrationError
 from smajax.fit.uncertainty import Remark
 

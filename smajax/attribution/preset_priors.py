@@ -11,6 +11,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from smajax.core.parameters import Parameter
+from smajax.data.experiment.record import FromModelFile
 from smajax.fit.sensitivity import Sensitivity
 from smajax.model.effects.prior_width import CoefficientPrior
 
@@ -47,6 +48,15 @@ def preset_priors(
     }
 
 
+def fitted_priors(kept: FromModelFile, given: frozenset[str]) -> dict[str, CoefficientPrior]:
+    """Normal priors of what was fitted before, about those values (SI) by their standard errors, of what is not among those `given`."""
+    return {
+        name: CoefficientPrior(float(kept.values[name]), error, False)
+        for name, error in kept.errors.items()
+        if name not in given and error > 0.0
+    }
+
+
 def preset_bounds(
     presets: Mapping[str, CoefficientPrior], bounds: Mapping[str, tuple[float, float]]
 ) -> dict[str, tuple[float, float]]:
@@ -62,9 +72,11 @@ def preset_bounds(
 def visible(
     at: Sensitivity, values: Mapping[str, float], presets: Mapping[str, CoefficientPrior]
 ) -> dict[str, CoefficientPrior]:
-    """Those of `presets` (logarithmic priors) of which one width changes the runs by more than the noise, by the Jacobian at the base fit."""
+    """Those of `presets` of which one width changes the runs by more than the noise, by the Jacobian at the base fit."""
+
+    def width(name: str, prior: CoefficientPrior) -> float:
+        return prior.sigma * values[name] if prior.logarithmic else prior.sigma
+
     return {
-        name: one
-        for name, one in presets.items()
-        if np.linalg.norm(at.columns([name])) * one.sigma * values[name] > VISIBLE
+        name: one for name, one in presets.items() if np.linalg.norm(at.columns([name])) * width(name, one) > VISIBLE
     }

@@ -13,8 +13,9 @@ from smajax.attribution.job import Job
 from smajax.attribution.joint_search import JointSearch
 from smajax.attribution.laplace_evidence import FittedModel
 from smajax.attribution.model_fits import Model, Search
+from smajax.data.model_file.actuator_model import ActuatorModel
 from smajax.data.model_file.of_experiment import actuator_model, range_of, rounded
-from smajax.data.model_file.record import ActuatorModel, LikelyModel, ModelOutput
+from smajax.data.model_file.record import LikelyModel, ModelOutput
 
 
 def saved_model(

@@ -6,8 +6,9 @@ import jax.numpy as jnp
 import numpy as np
 
 from smajax.data.experiment.record import RUN_STARTS
+from smajax.data.model_file.actuator_model import ActuatorModel
 from smajax.data.model_file.of_experiment import actuator_model, range_of, rounded
-from smajax.data.model_file.record import ActuatorModel, LikelyModel, ModelOutput
+from smajax.data.model_file.record import LikelyModel, ModelOutput
 from smajax.fit.identify_stages import Fitted, Setup, Statistics
 from smajax.fit.packed_runs import simulate_batch
 

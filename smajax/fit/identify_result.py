@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from smajax.data.experiment.record import Prior
-from smajax.data.model_file.record import ActuatorModel
+from smajax.data.model_file.actuator_model import ActuatorModel
 from smajax.fit.design import Suggestion
 from smajax.fit.directions import Direction
 from smajax.fit.integration import IntegrationError

@@ -15,9 +15,10 @@ from smajax.core.parameters import parameter_values
 from smajax.data.experiment.errors import ExperimentError
 from smajax.data.experiment.record import Experiment, Output, Run
 from smajax.data.experiment.toml_file import Quantity
+from smajax.data.model_file.actuator_model import ActuatorModel
 from smajax.data.model_file.of_experiment import quantities
 from smajax.data.model_file.read_logs import read_logs
-from smajax.data.model_file.record import ActuatorModel, LikelyModel, ModelOutput, range_unit
+from smajax.data.model_file.record import LikelyModel, ModelOutput, range_unit
 from smajax.data.open_experiment import open_experiment
 from smajax.fit.integration import IntegrationError, choose_integration, integration_error, with_integration
 from smajax.fit.packed_runs import pack, simulate_batch

@@ -14,6 +14,7 @@ from smajax.core.units import UnitError, convert, parse_quantity
 from smajax.data.experiment.column_overrides import own_columns
 from smajax.data.experiment.data_folder import data_folder
 from smajax.data.experiment.errors import ExperimentError, at_key, check_name
+from smajax.data.experiment.from_model_file import with_model_file
 from smajax.data.experiment.headings import heading_warnings
 from smajax.data.experiment.magnitude import common_warnings, magnitude_warnings
 from smajax.data.experiment.model_description import WIRE_SIZES, Catalogue, ModelDescription
@@ -258,13 +259,14 @@ def load_experiment(path: str | Path, catalogue: Catalogue) -> Experiment:
 
 def experiment_of(path: Path, file: ExperimentFile, catalogue: Catalogue) -> Experiment:
     """The experiment that `file` says, read from `path`, with its runs. Raises ExperimentError as `load_experiment` does."""
+    file, kept = with_model_file(path, file)
     model = _describe(path, file, catalogue)
     fixed = given_parameters(path, "model.parameters", file.model.parameters, file, model.parameters)
     every = unknowns(path, file, model.parameters)
     fixed |= {unknown.name: unknown.start for unknown in every if file.unknown[unknown.name].fixed}
     free = tuple(unknown for unknown in every if unknown.name not in fixed) + run_starts(path, file, model)
     _check_effects(path, file, catalogue)
-    values = fixed | {unknown.name: unknown.start for unknown in free}
+    values = (dict(kept.values) if kept else {}) | fixed | {unknown.name: unknown.start for unknown in free}
     _check_order(path, file, model, values)
     output_names, units = _channel_units(path, file, model)
     _check_runs(path, file, model)
@@ -305,7 +307,7 @@ def experiment_of(path: Path, file: ExperimentFile, catalogue: Catalogue) -> Exp
     heats = sorted(model.heats & runs[0].run.inputs.keys())
     warnings += magnitude_warnings(runs, None if model.scale is None else model.scale(values), heats, reading.step)
     warnings += _useless(file, model) + _untold(file, free)
-    warnings += preset_warnings(file.model.wire, free, model.parameters)
+    warnings += [] if kept else preset_warnings(file.model.wire, free, model.parameters)
     warnings += role_warnings(file.runs)
     return Experiment(
         name=path.resolve().parent.name if path.name == "experiment.toml" else path.stem,
@@ -325,4 +327,5 @@ def experiment_of(path: Path, file: ExperimentFile, catalogue: Catalogue) -> Exp
         runs=tuple(read.run for read in runs),
         warnings=tuple(warnings),
         log_format=file.log_format,
+        model_file=kept,
     )

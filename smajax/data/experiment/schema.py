@@ -11,13 +11,21 @@ from smajax.data.experiment.toml_file import Places, Quantity, Section, read_tom
 
 
 class ModelSection(Section):
-    """Which base model, and the parameters that are known."""
+    """Which base model, and the parameters that are known: presets by name, or a model file."""
 
-    wire: str = Field(description="the name of a wire, as text")
-    load: str = Field(description="the name of a load, as text")
-    drive: str = Field(description="the name of a drive, as text ('none' when nothing drives the wire)")
+    wire: str = Field(default="", description="the name of a wire, as text")
+    load: str = Field(default="", description="the name of a load, as text")
+    drive: str = Field(default="", description="the name of a drive, as text ('none' when nothing drives the wire)")
     law: str = Field(default="", description="the name of a kinetics law, as text; left out, the wire's own")
+    file: str | None = Field(default=None, description="the path of a model file, relative to this file, as text")
     parameters: dict[str, Quantity] = Field(default={}, description="a table of name = 'number unit'")
+
+    @model_validator(mode="after")
+    def _one_way(self) -> ModelSection:
+        named = [key for key in ("wire", "load", "drive", "law") if getattr(self, key)]
+        if self.file is not None and named:
+            raise ValueError(f"got file and {named[0]}; the file says its {named[0]}: remove one of the two")
+        return self
 
 
 class PriorSection(Section):

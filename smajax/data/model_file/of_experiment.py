@@ -6,15 +6,14 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
-from smajax.core.parameters import parameter_values, parameters
+from smajax.core.parameters import Parameter, parameter_values, parameters
 from smajax.data.experiment.record import Experiment, Run
+from smajax.data.model_file.actuator_model import ActuatorModel
 from smajax.data.model_file.record import (
-    ActuatorModel,
     FittedRun,
     LikelyModel,
     ModelOutput,
     ModelParameter,
-    Origin,
 )
 from smajax.model.extended import extended
 from smajax.model.presets import build
@@ -34,18 +33,11 @@ def actuator_model(
     """
     first = likely[0]
     system = extended(build(experiment.wire, experiment.load, experiment.drive, experiment.law), first.effects)
-    preset, table = parameter_values(system), parameters(system)
-    values: dict[str, ModelParameter] = {}
-    for name, entry in table.items():
-        origin: Origin = "preset"
-        value, low, high = preset[name], entry.low, entry.high
-        if name in experiment.parameters:
-            origin, value = "given", experiment.parameters[name]
-        if name in first.values:
-            origin, value = "fitted", first.values[name]
-            low, high = (rounded(one) for one in bounds.get(name, (low, high)))
-        error = standard_errors.get(name)
-        values[name] = ModelParameter(float(value), origin, low, high, None if error is None else rounded(error))
+    start = {**parameter_values(system), **experiment.base_values}
+    values = {
+        name: _parameter(experiment, entry, start[name], first, bounds.get(name), standard_errors.get(name))
+        for name, entry in parameters(system).items()
+    }
     return ActuatorModel(
         title=experiment.title or experiment.name,
         wire=experiment.wire,
@@ -61,6 +53,28 @@ def actuator_model(
         log_format=experiment.log_format,
         made_with={"experiment": experiment.path.name},
     )
+
+
+def _parameter(
+    experiment: Experiment,
+    entry: Parameter,
+    start: float,
+    fitted: LikelyModel,
+    bounds: tuple[float, float] | None,
+    error: float | None,
+) -> ModelParameter:
+    """One value: of this fit, given in the experiment file, of a fit before in its model file, or of a preset."""
+    name, kept = entry.name, experiment.model_file
+    low, high = (rounded(one) for one in bounds or (entry.low, entry.high))
+    if name in fitted.values:
+        return ModelParameter(
+            float(fitted.values[name]), "fitted", low, high, None if error is None else rounded(error)
+        )
+    if name in experiment.parameters:
+        return ModelParameter(float(start), "given", entry.low, entry.high)
+    if kept is not None and name in kept.errors:
+        return ModelParameter(float(start), "fitted", *kept.bounds[name], kept.errors[name])
+    return ModelParameter(float(start), "preset", entry.low, entry.high)
 
 
 def rounded(value: float) -> float:

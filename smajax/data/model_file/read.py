@@ -19,9 +19,9 @@ from smajax.data.experiment.record import Prior
 from smajax.data.experiment.toml_file import Quantity, read_toml, validated
 from smajax.data.experiment.unknowns import bounded
 from smajax.data.model_catalogue import CATALOGUE, check_together
+from smajax.data.model_file.actuator_model import ActuatorModel
 from smajax.data.model_file.record import (
     STATE_UNITS,
-    ActuatorModel,
     FittedRun,
     LikelyModel,
     ModelOutput,
@@ -54,6 +54,11 @@ def load_model(path: str | Path) -> ActuatorModel:
     if file.uncertainty is None:
         return model
     return _with_uncertainty(path, file, model)
+
+
+def parameter_text(value: float, unit: str) -> Quantity:
+    """A value as a file has it, every digit."""
+    return float(value) if unit == "-" else f"{float(value)!r} {unit}"
 
 
 def _check_kind(path: Path, content: Mapping[str, Any]) -> None:
@@ -134,10 +139,8 @@ def _check_parameter(
     check_parameter(path, f"parameters.{name}", name, table, presets)
 
 
-def _parameter(path: Path, name: str, given: ParameterSection | Quantity, info: ParameterInfo) -> ModelParameter:
+def _parameter(path: Path, name: str, given: ParameterSection, info: ParameterInfo) -> ModelParameter:
     key = f"parameters.{name}"
-    if not isinstance(given, ParameterSection):
-        return ModelParameter(bounded(path, key, given, info), "given", info.low, info.high)
     low = info.low if given.low is None else bounded(path, f"{key}.low", given.low, info)
     high = info.high if given.high is None else bounded(path, f"{key}.high", given.high, info)
     if low >= high:
@@ -150,7 +153,7 @@ def _parameter(path: Path, name: str, given: ParameterSection | Quantity, info: 
             error = parse_quantity(given.standard_error, info.unit, difference=True)
         if error < 0.0:
             raise ExperimentError(path, f"{key}.standard_error", f"got {given.standard_error!r}, expected zero or more")
-    return ModelParameter(bounded(path, f"{key}.value", given.value, info), given.origin, low, high, error)
+    return ModelParameter(bounded(path, key, given.value, info), given.origin, low, high, error)
 
 
 def _outputs(path: Path, file: ModelFile, sensors: Mapping[str, str]) -> tuple[ModelOutput, ...]:

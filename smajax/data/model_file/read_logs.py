@@ -16,9 +16,10 @@ from smajax.data.experiment.load import experiment_of
 from smajax.data.experiment.plausibility import role_warnings
 from smajax.data.experiment.record import Experiment
 from smajax.data.experiment.schema import DataSection, ExperimentFile, LogFormat, ModelSection, RunSection
-from smajax.data.experiment.toml_file import Quantity
+from smajax.data.experiment.toml_file import Quantity, validated
 from smajax.data.model_catalogue import CATALOGUE
-from smajax.data.model_file.record import ActuatorModel
+from smajax.data.model_file.actuator_model import ActuatorModel
+from smajax.data.model_file.read import parameter_text
 from smajax.data.readers.table import MeasuredDataError
 
 
@@ -84,7 +85,7 @@ def _guessed(
 ) -> tuple[ExperimentFile, tuple[str, ...]]:
     """A draft of an experiment of the model's wire, load and drive. Raises MeasuredDataError."""
     drafted = draft(paths, folder / "logs.toml", "logs", ModelChoice(model.load, model.wire, model.drive), decimal)
-    file = ExperimentFile.model_validate(tomllib.loads(drafted.text))
+    file = validated(paths[0], tomllib.loads(drafted.text), ExperimentFile, {(): ExperimentFile})
     if model.log_format is not None and model.log_format.sampling is not None and file.sampling is not None:
         file = file.model_copy(update={"sampling": model.log_format.sampling})
     columns = [message for message in drafted.messages if not message.startswith(("model:", "the bench:", "held out:"))]
@@ -98,10 +99,7 @@ def _experiment(
     constant = {name for run in runs for name in run.inputs}
     channels = {name: one for name, one in log_format.channels.items() if name not in constant}
     table = model.table
-    values: dict[str, Quantity] = {
-        name: one.value if table[name].unit == "-" else f"{one.value!r} {table[name].unit}"
-        for name, one in model.parameters.items()
-    }
+    values = {name: parameter_text(one.value, table[name].unit) for name, one in model.parameters.items()}
     file = ExperimentFile(
         title=model.title,
         model=ModelSection(wire=model.wire, load=model.load, drive=model.drive, law=model.law, parameters=values),

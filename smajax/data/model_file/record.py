@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 
-from smajax.core.parameters import Parameter, parameters, set_parameters
+from smajax.core.parameters import Parameter, parameter_values, parameters, set_parameters
 from smajax.data.experiment.record import Prior
 from smajax.data.experiment.schema import LogFormat
 from smajax.model.channels import INPUT_UNITS
@@ -90,8 +88,8 @@ class FittedRun:
 
 
 @dataclass(frozen=True)
-class ActuatorModel:
-    """A model of an actuator: what `smajax close-loop` and `smajax identify` write as `model.toml`, or a user by hand.
+class ModelRecord:
+    """What a model file holds.
 
     parameters: every one of the model, by name. likely: the models that predictions are averaged over, this one first; empty
     where nothing was fitted. fitted_range: quantity -> (lowest, highest) in the fit runs, SI. log_format: how the logs are read.
@@ -149,33 +147,40 @@ class ActuatorModel:
         )
 
     def draws(self, count: int, seed: int = 0) -> list[System]:
-        """`count` models from the posterior: a likely model by its probability, then its values by their covariance, within bounds.
+        """`count` models from the posterior, each of `plants` by itself."""
+        plants = self.plants(count, seed)
+        return [jax.tree.map(lambda leaf, at=at: leaf[at], plants) for at in range(count)]
 
-        All carry the effects of all likely models, at base value where theirs has none, so that they stack (`plants`). Where
-        nothing was fitted all are the model itself.
+    def plants(self, count: int, seed: int = 0) -> System:
+        """`count` models from the posterior as one system, each of whose values has shape (count,), for `jax.vmap`.
+
+        Each is a likely model by its probability, then its values by their covariance, within bounds. All carry the effects of all
+        likely models, at base value where theirs has none. Where nothing was fitted all are the model itself.
         """
         random = np.random.default_rng(seed)
         likely = self.likely or (LikelyModel(self.effects, 1.0, {}),)
         weights = np.asarray([one.probability for one in likely])
         chosen = random.choice(len(likely), size=count, p=weights / weights.sum())
-        return [self._drawn(likely[number], random) for number in chosen]
+        base = self.system_of((), {}, self.every_effect)
+        columns = {name: np.full(count, value) for name, value in parameter_values(base).items()}
+        for number, model in enumerate(likely):
+            own = chosen == number
+            known = {name: value for name, value in self.values.items() if name.split(".")[0] in model.effects}
+            for name, value in {**known, **model.values, **self._drawn(model, int(own.sum()), random)}.items():
+                columns[name][own] = value
+        return set_parameters(base, columns)
 
-    def plants(self, count: int, seed: int = 0) -> System:
-        """`draws` as one system, each of whose values has shape (count,), for `jax.vmap`."""
-        return jax.tree.map(lambda *leaves: jnp.stack(leaves), *self.draws(count, seed))
-
-    def _drawn(self, model: LikelyModel, random: np.random.Generator) -> System:
-        values = dict(model.values)
-        if model.names:
-            mean = np.asarray([values[name] for name in model.names])
-            size = np.sqrt(np.maximum(np.diag(model.covariance), 0.0))
-            size = np.where(size > 0.0, size, 1.0)
-            eigenvalues, vectors = np.linalg.eigh(model.covariance / np.outer(size, size))
-            step = vectors @ (np.sqrt(np.maximum(eigenvalues, 0.0)) * random.standard_normal(len(mean)))
-            for name, value in zip(model.names, mean + size * step, strict=True):
-                low, high = self._bounds[name]
-                values[name] = float(np.clip(value, low, high))
-        return self.system_of(model.effects, values, self.every_effect)
+    def _drawn(self, model: LikelyModel, count: int, random: np.random.Generator) -> dict[str, np.ndarray]:
+        """Values of what the covariance of one likely model covers, (count,) each."""
+        if not model.names:
+            return {}
+        mean = np.asarray([model.values[name] for name in model.names])
+        size = np.sqrt(np.maximum(np.diag(model.covariance), 0.0))
+        size = np.where(size > 0.0, size, 1.0)
+        eigenvalues, vectors = np.linalg.eigh(model.covariance / np.outer(size, size))
+        steps = random.standard_normal((count, len(mean))) * np.sqrt(np.maximum(eigenvalues, 0.0)) @ vectors.T
+        values = mean + size * steps
+        return {name: np.clip(values[:, k], *self._bounds[name]) for k, name in enumerate(model.names)}
 
     @cached_property
     def _bounds(self) -> dict[str, tuple[float, float]]:
@@ -183,12 +188,3 @@ class ActuatorModel:
         whole = parameters(self.system_of(self.every_effect, {}))
         own = {name: (one.low, one.high) for name, one in self.parameters.items()}
         return {name: (one.low, one.high) for name, one in whole.items()} | own
-
-    def save(self, path: str | Path) -> Path:
-        """Write `path` (TOML), and what is known of fitted values beside it (NetCDF, of the same name); the path.
-
-        Raises ExperimentError for a name without `.toml`.
-        """
-        from smajax.data.model_file.write import write_model
-
-        return write_model(self, Path(path))

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from smajax.data.experiment.schema import ChannelSection, LogFormat, SamplingSection, TimeSection
 from smajax.data.experiment.toml_file import Places, Quantity, Section
@@ -32,6 +32,12 @@ class ParameterSection(Section):
     origin: Literal["fitted", "given", "preset"] = Field(
         default="given", description="'fitted', 'given' or 'preset': where the value is from"
     )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _alone(cls, content: Any) -> Any:
+        """A value by itself is a given one."""
+        return {"value": content} if isinstance(content, str | float | int) else content
 
 
 class OutputSection(Section):
@@ -65,7 +71,7 @@ class ModelFile(Section):
     uncertainty: str | None = Field(default=None, description="the name of a NetCDF file beside this one")
     probability: float = Field(default=1.0, ge=0.0, le=1.0, description="a number from 0 to 1")
     model: PartsSection = Field(description="a section [model] with wire, load and drive")
-    parameters: dict[str, ParameterSection | Quantity] = Field(
+    parameters: dict[str, ParameterSection] = Field(
         default={}, description="a table of name = 'number unit', or name = { value = 'number unit', origin = 'given' }"
     )
     outputs: dict[str, OutputSection] = Field(default={}, description="sections [outputs.NAME] with noise")

@@ -1,4 +1,4 @@
-"""An `ActuatorModel` as `model.toml`, and `model.nc` beside it: covariance, priors and alternatives of what was fitted."""
+"""A `ModelRecord` as `model.toml`, and `model.nc` beside it: covariance, priors and alternatives of what was fitted."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import xarray as xr
 from smajax.core.files import as_netcdf, replace
 from smajax.data.experiment.errors import ExperimentError
 from smajax.data.experiment.toml_file import Section
-from smajax.data.model_file.record import ActuatorModel, LikelyModel, ModelParameter, range_unit
+from smajax.data.model_file.record import LikelyModel, ModelParameter, ModelRecord, range_unit
 from smajax.data.model_file.schema import FORMAT
 
 HEAD = """\
@@ -22,10 +22,10 @@ HEAD = """\
 # A value may be changed by hand: its line becomes name = "number unit", which is taken as known."""
 
 
-DIGITS = 10  # of a fitted value in the text
+DIGITS = 10  # of a fitted value in the text, where the NetCDF file has all
 
 
-def write_model(model: ActuatorModel, path: Path) -> Path:
+def write_model(model: ModelRecord, path: Path) -> Path:
     """Write `path` and, where anything was fitted, the NetCDF file of the same name. Each is there whole or not at all.
 
     Raises ExperimentError for a name without `.toml`.
@@ -40,7 +40,7 @@ def write_model(model: ActuatorModel, path: Path) -> Path:
     return path
 
 
-def model_text(model: ActuatorModel, uncertainty: str = "") -> str:
+def model_text(model: ModelRecord, uncertainty: str = "") -> str:
     """The text of the file. `uncertainty`: name of the NetCDF file beside it."""
     lines = [HEAD, f"format = {FORMAT}", f"title = {_text(model.title)}"]
     if uncertainty:
@@ -51,9 +51,10 @@ def model_text(model: ActuatorModel, uncertainty: str = "") -> str:
     parts = {"wire": model.wire, "load": model.load, "drive": model.drive, "law": model.law}
     lines += ["", "[model]", *(f"{key} = {_text(name)}" for key, name in parts.items() if name)]
     lines += [f"effects = {_list(model.effects)}", "", "[parameters]"]
+    kept = model.likely[0].values if model.likely else {}
     for name, one in model.parameters.items():
         known = model.table[name]
-        lines.append(f"{_key(name)} = {_parameter(one, known.unit)}  # {known.about}")
+        lines.append(f"{_key(name)} = {_parameter(one, known.unit, name in kept)}  # {known.about}")
     for output in model.outputs:
         lines += ["", f"[outputs.{_key(output.name)}]", f"noise = {_quantity(output.noise, output.unit)}"]
         lines.append(f"offset = {str(output.offset).lower()}  # whether each run has its own zero")
@@ -77,11 +78,11 @@ def model_text(model: ActuatorModel, uncertainty: str = "") -> str:
     return "\n".join(lines) + "\n"
 
 
-def _parameter(one: ModelParameter, unit: str) -> str:
+def _parameter(one: ModelParameter, unit: str, kept: bool) -> str:
+    """`kept`: the NetCDF file has every digit."""
     if one.origin == "given":
         return _quantity(one.value, unit)
-    # Of a fitted value the NetCDF file has every digit.
-    value = float(f"{one.value:.{DIGITS}g}") if one.origin == "fitted" else one.value
+    value = float(f"{one.value:.{DIGITS}g}") if kept else one.value
     entries = {"value": _quantity(value, unit)}
     if one.origin == "fitted":
         if one.standard_error is not None:
@@ -132,7 +133,7 @@ def _list(names: Iterable[str]) -> str:
     return f"[{', '.join(map(_text, names))}]"
 
 
-def _uncertainty(model: ActuatorModel) -> xr.Dataset:
+def _uncertainty(model: ModelRecord) -> xr.Dataset:
     """What is known of the fitted values of each likely model: `value_0`, `covariance_0`, ... along `parameter_0`."""
     result = xr.Dataset(attrs={"title": model.title, "format": FORMAT, "unit": "SI, degC, rad"})
     for number, one in enumerate(model.likely):
