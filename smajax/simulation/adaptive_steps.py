@@ -9,6 +9,7 @@ parameters by jumps. By the whole time, that of the last step. In forward mode a
 
 from __future__ import annotations
 
+import dataclasses
 from typing import NamedTuple
 
 import jax.numpy as jnp
@@ -18,12 +19,16 @@ from smajax.core.where_tree import where_tree
 from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.system import System
 from smajax.model.types import Inputs, Scalar, State
-from smajax.simulation.observers import HOTTEST
+from smajax.simulation.observers import went_wrong
 from smajax.simulation.step import step_and_error
 
 SAFETY = 0.9
 SHRINK, GROW = 0.2, 4.0  # of one step to the next
-SHORTEST = 1e-3  # share of the whole time, at which a step is taken whatever its error: an impact is not resolved
+# Share of the whole time at which a step is taken whatever its error: an impact is not resolved.
+SHORTEST = 1e-3
+# Tries in the whole time, after which one step goes to its end and counts as a stage that did not converge. Of 3,072 wires from all over the
+# declared bounds none needs more than 1,100 at a tolerance of 1e-4, or 6,000 at 1e-8.
+MOST_STEPS = 10_000
 VELOCITY_TIME = 0.01  # s: an error of velocity counts as what it has moved the load by in this time
 
 
@@ -44,12 +49,18 @@ def _relative(system: System, error: tuple[Scalar, Scalar, Scalar], tolerance: S
     return jnp.where(jnp.isnan(worst), jnp.inf, worst)
 
 
+def _outside(state: State) -> Scalar:
+    not_finite, runaway = went_wrong(state)
+    return not_finite | runaway
+
+
 def advance(
     system: System, state: State, inputs: Inputs, dt: Scalar, tried: Scalar, tolerance: Scalar, once: bool = False
 ) -> tuple[State, Scalar, Scalar]:
     """(state after `dt` seconds with `inputs` held, the step to begin with next time, how many were taken).
 
-    `tried` (s) is the step to begin with. `once`: as in `step.step`.
+    `tried` (s) is the step to begin with. `once`: as in `step.step`. A part that is not resolved, because a state in it cannot be or the tries
+    ran out (`MOST_STEPS`), counts in the state's `unsolved`.
     """
     shortest = SHORTEST * lax.stop_gradient(dt)
 
@@ -57,22 +68,24 @@ def advance(
         return at.left > 0.0
 
     def body(at: _At) -> _At:
-        last = at.tried >= at.left * (1.0 - 1e-6)
+        # A state that is not finite, or of a wire that has molten or is colder than can be, goes to the end at once: no shorter step mends it.
+        outside, exhausted = _outside(at.state), at.taken >= MOST_STEPS
+        lost = outside | exhausted
+        last = (at.tried >= at.left * (1.0 - 1e-6)) | lost
         # Two equal ones in the place of a long and a short one.
         length = jnp.where(last, at.left, lax.stop_gradient(jnp.minimum(at.tried, 0.5 * at.left)))
         new, error = step_and_error(system, at.state, inputs, length, once)
         worst = lax.stop_gradient(_relative(system, error, tolerance))
-        # A state that is not finite, or of a wire that has molten, goes to the end at once: no shorter step mends it.
-        degrees = at.state.wire.temperature
-        lost = ~jnp.isfinite(degrees + at.state.motion.position + at.state.wire.stress) | (degrees > HOTTEST)
-        length = jnp.where(lost, at.left, length)
-        last = last | lost
-        good = (worst <= 1.0) | (length <= shortest) | lost
+        # A step to the end may be longer than the one that was tried, by rounding: it is the shortest one all the same.
+        good = (worst <= 1.0) | (jnp.minimum(length, at.tried) <= shortest) | lost
         # The power 1/4 in the place of 1/3: two square roots are vector instructions, a power is a call a number.
         factor = jnp.clip(SAFETY / jnp.sqrt(jnp.sqrt(jnp.maximum(worst, 1e-6))), SHRINK, GROW)
         proposed = lax.stop_gradient(jnp.maximum(length * factor, shortest))
         # A step cut short by the end of the time says nothing against a longer one.
         following = jnp.where(good & (length < at.tried), jnp.maximum(at.tried, proposed), proposed)
+        # One that is back within the range at the end would show nothing of it.
+        hidden = exhausted | (outside & ~_outside(new))
+        new = dataclasses.replace(new, unsolved=new.unsolved + jnp.where(hidden, 1.0, 0.0))
         state = where_tree(good, new, at.state)
         left = jnp.where(good, jnp.where(last, 0.0, at.left - length), at.left)
         return _At(state, left, following, at.taken + 1)

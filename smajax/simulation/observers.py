@@ -74,7 +74,7 @@ class Status(AbstractObserver):
     def update(self, memory: tuple[Scalar, Scalar, Scalar], step: Step) -> tuple[Scalar, Scalar, Scalar]:
         first, status, unsolved = memory
         state: State = step.after
-        not_finite, runaway = _wrong(state)
+        not_finite, runaway = went_wrong(state)
         code = jnp.where(not_finite, NOT_FINITE, jnp.where(runaway, RUNAWAY, GOOD))
         fresh = (status == GOOD) & (code != GOOD)
         unsolved = jnp.where((unsolved == jnp.inf) & (state.unsolved > 0.0), state.time, unsolved)
@@ -87,8 +87,8 @@ class Status(AbstractObserver):
         return {"status": status.astype("int8"), "first_bad_time": first}
 
 
-def _wrong(state: State) -> tuple[Scalar, Scalar]:
-    """(not finite, runaway)."""
+def went_wrong(state: State) -> tuple[Scalar, Scalar]:
+    """Of one state: (not finite, runaway)."""
     wire, motion = state.wire, state.motion
     total = wire.temperature + wire.stress + wire.martensite_fraction + motion.position + motion.velocity
     return ~jnp.isfinite(total), (wire.temperature > HOTTEST) | (wire.temperature < COLDEST)

@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.stats import qmc
 
 from smajax.attribution.close_loop import close_loop
 from smajax.attribution.findings import pooled_rmse
@@ -40,6 +39,7 @@ from smajax.simulation.measures import Largest, Smallest
 from smajax.simulation.observers import COLDEST, GOOD, HOTTEST, NOT_FINITE, RUNAWAY
 from smajax.simulation.simulate import simulate
 from tests.helpers.machine_code import by_machine_code
+from tests.helpers.whole_box import whole_box
 
 RIGS = {
     "arm": (build("niti_table_3_1", "arm", "amplified_voltage"), "voltage", 9.0),
@@ -50,21 +50,6 @@ FAST, SLOW = 1024, 40_000  # members of each rig
 RUN = simulate_compiled
 
 
-def _whole_box(system: System, count: int, seed: int) -> dict[str, np.ndarray]:
-    """Points of all that is declared, by logarithm where that is above zero; what has an order is put into it."""
-    table = parameters(system)
-    shares = qmc.Sobol(len(table), rng=seed).random(count)
-    box = {}
-    for share, (name, entry) in zip(shares.T, table.items(), strict=True):
-        wide = entry.low * (entry.high / entry.low) ** share if entry.low > 0.0 else None
-        box[name] = entry.low + share * (entry.high - entry.low) if wide is None else wide
-    for lower, higher, _ in ORDER:
-        if lower in box:
-            low, high = np.minimum(box[lower], box[higher]), np.maximum(box[lower], box[higher])
-            box[lower], box[higher] = low, np.maximum(high, np.nextafter(low, np.inf))
-    return box
-
-
 @pytest.mark.filterwarnings("ignore:The balance properties of Sobol:UserWarning")
 @pytest.mark.parametrize("count", [FAST, pytest.param(SLOW, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("rig", RIGS)
@@ -73,7 +58,7 @@ def test_every_point_of_the_declared_box_gives_finite_numbers(rig: str, count: i
     system, channel, top = RIGS[rig]
     levels = np.zeros(400)
     levels[50:200], levels[250:300] = top, 0.5 * top
-    box = _whole_box(system, count, 1 if count == FAST else 2)
+    box = whole_box(system, count, 1 if count == FAST else 2)
     measures = [kind(of) for of in ("martensite_fraction", "temperature", "position") for kind in (Smallest, Largest)]
     settings: dict[str, Any] = {"dt": 0.02, "tolerance": None, "keep": (), "measures": (*measures, Smallest("stress"))}
     found = run_batch(system, {channel: jnp.asarray(levels)}, zipped(box), **settings)  # fixed steps, as the limits say

@@ -14,11 +14,13 @@ from smajax.engine import program
 from smajax.model.rigs import arm
 from smajax.model.system import initial_state
 from smajax.model.types import Inputs, Scalar, State
+from smajax.simulation import adaptive_steps
 from smajax.simulation.adaptive_steps import advance
 from smajax.simulation.batch.axes import zipped
 from smajax.simulation.batch.run_batch import run_batch
 from smajax.simulation.measures import Last
 from smajax.simulation.step import step, step_and_error
+from tests.helpers.whole_box import whole_box
 
 SECONDS = 4.0
 VOLTAGE = np.linspace(5.5, 8.5, 12)  # the fast ones throw the arm past the slack wire
@@ -132,3 +134,45 @@ def test_error_controlled_steps_meet_every_sample_of_the_inputs():
 def test_a_tolerance_that_is_not_positive_is_refused(tolerance):
     with pytest.raises(ValueError, match="1e-4"):
         run_batch(arm(), {}, zipped(voltage=[6.0]), seconds=1.0, tolerance=tolerance)
+
+
+@pytest.mark.filterwarnings("ignore:The balance properties of Sobol:UserWarning")
+def test_no_wire_of_the_declared_box_takes_steps_without_end():
+    """Two of these once did: the last step, longer than the shortest by rounding alone, was refused for ever."""
+    dt, system = jnp.asarray(0.02), arm()
+    levels = np.zeros(200)
+    levels[25:100], levels[125:150] = 9.0, 4.5
+
+    def counted(model, own):
+        own_arm = set_parameters(model[0], own)
+
+        def one(carry, voltage):
+            state, tried, taken = carry
+            state, tried, more = advance(own_arm, state, {"voltage": voltage}, dt, tried, jnp.asarray(1e-4))
+            return (state, tried, jnp.maximum(taken, more)), None
+
+        start = initial_state(own_arm, {"voltage": model[1][0]})
+        (state, _, taken), _ = jax.lax.scan(one, (start, dt, jnp.zeros((), int)), model[1])
+        return {"taken": taken, "time": state.time}
+
+    box, model = whole_box(system, 1024, 1), (system, jnp.asarray(levels))
+    found = program(counted, model, tuple(box), engine="native")(model, box, 2)
+    assert 500 < found["taken"].max() < 2000
+    np.testing.assert_allclose(found["time"], 4.0, rtol=1e-9)  # of molten wires too
+
+
+def test_a_run_whose_tries_run_out_ends_in_time_and_says_so(monkeypatch):
+    monkeypatch.setattr(adaptive_steps, "MOST_STEPS", 20)
+
+    def run(model, own):
+        inputs = {"voltage": jnp.asarray(7.0)}
+        start = initial_state(model, inputs)
+        state, _, taken = advance(model, start, inputs, jnp.asarray(0.5), jnp.asarray(0.5), own["tolerance"])
+        return {"taken": taken, "time": state.time, "unsolved": state.unsolved, "heat": state.wire.temperature}
+
+    found = program(run, LIGHT, ("tolerance",), engine="native")(LIGHT, {"tolerance": np.array([1e-4, 1e-9])}, 1)
+    assert found["taken"][0] < 20
+    assert found["taken"][1] == 21
+    np.testing.assert_allclose(found["time"], 0.5, rtol=1e-12)
+    assert found["unsolved"].tolist() == [0.0, 1.0]
+    assert found["heat"][1] == pytest.approx(found["heat"][0], abs=1.0)
