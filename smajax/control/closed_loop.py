@@ -117,7 +117,12 @@ class ClosedLoopSetup(eqx.Module):
             raise ValueError("a sensor draws noise: give `key`, for instance `jax.random.key(0)`.")
         if self.sensor is not None:
             check_bounds(self.sensor)
-        known = self.system.load.inputs_optional | {"ambient_temperature"}
+        load = self.system.load
+        if lacking := sorted(load.inputs_required - self.disturbances.keys()):
+            raise ValueError(
+                f"the load {type(load).__name__} needs the input {listed(lacking)}: give `disturbance={{'{lacking[0]}': values}}`, one a sample."
+            )
+        known = load.inputs_optional | load.inputs_required | {"ambient_temperature"}
         for name, series in self.disturbances.items():
             if name not in known:
                 raise ValueError(f"`{name}` is no disturbance of this system; there are {listed(sorted(known))}.")

@@ -37,7 +37,7 @@ class Merit(eqx.Module):
     peak_temperature: Scalar  # C
 
 
-# Of an arm; the lengths of another load are in m.
+# Of an arm.
 MERIT_UNITS = {
     "reach_time": "s",
     "settling_time": "s",
@@ -48,6 +48,11 @@ MERIT_UNITS = {
     "switches_per_second": "1/s",
     "peak_temperature": "degC",
 }
+
+
+def merit_units(position: str) -> dict[str, str]:
+    """`MERIT_UNITS` of a load whose position is in this unit."""
+    return {name: position if unit == "rad" else unit for name, unit in MERIT_UNITS.items()}
 
 
 def band_of(system: System) -> Scalar:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import abc
+import math
 from typing import ClassVar
 
 import equinox as eqx
@@ -29,6 +30,10 @@ class AbstractDrive(eqx.Module):
     def drawn_current(self, resistance: Scalar, inputs: Inputs) -> Scalar | float:
         """Current asked of the supply by `resistance` ohm while it is on, A; zero where the drive has no current of its own."""
         return 0.0
+
+    def largest_voltage(self) -> Scalar | float:
+        """Command above which it puts no more into the wire, V; infinite where there is none."""
+        return math.inf
 
     def from_voltage(self, voltage: Scalar) -> Inputs:
         """The inputs by which a controller's voltage (V, 0 or more) reaches the wire. ValueError for a drive of another kind."""

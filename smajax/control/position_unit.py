@@ -1,0 +1,107 @@
+"""The unit in which set points and figures of merit of a load are given and shown: degrees of an angle, millimetres of a length."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from smajax.control.figures_of_merit import BAND_DEGREES, band_of
+from smajax.control.load_equation import moving_load, stroke_of
+from smajax.core.display_units import display
+from smajax.model.system import System
+
+SHARES = (
+    0.15,
+    0.3,
+    0.45,
+    0.6,
+    0.75,
+    0.9,
+)  # of the stroke: set points of a load other than the arm, where none are given
+SLACK = 0.2  # of the stroke, beyond which no set point of a load without stops makes sense
+
+
+class PositionUnit(NamedTuple):
+    """Of the position of a load."""
+
+    shown: str  # deg, mm
+    own: str  # rad, m
+
+    @property
+    def symbol(self) -> str:
+        """Behind a number: `°`, ` mm`."""
+        return "°" if self.shown == "deg" else f" {self.shown}"
+
+    @property
+    def label(self) -> str:
+        """Of an axis: `°`, `mm`."""
+        return self.symbol.strip()
+
+    @property
+    def axis(self) -> str:
+        """Of the position over time."""
+        return "arm angle (°)" if self.shown == "deg" else f"position ({self.label})"
+
+    @property
+    def factor(self) -> float:
+        """How many make one of the program's own."""
+        return 180.0 / np.pi if self.shown == "deg" else display(self.own).factor
+
+    def to_own(self, values: object) -> np.ndarray:
+        """Radians or metres, of any shape."""
+        numbers = np.asarray(values, dtype=float)
+        return np.radians(numbers) if self.shown == "deg" else numbers / self.factor
+
+    def of(self, values: object) -> np.ndarray:
+        """Degrees or millimetres, of any shape."""
+        numbers = np.asarray(values, dtype=float)
+        return np.degrees(numbers) if self.shown == "deg" else numbers * self.factor
+
+
+DEGREES, MILLIMETRES = PositionUnit("deg", "rad"), PositionUnit("mm", "m")
+
+
+def unit_of(system: System) -> PositionUnit:
+    """Of a load that moves. Raises ValueError of one that does not."""
+    own = moving_load(system).reading[1]
+    return DEGREES if own == "rad" else PositionUnit(display(own).unit or own, own)
+
+
+def check_unit(system: System, shown: str) -> None:
+    """ValueError where settings are in another unit than the load's."""
+    unit = unit_of(system)
+    if shown != unit.shown:
+        raise ValueError(
+            f"set points and noise are in {shown}, and the position of the load {type(system.load).__name__} is shown in {unit.shown}: give "
+            f"them in {unit.shown} and unit={unit.shown!r}."
+        )
+
+
+def unit_named(shown: str) -> PositionUnit:
+    """`deg` or `mm`; another one is that of a load of one's own."""
+    return next((one for one in (DEGREES, MILLIMETRES) if one.shown == shown), PositionUnit(shown, shown))
+
+
+def position_range(system: System) -> tuple[float, float]:
+    """Between which set points make sense, in the unit shown: the stops, and where there are none the stroke and a fifth more."""
+    load, unit = moving_load(system), unit_of(system)
+    start, stroke = float(load.start()), float(stroke_of(system))
+    low, high = (float(end) for end in load.limits())
+    low = low if np.isfinite(low) else start - SLACK * stroke
+    high = high if np.isfinite(high) else start + (1.0 + SLACK) * stroke
+    return float(unit.of(low)), float(unit.of(high))
+
+
+def default_set_points(system: System, count: int = len(SHARES)) -> tuple[float, ...]:
+    """Of a load, evenly over its stroke, in the unit shown, to three digits."""
+    load, unit = moving_load(system), unit_of(system)
+    shares = np.linspace(SHARES[0], SHARES[-1], count)
+    positions = unit.of(float(load.start()) + shares * float(stroke_of(system)))
+    return tuple(float(f"{one:.3g}") for one in positions)
+
+
+def band_shown(system: System) -> float:
+    """How near counts as there, in the unit shown: a degree, or a hundredth of the stroke."""
+    unit = unit_of(system)
+    return BAND_DEGREES if unit == DEGREES else float(f"{float(unit.of(band_of(system))):.3g}")
