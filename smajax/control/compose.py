@@ -9,7 +9,7 @@ from typing import overload
 from smajax.control.controllers.base import AbstractController
 from smajax.control.loop_around import loop_around
 from smajax.control.loop_dataset import Loop
-from smajax.control.mismatch import MISMATCHES, ratio_of
+from smajax.control.mismatch import MISMATCHES, mismatches_of, ratio_of
 from smajax.core.names import of_many
 from smajax.core.parameters import check_bounds, parameter_values, parameters, set_parameters
 from smajax.core.units import UnitError, parse_quantity
@@ -27,11 +27,11 @@ PARAMETERS = "`smajax presets WIRE LOAD DRIVE` lists those of a model, `smajax e
 def parameter_name(system: System, name: str) -> str:
     """The parameter that `name` means: its own name, its place in the model (`wire.heat.convection_coefficient`), or short.
 
-    Short names are those of `MISMATCHES`. Raises ValueError with the nearest names, and what lists all.
+    Short names are those of `mismatches_of`. Raises ValueError with the nearest names, and what lists all.
     """
     table = parameters(system)
     places = {".".join(map(str, entry.path)): own for own, entry in table.items()}
-    short = {short: own for short, own in MISMATCHES.items() if own in table}
+    short = {short: own for short, own in mismatches_of(system).items() if own in table}
     meant = {**short, **places, **{own: own for own in table}}
     if name in meant:
         return meant[name]

@@ -58,7 +58,7 @@ def check_set_points(system: System, set_points: Sequence[float]) -> None:
     else:
         where = f"set points are within the stroke of the wire on the load {type(load).__name__} and a fifth more"
     raise ValueError(
-        f"{where}, {low:g} to {high:g} {'degrees' if unit == DEGREES else unit.shown}, at least one; not "
+        f"{where}, {low:g} to {high:g} {'degrees' if unit.is_angle else unit.shown}, at least one; not "
         f"{', '.join(f'{point:g}' for point in odd) or 'none'}."
     )
 
@@ -77,8 +77,8 @@ def check_interface(filtered: str, noise: float, period: float, dt: float) -> No
 def noise_of(noise: float | str, unit: PositionUnit) -> float:
     """A noise in the unit shown, from text such as `20um`. UnitError for a unit of another kind, ValueError for no size."""
     value = parse_quantity(noise, unit.shown, bare=unit.shown)
-    if not 0.0 <= value <= (LARGEST_ANGLE if unit == DEGREES else math.inf):
-        expected = f"0 to {LARGEST_ANGLE:g} deg" if unit == DEGREES else f"0 {unit.shown} or more"
+    if not 0.0 <= value <= (LARGEST_ANGLE if unit.is_angle else math.inf):
+        expected = f"0 to {LARGEST_ANGLE:g} deg" if unit.is_angle else f"0 {unit.shown} or more"
         raise UnitError(f"{expected}, not `{noise}`")
     return value
 
@@ -95,7 +95,7 @@ def interface_of(system: System, filtered: str, noise: float, period: float, dt:
 
 def between_in_words(filtered: str, noise: float, period: float, delay: int, unit: PositionUnit = DEGREES) -> str:
     """The same in a sentence."""
-    what = "angle" if unit == DEGREES else "position"
+    what = "angle" if unit.is_angle else "position"
     reads = f"their states from the filter `{filtered}`" if filtered else "the true state"
     read = f"the {what} with {noise:g}{unit.symbol} of noise" if noise else f"the {what} without noise"
     late = f", commands {delay} periods late" if delay else ""

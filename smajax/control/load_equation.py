@@ -88,10 +88,10 @@ def missing_for_equation(system: System) -> str:
     slope = jax.jacfwd(equation.resistance, argnums=(0, 1))
     try:
         values = {
-            "lever": (equation.lever(), True),
-            "inertia": (equation.inertia(), True),
-            "resistance": (equation.resistance(at, jnp.zeros_like(at)), False),
-            "derivative of its resistance": (jnp.stack(slope(at, jnp.zeros_like(at))), False),
+            "its lever": (equation.lever(), True),
+            "its inertia": (equation.inertia(), True),
+            "its resistance": (equation.resistance(at, jnp.zeros_like(at)), False),
+            "the derivative of its resistance": (jnp.stack(slope(at, jnp.zeros_like(at))), False),
         }
     except NotImplementedError as error:
         return f"a part of its equation of motion is not implemented ({error})"
@@ -100,7 +100,7 @@ def missing_for_equation(system: System) -> str:
             continue
         number = np.asarray(value, dtype=float)
         if not np.isfinite(number).all() or (positive and not (number > 0.0).all()):
-            return f"its {name} is {number.ravel()[0]:g}, expected a finite number{' above 0' if positive else ''}"
+            return f"{name} is {number.ravel()[0]:g}, expected a finite number{' above 0' if positive else ''}"
     return ""
 
 

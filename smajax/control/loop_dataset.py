@@ -44,12 +44,12 @@ class Loop(eqx.Module):
 def labelled_loop(
     system: System, loop: ClosedLoop, error: IntegrationError | None = None, **settings: object
 ) -> xr.Dataset:
-    """A closed loop as `labelled_run`, with the command `voltage` (V) and the position `wanted`.
+    """A closed loop as `labelled_run`, with the command `voltage` (V; of such a drive `current` or `power`) and the position `wanted`.
 
     A mapping among the settings, such as `gains`, becomes JSON.
     """
     attributes = {name: json.dumps(dict(one)) if isinstance(one, Mapping) else one for name, one in settings.items()}
-    result = labelled_run(system, loop.run, {"voltage": loop.voltage}, error, **attributes)
+    result = labelled_run(system, loop.run, {system.drive.command[0]: loop.voltage}, error, **attributes)
     position = result["position"].attrs["units"]
     result["wanted"] = ("time", np.asarray(loop.wanted.position), {"units": position, "long_name": "set point"})
     return result

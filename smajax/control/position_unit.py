@@ -27,11 +27,16 @@ class PositionUnit(NamedTuple):
 
     shown: str  # deg, mm
     own: str  # rad, m
+    command: str = "V"  # of what the drive is commanded
+
+    @property
+    def is_angle(self) -> bool:
+        return self.shown == "deg"
 
     @property
     def symbol(self) -> str:
         """Behind a number: `°`, ` mm`."""
-        return "°" if self.shown == "deg" else f" {self.shown}"
+        return "°" if self.is_angle else f" {self.shown}"
 
     @property
     def label(self) -> str:
@@ -41,46 +46,50 @@ class PositionUnit(NamedTuple):
     @property
     def axis(self) -> str:
         """Of the position over time."""
-        return "arm angle (°)" if self.shown == "deg" else f"position ({self.label})"
+        return "arm angle (°)" if self.is_angle else f"position ({self.label})"
 
     @property
     def factor(self) -> float:
         """How many make one of the program's own."""
-        return 180.0 / np.pi if self.shown == "deg" else display(self.own).factor
+        return 180.0 / np.pi if self.is_angle else display(self.own).factor
 
     def to_own(self, values: object) -> np.ndarray:
         """Radians or metres, of any shape."""
         numbers = np.asarray(values, dtype=float)
-        return np.radians(numbers) if self.shown == "deg" else numbers / self.factor
+        return np.radians(numbers) if self.is_angle else numbers / self.factor
 
     def of(self, values: object) -> np.ndarray:
         """Degrees or millimetres, of any shape."""
         numbers = np.asarray(values, dtype=float)
-        return np.degrees(numbers) if self.shown == "deg" else numbers * self.factor
+        return np.degrees(numbers) if self.is_angle else numbers * self.factor
 
 
-DEGREES, MILLIMETRES = PositionUnit("deg", "rad"), PositionUnit("mm", "m")
+DEGREES = PositionUnit("deg", "rad")
 
 
 def unit_of(system: System) -> PositionUnit:
     """Of a load that moves. Raises ValueError of one that does not."""
     own = moving_load(system).reading[1]
-    return DEGREES if own == "rad" else PositionUnit(display(own).unit or own, own)
+    return PositionUnit(display(own).unit or own, own, system.drive.command[1])
 
 
-def check_unit(system: System, shown: str) -> None:
-    """ValueError where settings are in another unit than the load's."""
+def check_unit(system: System, given: PositionUnit) -> None:
+    """ValueError where settings are in another unit than the plant's."""
     unit = unit_of(system)
-    if shown != unit.shown:
+    if given.shown != unit.shown:
         raise ValueError(
-            f"set points and noise are in {shown}, and the position of the load {type(system.load).__name__} is shown in {unit.shown}: give "
-            f"them in {unit.shown} and unit={unit.shown!r}."
+            f"set points and noise are in {given.shown}, and the position of the load {type(system.load).__name__} is shown in "
+            f"{unit.shown}: give them in {unit.shown} and unit={unit.shown!r}."
+        )
+    if given.command != unit.command:
+        raise ValueError(
+            f"commands are in {given.command}, and the drive {type(system.drive).__name__} takes {unit.command}: give command={unit.command!r}."
         )
 
 
-def unit_named(shown: str) -> PositionUnit:
+def unit_named(shown: str, command: str = "V") -> PositionUnit:
     """`deg` or `mm`; another one is that of a load of one's own."""
-    return next((one for one in (DEGREES, MILLIMETRES) if one.shown == shown), PositionUnit(shown, shown))
+    return PositionUnit(shown, {"deg": "rad", "mm": "m"}.get(shown, shown), command)
 
 
 def position_range(system: System) -> tuple[float, float]:
@@ -104,4 +113,4 @@ def default_set_points(system: System, count: int = len(SHARES)) -> tuple[float,
 def band_shown(system: System) -> float:
     """How near counts as there, in the unit shown: a degree, or a hundredth of the stroke."""
     unit = unit_of(system)
-    return BAND_DEGREES if unit == DEGREES else float(f"{float(unit.of(band_of(system))):.3g}")
+    return BAND_DEGREES if unit.is_angle else float(f"{float(unit.of(band_of(system))):.3g}")

@@ -3,19 +3,20 @@ r"""Gains of one plant from those of another, by similarity: each gain is a numb
 The gains of the presets were searched for the preset arm. With the scales of a plant
 
     position   stroke of the recoverable strain, up to the upper stop                         rad, m
-    voltage    what holds the wire at the end of its transformation at full stroke,
-               A_f + max(sigma)/C_A above the air; at most 1/1.36 of the drive's limit        V
+    command    what holds the wire at the end of its transformation at full stroke,
+               A_f + max(sigma)/C_A above the air; at most 1/1.33 of the drive's limit        V, A, W
     time       m c_p / (h_c A_c), in which the wire cools                                     s
-    force      largest resistance of the load at rest along the stroke                        N m, N
+    force      largest resistance of the load at rest along the stroke; where it follows an
+               input that nobody knows before, that of a wire under the arm's stress          N m, N
     stress     of the wire there                                                              Pa
     warmth     of the wire there, over the air                                                K
     inertia    of the load                                                                    kg m^2, kg
     damping    of the load, d(resistance)/dv there                                            N m s, N s/m
 
-a gain of the unit V/(rad s) is multiplied by (voltage/arm's) / ((position/arm's) (time/arm's)), and so for every unit; its
-box as well; a preset names the scales of a gain whose unit does not tell them. So a PID controller asks the same share of the voltage for the same share of the stroke. A second-order load
+a gain of the unit V/(rad s) is multiplied by (command/arm's) / ((position/arm's) (time/arm's)), and so for every unit; its
+box as well; a preset names the scales of a gain whose unit does not tell them. So a PID controller asks the same share of the command for the same share of the stroke. A second-order load
 that swings has a time of its own, which the scales do not know: these gains are a place to begin from, and `tune` searches
-its box around them. 1.36 is 10 V, the largest command of the arm's presets, over the voltage that holds the arm.
+its box around them. 1.33 is 10 V, the largest command of the arm's presets, over the voltage that holds the arm.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ from smajax.model.types import Scalar
 from smajax.model.wire.heat import convection, mass_per_metre
 from smajax.model.wire.resistance import resistance_per_metre
 
-HEADROOM = 1.36  # largest command over the one that holds, of the arm's presets
+HEADROOM = 1.33  # largest command over the one that holds, of the arm's presets
 POINTS = 65  # along the stroke
 Module = TypeVar("Module", bound=eqx.Module)
 
@@ -47,7 +48,7 @@ class Scales(NamedTuple):
     """Of a plant, as the head of this file lists them."""
 
     position: Scalar
-    voltage: Scalar
+    command: Scalar
     time: Scalar
     force: Scalar
     stress: Scalar
@@ -58,7 +59,7 @@ class Scales(NamedTuple):
 
 # Symbol of a unit -> the scale that it stands for.
 _SYMBOLS = {
-    "V": "voltage",
+    "V": "command",
     "rad": "position",
     "m": "position",
     "s": "time",
@@ -70,22 +71,29 @@ _FORCES = ("N m", "N")
 
 
 def scales_of(system: System) -> Scales:
-    """The scales of a plant whose drive takes a voltage. Raises ValueError for a coupon or a drive of another kind."""
+    """The scales of a plant that is led by a command. Raises ValueError for a coupon or a drive that takes none."""
     load, wire, equation = moving_load(system), system.wire, equation_of(system)
     stroke = stroke_of(system)
-    way = load.start() + stroke * jnp.linspace(0.0, 1.0, POINTS)
-    force = jnp.max(jnp.abs(jax.vmap(equation.resistance)(way, jnp.zeros_like(way))))
-    stress = force / force_per_stress(system)
-    damping = jax.grad(equation.resistance, 1)(way[-1], jnp.zeros_like(stroke))
+    if load.inputs_required:
+        # Its resistance follows an input: a wire under the stress of the arm's stands for it.
+        stress = arm_scales().stress
+        force, damping = stress * force_per_stress(system), jnp.zeros_like(stress)
+    else:
+        way = load.start() + stroke * jnp.linspace(0.0, 1.0, POINTS)
+        force = jnp.max(jnp.abs(jax.vmap(equation.resistance)(way, jnp.zeros_like(way))))
+        stress = force / force_per_stress(system)
+        damping = jax.grad(equation.resistance, 1)(way[-1], jnp.zeros_like(stroke))
+    inertia = jnp.zeros_like(stress) if load.inputs_required else equation.inertia()
     law, air = wire.kinetics, wire.heat.ambient_temperature
     hot = law.austenite_finish + stress / law.stress_slope_austenite
     ohms = resistance_per_metre(wire, system.terms.resistance, hot, jnp.zeros_like(hot))
-    at_one_volt = heating_power(system, ohms, system.drive.from_voltage(jnp.ones_like(hot)))
-    holding = jnp.sqrt(convection(wire, hot, air) / at_one_volt)
+    at_one = heating_power(system, ohms, system.drive.from_command(jnp.ones_like(hot)))
+    needed = convection(wire, hot, air) / at_one
+    holding = needed if system.drive.command[1] == "W" else jnp.sqrt(needed)
     per_kelvin = convection(wire, air + 1.0, air)
     time = mass_per_metre(wire) * wire.heat.specific_heat / per_kelvin
-    voltage = jnp.minimum(holding, system.drive.largest_voltage() / HEADROOM)
-    return Scales(stroke, voltage, time, force, stress, hot - air, equation.inertia(), damping)
+    command = jnp.minimum(holding, system.drive.largest_command() / HEADROOM)
+    return Scales(stroke, command, time, force, stress, hot - air, inertia, damping)
 
 
 @lru_cache(maxsize=1)
@@ -117,7 +125,8 @@ def exponents(unit: str) -> dict[str, int] | None:
 
 
 def unit_on(unit: str, system: System) -> str:
-    """A gain's unit on a plant: `V/rad` of the arm is `V/m` where the position is a length."""
+    """A gain's unit on a plant: `V/rad` of the arm is `A/m` where the position is a length and the drive a current source."""
+    unit = re.sub(r"\bV\b", system.drive.command[1], unit)
     if moving_load(system).reading[1] == "rad":
         return unit
     return re.sub(r"\brad\b", "m", re.sub(r"\bN m\b", "N", unit))

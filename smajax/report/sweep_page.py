@@ -104,10 +104,10 @@ def page(results: SweepResults, pictures: Pictures, command: str = "") -> str:
     """One page for a browser, with the pictures inside; the rows as CSV are beside it."""
     say, settings, grid, unit = html.escape, results.settings, results.grid, results.unit
     low, high = min(settings.set_points), max(settings.set_points)
-    precision = ".0f" if unit == DEGREES else ".3g"
+    precision = ".0f" if unit.is_angle else ".3g"
     arrived = (
         "The angle has arrived when it is within 1°."
-        if unit == DEGREES
+        if unit.is_angle
         else "The position has arrived when it is within a hundredth of the stroke."
     )
     drawn_as = (
@@ -168,9 +168,9 @@ def conclusions(results: SweepResults) -> list[str]:
 def description(name: str, unit: PositionUnit = DEGREES) -> str:
     """What a controller reads, and of which plant: that of a section is an arm."""
     preset = CONTROLLERS[name]
-    own = preset.section is with_printed_law and unit == DEGREES
+    own = preset.section is with_printed_law and unit.is_angle
     plant = " Plant: the integrated law without a thermal term (eq. 4.51)." if own else ""
-    reads = preset.reads if unit == DEGREES else preset.reads.replace("angle", "position")
+    reads = preset.reads if unit.is_angle else preset.reads.replace("angle", "position")
     return f"It reads {reads}.{plant}"
 
 

@@ -35,7 +35,7 @@ GREY = {"settling_time": ("settling_time", "never settles"), "overshoot": ("reac
 def shown_in(unit: PositionUnit) -> dict[str, tuple[str, str, float]]:
     """`SHOWN` of a load whose position is shown in this unit."""
     own = {name: (label, unit.label, unit.factor) for name, (label, symbol, _) in SHOWN.items() if symbol == "°"}
-    return SHOWN if unit == DEGREES else {**SHOWN, **own}
+    return SHOWN if unit.is_angle else {**SHOWN, **own}
 
 
 def merit_values(one: Merit, name: str, unit: PositionUnit = DEGREES) -> np.ndarray:

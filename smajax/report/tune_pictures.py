@@ -6,7 +6,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter
 
-from smajax.control.position_unit import DEGREES
 from smajax.control.tune.objective import rank
 from smajax.control.tune.terms import TERMS, terms_in
 from smajax.control.tune.tuning import TuningResult
@@ -67,8 +66,8 @@ def _over_set_points(axes: Axes, result: TuningResult, name: str) -> None:
     unit = result.settings.shown
     term, column = terms_in(unit)[name], COLUMNS.index(name)
     way = float(unit.of(np.ptp(result.lines.targets) or 10.0 * result.lines.targets[0]))
-    least = 1e-3 if unit == DEGREES else 1e-3 * abs(way)
-    beside = 0.7 if unit == DEGREES else 0.006 * abs(way)
+    least = 1e-3 if unit.is_angle else 1e-3 * abs(way)
+    beside = 0.7 if unit.is_angle else 0.006 * abs(way)
     never = 2.0 * result.settings.seconds if name == "settling_time" else np.inf
     shown = [("tuned on", "s"), ("inside", "o")]
     for which, (colour, label, shift) in enumerate(((BEFORE, "before", -beside), (AFTER, "after", beside))):

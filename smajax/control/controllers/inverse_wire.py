@@ -116,11 +116,16 @@ def power_for(believed: System, temperature: Scalar, rate: Scalar) -> Scalar:
 
 
 def voltage_for(believed: System, power: Scalar, temperature: Scalar, fraction: Scalar, largest: Scalar) -> Scalar:
-    """V = sqrt(U R) (eq. 4.69) through the amplifier; nothing for a negative power (sec. 4.8.3), `largest` at most."""
+    """V = sqrt(U R) (eq. 4.69) through the amplifier; nothing for a negative power (sec. 4.8.3), `largest` at most.
+
+    Of a current source the current, of a power supply the power.
+    """
     wire, drive = believed.wire, believed.drive
     ohms = resistance_per_metre(wire, (), temperature, fraction)
-    at_one_volt = drive.power(ohms, wire.wire_length, drive.from_voltage(jnp.ones_like(power)))
-    squared = power / at_one_volt
+    at_one = drive.power(ohms, wire.wire_length, drive.from_command(jnp.ones_like(power)))
+    squared = power / at_one
+    if drive.command[1] == "W":
+        return limited(squared, 0.0, largest)
     large = squared > SMALLEST_VOLTAGE**2
     root = jnp.sqrt(jnp.where(large, squared, 1.0))
     return limited(jnp.where(large, root, squared / SMALLEST_VOLTAGE), 0.0, largest)

@@ -52,7 +52,7 @@ class ControllerPreset:
         if not isinstance(system.load, AbstractMovingLoad):
             return "it moves nothing that a controller could lead"
         try:
-            system.drive.from_voltage(jnp.zeros(()))
+            system.drive.from_command(jnp.zeros(()))
         except ValueError as error:
             return str(error).rstrip(".")
         lacking = missing_for_stroke(system)

@@ -16,7 +16,7 @@ from smajax.control.gains_file import Gains
 from smajax.control.interface import between_in_words, check_interface, check_set_points, interface_of
 from smajax.control.mismatch import MISMATCHES
 from smajax.control.plants import Plants, PlantSet, plant_set
-from smajax.control.position_unit import PositionUnit, check_unit, unit_named
+from smajax.control.position_unit import PositionUnit, check_unit, unit_named, unit_of
 from smajax.control.presets import CONTROLLERS, check_controller
 from smajax.control.scales import is_arm
 from smajax.control.sweep.batched_loops import LoopSetup, closed_loops, integrated_setup, positions
@@ -84,7 +84,7 @@ class SweepSettings:
             check_controller(name, system)
         if not self.controllers:
             raise ValueError(f"no controller is named, expected some of {', '.join(CONTROLLERS)}.")
-        check_unit(system, self.unit)
+        check_unit(system, unit_named(self.unit, unit_of(system).command))
         check_set_points(system, self.set_points)
         if not self.gain_ratios or min(self.gain_ratios) <= 0.0:
             raise ValueError(

@@ -107,7 +107,7 @@ def _drawn(variation: Mapping[str, float], count: int, seed: int) -> list[dict[s
 
 def beside(target: float, unit: PositionUnit = DEGREES) -> float:
     """How far beside the only set point gains are checked, in its unit."""
-    return BESIDE if unit == DEGREES else BESIDE_SHARE * abs(target)
+    return BESIDE if unit.is_angle else BESIDE_SHARE * abs(target)
 
 
 def between(targets: Sequence[float], unit: PositionUnit = DEGREES) -> list[float]:

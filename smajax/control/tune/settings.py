@@ -9,7 +9,6 @@ from typing import Any
 from smajax.control.interface import between_in_words, check_interface, check_set_points
 from smajax.control.plants import Plants, PlantSet, plant_set
 from smajax.control.position_unit import (
-    DEGREES,
     PositionUnit,
     band_shown,
     check_unit,
@@ -54,6 +53,7 @@ class TuneSettings:
     start: Mapping[str, float] = field(default_factory=dict)  # gains to begin from in the place of the preset's
     tolerance: Tolerance = AUTO  # as `run_batch`'s; None is one step a sample
     unit: str = "deg"  # as `position_unit.unit_of` the plant
+    command: str = "V"  # as the drive's: of chatter
     batch: int = 0  # plants of a batch in the place of the variation
 
     @property
@@ -67,12 +67,12 @@ class TuneSettings:
     @property
     def shown(self) -> PositionUnit:
         """The unit of set points."""
-        return unit_named(self.unit)
+        return unit_named(self.unit, self.command)
 
     def check(self, system: System, plants: Plants | None = None) -> PlantSet:
         """The plants, if all is well: ValueError for what there is not, or makes no sense, with what does."""
         check_controller(self.controller, system)
-        check_unit(system, self.unit)
+        check_unit(system, self.shown)
         check_set_points(system, self.set_points)
         if len(set(self.set_points)) < len(self.set_points):
             raise ValueError(f"every set point once, not {', '.join(f'{angle:g}' for angle in self.set_points)}.")
@@ -172,7 +172,7 @@ class TuneSettings:
 
 def regulation_weights(system: System) -> dict[str, float]:
     """`REGULATION` of a plant: one second costs as much as one degree of overshoot, or a hundredth of the stroke of a length."""
-    if unit_of(system) == DEGREES:
+    if unit_of(system).is_angle:
         return dict(REGULATION)
     near = band_shown(system)
     lengths = {"overshoot", "steady_error"}
@@ -192,7 +192,8 @@ def settings_for(system: System, controller: str, plants: Plants | None = None, 
     given: fields of `TuneSettings`. Set points and noise in degrees of an angle and millimetres of a length, weights and limits
     in these too.
     """
-    defaults: dict[str, Any] = {"unit": unit_of(system).shown, "weights": regulation_weights(system)}
+    unit = unit_of(system)
+    defaults: dict[str, Any] = {"unit": unit.shown, "command": unit.command, "weights": regulation_weights(system)}
     defaults["seconds"] = seconds_for(system)
     if not is_arm(system):
         defaults["set_points"] = default_set_points(system)

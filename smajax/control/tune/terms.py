@@ -50,8 +50,11 @@ FACTORS = np.asarray([term.factor for term in TERMS.values()])
 
 def terms_in(unit: PositionUnit) -> dict[str, Term]:
     """`TERMS` of a load whose position is shown in this unit."""
+    if unit == DEGREES:
+        return TERMS
     own = {name: Term(term.label, unit.label, unit.factor) for name, term in TERMS.items() if term.unit == "°"}
-    return {**TERMS, **own} if unit != DEGREES else TERMS
+    chatter = TERMS["chatter"]
+    return {**TERMS, **own, "chatter": Term(chatter.label, f"{unit.command}/s", chatter.factor)}
 
 
 def factors_in(unit: PositionUnit) -> np.ndarray:
@@ -70,7 +73,7 @@ class Terms(NamedTuple):
     settling_time: Scalar  # s, the memory s at the end: nearly the run's length where it never settles
     steady_error: Scalar  # rad or m
     energy: Scalar  # J
-    chatter: Scalar  # V/s, how far the command moves in a second, up and down
+    chatter: Scalar  # V/s (A/s, W/s), how far the command moves in a second, up and down
     peak_temperature: Scalar  # C
 
 

@@ -27,7 +27,7 @@ class Duty(AbstractDrive):
     def drawn_current(self, resistance: Scalar, inputs: Inputs) -> Scalar:
         return self.supply_voltage / resistance
 
-    def largest_voltage(self) -> Scalar:
+    def largest_command(self) -> Scalar:
         return self.supply_voltage
 
     def from_voltage(self, voltage: Scalar) -> Inputs:

@@ -38,7 +38,7 @@ class Voltage(AbstractDrive):
     def drawn_current(self, resistance: Scalar, inputs: Inputs) -> Scalar:
         return self._put(inputs) / resistance
 
-    def largest_voltage(self) -> Scalar:
+    def largest_command(self) -> Scalar:
         return self.amplifier_limit / self.amplifier_gain
 
     def from_voltage(self, voltage: Scalar) -> Inputs:
