@@ -14,8 +14,8 @@ from smajax.core.names import of_many
 from smajax.core.parameters import check_bounds, parameter_values, parameters, set_parameters
 from smajax.core.units import UnitError, parse_quantity
 from smajax.data.model_catalogue import check_together
-from smajax.model.effects.library import LIBRARY, at_base
-from smajax.model.extended import extended
+from smajax.model.effects.library import LIBRARY
+from smajax.model.extended import extended, with_effects
 from smajax.model.presets import build
 from smajax.model.system import System
 from smajax.model.wire.laws import under_law
@@ -93,7 +93,7 @@ def with_values(system: System, values: Mapping[str, str | float]) -> System:
     """
     known = {one.effect_name for one in system.effects}
     named = {name.split(".")[0] for name in values} & LIBRARY.keys()
-    wider = _with_effects(system, sorted(named - known))
+    wider = with_effects(system, sorted(named - known))
     own: dict[str, str] = {}
     for name in values:
         meant = parameter_name(wider, name)
@@ -106,16 +106,6 @@ def with_values(system: System, values: Mapping[str, str | float]) -> System:
     check_bounds(result)
     check_order(result)
     return result
-
-
-def _with_effects(system: System, names: Sequence[str]) -> System:
-    """`system` with more effects at base value, all in the library's order."""
-    if not names:
-        return system
-    there = [one.effect_name for one in system.effects]
-    own = dict(zip(there, system.effects, strict=True))
-    both = (own.get(one.effect_name, one) for one in at_base([*there, *names]))
-    return dataclasses.replace(system, effects=tuple(both))
 
 
 @overload

@@ -15,6 +15,8 @@ from smajax.control.perturbed_plant import OF_ARM, Perturbation
 from smajax.control.position_unit import DEGREES, PositionUnit, unit_of
 from smajax.core.names import of_many
 from smajax.core.parameters import check_bounds, get_parameters, parameters, set_parameters
+from smajax.model.effects.library import LIBRARY
+from smajax.model.extended import with_effects
 from smajax.model.system import System
 
 # A batch of plants: parameter -> its value in each, SI; or systems of one kind, in a list or stacked (leaves of shape (plants, ...)).
@@ -46,13 +48,25 @@ class PlantSet:
         return dict(zip(self.columns, self.perturbation.parameters, strict=True))
 
 
+def carrying(system: System, plants: Plants | None) -> System:
+    """`system` with the effects of a batch of plants that it lacks, at base value: its runs are the same."""
+    if plants is None:
+        return system
+    if isinstance(plants, Mapping):
+        named = dict.fromkeys(name.split(".")[0] for name in plants if "." in name)
+    else:
+        first = plants if isinstance(plants, System) else next(iter(plants), system)
+        named = dict.fromkeys(one.effect_name for one in first.effects)
+    return with_effects(system, [name for name in named if name in LIBRARY])
+
+
 def plant_set(system: System, plants: Plants | None = None) -> PlantSet:
-    """The mismatches of a plant, or a batch of plants in their place.
+    """The mismatches of a plant, or a batch of plants in their place, which may have effects that the system lacks (`carrying`).
 
     Raises ValueError for a batch that has no plant, parameters that the system has not, values out of their bounds, lists of
     different lengths, and systems that differ in more than their parameters.
     """
-    unit = unit_of(system)
+    unit, system = unit_of(system), carrying(system, plants)
     if plants is None:
         table = mismatches_of(system)
         return PlantSet(Perturbation(tuple(table), tuple(table.values())), unit, np.ones(len(table)))
@@ -94,13 +108,13 @@ def _differing(system: System, plants: Sequence[System] | System) -> dict[str, n
     if not several:
         raise ValueError("a batch of plants has at least one.")
     names = list(parameters(system))
-    values: dict[str, np.ndarray] = {}
-    for name in names:
-        own, *others = (np.asarray(get_parameters(one, [name])[0], dtype=float) for one in (system, *several))
-        column = np.ravel(others[0]) if len(others) == 1 else np.stack(others)
-        if (column != own).any():
-            values[name] = column
-    # A leaf that is the same in all plants may be stacked or not.
-    count = max((len(column) for column in values.values()), default=len(several))
-    values = {name: np.broadcast_to(column, count) for name, column in values.items()}
-    return values or {names[0]: np.full(count, float(get_parameters(system, names[:1])[0]))}
+    own = dict(zip(names, np.asarray(get_parameters(system, names), dtype=float), strict=True))
+    if isinstance(plants, System):
+        # A leaf that is the same in all plants may be stacked or not.
+        columns = {name: np.ravel(np.asarray(get_parameters(plants, [name])[0], dtype=float)) for name in names}
+    else:
+        rows = np.stack([np.asarray(get_parameters(one, names), dtype=float) for one in several])
+        columns = dict(zip(names, rows.T, strict=True))
+    count = max(len(column) for column in columns.values())
+    values = {name: np.broadcast_to(column, count) for name, column in columns.items() if (column != own[name]).any()}
+    return values or {names[0]: np.full(count, own[names[0]])}

@@ -176,6 +176,22 @@ def test_batches_of_systems_and_stacked_systems_are_the_same_plants() -> None:
     assert plant_set(HANGING, [HANGING, HANGING]).batch.shape == (2, 1)  # type: ignore[union-attr]
 
 
+def test_plants_may_have_effects_that_the_assumed_model_lacks() -> None:
+    """Draws over several models carry the effects of all: the assumed one has them at base value, where they change nothing."""
+    plants = {"latent_heat.enthalpy": [0.0, 8e3, 15e3, 20e3], "load_mass": [0.075, 0.07, 0.08, 0.075]}
+    found = plant_set(HANGING, plants)
+    np.testing.assert_allclose(found.nominal, [0.0, 0.075])
+    wider = sma.extended(HANGING, ["latent_heat"])
+    stacked = set_parameters(wider, {name: jnp.asarray(values) for name, values in plants.items()})
+    assert set(plant_set(HANGING, stacked).columns) == set(plants)
+    settings = SweepSettings(("pid",), set_points=(8.0,), gain_ratios=(1.0,), seconds=4.0, tolerance=None, unit="mm")
+    (swept,) = sweep_controllers(HANGING, settings, plants=stacked)
+    (alone,) = sweep_controllers(HANGING, settings, plants={"load_mass": [0.075]})
+    np.testing.assert_allclose(swept.nominal.energy, alone.nominal.energy, rtol=1e-9)
+    np.testing.assert_allclose(swept.merits.energy[0, 0, 0], alone.nominal.energy, rtol=1e-9)
+    assert abs(float(swept.merits.energy[3, 0, 0, 0] / alone.nominal.energy[0]) - 1.0) > 0.01
+
+
 @pytest.mark.parametrize(
     ("plants", "told"),
     [

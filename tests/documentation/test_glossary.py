@@ -63,6 +63,7 @@ PLAIN = set(
         "added",
         "after",
         "alone",
+        "around",
         "at",
         "average",
         "averaged",

@@ -15,7 +15,7 @@ from smajax.control.figures_of_merit import Merit
 from smajax.control.gains_file import Gains
 from smajax.control.interface import between_in_words, check_interface, check_set_points, interface_of
 from smajax.control.mismatch import MISMATCHES
-from smajax.control.plants import Plants, PlantSet, plant_set
+from smajax.control.plants import Plants, PlantSet, carrying, plant_set
 from smajax.control.position_unit import PositionUnit, check_unit, unit_named, unit_of
 from smajax.control.presets import CONTROLLERS, check_controller
 from smajax.control.scales import is_arm
@@ -175,7 +175,7 @@ def sweep_controllers(
     system: any load that moves, which the controllers assume. plants: a batch of plants (`plants.Plants`), such as draws from a
     posterior, in the place of mismatches. Raises ValueError as `SweepSettings.check`.
     """
-    found = settings.check(system, plants)
+    found, system = settings.check(system, plants), carrying(system, plants)
     return (_sweep(system, name, settings, found, folder, progress) for name in settings.controllers)
 
 

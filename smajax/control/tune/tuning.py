@@ -12,7 +12,7 @@ from smajax.control.controllers.base import AbstractController
 from smajax.control.gains_file import Gains
 from smajax.control.interface import interface_of
 from smajax.control.mismatch import MISMATCHES
-from smajax.control.plants import Plants, PlantSet
+from smajax.control.plants import Plants, PlantSet, carrying
 from smajax.control.presets import CONTROLLERS
 from smajax.control.scales import unit_on
 from smajax.control.sweep.batched_loops import LoopSetup, integrated_setup, positions
@@ -111,7 +111,7 @@ def tune(
 
     Raises ValueError for settings that make no sense, MissingExtraError without a package that they need.
     """
-    found = settings.check(system, plants)
+    found, system = settings.check(system, plants), carrying(system, plants)
     settings.check_packages()
     scenarios = tuned_on(settings.set_points, settings.variation, settings.seed, found)
     task = SearchTask(problem_of(system, settings, found), settings.goal, scenarios)
