@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from smajax.control.compose import compose as compose
     from smajax.control.controllers.base import AbstractController as AbstractController
     from smajax.control.figures_of_merit import merit as merit
+    from smajax.control.loop_around import loop_around as loop_around
     from smajax.control.loop_dataset import Loop as Loop
     from smajax.control.loop_dataset import simulate_loop_dataset as simulate_loop_dataset
     from smajax.control.measured_state import Sensor as Sensor
@@ -97,6 +98,7 @@ NAMES = {
     "identify": ("smajax.fit.identify", "identify"),
     "load_experiment": ("smajax.data.open_experiment", "open_experiment"),
     "load_model": ("smajax.data.model_file.read", "load_model"),
+    "loop_around": ("smajax.control.loop_around", "loop_around"),
     "merit": ("smajax.control.figures_of_merit", "merit"),
     "narrate": ("smajax.report.narrative", "narrate"),
     "parameter": ("smajax.core.parameters", "parameter"),

@@ -13,7 +13,7 @@ from smajax.model.presets import DRIVES, LOADS, WIRES
 from smajax.model.rigs import arm
 from smajax.model.wire.laws import LAWS, detwinning
 
-BELIEVED = ("arm", "believed", "system")  # fields that hold a plant
+BELIEVED = ("equation", "believed", "system")  # fields that hold a plant
 PAGE = Path(__file__).parent / "parameters.md"
 
 
@@ -51,7 +51,7 @@ def page() -> str:
         "from the searches in `studies/gains`. What a controller believes of its plant is the plant's own table above.",
     ]
     system = arm()
-    shown = {name: preset.make for name, preset in CONTROLLERS.items()}
+    shown = {name: preset.on_arm for name, preset in CONTROLLERS.items()}
     for name, make in {**shown, "printed filter": printed_filter, "model filter": model_filter}.items():
         one = make(system)
         about = (make.__doc__ or "").strip().split("\n\n")[0]

@@ -43,6 +43,7 @@ STAGES = (
         "A closed loop",
         (
             "Loop",
+            "loop_around",
             "simulate_loop_dataset",
             "simulate_closed_loop",
             "merit",

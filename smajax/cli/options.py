@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 if TYPE_CHECKING:
+    from smajax.control.position_unit import PositionUnit
     from smajax.simulation.integration_error import Tolerance
 
 DEMOS = ("latent", "complete")  # the benches of `smajax demo`
@@ -32,6 +34,29 @@ Finely = Annotated[
         "such as 1e-4, the error of a step (moving loads); or `none`, one step a sample, not checked",
     ),
 ]
+
+
+Noise = Annotated[
+    str,
+    typer.Option(help="noise of the readings (1 sigma), 0.1deg or 20um; without a unit in deg, or in mm of a length"),
+]
+
+
+@contextmanager
+def refused(option: str | None = None) -> Iterator[None]:
+    """A ValueError in this context becomes a typer.BadParameter of this option."""
+    try:
+        yield
+    except ValueError as error:
+        raise typer.BadParameter(str(error), param_hint=option) from None
+
+
+def noise_option(text: str, unit: PositionUnit) -> float:
+    """A noise in the unit shown; none of "". Raises typer.BadParameter."""
+    from smajax.control.interface import noise_of
+
+    with refused("'--noise'"):
+        return noise_of(text, unit) if text else 0.0
 
 
 def quantity(

@@ -42,7 +42,7 @@ class ClosedLoop(eqx.Module):
 
     run: Trajectory
     wanted: Reference
-    voltage: Series  # the controller's command, as it reaches the amplifier
+    voltage: Series  # the controller's command, as it reaches the amplifier: V, or A or W of such a drive
     measured: MeasuredState  # what the controller measured
     failed_at: Scalar  # s, when the command was first not finite, from where on the drive gets 0 V; else inf
 
@@ -92,7 +92,7 @@ class ClosedLoopSetup(eqx.Module):
         """The first state: `initial`, or rest with the first disturbances and 0 V."""
         if self.initial is not None:
             return self.initial
-        inputs = self.system.drive.from_voltage(jnp.zeros(()))
+        inputs = self.system.drive.from_command(jnp.zeros(()))
         return initial_state(self.system, {**inputs, **{name: one[0] for name, one in self.disturbances.items()}})
 
     def check(self) -> None:
@@ -117,7 +117,12 @@ class ClosedLoopSetup(eqx.Module):
             raise ValueError("a sensor draws noise: give `key`, for instance `jax.random.key(0)`.")
         if self.sensor is not None:
             check_bounds(self.sensor)
-        known = self.system.load.inputs_optional | {"ambient_temperature"}
+        load = self.system.load
+        if lacking := sorted(load.inputs_required - self.disturbances.keys()):
+            raise ValueError(
+                f"the load {type(load).__name__} needs the input {listed(lacking)}: give `disturbance={{'{lacking[0]}': values}}`, one a sample."
+            )
+        known = load.inputs_optional | load.inputs_required | {"ambient_temperature"}
         for name, series in self.disturbances.items():
             if name not in known:
                 raise ValueError(f"`{name}` is no disturbance of this system; there are {listed(sorted(known))}.")
@@ -267,7 +272,7 @@ def _control(setup: ClosedLoopSetup, start: State) -> Control:
         failed_at = jnp.minimum(memory.failed_at, jnp.where(jnp.isfinite(answer), jnp.inf, state.time))
         queue = jnp.append(memory.queue, jnp.where(jnp.isfinite(failed_at), 0.0, answer))
         held, queue = queue[0], queue[1:]
-        command = Command(held, setup.dt, setup.system.drive.from_voltage(held))
+        command = Command(held, setup.dt, setup.system.drive.from_command(held))
         return ControlMemory(estimate, own, held, queue, failed_at), command, (held, measured)
 
     reading = reading_of(start, noise[0])

@@ -46,7 +46,7 @@ def measured_loop(
     def run(integration: Integration) -> tuple[tuple[ClosedLoop, Merit], Outputs]:
         loop, figures = evaluated_loop_compiled(dataclasses.replace(setup, integration=integration), engine)
         outputs = {name: np.asarray(getattr(loop.run, name))[None] for name in SHOWN}
-        return (loop, figures), outputs | {"voltage": np.asarray(loop.voltage)[None]}
+        return (loop, figures), outputs | {setup.system.drive.command[0]: np.asarray(loop.voltage)[None]}
 
     _, error, found = integrated(run, setup.system, tolerance, alone(setup.system))
     return *found, error

@@ -7,16 +7,15 @@ from collections.abc import Mapping, Sequence
 from typing import overload
 
 from smajax.control.controllers.base import AbstractController
+from smajax.control.loop_around import loop_around
 from smajax.control.loop_dataset import Loop
-from smajax.control.mismatch import MISMATCHES, ratio_of
-from smajax.control.presets import CONTROLLERS
-from smajax.core.names import close_matches, of_many
+from smajax.control.mismatch import MISMATCHES, mismatches_of, ratio_of
+from smajax.core.names import of_many
 from smajax.core.parameters import check_bounds, parameter_values, parameters, set_parameters
 from smajax.core.units import UnitError, parse_quantity
 from smajax.data.model_catalogue import check_together
-from smajax.model.effects.library import LIBRARY, at_base
-from smajax.model.extended import extended
-from smajax.model.load.base import AbstractMovingLoad
+from smajax.model.effects.library import LIBRARY
+from smajax.model.extended import extended, with_effects
 from smajax.model.presets import build
 from smajax.model.system import System
 from smajax.model.wire.laws import under_law
@@ -28,11 +27,11 @@ PARAMETERS = "`smajax presets WIRE LOAD DRIVE` lists those of a model, `smajax e
 def parameter_name(system: System, name: str) -> str:
     """The parameter that `name` means: its own name, its place in the model (`wire.heat.convection_coefficient`), or short.
 
-    Short names are those of `MISMATCHES`. Raises ValueError with the nearest names, and what lists all.
+    Short names are those of `mismatches_of`. Raises ValueError with the nearest names, and what lists all.
     """
     table = parameters(system)
     places = {".".join(map(str, entry.path)): own for own, entry in table.items()}
-    short = {short: own for short, own in MISMATCHES.items() if own in table}
+    short = {short: own for short, own in mismatches_of(system).items() if own in table}
     meant = {**short, **places, **{own: own for own in table}}
     if name in meant:
         return meant[name]
@@ -94,7 +93,7 @@ def with_values(system: System, values: Mapping[str, str | float]) -> System:
     """
     known = {one.effect_name for one in system.effects}
     named = {name.split(".")[0] for name in values} & LIBRARY.keys()
-    wider = _with_effects(system, sorted(named - known))
+    wider = with_effects(system, sorted(named - known))
     own: dict[str, str] = {}
     for name in values:
         meant = parameter_name(wider, name)
@@ -107,16 +106,6 @@ def with_values(system: System, values: Mapping[str, str | float]) -> System:
     check_bounds(result)
     check_order(result)
     return result
-
-
-def _with_effects(system: System, names: Sequence[str]) -> System:
-    """`system` with more effects at base value, all in the library's order."""
-    if not names:
-        return system
-    there = [one.effect_name for one in system.effects]
-    own = dict(zip(there, system.effects, strict=True))
-    both = (own.get(one.effect_name, one) for one in at_base([*there, *names]))
-    return dataclasses.replace(system, effects=tuple(both))
 
 
 @overload
@@ -163,8 +152,8 @@ def compose(
     values: parameter -> a number (SI, temperatures in degC, angles in rad), text with a unit (`"80 W/m^2/K"`), or a change of
     the preset's value (`"+20%"`, `"-50%"`); by its name, its place in the model, or a name of `MISMATCHES`. An effect is part
     of the model when one of its parameters is given (`latent_heat.enthalpy`).
-    controller: the name of one in `CONTROLLERS` with its preset gains, which knows this system, or one of one's own; what
-    comes back is then a `Loop`, for `simulate_loop_dataset`.
+    controller: the name of one in `CONTROLLERS` with its preset gains, scaled to the load, which knows this system, or one of
+    one's own; what comes back is then a `Loop`, for `simulate_loop_dataset`. `loop_around` takes gains, a filter and noise too.
     Raises KeyError for a preset, law, effect or controller there is not, ValueError for a parameter there is not, one given twice, a
     change of nothing, a value out of its bounds, transformation temperatures in the wrong order, or presets that do not go
     together, UnitError for a unit of another kind, TypeError for a parameter that is not in `values`.
@@ -186,19 +175,4 @@ def compose(
     if law:
         system = dataclasses.replace(system, wire=under_law(system.wire, law))
     system = with_values(extended(system, [*dict.fromkeys(effects)]), values or {})
-    return system if controller is None else _around(system, controller, load)
-
-
-def _around(system: System, controller: str | AbstractController, load: str) -> Loop:
-    """The loop; a preset is made for the system, and takes the plant that its section is written for."""
-    if isinstance(controller, AbstractController):
-        return Loop(system, controller)
-    if controller not in CONTROLLERS:
-        raise KeyError(f"no controller {controller!r}{close_matches(controller, CONTROLLERS, 'there are')}")
-    if not isinstance(system.load, AbstractMovingLoad) or system.load.reading[1] != "rad":
-        raise ValueError(
-            f"controllers by name have gains for the arm: give the load 'arm', not {load!r}, or a controller of your own."
-        )
-    preset = CONTROLLERS[controller]
-    plant = preset.plant(system)
-    return Loop(plant, preset.make(plant))
+    return system if controller is None else loop_around(system, controller)

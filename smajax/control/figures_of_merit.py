@@ -21,7 +21,9 @@ from smajax.simulation.integrate import AbstractObserver, Carry, Observed, Sched
 BAND_DEGREES = 1.0  # an angle this near the set point counts as there
 BAND_SHARE = 0.01  # a length: this share of the stroke that the recoverable strain gives
 STEADY_SHARE = 0.2  # the last share of a run in which the error counts as steady
-SWITCH_THRESHOLD = 0.5  # V: a command that turns back by less has not switched
+SWITCH_THRESHOLD = (
+    0.5  # V: a command that turns back by less has not switched; of a current or a power what it gives in the wire
+)
 
 
 class Merit(eqx.Module):
@@ -33,11 +35,11 @@ class Merit(eqx.Module):
     steady_error: Scalar  # rad or m, mean of the absolute error over the last fifth
     steady_offset: Scalar  # rad or m, mean of position - set point there
     energy: Scalar  # J into the wire
-    switches_per_second: Scalar  # 1/s, how often the command turns back by more than half a volt
+    switches_per_second: Scalar  # 1/s, how often the command turns back by more than `SWITCH_THRESHOLD`
     peak_temperature: Scalar  # C
 
 
-# Of an arm; the lengths of another load are in m.
+# Of an arm.
 MERIT_UNITS = {
     "reach_time": "s",
     "settling_time": "s",
@@ -50,6 +52,11 @@ MERIT_UNITS = {
 }
 
 
+def merit_units(position: str) -> dict[str, str]:
+    """`MERIT_UNITS` of a load whose position is in this unit."""
+    return {name: position if unit == "rad" else unit for name, unit in MERIT_UNITS.items()}
+
+
 def band_of(system: System) -> Scalar:
     """One degree for an angle, one per cent of the stroke for a length; rad or m."""
     load = system.load
@@ -57,6 +64,12 @@ def band_of(system: System) -> Scalar:
     if load.reading[1] == "rad":
         return jnp.radians(jnp.asarray(BAND_DEGREES))
     return BAND_SHARE * system.wire.constitutive.recoverable_strain / load.contraction(system.wire)
+
+
+def switch_threshold(system: System, ohms: Scalar) -> Scalar | float:
+    """`SWITCH_THRESHOLD` in the unit of the drive's command; `ohms` is the wire's resistance per metre."""
+    unit, whole = system.drive.command[1], ohms * system.wire.wire_length
+    return {"A": SWITCH_THRESHOLD / whole, "W": SWITCH_THRESHOLD**2 / whole}.get(unit, SWITCH_THRESHOLD)
 
 
 class MeritMemory(NamedTuple):
@@ -137,10 +150,10 @@ class MeritObserver(AbstractLoopObserver):
         rising = jnp.where(memory.rising == 0.0, 1.0, memory.rising)
         fresh = (memory.rising == 0.0) | (rising * (now.command - memory.extreme) > 0.0)
         extreme = jnp.where(fresh, now.command, memory.extreme)
-        turned = rising * (extreme - now.command) > SWITCH_THRESHOLD
         system = self.system
         ohms = resistance_per_metre(system.wire, system.terms.resistance, now.temperature, now.fraction)
-        power = heating_power(system, ohms, system.drive.from_voltage(now.command))
+        turned = rising * (extreme - now.command) > switch_threshold(system, ohms)
+        power = heating_power(system, ohms, system.drive.from_command(now.command))
         return MeritMemory(
             number=memory.number + 1,
             began=memory.began,

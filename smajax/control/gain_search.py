@@ -55,7 +55,7 @@ class SearchResult:
 
 
 def regulation_cost(one: Merit, seconds: float) -> Scalar:
-    """Seconds to settle (twice the run where it never does), one more a degree of overshoot, two a degree of steady error."""
+    """Of an angle: seconds to settle (twice the run where it never does), one more a degree of overshoot, two a degree of steady error."""
     settling = jnp.where(jnp.isfinite(one.settling_time), one.settling_time, 2.0 * seconds)
     return settling + jnp.degrees(one.overshoot) + 2.0 * jnp.degrees(one.steady_error)
 

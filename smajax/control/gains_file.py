@@ -14,7 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from smajax.control.controllers.base import AbstractController
-from smajax.control.presets import CONTROLLERS
+from smajax.control.presets import CONTROLLERS, check_controller
+from smajax.control.scales import unit_on
 from smajax.core.files import json_text, replace
 from smajax.core.names import close_matches
 from smajax.core.parameters import check_bounds, parameters, set_parameters
@@ -33,6 +34,11 @@ class Gains:
 
     controller: str
     values: Mapping[str, float]
+
+    def units(self, system: System) -> dict[str, str]:
+        """The unit of each gain of the controller on this plant: V/rad of an arm is V/m where the position is a length."""
+        table = parameters(CONTROLLERS[self.controller].make(system))
+        return {name: unit_on(entry.unit, system) for name, entry in table.items()}
 
     def put(self, system: System) -> AbstractController:
         """The controller's preset on `system`, the plant that it believes in, with these gains.
@@ -77,20 +83,23 @@ def read_gains(path: Path, system: System) -> Gains:
     name = held["controller"]
     if not isinstance(name, str) or name not in CONTROLLERS:
         raise GainsFileError(f"{where}: no controller {name!r}{close_matches(str(name), CONTROLLERS, 'there are')}.")
+    try:
+        check_controller(name, system)
+    except ValueError as error:
+        raise GainsFileError(f"{where}: {error}") from None
     preset = CONTROLLERS[name]
     plant = preset.plant(system)
-    controller = preset.make(plant)
-    known = parameters(controller)
+    known = Gains(name, {}).units(plant)
     values = {}
     for gain, entry in held["gains"].items():
         if gain not in known:
             raise GainsFileError(f"{where}: {name} has no gain {gain!r}{close_matches(gain, preset.box, 'tuned are')}.")
-        unit = entry.get("unit", known[gain].unit) if isinstance(entry, dict) else known[gain].unit
+        unit = entry.get("unit", known[gain]) if isinstance(entry, dict) else known[gain]
         value = entry.get("value") if isinstance(entry, dict) else entry
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise GainsFileError(f"{where}: {gain} must be a number, not {value!r}.")
-        if unit != known[gain].unit:
-            raise GainsFileError(f"{where}: {gain} is given in {unit!r}; expected {known[gain].unit!r}.")
+        if unit != known[gain]:
+            raise GainsFileError(f"{where}: {gain} is given in {unit!r}; expected {known[gain]!r}.")
         values[gain] = float(value)
     gains = Gains(name, values)
     try:

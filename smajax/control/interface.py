@@ -11,12 +11,17 @@ import jax
 import numpy as np
 
 from smajax.control.estimators.base import AbstractEstimator
+from smajax.control.load_equation import moving_load
 from smajax.control.measured_state import Sensor
+from smajax.control.position_unit import DEGREES, PositionUnit, position_range, unit_of
 from smajax.control.presets import FILTERS
+from smajax.control.scales import is_arm
 from smajax.core.names import close_matches
-from smajax.model.load.base import AbstractMovingLoad
+from smajax.core.units import UnitError, parse_quantity
 from smajax.model.system import System
 from smajax.model.types import Scalar
+
+LARGEST_ANGLE = 360.0  # deg
 
 
 class Interface(eqx.Module):
@@ -40,24 +45,28 @@ class Interface(eqx.Module):
 
 
 def check_set_points(system: System, set_points: Sequence[float]) -> None:
-    """ValueError for set points (deg) beyond the stops of the load, or none."""
-    limits = (
-        np.degrees([float(end) for end in system.load.limits()])
-        if isinstance(system.load, AbstractMovingLoad)
-        else (-np.inf, np.inf)
+    """ValueError for set points (deg or mm) beyond the stops of the load or what its wire can do, or none."""
+    low, high = position_range(system)
+    odd = [point for point in set_points if not low <= point <= high]
+    if not odd and set_points:
+        return
+    unit, load = unit_of(system), moving_load(system)
+    if is_arm(system):
+        where = "set points are angles between the arm's stops"
+    elif all(np.isfinite([float(end) for end in load.limits()])):
+        where = f"set points are between the stops of the load {type(load).__name__}"
+    else:
+        where = f"set points are within the stroke of the wire on the load {type(load).__name__} and a fifth more"
+    raise ValueError(
+        f"{where}, {low:g} to {high:g} {'degrees' if unit.is_angle else unit.shown}, at least one; not "
+        f"{', '.join(f'{point:g}' for point in odd) or 'none'}."
     )
-    odd = [angle for angle in set_points if not limits[0] <= angle <= limits[1]]
-    if odd or not set_points:
-        raise ValueError(
-            f"set points are angles between the arm's stops, {limits[0]:g} to {limits[1]:g} degrees, at least one; not "
-            f"{', '.join(f'{angle:g}' for angle in odd) or 'none'}."
-        )
 
 
 def check_interface(filtered: str, noise: float, period: float, dt: float) -> None:
-    """ValueError for a filter there is not, a noise (degrees) that is no size, or a period (s) of no whole steps of `dt`."""
+    """ValueError for a filter there is not, a noise (deg or mm) that is no size, or a period (s) of no whole steps of `dt`."""
     if not 0.0 <= noise < math.inf:
-        raise ValueError(f"a noise is a number of degrees, 0 or more; not {noise:g}.")
+        raise ValueError(f"a noise is a size in the unit of the reading, 0 or more; not {noise:g}.")
     if filtered and filtered not in FILTERS:
         raise ValueError(f"no filter `{filtered}`{close_matches(filtered, FILTERS, 'there are')}.")
     steps = period / dt
@@ -65,19 +74,29 @@ def check_interface(filtered: str, noise: float, period: float, dt: float) -> No
         raise ValueError(f"a controller's period is a whole number of simulation steps of {dt:g} s, not {period:g} s.")
 
 
+def noise_of(noise: float | str, unit: PositionUnit) -> float:
+    """A noise in the unit shown, from text such as `20um`. UnitError for a unit of another kind, ValueError for no size."""
+    value = parse_quantity(noise, unit.shown, bare=unit.shown)
+    if not 0.0 <= value <= (LARGEST_ANGLE if unit.is_angle else math.inf):
+        expected = f"0 to {LARGEST_ANGLE:g} deg" if unit.is_angle else f"0 {unit.shown} or more"
+        raise UnitError(f"{expected}, not `{noise}`")
+    return value
+
+
 def interface_of(system: System, filtered: str, noise: float, period: float, dt: float, delay: int) -> Interface:
-    """What lies between: the filter by name, noise in degrees, period in s, delay in periods."""
+    """What lies between: the filter by name, noise in deg or mm, period in s, delay in periods."""
     return Interface(
         FILTERS[filtered](system) if filtered else None,
-        Sensor(noise_sigma=float(np.radians(noise))) if noise else None,
+        Sensor(noise_sigma=float(unit_of(system).to_own(noise))) if noise else None,
         round(period / dt),
         delay,
     )
 
 
-def between_in_words(filtered: str, noise: float, period: float, delay: int) -> str:
+def between_in_words(filtered: str, noise: float, period: float, delay: int, unit: PositionUnit = DEGREES) -> str:
     """The same in a sentence."""
+    what = "angle" if unit.is_angle else "position"
     reads = f"their states from the filter `{filtered}`" if filtered else "the true state"
-    read = f"the angle with {noise:g}° of noise" if noise else "the angle without noise"
+    read = f"the {what} with {noise:g}{unit.symbol} of noise" if noise else f"the {what} without noise"
     late = f", commands {delay} periods late" if delay else ""
     return f"Controllers are called every {1e3 * period:g} ms{late} and are told {reads}, {read}."

@@ -6,14 +6,18 @@ import json
 from collections.abc import Mapping
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 import xarray as xr
+from numpy.typing import ArrayLike
 
 from smajax.control.closed_loop import ClosedLoop, ClosedLoopSetup, check_answers
 from smajax.control.compiled_loop import measured_loop
 from smajax.control.controllers.base import AbstractController
+from smajax.control.estimators.base import AbstractEstimator
 from smajax.control.interface import check_interface
+from smajax.control.measured_state import Sensor
 from smajax.control.reference import Reference, resting
 from smajax.core.parameters import check_bounds, parameter_values
 from smajax.data.text_input import clock_of, given
@@ -32,17 +36,20 @@ class Loop(eqx.Module):
 
     system: System
     controller: AbstractController
+    estimator: AbstractEstimator | None = None  # None: the controller is told the true state
+    sensor: Sensor | None = None  # None: the reading has no noise
+    delay: int = eqx.field(static=True, default=0)  # control periods until a command arrives
 
 
 def labelled_loop(
     system: System, loop: ClosedLoop, error: IntegrationError | None = None, **settings: object
 ) -> xr.Dataset:
-    """A closed loop as `labelled_run`, with the command `voltage` (V) and the position `wanted`.
+    """A closed loop as `labelled_run`, with the command `voltage` (V; of such a drive `current` or `power`) and the position `wanted`.
 
     A mapping among the settings, such as `gains`, becomes JSON.
     """
     attributes = {name: json.dumps(dict(one)) if isinstance(one, Mapping) else one for name, one in settings.items()}
-    result = labelled_run(system, loop.run, {"voltage": loop.voltage}, error, **attributes)
+    result = labelled_run(system, loop.run, {system.drive.command[0]: loop.voltage}, error, **attributes)
     position = result["position"].attrs["units"]
     result["wanted"] = ("time", np.asarray(loop.wanted.position), {"units": position, "long_name": "set point"})
     return result
@@ -55,13 +62,15 @@ def simulate_loop_dataset(
     dt: float = DEFAULT_STEP,
     period: float = PERIOD,
     tolerance: Tolerance = AUTO,
+    *,
+    disturbance: Mapping[str, ArrayLike] | None = None,
+    seed: int = 0,
 ) -> xr.Dataset:
     """Run a loop from rest: an `xarray.Dataset` over time (s), with the command `voltage` (V) and the position `wanted`.
 
     set_point: a number (rad or m), text with a unit (`"40 deg"`), levels each with its time (`"40deg:5s,10deg:5s"`, which
-    need no `seconds`), or a `Reference` of samples `dt` apart, which has its own length. The controller is called every
-    `period` seconds and measures the true state; noise, a filter, delays and disturbances are `simulate_closed_loop`'s.
-    `tolerance`, and what the integration leaves in the result, as `simulate_dataset`'s.
+    need no `seconds`; millimetres of a length), or a `Reference` of samples `dt` apart, which has its own length. The controller is called every
+    `period` seconds. disturbance: further inputs by channel, a value a sample; seed: of the sensor's noise. `tolerance`, and what the integration leaves in the result, as `simulate_dataset`'s.
 
     Raises TypeError for what is no `Loop` (a system without a controller), UnitError for a unit of another kind, ValueError
     for a coupon, a parameter or gain out of its bounds, a period that is no multiple of `dt`, a run without a length or
@@ -85,7 +94,10 @@ def simulate_loop_dataset(
     if samples <= every:
         raise ValueError(f"the run is shorter than one control period of {period:g} s.")
     wanted = Reference(wanted.position[:samples], wanted.velocity[:samples], wanted.acceleration[:samples])
-    run, _, error = measured_loop(ClosedLoopSetup(system, controller, wanted, dt, every), tolerance)
+    key = None if loop.sensor is None else jax.random.key(seed)
+    inputs = {name: jnp.asarray(values, dtype=float) for name, values in (disturbance or {}).items()}
+    between = (loop.estimator, loop.sensor, key, loop.delay, inputs)
+    run, _, error = measured_loop(ClosedLoopSetup(system, controller, wanted, dt, every, *between), tolerance)
     check_answers(run)
     return labelled_loop(
         system,

@@ -8,7 +8,10 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
+from smajax.core.parameters import parameters
 from smajax.core.units import UnitError, parse_quantity
+from smajax.model.load.arm import Arm
+from smajax.model.system import System
 
 # What is looked at by sweeps and tuning: its name on the command line -> the plant's parameter.
 MISMATCHES = {
@@ -19,6 +22,8 @@ MISMATCHES = {
     "payload": "payload_mass",
     "supply": "amplifier_gain",
 }
+# The same of other loads and drives, and of a user's own: what their parameters are called.
+_OTHER = {"inertia": ("slider_mass",), "payload": ("load_mass",), "supply": ("supply_voltage",)}
 MINUS, BOTH = "\N{MINUS SIGN}", "\N{PLUS-MINUS SIGN}"
 _SIZE = r"\s*(\d+\.?\d*|\.\d+)\s*%\s*"
 _ONE_WAY = re.compile(rf"\s*([-+{MINUS}]){_SIZE}")
@@ -26,9 +31,23 @@ _BOTH_WAYS = re.compile(rf"\s*(?:{BOTH}|\+\s*/?\s*[-{MINUS}]){_SIZE}")
 _UNSIGNED = re.compile(_SIZE)
 
 
+def mismatches_of(system: System) -> dict[str, str]:
+    """`MISMATCHES` of a plant: of the arm those; of another one those that it has, then its load's other parameters by their names."""
+    if isinstance(system.load, Arm):
+        return dict(MISMATCHES)
+    there = parameters(system)
+    result: dict[str, str] = {}
+    for short, own in MISMATCHES.items():
+        found = next((name for name in (own, *_OTHER.get(short, ())) if name in there), "")
+        if found:
+            result[short] = found
+    return result | {name: name for name in parameters(system.load) if name not in result.values()}
+
+
 def short_name(name: str) -> str:
     """`convection` of `convection_coefficient`; any other name as it is."""
-    return next((short for short, own in MISMATCHES.items() if own == name), name)
+    names = {own: short for short, several in _OTHER.items() for own in several}
+    return next((short for short, own in MISMATCHES.items() if own == name), names.get(name, name))
 
 
 def ratio_of(name: str, text: str, plain: bool = False) -> float | None:

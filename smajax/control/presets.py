@@ -1,18 +1,19 @@
-"""Controllers and filters of the arm with their gains, and how those were found.
+"""Controllers and filters with their gains of the arm, and how those were found.
 
-A preset takes the system that the controller is to believe in.
+A function here takes the system that the controller is to believe in, and gives the arm's gains whatever its load is:
+`CONTROLLERS[name].make(system)` scales them to the load (`control.scales`).
 """
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from smajax.control.controllers.backstepping_one import BacksteppingOne
 from smajax.control.controllers.backstepping_two import BacksteppingTwo
 from smajax.control.controllers.base import AbstractController
 from smajax.control.controllers.pid import Pid
-from smajax.control.controllers.preset import ANGLE, STATE, Box, ControllerPreset
+from smajax.control.controllers.preset import ANGLE, EQUATION, STATE, STROKE, Box, ControllerPreset
 from smajax.control.controllers.stress_sliding import StressSliding
 from smajax.control.controllers.temperature_vsc import Passing, TemperatureVsc
 from smajax.control.controllers.vsc1 import Vsc1
@@ -21,7 +22,9 @@ from smajax.control.controllers.vsc3 import Vsc3
 from smajax.control.estimators.base import AbstractEstimator
 from smajax.control.estimators.model_filter import ModelFilter
 from smajax.control.estimators.printed_filter import PrintedFilter
-from smajax.core.names import listed
+from smajax.control.load_equation import equation_of, moving_load
+from smajax.control.scales import is_arm
+from smajax.core.names import close_matches, listed
 from smajax.core.parameters import set_parameters
 from smajax.core.plugins import resolved
 from smajax.model.load.arm import Arm
@@ -34,17 +37,20 @@ from smajax.model.wire.heat import cross_section
 
 def _needs_arm(system: System, control: str) -> Arm:
     if not isinstance(system.load, Arm):
-        raise ValueError(f"{control} is derived for the arm, not for {type(system.load).__name__}.")
+        raise ValueError(
+            f"{control} is derived for the arm, not for {type(system.load).__name__}: take the filter `model`, which goes with any "
+            "moving load."
+        )
     return system.load
 
 
 def stress_sliding(system: System) -> StressSliding:
-    """Stress-based sliding control of the arm (sec. 4.7) as chapter 3 uses it; the source prints no gains.
+    """Stress-based sliding control (sec. 4.7) as chapter 3 uses it; the source prints no gains.
 
     Slow enough that the loading below the angle of greatest stress stays simple (M8).
     """
     return StressSliding(
-        arm=_needs_arm(system, "stress-based sliding control"),
+        equation=equation_of(system),
         cross_section=cross_section(system.wire),
         surface_slope=3.0,
         gain=8.5e-3,
@@ -75,14 +81,16 @@ def quick_stress_sliding(system: System) -> StressSliding:
 
 def backstepping_one(system: System) -> BacksteppingOne:
     """Backstepping, approach I (sec. 4.8.1), that knows its plant; gains: studies/gains/backstepping_one.json."""
-    _needs_arm(system, "backstepping control")
-    return BacksteppingOne(believed=system, damping_gain=1.76, stress_gain=121.0, largest_voltage=8.7)
+    return BacksteppingOne(
+        believed=system, damping_gain=1.76, stress_gain=121.0, largest_voltage=8.7, anchored=not is_arm(system)
+    )
 
 
 def backstepping_two(system: System) -> BacksteppingTwo:
     """Backstepping, approach II (sec. 4.8.2), that knows its plant; gains: studies/gains/backstepping_two.json."""
-    _needs_arm(system, "backstepping control")
-    return BacksteppingTwo(believed=system, damping_gain=1.67, temperature_gain=99.3, largest_voltage=8.7)
+    return BacksteppingTwo(
+        believed=system, damping_gain=1.67, temperature_gain=99.3, largest_voltage=8.7, anchored=not is_arm(system)
+    )
 
 
 # By the set point at which they were tuned, deg: studies/gains/pid.json, `tuned_at_...`.
@@ -129,8 +137,8 @@ def vsc3_of_section_4_6(system: System) -> Vsc3:
 
 def temperature_vsc(system: System) -> TemperatureVsc:
     """NVSC around the VSC of section 4.6, which knows its wire: studies/gains/temperature_vsc.json."""
-    load, law = _needs_arm(system, "temperature-based VSC"), system.wire.kinetics
-    # All austenite: the arm has gone the whole recoverable strain.
+    load, law = moving_load(system), system.wire.kinetics
+    # All austenite: the load has gone the whole recoverable strain.
     stroke = system.wire.constitutive.recoverable_strain / load.contraction(system.wire)
     return TemperatureVsc(
         vsc=vsc3_of_section_4_6(system),
@@ -140,7 +148,7 @@ def temperature_vsc(system: System) -> TemperatureVsc:
         finish_filter=0.02,
         finish_temperature=law.austenite_finish,
         stress_slope=law.stress_slope_austenite,
-        finish_position=load.start_angle + stroke,
+        finish_position=load.start() + stroke,
     )
 
 
@@ -221,6 +229,18 @@ STRESS_BOX: Box = {
 }
 
 
+# Of backstepping on another load. x'' + K x' + K_0 x = 0 asks for a force of I K_0 x: on a light load, which its guide damps,
+# next to nothing at the arm's K_0. The same share of the load's force for the same share of the stroke, and K/K_0 by the wire's
+# time; how fast errors of stress and temperature die out is up to the control period, not to the plant.
+_PER_FORCE = {"force": 1, "inertia": -1, "position": -1}
+_DIE_OUT: dict[str, tuple[Mapping[str, int], ...]] = {"stress_gain": ({},), "temperature_gain": ({},)}
+MOTION_ONE = {"position_gain": (_PER_FORCE,), "damping_gain": ({**_PER_FORCE, "time": 1},), **_DIE_OUT}
+# Approach II takes its curve by the sign of dPhi/dv = c - I K, which is the load's damping c while I K is the smaller.
+MOTION_TWO = {
+    "position_gain": (_PER_FORCE, {"damping": 1, "inertia": -1, "time": -1}),
+    "damping_gain": ({**_PER_FORCE, "time": 1}, {"damping": 1, "inertia": -1}),
+    **_DIE_OUT,
+}
 # Name on the command line -> controller. One in a file of its own, with its preset, is one line:
 # "my_pi": "smajax.control.controllers.my_pi:PRESET".
 CONTROLLERS: dict[str, ControllerPreset] = resolved(
@@ -230,15 +250,29 @@ CONTROLLERS: dict[str, ControllerPreset] = resolved(
         "vsc2": ControllerPreset(vsc2, "boundary", ANGLE, {**SWITCH_BOX, "boundary": (0.01, 1.0)}),
         "vsc3": ControllerPreset(vsc3, "surface_slope", ANGLE, {**SWITCH_BOX, **SURFACE_BOX}),
         "nvsc": ControllerPreset(
-            temperature_vsc, "temperature_gain", STATE, {**SWITCH_BOX, **SURFACE_BOX, **PASSING_BOX}
+            temperature_vsc,
+            "temperature_gain",
+            STATE,
+            {**SWITCH_BOX, **SURFACE_BOX, **PASSING_BOX},
+            needs=STROKE,
+            known=frozenset({"finish_temperature", "stress_slope", "finish_position"}),
         ),
-        "sld": ControllerPreset(quick_stress_sliding, "surface_slope", STATE, STRESS_BOX),
+        "sld": ControllerPreset(
+            quick_stress_sliding,
+            "surface_slope",
+            STATE,
+            STRESS_BOX,
+            needs=EQUATION,
+            known=frozenset({"equation", "cross_section"}),
+        ),
         "backstepping1": ControllerPreset(
             backstepping_one,
             "damping_gain",
             STATE,
             {"damping_gain": (0.2, 10.0), "stress_gain": (1.0, 150.0)},
             with_printed_law,
+            needs=EQUATION,
+            scales=MOTION_ONE,
         ),
         "backstepping2": ControllerPreset(
             backstepping_two,
@@ -246,8 +280,25 @@ CONTROLLERS: dict[str, ControllerPreset] = resolved(
             STATE,
             {"damping_gain": (0.2, 10.0), "temperature_gain": (1.0, 150.0)},
             with_printed_law,
+            needs=EQUATION,
+            scales=MOTION_TWO,
         ),
     }
 )
 # Name on the command line -> filter.
 FILTERS: dict[str, Callable[[System], AbstractEstimator]] = {"printed": printed_filter, "model": model_filter}
+
+
+def controllers_for(system: System) -> list[str]:
+    """The controllers by name that this plant gives all that they need."""
+    return [name for name, preset in CONTROLLERS.items() if not preset.missing(system)]
+
+
+def check_controller(name: str, system: System) -> None:
+    """ValueError for a controller there is not, or one that needs what this plant does not give; with those that can."""
+    if name not in CONTROLLERS:
+        raise ValueError(f"no controller `{name}`{close_matches(name, CONTROLLERS, 'there are')}.")
+    if lacking := CONTROLLERS[name].missing(system):
+        able = controllers_for(system)
+        who = f"controllers that work on it: {listed(able)}" if able else "no controller works on it"
+        raise ValueError(f"controller `{name}` cannot lead the load {type(system.load).__name__}: {lacking}; {who}.")

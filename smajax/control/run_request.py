@@ -20,9 +20,10 @@ from smajax.control.compiled_loop import measured_loop
 from smajax.control.compose import compose, with_values
 from smajax.control.figures_of_merit import SetPointMerit, merit_by_set_point, set_point_spans
 from smajax.control.gains_file import Gains, read_gains
-from smajax.control.interface import between_in_words, check_interface, check_set_points, interface_of
+from smajax.control.interface import between_in_words, check_interface, check_set_points, interface_of, noise_of
 from smajax.control.loop_dataset import labelled_loop
-from smajax.control.presets import CONTROLLERS
+from smajax.control.position_unit import PositionUnit, unit_of
+from smajax.control.presets import CONTROLLERS, check_controller
 from smajax.control.reference import resting
 from smajax.core.names import close_matches
 from smajax.core.parameters import parameter_values, parameters
@@ -30,7 +31,6 @@ from smajax.core.wording import and_listed
 from smajax.data.experiment.magnitude import MELTS
 from smajax.data.text_input import clock_of, given
 from smajax.model.channels import INPUT_UNITS
-from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.load.coupon import AbstractCoupon
 from smajax.model.system import System
 from smajax.simulation.dataset import simulate_dataset
@@ -84,12 +84,12 @@ class LoopRequest:
     """A closed loop around the model of a `RunRequest`."""
 
     controller: str
-    set_points: str  # levels: `40deg:5s,10deg:5s`
+    set_points: str  # levels: `40deg:5s,10deg:5s`, or of a length `3mm:10s`
     gains: Path | None = None
     # Values of the plant that the controller does not assume, or changes of what it assumes: `+20%`.
     mismatch: Mapping[str, str] = field(default_factory=dict)
     estimator: str = ""
-    noise: float = 0.0  # degrees
+    noise: float | str = 0.0  # degrees or millimetres, or text with a unit
     period: float = 0.01  # s
     delay: int = 0  # periods
     seed: int = 0
@@ -189,7 +189,7 @@ def mismatches(assumed: System, plant: System) -> tuple[Mismatch, ...]:
 def _set_point_notes(system: System, position: np.ndarray) -> list[str]:
     """A note on a set point beyond the stops of the load."""
     try:
-        check_set_points(system, np.degrees(np.unique([position.min(), position.max()])).tolist())
+        check_set_points(system, unit_of(system).of(np.unique([position.min(), position.max()])).tolist())
     except ValueError as error:
         return [f"A set point cannot be reached: {error}"]
     return []
@@ -198,20 +198,21 @@ def _set_point_notes(system: System, position: np.ndarray) -> list[str]:
 def _gains(request: RunRequest, loop: LoopRequest) -> tuple[System, Gains]:
     """(the system that the controller assumes, its gains)."""
     system = request.system()
-    if not isinstance(system.load, AbstractMovingLoad) or system.load.reading[1] != "rad":
-        raise ValueError(f"controllers are those of the arm: give the load `arm`, not `{request.load}`.")
     gains = Gains(loop.controller, {}) if loop.gains is None else read_gains(loop.gains, system)
     if gains.controller not in CONTROLLERS:
         raise ValueError(
             f"no controller {gains.controller!r}{close_matches(gains.controller, CONTROLLERS, 'there are')}"
         )
+    check_controller(gains.controller, system)
     return CONTROLLERS[gains.controller].plant(system), gains
 
 
-def _set_points(request: RunRequest, loop: LoopRequest, every: int) -> tuple[np.ndarray, np.ndarray]:
-    """(time, position) of a whole number of control periods, (n,), s and rad."""
+def _set_points(
+    request: RunRequest, loop: LoopRequest, every: int, unit: PositionUnit
+) -> tuple[np.ndarray, np.ndarray]:
+    """(time, position) of a whole number of control periods, (n,), s and rad or m."""
     with _part("set_points"):
-        levels = given(loop.set_points, "rad", request.time, bare="deg")
+        levels = given(loop.set_points, unit.own, request.time, bare=unit.shown)
     clock = clock_of([levels], request.seconds, request.dt)
     periods = (clock.size - 1) // every
     if periods < 1:
@@ -226,9 +227,12 @@ def run_closed(request: RunRequest, loop: LoopRequest) -> RunResult:
     assumed, gains = _gains(request, loop)
     with _part("mismatch"):
         plant = with_values(assumed, loop.mismatch)
-    check_interface(loop.estimator, loop.noise, loop.period, request.dt)
-    interface = interface_of(assumed, loop.estimator, loop.noise, loop.period, request.dt, loop.delay)
-    clock, position = _set_points(request, loop, interface.every)
+    unit = unit_of(assumed)
+    with _part("noise"):
+        noise = noise_of(loop.noise, unit)
+    check_interface(loop.estimator, noise, loop.period, request.dt)
+    interface = interface_of(assumed, loop.estimator, noise, loop.period, request.dt, loop.delay)
+    clock, position = _set_points(request, loop, interface.every, unit)
     controller = gains.put(assumed)
     setup = ClosedLoopSetup(
         plant,
@@ -244,7 +248,7 @@ def run_closed(request: RunRequest, loop: LoopRequest) -> RunResult:
     run, merits, error = measured_loop(setup, request.tolerance)
     # As in `run_open`.
     run = eqx.tree_at(lambda one: one.run.time, run, jnp.asarray(clock))
-    between = between_in_words(loop.estimator, loop.noise, loop.period, loop.delay)
+    between = between_in_words(loop.estimator, noise, loop.period, loop.delay, unit)
     data = labelled_loop(
         plant,
         run,

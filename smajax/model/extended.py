@@ -16,3 +16,13 @@ def extended(system: System, effects: Sequence[str], coefficients: Mapping[str, 
     At base value the simulated trajectory is that of `system`.
     """
     return set_parameters(dataclasses.replace(system, effects=at_base(effects)), dict(coefficients or {}))
+
+
+def with_effects(system: System, names: Sequence[str]) -> System:
+    """`system` with further effects at base value, all in the library's order; the values of those that it has stay."""
+    there = [one.effect_name for one in system.effects]
+    if not set(names) - set(there):
+        return system
+    own = dict(zip(there, system.effects, strict=True))
+    both = (own.get(one.effect_name, one) for one in at_base([*there, *names]))
+    return dataclasses.replace(system, effects=tuple(both))

@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from smajax.control.figures_of_merit import MERIT_UNITS, STEADY_SHARE, SetPointMerit
+from smajax.control.figures_of_merit import STEADY_SHARE, SetPointMerit, merit_units
 from smajax.control.mismatch import in_words
 from smajax.control.run_request import RunResult
 from smajax.core.display_units import axis_label, digits, display, label
@@ -43,7 +43,7 @@ def as_csv(data: xr.Dataset) -> str:
 
 def record(result: RunResult, command: str, series: bool = True) -> dict[str, Any]:
     """Everything in SI: the model, least, greatest and last of each variable, figures of merit, and the series."""
-    data = result.data
+    data, units, own = result.data, _units(result), result.system.load.reading[1]
     return {
         "command": command,
         "provenance": {name: _plain(name, text) for name, text in data.attrs.items() if name not in APART},
@@ -62,9 +62,14 @@ def record(result: RunResult, command: str, series: bool = True) -> dict[str, An
         },
         "notes": list(result.notes),
         "conclusions": conclusions(result),
-        "merit": _merit(result.merit),
+        "merit": _merit(result.merit, units),
         "merit_by_set_point": [
-            {"begin_s": one.begin, "end_s": one.end, "set_point_rad": one.set_point, "merit": _merit(_figures(one))}
+            {
+                "begin_s": one.begin,
+                "end_s": one.end,
+                f"set_point_{own}": one.set_point,
+                "merit": _merit(_figures(one), units),
+            }
             for one in result.by_set_point
         ],
         "summary": {
@@ -104,8 +109,13 @@ def _plain(name: str, text: str) -> Any:
         return text
 
 
-def _merit(figures: Mapping[str, float]) -> dict[str, Any]:
-    return {name: {"value": value, "unit": MERIT_UNITS[name]} for name, value in figures.items()}
+def _units(result: RunResult) -> dict[str, str]:
+    """Of the figures of merit, SI."""
+    return merit_units(result.system.load.reading[1])
+
+
+def _merit(figures: Mapping[str, float], units: Mapping[str, str]) -> dict[str, Any]:
+    return {name: {"value": value, "unit": units[name]} for name, value in figures.items()}
 
 
 def _figures(one: SetPointMerit) -> dict[str, float]:
@@ -180,36 +190,38 @@ def summary_rows(data: xr.Dataset) -> list[list[str]]:
 
 def merit_rows(result: RunResult) -> list[list[str]]:
     """A row a figure of merit; the steady ones with the time over which they are means, since a short run may still be moving."""
+    units = _units(result)
     steady = f" (last {STEADY_SHARE:.0%} of the run)"
     return [
         [
             label(name) + steady * name.startswith("steady"),
-            _cell(name, value),
-            "" if np.isinf(value) else display(MERIT_UNITS[name], name).unit,
+            _cell(name, value, units),
+            "" if np.isinf(value) else display(units[name], name).unit,
         ]
         for name, value in result.merit.items()
     ]
 
 
-def _cell(name: str, value: float) -> str:
-    return "never" if np.isinf(value) else digits(display(MERIT_UNITS[name], name).of(value), 3)
+def _cell(name: str, value: float, units: Mapping[str, str]) -> str:
+    return "never" if np.isinf(value) else digits(display(units[name], name).of(value), 3)
 
 
 def set_point_rows(result: RunResult) -> tuple[list[str], list[list[str]]]:
     """(head, rows): a row a set point, from its start to the next one."""
-    of = display("rad")
+    units = _units(result)
+    of = display(result.system.load.reading[1])
     head = [
         f"set point ({of.unit})",
         "from (s)",
         "to (s)",
-        *(axis_label(name, display(unit, name)) for name, unit in MERIT_UNITS.items()),
+        *(axis_label(name, display(unit, name)) for name, unit in units.items()),
     ]
     rows = [
         [
             digits(of.of(one.set_point)),
             digits(one.begin),
             digits(one.end),
-            *(_cell(name, value) for name, value in _figures(one).items()),
+            *(_cell(name, value, units) for name, value in _figures(one).items()),
         ]
         for one in result.by_set_point
     ]
@@ -275,7 +287,10 @@ def conclusions(result: RunResult) -> list[str]:
             f"The loop settles after {digits(settles, 3)} s." if np.isfinite(settles) else "The loop never settles."
         )
     if result.by_set_point:
-        of, after = display("rad"), [float(one.merit.settling_time) for one in result.by_set_point]
+        of, after = (
+            display(result.system.load.reading[1]),
+            [float(one.merit.settling_time) for one in result.by_set_point],
+        )
         each = [
             f"{digits(of.of(one.set_point))} {of.unit} "
             + (f"after {digits(late, 3)} s" if np.isfinite(late) else "never")

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 
-from smajax.control.figures_of_merit import MERIT_UNITS
+from smajax.control.figures_of_merit import merit_units
 from smajax.control.sweep.run_sweep import SweepResults
 from smajax.core.files import json_line
 from smajax.core.provenance import made_with
@@ -18,8 +18,8 @@ def as_dataset(results: SweepResults, command: str) -> xr.Dataset:
 
     Times are infinite where a run never arrives or settles; `failed_at` is NaN where no loop failed.
     """
-    sweeps, grid = results.sweeps, results.settings.grid
-    ratios = [f"{name}_ratio" for name in grid.mismatches]
+    sweeps, grid = results.sweeps, results.grid
+    ratios = grid.axis_names
     dims = ("controller", *ratios, "set_point", "gain_ratio")
     shape = (len(sweeps), *(len(grid.ratios) for _ in ratios), *grid.shape[2:])
 
@@ -28,15 +28,17 @@ def as_dataset(results: SweepResults, command: str) -> xr.Dataset:
 
     variables = {
         name: (dims, stacked([np.asarray(getattr(one.merits, name)) for one in sweeps]), {"units": unit})
-        for name, unit in MERIT_UNITS.items()
+        for name, unit in merit_units(results.unit.own).items()
     }
     failed = stacked([one.failed_at for one in sweeps])
     variables["failed_at"] = (dims, np.where(np.isfinite(failed), failed, np.nan), {"units": "s"})
     assumed = {"units": "1", "long_name": "plant over the value that the controller assumes"}
+    if grid.numbered:
+        assumed["long_name"] = "number of the plant in its batch"
     axes = {
         "controller": [one.name for one in sweeps],
         **{name: (name, grid.ratios, assumed) for name in ratios},
-        "set_point": ("set_point", grid.targets, {"units": "rad"}),
+        "set_point": ("set_point", grid.targets, {"units": results.unit.own}),
         "gain_ratio": ("gain_ratio", grid.gains, {"units": "1", "long_name": "ratio to the controller's main gain"}),
     }
     gains = "; ".join(f"{one.name}: {one.main_gain}" for one in sweeps)

@@ -10,15 +10,16 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
+from smajax.control.plants import Plants, plant_set
 from smajax.control.reference import clock
 from smajax.control.sweep.run_sweep import (
     CACHED,
-    LINE_TARGET,
     LINES,
     ControllerSweep,
     SweepResults,
     SweepSettings,
     assumed_air,
+    line_target,
 )
 from smajax.core.files import as_netcdf, replace
 from smajax.core.progress import Message, Progress, quiet
@@ -50,12 +51,14 @@ def write_sweep(
     out: Path,
     progress: Progress = quiet,
     command: str = "",
+    plants: Plants | None = None,
 ) -> SweepResults:
-    """Write the files of each controller as it comes, then those of all; `sweeps` are of `sweep_controllers`."""
+    """Write the files of each controller as it comes, then those of all; `sweeps` are of `sweep_controllers`, as are the others."""
     out.mkdir(parents=True, exist_ok=True)
-    grid = settings.grid
+    found = plant_set(system, plants)
+    grid = settings.grid_on(found)
     time = np.asarray(clock(settings.seconds, settings.dt))
-    target = float(np.radians(LINE_TARGET))
+    target = line_target(system, grid)
     upright: dict[str, bytes] = {}
     results: list[ControllerSweep] = []
 
@@ -68,11 +71,12 @@ def write_sweep(
         write_rows(out / f"{one.name}.csv", grid, one)
         over_grid = draw_maps if grid.second else draw_curves
         write_picture(f"{one.name}_maps.png", (10.0, 7.6), partial(over_grid, grid=grid, sweep=one))
-        lines = partial(draw_lines, time=time, ratios=LINES, sweep=one, target=target)
-        write_picture(f"{one.name}_lines.png", (11.0, 6.2), lines)
+        if one.lines:
+            lines = partial(draw_lines, time=time, ratios=LINES, sweep=one, target=target, unit=found.unit)
+            write_picture(f"{one.name}_lines.png", (11.0, 3.1 * -(-len(one.lines) // 3)), lines)
         progress(Message(f"{one.name}: {grid.size:,} closed loops; {failures(one)}. {perturbed_sentence(grid, one)}"))
-    whole = SweepResults(settings, tuple(results), assumed_air(system))
-    comparison = partial(draw_comparison, targets=grid.targets, merits=whole.nominal)
+    whole = SweepResults(settings, tuple(results), assumed_air(system), found)
+    comparison = partial(draw_comparison, targets=grid.targets, merits=whole.nominal, position=found.unit)
     write_picture("comparison.png", (10.0, 11.0), comparison)
     replace(out / "sweep.json", as_json(whole, command))
     replace(out / "sweep.nc", as_netcdf(as_dataset(whole, command)))
@@ -95,8 +99,8 @@ def as_text(results: SweepResults) -> str:
         "settles",
         "reach s",
         "settle s",
-        "overshoot °",
-        "error °",
+        f"overshoot {results.unit.label}",
+        f"error {results.unit.label}",
         "energy J",
         "switches/s",
         "peak °C",

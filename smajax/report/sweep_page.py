@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from smajax.control.position_unit import DEGREES, PositionUnit
 from smajax.control.presets import CONTROLLERS, with_printed_law
 from smajax.control.sweep.grid import Grid
 from smajax.control.sweep.run_sweep import ControllerSweep, SweepResults
@@ -21,20 +22,21 @@ from smajax.core.wording import and_listed, counted
 from smajax.report.html import picture
 from smajax.report.integration_words import integration_sentence
 from smajax.report.plain_page import bullets, table, whole
-from smajax.report.sweep_pictures import ROUNDING, SHOWN, merit_values, nominal_gain
+from smajax.report.sweep_pictures import ROUNDING, SHOWN, merit_values, nominal_gain, shown_in
 
 Pictures = Mapping[str, tuple[bytes, bytes]]  # file name -> the picture, and the one for a telephone
 
 
 def write_rows(path: Path, grid: Grid, sweep: ControllerSweep) -> None:
-    """Every closed loop in a row; angles in degrees, an empty cell where a time is infinite."""
+    """Every closed loop in a row; angles in degrees, lengths in millimetres, an empty cell where a time is infinite."""
     *ratios, target, gain = (axis.ravel() for axis in grid.axes())
     ratios = ratios[: len(grid.mismatches)]
-    inputs = np.stack([*ratios, np.degrees(target), gain], axis=1)
-    columns = [*(f"{name}_ratio" for name in grid.mismatches), "set_point_deg", f"{sweep.main_gain}_ratio"]
+    position = grid.plants.unit
+    inputs = np.stack([*ratios, position.of(target), gain], axis=1)
+    columns = [*grid.axis_names, f"set_point_{position.shown}", f"{sweep.main_gain}_ratio"]
     units = {"°": "deg", "°C": "degC", "1/s": "per_s"}
-    merits = [f"{name}_{units.get(SHOWN[name][1], SHOWN[name][1])}" for name in SHOWN]
-    outputs = np.stack([merit_values(sweep.merits, name).ravel() for name in SHOWN], axis=1)
+    merits = [f"{name}_{units.get(unit, unit)}" for name, (_, unit, _) in shown_in(position).items()]
+    outputs = np.stack([merit_values(sweep.merits, name, position).ravel() for name in SHOWN], axis=1)
     text = io.StringIO(newline="")
     writer = csv.writer(text)
     writer.writerow([*columns, *merits, "failed_at_s"])
@@ -47,10 +49,18 @@ def perturbed_sentence(grid: Grid, sweep: ControllerSweep) -> str:
     """The results of a controller on all the perturbed plants of the grid, in a sentence."""
     at = nominal_gain(grid)
     settles = float(np.isfinite(merit_values(sweep.merits, "settling_time")[..., at]).mean())
-    overshoot = float(np.nanmax(merit_values(sweep.merits, "overshoot")[..., at]))
+    unit = grid.plants.unit
+    overshoot = float(np.nanmax(merit_values(sweep.merits, "overshoot", unit)[..., at]))
     return (
-        f"On all mismatches of {and_listed(grid.mismatches)} it settles in {100 * settles:.0f} % of the runs at "
-        f"{grid.gains[at]:g} times its main gain; overshoot up to {overshoot:.3g}°."
+        f"On all {grid_in_words(grid)} it settles in {100 * settles:.0f} % of the runs at "
+        f"{grid.gains[at]:g} times its main gain; overshoot up to {overshoot:.3g}{unit.symbol}."
+    )
+
+
+def grid_in_words(grid: Grid) -> str:
+    """What differs between its plants."""
+    return (
+        f"{len(grid.ratios)} plants of the batch" if grid.numbered else f"mismatches of {and_listed(grid.mismatches)}"
     )
 
 
@@ -67,7 +77,7 @@ def comparison_rows(results: SweepResults) -> list[list[str]]:
         settles = int(np.isfinite(merit_values(one, "settling_time")).sum())
         cells = [name, f"{settles} of {len(results.settings.set_points)}"]
         for merit_name in SHOWN:
-            values = merit_values(one, merit_name)
+            values = merit_values(one, merit_name, results.unit)
             cells.append(" / ".join(_cell(float(of(values))) for of in (np.median, np.max)))
         rows.append(cells)
     return rows
@@ -82,39 +92,59 @@ def _controller_part(results: SweepResults, sweep: ControllerSweep, pictures: Pi
     """The section of one controller: failures, what it reads, maps and lines."""
     say, settings = html.escape, results.settings
     return (
-        f"<h3>{say(sweep.name)}</h3><p>{counted(settings.grid.size, 'closed loop')} of {settings.seconds:g} s; {failures(sweep)}. "
-        f"{say(description(sweep.name))} {say(integration_sentence(sweep.integration_error))} "
+        f"<h3>{say(sweep.name)}</h3><p>{counted(results.grid.size, 'closed loop')} of {settings.seconds:g} s; {failures(sweep)}. "
+        f"{say(description(sweep.name, results.unit))} {say(integration_sentence(sweep.integration_error))} "
         f'<a href="{sweep.name}.csv">every loop as CSV</a></p>'
         + _panels(pictures, f"{sweep.name}_maps.png", f"maps of {sweep.name}")
-        + _panels(pictures, f"{sweep.name}_lines.png", f"lines of {sweep.name}")
+        + (_panels(pictures, f"{sweep.name}_lines.png", f"lines of {sweep.name}") if sweep.lines else "")
     )
 
 
 def page(results: SweepResults, pictures: Pictures, command: str = "") -> str:
     """One page for a browser, with the pictures inside; the rows as CSV are beside it."""
-    say, settings, grid = html.escape, results.settings, results.settings.grid
+    say, settings, grid, unit = html.escape, results.settings, results.grid, results.unit
     low, high = min(settings.set_points), max(settings.set_points)
+    precision = ".0f" if unit.is_angle else ".3g"
+    arrived = (
+        "The angle has arrived when it is within 1°."
+        if unit.is_angle
+        else "The position has arrived when it is within a hundredth of the stroke."
+    )
     drawn_as = (
         "Maps: median over the set points"
         if grid.second
         else "Lines: median over the set points; bands: their range, where all have a value"
     )
-    head = ["controller", "settles at", *(f"{label} ({unit})" for label, unit, _ in SHOWN.values())]
+    head = ["controller", "settles at", *(f"{label} ({symbol})" for label, symbol, _ in shown_in(unit).values())]
     parts = [
         f"<h1>Controllers compared</h1>{bullets(conclusions(results))}<p>The unperturbed plant, "
-        f"{len(settings.set_points)} set points from {low:.0f}° to {high:.0f}°; "
-        f"median / worst over the set points. The angle has arrived when it is within 1°. {say(settings.between)}</p>",
+        f"{len(settings.set_points)} set points from {low:{precision}}{unit.symbol} to {high:{precision}}{unit.symbol}; "
+        f"median / worst over the set points. {arrived} {say(settings.between)}</p>",
         table(head, comparison_rows(results)),
         _panels(pictures, "comparison.png", "figures of merit over the set point"),
-        f"<h2>Mismatch of {say(and_listed(grid.mismatches))}</h2><p>The plant's value over the one that the "
-        f"controller assumes, where it assumes one. {drawn_as}, at the gain ratio nearest to 1. "
-        f"{say(air_sentence(grid, results.air))}</p>",
+        _what_differs(results, drawn_as),
         *(_controller_part(results, one, pictures) for one in results.sweeps),
         "<h2>Provenance</h2>",
         table(["", ""], [["command", command], *map(list, made_with().items())]),
         "<p class=quiet>The same numbers: sweep.json, sweep.nc (every loop, with named axes and units), and a CSV file for each controller.</p>",
     ]
     return whole("Controllers compared", [str(part) for part in parts])
+
+
+def _what_differs(results: SweepResults, drawn_as: str) -> str:
+    """The head of the part on perturbed plants."""
+    say, grid = html.escape, results.grid
+    if grid.numbered:
+        names = ", ".join(grid.plants.columns)
+        return (
+            f"<h2>Batch of {counted(len(grid.ratios), 'plant')}</h2><p>They differ in {say(names)}; the controller assumes the "
+            f"unperturbed plant. {drawn_as}, at the gain ratio nearest to 1.</p>"
+        )
+    return (
+        f"<h2>Mismatch of {say(and_listed(grid.mismatches))}</h2><p>The plant's value over the one that the "
+        f"controller assumes, where it assumes one. {drawn_as}, at the gain ratio nearest to 1. "
+        f"{say(air_sentence(grid, results.air))}</p>"
+    )
 
 
 def air_sentence(grid: Grid, air: float) -> str:
@@ -131,15 +161,17 @@ def conclusions(results: SweepResults) -> list[str]:
         settles = int(np.isfinite(merit_values(one.nominal, "settling_time")).sum())
         points = counted(len(results.settings.set_points), "set point")
         nominal = f"{one.name} settles at {settles} of {points} on the unperturbed plant."
-        sentences.append(f"{nominal} {perturbed_sentence(results.settings.grid, one)}")
+        sentences.append(f"{nominal} {perturbed_sentence(results.grid, one)}")
     return sentences
 
 
-def description(name: str) -> str:
-    """What a controller reads, and of which plant."""
+def description(name: str, unit: PositionUnit = DEGREES) -> str:
+    """What a controller reads, and of which plant: that of a section is an arm."""
     preset = CONTROLLERS[name]
-    plant = " Plant: the integrated law without a thermal term (eq. 4.51)." if preset.plant is with_printed_law else ""
-    return f"It reads {preset.reads}.{plant}"
+    own = preset.section is with_printed_law and unit.is_angle
+    plant = " Plant: the integrated law without a thermal term (eq. 4.51)." if own else ""
+    reads = preset.reads if unit.is_angle else preset.reads.replace("angle", "position")
+    return f"It reads {reads}.{plant}"
 
 
 def failures(sweep: ControllerSweep) -> str:
@@ -154,23 +186,29 @@ def failures(sweep: ControllerSweep) -> str:
 
 def as_json(results: SweepResults, command: str = "") -> str:
     """The comparison and the grid, SI; infinite times are null."""
-    settings, grid = results.settings, results.settings.grid
+    settings, grid, own = results.settings, results.grid, results.unit.own
 
     def plain(values: np.ndarray) -> list[float | None]:
         return [float(value) if np.isfinite(value) else None for value in np.asarray(values).ravel()]
 
+    batch = grid.plants.batch
     record = {
         "conclusions": conclusions(results),
         "between": settings.between,
-        "set_points_rad": plain(grid.targets),
+        f"set_points_{own}": plain(grid.targets),
         "controllers": {
             name: {field.name: plain(getattr(one, field.name)) for field in dataclasses.fields(one)}
             for name, one in results.nominal.items()
         },
         "sweep": {
             "mismatches": list(grid.mismatches),
+            **(
+                {"plants": dict(zip(grid.plants.columns, map(plain, batch.T), strict=True))}
+                if batch is not None
+                else {}
+            ),
             "ratios": plain(grid.ratios),
-            "set_points_rad": plain(grid.targets),
+            f"set_points_{own}": plain(grid.targets),
             "gain_ratios": plain(grid.gains),
             "loops": grid.size,
             "failed": {one.name: int(np.isfinite(one.failed_at).sum()) for one in results.sweeps},

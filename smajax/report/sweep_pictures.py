@@ -10,11 +10,12 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FormatStrFormatter
 
 from smajax.control.figures_of_merit import Merit
+from smajax.control.position_unit import DEGREES, PositionUnit
 from smajax.control.sweep.grid import Grid
 from smajax.control.sweep.run_sweep import ControllerSweep
 from smajax.report.drawing import named, panels
 
-# Figure of merit -> (label, unit shown, factor from SI).
+# Figure of merit -> (label, unit shown, factor from SI); of an angle.
 SHOWN = {
     "reach_time": ("reach time", "s", 1.0),
     "settling_time": ("settling time", "s", 1.0),
@@ -31,9 +32,15 @@ COLOURS = ("#1f6fb2", "#c8553d", "#d9a441", "#3f8f5b", "#7a5195", "#8a8f98", "#1
 GREY = {"settling_time": ("settling_time", "never settles"), "overshoot": ("reach_time", "never arrives")}
 
 
-def merit_values(one: Merit, name: str) -> np.ndarray:
+def shown_in(unit: PositionUnit) -> dict[str, tuple[str, str, float]]:
+    """`SHOWN` of a load whose position is shown in this unit."""
+    own = {name: (label, unit.label, unit.factor) for name, (label, symbol, _) in SHOWN.items() if symbol == "°"}
+    return SHOWN if unit.is_angle else {**SHOWN, **own}
+
+
+def merit_values(one: Merit, name: str, unit: PositionUnit = DEGREES) -> np.ndarray:
     """A figure of merit in the unit shown."""
-    return np.asarray(getattr(one, name)) * SHOWN[name][2]
+    return np.asarray(getattr(one, name)) * shown_in(unit)[name][2]
 
 
 def nominal_gain(grid: Grid) -> int:
@@ -54,7 +61,7 @@ def _over_set_points(grid: Grid, sweep: ControllerSweep, name: str) -> tuple[np.
     It is NaN where at half of the set points the angle never arrives, or never settles.
     """
     at = nominal_gain(grid)
-    values = merit_values(sweep.merits, name)[..., at]
+    values = merit_values(sweep.merits, name, grid.plants.unit)[..., at]
     if name not in GREY:
         return values, ""
     deciding, why = GREY[name]
@@ -71,18 +78,20 @@ def _ratio_axis(axis: Axis) -> None:
 def draw_curves(figure: Figure, grid: Grid, sweep: ControllerSweep) -> None:
     """Over one mismatch alone: the median over the set points as a line, their range as a band where all have a value."""
     for axes, name in zip(panels(figure, 2, 2), MAPPED, strict=True):
-        label, unit, _ = SHOWN[name]
+        label, unit, _ = shown_in(grid.plants.unit)[name]
         values, never = _over_set_points(grid, sweep, name)
         lines = np.stack([one(values[:, 0], axis=1) for one in (np.min, np.median, np.max)])
         lines[:, ~np.isfinite(lines[1])] = np.nan
         least, middle, largest = np.where(np.isfinite(lines), lines, np.nan)
         axes.plot(grid.ratios, middle, "o-", color=COLOURS[0], markersize=3, linewidth=1.3)
         axes.fill_between(grid.ratios, least, largest, color=COLOURS[0], alpha=0.2, linewidth=0)
-        axes.set(xscale="log", xlim=_edges(grid.ratios)[[0, -1]])
-        axes.axvline(1.0, color="#9aa0a8", linewidth=1.0, linestyle="--")
-        _ratio_axis(axes.xaxis)
+        if not grid.numbered:
+            axes.set(xscale="log", xlim=_edges(grid.ratios)[[0, -1]])
+            axes.axvline(1.0, color="#9aa0a8", linewidth=1.0, linestyle="--")
+            _ratio_axis(axes.xaxis)
         gaps = f"; no line: {never}" if never else ""
-        named(axes, f"{grid.first}, plant / controller", f"{label} ({unit}{gaps})")
+        across = "plant of the batch" if grid.numbered else f"{grid.first}, plant / controller"
+        named(axes, across, f"{label} ({unit}{gaps})")
         if np.isnan(middle).all():  # no value: no scale
             axes.set_yticks([])
 
@@ -94,7 +103,7 @@ def draw_maps(figure: Figure, grid: Grid, sweep: ControllerSweep) -> None:
     """
     edges = _edges(grid.ratios)
     for axes, name in zip(panels(figure, 2, 2), MAPPED, strict=True):
-        label, unit, _ = SHOWN[name]
+        label, unit, _ = shown_in(grid.plants.unit)[name]
         several, why = _over_set_points(grid, sweep, name)
         values, never = np.median(several, axis=2), f"; grey: {why}" if why else ""
         axes.set_facecolor("#c9ccd1")
@@ -114,14 +123,22 @@ def draw_maps(figure: Figure, grid: Grid, sweep: ControllerSweep) -> None:
 
 
 def draw_lines(
-    figure: Figure, time: np.ndarray, ratios: Sequence[float], sweep: ControllerSweep, target: float
+    figure: Figure,
+    time: np.ndarray,
+    ratios: Sequence[float],
+    sweep: ControllerSweep,
+    target: float,
+    unit: PositionUnit = DEGREES,
 ) -> None:
-    """Angle over time with one mismatch at a time (Elahinia 2004, Fig. 4.23-4.25, for this controller)."""
-    for axes, (mismatch, angles) in zip(panels(figure, 2, 3), sweep.lines.items(), strict=True):
+    """Position over time with one mismatch at a time (Elahinia 2004, Fig. 4.23-4.25, for this controller)."""
+    axes_of = panels(figure, -(-len(sweep.lines) // 3), min(3, len(sweep.lines)))
+    for spare in axes_of[len(sweep.lines) :]:
+        spare.axis("off")
+    for axes, (mismatch, angles) in zip(axes_of, sweep.lines.items(), strict=False):
         for colour, ratio, angle in zip(COLOURS, ratios, angles, strict=False):
-            axes.plot(time, np.degrees(angle), color=colour, linewidth=1.2, label=f"{ratio:g}")
-        axes.axhline(np.degrees(target), color="#9aa0a8", linewidth=0.8)
-        named(axes, "time (s)", "arm angle (°)", mismatch)
+            axes.plot(time, unit.of(angle), color=colour, linewidth=1.2, label=f"{ratio:g}")
+        axes.axhline(float(unit.of(target)), color="#9aa0a8", linewidth=0.8)
+        named(axes, "time (s)", unit.axis, mismatch)
     # One key for all panels, where it covers no line.
     handles, labels = axes.get_legend_handles_labels()
     figure.legend(
@@ -136,19 +153,21 @@ def draw_lines(
     )
 
 
-def draw_comparison(figure: Figure, targets: np.ndarray, merits: Mapping[str, Merit]) -> None:
+def draw_comparison(
+    figure: Figure, targets: np.ndarray, merits: Mapping[str, Merit], position: PositionUnit = DEGREES
+) -> None:
     """Every figure of merit over the set point, one line a controller."""
     axes_of = panels(figure, 4, 2)
     for axes, name in zip(axes_of, SHOWN, strict=False):
         for k, (colour, (controller, one)) in enumerate(zip(COLOURS, merits.items(), strict=False)):
-            values = merit_values(one, name)
+            values = merit_values(one, name, position)
             values = np.where(np.abs(values) < ROUNDING, 0.0, np.where(np.isfinite(values), values, np.nan))
             if np.isnan(values).all():
                 nowhere = f"{controller}: at no set point"
                 axes.text(0.03, 0.92 - 0.09 * k, nowhere, color=colour, transform=axes.transAxes, fontsize=9)
-            axes.plot(np.degrees(targets), values, "o-", color=colour, markersize=3, linewidth=1.2, label=controller)
-        label, unit, _ = SHOWN[name]
-        named(axes, "set point (°)", f"{label} ({unit})")
+            axes.plot(position.of(targets), values, "o-", color=colour, markersize=3, linewidth=1.2, label=controller)
+        label, unit, _ = shown_in(position)[name]
+        named(axes, f"set point ({position.label})", f"{label} ({unit})")
     last = axes_of[-1]
     last.axis("off")
     handles, labels = axes_of[0].get_legend_handles_labels()

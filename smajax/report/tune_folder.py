@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from smajax.control.gains_file import write_gains
+from smajax.control.plants import Plants
 from smajax.control.tune.settings import TuneSettings
 from smajax.control.tune.tuning import TuningResult
 from smajax.control.tune.tuning_folder import GAINS, RECORD, RESULTS, check_folder, settings_record
@@ -17,12 +18,12 @@ from smajax.report.tune_page import loops, page, record
 from smajax.report.tune_pictures import before_after, costs_over_loops
 
 
-def finished(system: System, settings: TuneSettings, out: Path) -> dict[str, Any] | None:
+def finished(system: System, settings: TuneSettings, out: Path, plants: Plants | None = None) -> dict[str, Any] | None:
     """The record of this very tuning, where `out` has all of its results; None otherwise.
 
     Raises ValueError as `tune_in_folder` does.
     """
-    check_folder(out, settings_record(system, settings))
+    check_folder(out, settings_record(system, settings, plants))
     if not all((out / name).is_file() for name in RESULTS):
         return None
     try:

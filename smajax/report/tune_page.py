@@ -9,10 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from smajax.control.mismatch import MISMATCHES
 from smajax.control.tune.moves import Moves
 from smajax.control.tune.scenarios import BEYOND
-from smajax.control.tune.terms import TERMS
+from smajax.control.tune.terms import TERMS, Term, terms_in
 from smajax.control.tune.tuning import Check, TuningResult
 from smajax.core.display_units import digits
 from smajax.core.files import csv_text, heading
@@ -27,6 +26,11 @@ EDGE = 0.02  # of the box, by logarithm
 GROWN = 1.5  # times as much as before
 LEAST_PRICE = 0.1  # J, V/s, 1/s: what is less is nothing, however it grew
 UNITS = {"°": "deg", "°C": "degC"}  # as a file has them
+
+
+def terms_of(result: TuningResult) -> dict[str, Term]:
+    """The terms as the load's unit shows them."""
+    return terms_in(result.settings.shown)
 
 
 def checked_on(result: TuningResult, name: str) -> str:
@@ -66,14 +70,14 @@ def broken(result: TuningResult, check: Check) -> list[str]:
     """Which limits the tuned gains do not meet: by how much, where, in how many loops."""
     sentences = []
     for name, limit in result.settings.limits.items():
-        term, values = TERMS[name], check.seen.exact[1, :, list(TERMS).index(name)]
+        term, values = terms_of(result)[name], check.seen.exact[1, :, list(TERMS).index(name)]
         over = values > limit
         if over.any():
             at = int(np.argmax(values))
             never = name == "settling_time" and values[at] >= 2.0 * result.settings.seconds
             worst = "never reached" if never else f"{digits(float(values[at]), 3)} {term.unit}"
             sentences.append(
-                f"{term.label} {worst} at {np.degrees(check.scenarios.targets[at]):.3g}° where {limit:g} {term.unit} are "
+                f"{term.label} {worst} at {result.settings.shown.of(check.scenarios.targets[at]):.3g}{result.settings.shown.symbol} where {limit:g} {term.unit} are "
                 f"asked ({int(over.sum())} of {len(values)} loops)"
             )
     return sentences
@@ -120,7 +124,8 @@ def in_moves(result: TuningResult) -> list[str]:
     if result.moves is None:
         return [f"{cold}: moves from one set point to another were not tried."]
     moves = result.moves
-    ends = [f"{low:g}° to {high:g}°" for low, high in itertools.pairwise(moves.asked)]
+    unit = result.settings.shown
+    ends = [f"{low:g}{unit.symbol} to {high:g}{unit.symbol}" for low, high in itertools.pairwise(moves.asked)]
     overshoot, at = float(moves.overshoot[1].max()), ends[int(np.argmax(moves.overshoot[1]))]
     never = int((~np.isfinite(moves.settling_time[1])).sum())
     slowest = float(np.max(moves.settling_time[1], where=np.isfinite(moves.settling_time[1]), initial=0.0))
@@ -138,7 +143,8 @@ def in_moves(result: TuningResult) -> list[str]:
     broken_there = f": beyond the limit of {and_listed(missed)}" if missed else ""
     return [
         f"{cold}. In {counted(len(ends), 'move')} from one set point to another on the plant as believed, which nothing was "
-        f"tuned on, {settled}, and the largest overshoot is {digits(overshoot, 3)}° ({at}; {digits(float(moves.overshoot[0].max()), 3)}° "
+        f"tuned on, {settled}, and the largest overshoot is {digits(overshoot, 3)}{unit.symbol} ({at}; "
+        f"{digits(float(moves.overshoot[0].max()), 3)}{unit.symbol} "
         f"with the preset's gains){broken_there}."
     ]
 
@@ -217,7 +223,7 @@ def gain_rows(gains: Mapping[str, Mapping[str, Any]]) -> list[list[str]]:
 def _figures(result: TuningResult, check: Check) -> list[list[str]]:
     """A row a term: median and worst before and after, and the limits where there are some."""
     rows = []
-    for column, (name, term) in enumerate(TERMS.items()):
+    for column, (name, term) in enumerate(terms_of(result).items()):
         cells = []
         for which in (0, 1):
             values = check.seen.exact[which, :, column]
@@ -242,7 +248,7 @@ def page(result: TuningResult, pictures: Mapping[str, bytes], command: str) -> s
         f"<p>Tuned on {say(settings.plants_sentence(result.air))}. {say(settings.goal_sentence())}.</p>",
         picture(
             pictures["before_after.png"],
-            "angles and figures of merit before and after",
+            "positions and figures of merit before and after",
             "panels",
             before_after(result, upright=True),
         ),
@@ -271,14 +277,15 @@ def page(result: TuningResult, pictures: Mapping[str, bytes], command: str) -> s
 
 def loops(result: TuningResult) -> str:
     """CSV, a row a closed loop: which check, whose gains, plant over what is believed, set point, figures (none: never)."""
-    rows = []
+    rows, unit, plants = [], result.settings.shown, result.plants
     for name, check in result.checks.items():
         for which, when in enumerate(("before", "after")):
             for plant, figures in zip(check.scenarios.rows.tolist(), check.seen.exact[which], strict=True):
                 merits = [_plain(result, term, value) for term, value in zip(TERMS, figures, strict=True)]
-                rows.append([name, when, *plant[:-1], float(np.degrees(plant[-1])), *merits])
-    terms = [heading(name, UNITS.get(term.unit, term.unit)) for name, term in TERMS.items()]
-    return csv_text(["check", "gains", *(f"{name} ratio" for name in MISMATCHES), "set point [deg]", *terms], rows)
+                rows.append([name, when, *plant[:-1], float(unit.of(plant[-1])), *merits])
+    terms = [heading(name, UNITS.get(term.unit, term.unit)) for name, term in terms_of(result).items()]
+    columns = [name if plants.batch is not None else f"{name} ratio" for name in plants.columns]
+    return csv_text(["check", "gains", *columns, heading("set point", unit.shown), *terms], rows)
 
 
 def record(result: TuningResult, command: str) -> dict[str, Any]:
@@ -300,7 +307,7 @@ def record(result: TuningResult, command: str) -> dict[str, Any]:
                 **{
                     when: {
                         term: {
-                            "unit": TERMS[term].unit,
+                            "unit": terms_of(result)[term].unit,
                             "median": _plain(result, term, np.median(one.seen.exact[which, :, column])),
                             "worst": _plain(result, term, np.max(one.seen.exact[which, :, column])),
                         }
@@ -312,7 +319,7 @@ def record(result: TuningResult, command: str) -> dict[str, Any]:
             for name, one in result.checks.items()
         },
         "integration_error": result.integration.record(),
-        "moves": _moves(result.moves),
+        "moves": _moves(result.moves, result.settings.unit),
         "search": {
             "closed_loops": result.simulations,
             "rounds": descent.round,
@@ -331,17 +338,17 @@ def record(result: TuningResult, command: str) -> dict[str, Any]:
     }
 
 
-def _moves(moves: Moves | None) -> dict[str, Any] | None:
+def _moves(moves: Moves | None, unit: str) -> dict[str, Any] | None:
     if moves is None:
         return None
     settled = np.where(np.isfinite(moves.settling_time), moves.settling_time, np.nan)
     return {
-        "set_points_deg": moves.asked.tolist(),
+        f"set_points_{unit}": moves.asked.tolist(),
         **{
             when: {
-                "overshoot_deg": moves.overshoot[k].tolist(),
+                f"overshoot_{unit}": moves.overshoot[k].tolist(),
                 "settling_time_s": settled[k].tolist(),
-                "steady_error_deg": moves.steady_error[k].tolist(),
+                f"steady_error_{unit}": moves.steady_error[k].tolist(),
             }
             for k, when in enumerate(("before", "after"))
         },

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter
 
 from smajax.control.tune.objective import rank
-from smajax.control.tune.terms import TERMS
+from smajax.control.tune.terms import TERMS, terms_in
 from smajax.control.tune.tuning import TuningResult
 from smajax.report.pictures import AFTER, BEFORE, MEASURED, QUIET, as_png, new_figure, tidy
 
@@ -16,7 +16,7 @@ COLUMNS = list(TERMS)
 
 
 def before_after(result: TuningResult, upright: bool = False) -> bytes:
-    """Angles over time with the preset's gains and with the tuned ones, and what was asked for over the set point.
+    """Positions over time with the preset's gains and with the tuned ones, and what was asked for over the set point.
 
     upright: one below the other, for a telephone.
     """
@@ -30,19 +30,19 @@ def before_after(result: TuningResult, upright: bool = False) -> bytes:
         top, bottom = np.asarray(figure.subfigures(2, 1, height_ratios=[1.15, 1.0]))
         left, right = top.subplots(1, 2, sharey=True)
         below = list(bottom.subplots(1, len(terms)))
-    lines = result.lines
+    lines, unit = result.lines, result.settings.shown
     alone = len(np.unique(lines.targets))
     for axes, angles, colour, name in (
         (left, lines.angles[0], BEFORE, "before: the preset's gains"),
         (right, lines.angles[1], AFTER, "after: tuned"),
     ):
         for target in np.unique(lines.targets):
-            axes.axhline(np.degrees(target), color=QUIET, linewidth=0.7, linestyle="--")
+            axes.axhline(unit.of(target), color=QUIET, linewidth=0.7, linestyle="--")
         for number, angle in enumerate(angles):
             believed = number < alone
             axes.plot(
                 lines.time,
-                np.degrees(angle),
+                unit.of(angle),
                 color=colour,
                 linewidth=1.5 if believed else 0.5,
                 alpha=1.0 if believed else 0.5,
@@ -51,7 +51,7 @@ def before_after(result: TuningResult, upright: bool = False) -> bytes:
         axes.set_xlabel("time (s)", fontsize=9)
         tidy(axes)
     for axes in (left, right) if upright else (left,):
-        axes.set_ylabel("arm angle (°)", fontsize=9)
+        axes.set_ylabel(unit.axis, fontsize=9)
     if len(lines.targets) > alone:
         right.plot([], [], color=MEASURED, linewidth=1.5, label="plant as believed")
         right.plot([], [], color=MEASURED, linewidth=0.5, label="plants never seen")
@@ -63,15 +63,19 @@ def before_after(result: TuningResult, upright: bool = False) -> bytes:
 
 def _over_set_points(axes: Axes, result: TuningResult, name: str) -> None:
     """A figure of merit, from its least to its largest over the plants at each set point; never settled at the top."""
-    term, column = TERMS[name], COLUMNS.index(name)
+    unit = result.settings.shown
+    term, column = terms_in(unit)[name], COLUMNS.index(name)
+    way = float(unit.of(np.ptp(result.lines.targets) or 10.0 * result.lines.targets[0]))
+    least = 1e-3 if unit.is_angle else 1e-3 * abs(way)
+    beside = 0.7 if unit.is_angle else 0.006 * abs(way)
     never = 2.0 * result.settings.seconds if name == "settling_time" else np.inf
     shown = [("tuned on", "s"), ("inside", "o")]
-    for which, (colour, label, shift) in enumerate(((BEFORE, "before", -0.7), (AFTER, "after", 0.7))):
+    for which, (colour, label, shift) in enumerate(((BEFORE, "before", -beside), (AFTER, "after", beside))):
         for check, marker in shown:
             one = result.checks[check]
             for target in np.unique(one.scenarios.targets):
                 values = one.seen.exact[which, one.scenarios.targets == target, column]
-                at = np.degrees(target) + shift
+                at = float(unit.of(target)) + shift
                 ends = np.where(values >= never, 1.08 * result.settings.seconds, values)
                 axes.plot([at, at], [ends.min(), ends.max()], color=colour, linewidth=1.4)
                 lost = bool((values >= never).any())
@@ -91,9 +95,9 @@ def _over_set_points(axes: Axes, result: TuningResult, name: str) -> None:
     if name in result.settings.limits:
         axes.axhline(result.settings.limits[name], color=MEASURED, linewidth=0.9, linestyle=":", label="limit")
     # Room above for the legend.
-    axes.set_ylim(0.0, 1.35 * max(axes.dataLim.y1, result.settings.limits.get(name, 0.0), 1e-3))
+    axes.set_ylim(0.0, 1.35 * max(axes.dataLim.y1, result.settings.limits.get(name, 0.0), least))
     axes.plot([], [], "o", color=QUIET, markerfacecolor="white", markersize=3.5, label="never seen")
-    axes.set_xlabel("set point (°)", fontsize=9)
+    axes.set_xlabel(f"set point ({unit.label})", fontsize=9)
     axes.set_title(f"{term.label} ({term.unit})", fontsize=9.5, loc="left")
     axes.legend(frameon=False, fontsize=7.5, loc="upper left", ncols=2)
     tidy(axes)

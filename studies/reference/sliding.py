@@ -12,7 +12,7 @@ Controller = Callable[[float, float, float, float, float, float, float], tuple[f
 
 def sliding_controller(gains: Any, target: float, period: float) -> Controller:
     """Eq. 4.44, 4.45 and a PI controller on the stress, from an object with the gains and the arm it believes in."""
-    arm = gains.arm
+    arm = gains.equation.load
     mass, link, length = (float(getattr(arm, name)) for name in ("payload_mass", "link_mass", "arm_length"))
     inertia = (mass + link / 3.0) * length**2
     spring = float(arm.spring_stiffness) * float(arm.spring_lever) ** 2

@@ -49,7 +49,7 @@ def on_heating_curve(system: System, position: Scalar, velocity: Scalar) -> Stat
     """The arm at an angle with a velocity; the wire carries its weight, on the heating curve of cold martensite."""
     load = system.load
     assert isinstance(load, AbstractMovingLoad)
-    rest = initial_state(system, system.drive.from_voltage(jnp.zeros(())))
+    rest = initial_state(system, system.drive.from_command(jnp.zeros(())))
     stress = load.resistance(position, jnp.zeros_like(position), {}) / (load.lever() * cross_section(system.wire))
     fraction = fraction_for(system, position, stress)
     one, zero = jnp.ones_like(position), jnp.zeros_like(position)

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 from matplotlib.figure import Figure
 
-from smajax.control.controllers.inverse_wire import moving_load
+from smajax.control.load_equation import moving_load
 from smajax.control.presets import printed_filter, quick_stress_sliding
 from smajax.core.parameters import set_parameters
 from smajax.model.rigs import arm

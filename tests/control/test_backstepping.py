@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from typing import Any
 
@@ -22,14 +21,13 @@ from smajax.control.controllers.inverse_wire import (
     strain_at_angle,
     stress_slopes,
     temperature_for,
-    torque_per_stress,
 )
+from smajax.control.load_equation import force_per_stress
 from smajax.control.measured_state import MeasuredState
-from smajax.control.presets import backstepping_one, backstepping_two, quick_stress_sliding
+from smajax.control.presets import backstepping_one, backstepping_two
 from smajax.control.reference import Reference, resting
 from smajax.core.parameters import get_parameters, set_parameters
 from smajax.model.load.arm import Arm
-from smajax.model.presets import dead_weight
 from smajax.model.wire.kinetics import austenite_left, martensite_left
 from smajax.model.wire.kinetics_terms import NO_TERMS
 from studies.source.backstepping_runs import on_heating_curve, plant, stacked
@@ -316,14 +314,8 @@ def test_without_h_0_the_set_point_is_held_and_with_h_0_the_arm_falls() -> None:
     wanted = Reference(target, jnp.zeros(()), jnp.zeros(()))
     load = PLANT.load
     assert isinstance(load, Arm)
-    held = load.resistance(target, jnp.zeros(()), {}) / torque_per_stress(PLANT)
+    held = load.resistance(target, jnp.zeros(()), {}) / force_per_stress(PLANT)
     for tuned in (ONE, TWO):
         np.testing.assert_allclose(tuned.stress_wanted(target, jnp.zeros(()), wanted), held)
         printed = set_parameters(tuned, {"rest_torque_share": 1.0})
         assert float(printed.stress_wanted(target, jnp.zeros(()), wanted)) == 0.0
-
-
-@pytest.mark.parametrize("preset", [backstepping_one, backstepping_two, quick_stress_sliding])
-def test_a_load_without_an_arm_is_refused(preset: Any) -> None:
-    with pytest.raises(ValueError, match="arm"):
-        preset(dataclasses.replace(PLANT, load=dead_weight()))

@@ -227,7 +227,7 @@ def test_the_jacobians_of_the_printed_filter_agree_with_differences_and_with_its
 
 def test_a_corrected_fraction_does_not_jump_back() -> None:
     """On a branch the curve is laid anew; a curve on which the wire turned back stays where it was."""
-    state = initial_state(ARM, ARM.drive.from_voltage(jnp.asarray(8.0)))
+    state = initial_state(ARM, ARM.drive.from_command(jnp.asarray(8.0)))
 
     @jax.jit
     def heated(state, volts, period, count):

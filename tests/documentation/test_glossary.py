@@ -64,6 +64,7 @@ PLAIN = set(
         "added",
         "after",
         "alone",
+        "around",
         "at",
         "average",
         "averaged",

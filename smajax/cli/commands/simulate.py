@@ -10,14 +10,19 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from smajax.cli import completion
-from smajax.cli.options import Finely, Json, Open, Overwrite, quantity, texts, tolerance_of, within
+from smajax.cli.options import Finely, Json, Noise, Open, Overwrite, quantity, texts, tolerance_of, within
 from smajax.cli.terminal import browse, command_line, console, resumable
 
 if TYPE_CHECKING:
     from smajax.control.run_request import LoopRequest, RunRequest, RunResult
 
 SHOWN = 7  # columns of a table of set points on a terminal
-OPTIONS = {"values": "--set", "mismatch": "--mismatch", "set_points": "--set-point"}  # part of a run -> its option
+OPTIONS = {
+    "values": "--set",
+    "mismatch": "--mismatch",
+    "set_points": "--set-point",
+    "noise": "'--noise'",
+}  # part of a run -> its option
 VALUES = "damping=+20%,wire_length='1 m'"
 
 
@@ -190,15 +195,19 @@ def simulate(
     dt: Annotated[float, quantity("time between samples", "s", above=0.0, like="5ms")] = 0.005,
     tolerance: Finely = "auto",
     gains: Annotated[
-        Path | None, typer.Option(help="gains.json of `smajax tune`: a closed loop of the arm by that controller")
+        Path | None, typer.Option(help="gains.json of `smajax tune`: a closed loop by that controller")
     ] = None,
     controller: Annotated[
-        str, typer.Option(help="a closed loop by this controller's preset gains", autocompletion=completion.controllers)
+        str,
+        typer.Option(
+            help="a closed loop by this controller's preset gains, scaled to the load",
+            autocompletion=completion.controllers,
+        ),
     ] = "",
     set_point: Annotated[
         str | None,
         typer.Option(
-            help="set points of the loop, each with its duration: 40deg:5s,10deg:5s, without units in deg and s, or a file"
+            help="set points of the loop, each with its duration: 40deg:5s,10deg:5s, without units in deg (mm of a length) and s, or a file"
         ),
     ] = None,
     mismatch: Annotated[
@@ -213,7 +222,7 @@ def simulate(
         str,
         typer.Option(help="`printed` or `model` filter; default: the true state", autocompletion=completion.estimators),
     ] = "",
-    noise: Annotated[float, quantity("noise of the angle's readings (1 sigma)", "deg", 0.0, 360.0)] = 0.0,
+    noise: Noise = "",
     period: Annotated[float, quantity("sample time of the controller, a multiple of --dt", "s")] = 0.01,
     delay: Annotated[int, typer.Option(callback=within(0), help="control periods until a command arrives")] = 0,
     seed: Annotated[int, typer.Option(help="of the noise")] = 0,
@@ -227,16 +236,18 @@ def simulate(
     json_out: Json = False,
     open_page: Open = False,
 ) -> None:
-    """Simulate a model once: a wire, a load and a drive with given inputs, or the arm under a controller.
+    """Simulate a model once: a wire, a load and a drive with given inputs, or under a controller.
 
     By default the model is the rotary arm of the source. Angles are given in deg; files are in SI with degC and rad.
 
     What can differ between the plant and the controller's model: inertia (inertia_ratio), damping, convection
     (convection_coefficient), ambient (ambient_temperature, in degC), payload (payload_mass), supply (amplifier_gain).
     +20% is 1.2 times the value that the controller assumes (of 20 degC: 24 degC), -50% half of it, and 20% of a variation
-    is both ways.
+    is both ways. Of another load than the arm: those of these that it has, and its other parameters by their names.
 
     Example:  smajax simulate flexinol_table_3_2 dead_weight flexinol_voltage --step 5V:8s,0V:8s --set convection_coefficient=80
+
+    Example:  smajax simulate flexinol_ht_500um bias_spring voltage --controller pid --set-point 5mm:30s,2mm:30s
 
     Example:  smajax simulate --gains tune/gains.json --set-point 40deg:5s,10deg:5s --mismatch damping=+20% --out loop
     """
@@ -256,7 +267,7 @@ def simulate(
     options.check(load)
     changed, finely = texts("--set", values, VALUES), tolerance_of(tolerance)
     request = RunRequest(wire, load, drive, law, changed, series, time, seconds, dt, finely)
-    loop = LoopRequest(controller, set_point or "", gains, perturbed, estimator, noise, period, delay, seed)
+    loop = LoopRequest(controller, set_point or "", gains, perturbed, estimator, noise or 0.0, period, delay, seed)
     request, result = _run(options, request, loop)
     command = command_line()
     title = f"{wire}, {load}, {drive}" + (f", {result.data.attrs['controller']}" if options.closed else "")

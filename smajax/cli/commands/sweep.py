@@ -1,4 +1,4 @@
-"""`smajax sweep`: robustness of the controllers of the arm."""
+"""`smajax sweep`: robustness of controllers on the arm or on any load."""
 
 from __future__ import annotations
 
@@ -12,29 +12,36 @@ from smajax.cli import completion
 from smajax.cli.options import (
     Finely,
     Json,
+    Noise,
     Open,
     Overwrite,
     alone,
+    noise_option,
     numbers,
     quantity,
+    refused,
     tolerance_of,
     understood,
     within,
 )
+from smajax.cli.plant_options import Changes, DriveName, LawName, LoadName, PlantOptions, WireName
 from smajax.cli.terminal import browse, command_line, console, resumable
 
 if TYPE_CHECKING:
     from smajax.control.sweep.run_sweep import SweepSettings
+    from smajax.model.system import System
 
-SET_POINTS, GAINS = "-40,-20,0,10,20,40,50,60,80", "0.5,0.7,1,1.4,2"
+SET_POINTS, FAST_AT, GAINS = "-40,-20,0,10,20,40,50,60,80", "-20,20,60", "0.5,0.7,1,1.4,2"  # of the arm
+FEW, MANY = 3, 6  # set points of another load, with --fast and without
 
 
 @dataclass(frozen=True)
 class _Options:
     """Options of `sweep` as typed, where more than one decides."""
 
+    plant: System
     controllers: str | None
-    over: str
+    over: str | None
     points: int | None
     set_points: str | None
     gain_files: tuple[Path, ...]
@@ -43,35 +50,41 @@ class _Options:
 
     def mismatches(self) -> tuple[str, str]:
         """Both names of --over, "" for the second where there is one alone. Raises typer.BadParameter."""
-        from smajax.control.mismatch import short_name
+        from smajax.control.mismatch import mismatches_of, short_name
         from smajax.control.sweep.grid import check_mismatches
 
-        first, _, second = (part.strip() for part in self.over.strip(" ,").partition(","))
-        if "=" in self.over:
+        there = tuple(mismatches_of(self.plant))
+        over = self.over or "convection," + ("damping" if "damping" in there else "ambient")
+        first, _, second = (part.strip() for part in over.strip(" ,").partition(","))
+        if "=" in over:
             raise typer.BadParameter(
-                f"names alone, as in `convection,damping`, not `{self.over}`: each goes from -50% to +100% in --points steps.",
+                f"names alone, as in `convection,damping`, not `{over}`: each goes from -50% to +100% in --points steps.",
                 param_hint="--over",
             )
         if not first or "," in second:
             raise typer.BadParameter(
-                f"one mismatch, or two with a comma between them, not `{self.over}`", param_hint="--over"
+                f"one mismatch, or two with a comma between them, not `{over}`", param_hint="--over"
             )
         first, second = short_name(first), short_name(second)
         try:
-            check_mismatches(first, second)
+            check_mismatches(first, second, there)
         except ValueError as error:
             raise typer.BadParameter(str(error), param_hint="--over") from None
         return first, second
 
-    def settings(self, seconds: float, estimator: str, noise: float, period: float, delay: int) -> SweepSettings:
+    def settings(self, seconds: float | None, estimator: str, noise: str, period: float, delay: int) -> SweepSettings:
         """Raises typer.BadParameter."""
         from smajax.control.gains_file import GainsFileError, read_gains
-        from smajax.control.presets import CONTROLLERS
+        from smajax.control.position_unit import default_set_points, unit_of
+        from smajax.control.presets import controllers_for
+        from smajax.control.scales import is_arm
         from smajax.control.sweep.run_sweep import SweepSettings
-        from smajax.model.rigs import arm
+        from smajax.control.tune.settings import seconds_for
 
+        with refused():
+            unit = unit_of(self.plant)
         try:
-            tuned = tuple(read_gains(path, arm()) for path in self.gain_files)
+            tuned = tuple(read_gains(path, self.plant) for path in self.gain_files)
         except GainsFileError as error:
             hint = (
                 " Ratios of the main gain are `--gain-ratios`."
@@ -81,20 +94,28 @@ class _Options:
             raise typer.BadParameter(f"{error}{hint}", param_hint="--gains") from None
         request = self.controllers or ",".join(dict.fromkeys(one.controller for one in tuned)) or "all"
         named = [part.strip() for part in request.split(",")]
-        set_points = self.set_points if self.set_points is not None else "-20,20,60" if self.fast else SET_POINTS
+        if self.set_points is not None:
+            set_points = numbers("--set-points", self.set_points, unit.shown)
+        elif is_arm(self.plant):
+            set_points = numbers("", FAST_AT if self.fast else SET_POINTS)
+        else:
+            set_points = default_set_points(self.plant, FEW if self.fast else MANY)
         ratios = self.gain_ratios if self.gain_ratios is not None else "1" if self.fast else GAINS
         return SweepSettings(
-            tuple(CONTROLLERS) if named == ["all"] else tuple(dict.fromkeys(part for part in named if part)),
+            tuple(controllers_for(self.plant))
+            if named == ["all"]
+            else tuple(dict.fromkeys(part for part in named if part)),
             *self.mismatches(),
             self.points or (3 if self.fast else 15),
-            numbers("--set-points", set_points, "deg"),
+            set_points,
             numbers("--gain-ratios", ratios),
-            seconds,
+            seconds_for(self.plant) if seconds is None else seconds,
             estimator=estimator,
-            noise=noise,
+            noise=noise_option(noise, unit),
             period=period,
             delay=delay,
             tuned=tuned,
+            unit=unit.shown,
         )
 
 
@@ -108,13 +129,18 @@ def sweep(
             autocompletion=completion.several_controllers,
         ),
     ] = None,
+    wire: WireName = "",
+    load: LoadName = "",
+    drive: DriveName = "",
+    law: LawName = "",
+    values: Changes = None,
     over: Annotated[
-        str,
+        str | None,
         typer.Option(
-            help="the two mismatches of the maps, or one of curves; names alone: each goes from -50% to +100%",
+            help="the two mismatches of the maps, or one of curves; names alone: each goes from -50% to +100%; default convection,damping",
             autocompletion=completion.mismatches,
         ),
-    ] = "convection,damping",
+    ] = None,
     points: Annotated[
         int | None,
         typer.Option(
@@ -123,7 +149,12 @@ def sweep(
         ),
     ] = None,
     set_points: Annotated[
-        str | None, typer.Option(help=f"with commas, {alone('deg')}; default -40,-20,0,10,20,40,50,60,80")
+        str | None,
+        typer.Option(
+            "--set-points",
+            "--set-point",
+            help=f"with commas, {alone('deg (mm of a length)')}; default -40,-20,0,10,20,40,50,60,80, or six over the stroke of another load",
+        ),
     ] = None,
     gains: Annotated[
         list[Path] | None,
@@ -132,12 +163,17 @@ def sweep(
     gain_ratios: Annotated[
         str | None, typer.Option(help="multiples of the controller's main gain; default 0.5,0.7,1,1.4,2")
     ] = None,
-    seconds: Annotated[float, quantity("length of each closed loop", "s", 0.1, 86_400.0)] = 10.0,
+    seconds: Annotated[
+        float | None,
+        quantity(
+            "length of each closed loop; default 10 s, longer of a wire that cools more slowly", "s", 0.1, 86_400.0
+        ),
+    ] = None,
     estimator: Annotated[
         str,
         typer.Option(help="`printed` or `model` filter; default: the true state", autocompletion=completion.estimators),
     ] = "",
-    noise: Annotated[float, quantity("noise of the angle's readings (1 sigma)", "deg", 0.0, 360.0)] = 0.0,
+    noise: Noise = "",
     period: Annotated[float, quantity("sample time of the controller, a multiple of 10 ms", "s")] = 0.01,
     delay: Annotated[int, typer.Option(callback=within(0), help="control periods until a command arrives")] = 0,
     tolerance: Finely = "auto",
@@ -154,43 +190,53 @@ def sweep(
     json_out: Json = False,
     open_page: Open = False,
 ) -> None:
-    """Run controllers of the arm on perturbed plants, and compare them on every set point.
+    """Run controllers on perturbed plants, and compare them on every set point.
+
+    By default on the arm of the source; with --wire, --load and --drive on any load that moves, where the gains are those of the
+    arm scaled to the load's stroke, force and time and to the drive's limit.
 
     After Ctrl-C the same command resumes with the controllers that are not finished.
 
     What can differ between the plant and the controller's model: inertia (inertia_ratio), damping, convection
     (convection_coefficient), ambient (ambient_temperature, in degC), payload (payload_mass), supply (amplifier_gain).
     +20% is 1.2 times the value that the controller assumes (of 20 degC: 24 degC), -50% half of it, and 20% of a variation
-    is both ways.
+    is both ways. Of another load than the arm: those of these that it has, and its other parameters by their names.
 
     Example:  smajax sweep --controllers pid,sld --over convection,ambient --out sweep
+
+    Example:  smajax sweep --wire flexinol_ht_500um --load bias_spring --drive voltage --set-point 5mm,10mm --fast
     """
     from smajax.core.runtime import prepare
 
     prepare(cores=True)
     from smajax.cli.progress_display import displayed
     from smajax.cli.result_folder import FolderTaken, claimed
+    from smajax.control.scales import is_arm
     from smajax.control.sweep.run_sweep import may_resume, sweep_controllers
-    from smajax.model.rigs import arm
+    from smajax.core.provenance import digest
     from smajax.report.sweep_folder import as_text, files_of, write_sweep
 
-    options = _Options(controllers, over, points, set_points, tuple(gains or ()), gain_ratios, fast)
+    plant = PlantOptions(wire, load, drive, law, values or []).system()
+    options = _Options(plant, controllers, over, points, set_points, tuple(gains or ()), gain_ratios, fast)
     settings = replace(options.settings(seconds, estimator, noise, period, delay), tolerance=tolerance_of(tolerance))
     for sentence in (
-        understood("Set points", set_points, settings.set_points, "deg"),
+        understood("Set points", set_points, settings.set_points, settings.unit),
         understood("Ratios of the main gain", gain_ratios, settings.gain_ratios),
     ):
         if sentence and not json_out:
             typer.echo(sentence, err=True)
+    request = settings.record()
+    if not is_arm(plant) or law or values:
+        request["plant"] = digest(plant)[:16]
     resume = "Finished controllers are cached: the same command resumes."
     try:
         with (
             resumable(resume, out, "finished/*.npz"),
-            claimed(out, "sweep", settings.record(), files_of(settings.controllers), overwrite, may_resume),
+            claimed(out, "sweep", request, files_of(settings.controllers), overwrite, may_resume),
             displayed(console(), hint=not json_out) as progress,
         ):
-            sweeps = sweep_controllers(arm(), settings, out, progress)
-            results = write_sweep(arm(), settings, sweeps, out, progress, command_line())
+            sweeps = sweep_controllers(plant, settings, out, progress)
+            results = write_sweep(plant, settings, sweeps, out, progress, command_line())
     except FolderTaken:
         raise
     except ValueError as error:

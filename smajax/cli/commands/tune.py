@@ -14,24 +14,30 @@ from smajax.cli.options import (
     UNMET,
     Finely,
     Json,
+    Noise,
     Open,
     Overwrite,
     alone,
+    noise_option,
     numbers,
     pairs,
     quantity,
+    refused,
     texts,
     tolerance_of,
     understood,
     within,
 )
+from smajax.cli.plant_options import Changes, DriveName, LawName, LoadName, PlantOptions, WireName
 from smajax.cli.terminal import browse, command_line, console, resumable
 
 if TYPE_CHECKING:
     from smajax.control.gains_file import Gains
     from smajax.control.tune.settings import TuneSettings
+    from smajax.model.system import System
 
-TUNED_AT = "-40,-20,0,20,40,60,85"
+TUNED_AT, FAST_AT = "-40,-20,0,20,40,60,85", "-20,20,60"  # of the arm
+FEW, MANY = 3, 6  # set points of another load, with --fast and without
 
 
 @dataclass(frozen=True)
@@ -55,15 +61,14 @@ class _Search:
         }
 
 
-def _initial_gains(start: Path | None, controller: str) -> Gains | None:
+def _initial_gains(start: Path | None, controller: str, plant: System) -> Gains | None:
     """Raises typer.BadParameter."""
     from smajax.control.gains_file import GainsFileError, read_gains
-    from smajax.model.rigs import arm
 
     if start is None:
         return None
     try:
-        gains = read_gains(start, arm())
+        gains = read_gains(start, plant)
         if gains.controller != controller:
             raise GainsFileError(f"gains file {start} is of {gains.controller}, not of {controller}.")
     except GainsFileError as error:
@@ -71,39 +76,39 @@ def _initial_gains(start: Path | None, controller: str) -> Gains | None:
     return gains
 
 
-def _variation(several: Sequence[str] | None) -> dict[str, float]:
+def _variation(several: Sequence[str] | None, plant: System) -> dict[str, float]:
     """Raises typer.BadParameter."""
     from smajax.control.mismatch import variation_of
+    from smajax.control.plants import plant_set
     from smajax.control.tune.scenarios import check_variation
 
     try:
         variation = variation_of(texts("--variation", several, "damping=20%,payload=50%"))
-        check_variation(variation)
+        check_variation(variation, plant_set(plant))
     except ValueError as error:
         raise typer.BadParameter(str(error), param_hint="--variation") from None
     return variation
 
 
-def _run(settings: TuneSettings, out: Path, overwrite: bool, json_out: bool) -> Mapping[str, Any]:
+def _run(plant: System, settings: TuneSettings, out: Path, overwrite: bool, json_out: bool) -> Mapping[str, Any]:
     """The record of the tuning, from the folder where it is finished there. Raises typer.BadParameter."""
     from smajax.cli.progress_display import displayed
     from smajax.cli.result_folder import FolderTaken, claimed
     from smajax.control.tune.tuning_folder import FILES, STATE, tune_in_folder
-    from smajax.model.rigs import arm
     from smajax.report.tune_folder import finished, write_tuning
 
     resume = "Finished rounds are cached: the same command resumes."
     request = {"tuning": settings.controller}  # the other settings are in a file of the tuning itself, which it checks
     try:
-        settings.check(arm())
+        settings.check(plant)
         with (
             resumable(resume, out, STATE),
             claimed(out, "tune", request, sorted(FILES), overwrite),
             displayed(console(), hint=not json_out) as progress,
         ):
-            record = finished(arm(), settings, out)
+            record = finished(plant, settings, out)
             if record is None:
-                record = write_tuning(tune_in_folder(arm(), settings, out, progress), out, command_line())
+                record = write_tuning(tune_in_folder(plant, settings, out, progress), out, command_line())
     except FolderTaken:
         raise
     except ValueError as error:
@@ -120,8 +125,18 @@ def tune(
             autocompletion=completion.controllers,
         ),
     ],
+    wire: WireName = "",
+    load: LoadName = "",
+    drive: DriveName = "",
+    law: LawName = "",
+    values: Changes = None,
     set_points: Annotated[
-        str | None, typer.Option(help=f"with commas, {alone('deg')}; default -40,-20,0,20,40,60,85")
+        str | None,
+        typer.Option(
+            "--set-points",
+            "--set-point",
+            help=f"with commas, {alone('deg (mm of a length)')}; default -40,-20,0,20,40,60,85, or six over the stroke of another load",
+        ),
     ] = None,
     variation: Annotated[
         list[str] | None,
@@ -138,14 +153,14 @@ def tune(
         list[str] | None,
         typer.Option(
             help="of tracking_error, overshoot, settling_time, steady_error, energy, chatter, peak_temperature; default "
-            "settling_time=1,overshoot=1,steady_error=2 (a second, a degree, half a degree)",
+            "settling_time=1,overshoot=1,steady_error=2 (a second, a degree, half a degree; of a length a hundredth of the stroke)",
             autocompletion=completion.terms,
         ),
     ] = None,
     limits: Annotated[
         list[str] | None,
         typer.Option(
-            help="of the same, met in every loop: settling_time=4,overshoot=2deg; without units in s, deg, J, V/s or degC",
+            help="of the same, met in every loop: settling_time=4,overshoot=2deg; without units in s, deg (mm), J, V/s or degC",
             autocompletion=completion.terms,
         ),
     ] = None,
@@ -164,12 +179,17 @@ def tune(
             help="generations of CMA-ES, without gradients, after that, 24 candidates each; default 60, 0 for none",
         ),
     ] = None,
-    seconds: Annotated[float, quantity("length of each closed loop", "s", 0.1, 86_400.0)] = 10.0,
+    seconds: Annotated[
+        float | None,
+        quantity(
+            "length of each closed loop; default 10 s, longer of a wire that cools more slowly", "s", 0.1, 86_400.0
+        ),
+    ] = None,
     estimator: Annotated[
         str,
         typer.Option(help="`printed` or `model` filter; default: the true state", autocompletion=completion.estimators),
     ] = "",
-    noise: Annotated[float, quantity("noise of the angle's readings (1 sigma)", "deg", 0.0, 360.0)] = 0.0,
+    noise: Noise = "",
     period: Annotated[float, quantity("sample time of the controller, a multiple of 10 ms", "s")] = 0.01,
     delay: Annotated[int, typer.Option(callback=within(0), help="control periods until a command arrives")] = 0,
     seed: Annotated[int, typer.Option(callback=within(0), help="of starting points, plants and noise")] = 0,
@@ -184,7 +204,10 @@ def tune(
     json_out: Json = False,
     open_page: Open = False,
 ) -> None:
-    """Tune the gains of a controller of the arm on many set points and plants at once: by gradient, then by CMA-ES.
+    """Tune the gains of a controller on many set points and plants at once: by gradient, then by CMA-ES.
+
+    By default on the arm of the source; with --wire, --load and --drive on any load that moves, where the gains and their bounds
+    are those of the arm scaled to the load's stroke, force and time and to the drive's limit.
 
     Each closed loop is one step from the start, cold and at rest. Moves between the set points are simulated at the end. The
     gains are validated on held-out plants and set points. `smajax sweep --gains tune/gains.json` reads them. Exit code 3 when
@@ -193,42 +216,58 @@ def tune(
     What can differ between the plant and the controller's model: inertia (inertia_ratio), damping, convection
     (convection_coefficient), ambient (ambient_temperature, in degC), payload (payload_mass), supply (amplifier_gain).
     +20% is 1.2 times the value that the controller assumes (of 20 degC: 24 degC), -50% half of it, and 20% of a variation
-    is both ways.
+    is both ways. Of another load than the arm: those of these that it has, and its other parameters by their names.
+
+    Example:  smajax tune pid --wire flexinol_table_3_2 --load dead_weight --drive flexinol_voltage --set-point 5mm,12mm,20mm
 
     Example:  smajax tune sld --variation inertia=20%,damping=20%,convection=20% --limits settling_time=4,overshoot=2
     """
     from smajax.core.runtime import prepare
 
     prepare(cores=True)
-    from smajax.control.tune.objective import REGULATION
-    from smajax.control.tune.settings import TuneSettings
-    from smajax.control.tune.terms import TERMS
+    from smajax.control.position_unit import default_set_points, unit_of
+    from smajax.control.scales import is_arm
+    from smajax.control.tune.settings import regulation_weights, seconds_for, settings_for
+    from smajax.control.tune.terms import terms_in
     from smajax.report.tune_page import gain_rows
 
-    initial = _initial_gains(start, controller)
-    units = {name: term.unit for name, term in TERMS.items()}
-    settings = TuneSettings(
+    plant = PlantOptions(wire, load, drive, law, values or []).system()
+    with refused():
+        unit = unit_of(plant)
+    initial = _initial_gains(start, controller, plant)
+    units = {name: term.unit for name, term in terms_in(unit).items()}
+    if set_points is None:
+        given = (
+            numbers("", FAST_AT if fast else TUNED_AT)
+            if is_arm(plant)
+            else default_set_points(plant, FEW if fast else MANY)
+        )
+    else:
+        given = numbers("--set-points", set_points, unit.shown)
+    effort: dict[str, Any] = _Search(starts, rounds, finish, fast).effort()
+    settings = settings_for(
+        plant,
         controller,
-        numbers("--set-points", set_points if set_points is not None else "-20,20,60" if fast else TUNED_AT, "deg"),
-        _variation(variation),
-        objective,
-        pairs("--weights", weights, {}, "settling_time=1,overshoot=1") or dict(REGULATION),
-        pairs("--limits", limits, units, "settling_time=4,overshoot=2deg"),
+        set_points=given,
+        variation=_variation(variation, plant),
+        objective=objective,
+        weights=pairs("--weights", weights, {}, "settling_time=1,overshoot=1") or regulation_weights(plant),
+        limits=pairs("--limits", limits, units, "settling_time=4,overshoot=2deg"),
         by=by,
-        seconds=seconds,
+        seconds=seconds_for(plant) if seconds is None else seconds,
         estimator=estimator,
-        noise=noise,
+        noise=noise_option(noise, unit),
         period=period,
         delay=delay,
         seed=seed,
         start={} if initial is None else initial.values,
         tolerance=tolerance_of(tolerance),
-        **_Search(starts, rounds, finish, fast).effort(),
+        **effort,
     )
-    sentence = understood("Set points", set_points, settings.set_points, "deg")
+    sentence = understood("Set points", set_points, settings.set_points, unit.shown)
     if sentence and not json_out:
         typer.echo(sentence, err=True)
-    record = _run(settings, out, overwrite, json_out)
+    record = _run(plant, settings, out, overwrite, json_out)
     page = out / "tune.html"
     for sentence in record["price"]:
         typer.echo(sentence, err=True)

@@ -1,10 +1,11 @@
-r"""Backstepping, approach I (Elahinia 2004, sec. 4.8.1): Khalil's procedure through the stress, without a temperature.
+r"""Backstepping, approach I (Elahinia 2004, sec. 4.8.1), of any moving load: Khalil's procedure through the stress.
 
-With $x_1 = \theta - \theta_d$ and $x_2 = \dot x_1$ (the source has $\theta_d = 0$):
+No temperature is measured. With $x_1 = \theta - \theta_d$, $x_2 = \dot x_1$ (the source has $\theta_d = 0$), the load's inertia I and
+resistance h, alpha = lever A_w (2 r A_w of the arm), K_0 = 1/s^2 in the source:
 
-    Phi   = (I/alpha) (-x_1 + h/I + theta_d'' - K x_2)     stress that makes x_1'' + K x_1' + x_1 = 0   (eq. 4.57)
+    Phi   = (I/alpha) (-K_0 x_1 + h/I + theta_d'' - K x_2)   stress that makes x_1'' + K x_1' + K_0 x_1 = 0   (eq. 4.57)
     z_1   = sigma - Phi,      u_1 = -(alpha/I) x_2 - k_1 z_1                                         (eq. 4.58, 4.65)
-    x_4'  = (u_1 + dPhi/dt + (2 r/l_0) E x_2) / Gamma      rate of the fraction with which z_1' = u_1   (eq. 4.66)
+    x_4'  = (u_1 + dPhi/dt + (lever/l_0) E x_2) / Gamma      rate of the fraction with which z_1' = u_1   (eq. 4.66)
     x_5   = temperature at which the wire has its fraction under its stress                           (eq. 4.67)
     U     = m c_p x_5' + h_c A_c (x_5 - T_inf)                                                       (eq. 4.68)
 
@@ -19,13 +20,13 @@ import jax.numpy as jnp
 
 from smajax.control.controllers.base import AbstractController
 from smajax.control.controllers.inverse_wire import (
-    moving_load,
     power_for,
+    strain_offset,
     stress_slopes,
     temperature_for,
-    torque_per_stress,
     voltage_for,
 )
+from smajax.control.load_equation import equation_of, force_per_stress
 from smajax.control.measured_state import MeasuredState
 from smajax.control.reference import Reference
 from smajax.core.parameters import parameter
@@ -53,7 +54,7 @@ class Asked(eqx.Module):
 
 
 class BacksteppingOne(AbstractController):
-    """Needs angle, rate, stress, its rate (a difference of two calls), the fraction, and the amplitudes xi_M and xi_A.
+    """Needs position, rate, stress, its rate (a difference of two calls), the fraction, and the amplitudes xi_M and xi_A.
 
     The curve changes with the sign of the wanted fraction's rate: there the voltage jumps and has no derivative.
     """
@@ -68,29 +69,35 @@ class BacksteppingOne(AbstractController):
     rest_torque_share: Scalar = parameter(
         "-", 0.0, 1.0, "share of h_0 taken off h: 1 as in eq. 4.70, which moves the equilibrium", default=0.0
     )
+    position_gain: Scalar = parameter(
+        "1/s^2", 0.0, 1e4, "weight of the error in the stress wanted: 1 as eq. 4.57 prints", default=1.0
+    )
     measured_rate_share: Scalar = parameter(
         "-", 0.0, 1.0, "1: the stress's rate as measured (sec. 4.8.2); 0: the rate that is wanted", default=1.0
     )
+
+    # The wire read backwards from the measured state (`inverse_wire.strain_offset`), for laws other than eq. 4.51.
+    anchored: bool = eqx.field(static=True, default=False)
 
     def start(self, measured: MeasuredState, wanted: Reference) -> BacksteppingOneMemory:
         return BacksteppingOneMemory(measured.stress, jnp.ones_like(measured.stress))
 
     def stress_wanted(self, position: Scalar, velocity: Scalar, wanted: Reference) -> Scalar:
         """Phi of eq. 4.57, Pa; never negative: a wire cannot push."""
-        load, inertia = moving_load(self.believed), self._inertia()
+        equation, inertia = equation_of(self.believed), self._inertia()
         off, off_rate = position - wanted.position, velocity - wanted.velocity
-        torque = load.resistance(position, velocity, {}) - self.rest_torque_share * load.resistance(
-            wanted.position, jnp.zeros_like(velocity), {}
+        torque = equation.resistance(position, velocity) - self.rest_torque_share * equation.resistance(
+            wanted.position, jnp.zeros_like(velocity)
         )
-        torque = torque + inertia * (wanted.acceleration - off - self.damping_gain * off_rate)
-        stress = torque / torque_per_stress(self.believed)
+        torque = torque + inertia * (wanted.acceleration - self.position_gain * off - self.damping_gain * off_rate)
+        stress = torque / force_per_stress(self.believed)
         return jnp.where(stress < 0.0, 0.0, stress)  # so that nan stays nan
 
     def asked(self, memory: BacksteppingOneMemory, measured: MeasuredState, wanted: Reference, period: Scalar) -> Asked:
         """From the state to the power."""
         believed, law = self.believed, self.believed.wire.kinetics
-        push = torque_per_stress(believed) / self._inertia()
-        resisting = moving_load(believed).resistance(measured.position, measured.velocity, {}) / self._inertia()
+        push = force_per_stress(believed) / self._inertia()
+        resisting = equation_of(believed).resistance(measured.position, measured.velocity) / self._inertia()
         acceleration = push * measured.stress - resisting
         moving = Reference(wanted.velocity, wanted.acceleration, jnp.zeros_like(wanted.acceleration))
         stress, stress_wanted_rate = jax.jvp(
@@ -102,7 +109,8 @@ class BacksteppingOne(AbstractController):
         # In pascals and radians the first term is next to nothing; it is there for the Lyapunov function of eq. 4.64.
         pull = -push * (measured.velocity - wanted.velocity) - self.stress_gain * error
         stress_rate = pull + stress_wanted_rate
-        per_fraction, per_radian = stress_slopes(believed, measured.position, measured.martensite_fraction)
+        offset = strain_offset(believed, measured) if self.anchored else 0.0
+        per_fraction, per_radian = stress_slopes(believed, measured.position, measured.martensite_fraction, offset)
         fraction_rate = (stress_rate - per_radian * measured.velocity) / per_fraction
         heating = (fraction_rate < 0.0) | ((fraction_rate == 0.0) & (memory.heating > 0.5))
         seen = (measured.stress - memory.stress) / period
@@ -127,4 +135,4 @@ class BacksteppingOne(AbstractController):
         return BacksteppingOneMemory(measured.stress, unlimited.heating), voltage
 
     def _inertia(self) -> Scalar:
-        return moving_load(self.believed).inertia({})
+        return equation_of(self.believed).inertia()

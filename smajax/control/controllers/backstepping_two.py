@@ -1,9 +1,10 @@
-r"""Backstepping, approach II (Elahinia 2004, sec. 4.8.2): angle -> stress -> fraction -> temperature -> voltage.
+r"""Backstepping, approach II (Elahinia 2004, sec. 4.8.2), of any moving load: position -> stress -> fraction -> temperature -> voltage.
 
-With $x_1 = \theta - \theta_d$ and $x_2 = \dot x_1$ (the source has $\theta_d = 0$):
+With $x_1 = \theta - \theta_d$, $x_2 = \dot x_1$ (the source has $\theta_d = 0$), the load's inertia I and resistance h,
+alpha = lever A_w (2 r A_w of the arm), K_0 = 1/s^2 in the source:
 
-    x_3 = (I/alpha) (-x_1 + h/I + theta_d'' - K x_2)     stress that makes x_1'' + K x_1' + x_1 = 0      (eq. 4.70)
-    x_4 = fraction with that stress at this angle                                                      (eq. 4.72)
+    x_3 = (I/alpha) (-K_0 x_1 + h/I + theta_d'' - K x_2)   stress that makes x_1'' + K x_1' + K_0 x_1 = 0  (eq. 4.70)
+    x_4 = fraction with that stress at this position                                                   (eq. 4.72)
     z   = T - Phi_1(x_3, x_4)                            temperature less the one with that fraction     (eq. 4.73-4.75)
     U   = m c_p (v + dPhi_1/dt) + h_c A_c (T - T_inf),   so that z' = v = -K_1 z                         (eq. 4.77-4.80)
 
@@ -19,12 +20,12 @@ import jax.numpy as jnp
 from smajax.control.controllers.base import AbstractController
 from smajax.control.controllers.inverse_wire import (
     fraction_for,
-    moving_load,
     power_for,
+    strain_offset,
     temperature_for,
-    torque_per_stress,
     voltage_for,
 )
+from smajax.control.load_equation import equation_of, force_per_stress
 from smajax.control.measured_state import MeasuredState
 from smajax.control.reference import Reference
 from smajax.core.parameters import parameter
@@ -52,7 +53,7 @@ class Asked(eqx.Module):
 
 
 class BacksteppingTwo(AbstractController):
-    """Needs angle, rate, temperature and the amplitudes xi_M and xi_A; `believed` is the plant as the controller knows it.
+    """Needs position, rate, temperature and the amplitudes xi_M and xi_A; `believed` is the plant as the controller knows it.
 
     The curve changes with the sign of the wanted fraction's rate: there the voltage jumps and has no derivative.
     """
@@ -67,6 +68,9 @@ class BacksteppingTwo(AbstractController):
     rest_torque_share: Scalar = parameter(
         "-", 0.0, 1.0, "share of h_0 taken off h: 1 as eq. 4.70 prints, which moves the equilibrium", default=0.0
     )
+    position_gain: Scalar = parameter(
+        "1/s^2", 0.0, 1e4, "weight of the error in the stress wanted: 1 as eq. 4.70 prints", default=1.0
+    )
     stress_share: Scalar = parameter(
         "-", 0.0, 1.0, "share of the stress error in the acceleration: 0 as eq. 4.76, 1 exact, with x_3", default=0.0
     )
@@ -79,26 +83,31 @@ class BacksteppingTwo(AbstractController):
         default=0.0,
     )
 
+    # The wire read backwards from the measured state (`inverse_wire.strain_offset`), for laws other than eq. 4.51.
+    anchored: bool = eqx.field(static=True, default=False)
+
     def start(self, measured: MeasuredState, wanted: Reference) -> BacksteppingTwoMemory:
         return BacksteppingTwoMemory(jnp.ones_like(measured.position))
 
     def stress_wanted(self, position: Scalar, velocity: Scalar, wanted: Reference) -> Scalar:
         """x_3 of eq. 4.70, Pa; never negative: a wire cannot push."""
-        load, inertia = moving_load(self.believed), self._inertia()
-        torque = load.resistance(position, velocity, {}) - self.rest_torque_share * load.resistance(
-            wanted.position, jnp.zeros_like(velocity), {}
+        equation, inertia = equation_of(self.believed), self._inertia()
+        torque = equation.resistance(position, velocity) - self.rest_torque_share * equation.resistance(
+            wanted.position, jnp.zeros_like(velocity)
         )
         torque = torque + inertia * self._acceleration(position, velocity, wanted)
-        stress = torque / torque_per_stress(self.believed)
+        stress = torque / force_per_stress(self.believed)
         return jnp.where(stress < 0.0, 0.0, stress)  # so that nan stays nan
 
     def asked(self, memory: BacksteppingTwoMemory, measured: MeasuredState, wanted: Reference) -> Asked:
         """From the state to the power."""
         believed, law = self.believed, self.believed.wire.kinetics
 
+        offset = strain_offset(believed, measured) if self.anchored else 0.0
+
         def stress_and_fraction(position: Scalar, velocity: Scalar, wanted: Reference) -> tuple[Scalar, Scalar]:
             stress = self.stress_wanted(position, velocity, wanted)
-            return stress, fraction_for(believed, position, stress)
+            return stress, fraction_for(believed, position, stress, offset)
 
         here = measured.position, measured.velocity, wanted
         moving = Reference(wanted.velocity, wanted.acceleration, jnp.zeros_like(wanted.acceleration))
@@ -108,7 +117,7 @@ class BacksteppingTwo(AbstractController):
         )
         # The curve follows the wish: an arm that the wire does not move yet shows no acceleration to go by.
         heating = (fraction_rate < 0.0) | ((fraction_rate == 0.0) & (memory.heating > 0.5))
-        push = torque_per_stress(believed) / self._inertia()
+        push = force_per_stress(believed) / self._inertia()
         missed = self.stress_share * push * (measured.stress - stress)
         still = jax.tree.map(jnp.zeros_like, moving)
         _, (stress_miss, fraction_miss) = jax.jvp(stress_and_fraction, here, (jnp.zeros_like(missed), missed, still))
@@ -137,9 +146,9 @@ class BacksteppingTwo(AbstractController):
         return BacksteppingTwoMemory(unlimited.heating), voltage
 
     def _inertia(self) -> Scalar:
-        return moving_load(self.believed).inertia({})
+        return equation_of(self.believed).inertia()
 
     def _acceleration(self, position: Scalar, velocity: Scalar, wanted: Reference) -> Scalar:
-        """theta'' that the stress wanted gives: theta_d'' - x_1 - K x_2."""
+        """theta'' that the stress wanted gives: theta_d'' - K_0 x_1 - K x_2."""
         off, off_rate = position - wanted.position, velocity - wanted.velocity
-        return wanted.acceleration - off - self.damping_gain * off_rate
+        return wanted.acceleration - self.position_gain * off - self.damping_gain * off_rate

@@ -1,7 +1,7 @@
 """The wire read backwards: angle and stress -> martensite fraction -> temperature, and power -> voltage (sec. 4.8).
 
 Of the `System` that a controller believes in: eq. 4.51 to 4.53, 4.72 to 4.74 and 4.69. Its effects, its thermal modulus
-and other forms of its stiffness are passed over, as the section passes them over.
+and other forms of its stiffness are passed over, as the section passes them over, or come in through `strain_offset`.
 """
 
 from __future__ import annotations
@@ -9,11 +9,12 @@ from __future__ import annotations
 import jax.numpy as jnp
 from jaxtyping import Array, Bool
 
+from smajax.control.load_equation import equation_of, force_per_stress, moving_load
+from smajax.control.measured_state import MeasuredState
 from smajax.core.limited import limited
-from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.system import System
 from smajax.model.types import Scalar
-from smajax.model.wire.heat import convection, cross_section, mass_per_metre
+from smajax.model.wire.heat import convection, mass_per_metre
 from smajax.model.wire.resistance import resistance_per_metre
 from smajax.model.wire.wire import Kinetics
 
@@ -23,17 +24,6 @@ SMALLEST_VOLTAGE = 1e-3  # V: below it the voltage falls in proportion to the po
 SMALLEST_ROOT = 1e-12  # of a discriminant, in units of (E_A eps_L)^2
 
 
-def moving_load(believed: System) -> AbstractMovingLoad:
-    """Its load, which the section needs to move."""
-    assert isinstance(believed.load, AbstractMovingLoad)
-    return believed.load
-
-
-def torque_per_stress(believed: System) -> Scalar:
-    """alpha = 2 r A_w, N m/Pa (below eq. 4.50)."""
-    return moving_load(believed).lever() * cross_section(believed.wire)
-
-
 def strain_at_angle(believed: System, position: Scalar) -> Scalar:
     r"""$\varepsilon = -2 r (\theta - \theta_0)/l_0 + \varepsilon_L + \sigma_0/E_M$, - (eq. 4.53).
 
@@ -41,28 +31,43 @@ def strain_at_angle(believed: System, position: Scalar) -> Scalar:
     """
     load, law = moving_load(believed), believed.wire.constitutive
     start = load.start()
-    at_rest = load.resistance(start, jnp.zeros_like(start), {}) / torque_per_stress(believed)
+    at_rest = equation_of(believed).resistance(start, jnp.zeros_like(start)) / force_per_stress(believed)
     elastic = jnp.where(at_rest > 0.0, at_rest, 0.0) / law.young_modulus_martensite
     return law.recoverable_strain + elastic - load.contraction(believed.wire) * (position - start)
 
 
-def stress_slopes(believed: System, position: Scalar, fraction: Scalar) -> tuple[Scalar, Scalar]:
+def strain_offset(believed: System, measured: MeasuredState) -> Scalar:
+    r"""By how much eq. 4.53 is off at a measured state, -: the strain of the position less $\sigma/E(\xi) + \varepsilon_L \xi$.
+
+    Zero of a wire of eq. 4.51. Of one with a thermal term, in rate form or with effects, what they add: with the strain
+    corrected by it, what is read backwards passes through the measured state, and only differences are those of eq. 4.51.
+    """
+    law = believed.wire.constitutive
+    softer = law.young_modulus_martensite - law.young_modulus_austenite
+    modulus = law.young_modulus_austenite + measured.martensite_fraction * softer
+    carried = measured.stress / modulus + law.recoverable_strain * measured.martensite_fraction
+    return strain_at_angle(believed, measured.position) - carried
+
+
+def stress_slopes(
+    believed: System, position: Scalar, fraction: Scalar, offset: Scalar | float = 0.0
+) -> tuple[Scalar, Scalar]:
     r"""(Gamma, $-2 r E(\xi)/l_0$): stress per fraction and per radian, Pa and Pa/rad (eq. 4.61)."""
     law = believed.wire.constitutive
     softer = law.young_modulus_martensite - law.young_modulus_austenite
     modulus = law.young_modulus_austenite + fraction * softer
-    elastic = strain_at_angle(believed, position) - law.recoverable_strain * fraction
+    elastic = strain_at_angle(believed, position) - offset - law.recoverable_strain * fraction
     per_fraction = softer * elastic - modulus * law.recoverable_strain
     return per_fraction, -moving_load(believed).contraction(believed.wire) * modulus
 
 
-def fraction_for(believed: System, position: Scalar, stress: Scalar) -> Scalar:
+def fraction_for(believed: System, position: Scalar, stress: Scalar, offset: Scalar | float = 0.0) -> Scalar:
     r"""Root of $[E_A + \xi (E_M - E_A)](\varepsilon - \varepsilon_L \xi) = \sigma$ in [0, 1] (eq. 4.72), -.
 
-    At the end that lies nearer where no fraction gives that stress.
+    offset: of the strain (`strain_offset`). At the end that lies nearer where no fraction gives that stress.
     """
     law = believed.wire.constitutive
-    strain = strain_at_angle(believed, position)
+    strain = strain_at_angle(believed, position) - offset
     softer = law.young_modulus_martensite - law.young_modulus_austenite
     scale = law.young_modulus_austenite * law.recoverable_strain
     # 0 = square xi^2 - line xi + constant; the smaller root, in the form that needs no square term.
@@ -111,11 +116,16 @@ def power_for(believed: System, temperature: Scalar, rate: Scalar) -> Scalar:
 
 
 def voltage_for(believed: System, power: Scalar, temperature: Scalar, fraction: Scalar, largest: Scalar) -> Scalar:
-    """V = sqrt(U R) (eq. 4.69) through the amplifier; nothing for a negative power (sec. 4.8.3), `largest` at most."""
+    """V = sqrt(U R) (eq. 4.69) through the amplifier; nothing for a negative power (sec. 4.8.3), `largest` at most.
+
+    Of a current source the current, of a power supply the power.
+    """
     wire, drive = believed.wire, believed.drive
     ohms = resistance_per_metre(wire, (), temperature, fraction)
-    at_one_volt = drive.power(ohms, wire.wire_length, drive.from_voltage(jnp.ones_like(power)))
-    squared = power / at_one_volt
+    at_one = drive.power(ohms, wire.wire_length, drive.from_command(jnp.ones_like(power)))
+    squared = power / at_one
+    if drive.command[1] == "W":
+        return limited(squared, 0.0, largest)
     large = squared > SMALLEST_VOLTAGE**2
     root = jnp.sqrt(jnp.where(large, squared, 1.0))
     return limited(jnp.where(large, root, squared / SMALLEST_VOLTAGE), 0.0, largest)

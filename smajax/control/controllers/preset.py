@@ -1,16 +1,24 @@
-"""A controller with its gains, as a sweep runs it and as tuning changes it."""
+"""A controller with its gains, as a sweep runs it and as tuning changes it, on the arm and on other plants."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import jax.numpy as jnp
 
 from smajax.control.controllers.base import AbstractController
+from smajax.control.load_equation import missing_for_equation, missing_for_stroke
+from smajax.control.scales import factors_for, is_arm, scaled
+from smajax.core.parameters import parameters
+from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.system import System
 from smajax.model.types import Scalar
 
 Box = Mapping[str, tuple[float, float]]  # gain -> its positive bounds; the box is searched by logarithm
 ANGLE, STATE = "angle", "angle, rate, stress, temperature, fraction"
+# What a controller is derived from, beside the reading: the load's equation of motion, or where its stroke ends.
+EQUATION, STROKE = "equation", "stroke"
 
 
 def _same(system: System) -> System:
@@ -19,12 +27,62 @@ def _same(system: System) -> System:
 
 @dataclass(frozen=True)
 class ControllerPreset:
-    """A controller by name: how it is made for a plant, and which of its gains are varied and tuned within which bounds."""
+    """A controller by name: how it is made for a plant, and which of its gains are varied and tuned within which bounds.
 
-    make: Callable[[System], AbstractController]  # of the system that the controller is to assume
+    Gains and bounds are the arm's; on another load `make` and `box_on` scale them (`control.scales`).
+    """
+
+    on_arm: Callable[
+        [System], AbstractController
+    ]  # of the system that the controller is to assume, with the arm's gains
     main_gain: str  # the gain that a sweep varies
     reads: str  # what it reads of the plant: ANGLE or STATE
     box: Box  # the gains that are tuned
-    plant: Callable[[System], System] = _same  # the plant that its section is written for
+    section: Callable[[System], System] = _same  # the arm that its section is written for
     # One that switches -> one with a derivative, of a width that goes to nothing.
     smoothed: Callable[[AbstractController, Scalar], AbstractController] | None = None
+    needs: str = ""  # EQUATION or STROKE of the load; "": the reading alone
+    # Its fields and parameters that are of the plant, and so are no gains.
+    known: frozenset[str] = frozenset({"believed", "equation"})
+    # Gain -> scale -> its power on another load (`control.scales`), in the place of what its unit says; of several the least.
+    scales: Mapping[str, Sequence[Mapping[str, int]]] = field(default_factory=dict)
+
+    def missing(self, system: System) -> str:
+        """What it needs and this plant does not give, in words; "" where it can be made."""
+        if not isinstance(system.load, AbstractMovingLoad):
+            return "it moves nothing that a controller could lead"
+        try:
+            system.drive.from_command(jnp.zeros(()))
+        except ValueError as error:
+            return str(error).rstrip(".")
+        lacking = missing_for_stroke(system)
+        return missing_for_equation(system) if self.needs == EQUATION and not lacking else lacking
+
+    def make(self, system: System) -> AbstractController:
+        """The controller of a plant that it is to assume. Raises ValueError where the plant does not give what it needs."""
+        if lacking := self.missing(system):
+            raise ValueError(f"no controller of a {type(system.load).__name__}: {lacking}.")
+        controller = self.on_arm(system)
+        return (
+            controller
+            if is_arm(system)
+            else scaled(controller, factors_for(system, controller, self.scales), self.known)
+        )
+
+    def plant(self, system: System) -> System:
+        """The plant that runs: an arm as the controller's section has it, any other load as it is."""
+        return self.section(system) if is_arm(system) else system
+
+    def box_on(self, system: System) -> Box:
+        """The bounds of its gains on a plant, to three digits."""
+        if is_arm(system):
+            return self.box
+        controller = self.on_arm(system)
+        factors, table = factors_for(system, controller, self.scales), parameters(controller)
+        return {
+            name: tuple(
+                max(float(f"{bound * float(factors[name]):.3g}"), table[name].low)
+                for bound in bounds  # type: ignore[misc]
+            )
+            for name, bounds in self.box.items()
+        }

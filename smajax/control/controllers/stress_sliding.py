@@ -1,11 +1,11 @@
-r"""Stress-based sliding control (Elahinia 2004, sec. 4.7): position error -> stress wanted -> voltage.
+r"""Stress-based sliding control (Elahinia 2004, sec. 4.7) of any moving load: position error -> stress wanted -> voltage.
 
 With $e = \theta - \theta_d$ and $s = \dot e + \lambda e$ (the source writes the error the other way round in eq. 4.42 and
-the derivative for this one in eq. 4.44) and eq. 3.8,
+the derivative for this one in eq. 4.44) and the load's equation of motion (eq. 3.8 of the arm),
 
-    tau_w = tau_g + tau_s + c theta' + I theta_d'' - I lambda e' - K sat(s / phi),      sigma_d = tau_w / (2 r A_w)    (eq. 4.44, 4.45)
+    tau_w = h(theta, theta') + I theta_d'' - I lambda e' - K sat(s / phi),      sigma_d = tau_w / (lever A_w)    (eq. 4.44, 4.45)
 
-and a PID controller on the stress sets the voltage.
+with the resistance h, the inertia I and the lever of whatever load it is (of the arm tau_g + tau_s + c theta' and 2 r), and a PID controller on the stress sets the voltage.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from smajax.control.controllers.base import AbstractController
+from smajax.control.load_equation import LoadEquation
 from smajax.control.measured_state import MeasuredState
 from smajax.control.reference import Reference
 from smajax.core.limited import limited
 from smajax.core.parameters import parameter
-from smajax.model.load.arm import Arm
 from smajax.model.types import Scalar
 
 
@@ -30,12 +30,12 @@ class StressSlidingMemory(eqx.Module):
 
 
 class StressSliding(AbstractController):
-    """Outer sliding surface on the angle, inner PID on the stress; `arm` is the arm that the controller believes in.
+    """Outer sliding surface on the position, inner PID on the stress; `equation` is that of the load that it believes in.
 
     Continuous in its gains, with a derivative but at the edges of the boundary layer and of the voltage.
     """
 
-    arm: Arm
+    equation: LoadEquation
     cross_section: Scalar = parameter("m^2", 1e-10, 1e-4, "A_w that the controller believes in")
     surface_slope: Scalar = parameter("1/s", 0.0, 1e3, "lambda: how fast the error dies out on the surface")
     gain: Scalar = parameter("N m", 0.0, 1e3, "K: torque added against the distance from the surface")
@@ -53,10 +53,10 @@ class StressSliding(AbstractController):
         """sigma_d, Pa (eq. 4.44, 4.45); never negative: a wire cannot push."""
         error, rate = measured.position - wanted.position, measured.velocity - wanted.velocity
         surface = limited((rate + self.surface_slope * error) / self.boundary, -1.0, 1.0)
-        inertia = self.arm.inertia({})
-        torque = self.arm.resistance(measured.position, measured.velocity, {}) + inertia * wanted.acceleration
+        inertia = self.equation.inertia()
+        torque = self.equation.resistance(measured.position, measured.velocity) + inertia * wanted.acceleration
         torque = torque - inertia * self.surface_slope * rate - self.gain * surface
-        stress = torque / (self.arm.lever() * self.cross_section)
+        stress = torque / (self.equation.lever() * self.cross_section)
         return jnp.where(stress < 0.0, 0.0, stress)  # so that nan stays nan
 
     def step(

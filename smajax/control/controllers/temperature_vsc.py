@@ -45,9 +45,6 @@ from smajax.core.limited import limited
 from smajax.core.parameters import parameter
 from smajax.model.types import Scalar
 
-# The line to the end of the transformation is no steeper than if this were left of the way.
-SHORTEST_WAY = 0.02  # rad
-
 
 class AbstractBand(eqx.Module):
     """When the temperature is controlled."""
@@ -94,6 +91,9 @@ class TemperatureVsc(AbstractController):
     finish_temperature: Scalar = parameter("degC", -100.0, 400.0, "A_f at zero stress that the controller believes in")
     stress_slope: Scalar = parameter("Pa/K", 1e6, 1e8, "C_A that it believes in")
     finish_position: Scalar = parameter("rad", -7.0, 7.0, "theta_f: where all is austenite")
+    shortest_way: Scalar = parameter(
+        "rad", 1e-9, 7.0, "the line to theta_f is no steeper than if this were left of the way", default=0.02
+    )
 
     def finish(self, measured: MeasuredState) -> Scalar:
         """A_f', C (eq. 4.35)."""
@@ -102,7 +102,7 @@ class TemperatureVsc(AbstractController):
     def temperature_wanted(self, measured: MeasuredState, wanted: Reference) -> Scalar:
         """T_d, C."""
         left = self.finish_position - measured.position
-        way = jnp.where(left < SHORTEST_WAY, SHORTEST_WAY, left)
+        way = jnp.where(left < self.shortest_way, self.shortest_way, left)
         share = (wanted.position - measured.position) / way
         return measured.temperature + share * (self.finish(measured) - measured.temperature)
 

@@ -54,7 +54,7 @@ def with_correction(system: System, state: State, vector: Corrected, transformin
 def advanced(system: System, state: State, voltage: Scalar, period: Scalar, substeps: int) -> State:
     """The simulator's own steps through one period with `voltage` held."""
     refuse_lag(system, "a filter")
-    inputs = system.drive.from_voltage(voltage)
+    inputs = system.drive.from_command(voltage)
     for _ in range(substeps):
         state = step(system, state, inputs, period / substeps)
     return state

@@ -58,7 +58,7 @@ class ModelFilter(AbstractEstimator):
     substeps: int = eqx.field(static=True, default=1)
 
     def start(self, reading: Scalar) -> tuple[ModelFilterMemory, MeasuredState]:
-        rest = initial_state(self.system, self.system.drive.from_voltage(jnp.zeros_like(reading)))
+        rest = initial_state(self.system, self.system.drive.from_command(jnp.zeros_like(reading)))
         # Strain and stress count from the rest at ambient temperature also where the wire is believed to be warm.
         believed = vector_of(rest).at[2].set(self.start_temperature)
         errors = [self.start_position_error, self.start_velocity_error, self.start_temperature_error]

@@ -128,7 +128,7 @@ class PrintedFilter(AbstractEstimator):
         stress = torque / (load.lever() * cross_section(wire))
         fraction = coupon.wire.martensite_fraction
         ohms = resistance_per_metre(wire, terms.resistance, temperature, fraction)
-        power = heating_power(self.system, ohms, self.system.drive.from_voltage(voltage))
+        power = heating_power(self.system, ohms, self.system.drive.from_command(voltage))
         ambient = ambient_temperature(self.system, coupon.time, {})
         at = HeatState(temperature, ambient, fraction, coupon.time, coupon.wire, period)
         warming = heat_rate(wire, terms.heat, at, power)

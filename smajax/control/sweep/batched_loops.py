@@ -18,8 +18,7 @@ from smajax.control.closed_loop import ClosedLoopSetup, stored_loop
 from smajax.control.controllers.base import AbstractController
 from smajax.control.figures_of_merit import Merit, evaluated_loop
 from smajax.control.interface import Interface
-from smajax.control.mismatch import MISMATCHES
-from smajax.control.perturbed_plant import perturbed_plant
+from smajax.control.perturbed_plant import OF_ARM, Perturbation, perturbed_plant
 from smajax.control.reference import clock, constant
 from smajax.core.parameters import get_parameters, set_vector
 from smajax.core.progress import Progress, Stage, quiet
@@ -36,7 +35,7 @@ from smajax.simulation.integration_error import (
 )
 from smajax.simulation.steppers import ONE_STEP, Integration
 
-# Names of a batch's axes, beside those of `MISMATCHES`.
+# Names of a batch's axes, beside the columns of a `Perturbation`.
 TARGET, GAIN, NUMBER = "set point", "share of the gain", "number"
 CHUNK = 1024  # loops between two reports of progress
 MEASURED = 16  # loops on which the error of the integration is measured
@@ -56,6 +55,7 @@ class LoopSetup:
     interface: Interface = IDEAL_INTERFACE
     seed: int = 0
     integration: Integration = ONE_STEP  # how finely between two samples
+    perturbation: Perturbation = OF_ARM  # what the first columns of the rows change of the plant
 
 
 class Outcome(NamedTuple):
@@ -75,6 +75,7 @@ class _Setup(eqx.Module):
     key: jax.Array
     integration: Integration
     main_gain: str = eqx.field(static=True)
+    perturbation: Perturbation = eqx.field(static=True)
 
 
 def _loop(setup: _Setup, values: dict[str, Scalar]) -> ClosedLoopSetup:
@@ -82,7 +83,7 @@ def _loop(setup: _Setup, values: dict[str, Scalar]) -> ClosedLoopSetup:
     gain = get_parameters(setup.controller, [setup.main_gain]) * values[GAIN]
     interface = setup.interface.settings(setup.time[1] - setup.time[0], setup.key, values[NUMBER])
     controller = set_vector(setup.controller, [setup.main_gain], gain)
-    plant = perturbed_plant(setup.system, values)
+    plant = perturbed_plant(setup.system, values, setup.perturbation)
     wanted = constant(setup.time, values[TARGET])
     return ClosedLoopSetup(plant, controller, wanted, integration=setup.integration, **interface)
 
@@ -98,8 +99,9 @@ def _position(setup: _Setup, values: dict[str, Scalar]) -> dict[str, Any]:
 
 def _run(function: Function, setup: LoopSetup, rows: np.ndarray, progress: Progress) -> Any:
     time, key = clock(setup.seconds, setup.dt), jax.random.key(setup.seed)
-    common = _Setup(setup.system, setup.controller, time, setup.interface, key, setup.integration, setup.main_gain)
-    columns = dict(zip((*MISMATCHES, TARGET, GAIN), rows.T, strict=True))
+    fixed = (setup.main_gain, setup.perturbation)
+    common = _Setup(setup.system, setup.controller, time, setup.interface, key, setup.integration, *fixed)
+    columns = dict(zip((*setup.perturbation.columns, TARGET, GAIN), rows.T, strict=True))
     axes = zipped({**columns, NUMBER: np.arange(len(rows))})
     count = -(-len(rows) // CHUNK)
     results = []

@@ -2,38 +2,46 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from smajax.control.mismatch import MISMATCHES
+from smajax.control.plants import PlantSet
 from smajax.core.names import close_matches
 
+PLANT = "plant"  # the axis of a batch of plants
+OF_ARM = PlantSet()
 LEAST, MOST = 0.5, 2.0  # ratios of a perturbed parameter to its assumed value
 
 
 def loop_rows(
-    mismatches: Mapping[str, np.ndarray | float], target: np.ndarray | float, gain: np.ndarray | float = 1.0
+    mismatches: Mapping[str, np.ndarray | float],
+    target: np.ndarray | float,
+    gain: np.ndarray | float = 1.0,
+    plants: PlantSet = OF_ARM,
 ) -> np.ndarray:
-    """One row a closed loop, (L, mismatches + 2): every ratio (1 by default), set point (rad), ratio of the main gain.
+    """One row a closed loop, (L, columns + 2): every ratio (1 by default), set point (rad, m), ratio of the main gain.
+
+    Of a batch of plants the columns are values of parameters.
 
     Raises ValueError for the name of a mismatch that does not exist.
     """
-    unknown = [name for name in mismatches if name not in MISMATCHES]
+    unknown = [name for name in mismatches if name not in plants.columns]
     if unknown:
-        raise ValueError(f"no mismatch `{', '.join(unknown)}`; there are {', '.join(sorted(MISMATCHES))}.")
-    columns = [mismatches.get(name, 1.0) for name in MISMATCHES]
+        raise ValueError(f"no mismatch `{', '.join(unknown)}`; there are {', '.join(sorted(plants.columns))}.")
+    columns = [mismatches.get(name, nominal) for name, nominal in zip(plants.columns, plants.nominal, strict=True)]
     return np.stack([np.ravel(column) for column in np.broadcast_arrays(*columns, target, gain)], axis=1)
 
 
-def check_mismatches(first: str, second: str) -> None:
+def check_mismatches(first: str, second: str, known: Sequence[str] = tuple(MISMATCHES)) -> None:
     """Raise ValueError for an unknown mismatch, or twice the same; `second` is "" for a sweep over the first alone."""
     for name in (first, second) if second else (first,):
-        if name not in MISMATCHES:
-            raise ValueError(f"no mismatch `{name}`{close_matches(name, MISMATCHES, 'there are')}.")
+        if name not in known:
+            raise ValueError(f"no mismatch `{name}`{close_matches(name, known, 'there are')}.")
     if first == second:
-        raise ValueError(f"`{first}` twice, expected one mismatch or two different ones of {', '.join(MISMATCHES)}.")
+        raise ValueError(f"`{first}` twice, expected one mismatch or two different ones of {', '.join(known)}.")
 
 
 def sweep_ratios(points: int) -> np.ndarray:
@@ -43,19 +51,31 @@ def sweep_ratios(points: int) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Grid:
-    """The product of one or two mismatches (plant over assumed value), set points (rad) and ratios of the main gain.
+    """The product of one or two mismatches (plant over assumed value), set points (rad, m) and ratios of the main gain.
 
-    Raises ValueError for an unknown mismatch, or twice the same.
+    Of a batch of plants, its plants in the place of the mismatches: `PLANT` is the first, its numbers are the ratios. Raises ValueError for an unknown mismatch, or twice the same.
     """
 
     first: str
     second: str  # "": the first alone
     ratios: np.ndarray  # (A,), for both
-    targets: np.ndarray  # (S,), rad
+    targets: np.ndarray  # (S,), rad or m
     gains: np.ndarray  # (G,), times the preset's main gain
+    plants: PlantSet = OF_ARM
 
     def __post_init__(self) -> None:
-        check_mismatches(self.first, self.second)
+        if self.plants.batch is None:
+            check_mismatches(self.first, self.second, self.plants.columns)
+
+    @property
+    def numbered(self) -> bool:
+        """Whether the first axis counts plants of a batch."""
+        return self.plants.batch is not None
+
+    @property
+    def axis_names(self) -> tuple[str, ...]:
+        """Of the first axes in tables: `damping_ratio`, or `plant`."""
+        return (PLANT,) if self.numbered else tuple(f"{name}_ratio" for name in self.mismatches)
 
     @property
     def mismatches(self) -> tuple[str, ...]:
@@ -82,4 +102,8 @@ class Grid:
     def rows(self) -> np.ndarray:
         """`loop_rows` of the whole grid."""
         *ratios, target, gain = self.axes()
-        return loop_rows(dict(zip(self.mismatches, ratios, strict=False)), target, gain)
+        if self.plants.batch is not None:
+            which = ratios[0].astype(int) - 1
+            values = {name: self.plants.batch[which, k] for k, name in enumerate(self.plants.columns)}
+            return loop_rows(values, target, gain, self.plants)
+        return loop_rows(dict(zip(self.mismatches, ratios, strict=False)), target, gain, self.plants)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,11 +15,13 @@ from smajax.control.figures_of_merit import Merit
 from smajax.control.gains_file import Gains
 from smajax.control.interface import between_in_words, check_interface, check_set_points, interface_of
 from smajax.control.mismatch import MISMATCHES
-from smajax.control.presets import CONTROLLERS
+from smajax.control.plants import Plants, PlantSet, carrying, plant_set
+from smajax.control.position_unit import PositionUnit, check_unit, unit_named, unit_of
+from smajax.control.presets import CONTROLLERS, check_controller
+from smajax.control.scales import is_arm
 from smajax.control.sweep.batched_loops import LoopSetup, closed_loops, integrated_setup, positions
-from smajax.control.sweep.grid import Grid, loop_rows, sweep_ratios
+from smajax.control.sweep.grid import OF_ARM, PLANT, Grid, loop_rows, sweep_ratios
 from smajax.core.files import json_line, writing
-from smajax.core.names import close_matches
 from smajax.core.parameters import get_parameters
 from smajax.core.progress import Event, Progress, Stage, quiet
 from smajax.core.provenance import digest
@@ -28,14 +30,14 @@ from smajax.model.system import System
 from smajax.simulation.integration_error import AUTO, Tolerance
 
 LINES = (0.5, 0.8, 1.0, 1.25, 2.0)  # ratios of which the angle over time is stored
-LINE_TARGET = 40.0  # deg
+LINE_TARGET = 40.0  # deg, of the arm
 CACHED = f"finished/*-{'[0-9a-f]' * 16}.npz"  # files of the cache, below the folder of the sweep
 FIELDS = tuple(field.name for field in dataclasses.fields(Merit))
 
 
 @dataclass(frozen=True)
 class SweepSettings:
-    """A sweep; angles in degrees."""
+    """A sweep; set points and noise in `unit`: degrees of an angle, millimetres of a length."""
 
     controllers: tuple[str, ...]
     first: str = "convection"
@@ -46,17 +48,24 @@ class SweepSettings:
     seconds: float = 10.0
     dt: float = 0.01
     estimator: str = ""  # the filter that estimates the state; "": the controllers get the true state
-    noise: float = 0.0  # degrees, standard deviation of the angle's readings
+    noise: float = 0.0  # standard deviation of the readings
     period: float = 0.01  # s, sample time of the controller, a whole number of `dt`
     delay: int = 0  # control periods until a command reaches the amplifier
     tuned: tuple[Gains, ...] = ()  # in place of the presets'
     tolerance: Tolerance = AUTO  # as `run_batch`'s; None is one step a sample
+    unit: str = "deg"  # of set points and noise, as `position_unit.unit_of` the plant
 
     @property
     def grid(self) -> Grid:
-        """Raises ValueError as `Grid` does."""
-        targets = np.radians(self.set_points)
-        return Grid(self.first, self.second, sweep_ratios(self.points), targets, np.asarray(self.gain_ratios))
+        """On the arm. Raises ValueError as `Grid` does."""
+        return self.grid_on(OF_ARM)
+
+    def grid_on(self, plants: PlantSet) -> Grid:
+        """On the mismatches of a plant or a batch of plants. Raises ValueError as `Grid` does."""
+        targets, gains = unit_named(self.unit).to_own(self.set_points), np.asarray(self.gain_ratios)
+        if plants.batch is not None:
+            return Grid(PLANT, "", 1.0 + np.arange(len(plants.batch)), targets, gains, plants)
+        return Grid(self.first, self.second, sweep_ratios(self.points), targets, gains, plants)
 
     def record(self) -> dict[str, Any]:
         """For JSON."""
@@ -66,16 +75,16 @@ class SweepSettings:
     def between(self) -> str:
         """The interface between plant and controller, in words."""
         files = ", ".join(f"{one.controller} has gains from a file" for one in self.tuned)
-        words = between_in_words(self.estimator, self.noise, self.period, self.delay)
+        words = between_in_words(self.estimator, self.noise, self.period, self.delay, unit_named(self.unit))
         return f"{words} {files}." if files else words
 
-    def check(self, system: System) -> None:
-        """Raise ValueError for names that do not exist and values that make no sense."""
+    def check(self, system: System, plants: Plants | None = None) -> PlantSet:
+        """The plants, if all is well: ValueError for names that do not exist and values that make no sense."""
         for name in self.controllers:
-            if name not in CONTROLLERS:
-                raise ValueError(f"no controller `{name}`{close_matches(name, CONTROLLERS, 'there are')}.")
+            check_controller(name, system)
         if not self.controllers:
             raise ValueError(f"no controller is named, expected some of {', '.join(CONTROLLERS)}.")
+        check_unit(system, unit_named(self.unit, unit_of(system).command))
         check_set_points(system, self.set_points)
         if not self.gain_ratios or min(self.gain_ratios) <= 0.0:
             raise ValueError(
@@ -87,7 +96,9 @@ class SweepSettings:
             raise ValueError(
                 f"gains are given for {', '.join(unused)}, and only {', '.join(self.controllers)} are swept."
             )
-        _ = self.grid  # it checks itself
+        found = plant_set(system, plants)
+        _ = self.grid_on(found)  # it checks itself
+        return found
 
 
 @dataclass(frozen=True)
@@ -98,7 +109,7 @@ class ControllerSweep:
     main_gain: str
     merits: Merit  # arrays of the grid's shape
     failed_at: np.ndarray  # s, of the grid's shape; infinity where no loop failed
-    lines: Mapping[str, np.ndarray]  # mismatch -> (len(LINES), time), rad, at the set point LINE_TARGET
+    lines: Mapping[str, np.ndarray]  # mismatch -> (len(LINES), time), rad or m, at `line_target`; of a batch: none
     nominal: Merit  # of the unperturbed plant, arrays (set points,)
     integration_error: Mapping[str, Any]  # what the integration leaves in the positions, as `IntegrationError.record`
 
@@ -110,6 +121,17 @@ class SweepResults:
     settings: SweepSettings
     sweeps: tuple[ControllerSweep, ...]
     air: float
+    plants: PlantSet = OF_ARM
+
+    @property
+    def grid(self) -> Grid:
+        """Of its loops."""
+        return self.settings.grid_on(self.plants)
+
+    @property
+    def unit(self) -> PositionUnit:
+        """Of angles or lengths, as shown."""
+        return self.plants.unit
 
     @property
     def nominal(self) -> dict[str, Merit]:
@@ -120,6 +142,13 @@ class SweepResults:
 def assumed_air(system: System) -> float:
     """The air's temperature that controllers assume, degC."""
     return float(get_parameters(system, [MISMATCHES["ambient"]])[0])
+
+
+def line_target(system: System, grid: Grid) -> float:
+    """The set point (rad, m) of the lines: 40 degrees of the arm, of another load the middle one of the sweep's."""
+    if is_arm(system):
+        return float(np.radians(LINE_TARGET))
+    return float(np.sort(grid.targets)[len(grid.targets) // 2])
 
 
 def may_resume(before: Mapping[str, Any], now: Mapping[str, Any]) -> bool:
@@ -135,27 +164,37 @@ def may_resume(before: Mapping[str, Any], now: Mapping[str, Any]) -> bool:
 
 
 def sweep_controllers(
-    system: System, settings: SweepSettings, folder: Path | None = None, progress: Progress = quiet
+    system: System,
+    settings: SweepSettings,
+    folder: Path | None = None,
+    progress: Progress = quiet,
+    plants: Plants | None = None,
 ) -> Iterator[ControllerSweep]:
     """The controllers one after the other; `folder` has the cache of those that are finished (`CACHED`).
 
-    Raises ValueError as `SweepSettings.check`.
+    system: any load that moves, which the controllers assume. plants: a batch of plants (`plants.Plants`), such as draws from a
+    posterior, in the place of mismatches. Raises ValueError as `SweepSettings.check`.
     """
-    settings.check(system)
-    return (_sweep(system, name, settings, folder, progress) for name in settings.controllers)
+    found, system = settings.check(system, plants), carrying(system, plants)
+    return (_sweep(system, name, settings, found, folder, progress) for name in settings.controllers)
 
 
 def _sweep(
-    system: System, name: str, settings: SweepSettings, folder: Path | None, progress: Progress
+    system: System,
+    name: str,
+    settings: SweepSettings,
+    plants: PlantSet,
+    folder: Path | None,
+    progress: Progress,
 ) -> ControllerSweep:
     preset = CONTROLLERS[name]
     plant = preset.plant(system)
     tuned = tuple(gains for gains in settings.tuned if gains.controller == name)
-    key = digest(plant, [str(dataclasses.replace(settings, controllers=(name,), tuned=tuned))])[:16]
+    key = digest(plant, [str(dataclasses.replace(settings, controllers=(name,), tuned=tuned)), *plants.marks])[:16]
     file = None if folder is None else folder / "finished" / f"{name}-{key}.npz"
     saved: dict[str, Any] | None = None if file is None else arrays(file)
     if saved is None:
-        saved = _computed(plant, name, settings, progress)
+        saved = _computed(plant, name, settings, plants, progress)
         if file is not None:
             file.parent.mkdir(parents=True, exist_ok=True)
             with writing(file) as stream:
@@ -165,19 +204,26 @@ def _sweep(
         preset.main_gain,
         Merit(**{field: saved[f"grid_{field}"] for field in FIELDS}),
         saved["failed"],
-        {mismatch: saved[f"line_{mismatch}"] for mismatch in MISMATCHES},
+        {mismatch: saved[f"line_{mismatch}"] for mismatch in _lined(plants)},
         Merit(**{field: saved[f"nominal_{field}"] for field in FIELDS}),
         json.loads(str(saved["integration_error"])),
     )
 
 
-def _computed(plant: System, name: str, settings: SweepSettings, progress: Progress) -> dict[str, Any]:
+def _lined(plants: PlantSet) -> tuple[str, ...]:
+    """The mismatches of the lines."""
+    return plants.columns if plants.batch is None else ()
+
+
+def _computed(
+    plant: System, name: str, settings: SweepSettings, plants: PlantSet, progress: Progress
+) -> dict[str, Any]:
     """Arrays by name: the grid, the unperturbed plant at every set point, and the lines."""
 
     def relabelled(event: Event) -> None:
         progress(dataclasses.replace(event, name=f"sweeping {name}") if isinstance(event, Stage) else event)
 
-    preset, grid = CONTROLLERS[name], settings.grid
+    preset, grid, lined = CONTROLLERS[name], settings.grid_on(plants), _lined(plants)
     tuned = [gains for gains in settings.tuned if gains.controller == name]
     setup = LoopSetup(
         plant,
@@ -186,18 +232,21 @@ def _computed(plant: System, name: str, settings: SweepSettings, progress: Progr
         settings.seconds,
         settings.dt,
         interface_of(plant, settings.estimator, settings.noise, settings.period, settings.dt, settings.delay),
+        perturbation=plants.perturbation,
     )
     # One batch, one program.
-    whole = np.concatenate([grid.rows(), loop_rows({}, grid.targets)])
+    whole = np.concatenate([grid.rows(), loop_rows({}, grid.targets, plants=plants)])
     setup, error = integrated_setup(setup, whole, settings.tolerance)
     outcome = closed_loops(setup, whole, relabelled)
-    target = float(np.radians(LINE_TARGET))
-    rows = np.concatenate([loop_rows({one: np.asarray(LINES)}, target) for one in MISMATCHES])
-    angles = positions(setup, rows).reshape(len(MISMATCHES), len(LINES), -1)
+    angles: Sequence[np.ndarray] = ()
+    if lined:
+        target = line_target(plant, grid)
+        rows = np.concatenate([loop_rows({one: np.asarray(LINES)}, target, plants=plants) for one in lined])
+        angles = list(positions(setup, rows).reshape(len(lined), len(LINES), -1))
     inside, nominal = slice(grid.size), grid.size + np.arange(len(grid.targets))
     result: dict[str, Any] = {"failed": outcome.failed_at[inside].reshape(grid.shape)}
     result["integration_error"] = np.asarray(json_line(error.record()))
     for field in FIELDS:
         values = np.asarray(getattr(outcome.merits, field))
         result[f"grid_{field}"], result[f"nominal_{field}"] = values[inside].reshape(grid.shape), values[nominal]
-    return result | {f"line_{mismatch}": line for mismatch, line in zip(MISMATCHES, angles, strict=True)}
+    return result | {f"line_{mismatch}": line for mismatch, line in zip(lined, angles, strict=True)}

@@ -20,12 +20,14 @@ from smajax.control.controllers.base import AbstractController
 from smajax.control.controllers.preset import Box, ControllerPreset
 from smajax.control.figures_of_merit import Merit, merit_observer
 from smajax.control.interface import Interface
-from smajax.control.mismatch import MISMATCHES
-from smajax.control.perturbed_plant import perturbed_plant
+from smajax.control.load_equation import stroke_of
+from smajax.control.perturbed_plant import Perturbation, perturbed_plant
+from smajax.control.plants import PlantSet, plant_set
 from smajax.control.reference import clock, constant
+from smajax.control.scales import arm_scales, is_arm
 from smajax.control.sweep.batched_loops import NUMBER, TARGET
 from smajax.control.tune.scenarios import Scenarios
-from smajax.control.tune.terms import TERMS, Terms, exact_vector, term_observer, term_vector
+from smajax.control.tune.terms import TERMS, Terms, exact_vector, factors_in, term_observer, term_vector
 from smajax.core.parameters import check_bounds, get_parameters, set_parameters, set_vector
 from smajax.model.system import System
 from smajax.model.types import Scalar, Series
@@ -42,7 +44,7 @@ LARGEST_GRADIENT = 1e4  # units of a term per box: a larger gradient predicts no
 class Evaluation(NamedTuple):
     """Results of candidates: arrays of shape (candidates, scenarios, ...)."""
 
-    terms: np.ndarray  # (C, M, terms), with derivatives; units of `TERMS`
+    terms: np.ndarray  # (C, M, terms), with derivatives; units of `terms_in`
     gradients: np.ndarray  # (C, M, terms, gains), by the unit cube; of no length where they were not requested
     exact: np.ndarray  # (C, M, terms), the settling time itself
     merits: Merit
@@ -64,10 +66,13 @@ class _Problem(eqx.Module):
     width: Series
     time: Series
     softness: Scalar
+    length: Scalar  # of the load's stroke, in those of the arm: what a layer's width is a share of
+    factors: Series  # of the terms, from SI to the units shown
     interface: Interface
     key: jax.Array
     integration: Integration
     names: tuple[str, ...] = eqx.field(static=True)
+    perturbation: Perturbation = eqx.field(static=True)
     smoothed: Callable[[AbstractController, Scalar], AbstractController] | None = eqx.field(static=True)
 
 
@@ -76,10 +81,11 @@ def _point(problem: _Problem, values: dict[str, Scalar]) -> Scalar:
 
 
 def _loop(problem: _Problem, values: dict[str, Scalar], point: Scalar) -> tuple[Terms, Merit]:
-    plant, wanted = perturbed_plant(problem.system, values), constant(problem.time, values[TARGET])
+    plant = perturbed_plant(problem.system, values, problem.perturbation)
+    wanted = constant(problem.time, values[TARGET])
     controller = set_vector(problem.controller, problem.names, jnp.exp(problem.low + point * problem.width))
     if problem.smoothed is not None:
-        controller = problem.smoothed(controller, problem.softness)
+        controller = problem.smoothed(controller, problem.softness * problem.length)
     observer = term_observer(merit_observer(plant, wanted), problem.softness)
     settings = problem.interface.settings(problem.time[1] - problem.time[0], problem.key, values[NUMBER])
     setup = ClosedLoopSetup(plant, controller, wanted, integration=problem.integration, **settings)
@@ -88,24 +94,26 @@ def _loop(problem: _Problem, values: dict[str, Scalar], point: Scalar) -> tuple[
 
 def _valued(problem: _Problem, values: dict[str, Scalar]) -> dict[str, Any]:
     terms, merit = _loop(problem, values, _point(problem, values))
-    exact = exact_vector(terms, merit, problem.time[-1])
-    return {"terms": term_vector(terms), "exact": exact, "merits": merit}
+    exact = exact_vector(terms, merit, problem.time[-1], problem.factors)
+    return {"terms": term_vector(terms, problem.factors), "exact": exact, "merits": merit}
 
 
 def _sloped(problem: _Problem, values: dict[str, Scalar]) -> dict[str, Any]:
     def terms_of(point: Scalar) -> tuple[Scalar, tuple[Terms, Merit]]:
         terms, merit = _loop(problem, values, point)
-        return term_vector(terms), (terms, merit)
+        return term_vector(terms, problem.factors), (terms, merit)
 
     gradients, (terms, merit) = jax.jacfwd(terms_of, has_aux=True)(_point(problem, values))
-    exact = exact_vector(terms, merit, problem.time[-1])
-    return {"terms": term_vector(terms), "gradients": gradients, "exact": exact, "merits": merit}
+    exact = exact_vector(terms, merit, problem.time[-1], problem.factors)
+    return {"terms": term_vector(terms, problem.factors), "gradients": gradients, "exact": exact, "merits": merit}
 
 
 class TuningProblem:
     """A controller on its plant with a box of gains. `simulations` counts the closed loops so far.
 
-    Raises ValueError for gains that the controller does not have, and bounds that are not positive and rising.
+    system: any load that moves; gains and box are the arm's, scaled to it. plants: what the columns of scenarios mean.
+    Raises ValueError for gains that the controller does not have, bounds that are not positive and rising, and a plant that
+    does not give what the controller needs.
     """
 
     def __init__(
@@ -118,11 +126,13 @@ class TuningProblem:
         interface: Interface | None = None,
         seed: int = 0,
         loops: int = LOOPS,
+        plants: PlantSet | None = None,
     ) -> None:
         self.preset = preset
         self.system = preset.plant(system)
         self.controller = preset.make(self.system)
-        self.box = dict(preset.box if box is None else box)
+        self.plants = plant_set(system) if plants is None else plants
+        self.box = dict(preset.box_on(self.system) if box is None else box)
         wrong = {name: bounds for name, bounds in self.box.items() if not 0.0 < bounds[0] < bounds[1]}
         if wrong:
             raise ValueError(f"gains are searched by logarithm: bounds must be positive and rise, not {wrong}.")
@@ -167,6 +177,8 @@ class TuningProblem:
     ) -> Evaluation:
         inside = round(STEP / dt)
         interface = dataclasses.replace(self.interface, every=self.interface.every * inside)
+        arm = is_arm(self.system)
+        length = 1.0 if arm else float(stroke_of(self.system) / arm_scales().position)
         problem = _Problem(
             self.system,
             self.controller,
@@ -174,15 +186,18 @@ class TuningProblem:
             jnp.asarray(self._width),
             clock(self.seconds, dt),
             jnp.asarray(softness),
+            jnp.asarray(length),
+            jnp.asarray(factors_in(self.plants.unit)),
             interface,
             jax.random.key(self.seed),
             self.integration,
             self.names,
+            self.plants.perturbation,
             self.preset.smoothed if smooth else None,
         )
         count, size = len(points), scenarios.size
         columns = {f"at {name}": np.repeat(points[:, k], size) for k, name in enumerate(self.names)}
-        columns |= dict(zip((*MISMATCHES, TARGET), np.tile(scenarios.rows, (count, 1)).T, strict=True))
+        columns |= dict(zip((*self.plants.columns, TARGET), np.tile(scenarios.rows, (count, 1)).T, strict=True))
         columns[NUMBER] = np.tile(np.arange(size, dtype=float), count)
         result = []
         for start in range(0, count * size, self.loops):

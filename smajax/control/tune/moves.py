@@ -21,12 +21,12 @@ MOST = 12  # set points of a walk
 
 @dataclass(frozen=True)
 class Moves:
-    """A walk over the set points on the plant as believed, up and down by turns: a row a move, figures in degrees and seconds.
+    """A walk over the set points on the plant as believed, up and down by turns: a row a move, figures in degrees (millimetres) and seconds.
 
     settling_time is infinite where the next set point was asked before the angle had come to rest.
     """
 
-    asked: np.ndarray  # (moves + 1,), degrees; the first one is begun from the start and not judged
+    asked: np.ndarray  # (moves + 1,), degrees or millimetres; the first one is begun from the start and not judged
     overshoot: np.ndarray  # (2, moves), before and after
     settling_time: np.ndarray  # (2, moves), s
     steady_error: np.ndarray  # (2, moves)
@@ -50,9 +50,10 @@ def moved(rig: TuningProblem, pair: Sequence[AbstractController], set_points: Se
     asked = walk(set_points)
     if len(asked) < 2:
         return None
+    unit = rig.plants.unit
     time = np.asarray(clock(rig.seconds * len(asked), FINE))
     which = np.minimum((time / rig.seconds + 1e-9).astype(int), len(asked) - 1)
-    wanted = resting(jnp.asarray(np.radians(asked)[which]))
+    wanted = resting(jnp.asarray(unit.to_own(asked)[which]))
     several: list[tuple[SetPointMerit, ...]] = []
     for controller in pair:
         setup = ClosedLoopSetup(
@@ -73,4 +74,4 @@ def moved(rig: TuningProblem, pair: Sequence[AbstractController], set_points: Se
     def of(name: str) -> np.ndarray:
         return np.asarray([[float(getattr(one.merit, name)) for one in rests] for rests in several])
 
-    return Moves(np.asarray(asked), np.degrees(of("overshoot")), of("settling_time"), np.degrees(of("steady_error")))
+    return Moves(np.asarray(asked), unit.of(of("overshoot")), of("settling_time"), unit.of(of("steady_error")))

@@ -7,21 +7,30 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from smajax.control.interface import between_in_words, check_interface, check_set_points
-from smajax.control.presets import CONTROLLERS
+from smajax.control.plants import Plants, PlantSet, plant_set
+from smajax.control.position_unit import (
+    PositionUnit,
+    band_shown,
+    check_unit,
+    default_set_points,
+    unit_named,
+    unit_of,
+)
+from smajax.control.presets import CONTROLLERS, check_controller
+from smajax.control.scales import arm_scales, is_arm, scales_of
 from smajax.control.tune import adam, cma_es
 from smajax.control.tune.evaluate import STEP
 from smajax.control.tune.multistart import Effort
 from smajax.control.tune.objective import REGULATION, Goal
-from smajax.control.tune.scenarios import BESIDE, check_variation
-from smajax.control.tune.terms import TERMS
-from smajax.core.names import close_matches
+from smajax.control.tune.scenarios import HELD_OUT, beside, check_variation
+from smajax.control.tune.terms import terms_in
 from smajax.model.system import System
 from smajax.simulation.integration_error import AUTO, Tolerance
 
 
 @dataclass(frozen=True)
 class TuneSettings:
-    """A tuning; angles in degrees, weights and limits in the units of `TERMS`."""
+    """A tuning; set points and noise in `unit`, weights and limits in the units of `terms_in(unit)`."""
 
     controller: str
     set_points: tuple[float, ...] = (-40.0, -20.0, 0.0, 20.0, 40.0, 60.0, 85.0)
@@ -36,13 +45,16 @@ class TuneSettings:
     finish: int = 60  # generations of the search without gradients that follows
     seconds: float = 10.0
     estimator: str = ""
-    noise: float = 0.0  # degrees
+    noise: float = 0.0
     period: float = STEP  # s
     delay: int = 0
     seed: int = 0
     unseen: int = 32  # plants of the check
     start: Mapping[str, float] = field(default_factory=dict)  # gains to begin from in the place of the preset's
     tolerance: Tolerance = AUTO  # as `run_batch`'s; None is one step a sample
+    unit: str = "deg"  # as `position_unit.unit_of` the plant
+    command: str = "V"  # as the drive's: of chatter
+    batch: int = 0  # plants of a batch in the place of the variation
 
     @property
     def goal(self) -> Goal:
@@ -52,16 +64,24 @@ class TuneSettings:
     def effort(self) -> Effort:
         return Effort(self.tried, self.starts, self.rounds, self.seed, self.by)
 
-    def check(self, system: System) -> None:
-        """ValueError for what there is not, or makes no sense, with what does."""
-        if self.controller not in CONTROLLERS:
-            raise ValueError(
-                f"no controller `{self.controller}`{close_matches(self.controller, CONTROLLERS, 'there are')}."
-            )
+    @property
+    def shown(self) -> PositionUnit:
+        """The unit of set points."""
+        return unit_named(self.unit, self.command)
+
+    def check(self, system: System, plants: Plants | None = None) -> PlantSet:
+        """The plants, if all is well: ValueError for what there is not, or makes no sense, with what does."""
+        check_controller(self.controller, system)
+        check_unit(system, self.shown)
         check_set_points(system, self.set_points)
         if len(set(self.set_points)) < len(self.set_points):
             raise ValueError(f"every set point once, not {', '.join(f'{angle:g}' for angle in self.set_points)}.")
-        check_variation(self.variation)
+        found = plant_set(system, plants)
+        check_variation(self.variation, found)
+        if self.batch != (0 if found.batch is None else len(found.batch)):
+            raise ValueError(
+                f"the settings say {self.batch} plants of a batch, and {plants!r} was given: use `settings_for`."
+            )
         check_interface(self.estimator, self.noise, self.period, STEP)
         steps = self.seconds / self.period
         if steps < 1.0 or abs(steps - round(steps)) > 1e-6:
@@ -76,6 +96,7 @@ class TuneSettings:
         if self.unseen < 1:
             raise ValueError(f"the check needs at least one plant, not {self.unseen}.")
         _ = self.goal, self.effort  # they check themselves
+        return found
 
     def check_packages(self) -> None:
         """MissingExtraError without a package that these settings need, before the work."""
@@ -91,35 +112,42 @@ class TuneSettings:
             sizes["ambient"] = f"{self.variation['ambient'] * abs(air):.3g} K"
         wrong = [f"{name} ±{size}" for name, size in sizes.items()]
         plants = f"the plant as believed and with {', '.join(wrong)} at once" if wrong else "the plant as believed"
-        return f"{plants}; set points {', '.join(f'{angle:g}°' for angle in self.set_points)}"
+        if self.batch:
+            plants = f"the plant as believed and three of every four of a batch of {self.batch}"
+        return f"{plants}; set points {', '.join(f'{point:g}{self.shown.symbol}' for point in self.set_points)}"
 
     def held_out_sentence(self) -> str:
         """On what the gains are checked that tuning never saw."""
-        where = "set points between those tuned" if len(self.set_points) > 1 else f"a set point {BESIDE:g}° beside"
+        where = "set points between those tuned"
+        if len(self.set_points) == 1:
+            where = f"a set point {beside(self.set_points[0], self.shown):.3g}{self.shown.symbol} beside"
+        if self.batch >= HELD_OUT:
+            return f"every fourth plant of the batch, {where}"
         return f"plants within the variation, {where}" if self.variation else f"{where}, the plant as believed"
 
     def goal_sentence(self) -> str:
         """What is made small, and what is kept below a limit."""
+        terms = terms_in(self.shown)
         parts = [
-            f"{weight:g} x {TERMS[name].label} ({TERMS[name].unit})" for name, weight in self.weights.items() if weight
+            f"{weight:g} x {terms[name].label} ({terms[name].unit})" for name, weight in self.weights.items() if weight
         ]
         of = {
             "nominal": "mean over the set points, plant as believed",
             "worst": "largest of all loops",
             "mean-variance": "mean of all loops plus one standard deviation",
         }[self.objective]
-        limits = [f"{TERMS[name].label} ≤ {limit:g} {TERMS[name].unit}" for name, limit in self.limits.items()]
+        limits = [f"{terms[name].label} ≤ {limit:g} {terms[name].unit}" for name, limit in self.limits.items()]
         return f"Cost: {' + '.join(parts)}, {of}" + (f"; in every loop {', '.join(limits)}" if limits else "")
 
     def between_in_words(self) -> str:
         """What lies between plant and controller."""
-        return between_in_words(self.estimator, self.noise, self.period, self.delay)
+        return between_in_words(self.estimator, self.noise, self.period, self.delay, self.shown)
 
     def record(self) -> dict[str, Any]:
         """For JSON."""
         return {
             "controller": self.controller,
-            "set_points_deg": list(self.set_points),
+            f"set_points_{self.unit}": list(self.set_points),
             "variation": dict(self.variation),
             "objective": self.objective,
             "weights": dict(self.weights),
@@ -131,11 +159,44 @@ class TuneSettings:
             "generations_without_slopes": self.finish,
             "seconds": self.seconds,
             "filter": self.estimator,
-            "noise_deg": self.noise,
+            f"noise_{self.unit}": self.noise,
             "period_s": self.period,
             "delay_periods": self.delay,
             "seed": self.seed,
             "plants_of_the_check": self.unseen,
             "start": dict(self.start),
             "tolerance": self.tolerance,
+            **({"plants_of_the_batch": self.batch} if self.batch else {}),
         }
+
+
+def regulation_weights(system: System) -> dict[str, float]:
+    """`REGULATION` of a plant: one second costs as much as one degree of overshoot, or a hundredth of the stroke of a length."""
+    if unit_of(system).is_angle:
+        return dict(REGULATION)
+    near = band_shown(system)
+    lengths = {"overshoot", "steady_error"}
+    return {name: float(f"{weight / near:.3g}") if name in lengths else weight for name, weight in REGULATION.items()}
+
+
+def seconds_for(system: System) -> float:
+    """Length of a closed loop: 10 s of the arm, and as many times longer as another wire cools more slowly, to a second."""
+    if is_arm(system):
+        return 10.0
+    return float(max(10.0, round(10.0 * float(scales_of(system).time / arm_scales().time))))
+
+
+def settings_for(system: System, controller: str, plants: Plants | None = None, **given: Any) -> TuneSettings:
+    """A tuning on any plant: what is not given is the arm's, or that of the load's unit, stroke and time.
+
+    given: fields of `TuneSettings`. Set points and noise in degrees of an angle and millimetres of a length, weights and limits
+    in these too.
+    """
+    unit = unit_of(system)
+    defaults: dict[str, Any] = {"unit": unit.shown, "command": unit.command, "weights": regulation_weights(system)}
+    defaults["seconds"] = seconds_for(system)
+    if not is_arm(system):
+        defaults["set_points"] = default_set_points(system)
+    found = plant_set(system, plants)
+    defaults["batch"] = 0 if found.batch is None else len(found.batch)
+    return TuneSettings(controller, **{**defaults, **given})

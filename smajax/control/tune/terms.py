@@ -19,7 +19,8 @@ import numpy as np
 
 from smajax.control.closed_loop import AbstractLoopObserver
 from smajax.control.figures_of_merit import Merit, MeritObserver
-from smajax.model.types import Scalar, State
+from smajax.control.position_unit import DEGREES, PositionUnit
+from smajax.model.types import Scalar, Series, State
 
 FOLLOWS = 0.05  # s, tau: how fast the memory follows at the edge of the band
 STEEPEST = 30.0  # exponent from where on it follows at once
@@ -34,7 +35,7 @@ class Term(NamedTuple):
     factor: float  # from SI
 
 
-# By the fields of `Terms`.
+# By the fields of `Terms`, of an angle.
 TERMS = {
     "tracking_error": Term("error, weighted by time", "°", 180.0 / np.pi),
     "overshoot": Term("overshoot", "°", 180.0 / np.pi),
@@ -45,18 +46,34 @@ TERMS = {
     "peak_temperature": Term("peak temperature", "°C", 1.0),
 }
 FACTORS = np.asarray([term.factor for term in TERMS.values()])
+
+
+def terms_in(unit: PositionUnit) -> dict[str, Term]:
+    """`TERMS` of a load whose position is shown in this unit."""
+    if unit == DEGREES:
+        return TERMS
+    own = {name: Term(term.label, unit.label, unit.factor) for name, term in TERMS.items() if term.unit == "°"}
+    chatter = TERMS["chatter"]
+    return {**TERMS, **own, "chatter": Term(chatter.label, f"{unit.command}/s", chatter.factor)}
+
+
+def factors_in(unit: PositionUnit) -> np.ndarray:
+    """From SI to the units of `terms_in`, (terms,)."""
+    return np.asarray([term.factor for term in terms_in(unit).values()])
+
+
 SETTLING = tuple(TERMS).index("settling_time")
 
 
 class Terms(NamedTuple):
     """Of one closed loop, SI."""
 
-    tracking_error: Scalar  # rad, mean of |e| weighted by the time since the start
-    overshoot: Scalar  # rad
+    tracking_error: Scalar  # rad or m, mean of |e| weighted by the time since the start
+    overshoot: Scalar  # rad or m
     settling_time: Scalar  # s, the memory s at the end: nearly the run's length where it never settles
-    steady_error: Scalar  # rad
+    steady_error: Scalar  # rad or m
     energy: Scalar  # J
-    chatter: Scalar  # V/s, how far the command moves in a second, up and down
+    chatter: Scalar  # V/s (A/s, W/s), how far the command moves in a second, up and down
     peak_temperature: Scalar  # C
 
 
@@ -110,15 +127,15 @@ class TermObserver(AbstractLoopObserver):
         return terms, merit
 
 
-def term_vector(terms: Terms) -> Scalar:
-    """The terms as a vector in the units of `TERMS`, shape (terms,)."""
-    return jnp.stack(terms) * jnp.asarray(FACTORS)
+def term_vector(terms: Terms, factors: Series) -> Scalar:
+    """The terms as a vector, shape (terms,), in the units of `factors_in`."""
+    return jnp.stack(terms) * factors
 
 
-def exact_vector(terms: Terms, merit: Merit, seconds: Scalar | float) -> Scalar:
+def exact_vector(terms: Terms, merit: Merit, seconds: Scalar | float, factors: Series) -> Scalar:
     """The same with the settling time itself, and twice the run where there is none: what a user asked for."""
     settling = jnp.where(jnp.isfinite(merit.settling_time), merit.settling_time, 2.0 * seconds)
-    return term_vector(terms._replace(settling_time=settling))
+    return term_vector(terms._replace(settling_time=settling), factors)
 
 
 def term_observer(merit: MeritObserver, softness: Scalar) -> TermObserver:

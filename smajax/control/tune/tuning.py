@@ -12,7 +12,9 @@ from smajax.control.controllers.base import AbstractController
 from smajax.control.gains_file import Gains
 from smajax.control.interface import interface_of
 from smajax.control.mismatch import MISMATCHES
+from smajax.control.plants import Plants, PlantSet, carrying
 from smajax.control.presets import CONTROLLERS
+from smajax.control.scales import unit_on
 from smajax.control.sweep.batched_loops import LoopSetup, integrated_setup, positions
 from smajax.control.tune.cma_es import CmaEsState, SearchTask, evolve
 from smajax.control.tune.evaluate import FINE, LOOPS, STEP, Evaluation, TuningProblem
@@ -40,7 +42,7 @@ class Check:
 
 @dataclass(frozen=True)
 class Lines:
-    """Angles over time, before and after: (2, loops, time), rad; the loops of the plant as believed come first."""
+    """Positions over time, before and after: (2, loops, time), rad or m; the loops of the plant as believed come first."""
 
     time: np.ndarray
     angles: np.ndarray
@@ -65,6 +67,7 @@ class TuningResult:
     lines: Lines
     moves: Moves | None
     air: float  # degC, as the controller believes it
+    plants: PlantSet  # what the columns of the scenarios mean
     integration: IntegrationError  # what the integration leaves in the positions with the tuned gains
 
     @property
@@ -73,11 +76,11 @@ class TuningResult:
         return self.excesses["tuned on"][1] <= 0.0 and self.excesses["inside"][1] <= 0.0
 
 
-def problem_of(system: System, settings: TuneSettings) -> TuningProblem:
+def problem_of(system: System, settings: TuneSettings, plants: PlantSet) -> TuningProblem:
     """The controller on its plant; batches no larger than a round needs."""
     preset = CONTROLLERS[settings.controller]
     plant = preset.plant(system)
-    size = settings.starts * tuned_on(settings.set_points, settings.variation, settings.seed).size
+    size = settings.starts * tuned_on(settings.set_points, settings.variation, settings.seed, plants).size
     return TuningProblem(
         preset,
         system,
@@ -85,6 +88,7 @@ def problem_of(system: System, settings: TuneSettings) -> TuningProblem:
         interface=interface_of(plant, settings.estimator, settings.noise, settings.period, STEP, settings.delay),
         seed=settings.seed,
         loops=int(np.clip(1 << (size - 1).bit_length(), LEAST_LOOPS, LOOPS)),
+        plants=plants,
     )
 
 
@@ -92,6 +96,7 @@ def tune(
     system: System,
     settings: TuneSettings,
     *,
+    plants: Plants | None = None,
     after: MultistartState | None = None,
     known: CmaEsState | None = None,
     save: Callable[[MultistartState | CmaEsState], object] = lambda state: None,
@@ -99,14 +104,17 @@ def tune(
 ) -> TuningResult:
     """Tune from the preset's gains and the best of points of the box; `save` gets the state after every round.
 
+    system: any load that moves, with any wire law and effects; `settings_for` has its set points and weights. plants: a batch of
+    plants (`plants.Plants`), such as draws from a posterior, in the place of a variation: gains are tuned on three of every
+    four and checked on the others.
     after, known: states of an interrupted tuning, of the gradient search and of CMA-ES; it resumes to the same end.
 
     Raises ValueError for settings that make no sense, MissingExtraError without a package that they need.
     """
-    settings.check(system)
+    found, system = settings.check(system, plants), carrying(system, plants)
     settings.check_packages()
-    scenarios = tuned_on(settings.set_points, settings.variation, settings.seed)
-    task = SearchTask(problem_of(system, settings), settings.goal, scenarios)
+    scenarios = tuned_on(settings.set_points, settings.variation, settings.seed, found)
+    task = SearchTask(problem_of(system, settings, found), settings.goal, scenarios)
     problem, name = task.problem, f"tuning {settings.controller}"
     _integrated(problem, settings, problem.controller, scenarios, STEP)
     descent = _by_gradient(task, settings, after, save, progress)
@@ -168,7 +176,7 @@ def _validated(
     problem, goal = task.problem, task.goal
     searched = problem.simulations
     pair = np.stack([problem.before, problem.point(best)])
-    held = held_out(settings.set_points, settings.variation, settings.unseen, settings.seed)
+    held = held_out(settings.set_points, settings.variation, settings.unseen, settings.seed, problem.plants)
     checks: dict[str, Check] = {}
     tuned = Gains(settings.controller, best)
     # What is small for the preset's gains need not be for those that were found.
@@ -188,7 +196,7 @@ def _validated(
         dict(zip(problem.names, preset, strict=True)),
         tuned,
         problem.box,
-        {name: table[name].unit for name in problem.names},
+        {name: unit_on(table[name].unit, problem.system) for name in problem.names},
         checks,
         (float(cost[0]), float(cost[1])),
         {name: (float(one[0]), float(one[1])) for name, one in excesses.items()},
@@ -198,6 +206,7 @@ def _validated(
         lines,
         moves,
         float(get_parameters(problem.system, [MISMATCHES["ambient"]])[0]),
+        problem.plants,
         error,
     )
 
@@ -219,6 +228,7 @@ def _integrated(
         dt,
         dataclasses.replace(problem.interface, every=every),
         settings.seed,
+        perturbation=problem.plants.perturbation,
     )
     rows = np.column_stack([scenarios.rows, np.ones(scenarios.size)])
     chosen, error = integrated_setup(setup, rows, settings.tolerance)
@@ -235,9 +245,9 @@ def _best_of(task: SearchTask, points: Sequence[np.ndarray]) -> dict[str, float]
 
 def _lines(problem: TuningProblem, settings: TuneSettings, tuned: Gains, inside: Scenarios) -> Lines:
     """The plant as believed and some of the plants never seen, at the set points tuned."""
-    targets = np.radians(settings.set_points)
+    targets = settings.shown.to_own(settings.set_points)
     plants = np.unique(inside.rows[:, :-1], axis=0)[:DRAWN]
-    plants = np.concatenate([np.ones((1, plants.shape[1])), plants])
+    plants = np.concatenate([problem.plants.nominal[None], plants])
     rows = np.column_stack([np.repeat(plants, len(targets), axis=0), np.tile(targets, len(plants))])
     rows = np.column_stack([rows, np.ones(len(rows))])
     setup = LoopSetup(
@@ -249,6 +259,7 @@ def _lines(problem: TuningProblem, settings: TuneSettings, tuned: Gains, inside:
         problem.interface,
         settings.seed,
         problem.integration,
+        problem.plants.perturbation,
     )
     angles = [
         positions(dataclasses.replace(setup, controller=controller), rows)

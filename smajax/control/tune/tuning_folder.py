@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from smajax.control.plants import Plants
 from smajax.control.presets import CONTROLLERS
 from smajax.control.tune.cma_es import CmaEsState
 from smajax.control.tune.cma_es import load as load_evolution
@@ -25,10 +26,10 @@ RESULTS = frozenset({SETTINGS, GAINS, RECORD, *PAGES})  # of a finished tuning
 FILES = RESULTS | {STATE, FINISH}
 
 
-def settings_record(system: System, settings: TuneSettings) -> dict[str, Any]:
+def settings_record(system: System, settings: TuneSettings, plants: Plants | None = None) -> dict[str, Any]:
     """What distinguishes this tuning from another: settings, code and plant. ValueError for settings that make no sense."""
-    settings.check(system)
-    mark = digest(CONTROLLERS[settings.controller].plant(system))[:16]
+    found = settings.check(system, plants)
+    mark = digest(CONTROLLERS[settings.controller].plant(system), found.marks)[:16]
     return dict(json.loads(json.dumps({**settings.record(), "code": mark})))
 
 
@@ -55,13 +56,15 @@ def check_folder(out: Path, record: Mapping[str, object]) -> None:
         raise ValueError(f"--out {out} holds another tuning ({differences}): give another folder, or delete that one.")
 
 
-def tune_in_folder(system: System, settings: TuneSettings, out: Path, progress: Progress = quiet) -> TuningResult:
+def tune_in_folder(
+    system: System, settings: TuneSettings, out: Path, progress: Progress = quiet, plants: Plants | None = None
+) -> TuningResult:
     """Tune, or resume where this tuning was interrupted; its state is in `out`, each file written in one step.
 
     Raises ValueError for settings that make no sense and for a folder that holds something else, MissingExtraError without a
     package that the settings need.
     """
-    record = settings_record(system, settings)
+    record = settings_record(system, settings, plants)
     check_folder(out, record)
     settings.check_packages()
     out.mkdir(parents=True, exist_ok=True)
@@ -76,4 +79,4 @@ def tune_in_folder(system: System, settings: TuneSettings, out: Path, progress: 
         progress(Message(f"resumed after {after}"))
     elif descent is not None and evolution is not None and evolution.generations < settings.finish:
         progress(Message(f"resumed after generation {evolution.generations}"))
-    return tune(system, settings, after=descent, known=evolution, save=save, progress=progress)
+    return tune(system, settings, plants=plants, after=descent, known=evolution, save=save, progress=progress)

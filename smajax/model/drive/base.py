@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import abc
+import math
 from typing import ClassVar
 
 import equinox as eqx
@@ -17,6 +18,8 @@ class AbstractDrive(eqx.Module):
     inputs_optional: ClassVar[frozenset[str]] = frozenset()
     # Channels that heat by their square: their value over a step is the root of the mean square, not the mean.
     inputs_squared: ClassVar[frozenset[str]] = frozenset()
+    # What a controller commands, and its unit: V, A, or W, by which the power is proportional to the command and not to its square.
+    command: ClassVar[tuple[str, str]] = ("voltage", "V")
 
     @abc.abstractmethod
     def power(self, resistance: Scalar, length: Scalar, inputs: Inputs) -> Scalar:
@@ -30,8 +33,17 @@ class AbstractDrive(eqx.Module):
         """Current asked of the supply by `resistance` ohm while it is on, A; zero where the drive has no current of its own."""
         return 0.0
 
+    def largest_command(self) -> Scalar | float:
+        """Command above which it puts no more into the wire, in the unit of `command`; infinite where there is none."""
+        return math.inf
+
+    def from_command(self, command: Scalar) -> Inputs:
+        """The inputs by which a controller's command (0 or more) reaches the wire. ValueError for a drive that takes none."""
+        return self.from_voltage(command)
+
     def from_voltage(self, voltage: Scalar) -> Inputs:
-        """The inputs by which a controller's voltage (V, 0 or more) reaches the wire. ValueError for a drive of another kind."""
+        """The same of a command in V. ValueError for a drive of another kind."""
         raise ValueError(
-            f"a controller asks for a voltage, which {type(self).__name__} does not take: use the voltage or duty drive."
+            f"a controller commands a voltage, a current or a power, and {type(self).__name__} takes none: use the drive voltage, duty, "
+            "current or power."
         )

@@ -15,9 +15,13 @@ class Current(AbstractDrive):
 
     inputs_required: ClassVar[frozenset[str]] = frozenset({"current"})
     inputs_squared: ClassVar[frozenset[str]] = inputs_required
+    command: ClassVar[tuple[str, str]] = ("current", "A")
 
     def power(self, resistance: Scalar, length: Scalar, inputs: Inputs) -> Scalar:
         return inputs["current"] ** 2 * resistance
 
     def drawn_current(self, resistance: Scalar, inputs: Inputs) -> Scalar:
         return jnp.abs(inputs["current"])
+
+    def from_command(self, command: Scalar) -> Inputs:
+        return {"current": command}

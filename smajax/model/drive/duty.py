@@ -27,6 +27,9 @@ class Duty(AbstractDrive):
     def drawn_current(self, resistance: Scalar, inputs: Inputs) -> Scalar:
         return self.supply_voltage / resistance
 
+    def largest_command(self) -> Scalar:
+        return self.supply_voltage
+
     def from_voltage(self, voltage: Scalar) -> Inputs:
         """The duty that heats as `voltage` would; all of the supply is the most there is."""
         duty = (voltage / self.supply_voltage) ** 2

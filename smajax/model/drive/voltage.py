@@ -38,5 +38,8 @@ class Voltage(AbstractDrive):
     def drawn_current(self, resistance: Scalar, inputs: Inputs) -> Scalar:
         return self._put(inputs) / resistance
 
+    def largest_command(self) -> Scalar:
+        return self.amplifier_limit / self.amplifier_gain
+
     def from_voltage(self, voltage: Scalar) -> Inputs:
         return {"voltage": voltage}

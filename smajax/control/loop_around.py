@@ -1,0 +1,89 @@
+"""From a plant to a closed loop around it: any composed system, a controller by name, and what lies between."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from smajax.control.controllers.base import AbstractController
+from smajax.control.estimators.base import AbstractEstimator
+from smajax.control.gains_file import Gains, read_gains
+from smajax.control.load_equation import moving_load
+from smajax.control.loop_dataset import Loop
+from smajax.control.measured_state import Sensor
+from smajax.control.presets import CONTROLLERS, FILTERS, check_controller
+from smajax.core.names import close_matches
+from smajax.core.units import parse_quantity
+from smajax.model.system import System
+
+
+def loop_around(
+    system: System,
+    controller: str | AbstractController,
+    gains: Mapping[str, float | str] | Gains | Path | None = None,
+    *,
+    estimator: str | AbstractEstimator | None = None,
+    noise: float | str = 0.0,
+    delay: int = 0,
+    assumed: System | None = None,
+) -> Loop:
+    """A closed loop on any load that moves, wire law and effects, for `simulate_loop_dataset`.
+
+    controller: the name of one in `CONTROLLERS`, or one of one's own. gains: by name, SI or text with a unit (`"900 V/m"`), a
+    file of `smajax tune`, or none: those of the arm, scaled to this plant (`control.scales`); gains that are not named keep
+    that value. estimator: the name of a filter, or one of one's own; none: the true state. noise: standard deviation of the
+    reading, rad or m, or text (`"20 um"`). delay: control periods until a command arrives. assumed: the plant that
+    controller and filter know; by default the system itself.
+
+    Raises KeyError for a controller or filter there is not, GainsFileError for a file that cannot be used, UnitError for a
+    unit of another kind, ValueError for a gain there is not, and where the load or the drive does not give what the
+    controller needs: which controller, which load, what is missing, which controllers can.
+    """
+    believed = system if assumed is None else assumed
+    own = moving_load(system).reading[1]
+    sigma = parse_quantity(noise, own, bare=own)
+    sensor = Sensor(noise_sigma=sigma) if sigma else None
+    filtered = _filter(believed, estimator)
+    if isinstance(controller, AbstractController):
+        if gains is not None:
+            raise ValueError("gains go with the name of a controller: a controller of one's own has its gains already.")
+        return Loop(system, controller, filtered, sensor, delay)
+    if controller not in CONTROLLERS:
+        raise KeyError(f"no controller {controller!r}{close_matches(controller, CONTROLLERS, 'there are')}")
+    check_controller(controller, believed)
+    preset = CONTROLLERS[controller]
+    known = preset.plant(believed)
+    return Loop(preset.plant(system), _gains(controller, gains, known).put(known), filtered, sensor, delay)
+
+
+def _filter(system: System, estimator: str | AbstractEstimator | None) -> AbstractEstimator | None:
+    if not isinstance(estimator, str):
+        return estimator
+    if estimator not in FILTERS:
+        raise KeyError(f"no filter {estimator!r}{close_matches(estimator, FILTERS, 'there are')}")
+    return FILTERS[estimator](system)
+
+
+def _gains(controller: str, gains: Mapping[str, float | str] | Gains | Path | None, system: System) -> Gains:
+    """Numbers in SI. Raises ValueError for gains of another controller."""
+    if isinstance(gains, Path):
+        gains = read_gains(gains, system)
+    if isinstance(gains, Gains):
+        if gains.controller != controller:
+            raise ValueError(f"these gains are of {gains.controller}, expected those of {controller}.")
+        return gains
+    if not gains:
+        return Gains(controller, {})
+    units = Gains(controller, {}).units(system)
+    unknown = [name for name in gains if name not in units]
+    if unknown:
+        box = CONTROLLERS[controller].box
+        raise ValueError(f"{controller} has no gain {unknown[0]!r}{close_matches(unknown[0], box, 'tuned are')}.")
+    return Gains(
+        controller,
+        {name: parse_quantity(value, _unit(units[name]), bare=_unit(units[name])) for name, value in gains.items()},
+    )
+
+
+def _unit(unit: str) -> str:
+    return "1" if unit == "-" else unit
