@@ -64,6 +64,6 @@ def job_of(experiment: Experiment, integration: Integration | None = None) -> Jo
     unknowns = tuple(unknown.name for unknown in experiment.unknowns)
     of_runs = {name for run in experiment.runs for name in run.parameters}
     given = frozenset({*experiment.parameters, *unknowns, *of_runs})
-    presets = preset_priors(parameters(base), parameter_values(base), given)
+    presets = preset_priors(parameters(base), parameter_values(base), given, experiment.priors.presets)
     bounds |= preset_bounds(presets, bounds)
     return Job(experiment, runs, problem, held_out, unknowns, bounds, names, presets)

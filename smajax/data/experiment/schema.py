@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from smajax.core.names import close_matches
+from smajax.core.names import close_matches, listed, nearest
 from smajax.data.experiment.errors import ExperimentError
 
 Quantity = str | float
@@ -182,6 +182,61 @@ class EffectsSection(Section):
     exclude: list[str] = Field(default=[], description="a list of effect names")
 
 
+class SpreadSection(Section):
+    """How far a value may lie from the middle of its prior: a normal distribution of it, or of its logarithm."""
+
+    width: Quantity | None = Field(default=None, description="a standard deviation above zero, text like '10 J/g'")
+    relative: float | None = Field(default=None, gt=0.0, description="a number above 0; 0.2 is about 20 %")
+
+    @model_validator(mode="after")
+    def _one_spread(self) -> SpreadSection:
+        if self.width is not None and self.relative is not None:
+            raise ValueError("got both width and relative; give width = 'number unit', or relative = 0.2 for a share")
+        return self
+
+
+class CoefficientPriorSection(SpreadSection):
+    """The prior of a coefficient of a candidate effect, in the place of the library's."""
+
+    base: Quantity | None = Field(default=None, description="the middle of the prior, text like '5 s'")
+
+    @model_validator(mode="after")
+    def _something(self) -> CoefficientPriorSection:
+        if self.base is None and self.width is None and self.relative is None:
+            raise ValueError("says nothing; give base, width or relative")
+        return self
+
+
+class PresetPriorSection(SpreadSection):
+    """How uncertain a value is that the file does not list."""
+
+    @model_validator(mode="after")
+    def _something(self) -> PresetPriorSection:
+        if self.width is None and self.relative is None:
+            raise ValueError("says nothing; give width = 'number unit', or relative = 0.2 for a share of the value")
+        return self
+
+
+class EffectPriorSection(Section):
+    """What is known of a candidate effect before the runs: its odds, and the priors of its coefficients by their names."""
+
+    model_config = ConfigDict(extra="allow", frozen=True, strict=True)
+    __pydantic_extra__: dict[str, CoefficientPriorSection]
+
+    odds: str | float | None = Field(default=None, description="a class of odds, or a number above 0 and at most 1")
+
+
+class PriorsSection(Section):
+    """Priors in the place of the library's: a section for each effect by its name, and one for the values of presets."""
+
+    model_config = ConfigDict(extra="allow", frozen=True, strict=True)
+    __pydantic_extra__: dict[str, EffectPriorSection]
+
+    presets: dict[str, PresetPriorSection] = Field(
+        default={}, description="a table of parameter = { relative = 0.1 } or { width = 'number unit' }"
+    )
+
+
 class ExperimentFile(Section):
     """The whole file."""
 
@@ -195,10 +250,13 @@ class ExperimentFile(Section):
     data: DataSection = Field(default=DataSection(folder="."), description="a section [data] with folder")
     runs: list[RunSection] = Field(min_length=1, description="one section [[runs]] a run, with name, role and file")
     effects: EffectsSection = Field(default=EffectsSection(), description="a section [effects]")
+    priors: PriorsSection = Field(
+        default=PriorsSection.model_validate({}), description="sections [priors.EFFECT], and [priors.presets]"
+    )
 
 
 # Sections by place in the file; "*" stands for any name or number.
-_PLACES: dict[tuple[str, ...], type[Section]] = {
+_PLACES: dict[tuple[str, ...], type[Section] | None] = {
     (): ExperimentFile,
     ("model",): ModelSection,
     ("unknown", "*"): UnknownSection,
@@ -214,6 +272,11 @@ _PLACES: dict[tuple[str, ...], type[Section]] = {
     ("data",): DataSection,
     ("runs", "*"): RunSection,
     ("effects",): EffectsSection,
+    ("priors",): PriorsSection,
+    ("priors", "presets", "*"): PresetPriorSection,
+    ("priors", "*", "odds"): None,
+    ("priors", "*", "*"): CoefficientPriorSection,
+    ("priors", "*"): EffectPriorSection,
 }
 
 
@@ -240,13 +303,21 @@ def _depth(place: Sequence[str | int]) -> int:
     return min(len(place), sections[-1] + 1)
 
 
+def _table(place: Sequence[str | int], depth: int, around: type[Section] | None) -> str:
+    """What is expected of an entry that has a section of its own; its name may be that of another key, misspelled."""
+    own = _section_at(place[:depth])
+    if own is None or around is None:
+        return "expected a section"
+    return f"expected a table with {listed(own.model_fields)}{nearest(str(place[depth - 1]), around.model_fields)}"
+
+
 def _message(error: Any, content: dict[str, Any]) -> tuple[str, str]:
     """(key path, message) of one pydantic error."""
     place = tuple(error["loc"])
     depth = _depth(place)
     section = _section_at(place[: depth - 1]) if depth else None
     field = section.model_fields.get(str(place[depth - 1])) if section is not None and depth else None
-    expected = f"expected {field.description}" if field is not None else "expected a section"
+    expected = f"expected {field.description}" if field is not None else _table(place, depth, section)
     # One step further for the entries of a table (parameters, files, inputs) and of a list.
     entry = len(place) > depth and isinstance(error["input"], str | int | float | bool | list | dict)
     table = field is not None and any(word in str(field.annotation) for word in ("dict[", "list["))

@@ -15,7 +15,7 @@ from smajax.data.experiment.schema import BoxSection, ExperimentFile, PriorSecti
 CELSIUS = ParameterInfo("degC", -273.15, 1500.0)  # of a wire as a run starts, which no parameter says
 
 
-def _bounded(path: Path, key: str, value: Quantity, info: ParameterInfo) -> float:
+def bounded(path: Path, key: str, value: Quantity, info: ParameterInfo) -> float:
     """One parameter value in the program's own unit, inside what makes physical sense."""
     with at_key(path, key):
         number = parse_quantity(value, info.unit)
@@ -42,12 +42,12 @@ def given_parameters(
         check_parameter(path, where, name, known, _presets(file))
         if name in file.unknown:
             raise ExperimentError(path, where, f"is given here and is an unknown too; remove this or [unknown.{name}]")
-        result[name] = _bounded(path, where, value, known[name])
+        result[name] = bounded(path, where, value, known[name])
     return result
 
 
 def _prior(path: Path, key: str, section: PriorSection, info: ParameterInfo, low: float) -> Prior:
-    mean = _bounded(path, f"{key}.mean", section.mean, info)
+    mean = bounded(path, f"{key}.mean", section.mean, info)
     if section.log_sigma is not None:
         if mean <= 0.0 or low < 0.0:
             what = f"mean = {section.mean!r}" if mean <= 0.0 else "a box that begins below zero"
@@ -63,9 +63,9 @@ def _prior(path: Path, key: str, section: PriorSection, info: ParameterInfo, low
 
 
 def _unknown(path: Path, key: str, name: str, section: BoxSection, info: ParameterInfo, per_run: bool) -> Unknown:
-    low = _bounded(path, f"{key}.low", section.low, info)
-    high = _bounded(path, f"{key}.high", section.high, info)
-    start = _bounded(path, f"{key}.start", section.start, info)
+    low = bounded(path, f"{key}.low", section.low, info)
+    high = bounded(path, f"{key}.high", section.high, info)
+    start = bounded(path, f"{key}.start", section.start, info)
     if low >= high:
         raise ExperimentError(
             path, f"{key}.low", f"got {section.low!r}, which is not below high = {section.high!r}; exchange the two"
