@@ -126,4 +126,4 @@ def test_identify_says_that_it_uses_none_of_them(tmp_path: Path) -> None:
     path = bench(tmp_path / "bench", ("[sampling]", "[priors.latent_heat]\nodds = 0.25\n[sampling]"))
     ended = smajax("identify", path, "--out", tmp_path / "out", "--starts", "1")
     assert ended.code == 0, ended
-    assert "[priors] changes nothing here" in (tmp_path / "out" / "report.json").read_text()
+    assert "[priors] changes nothing here" in ended.said
