@@ -23,7 +23,7 @@ from smajax.attribution.findings import (
     Rejected,
     Verdict,
 )
-from smajax.attribution.found import effects_found, parameters_found
+from smajax.attribution.found import effects_found, parameters_found, priors_found
 from smajax.attribution.held_out import Compared, every_run, validated
 from smajax.attribution.job import Job, job_of
 from smajax.attribution.joint_search import JointSearch
@@ -145,6 +145,7 @@ def prepared(  # the stage's inputs, each once
         experiment.outputs[0].noise_given,
         job.held_out,
         config,
+        declared=experiment.priors,
     )
     report_checks(progress, experiment.warnings, ())
     base = setting.base(start, seed)
@@ -253,6 +254,7 @@ def findings_of(context: Context, outcome: Outcome, compared: Compared, rejected
         load=experiment.load,
         declared=tuple(experiment.parameters),
         assumed=assumed(job, setting.presets),
+        priors=priors_found(job, setting),
         preset_expansion=expansion_not_given(
             job, {one.name: one.value for one in after.parameters if one.name in setting.presets}
         ),

@@ -98,6 +98,26 @@ class AssumedParameter:
 
 
 @dataclass(frozen=True)
+class PriorFinding:
+    """What the experiment file says of a prior, as it was used, and what stands in its place without it (None: nothing, the value is held).
+
+    Of an effect, by its name, `odds` alone; of a coefficient ("latent_heat.enthalpy") and of a value of a preset the others, SI. `width` is of the
+    natural logarithm where `logarithmic`.
+    """
+
+    name: str
+    unit: str = ""
+    odds: float | None = None
+    base: float | None = None
+    width: float | None = None
+    logarithmic: bool = False
+    library_odds: float | None = None
+    library_base: float | None = None
+    library_width: float | None = None
+    library_logarithmic: bool = False
+
+
+@dataclass(frozen=True)
 class CoefficientFinding:
     value: float
     standard_error: float | None
@@ -324,6 +344,7 @@ class Findings:
     load: str
     declared: tuple[str, ...] = ()  # parameters that the experiment file gives
     assumed: tuple[AssumedParameter, ...] = ()
+    priors: tuple[PriorFinding, ...] = ()  # that the experiment file gives
     preset_expansion: tuple[float, float] | None = (
         None  # 1/K, martensite and austenite, that the preset's theta_T alone gives
     )

@@ -6,13 +6,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from smajax.attribution.findings import CoefficientFinding, EffectFinding, ParameterFinding
+from smajax.attribution.declared_priors import NONE_DECLARED
+from smajax.attribution.findings import CoefficientFinding, EffectFinding, ParameterFinding, PriorFinding
 from smajax.attribution.job import Job
+from smajax.attribution.joint_parameters import JointParameters
 from smajax.attribution.leave_one_run_out import jackknife_error
 from smajax.attribution.model_fits import Evidence, Model, Search
 from smajax.attribution.nuisance_grid import scores_at
-from smajax.core.parameters import parameters
-from smajax.data.experiment.record import Prior
+from smajax.attribution.preset_priors import preset_priors
+from smajax.core.parameters import parameter_values, parameters
+from smajax.data.experiment.record import DeclaredPriors, Prior
+from smajax.fit.base_model import base_model
 from smajax.fit.problem import Problem
 from smajax.fit.sensitivity import Sensitivity, sensitivity
 from smajax.fit.uncertainty import Uncertainty, uncertainty
@@ -114,3 +118,34 @@ def over_runs(model: Model, place: int, error: float | None) -> tuple[float, flo
         return None
     half = NORMAL_95 * float(jackknife_error(found[:, [place]])[0])
     return None if half < error else (float(model.values[place]) - half, float(model.values[place]) + half)
+
+
+def priors_found(job: Job, setting: Search) -> tuple[PriorFinding, ...]:
+    """The priors that the experiment file gives, of effects that are candidates and of the presets, as they were used."""
+    declared, table = setting.declared, parameters(job.problem.system)
+    named = {*declared.odds, *(name.split(".", 1)[0] for name in declared.coefficients)}
+    effects = [name for name in setting.candidates if name in named]
+
+    def joint(priors: DeclaredPriors) -> JointParameters:
+        return JointParameters.of(
+            setting.problem, (), setting.bounds, effects, setting.extent, job.presets, declared=priors
+        )
+
+    ours, library = joint(declared), joint(NONE_DECLARED)
+    findings = [
+        PriorFinding(name, odds=declared.odds[name], library_odds=float(np.exp(library.log_odds[name])))
+        for name in effects
+        if name in declared.odds
+    ]
+    model = base_model(job.experiment)
+    held_or_free = preset_priors(parameters(model), parameter_values(model), frozenset())
+    before = {**library.priors, **{name: held_or_free.get(name) for name in declared.presets}}
+    for name in (*declared.coefficients, *declared.presets):
+        if name not in ours.priors:
+            continue
+        used, own = ours.priors[name], before[name]
+        stands = () if own is None else (own.base, own.sigma, own.logarithmic)
+        findings.append(
+            PriorFinding(name, table[name].unit, None, used.base, used.sigma, used.logarithmic, None, *stands)
+        )
+    return tuple(findings)

@@ -64,9 +64,9 @@ def job_of(experiment: Experiment, integration: Integration | None = None) -> Jo
     unknowns = tuple(unknown.name for unknown in experiment.unknowns)
     of_runs = {name for run in experiment.runs for name in run.parameters}
     given = frozenset({*experiment.parameters, *unknowns, *of_runs})
-    presets = preset_priors(parameters(base), parameter_values(base), given)
+    presets = preset_priors(parameters(base), parameter_values(base), given, experiment.priors.presets)
     bounds |= preset_bounds(presets, bounds)
     if experiment.model_file is not None:
-        presets |= fitted_priors(experiment.model_file, given)
+        presets |= fitted_priors(experiment.model_file, given | experiment.priors.presets.keys())
         bounds |= {name: one for name, one in experiment.model_file.bounds.items() if name in presets}
     return Job(experiment, runs, problem, held_out, unknowns, bounds, names, presets)

@@ -14,7 +14,8 @@ from types import MappingProxyType
 
 import numpy as np
 
-from smajax.data.experiment.record import Prior
+from smajax.attribution.declared_priors import NONE_DECLARED, overridden
+from smajax.data.experiment.record import DeclaredPriors, Prior
 from smajax.fit.problem import Problem
 from smajax.fit.sensitivity import sensitivity
 from smajax.model.effects.candidate import PRIOR_ODDS, Extent
@@ -50,8 +51,12 @@ class JointParameters:
         candidates: Sequence[str],
         extent: Extent,
         presets: Mapping[str, CoefficientPrior] = MappingProxyType({}),
+        declared: DeclaredPriors = NONE_DECLARED,
     ) -> JointParameters:
-        """Of a problem whose model carries all `candidates` at their base values. `presets`: of `preset_priors`."""
+        """Of a problem whose model carries all `candidates` at their base values.
+
+        `presets`: of `preset_priors`. `declared`: by the experiment file, in the place of what the effects say.
+        """
         at_rest = _load_at_rest(problem)
         coefficients, log_odds = {}, {}
         priors = dict(presets)
@@ -59,9 +64,10 @@ class JointParameters:
             kind = LIBRARY[effect]
             names = tuple(name for name in problem.names if name.startswith(f"{effect}."))
             coefficients[effect] = names
-            log_odds[effect] = math.log(PRIOR_ODDS[kind.candidate.prior_class])
+            log_odds[effect] = math.log(declared.odds.get(effect, PRIOR_ODDS[kind.candidate.prior_class]))
             for name in names:
-                priors[name] = width_of(kind, name.split(".", 1)[1], bounds[name], extent, at_rest)
+                own = width_of(kind, name.split(".", 1)[1], bounds[name], extent, at_rest)
+                priors[name] = overridden(own, declared.coefficients.get(name), bounds[name])
         return cls(problem, (*unknowns, *presets), bounds, coefficients, priors, log_odds)
 
     @cached_property

@@ -12,6 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from smajax.attribution.config import AttributionConfig
+from smajax.attribution.declared_priors import NONE_DECLARED
 from smajax.attribution.every_effect import EVERY
 from smajax.attribution.findings import Reason, Round
 from smajax.attribution.joint_parameters import JointParameters
@@ -21,6 +22,7 @@ from smajax.attribution.score_test import switches
 from smajax.core.progress import Progress, Result, quiet
 from smajax.core.result_cache import ResultCache
 from smajax.core.whiteness import split_runs
+from smajax.data.experiment.record import DeclaredPriors
 from smajax.fit.levenberg_marquardt import Fit, FitSettings, levenberg_marquardt
 from smajax.fit.packed_runs import RunBatch
 from smajax.fit.predicted import misfits
@@ -79,6 +81,7 @@ class Search:
     evidence: dict[str, Evidence] = field(default_factory=dict)
     rounds: list[Round] = field(default_factory=list)
     presets: Mapping[str, CoefficientPrior] = field(default_factory=dict)  # values that the user did not give
+    declared: DeclaredPriors = NONE_DECLARED  # priors by the experiment file
 
     def note(self, done: Round) -> None:
         """Record a round and report it."""
@@ -112,7 +115,8 @@ class Search:
     def joint(self, effects: Sequence[str], presets: Mapping[str, CoefficientPrior] | None = None) -> JointParameters:
         """Parameters of joint fits of models with some of `effects`. `presets`: those of the search, unless others are given."""
         free = self.presets if presets is None else presets
-        return JointParameters.of(self.problem, self.unknowns, self.bounds, effects, self.extent, free)
+        own = self.declared
+        return JointParameters.of(self.problem, self.unknowns, self.bounds, effects, self.extent, free, own)
 
     def coefficients(self, effect: str) -> list[str]:
         return [name for name in self.problem.names if name.startswith(f"{effect}.")]

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from types import MappingProxyType
 
 import numpy as np
 
 from smajax.core.parameters import Parameter
-from smajax.data.experiment.record import FromModelFile
+from smajax.data.experiment.record import FromModelFile, PriorSpread
 from smajax.fit.sensitivity import Sensitivity
 from smajax.model.effects.prior_width import CoefficientPrior
 
@@ -35,17 +36,25 @@ RELATIVE: Mapping[str, tuple[float, str]] = {
 
 
 def preset_priors(
-    table: Mapping[str, Parameter], values: Mapping[str, float], given: frozenset[str]
+    table: Mapping[str, Parameter],
+    values: Mapping[str, float],
+    given: frozenset[str],
+    declared: Mapping[str, PriorSpread] = MappingProxyType({}),
 ) -> dict[str, CoefficientPrior]:
-    """Logarithmic priors about the preset's `values` (SI) of the parameters in `table` that are not among those `given`.
+    """Priors about the preset's `values` (SI) of the parameters in `table` that are not among those `given`.
 
-    `given`: known from the experiment file or the runs, or unknowns of the fit. A value of zero has no logarithm and is held.
+    `given`: known from the experiment file or the runs, or unknowns of the fit. `declared`: how uncertain they are by the experiment file, of
+    parameters that `RELATIVE` does not have too. Those of `RELATIVE` are logarithmic; a value of zero has no logarithm and is held.
     """
-    return {
+    found = {
         name: CoefficientPrior(float(values[name]), sigma, True)
         for name, (sigma, _) in RELATIVE.items()
         if name in table and name not in given and values[name] > 0.0
     }
+    for name, one in declared.items():
+        if one.sigma is not None:
+            found[name] = CoefficientPrior(float(values[name]), one.sigma, one.logarithmic)
+    return found
 
 
 def fitted_priors(kept: FromModelFile, given: frozenset[str]) -> dict[str, CoefficientPrior]:
@@ -63,9 +72,13 @@ def preset_bounds(
     """Within so many widths: a value at zero has no logarithm, and a fit does not leave it again."""
     found = {}
     for name, prior in presets.items():
-        factor = math.exp(WIDTHS * prior.sigma)
         low, high = bounds[name]
-        found[name] = max(low, prior.base / factor), min(high, prior.base * factor)
+        if prior.logarithmic:
+            factor = math.exp(WIDTHS * prior.sigma)
+            found[name] = max(low, prior.base / factor), min(high, prior.base * factor)
+        else:
+            reach = WIDTHS * prior.sigma
+            found[name] = max(low, prior.base - reach), min(high, prior.base + reach)
     return found
 
 
@@ -73,10 +86,8 @@ def visible(
     at: Sensitivity, values: Mapping[str, float], presets: Mapping[str, CoefficientPrior]
 ) -> dict[str, CoefficientPrior]:
     """Those of `presets` of which one width changes the runs by more than the noise, by the Jacobian at the base fit."""
-
-    def width(name: str, prior: CoefficientPrior) -> float:
-        return prior.sigma * values[name] if prior.logarithmic else prior.sigma
-
     return {
-        name: one for name, one in presets.items() if np.linalg.norm(at.columns([name])) * width(name, one) > VISIBLE
+        name: one
+        for name, one in presets.items()
+        if np.linalg.norm(at.columns([name])) * one.sigma * (values[name] if one.logarithmic else 1.0) > VISIBLE
     }

@@ -9,8 +9,10 @@ import numpy as np
 
 from smajax.core.names import listed
 from smajax.core.parameters import parameter_values, parameters, set_parameters
-from smajax.data.experiment.model_description import Catalogue, ModelDescription, ParameterInfo, Scale
+from smajax.data.experiment.model_description import Catalogue, CoefficientInfo, ModelDescription, ParameterInfo, Scale
+from smajax.model.effects.candidate import PRIOR_ODDS
 from smajax.model.effects.library import LIBRARY
+from smajax.model.effects.prior_width import stated_width
 from smajax.model.extended import extended
 from smajax.model.load.coupon import AbstractCoupon
 from smajax.model.presets import DRIVES, LOADS, WIRES, build
@@ -79,6 +81,23 @@ def _scale(system: System) -> Scale:
     )
 
 
+def coefficients(effect: str) -> dict[str, CoefficientInfo]:
+    """Coefficients of an effect of the library, with what a prior of each may be."""
+    kind, found = LIBRARY[effect], {}
+    for entry in parameters(kind.base()).values():
+        name = entry.name.removeprefix(f"{effect}.")
+        width = stated_width(kind, name)
+        found[name] = CoefficientInfo(
+            entry.unit,
+            entry.low,
+            entry.high,
+            switch=name in kind.candidate.switches,
+            logarithmic=width.logarithmic,
+            positive=(width.base or 0.0) > 0.0,
+        )
+    return found
+
+
 CATALOGUE = Catalogue(
     wires=tuple(WIRES),
     loads=tuple(LOADS),
@@ -86,6 +105,8 @@ CATALOGUE = Catalogue(
     laws=tuple(LAWS),
     effects=tuple(LIBRARY),
     describe=describe,
+    coefficients=coefficients,
+    odds={str(name): odds for name, odds in PRIOR_ODDS.items()},
 )
 
 

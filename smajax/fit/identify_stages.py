@@ -28,6 +28,10 @@ from smajax.fit.uncertainty import Uncertainty, covariance_of, identifiability, 
 from smajax.model.system import System
 from smajax.simulation.steppers import Integration
 
+UNUSED_PRIORS = (
+    "[priors] changes nothing here: they are of candidate effects and of the presets' values, which `smajax close-loop` fits; a prior of an "
+    "unknown stands in its own section, as prior = { mean = ..., sigma = ... }"
+)
 EDGE = 1e-6  # of the range: a fit within bounds comes to a bound itself
 
 
@@ -133,8 +137,9 @@ def check_identifiability(setup: Setup, options: Options) -> tuple[str, ...]:
     values = _full_values(setup.every_run, setup.problem, setup.problem.start_values())
     at = _of_fit_runs(sensitivity(setup.every_run, values, setup.names), setup)
     sentences = [line for line in identifiability(at, setup.names, setup.bounds) if "are correlated" not in line]
-    report_checks(options.progress, setup.experiment.warnings, sentences)
-    return (*setup.experiment.warnings, *sentences)
+    warnings = (*setup.experiment.warnings, *((UNUSED_PRIORS,) if setup.experiment.priors else ()))
+    report_checks(options.progress, warnings, sentences)
+    return (*warnings, *sentences)
 
 
 def fit_within_tolerance(setup: Setup, options: Options) -> tuple[Setup, Fitted, IntegrationError]:

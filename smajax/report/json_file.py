@@ -173,6 +173,7 @@ def findings_to_json(findings: Findings, narrative: Narrative | None = None) -> 
         },
         "integration_error": findings.integration.record(),
         "runs": [_run(run) for run in findings.runs],
+        "priors": [dataclasses.asdict(one) for one in findings.priors],
         "averaged_models": [{"effects": list(one.effects), "weight": one.weight} for one in findings.averaged],
         "before": {"parameters": {result.name: _parameter(result) for result in findings.before}},
         "after": {"parameters": {result.name: _parameter(result) for result in findings.after}},

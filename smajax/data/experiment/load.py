@@ -13,6 +13,7 @@ from smajax.core.names import close_matches
 from smajax.core.units import UnitError, convert, parse_quantity
 from smajax.data.experiment.column_overrides import own_columns
 from smajax.data.experiment.data_folder import data_folder
+from smajax.data.experiment.declared_priors import declared_priors
 from smajax.data.experiment.errors import ExperimentError, at_key, check_name
 from smajax.data.experiment.from_model_file import with_model_file
 from smajax.data.experiment.headings import heading_warnings
@@ -266,6 +267,7 @@ def experiment_of(path: Path, file: ExperimentFile, catalogue: Catalogue) -> Exp
     fixed |= {unknown.name: unknown.start for unknown in every if file.unknown[unknown.name].fixed}
     free = tuple(unknown for unknown in every if unknown.name not in fixed) + run_starts(path, file, model)
     _check_effects(path, file, catalogue)
+    priors, not_tried = declared_priors(path, file, catalogue, model)
     values = (dict(kept.values) if kept else {}) | fixed | {unknown.name: unknown.start for unknown in free}
     _check_order(path, file, model, values)
     output_names, units = _channel_units(path, file, model)
@@ -306,7 +308,7 @@ def experiment_of(path: Path, file: ExperimentFile, catalogue: Catalogue) -> Exp
     warnings += common_warnings(runs)
     heats = sorted(model.heats & runs[0].run.inputs.keys())
     warnings += magnitude_warnings(runs, None if model.scale is None else model.scale(values), heats, reading.step)
-    warnings += _useless(file, model) + _untold(file, free)
+    warnings += _useless(file, model) + not_tried + _untold(file, free)
     warnings += [] if kept else preset_warnings(file.model.wire, free, model.parameters)
     warnings += role_warnings(file.runs)
     return Experiment(
@@ -328,4 +330,5 @@ def experiment_of(path: Path, file: ExperimentFile, catalogue: Catalogue) -> Exp
         warnings=tuple(warnings),
         log_format=file.log_format,
         model_file=kept,
+        priors=priors,
     )

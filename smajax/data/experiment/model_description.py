@@ -27,6 +27,18 @@ class ParameterInfo:
 
 
 @dataclass(frozen=True)
+class CoefficientInfo(ParameterInfo):
+    """A coefficient of a candidate effect.
+
+    switch: the effect is off where it is zero. logarithmic: the library's prior is of its logarithm. positive: the middle of that is above zero.
+    """
+
+    switch: bool = False
+    logarithmic: bool = False
+    positive: bool = False
+
+
+@dataclass(frozen=True)
 class Scale:
     """What magnitudes a model has at given values, by which measured ones are judged.
 
@@ -70,6 +82,7 @@ class Catalogue:
     """Names that an experiment file may use, and the description of a combination of them.
 
     describe(wire, load, drive, law) raises ValueError when the three do not go together; law "" is the wire's own.
+    coefficients(effect): those of one effect by their own names. odds: prior odds by class.
     """
 
     wires: Collection[str]
@@ -78,3 +91,5 @@ class Catalogue:
     laws: Collection[str]
     effects: Collection[str]
     describe: Callable[[str, str, str, str], ModelDescription]
+    coefficients: Callable[[str], Mapping[str, CoefficientInfo]] = lambda effect: {}
+    odds: Mapping[str, float] = field(default_factory=dict)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 
@@ -21,6 +21,33 @@ class Prior:
     mean: float
     sigma: float
     logarithmic: bool
+
+
+@dataclass(frozen=True)
+class PriorSpread:
+    """What a file says of the prior of a value, program's own unit; None: as the library has it.
+
+    logarithmic: whether `sigma` is of the natural logarithm.
+    """
+
+    base: float | None
+    sigma: float | None
+    logarithmic: bool
+
+
+@dataclass(frozen=True)
+class DeclaredPriors:
+    """Priors of candidate effects and of the presets' values that the file gives in the place of the library's.
+
+    odds: by effect. coefficients: by full name ("latent_heat.enthalpy"). presets: by parameter, about the presets' values.
+    """
+
+    odds: dict[str, float] = field(default_factory=dict)
+    coefficients: dict[str, PriorSpread] = field(default_factory=dict)
+    presets: dict[str, PriorSpread] = field(default_factory=dict)
+
+    def __bool__(self) -> bool:
+        return bool(self.odds or self.coefficients or self.presets)
 
 
 @dataclass(frozen=True)
@@ -119,6 +146,7 @@ class Experiment:
     warnings: tuple[str, ...]
     log_format: LogFormat | None = None  # how the logs of its runs were read
     model_file: FromModelFile | None = None
+    priors: DeclaredPriors = field(default_factory=DeclaredPriors)
 
     @property
     def base_values(self) -> dict[str, float]:

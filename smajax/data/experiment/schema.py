@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Literal
 
-from pydantic import Field, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
 from smajax.data.experiment.toml_file import Places, Quantity, Section, read_toml, validated
 
@@ -186,6 +186,61 @@ class EffectsSection(Section):
     exclude: list[str] = Field(default=[], description="a list of effect names")
 
 
+class SpreadSection(Section):
+    """How far a value may lie from the middle of its prior: a normal distribution of it, or of its logarithm."""
+
+    width: Quantity | None = Field(default=None, description="a standard deviation above zero, text like '10 J/g'")
+    relative: float | None = Field(default=None, gt=0.0, description="a number above 0; 0.2 is about 20 %")
+
+    @model_validator(mode="after")
+    def _one_spread(self) -> SpreadSection:
+        if self.width is not None and self.relative is not None:
+            raise ValueError("got both width and relative; give width = 'number unit', or relative = 0.2 for a share")
+        return self
+
+
+class CoefficientPriorSection(SpreadSection):
+    """The prior of a coefficient of a candidate effect, in the place of the library's."""
+
+    base: Quantity | None = Field(default=None, description="the middle of the prior, text like '5 s'")
+
+    @model_validator(mode="after")
+    def _something(self) -> CoefficientPriorSection:
+        if self.base is None and self.width is None and self.relative is None:
+            raise ValueError("says nothing; give base, width or relative")
+        return self
+
+
+class PresetPriorSection(SpreadSection):
+    """How uncertain a value is that the file does not list."""
+
+    @model_validator(mode="after")
+    def _something(self) -> PresetPriorSection:
+        if self.width is None and self.relative is None:
+            raise ValueError("says nothing; give width = 'number unit', or relative = 0.2 for a share of the value")
+        return self
+
+
+class EffectPriorSection(Section):
+    """What is known of a candidate effect before the runs: its odds, and the priors of its coefficients by their names."""
+
+    model_config = ConfigDict(extra="allow", frozen=True, strict=True)
+    __pydantic_extra__: dict[str, CoefficientPriorSection]
+
+    odds: str | float | None = Field(default=None, description="a class of odds, or a number above 0 and at most 1")
+
+
+class PriorsSection(Section):
+    """Priors in the place of the library's: a section for each effect by its name, and one for the values of presets."""
+
+    model_config = ConfigDict(extra="allow", frozen=True, strict=True)
+    __pydantic_extra__: dict[str, EffectPriorSection]
+
+    presets: dict[str, PresetPriorSection] = Field(
+        default={}, description="a table of parameter = { relative = 0.1 } or { width = 'number unit' }"
+    )
+
+
 class ExperimentFile(Section):
     """The whole file."""
 
@@ -199,6 +254,9 @@ class ExperimentFile(Section):
     data: DataSection = Field(default=DataSection(folder="."), description="a section [data] with folder")
     runs: list[RunSection] = Field(min_length=1, description="one section [[runs]] a run, with name, role and file")
     effects: EffectsSection = Field(default=EffectsSection(), description="a section [effects]")
+    priors: PriorsSection = Field(
+        default=PriorsSection.model_validate({}), description="sections [priors.EFFECT], and [priors.presets]"
+    )
 
     @property
     def log_format(self) -> LogFormat:
@@ -223,6 +281,11 @@ _PLACES: Places = {
     ("data",): DataSection,
     ("runs", "*"): RunSection,
     ("effects",): EffectsSection,
+    ("priors",): PriorsSection,
+    ("priors", "presets", "*"): PresetPriorSection,
+    ("priors", "*", "odds"): None,
+    ("priors", "*", "*"): CoefficientPriorSection,
+    ("priors", "*"): EffectPriorSection,
 }
 
 

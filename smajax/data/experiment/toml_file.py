@@ -9,7 +9,7 @@ from typing import Any, TypeAlias, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from smajax.core.names import close_matches
+from smajax.core.names import close_matches, listed, nearest
 from smajax.data.experiment.errors import ExperimentError
 
 Quantity = str | float
@@ -24,8 +24,8 @@ class Section(BaseModel):
 
 
 Whole = TypeVar("Whole", bound=Section)
-# Sections by place in the file; "*" stands for any name or number, () for the whole.
-Places: TypeAlias = Mapping[tuple[str, ...], type[Section]]
+# Sections by place in the file; "*" stands for any name or number, () for the whole; None: a key that is no section.
+Places: TypeAlias = Mapping[tuple[str, ...], type[Section] | None]
 
 
 def _section_at(place: Sequence[str | int], places: Places) -> type[Section] | None:
@@ -51,13 +51,21 @@ def _depth(place: Sequence[str | int], places: Places) -> int:
     return min(len(place), sections[-1] + 1)
 
 
+def _table(place: Sequence[str | int], depth: int, around: type[Section] | None, places: Places) -> str:
+    """What is expected of an entry that has a section of its own; its name may be that of another key, misspelled."""
+    own = _section_at(place[:depth], places)
+    if own is None or around is None:
+        return "expected a section"
+    return f"expected a table with {listed(own.model_fields)}{nearest(str(place[depth - 1]), around.model_fields)}"
+
+
 def _message(error: Any, content: dict[str, Any], places: Places) -> tuple[str, str]:
     """(key path, message) of one pydantic error."""
     place = tuple(error["loc"])
     depth = _depth(place, places)
     section = _section_at(place[: depth - 1], places) if depth else None
     field = section.model_fields.get(str(place[depth - 1])) if section is not None and depth else None
-    expected = f"expected {field.description}" if field is not None else "expected a section"
+    expected = f"expected {field.description}" if field is not None else _table(place, depth, section, places)
     # One step further for the entries of a table (parameters, files, inputs) and of a list.
     entry = len(place) > depth and isinstance(error["input"], str | int | float | bool | list | dict)
     table = field is not None and any(word in str(field.annotation) for word in ("dict[", "list[", "Mapping["))

@@ -3,7 +3,7 @@
 In: `smajax.attribution.findings.Findings`, numbers and enums. Out: a `Narrative`, sentences for the page, the record and the
 terminal; `narrated` does the same for the rounds of a search while it runs. Nothing here computes a result: thresholds
 are those of `findings.config`, and each module writes one part. `verdict` has the summary and `caveats` what is to be
-minded; `limits` what the runs do not determine; `residual`, `rounds` and `unknown` the parts of the same name.
+minded; `limits` what the runs do not determine; `priors` those of the experiment file; `residual`, `rounds` and `unknown` the parts of the same name.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from smajax.attribution.findings import Findings, Round
 from smajax.core.progress import Event, Message, Progress, Result
 from smajax.model.effects.library import LIBRARY
 from smajax.report.narrative.limits import cannot_know
+from smajax.report.narrative.priors import of_priors
 from smajax.report.narrative.residual import residual_sentences, unexplained
 from smajax.report.narrative.rounds import chosen_text, reason_text
 from smajax.report.narrative.unknown import comparison_sentence
@@ -42,7 +43,7 @@ def narrate(findings: Findings) -> Narrative:
         summary=summary(findings),
         unexplained=unexplained(findings),
         cannot_know=cannot_know(findings),
-        check=findings.check,
+        check=(*findings.check, *of_priors(findings)),
         residual_before=residual_sentences(findings.residual_before),
         residual_after=residual_sentences(findings.residual_after),
         rounds=tuple(

@@ -1,0 +1,24 @@
+"""Priors that the experiment file gives, in the place of the library's."""
+
+from __future__ import annotations
+
+import math
+
+from smajax.data.experiment.record import DeclaredPriors, PriorSpread
+from smajax.model.effects.prior_width import CoefficientPrior
+
+NONE_DECLARED = DeclaredPriors()
+
+
+def overridden(own: CoefficientPrior, declared: PriorSpread | None, bounds: tuple[float, float]) -> CoefficientPrior:
+    """The prior of a coefficient with what is `declared` of it; no wider than half of its `bounds`, as the library's."""
+    if declared is None:
+        return own
+    low, high = bounds
+    base = own.base if declared.base is None else min(max(declared.base, low), high)
+    if declared.sigma is None:
+        return CoefficientPrior(base, own.sigma, own.logarithmic)
+    if declared.logarithmic:
+        widest = 0.5 * math.log(high / low) if low > 0.0 else math.inf
+        return CoefficientPrior(base, min(declared.sigma, widest), True)
+    return CoefficientPrior(base, min(declared.sigma, 0.5 * (high - low)), False)
