@@ -3,16 +3,33 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+import numpy as np
 import typer
 
 from smajax.cli import completion
 from smajax.cli.options import texts
 
 if TYPE_CHECKING:
+    from smajax.data.model_file.actuator_model import ActuatorModel
     from smajax.model.system import System
 
+ModelFile = Annotated[
+    Path | None,
+    typer.Option("--model", help="a model.toml of close-loop or identify, in the place of --wire, --load and --drive"),
+]
+Drawn = Annotated[
+    int | None,
+    typer.Option(
+        "--plants",
+        min=0,
+        help="plants drawn from the posterior of --model, in the place of mismatches; default 16 with --model, 0 for none",
+    ),
+]
+DRAWN = 16
 WireName = Annotated[
     str,
     typer.Option(
@@ -56,9 +73,64 @@ class PlantOptions:
     drive: str = ""
     law: str = ""
     values: list[str] = field(default_factory=list)
+    model: Path | None = None
+
+    @cached_property
+    def kept(self) -> ActuatorModel | None:
+        """The model of --model. Raises ExperimentError, and typer.BadParameter where presets are named beside it."""
+        from smajax.data.model_file.read import load_model
+
+        if self.model is None:
+            return None
+        if self.wire or self.load or self.drive or self.law:
+            raise typer.BadParameter(
+                "says wire, load, drive and law: leave --wire, --load, --drive and --law out.", param_hint="--model"
+            )
+        return load_model(self.model)
+
+    def draws(self, count: int | None, seed: int, others: bool) -> System | None:
+        """Plants from the posterior of the model, stacked; None for none. others: whether mismatches are asked for too.
+
+        Raises typer.BadParameter for plants without a model, or of one of which nothing was fitted.
+        """
+        if self.kept is None:
+            if count:
+                raise typer.BadParameter("are drawn from a model's posterior: give --model.", param_hint="--plants")
+            return None
+        if others and count:
+            raise typer.BadParameter(
+                "plants are drawn, or differ by mismatches: give one of the two.", param_hint="--plants"
+            )
+        fitted = any(one.names for one in self.kept.likely)
+        if count and not fitted:
+            raise typer.BadParameter(
+                f"{self.model} has no covariance of fitted values, so that nothing can be drawn: leave it out.",
+                param_hint="--plants",
+            )
+        wanted = (0 if others or not fitted else DRAWN) if count is None else count
+        if not wanted:
+            return None
+        from smajax.control.kept_plant import within_limit
+        from smajax.core.parameters import parameter_values, parameters, set_parameters
+
+        plants = within_limit(self.kept, self.kept.plants(wanted, seed))
+        if not self._changed:
+            return plants
+        own, changed = self.kept.values, parameter_values(self.system())
+        values = {name: value for name, value in changed.items() if value != own.get(name) or name in self._changed}
+        if new := sorted(values.keys() - parameters(plants).keys()):
+            raise typer.BadParameter(
+                f"{new[0]} is of an effect that the model has not: with --set of it give --plants 0.",
+                param_hint="--plants",
+            )
+        return set_parameters(plants, {name: np.full(wanted, value) for name, value in values.items()})
+
+    @property
+    def _changed(self) -> dict[str, str]:
+        return texts("--set", self.values, EXAMPLE)
 
     def system(self) -> System:
-        """Raises typer.BadParameter for presets there are not, or some without the others."""
+        """Raises typer.BadParameter for presets there are not, or some without the others; ExperimentError of --model."""
         from smajax.control.compose import compose, with_values
         from smajax.model.rigs import arm
 
@@ -68,8 +140,15 @@ class PlantOptions:
             raise typer.BadParameter(
                 f"a plant is a wire, a load and a drive: give {' and '.join(missing)} too (`smajax presets` lists them)."
             )
-        changed = texts("--set", self.values, EXAMPLE)
+        changed = self._changed
         try:
+            if self.kept is not None:
+                from smajax.control.kept_plant import plant_of
+
+                system, sentence = plant_of(self.kept)
+                if sentence and "amplifier_limit" not in changed:
+                    typer.echo(sentence, err=True)
+                return with_values(system, changed)
             if missing:
                 return with_values(arm(self.law) if self.law else arm(), changed)
             return compose(self.wire, self.load, self.drive, law=self.law, values=changed)

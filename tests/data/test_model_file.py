@@ -13,6 +13,7 @@ from smajax.data.experiment.errors import ExperimentError
 from smajax.data.experiment.record import Prior
 from smajax.data.experiment.schema import ChannelSection, LogFormat, SamplingSection, TimeSection
 from smajax.data.model_file.actuator_model import ActuatorModel
+from smajax.data.model_file.of_experiment import actuator_model
 from smajax.data.model_file.of_presets import model_of_presets
 from smajax.data.model_file.read import load_model
 from smajax.data.model_file.record import FittedRun, LikelyModel, ModelOutput, ModelParameter
@@ -258,3 +259,18 @@ def test_a_model_section_names_presets_or_a_file(tmp_path: Path, new: str, said:
     presets = 'wire = "flexinol_table_3_2"\nload = "dead_weight"\ndrive = "voltage"\n'
     with pytest.raises(ExperimentError, match=said):
         open_experiment(bench(tmp_path, (presets, new)))
+
+
+def test_a_mass_that_the_logs_give_is_that_of_the_bench(tmp_path: Path) -> None:
+    file = bench(
+        tmp_path,
+        ("[channels.position]", '[channels.mass]\nrole = "input"\ncolumn = "U"\nunit = "kg"\n[channels.position]'),
+    )
+    for name in ("a.csv", "b.csv"):  # the voltages, 5 and 0, stand in for masses
+        text = (tmp_path / name).read_text(encoding="utf-8").replace(",0,", ",2,")
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    experiment = open_experiment(file)
+    likely = LikelyModel((), 1.0, {"convection_coefficient": 120.0})
+    made = actuator_model(experiment, [likely], {"convection_coefficient": (40.0, 400.0)}, {}, [], {})
+    assert made.parameters["load_mass"].origin == "given"
+    assert made.values["load_mass"] == float(np.median(experiment.runs[0].inputs["mass"]))

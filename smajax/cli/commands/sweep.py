@@ -24,7 +24,7 @@ from smajax.cli.options import (
     understood,
     within,
 )
-from smajax.cli.plant_options import Changes, DriveName, LawName, LoadName, PlantOptions, WireName
+from smajax.cli.plant_options import Changes, Drawn, DriveName, LawName, LoadName, ModelFile, PlantOptions, WireName
 from smajax.cli.terminal import browse, command_line, console, resumable
 
 if TYPE_CHECKING:
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from smajax.model.system import System
 
 SET_POINTS, FAST_AT, GAINS = "-40,-20,0,10,20,40,50,60,80", "-20,20,60", "0.5,0.7,1,1.4,2"  # of the arm
+SEED = 0  # of plants drawn from a posterior
 FEW, MANY = 3, 6  # set points of another load, with --fast and without
 
 
@@ -134,6 +135,8 @@ def sweep(
     drive: DriveName = "",
     law: LawName = "",
     values: Changes = None,
+    model: ModelFile = None,
+    drawn: Drawn = None,
     over: Annotated[
         str | None,
         typer.Option(
@@ -192,7 +195,7 @@ def sweep(
 ) -> None:
     """Run controllers on perturbed plants, and compare them on every set point.
 
-    By default on the arm of the source; with --wire, --load and --drive on any load that moves, where the gains are those of the
+    By default on the arm of the source; with --model on a fitted model, and on plants drawn from its posterior; with --wire, --load and --drive on any load that moves, where the gains are those of the
     arm scaled to the load's stroke, force and time and to the drive's limit.
 
     After Ctrl-C the same command resumes with the controllers that are not finished.
@@ -203,6 +206,8 @@ def sweep(
     is both ways. Of another load than the arm: those of these that it has, and its other parameters by their names.
 
     Example:  smajax sweep --controllers pid,sld --over convection,ambient --out sweep
+
+    Example:  smajax sweep --model report/model.toml --controllers pid --gains tuned/gains.json
 
     Example:  smajax sweep --wire flexinol_ht_500um --load bias_spring --drive voltage --set-point 5mm,10mm --fast
     """
@@ -216,7 +221,8 @@ def sweep(
     from smajax.core.provenance import digest
     from smajax.report.sweep_folder import as_text, files_of, write_sweep
 
-    plant = PlantOptions(wire, load, drive, law, values or []).system()
+    plant_options = PlantOptions(wire, load, drive, law, values or [], model)
+    plant, plants = plant_options.system(), plant_options.draws(drawn, SEED, others=over is not None)
     options = _Options(plant, controllers, over, points, set_points, tuple(gains or ()), gain_ratios, fast)
     settings = replace(options.settings(seconds, estimator, noise, period, delay), tolerance=tolerance_of(tolerance))
     for sentence in (
@@ -228,6 +234,8 @@ def sweep(
     request = settings.record()
     if not is_arm(plant) or law or values:
         request["plant"] = digest(plant)[:16]
+    if plants is not None:
+        request["plants"] = digest(plants)[:16]
     resume = "Finished controllers are cached: the same command resumes."
     try:
         with (
@@ -235,8 +243,8 @@ def sweep(
             claimed(out, "sweep", request, files_of(settings.controllers), overwrite, may_resume),
             displayed(console(), hint=not json_out) as progress,
         ):
-            sweeps = sweep_controllers(plant, settings, out, progress)
-            results = write_sweep(plant, settings, sweeps, out, progress, command_line())
+            sweeps = sweep_controllers(plant, settings, out, progress, plants)
+            results = write_sweep(plant, settings, sweeps, out, progress, command_line(), plants)
     except FolderTaken:
         raise
     except ValueError as error:

@@ -28,7 +28,7 @@ from smajax.cli.options import (
     understood,
     within,
 )
-from smajax.cli.plant_options import Changes, DriveName, LawName, LoadName, PlantOptions, WireName
+from smajax.cli.plant_options import Changes, Drawn, DriveName, LawName, LoadName, ModelFile, PlantOptions, WireName
 from smajax.cli.terminal import browse, command_line, console, resumable
 
 if TYPE_CHECKING:
@@ -90,7 +90,9 @@ def _variation(several: Sequence[str] | None, plant: System) -> dict[str, float]
     return variation
 
 
-def _run(plant: System, settings: TuneSettings, out: Path, overwrite: bool, json_out: bool) -> Mapping[str, Any]:
+def _run(
+    plant: System, settings: TuneSettings, plants: System | None, out: Path, overwrite: bool, json_out: bool
+) -> Mapping[str, Any]:
     """The record of the tuning, from the folder where it is finished there. Raises typer.BadParameter."""
     from smajax.cli.progress_display import displayed
     from smajax.cli.result_folder import FolderTaken, claimed
@@ -100,15 +102,15 @@ def _run(plant: System, settings: TuneSettings, out: Path, overwrite: bool, json
     resume = "Finished rounds are cached: the same command resumes."
     request = {"tuning": settings.controller}  # the other settings are in a file of the tuning itself, which it checks
     try:
-        settings.check(plant)
+        settings.check(plant, plants)
         with (
             resumable(resume, out, STATE),
             claimed(out, "tune", request, sorted(FILES), overwrite),
             displayed(console(), hint=not json_out) as progress,
         ):
-            record = finished(plant, settings, out)
+            record = finished(plant, settings, out, plants)
             if record is None:
-                record = write_tuning(tune_in_folder(plant, settings, out, progress), out, command_line())
+                record = write_tuning(tune_in_folder(plant, settings, out, progress, plants), out, command_line())
     except FolderTaken:
         raise
     except ValueError as error:
@@ -130,6 +132,8 @@ def tune(
     drive: DriveName = "",
     law: LawName = "",
     values: Changes = None,
+    model: ModelFile = None,
+    drawn: Drawn = None,
     set_points: Annotated[
         str | None,
         typer.Option(
@@ -206,7 +210,7 @@ def tune(
 ) -> None:
     """Tune the gains of a controller on many set points and plants at once: by gradient, then by CMA-ES.
 
-    By default on the arm of the source; with --wire, --load and --drive on any load that moves, where the gains and their bounds
+    By default on the arm of the source; with --model on a fitted model, and then on plants drawn from its posterior; with --wire, --load and --drive on any load that moves, where the gains and their bounds
     are those of the arm scaled to the load's stroke, force and time and to the drive's limit.
 
     Each closed loop is one step from the start, cold and at rest. Moves between the set points are simulated at the end. The
@@ -220,6 +224,8 @@ def tune(
 
     Example:  smajax tune pid --wire flexinol_table_3_2 --load dead_weight --drive flexinol_voltage --set-point 5mm,12mm,20mm
 
+    Example:  smajax tune pid --model report/model.toml --set-point 5mm,10mm --out tuned
+
     Example:  smajax tune sld --variation inertia=20%,damping=20%,convection=20% --limits settling_time=4,overshoot=2
     """
     from smajax.core.runtime import prepare
@@ -231,7 +237,8 @@ def tune(
     from smajax.control.tune.terms import terms_in
     from smajax.report.tune_page import gain_rows
 
-    plant = PlantOptions(wire, load, drive, law, values or []).system()
+    options = PlantOptions(wire, load, drive, law, values or [], model)
+    plant, plants = options.system(), options.draws(drawn, seed, others=bool(variation))
     with refused():
         unit = unit_of(plant)
     initial = _initial_gains(start, controller, plant)
@@ -248,6 +255,7 @@ def tune(
     settings = settings_for(
         plant,
         controller,
+        plants,
         set_points=given,
         variation=_variation(variation, plant),
         objective=objective,
@@ -267,7 +275,7 @@ def tune(
     sentence = understood("Set points", set_points, settings.set_points, unit.shown)
     if sentence and not json_out:
         typer.echo(sentence, err=True)
-    record = _run(plant, settings, out, overwrite, json_out)
+    record = _run(plant, settings, plants, out, overwrite, json_out)
     page = out / "tune.html"
     for sentence in record["price"]:
         typer.echo(sentence, err=True)

@@ -19,6 +19,9 @@ from smajax.model.extended import extended
 from smajax.model.presets import build
 
 
+LOGGED = {"load_mass": "mass", "ambient_temperature": "ambient_temperature"}  # parameter -> the input that replaces it
+
+
 def actuator_model(
     experiment: Experiment,
     likely: Sequence[LikelyModel],
@@ -70,11 +73,25 @@ def _parameter(
         return ModelParameter(
             float(fitted.values[name]), "fitted", low, high, None if error is None else rounded(error)
         )
+    logged = _logged(experiment, name)
+    if logged is not None:
+        return ModelParameter(logged, "given", entry.low, entry.high)
     if name in experiment.parameters:
         return ModelParameter(float(start), "given", entry.low, entry.high)
     if kept is not None and name in kept.errors:
         return ModelParameter(float(start), "fitted", *kept.bounds[name], kept.errors[name])
     return ModelParameter(float(start), "preset", entry.low, entry.high)
+
+
+def _logged(experiment: Experiment, name: str) -> float | None:
+    """The median over the fit runs of what an input channel gives in the place of a parameter; None where none does.
+
+    Runs have their own, but a closed loop or a simulation without that channel is of this bench all the same.
+    """
+    if name not in LOGGED:
+        return None
+    series = [run.inputs[LOGGED[name]] for run in experiment.runs if run.role == "fit" and LOGGED[name] in run.inputs]
+    return rounded(float(np.median(np.concatenate(series)))) if series else None
 
 
 def rounded(value: float) -> float:
