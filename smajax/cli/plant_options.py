@@ -136,7 +136,7 @@ class PlantOptions:
 
         named = {"--wire": self.wire, "--load": self.load, "--drive": self.drive}
         missing = [option for option, name in named.items() if not name]
-        if 0 < len(missing) < len(named):
+        if self.kept is None and 0 < len(missing) < len(named):
             raise typer.BadParameter(
                 f"a plant is a wire, a load and a drive: give {' and '.join(missing)} too (`smajax presets` lists them)."
             )

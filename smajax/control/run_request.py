@@ -21,6 +21,7 @@ from smajax.control.compose import compose, with_values
 from smajax.control.figures_of_merit import SetPointMerit, merit_by_set_point, set_point_spans
 from smajax.control.gains_file import Gains, read_gains
 from smajax.control.interface import between_in_words, check_interface, check_set_points, interface_of, noise_of
+from smajax.control.kept_plant import plant_of
 from smajax.control.loop_dataset import labelled_loop
 from smajax.control.position_unit import PositionUnit, unit_of
 from smajax.control.presets import CONTROLLERS, check_controller
@@ -29,7 +30,8 @@ from smajax.core.names import close_matches
 from smajax.core.parameters import parameter_values, parameters
 from smajax.core.wording import and_listed
 from smajax.data.experiment.magnitude import MELTS
-from smajax.data.text_input import clock_of, given
+from smajax.data.model_file.read import load_model
+from smajax.data.text_input import clock_of, given, reads_file
 from smajax.model.channels import INPUT_UNITS
 from smajax.model.load.coupon import AbstractCoupon
 from smajax.model.system import System
@@ -59,7 +61,7 @@ def _part(name: str) -> Iterator[None]:
 
 @dataclass(frozen=True)
 class RunRequest:
-    """A run: presets by name, values that differ, inputs as text (`text_input.parse_input`), and the step, s."""
+    """A run: presets by name or a model file, values that differ, inputs as text (`text_input.given`), and the step, s."""
 
     wire: str = "niti_table_3_1"
     load: str = "arm"
@@ -71,10 +73,21 @@ class RunRequest:
     seconds: float | None = None
     dt: float = DEFAULT_STEP
     tolerance: Tolerance = AUTO  # as `simulate_dataset`'s
+    model: str = ""  # path of a model file, in the place of the presets
+    measured: Mapping[str, str] = field(
+        default_factory=dict
+    )  # sensor -> FILE:COLUMN:UNIT of a log to hold the run against
 
-    def system(self) -> System:
-        """The model. Raises KeyError and ValueError as `compose`, RequestError of `values`."""
-        bare = compose(self.wire, self.load, self.drive, law=self.law)
+    def system(self, closed: bool = False) -> System:
+        """The model. Raises KeyError and ValueError as `compose`, ExperimentError of the model file, RequestError of `values`.
+
+        closed: of a closed loop, whose commands stay within those that a model file was fitted to.
+        """
+        if self.model:
+            kept = load_model(self.model)
+            bare = plant_of(kept)[0] if closed else kept.system
+        else:
+            bare = compose(self.wire, self.load, self.drive, law=self.law)
         with _part("values"):
             return with_values(bare, self.values)
 
@@ -173,7 +186,26 @@ def run_open(request: RunRequest) -> RunResult:
     }
     data = simulate_dataset(system, series, request.dt, request.tolerance)
     data = data.assign_coords(time=data["time"].copy(data=clock))  # a sum of steps has rounding errors
-    return RunResult(data, system, {}, tuple(_notes(data)))
+    notes = _notes(data)
+    data = _with_measured(request, system, data)
+    return RunResult(data, system, {}, tuple(notes))
+
+
+def _with_measured(request: RunRequest, system: System, data: xr.Dataset) -> xr.Dataset:
+    """`data` with the measured series that it is held against, each at the run's times, nan beyond the log's end."""
+    sensors = {system.load.reading[0]: "reading", **{name: name for name in COMPARED if name in data}}
+    for name, text in request.measured.items():
+        with _part(f"measured.{name}"):
+            if name not in sensors:
+                raise ValueError(f"no sensor {name!r}{close_matches(name, sensors, 'a run may be held against')}")
+            unit = data[sensors[name]].attrs["units"]
+            own = "1" if unit == "-" else unit
+            if not reads_file(text):
+                raise ValueError(f"got {text!r}, expected a column of a log, such as log.csv:COLUMN:UNIT.")
+            log = given(text, own, request.time, bare=own)
+            values = np.interp(data["time"].to_numpy(), log.time, log.values, right=np.nan)
+            data = data.assign({f"{MEASURED}{name}": ("time", values, {"units": unit, "of": sensors[name]})})
+    return data
 
 
 def mismatches(assumed: System, plant: System) -> tuple[Mismatch, ...]:
@@ -197,7 +229,7 @@ def _set_point_notes(system: System, position: np.ndarray) -> list[str]:
 
 def _gains(request: RunRequest, loop: LoopRequest) -> tuple[System, Gains]:
     """(the system that the controller assumes, its gains)."""
-    system = request.system()
+    system = request.system(closed=True)
     gains = Gains(loop.controller, {}) if loop.gains is None else read_gains(loop.gains, system)
     if gains.controller not in CONTROLLERS:
         raise ValueError(
@@ -220,6 +252,10 @@ def _set_points(
     clock = clock[: periods * every + 1]
     # A set point holds from its instant on: a mean over the step before it would come early.
     return clock, levels.at(clock)
+
+
+COMPARED = ("temperature", "stress", "strain")  # beside the load's own reading
+MEASURED = "measured_"  # before the name of a sensor: the variable of its log
 
 
 def run_closed(request: RunRequest, loop: LoopRequest) -> RunResult:
@@ -259,6 +295,7 @@ def run_closed(request: RunRequest, loop: LoopRequest) -> RunResult:
         between=between,
     )
     notes = _notes(data)
+    data = _with_measured(request, plant, data)
     try:
         check_answers(run)
     except ValueError as error:

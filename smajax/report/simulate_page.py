@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 
 from smajax.control.figures_of_merit import STEADY_SHARE, SetPointMerit, merit_units
 from smajax.control.mismatch import in_words
-from smajax.control.run_request import RunResult
+from smajax.control.run_request import MEASURED, RunResult
 from smajax.core.display_units import axis_label, digits, display, label
 from smajax.core.files import as_netcdf, csv_text, heading, json_text, replace
 from smajax.core.parameters import parameter_values, parameters
@@ -128,6 +128,32 @@ def _inputs(data: xr.Dataset) -> list[str]:
     return [name for name in names[: names.index("temperature")] if name != "wanted"]
 
 
+def measured_of(data: xr.Dataset) -> dict[str, tuple[str, np.ndarray]]:
+    """Sensor -> (variable of the run, measured series (n,)) of the logs that the run is held against."""
+    return {
+        str(name).removeprefix(MEASURED): (str(one.attrs["of"]), one.to_numpy())
+        for name, one in data.data_vars.items()
+        if str(name).startswith(MEASURED)
+    }
+
+
+def measured_sentences(result: RunResult) -> list[str]:
+    """How far the run is off from the logs that it is held against; and without the mean, which may be a sensor's zero."""
+    sentences = []
+    for name, (of, values) in measured_of(result.data).items():
+        unit = display(result.data[of].attrs["units"], name)
+        error = values - result.data[of].to_numpy()
+        present = np.isfinite(error)
+        if not present.any():
+            continue
+        error = error[present]
+        off, about = (digits(unit.of(float(np.sqrt(np.mean(one**2)))), 3) for one in (error, error - error.mean()))
+        sentences.append(
+            f"The measured {label(name)} is off by {off} {unit.unit} (rms), by {about} {unit.unit} without its mean."
+        )
+    return sentences
+
+
 def _moves(data: xr.Dataset) -> bool:
     """Whether the load has a position; a coupon's has no unit, and is zero as its velocity is."""
     return bool(data["position"].attrs["units"] != "-")
@@ -152,6 +178,16 @@ def picture_of(data: xr.Dataset, form: str = "png", upright: bool = False) -> by
     for one, name in zip(axes, shown, strict=False):
         what, said = values(name)
         one.plot(time, what, color=RED if name in inputs else BLUE, linewidth=1.3)
+        for of, logged in measured_of(data).values():
+            if of == name or (of == "reading" and name == path):
+                one.plot(
+                    time,
+                    display(data[of].attrs["units"], name).of(logged),
+                    color=GREY,
+                    linewidth=2.6,
+                    alpha=0.55,
+                    zorder=1,
+                )
         if name == "position" and "wanted" in data:
             one.plot(time, values("wanted")[0], color=GREY, linewidth=1.0, linestyle="--")
         named(one, "time (s)", said)
@@ -178,7 +214,8 @@ def _redundant(data: xr.Dataset) -> set[str]:
 def summary_rows(data: xr.Dataset) -> list[list[str]]:
     """A row a variable: least, greatest, last, in the units that a reader sees; the reading where it is not the true value."""
     rows = []
-    for name, one in data.drop_vars(_redundant(data)).data_vars.items():
+    logged = [f"{MEASURED}{name}" for name in measured_of(data)]
+    for name, one in data.drop_vars([*_redundant(data), *logged]).data_vars.items():
         unit, values = display(one.attrs["units"], str(name)), one.to_numpy()
         least, greatest, last = float(values.min()), float(values.max()), float(values[-1])
         # A zero with rounding errors.
@@ -280,6 +317,7 @@ def conclusions(result: RunResult) -> list[str]:
         f"The {label(name)} starts at {read(reading[0])}, lies between {read(reading.min())} and "
         f"{read(reading.max())}, and ends at {read(reading[-1])}."
     )
+    sentences += measured_sentences(result)
     sentences += _at_ends(result)
     if result.merit:
         settles = result.merit["settling_time"]

@@ -23,6 +23,7 @@ OPTIONS = {
     "set_points": "--set-point",
     "noise": "'--noise'",
 }  # part of a run -> its option
+WIRE, LOAD, DRIVE = "niti_table_3_1", "arm", "amplified_voltage"
 VALUES = "damping=+20%,wire_length='1 m'"
 
 
@@ -96,7 +97,8 @@ class _Options:
         known = {**OPTIONS, **{f"inputs.{name}": f"--input {name}" for name in self.inputs}}
         # Of a file the column of the times may be wrong.
         timed = bool(self.time) and part.startswith(("inputs.", "set_points"))
-        return known.get(part, "--step") + " or --time" * timed
+        option = "--measured" if part.startswith("measured.") else known.get(part, "--step")
+        return option + " or --time" * timed
 
 
 def _run(options: _Options, request: RunRequest, loop: LoopRequest) -> tuple[RunRequest, RunResult]:
@@ -127,6 +129,7 @@ def _print(result: RunResult, title: str) -> None:
     from smajax.report.integration_words import integration_sentence
     from smajax.report.simulate_page import (
         integration_error,
+        measured_sentences,
         merit_rows,
         mismatch_rows,
         set_point_rows,
@@ -137,6 +140,8 @@ def _print(result: RunResult, title: str) -> None:
     for row in summary_rows(result.data):
         typer.echo(f"  {row[0]:<28} {row[1]:>11} … {row[2]:<11} last {row[3]:<11} {row[4]}")
     typer.echo(f"  {integration_sentence(integration_error(result.data))}")
+    for sentence in measured_sentences(result):
+        typer.echo(f"  {sentence}")
     for row in mismatch_rows(result):
         unit, ratio = f" {row[3]}" * (row[3] != "-"), f", {row[4]}" * bool(row[4])
         typer.echo(f"  {row[0]:<28} assumed {row[1]} -> true {row[2]}{unit}{ratio}")
@@ -151,14 +156,12 @@ def _print(result: RunResult, title: str) -> None:
 
 # More than 8 parameters and 80 lines: typer reads the options from them.
 def simulate(
-    wire: Annotated[
-        str, typer.Argument(help="a wire of `smajax presets`", autocompletion=completion.wires)
-    ] = "niti_table_3_1",
-    load: Annotated[str, typer.Argument(help="a load of `smajax presets`", autocompletion=completion.loads)] = "arm",
+    wire: Annotated[str, typer.Argument(help="a wire of `smajax presets`", autocompletion=completion.wires)] = WIRE,
+    load: Annotated[str, typer.Argument(help="a load of `smajax presets`", autocompletion=completion.loads)] = LOAD,
     drive: Annotated[
         str,
         typer.Argument(help="a drive of `smajax presets`; `none` for a coupon", autocompletion=completion.drives),
-    ] = "amplified_voltage",
+    ] = DRIVE,
     step: Annotated[
         str | None,
         typer.Option(
@@ -191,6 +194,16 @@ def simulate(
     ] = "",
     seconds: Annotated[
         float | None, quantity("length of the run; default: that of the inputs", "s", above=0.0, like="10s")
+    ] = None,
+    model: Annotated[
+        Path | None,
+        typer.Option(help="a model.toml of close-loop or identify, in the place of wire, load and drive"),
+    ] = None,
+    measured: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="hold the run against a log: position=log.csv:COLUMN:mm, or temperature, stress, strain; may be repeated"
+        ),
     ] = None,
     dt: Annotated[float, quantity("time between samples", "s", above=0.0, like="5ms")] = 0.005,
     tolerance: Finely = "auto",
@@ -249,6 +262,8 @@ def simulate(
 
     Example:  smajax simulate flexinol_ht_500um bias_spring voltage --controller pid --set-point 5mm:30s,2mm:30s
 
+    Example:  smajax simulate --model report/model.toml --input voltage=ramp.csv:U:V --measured position=ramp.csv:x:mm
+
     Example:  smajax simulate --gains tune/gains.json --set-point 40deg:5s,10deg:5s --mismatch damping=+20% --out loop
     """
     from smajax.core.runtime import prepare
@@ -265,12 +280,17 @@ def simulate(
     series = _inputs("--input", inputs)
     options = _Options(step, series, gains, controller, set_point, perturbed, time, gif)
     options.check(load)
+    if model is not None and (wire, load, drive, law) != (WIRE, LOAD, DRIVE, ""):
+        raise typer.BadParameter("says wire, load, drive and law: leave these out.", param_hint="--model")
     changed, finely = texts("--set", values, VALUES), tolerance_of(tolerance)
-    request = RunRequest(wire, load, drive, law, changed, series, time, seconds, dt, finely)
+    compared = _inputs("--measured", measured)
+    kept = "" if model is None else str(model)
+    request = RunRequest(wire, load, drive, law, changed, series, time, seconds, dt, finely, kept, compared)
     loop = LoopRequest(controller, set_point or "", gains, perturbed, estimator, noise or 0.0, period, delay, seed)
     request, result = _run(options, request, loop)
     command = command_line()
-    title = f"{wire}, {load}, {drive}" + (f", {result.data.attrs['controller']}" if options.closed else "")
+    what = f"{wire}, {load}, {drive}" if model is None else str(model)
+    title = what + (f", {result.data.attrs['controller']}" if options.closed else "")
     settings = {
         **vars(request),
         **(vars(loop) if options.closed else {}),

@@ -18,7 +18,6 @@ from smajax.data.model_file.record import (
 from smajax.model.extended import extended
 from smajax.model.presets import build
 
-
 LOGGED = {"load_mass": "mass", "ambient_temperature": "ambient_temperature"}  # parameter -> the input that replaces it
 
 
@@ -91,7 +90,9 @@ def _logged(experiment: Experiment, name: str) -> float | None:
     if name not in LOGGED:
         return None
     series = [run.inputs[LOGGED[name]] for run in experiment.runs if run.role == "fit" and LOGGED[name] in run.inputs]
-    return rounded(float(np.median(np.concatenate(series)))) if series else None
+    if not series:
+        return None
+    return rounded(float(np.quantile(np.concatenate(series), 0.5, method="nearest")))  # one that was there
 
 
 def rounded(value: float) -> float:

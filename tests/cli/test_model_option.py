@@ -1,0 +1,79 @@
+"""`--model`: simulate, tune and sweep take a kept model in the place of presets."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import smajax as sma
+from smajax.control.kept_plant import plant_of
+from tests.fit.test_predict import NOISE, kept_model, log, reading
+from tests.helpers.small_bench import refused, smajax
+
+
+@pytest.fixture
+def model(tmp_path: Path) -> Path:
+    return kept_model().save(tmp_path / "model.toml")
+
+
+def test_a_run_of_a_kept_model_is_held_against_a_log(tmp_path: Path, model: Path) -> None:
+    kept = kept_model()
+    run = log(tmp_path / "run.csv", reading(kept) + 2e-3, heading="t,U,x")
+    words = ["--input", f"voltage={run}:U:V", "--measured", f"position={run}:x:mm", "--dt", "100ms"]
+    ended = smajax("simulate", "--model", model, *words, "--out", tmp_path / "out")
+    assert ended.code == 0, ended.said
+    assert "The measured position is off by 2 mm (rms), by 0.09" in ended.out
+    record = json.loads((tmp_path / "out" / "simulate.json").read_text(encoding="utf-8"))
+    error = np.subtract(record["series"]["measured_position"], record["series"]["reading"])
+    # The last input of a log holds no longer than the log.
+    assert np.nanmean(error[:-1]) == pytest.approx(2e-3, abs=0.2 * NOISE)
+
+
+def test_what_cannot_be_held_against_a_log_is_refused(tmp_path: Path, model: Path) -> None:
+    run = log(tmp_path / "run.csv", reading(kept_model()), heading="t,U,x")
+    step = ["simulate", "--model", model, "--step", "5V:5s", "--out", tmp_path / "out"]
+    assert "no sensor 'angle'" in refused(*step, "--measured", f"angle={run}:x:mm")
+    assert "expected a column of a log" in refused(*step, "--measured", "position=3mm")
+    assert "leave these out" in refused(*step, "--law", "brinson")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_closed_loop_stays_within_the_commands_of_the_fit_runs() -> None:
+    kept = kept_model()
+    system, sentence = plant_of(kept)
+    # The drive's amplifier multiplies the command by 1.6.
+    assert float(system.drive.largest_command()) == pytest.approx(5.0)
+    assert float(sma.get_parameters(system, ["amplifier_limit"])[0]) == pytest.approx(8.0)
+    assert "limited to 5 V, the largest of the runs that the model was fitted to" in sentence
+    given = dataclasses.replace(kept.parameters["amplifier_limit"], value=20.0, origin="given")
+    own = dataclasses.replace(kept, parameters={**kept.parameters, "amplifier_limit": given})
+    assert plant_of(own)[1] == ""
+
+
+def test_gains_are_tuned_and_compared_on_plants_from_the_posterior(tmp_path: Path, model: Path) -> None:
+    effort = ["--set-point", "5mm,10mm", "--fast", "--rounds", "1", "--finish", "0", "--seconds", "8", "--starts", "1"]
+    ended = smajax("tune", "pid", "--model", model, "--plants", "4", *effort, "--out", tmp_path / "tuned")
+    assert ended.code == 0, ended.said
+    assert json.loads((tmp_path / "tuned" / "tune.json").read_text(encoding="utf-8"))["settings"]["plants_of_the_batch"] == 4
+    gains = tmp_path / "tuned" / "gains.json"
+    ended = smajax("simulate", "--model", model, "--gains", gains, "--set-point", "5mm:4s", "--out", tmp_path / "loop")
+    assert ended.code == 0, ended.said
+    words = ["--plants", "3", "--set-point", "5mm", "--gain-ratios", "1", "--seconds", "4", "--out", tmp_path / "swept"]
+    ended = smajax("sweep", "--model", model, "--gains", gains, *words)
+    assert ended.code == 0, ended.said
+    record = json.loads((tmp_path / "swept" / "sweep.json").read_text(encoding="utf-8"))
+    assert "pid" in json.dumps(record)
+
+
+def test_plants_need_a_model_of_which_something_was_fitted(tmp_path: Path, model: Path) -> None:
+    known = dataclasses.replace(kept_model(), likely=()).save(tmp_path / "known.toml")
+    tune = ["tune", "pid", "--set-point", "5mm", "--out", tmp_path / "out"]
+    assert "give --model" in refused(*tune, "--plants", "4")
+    assert "has no covariance of fitted values" in refused(*tune, "--plants", "4", "--model", known)
+    assert "give one of the two" in refused(*tune, "--plants", "4", "--model", model, "--variation", "damping=20%")
+    assert "leave --wire, --load, --drive" in refused(*tune, "--model", model, "--load", "arm")
+    assert not (tmp_path / "out").exists()
