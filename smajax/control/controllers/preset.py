@@ -74,15 +74,16 @@ class ControllerPreset:
         return self.section(system) if is_arm(system) else system
 
     def box_on(self, system: System) -> Box:
-        """The bounds of its gains on a plant, to three digits."""
+        """The bounds of its gains on a plant, to three digits, within those that make sense."""
         if is_arm(system):
             return self.box
         controller = self.on_arm(system)
         factors, table = factors_for(system, controller, self.scales), parameters(controller)
+
+        def held(bound: float, name: str) -> float:
+            return min(max(float(f"{bound:.3g}"), table[name].low), table[name].high)
+
         return {
-            name: tuple(
-                max(float(f"{bound * float(factors[name]):.3g}"), table[name].low)
-                for bound in bounds  # type: ignore[misc]
-            )
-            for name, bounds in self.box.items()
+            name: (held(low * float(factors[name]), name), held(high * float(factors[name]), name))
+            for name, (low, high) in self.box.items()
         }
