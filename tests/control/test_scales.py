@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from smajax.control.controllers.preset import WIDER
 from smajax.control.presets import CONTROLLERS, pid
 from smajax.control.scales import HEADROOM, arm_scales, exponents, factors_for, scales_of, unit_on
 from smajax.core.parameters import get_parameters, parameters, set_parameters
@@ -101,7 +102,7 @@ def test_pid_asks_the_same_share_of_the_voltage_for_the_same_share_of_the_stroke
             both.append(float(share * scales.time**per_time))
         assert both[1] == pytest.approx(both[0], rel=1e-12)
     low, high = CONTROLLERS["pid"].box_on(HANGING)["proportional_gain"]
-    assert high / low == pytest.approx(200.0, rel=0.01), "the box is as wide as the arm's"
+    assert high / low == pytest.approx(200.0 * WIDER**2, rel=0.01), "the box of the arm, and room on either side"
     assert low < float(here.proportional_gain) < high
 
 
