@@ -29,6 +29,7 @@ from typing import NamedTuple, TypeVar
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from smajax.control.load_equation import equation_of, force_per_stress, moving_load, stroke_of
 from smajax.core.parameters import get_parameters, parameters, set_parameters
@@ -96,9 +97,13 @@ def scales_of(system: System) -> Scales:
     return Scales(stroke, command, time, force, stress, hot - air, inertia, damping)
 
 
-@lru_cache(maxsize=1)
 def arm_scales() -> Scales:
     """Of the arm that the presets' gains were searched for."""
+    return _arm_scales(jnp.zeros(()).dtype)
+
+
+@lru_cache(maxsize=2)
+def _arm_scales(precision: np.dtype) -> Scales:
     with jax.ensure_compile_time_eval():
         return scales_of(arm())
 
@@ -167,3 +172,10 @@ def scaled(controller: Module, factors: Mapping[str, Scalar], own: frozenset[str
     names = [name for name, entry in table.items() if str(entry.path[0]) not in own and name not in own]
     values = get_parameters(controller, names)
     return set_parameters(controller, {name: values[k] * factors[name] for k, name in enumerate(names)})
+
+
+def seconds_for(system: System) -> float:
+    """Length of a closed loop: 10 s of the arm, and as many times longer as another wire cools more slowly, to a second."""
+    if is_arm(system):
+        return 10.0
+    return float(max(10.0, round(10.0 * float(scales_of(system).time / arm_scales().time))))

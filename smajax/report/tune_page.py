@@ -22,6 +22,7 @@ from smajax.report.integration_words import integration_sentence
 from smajax.report.plain_page import bullets, table, whole
 from smajax.report.tune_pictures import before_after
 
+SCALED = "The preset's gains and the box are those of the arm, scaled to this load's stroke, force and time and to the drive's limit."
 EDGE = 0.02  # of the box, by logarithm
 GROWN = 1.5  # times as much as before
 LEAST_PRICE = 0.1  # J, V/s, 1/s: what is less is nothing, however it grew
@@ -255,6 +256,7 @@ def page(result: TuningResult, pictures: Mapping[str, bytes], command: str) -> s
         "<p class=quiet>Above: thick, the plant as believed; thin, plants never seen. Below: from the least to the largest "
         "over the plants at each set point; squares were tuned on, circles never seen.</p>",
         "<h2>Gains</h2>",
+        "" if settings.shown.is_angle else f"<p class=quiet>{SCALED}</p>",
         table(["gain", "before", "after", "unit", "box", "remark"], gain_rows(gains_of(result)), (1, 2)),
     ]
     for name, check in result.checks.items():

@@ -164,8 +164,8 @@ SIMULATE = {
         "'convection_coefficient' and 'convection' are the same parameter: give it once",
     ),
     "a short name of what the model has not": (
-        [*WIRE, "--step", "5V:1s", "--set", "payload=+20%"],
-        "no parameter 'payload' (payload_mass); `smajax presets WIRE LOAD DRIVE` lists those of a model",
+        [*WIRE, "--step", "5V:1s", "--set", "inertia=+20%"],
+        "no parameter 'inertia' (inertia_ratio); `smajax presets WIRE LOAD DRIVE` lists those of a model",
     ),
     "gains that are not there": (["--gains", "no.json", "--set-point", "4deg:5s"], "gains file no.json cannot be read"),
 }

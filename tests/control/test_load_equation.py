@@ -15,6 +15,7 @@ from smajax.control.load_equation import (
     force_per_stress,
     lever_by_virtual_work,
     missing_for_equation,
+    moving_load,
     stroke_of,
 )
 from smajax.control.presets import quick_stress_sliding
@@ -50,20 +51,21 @@ def test_the_arm_s_lever_and_resistance_are_those_of_the_hand_written_equation()
 @pytest.mark.parametrize("system", [ARM, HANGING, SPRING, OWN], ids=["arm", "dead weight", "bias spring", "own"])
 def test_the_lever_by_virtual_work_is_the_load_s(system: System) -> None:
     """What the wire's stress does along the strain of the geometry, it does with the lever along the position."""
-    work = lever_by_virtual_work(system.load, system.wire)  # type: ignore[arg-type]
+    work = lever_by_virtual_work(moving_load(system), system.wire)
     np.testing.assert_allclose(work, equation_of(system).lever(), rtol=1e-10)
 
 
 @pytest.mark.parametrize("system", [ARM, HANGING, SPRING, OWN], ids=["arm", "dead weight", "bias spring", "own"])
 def test_derivatives_of_the_resistance_agree_with_differences_of_the_load_s_own_equation(system: System) -> None:
-    load, equation, step = system.load, equation_of(system), 1e-6
-    start, stroke = float(load.start()), float(stroke_of(system))  # type: ignore[union-attr]
+    load, equation, step = moving_load(system), equation_of(system), 1e-6
+    start, stroke = float(load.start()), float(stroke_of(system))
     for share, rate in ((0.2, 0.0), (0.5, 0.3), (0.9, -0.2)):
         at = jnp.asarray(start + share * stroke), jnp.asarray(rate * stroke)
         found = jax.grad(equation.resistance, argnums=(0, 1))(*at)
         for k, slope in enumerate(found):
-            moved = [tuple(value + sign * step * (j == k) for j, value in enumerate(at)) for sign in (1.0, -1.0)]
-            ahead, behind = (float(load.resistance(*one, {})) for one in moved)  # type: ignore[union-attr]
+            ahead, behind = (
+                float(load.resistance(at[0] + move * (k == 0), at[1] + move * (k == 1), {})) for move in (step, -step)
+            )
             assert float(slope) == pytest.approx((ahead - behind) / (2.0 * step), rel=1e-6, abs=1e-6)
 
 

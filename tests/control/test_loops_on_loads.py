@@ -76,10 +76,10 @@ def test_controllers_of_the_equation_of_motion_hold_a_set_point(
 def test_backstepping_follows_a_wire_of_another_law_from_its_measured_state(controller: str) -> None:
     """The rate form with a thermal term, on the spring; without the offset of the strain it does not come near."""
     made = CONTROLLERS[controller].make(SPRING)
-    assert made.anchored  # type: ignore[attr-defined]
+    assert made.anchored
     assert led(SPRING, controller, 6.0, 160.0)[-1] == pytest.approx(6.0, abs=0.15)
     if controller == "backstepping2":
-        loose = dataclasses.replace(made, anchored=False)  # type: ignore[type-var]
+        loose = dataclasses.replace(made, anchored=False)
         run = simulate_loop_dataset(sma.Loop(SPRING, loose), "6 mm", 160.0, dt=DT, period=DT, tolerance=None)
         assert abs(1e3 * float(run["position"][-1]) - 6.0) > 3.0
 
@@ -87,9 +87,9 @@ def test_backstepping_follows_a_wire_of_another_law_from_its_measured_state(cont
 def test_the_temperature_controller_overshoots_by_less_than_the_vsc_that_is_in_it() -> None:
     """NVSC against the VSC3 that is in it, on the dead weight: less beyond the set point."""
     nvsc = CONTROLLERS["nvsc"].make(HANGING)
-    assert float(nvsc.finish_position) == pytest.approx(0.02475)  # type: ignore[attr-defined]
+    assert float(nvsc.finish_position) == pytest.approx(0.02475)
     beyond = []
-    for one in (nvsc, nvsc.vsc):  # type: ignore[attr-defined]
+    for one in (nvsc, nvsc.vsc):
         run = simulate_loop_dataset(sma.Loop(HANGING, one), "12 mm", 5.0, dt=0.01, tolerance=None)
         beyond.append(1e3 * float(run["position"].max()) - 12.0)
     assert beyond[0] < 0.9 * beyond[1]
@@ -153,7 +153,7 @@ def test_gains_are_given_in_the_load_s_unit() -> None:
     assert float(loop.controller.proportional_gain) == pytest.approx(900.0)
     assert float(loop.controller.integral_gain) == 1500.0
     scaled = CONTROLLERS["pid"].make(HANGING)
-    assert float(loop.controller.derivative_gain) == float(scaled.derivative_gain)  # type: ignore[attr-defined]
+    assert float(loop.controller.derivative_gain) == float(scaled.derivative_gain)
     with pytest.raises(sma.units.UnitError, match="V/m"):
         loop_around(HANGING, "pid", {"proportional_gain": "0.9 V/rad"})
     with pytest.raises(ValueError, match="no gain 'proportional'; did you mean 'proportional_gain'"):
@@ -207,6 +207,27 @@ def test_compose_puts_a_controller_by_name_around_any_load() -> None:
     run = sma.simulate_loop_dataset(one, "5mm:20s,2mm:20s", dt=0.02, period=0.02)
     assert run["wanted"].attrs["units"] == "m"
     np.testing.assert_allclose([run["wanted"][0], run["wanted"][-1]], [5e-3, 2e-3])
+
+
+def test_a_registered_load_of_a_user_is_led_by_its_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As an entry point `smajax.loads` puts it into the table."""
+    monkeypatch.setitem(sma.LOADS, "lever", Lever)
+    one = sma.compose(
+        "flexinol_table_3_2", "lever", "flexinol_voltage", values={"stiffness": "12 N/m"}, controller="pid"
+    )
+    run = simulate_loop_dataset(one, "15 mm", 10.0, dt=DT, tolerance=None)
+    assert float(run["position"][-1]) == pytest.approx(15e-3, abs=1e-5)
+
+
+def test_a_controller_may_assume_another_plant_than_runs() -> None:
+    heavier = sma.set_parameters(HANGING, {"load_mass": 0.1})
+    loop = loop_around(heavier, "sld", estimator="model", assumed=HANGING)
+    assert float(loop.system.load.load_mass) == 0.1
+    assert float(loop.controller.equation.load.load_mass) == 0.075
+    assert isinstance(loop.estimator, ModelFilter)
+    assert float(loop.estimator.system.load.load_mass) == 0.075
+    knowing = loop_around(heavier, "pid").controller
+    assert float(knowing.proportional_gain) != float(CONTROLLERS["pid"].make(HANGING).proportional_gain)
 
 
 def test_a_request_by_names_is_in_the_load_s_unit() -> None:

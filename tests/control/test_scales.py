@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from smajax.control.controllers.preset import WIDER
 from smajax.control.presets import CONTROLLERS, pid
 from smajax.control.scales import HEADROOM, arm_scales, exponents, factors_for, scales_of, unit_on
 from smajax.core.parameters import get_parameters, parameters, set_parameters
@@ -68,7 +69,7 @@ def test_the_voltage_scale_holds_the_wire_at_the_end_of_its_transformation(syste
     seconds = float(scales.time)
     # Ten times in which it warms, and one in which it cools.
     volts = np.where(np.arange(1101) < 1000, float(scales.command), 0.0)
-    whole = simulate_compiled(system, {"voltage": volts}, seconds / 100.0)
+    whole = simulate_compiled(system, {"voltage": jnp.asarray(volts)}, seconds / 100.0)
     run = jax.tree.map(lambda series: series[:1001], whole)
     law, air = system.wire.kinetics, system.wire.heat.ambient_temperature
     assert float(run.temperature[-1]) - float(air) == pytest.approx(float(scales.warmth), rel=0.03)
@@ -101,8 +102,8 @@ def test_pid_asks_the_same_share_of_the_voltage_for_the_same_share_of_the_stroke
             both.append(float(share * scales.time**per_time))
         assert both[1] == pytest.approx(both[0], rel=1e-12)
     low, high = CONTROLLERS["pid"].box_on(HANGING)["proportional_gain"]
-    assert high / low == pytest.approx(200.0, rel=0.01), "the box is as wide as the arm's"
-    assert low < float(here.proportional_gain) < high  # type: ignore[attr-defined]
+    assert high / low == pytest.approx(200.0 * WIDER**2, rel=0.01), "the box of the arm, and room on either side"
+    assert low < float(here.proportional_gain) < high
 
 
 def test_no_command_is_beyond_the_drive_s_limit() -> None:

@@ -25,7 +25,7 @@ from smajax.control.plants import plant_set
 from smajax.control.presets import CONTROLLERS
 from smajax.control.reference import clock, constant
 from smajax.control.sweep.grid import loop_rows
-from smajax.control.sweep.run_sweep import SweepSettings, sweep_controllers
+from smajax.control.sweep.run_sweep import SweepSettings, sweep_controllers, sweep_settings_for
 from smajax.control.tune.evaluate import TuningProblem
 from smajax.control.tune.scenarios import held_out, tuned_on
 from smajax.control.tune.settings import TuneSettings, regulation_weights, settings_for
@@ -36,7 +36,7 @@ from smajax.model.rigs import arm
 from smajax.report.sweep_folder import write_sweep
 from smajax.report.tune_folder import finished, write_tuning
 from tests.helpers.machine_code import by_machine_code
-from tests.helpers.own_load import Lever
+from tests.helpers.own_load import Lever, Scheduled
 
 pytestmark = pytest.mark.usefixtures("blank_pictures")
 
@@ -107,6 +107,16 @@ def test_terms_and_weights_are_those_of_the_unit() -> None:
     assert settings_for(arm(), "pid") == TuneSettings("pid")
 
 
+def test_a_sweep_by_default_is_of_what_the_load_gives() -> None:
+    assert sweep_settings_for(arm()) == SweepSettings(tuple(CONTROLLERS))
+    spring = sweep_settings_for(SPRING)
+    assert (spring.unit, spring.first, spring.second) == ("mm", "convection", "damping")
+    assert spring.seconds == pytest.approx(62.0), "its wire cools 6.2 times as slowly as the arm's"
+    own = sweep_settings_for(dataclasses.replace(HANGING, load=Scheduled()), noise=0.01)
+    assert own.controllers == ("pid", "vsc1", "vsc2", "vsc3", "nvsc")
+    assert (own.second, own.noise) == ("ambient", 0.01)
+
+
 def test_the_mismatches_of_a_load_are_its_parameters() -> None:
     assert mismatches_of(arm()) == MISMATCHES
     assert mismatches_of(HANGING) == {
@@ -172,8 +182,12 @@ def test_batches_of_systems_and_stacked_systems_are_the_same_plants() -> None:
         found = plant_set(HANGING, plants)
         assert set(found.columns) == set(PLANTS)
         order = [found.columns.index(name) for name in by_name.columns]
-        np.testing.assert_allclose(found.batch[:, order], by_name.batch)  # type: ignore[index]
-    assert plant_set(HANGING, [HANGING, HANGING]).batch.shape == (2, 1)  # type: ignore[union-attr]
+        assert found.batch is not None
+        assert by_name.batch is not None
+        np.testing.assert_allclose(found.batch[:, order], by_name.batch)
+    alike = plant_set(HANGING, [HANGING, HANGING]).batch
+    assert alike is not None
+    assert alike.shape == (2, 1)
 
 
 def test_plants_may_have_effects_that_the_assumed_model_lacks() -> None:
@@ -220,7 +234,7 @@ def test_wrong_settings_of_a_load_are_errors() -> None:
         ({"batch": 3}, "use `settings_for`"),
     ):
         with pytest.raises(ValueError, match=re.escape(told)):
-            dataclasses.replace(good, **change).check(HANGING)  # type: ignore[arg-type]
+            dataclasses.replace(good, **change).check(HANGING)
     with pytest.raises(ValueError, match="takes the place of a variation"):
         dataclasses.replace(good, variation={"payload": 0.2}, batch=6).check(HANGING, PLANTS)
 

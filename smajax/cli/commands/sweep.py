@@ -77,10 +77,8 @@ class _Options:
         """Raises typer.BadParameter."""
         from smajax.control.gains_file import GainsFileError, read_gains
         from smajax.control.position_unit import default_set_points, unit_of
-        from smajax.control.presets import controllers_for
-        from smajax.control.scales import is_arm
-        from smajax.control.sweep.run_sweep import SweepSettings
-        from smajax.control.tune.settings import seconds_for
+        from smajax.control.scales import is_arm, seconds_for
+        from smajax.control.sweep.run_sweep import sweep_settings_for
 
         with refused():
             unit = unit_of(self.plant)
@@ -102,21 +100,21 @@ class _Options:
         else:
             set_points = default_set_points(self.plant, FEW if self.fast else MANY)
         ratios = self.gain_ratios if self.gain_ratios is not None else "1" if self.fast else GAINS
-        return SweepSettings(
-            tuple(controllers_for(self.plant))
-            if named == ["all"]
-            else tuple(dict.fromkeys(part for part in named if part)),
-            *self.mismatches(),
-            self.points or (3 if self.fast else 15),
-            set_points,
-            numbers("--gain-ratios", ratios),
-            seconds_for(self.plant) if seconds is None else seconds,
+        first, second = self.mismatches()
+        return sweep_settings_for(
+            self.plant,
+            None if named == ["all"] else [*dict.fromkeys(part for part in named if part)],
+            first=first,
+            second=second,
+            points=self.points or (3 if self.fast else 15),
+            set_points=set_points,
+            gain_ratios=numbers("--gain-ratios", ratios),
+            seconds=seconds_for(self.plant) if seconds is None else seconds,
             estimator=estimator,
             noise=noise_option(noise, unit),
             period=period,
             delay=delay,
             tuned=tuned,
-            unit=unit.shown,
         )
 
 

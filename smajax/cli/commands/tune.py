@@ -232,8 +232,8 @@ def tune(
 
     prepare(cores=True)
     from smajax.control.position_unit import default_set_points, unit_of
-    from smajax.control.scales import is_arm
-    from smajax.control.tune.settings import regulation_weights, seconds_for, settings_for
+    from smajax.control.scales import is_arm, seconds_for
+    from smajax.control.tune.settings import regulation_weights, settings_for
     from smajax.control.tune.terms import terms_in
     from smajax.report.tune_page import gain_rows
 

@@ -16,6 +16,7 @@ from smajax.model.system import System
 from smajax.model.types import Scalar
 
 Box = Mapping[str, tuple[float, float]]  # gain -> its positive bounds; the box is searched by logarithm
+WIDER = 3.0
 ANGLE, STATE = "angle", "angle, rate, stress, temperature, fraction"
 # What a controller is derived from, beside the reading: the load's equation of motion, or where its stroke ends.
 EQUATION, STROKE = "equation", "stroke"
@@ -74,15 +75,17 @@ class ControllerPreset:
         return self.section(system) if is_arm(system) else system
 
     def box_on(self, system: System) -> Box:
-        """The bounds of its gains on a plant, to three digits."""
+        """The bounds of its gains on a plant, to three digits, within those that make sense.
+
+        On another load than the arm they are `WIDER` on either side, since scales are rough; those of a command stay.
+        """
         if is_arm(system):
             return self.box
         controller = self.on_arm(system)
         factors, table = factors_for(system, controller, self.scales), parameters(controller)
-        return {
-            name: tuple(
-                max(float(f"{bound * float(factors[name]):.3g}"), table[name].low)
-                for bound in bounds  # type: ignore[misc]
-            )
-            for name, bounds in self.box.items()
-        }
+
+        def held(bound: float, name: str, wider: float) -> float:
+            scaled_bound = bound * float(factors[name]) * (1.0 if table[name].unit == "V" else wider)
+            return min(max(float(f"{scaled_bound:.3g}"), table[name].low), table[name].high)
+
+        return {name: (held(low, name, 1.0 / WIDER), held(high, name, WIDER)) for name, (low, high) in self.box.items()}

@@ -14,11 +14,11 @@ import numpy as np
 from smajax.control.figures_of_merit import Merit
 from smajax.control.gains_file import Gains
 from smajax.control.interface import between_in_words, check_interface, check_set_points, interface_of
-from smajax.control.mismatch import MISMATCHES
+from smajax.control.mismatch import MISMATCHES, mismatches_of
 from smajax.control.plants import Plants, PlantSet, carrying, plant_set
-from smajax.control.position_unit import PositionUnit, check_unit, unit_named, unit_of
-from smajax.control.presets import CONTROLLERS, check_controller
-from smajax.control.scales import is_arm
+from smajax.control.position_unit import PositionUnit, check_unit, default_set_points, unit_named, unit_of
+from smajax.control.presets import CONTROLLERS, check_controller, controllers_for
+from smajax.control.scales import is_arm, seconds_for
 from smajax.control.sweep.batched_loops import LoopSetup, closed_loops, integrated_setup, positions
 from smajax.control.sweep.grid import OF_ARM, PLANT, Grid, loop_rows, sweep_ratios
 from smajax.core.files import json_line, writing
@@ -99,6 +99,21 @@ class SweepSettings:
         found = plant_set(system, plants)
         _ = self.grid_on(found)  # it checks itself
         return found
+
+
+def sweep_settings_for(system: System, controllers: Sequence[str] | None = None, **given: Any) -> SweepSettings:
+    """A sweep on any plant: what is not given is the arm's, or that of the load's unit, stroke, time and mismatches.
+
+    controllers: by default all that this plant gives what they need. given: fields of `SweepSettings`.
+    """
+    there = mismatches_of(system)
+    defaults: dict[str, Any] = {"unit": unit_of(system).shown, "seconds": seconds_for(system)}
+    defaults["second"] = "damping" if "damping" in there else "ambient"
+    if not is_arm(system):
+        defaults["set_points"] = default_set_points(system)
+    return SweepSettings(
+        tuple(controllers_for(system) if controllers is None else controllers), **{**defaults, **given}
+    )
 
 
 @dataclass(frozen=True)

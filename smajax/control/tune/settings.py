@@ -17,7 +17,7 @@ from smajax.control.position_unit import (
     unit_of,
 )
 from smajax.control.presets import CONTROLLERS, check_controller
-from smajax.control.scales import arm_scales, is_arm, scales_of
+from smajax.control.scales import is_arm, seconds_for
 from smajax.control.tune import adam, cma_es
 from smajax.control.tune.evaluate import STEP
 from smajax.control.tune.multistart import Effort
@@ -177,13 +177,6 @@ def regulation_weights(system: System) -> dict[str, float]:
     near = band_shown(system)
     lengths = {"overshoot", "steady_error"}
     return {name: float(f"{weight / near:.3g}") if name in lengths else weight for name, weight in REGULATION.items()}
-
-
-def seconds_for(system: System) -> float:
-    """Length of a closed loop: 10 s of the arm, and as many times longer as another wire cools more slowly, to a second."""
-    if is_arm(system):
-        return 10.0
-    return float(max(10.0, round(10.0 * float(scales_of(system).time / arm_scales().time))))
 
 
 def settings_for(system: System, controller: str, plants: Plants | None = None, **given: Any) -> TuneSettings:

@@ -12,7 +12,7 @@ from smajax.control.controllers.base import AbstractController
 from smajax.control.gains_file import Gains
 from smajax.control.interface import interface_of
 from smajax.control.mismatch import MISMATCHES
-from smajax.control.plants import Plants, PlantSet, carrying
+from smajax.control.plants import Plants, PlantSet, carrying, plant_set
 from smajax.control.presets import CONTROLLERS
 from smajax.control.scales import unit_on
 from smajax.control.sweep.batched_loops import LoopSetup, integrated_setup, positions
@@ -76,8 +76,9 @@ class TuningResult:
         return self.excesses["tuned on"][1] <= 0.0 and self.excesses["inside"][1] <= 0.0
 
 
-def problem_of(system: System, settings: TuneSettings, plants: PlantSet) -> TuningProblem:
-    """The controller on its plant; batches no larger than a round needs."""
+def problem_of(system: System, settings: TuneSettings, plants: PlantSet | None = None) -> TuningProblem:
+    """The controller on its plant; batches no larger than a round needs. plants: by default the plant's mismatches."""
+    plants = plant_set(system) if plants is None else plants
     preset = CONTROLLERS[settings.controller]
     plant = preset.plant(system)
     size = settings.starts * tuned_on(settings.set_points, settings.variation, settings.seed, plants).size
