@@ -17,9 +17,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
-from smajax.attribution.findings import AveragedModel, AveragedRun
+from smajax.attribution.findings import AveragedModel, AveragedRun, DroppedModel
 from smajax.attribution.joint_search import JointSearch
 from smajax.attribution.laplace_evidence import FittedModel
+from smajax.attribution.likely_models_check import checked
 from smajax.attribution.model_fits import Model, Search
 from smajax.fit.packed_runs import RunBatch
 from smajax.fit.predicted import predicted_and_derivatives
@@ -36,6 +37,7 @@ class Averaged:
 
     models: tuple[AveragedModel, ...] = ()
     runs: tuple[AveragedRun, ...] = ()
+    dropped: tuple[DroppedModel, ...] = ()
 
 
 def likely_models(search: JointSearch, final: Model) -> list[tuple[FittedModel, float]]:
@@ -51,9 +53,17 @@ def likely_models(search: JointSearch, final: Model) -> list[tuple[FittedModel, 
     return [(search.fitted[one], probability[one] / total) for one in chosen]
 
 
-def averaged(setting: Search, search: JointSearch, final: Model, batch: RunBatch) -> Averaged:
-    """Every run of `batch`, held-out ones included, by the average of the likely models. Of one output, as the search."""
+def averaged(
+    setting: Search, search: JointSearch, final: Model, batch: RunBatch, base: Model | None = None
+) -> Averaged:
+    """Every run of `batch`, held-out ones included, by the average of the likely models. Of one output, as the search.
+
+    With the `base` model those that carry weight are checked as the final model was (`likely_models_check`).
+    """
     models = likely_models(search, final)
+    dropped: tuple[DroppedModel, ...] = ()
+    if base is not None:
+        models, dropped = checked(setting, search, base, final, models)
     problem, index = setting.restricted([effect for model, _ in models for effect in model.effects])
     problem = Problem.build(problem.system, batch, problem.noise_sigma, problem.offset)
     offset = problem.measured - problem.centred(problem.measured)
@@ -75,6 +85,7 @@ def averaged(setting: Search, search: JointSearch, final: Model, batch: RunBatch
         tuple(
             _run(*one) for one in zip(problem.measured, mean + offset, half, np.asarray(batch.mask) > 0, strict=True)
         ),
+        dropped,
     )
 
 

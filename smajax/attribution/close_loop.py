@@ -218,7 +218,7 @@ def findings_of(context: Context, outcome: Outcome, compared: Compared, rejected
     effects = effects_found(job, setting, final, after)
     average = Averaged()
     if len(job.fit_runs) > 1:  # else none can be left out, which the band is made of
-        average = averaged(setting, outcome.search, final, every_run(job))
+        average = averaged(setting, outcome.search, final, every_run(job), base)
         runs = tuple(replace(run, average=one) for run, one in zip(runs, average.runs, strict=True))
     extended_model = saved_model(job, setting, outcome.search, final, after, runs, average)
     base_model = (
@@ -259,6 +259,7 @@ def findings_of(context: Context, outcome: Outcome, compared: Compared, rejected
             job, {one.name: one.value for one in after.parameters if one.name in setting.presets}
         ),
         averaged=average.models,
+        dropped=average.dropped,
         correlated=after.uncertainty.correlated_groups,
         confounders=mistaken,
         superseded=superseded,

@@ -79,5 +79,6 @@ class AttributionConfig:
         0.5  # of the model's error on the fit runs: what was fitted may be the integration's
     )
     large_load_share: float = 0.2  # of the load, wrong or shifting: a size of the bench is as likely to be wrong
+    far_from_prior: float = 2.0  # widths of the prior of a preset's value: by chance one in twenty is farther
     expansion_cancelled: float = 0.3  # share of the preset's expansion to within which one found is its negative
     confounder_mentioned: float = 0.05  # weight from which a confounder is named

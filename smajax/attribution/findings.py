@@ -80,6 +80,8 @@ class ParameterFinding:
     upper: float
     start: float
     remark: Remark = field(default_factory=Remark)
+    prior_base: float | None = None  # middle of the prior of a preset's value; None of what has none
+    prior_deviation: float | None = None  # widths of that prior from its middle, with a sign
 
     @property
     def limited(self) -> bool:
@@ -221,6 +223,15 @@ Reason: TypeAlias = (
 
 
 @dataclass(frozen=True)
+class DroppedModel:
+    """A likely model that predictions are not averaged with, because it failed a check that the final model has passed."""
+
+    effects: tuple[str, ...]
+    weight: float  # posterior probability among the likely models before
+    reason: StepDependent | HeldOutWorse
+
+
+@dataclass(frozen=True)
 class Round:
     """One round of the search, or what a later stage took out of the model that it ended with."""
 
@@ -349,6 +360,7 @@ class Findings:
         None  # 1/K, martensite and austenite, that the preset's theta_T alone gives
     )
     averaged: tuple[AveragedModel, ...] = ()  # the likely models, over which `average` of each run is taken
+    dropped: tuple[DroppedModel, ...] = ()  # likely models that are not among them
     correlated: tuple[tuple[str, ...], ...] = ()  # clusters of parameters whose estimates are correlated
     confounders: tuple[Confounder, ...] = ()
     superseded: tuple[str, ...] = ()  # effects that one unknown term supersedes

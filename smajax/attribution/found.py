@@ -37,10 +37,11 @@ def parameters_found(job: Job, setting: Search, model: Model, start: np.ndarray,
 
     `error`: what an independent sample may be off by, SI, against which the priors of the presets count.
     """
-    names = [*setting.free(model.effects), *setting.presets]
+    presets = setting.presets
+    names = [*setting.free(model.effects), *presets]
     index = job.problem.names.index
     own, slots = setting.restricted(model.effects)
-    priors = {name: Prior(one.base, one.sigma, one.logarithmic) for name, one in setting.presets.items()}
+    priors = {name: Prior(one.base, one.sigma, one.logarithmic) for name, one in presets.items()}
     problem = Problem.build(own.system, own.batch, error, own.offset, priors=priors)
     at: Sensitivity = sensitivity(problem, model.values[slots], names)
     values = {name: float(model.values[index(name)]) for name in names}
@@ -56,6 +57,7 @@ def parameters_found(job: Job, setting: Search, model: Model, start: np.ndarray,
                 *job.bounds[name],
                 float(start[index(name)]),
                 known.remarks[name],
+                *((presets[name].base, presets[name].deviation(values[name])) if name in presets else ()),
             )
             for name in names
         ),

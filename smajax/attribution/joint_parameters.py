@@ -99,11 +99,7 @@ class JointParameters:
     def deviation(self, name: str, value: float) -> float:
         """Widths from the base value; 0 of an unknown."""
         prior = self.priors.get(name)
-        if prior is None:
-            return 0.0
-        if prior.logarithmic:
-            return math.log(max(value, 1e-300) / prior.base) / prior.sigma
-        return (value - prior.base) / prior.sigma
+        return 0.0 if prior is None else prior.deviation(value)
 
     def precision(self, name: str) -> float:
         """Of the prior, per squared width."""

@@ -6,6 +6,7 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from types import MappingProxyType
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -22,7 +23,7 @@ from smajax.attribution.score_test import switches
 from smajax.core.progress import Progress, Result, quiet
 from smajax.core.result_cache import ResultCache
 from smajax.core.whiteness import split_runs
-from smajax.data.experiment.record import DeclaredPriors
+from smajax.data.experiment.record import DeclaredPriors, Prior
 from smajax.fit.levenberg_marquardt import Fit, FitSettings, levenberg_marquardt
 from smajax.fit.packed_runs import RunBatch
 from smajax.fit.predicted import misfits
@@ -130,15 +131,18 @@ class Search:
             values[place] = np.clip(values[place], low + room, high - room)
         return values
 
-    def restricted(self, effects: Sequence[str]) -> tuple[Problem, list[int]]:
+    def restricted(
+        self, effects: Sequence[str], priors: Mapping[str, Prior] = MappingProxyType({})
+    ) -> tuple[Problem, list[int]]:
         """The same runs with a model that carries, of the candidates, only `effects`; where its parameters are in ours.
 
-        What is not in play costs nothing in a fit.
+        What is not in play costs nothing in a fit. `priors` of parameters that a fit frees.
         """
         gone = set(self.candidates) - set(effects)
         kept = tuple(effect for effect in self.problem.system.effects if effect.effect_name not in gone)
         system = dataclasses.replace(self.problem.system, effects=kept)
-        problem = Problem.build(system, self.problem.batch, self.problem.noise_sigma, self.problem.offset)
+        own = self.problem
+        problem = Problem.build(system, own.batch, own.noise_sigma, own.offset, priors=priors)
         return problem, [self.problem.names.index(name) for name in problem.names]
 
     def fit(
@@ -149,16 +153,20 @@ class Search:
         enough: float | None = None,
         settled: float = 0.0,
         hops: bool = False,
+        presets: bool = False,
     ) -> tuple[list[Fit], np.ndarray]:
         """Fit every start: (fits with full parameter vectors, misfit of all runs at each, (S, R, N)).
 
         `enough`, `settled`: relative and absolute tolerance of the cost. `hops`: each from points near its end as well
-        (`fit.starts.perturbed_restarts`).
+        (`fit.starts.perturbed_restarts`). `presets`: whether values of presets are free, within their priors against the noise.
         """
         enough = self.config.convergence if enough is None else enough
-        problem, index = self.restricted([name for start in starts for name in start.effects])
+        freed = self.presets if presets else {}
+        priors = {name: Prior(one.base, one.sigma, one.logarithmic) for name, one in freed.items()}
+        problem, index = self.restricted([name for start in starts for name in start.effects], priors)
         tasks = [
-            problem.task(self.free(start.effects), self.bounds, start.values[index], start.weights) for start in starts
+            problem.task([*self.free(start.effects), *freed], self.bounds, start.values[index], start.weights)
+            for start in starts
         ]
         settings = FitSettings(
             tolerance=enough, absolute_tolerance=settled, cache=self.cache, progress=self.progress, stage=what

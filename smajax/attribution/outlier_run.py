@@ -1,8 +1,9 @@
 """An outlier run: a fit run that does not agree with the others: without it a model leaves nothing but noise in them.
 
 It may not belong there (another wire, another day, the readings of another run, an input that was not as logged), or it
-alone shows what the model lacks; the runs cannot say which. Asked only where more than noise is left when the search has
-ended, so an effect of the library that accounts for all runs goes before.
+alone shows what the model lacks; the runs cannot say which. Values of presets are free in these fits, within their priors
+against the noise: the fit to all runs has them where the wrong run drew them. Asked only where more than noise is left when
+the search has ended, so an effect of the library that accounts for all runs goes before.
 """
 
 from __future__ import annotations
@@ -38,10 +39,10 @@ def outlier_runs(setting: Search, model: Model, names: Sequence[str]) -> tuple[O
     starts = [Start(model.effects, place, (everyone != run).astype(float)) for run in worst for place in places]
     stage = "leaving out each run for good"
     settled = SETTLED * float((whole**2).sum() / mask.sum()) / float(problem.noise_sigma) ** 2
-    fits, found = setting.fit(starts, stage, settled=settled)
+    fits, found = setting.fit(starts, stage, settled=settled, presets=True)
     near = [k for k, start in enumerate(starts) if _near(setting, found[k], start, whole)]
     if near:
-        again, misfit = setting.fit([starts[k] for k in near], stage, hops=True)
+        again, misfit = setting.fit([starts[k] for k in near], stage, hops=True, presets=True)
         for k, fit, one in zip(near, again, misfit, strict=True):
             fits[k], found[k] = fit, one
     outliers = []

@@ -19,6 +19,7 @@ from smajax.report import pictures
 from smajax.report.narrative import Narrative, narrate
 from smajax.report.narrative.rounds import chosen_text
 from smajax.report.narrative.unknown import units
+from smajax.report.narrative.values import far_text
 from smajax.report.plain_page import breakable
 from smajax.report.unknown_pictures import function_learnt
 
@@ -95,7 +96,7 @@ def _parameter_rows(findings: Findings) -> list[dict[str, Any]]:
                 "before": _fitted(before.get(name)),
                 "after": _fitted(after.get(name)),
                 "bounds": f"{shown(any_.lower, any_.unit, name).text} … {shown(any_.upper, any_.unit, name).text}",
-                "remark": _remarks(before.get(name), after.get(name)),
+                "remark": _remarks(findings, before.get(name), after.get(name)),
                 "entangled": name in correlated or any_.remark.kind is RemarkKind.COMBINATION,
             }
         )
@@ -108,8 +109,11 @@ def _fitted(result: ParameterFinding | None) -> Shown:
     return estimate(result.value, result.standard_error, result.unit, result.name)
 
 
-def _remarks(before: ParameterFinding | None, after: ParameterFinding | None) -> str:
-    first, second = before.remark.text if before else "", after.remark.text if after else ""
+def _remarks(findings: Findings, before: ParameterFinding | None, after: ParameterFinding | None) -> str:
+    def remark(one: ParameterFinding | None) -> str:
+        return "; ".join(part for part in (one.remark.text, far_text(findings, one)) if part) if one else ""
+
+    first, second = remark(before), remark(after)
     if first == second or not first or not before or not after:
         return second or first
     return f"before: {first}" + (f"; after: {second}" if second else "")

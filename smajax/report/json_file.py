@@ -86,6 +86,8 @@ def _parameter(result: ParameterFinding) -> dict[str, Any]:
         "upper": result.upper,
         "start": result.start,
         "remark": result.remark.text,
+        "prior_base": result.prior_base,
+        "prior_deviation": result.prior_deviation,
     }
 
 
@@ -175,6 +177,10 @@ def findings_to_json(findings: Findings, narrative: Narrative | None = None) -> 
         "runs": [_run(run) for run in findings.runs],
         "priors": [dataclasses.asdict(one) for one in findings.priors],
         "averaged_models": [{"effects": list(one.effects), "weight": one.weight} for one in findings.averaged],
+        "dropped_models": [
+            {"effects": list(one.effects), "weight": one.weight, "why": why}
+            for one, why in zip(findings.dropped, words.dropped, strict=True)
+        ],
         "before": {"parameters": {result.name: _parameter(result) for result in findings.before}},
         "after": {"parameters": {result.name: _parameter(result) for result in findings.after}},
         "effects": [_effect(effect, words) for effect in findings.effects],

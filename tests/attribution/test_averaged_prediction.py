@@ -8,7 +8,9 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from smajax.attribution import likely_models_check
 from smajax.attribution.averaged_prediction import BAND, averaged, likely_models
+from smajax.attribution.findings import HeldOutWorse, StepDependent
 from smajax.attribution.joint_search import JointSearch, search_jointly
 from smajax.attribution.joint_stage import as_model
 from smajax.attribution.model_fits import Model, Search
@@ -104,3 +106,59 @@ def test_each_run_keeps_its_own_offset(fitted: tuple[Search, JointSearch, Model]
     for run, (one, other) in enumerate(zip(plain.runs, moved.runs, strict=True)):
         np.testing.assert_allclose(other.reading - one.reading, 1e-3 * run, atol=1e-12)
         assert other.rmse == pytest.approx(one.rmse)
+
+
+def _with_rival(
+    fitted: tuple[Search, JointSearch, Model], share: float, factor: float
+) -> tuple[Search, JointSearch, Model, Model]:
+    """(setting with fresh runs held out, search of two models, the likeliest, the base model): a rival of weight `share` with `factor` of the latent heat."""
+    setting, search, final = fitted
+    best = search.fitted[search.joint.ordered(final.effects)]
+    values = np.array(best.values)
+    values[search.joint.slots["latent_heat.enthalpy"]] *= factor
+    log_prior = best.log_prior + np.log(share / (1.0 - share))
+    rival = dataclasses.replace(best, effects=(*best.effects, "sensor_gain"), values=values, log_prior=log_prior)
+    two = dataclasses.replace(search, fitted={best.effects: best, rival.effects: rival})
+    held_out = dataclasses.replace(setting, held_out=_fresh_runs())
+    return held_out, two, final, as_model(search, search.fitted[()], search.error_of(()))
+
+
+def test_a_rival_that_the_held_out_runs_reject_is_not_averaged_with(fitted: tuple[Search, JointSearch, Model]) -> None:
+    setting, search, final, base = _with_rival(fitted, 0.25, 1.5)
+    found = averaged(setting, search, final, _fresh_runs(), base)
+    assert [(one.effects, one.weight) for one in found.models] == [(final.effects, 1.0)]
+    (dropped,) = found.dropped
+    assert dropped.weight == pytest.approx(0.25)
+    assert isinstance(dropped.reason, HeldOutWorse)
+    assert dropped.reason.rmse_without == pytest.approx(NOISE, rel=0.1)
+    assert dropped.reason.rmse_with > 1.02 * dropped.reason.rmse_without
+    alone = averaged(
+        setting, dataclasses.replace(search, fitted=dict([*search.fitted.items()][:1])), final, _fresh_runs()
+    )
+    for one, other in zip(found.runs, alone.runs, strict=True):
+        np.testing.assert_array_equal(one.reading, other.reading)
+
+
+def test_a_rival_that_predicts_as_well_stays(fitted: tuple[Search, JointSearch, Model]) -> None:
+    setting, search, final, base = _with_rival(fitted, 0.25, 1.0 + 1e-6)
+    found = averaged(setting, search, final, _fresh_runs(), base)
+    assert [one.weight for one in found.models] == pytest.approx([0.75, 0.25])
+    assert found.dropped == ()
+
+
+def test_a_rival_of_little_weight_is_not_looked_at(fitted: tuple[Search, JointSearch, Model]) -> None:
+    setting, search, final, base = _with_rival(fitted, 0.04, 1.5)
+    found = averaged(setting, search, final, _fresh_runs(), base)
+    assert len(found.models) == 2
+    assert found.dropped == ()
+
+
+def test_a_rival_whose_gain_is_the_integrations_is_not_averaged_with(
+    fitted: tuple[Search, JointSearch, Model], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    setting, search, final, base = _with_rival(fitted, 0.25, 1.0 + 1e-6)
+    monkeypatch.setattr(likely_models_check, "gain_kept_at_half_step", lambda *_: 0.2)
+    found = averaged(setting, search, final, _fresh_runs(), base)
+    assert [one.effects for one in found.models] == [final.effects]
+    assert isinstance(found.dropped[0].reason, StepDependent)
+    assert found.dropped[0].reason.gain_kept == 0.2

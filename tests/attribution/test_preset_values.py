@@ -64,6 +64,8 @@ def test_the_value_that_was_not_given_comes_out_with_its_standard_error(found: t
     assert modulus.standard_error is not None
     assert modulus.value == pytest.approx(true, abs=3.0 * modulus.standard_error)
     assert abs(modulus.value - modulus.start) > 3.0 * modulus.standard_error
+    assert modulus.prior_base == pytest.approx(modulus.start)
+    assert modulus.prior_deviation == pytest.approx(np.log(modulus.value / modulus.start) / RELATIVE[NAME][0])
 
 
 @pytest.mark.slow  # another loop

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 import jax.numpy as jnp
 import numpy as np
@@ -11,7 +12,7 @@ import numpy as np
 from smajax.attribution.joint_parameters import JointParameters
 from smajax.attribution.joint_search import JointSearch
 from smajax.attribution.run_extent import extent_of
-from smajax.core.parameters import parameters
+from smajax.core.parameters import parameter_values, parameters, set_parameters
 from smajax.fit.levenberg_marquardt import FitSettings
 from smajax.fit.packed_runs import RunBatch, simulate_batch
 from smajax.fit.problem import Problem
@@ -23,8 +24,16 @@ CANDIDATES = ("latent_heat", "rising_convection", "phase_resistance", "asymmetri
 UNKNOWNS = ("convection_coefficient", "recoverable_strain")
 
 
-def hot_weight(truth: Mapping[str, float], candidates: Sequence[str] = CANDIDATES, seed: int = 3) -> JointSearch:
-    """A search among `candidates` in four runs of a wire whose effects have the coefficients `truth`."""
+def hot_weight(
+    truth: Mapping[str, float],
+    candidates: Sequence[str] = CANDIDATES,
+    seed: int = 3,
+    factors: Mapping[str, float] = MappingProxyType({}),
+) -> JointSearch:
+    """A search among `candidates` in four runs of a wire whose effects have the coefficients `truth`.
+
+    `factors`: of parameters of the wire that made the runs, over the preset's.
+    """
     steps = ((8.0, 0.0), (6.5, 0.0), (9.0, 4.0), (7.0, 5.5))
     volts = jnp.stack([jnp.repeat(jnp.asarray(pair), SAMPLES // 2) for pair in steps])
     base = build("flexinol_table_3_2", "dead_weight", "voltage")
@@ -33,7 +42,9 @@ def hot_weight(truth: Mapping[str, float], candidates: Sequence[str] = CANDIDATE
         {"voltage": volts}, jnp.zeros((count, SAMPLES)), jnp.ones((count, SAMPLES)), jnp.zeros((count, 0)), (), DT
     )
     hidden = tuple(dict.fromkeys(name.split(".")[0] for name in truth))
-    exact = simulate_batch(extended(base, hidden, dict(truth)), blank).reading
+    own = parameter_values(base)
+    wire = set_parameters(base, {name: factor * own[name] for name, factor in factors.items()})
+    exact = simulate_batch(extended(wire, hidden, dict(truth)), blank).reading
     noise = NOISE * np.random.default_rng(seed).standard_normal(exact.shape)
     batch = dataclasses.replace(blank, output=jnp.asarray(exact + noise))
     problem = Problem.build(extended(base, tuple(candidates)), batch, NOISE, False)

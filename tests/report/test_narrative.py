@@ -12,6 +12,7 @@ from smajax.attribution.findings import (
     AssumedParameter,
     CoefficientFinding,
     Confounder,
+    DroppedModel,
     Findings,
     HeldOutWorse,
     LikelierModel,
@@ -33,6 +34,8 @@ from smajax.attribution.unknown.terms import UNKNOWN
 from smajax.core.progress import Event, Message, Result, Stage
 from smajax.fit.integration import IntegrationError
 from smajax.fit.uncertainty import Remark, RemarkKind
+from smajax.report.html import findings_to_html
+from smajax.report.json_file import findings_to_json
 from smajax.report.narrative import narrate, narrated
 from smajax.report.narrative.rounds import reason_text
 from tests.helpers.made_findings import made_effect, made_findings, made_residual
@@ -156,6 +159,45 @@ def test_a_parameter_at_its_bound_is_reported_at_the_top() -> None:
     said = _summary(after=(one, coefficient))
     assert "Mind: recoverable_strain ends at its upper bound of 2 %. The truth may lie beyond" in said
     assert "Mind: latent_heat.enthalpy ends at a bound. The runs ask for more of the effect than is likely" in said
+
+
+def test_likely_models_that_failed_a_check_are_named_with_the_reason() -> None:
+    dropped = (
+        DroppedModel(("latent_heat", "creep"), 0.12, HeldOutWorse(1e-4, 2e-4)),
+        DroppedModel(("stribeck_friction",), 0.3, StepDependent("stribeck_friction", 0.1)),
+    )
+    said = _summary(dropped=dropped)
+    assert (
+        "latent_heat + creep, of probability 0.12, is not averaged with: set aside: error on the held-out runs 0.1 mm without and 0.2 mm with it."
+        in said
+    )
+    assert (
+        "stribeck_friction, of probability 0.30, is not averaged with: stribeck_friction keeps 10% of its gain" in said
+    )
+    record = findings_to_json(dataclasses.replace(made_findings(), dropped=dropped))
+    assert [(one["effects"], one["weight"]) for one in record["dropped_models"]] == [
+        (["latent_heat", "creep"], 0.12),
+        (["stribeck_friction"], 0.3),
+    ]
+
+
+def test_a_value_of_a_preset_far_from_its_prior_is_reported_with_the_distance() -> None:
+    fitted = {"near": (78e9, 0.2), "edge": (90e9, 2.0), "far": (100e9, 3.1), "low": (40e9, -2.5)}
+    after = tuple(
+        ParameterFinding(
+            f"{name}_modulus", "Pa", value, 1e9, 10e9, 200e9, 75e9, prior_base=75e9, prior_deviation=widths
+        )
+        for name, (value, widths) in fitted.items()
+    )
+    said = _summary(after=after)
+    far = "far_modulus ends 3.1 widths of its prior above the preset's value, 7.5e4 MPa"
+    assert f"Mind: {far}; low_modulus ends 2.5 widths" in said.replace(" and low", "; low")
+    assert "near_modulus" not in said
+    assert "edge_modulus" not in said
+    page = findings_to_html(dataclasses.replace(made_findings(), after=after))
+    assert "2.5 widths of its prior below the preset&#39;s value" in page
+    at_its_bound = dataclasses.replace(after[2], remark=Remark(RemarkKind.UPPER_BOUND))
+    assert "widen its bounds" not in _summary(after=(at_its_bound,))  # the file has none of it
 
 
 def test_runs_that_cannot_be_left_out_or_were_not_held_out_are_named() -> None:

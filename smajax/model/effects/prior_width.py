@@ -36,6 +36,12 @@ class CoefficientPrior(NamedTuple):
     sigma: float  # standard deviation, in the coefficient's unit, or of the natural logarithm
     logarithmic: bool
 
+    def deviation(self, value: float) -> float:
+        """Widths of `value` from the base."""
+        if self.logarithmic:
+            return math.log(max(value, 1e-300) / self.base) / self.sigma
+        return (value - self.base) / self.sigma
+
 
 def width_of(
     effect: type[AbstractEffect],

@@ -33,6 +33,7 @@ class Narrative:
     residual_before: tuple[str, ...]
     residual_after: tuple[str, ...]
     rounds: tuple[str, ...]  # why each ended so
+    dropped: tuple[str, ...]  # why each likely model is not averaged with
     unknown: tuple[str, ...]  # how each term compares with none; "" but for the best
     effects: dict[str, str]  # what each candidate would mean, by its name
 
@@ -49,6 +50,7 @@ def narrate(findings: Findings) -> Narrative:
         rounds=tuple(
             reason_text(entry.reason, findings.output_unit, findings.output_name) for entry in findings.rounds
         ),
+        dropped=tuple(reason_text(one.reason, findings.output_unit, findings.output_name) for one in findings.dropped),
         unknown=tuple(comparison_sentence(findings, term) for term in findings.unknown),
         effects={
             effect.name: LIBRARY[effect.name].candidate.sentence

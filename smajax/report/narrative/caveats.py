@@ -9,7 +9,7 @@ import numpy as np
 from smajax.attribution.findings import EffectFinding, Findings, OutlierRun, RunFinding, Verdict, pooled_rmse
 from smajax.core.display_units import digits
 from smajax.core.wording import and_listed
-from smajax.report.narrative.values import assumed_text, error_text, value_text
+from smajax.report.narrative.values import assumed_text, error_text, far_text, value_text
 
 NAMED_SIZES = 4  # in a sentence
 NOTHING_MORE = (Verdict.ADEQUATE, Verdict.EXPLAINED)
@@ -96,7 +96,8 @@ def of_bounds(findings: Findings) -> Iterator[str]:
             f"Mind: {and_listed(coefficients)} {'ends' if len(coefficients) == 1 else 'end'} at a bound. The runs ask for more of the "
             "effect than is likely: it may stand in for another."
         )
-    own = [one for one in limited if not one.name.startswith(added)]
+    # A value of a preset has no bounds in the file (`of_priors_left`).
+    own = [one for one in limited if not one.name.startswith(added) and not far_text(findings, one)]
     if own:
         ends = [
             f"{one.name} ends {one.remark.text} of {value_text(one.value, one.unit, one.name).strip()}" for one in own
@@ -106,6 +107,19 @@ def of_bounds(findings: Findings) -> Iterator[str]:
             f"Mind: {and_listed(ends)}. The truth may lie beyond, and what was fitted beside it makes up for that: widen "
             f"{its} in the experiment file where physics allows it, or look at what is taken as known."
         )
+
+
+def of_priors_left(findings: Findings) -> Iterator[str]:
+    """Values of presets that end far from what data sheets leave open."""
+    far = {one.name: text for one in findings.after if (text := far_text(findings, one))}
+    if not far:
+        return
+    ends = [f"{name} ends {text}" for name, text in far.items()]
+    what, them, is_ = ("it stands", "it", "it is") if len(far) == 1 else ("they stand", "them", "they are")
+    yield (
+        f"Mind: {and_listed(ends)}. The wire is not the preset's, or {what} in for what the model lacks: measure {them} and list {them} under "
+        f"[model.parameters], or say under [priors.presets] how uncertain {is_}."
+    )
 
 
 def of_the_preset(findings: Findings, effect: EffectFinding) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from smajax.attribution.findings import AssumedParameter, Findings
+from smajax.attribution.findings import AssumedParameter, Findings, ParameterFinding
 from smajax.core.display_units import digits, display
 
 
@@ -21,3 +21,13 @@ def assumed_text(parameter: AssumedParameter) -> str:
     """`wire_length 0.9 m`."""
     seen = display(parameter.unit, parameter.name)
     return f"{parameter.name} {digits(seen.of(parameter.value))} {seen.unit}".strip()
+
+
+def far_text(findings: Findings, parameter: ParameterFinding) -> str:
+    """`3.1 widths of its prior above the preset's value, 75000 MPa`, where it is far; else nothing."""
+    base, deviation = parameter.prior_base, parameter.prior_deviation
+    if base is None or deviation is None or abs(deviation) <= findings.config.far_from_prior:
+        return ""
+    seen, side = display(parameter.unit, parameter.name), "above" if deviation > 0.0 else "below"
+    middle = f"{digits(seen.of(base))} {seen.unit}".strip()
+    return f"{abs(deviation):.1f} widths of its prior {side} the preset's value, {middle}"

@@ -8,6 +8,7 @@ from smajax.attribution.findings import Findings, OutlierRun, Role, Verdict, cov
 from smajax.core.wording import and_listed
 from smajax.model.effects.library import LIBRARY
 from smajax.report.narrative import caveats
+from smajax.report.narrative.rounds import reason_text
 from smajax.report.narrative.unknown import unknown_sentences
 from smajax.report.narrative.values import error_text
 
@@ -26,6 +27,7 @@ def summary(findings: Findings) -> tuple[str, ...]:
         sentences.insert(0, _rejected(findings))
     sentences += _errors(findings)
     sentences += caveats.of_bounds(findings)
+    sentences += caveats.of_priors_left(findings)
     for effect in findings.added:
         meaning = caveats.of_the_preset(findings, effect) or LIBRARY[effect.name].candidate.sentence
         sentences += [meaning, *caveats.of_a_size(findings, effect)]
@@ -150,7 +152,12 @@ def _of_the_band(findings: Findings) -> list[str]:
     count = len(findings.averaged)
     who = f"the average of the {count} likely models" if count > 1 else "the model"
     return [
-        f"On the held-out runs {who} is off by {error_text(findings, error)}, and {inside:.0%} of the samples lie in its 90 % band."
+        f"On the held-out runs {who} is off by {error_text(findings, error)}, and {inside:.0%} of the samples lie in its 90 % band.",
+        *(
+            f"{' + '.join(one.effects)}, of probability {one.weight:.2f}, is not averaged with: "
+            f"{reason_text(one.reason, findings.output_unit, findings.output_name)}."
+            for one in findings.dropped
+        ),
     ]
 
 

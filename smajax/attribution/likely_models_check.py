@@ -1,0 +1,95 @@
+"""The checks that the final model has passed, for the other models that its prediction is averaged with.
+
+One whose load sticks and jumps has to keep its gain at half the step (`step_size_check`), and the held-out runs have to validate it as they
+do the final model (`held_out`): by what is fitted already, the likeliest set with one effect fewer. Models of little weight change the
+average by less than either check can tell and are not looked at.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from smajax.attribution.findings import DroppedModel, HeldOutWorse, StepDependent
+from smajax.attribution.joint_search import JointSearch
+from smajax.attribution.laplace_evidence import FittedModel
+from smajax.attribution.model_fits import Model, Search
+from smajax.attribution.step_size_check import gain_kept_at_half_step
+from smajax.fit.predicted import misfits
+from smajax.fit.problem import Problem
+from smajax.model.effects.library import LIBRARY
+
+CHECKED = 0.05  # weight above which a model is looked at
+
+Weighed = list[tuple[FittedModel, float]]
+
+
+def checked(
+    setting: Search, search: JointSearch, base: Model, final: Model, models: Weighed
+) -> tuple[Weighed, tuple[DroppedModel, ...]]:
+    """(the models that pass, with weights of sum one; those that do not). `final` has passed; the base model adds nothing that could fail."""
+    own = search.joint.ordered(final.effects)
+    doubted = {one.effects: one for one, weight in models if weight > CHECKED and one.effects not in ((), own)}
+    reasons: dict[tuple[str, ...], StepDependent | HeldOutWorse] = {}
+    for effects, one in doubted.items():
+        kept = gain_kept_at_half_step(setting, _as_model(search, one), base)
+        if kept < setting.config.gain_kept_at_half_step:
+            jumping = [effect for effect in effects if LIBRARY[effect].candidate.stick_slip]
+            reasons[effects] = StepDependent(" + ".join(jumping), kept)
+    if setting.held_out is not None:
+        left = [one for effects, one in doubted.items() if effects not in reasons]
+        reasons |= _on_held_out(setting, search, base, left)
+    rest = [(one, weight) for one, weight in models if one.effects not in reasons]
+    total = sum(weight for _, weight in rest)
+    dropped = (
+        DroppedModel(one.effects, weight, reasons[one.effects]) for one, weight in models if one.effects in reasons
+    )
+    return [(one, weight / total) for one, weight in rest], tuple(dropped)
+
+
+def _on_held_out(
+    setting: Search, search: JointSearch, base: Model, models: Sequence[FittedModel]
+) -> dict[tuple[str, ...], HeldOutWorse]:
+    """Those of `models` that predict the held-out runs no better than the base model, or worse than without one of their effects."""
+    if not models:
+        return {}
+    simpler = [_without_one(search, one) for one in models]
+    values = [base.values, *(one.values for one in models), *(one.values for one in simpler if one is not None)]
+    carried = [effect for one in models for effect in one.effects]
+    error, *others = _held_out_errors(setting, carried, values)
+    own, nested = others[: len(models)], iter(others[len(models) :])
+    found = {}
+    for one, rest, now in zip(models, simpler, own, strict=True):
+        without = error if rest is None else next(nested)
+        if now >= error:
+            found[one.effects] = HeldOutWorse(error, now)
+        elif now > (1.0 + setting.config.held_out_tolerance) * without:
+            found[one.effects] = HeldOutWorse(without, now)
+    return found
+
+
+def _without_one(search: JointSearch, model: FittedModel) -> FittedModel | None:
+    """The likeliest fitted set with one effect fewer; None where it is the base model, or none was fitted."""
+    error = search.error(model)
+    nested = [
+        one
+        for effects, one in search.fitted.items()
+        if effects and len(effects) == len(model.effects) - 1 and set(effects) < set(model.effects)
+    ]
+    return max(nested, key=lambda one: one.log_evidence(error**2), default=None)
+
+
+def _held_out_errors(setting: Search, effects: Sequence[str], values: Sequence[np.ndarray]) -> list[float]:
+    """Rms error on the held-out runs, SI, of parameters (P,) of models with some of `effects`."""
+    batch = setting.held_out
+    assert batch is not None
+    problem, index = setting.restricted(effects)
+    there = Problem.build(problem.system, batch, problem.noise_sigma, problem.offset)
+    found = misfits(there, [one[index] for one in values])
+    return [float(np.sqrt((misfit**2).sum() / np.asarray(batch.mask).sum())) for misfit in found]
+
+
+def _as_model(search: JointSearch, fitted: FittedModel) -> Model:
+    """A fitted model as the step-size check takes it: no run was left out."""
+    return Model(fitted.effects, fitted.values, fitted.squares / search.noise**2, np.zeros((0, 0)), float("nan"))
