@@ -28,7 +28,8 @@ def test_a_run_of_a_kept_model_is_held_against_a_log(tmp_path: Path, model: Path
     assert ended.code == 0, ended.said
     assert "The measured position is off by 2 mm (rms), by 0.09" in ended.out
     record = json.loads((tmp_path / "out" / "simulate.json").read_text(encoding="utf-8"))
-    error = np.subtract(record["series"]["measured_position"], record["series"]["reading"])
+    measured, simulated = (np.asarray(record["series"][name], dtype=float) for name in ("measured_position", "reading"))
+    error = measured - simulated
     # The last input of a log holds no longer than the log.
     assert np.nanmean(error[:-1]) == pytest.approx(2e-3, abs=0.2 * NOISE)
 
@@ -58,7 +59,10 @@ def test_gains_are_tuned_and_compared_on_plants_from_the_posterior(tmp_path: Pat
     effort = ["--set-point", "5mm,10mm", "--fast", "--rounds", "1", "--finish", "0", "--seconds", "8", "--starts", "1"]
     ended = smajax("tune", "pid", "--model", model, "--plants", "4", *effort, "--out", tmp_path / "tuned")
     assert ended.code == 0, ended.said
-    assert json.loads((tmp_path / "tuned" / "tune.json").read_text(encoding="utf-8"))["settings"]["plants_of_the_batch"] == 4
+    assert (
+        json.loads((tmp_path / "tuned" / "tune.json").read_text(encoding="utf-8"))["settings"]["plants_of_the_batch"]
+        == 4
+    )
     gains = tmp_path / "tuned" / "gains.json"
     ended = smajax("simulate", "--model", model, "--gains", gains, "--set-point", "5mm:4s", "--out", tmp_path / "loop")
     assert ended.code == 0, ended.said

@@ -1,0 +1,121 @@
+"""What a missing effect is worth in control: a controller tuned on each of several models, and judged on one plant."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import jax.numpy as jnp
+import numpy as np
+
+from smajax.control.closed_loop import ClosedLoopSetup
+from smajax.control.compiled_loop import measured_loop
+from smajax.control.controllers.base import AbstractController
+from smajax.control.gains_file import Gains
+from smajax.control.kept_plant import plant_of, within_limit
+from smajax.control.position_unit import PositionUnit, default_set_points, unit_of
+from smajax.control.presets import CONTROLLERS
+from smajax.control.reference import resting
+from smajax.control.scales import seconds_for
+from smajax.control.tune.evaluate import STEP
+from smajax.control.tune.settings import TuneSettings, settings_for
+from smajax.control.tune.tuning import tune
+from smajax.core.progress import Progress, quiet
+from smajax.data.model_file.record import ModelRecord
+from smajax.model.system import System
+
+PLANTS = 4  # drawn from each model's posterior, of which gains are tuned on three of every four
+SET_POINTS = 3  # over the stroke, where none are given
+EFFORT = {"tried": 16, "starts": 3, "rounds": 10, "finish": 20, "unseen": 4}
+
+
+@dataclass(frozen=True)
+class JudgedLoop:
+    """One closed loop on the plant, a step from the start, cold and at rest; SI."""
+
+    set_point: float  # rad or m
+    time: np.ndarray  # (n,), s
+    position: np.ndarray  # (n,), rad or m
+    settling_time: float  # s; infinite where it never settles
+    overshoot: float
+    steady_error: float
+
+
+@dataclass(frozen=True)
+class TunedOnModel:
+    """The gains that were tuned on one model, and their loops on the plant."""
+
+    model: str  # "base model"
+    gains: Gains
+    units: Mapping[str, str]
+    loops: tuple[JudgedLoop, ...]
+
+    @property
+    def settling_time(self) -> float:
+        """Mean over the set points, s; infinite where one never settles."""
+        return float(np.mean([one.settling_time for one in self.loops]))
+
+    @property
+    def overshoot(self) -> float:
+        """Largest over the set points, rad or m."""
+        return max(one.overshoot for one in self.loops)
+
+
+@dataclass(frozen=True)
+class ControlComparison:
+    """Gains tuned on several models, judged on one plant."""
+
+    controller: str
+    plant: str  # what it is, in words: "true model"
+    unit: PositionUnit
+    seconds: float  # length of a loop
+    tuned: tuple[TunedOnModel, ...]
+
+
+def tuned_on_models(
+    models: Mapping[str, ModelRecord],
+    plant: tuple[str, ModelRecord],
+    controller: str = "pid",
+    set_points: Sequence[float] = (),
+    *,
+    seed: int = 0,
+    effort: Mapping[str, int] | None = None,
+    progress: Progress = quiet,
+) -> ControlComparison:
+    """`controller` tuned on each of the `models` and on plants from its posterior, and judged on the `plant`, each by its name.
+
+    The first model's load has the unit and the default of the set points, shown in mm or deg. All have the first model's limit of the
+    command, and the same settings. Raises ValueError and KeyError as `tune`.
+    """
+    first = next(iter(models.values()))
+    system, _ = plant_of(first)
+    unit, seconds = unit_of(system), seconds_for(system)
+    targets = tuple(set_points) or tuple(default_set_points(system, SET_POINTS))
+    truth = within_limit(first, plant[1].system)
+    tuned = []
+    for name, model in models.items():
+        assumed = within_limit(first, model.system)
+        drawn = model.plants(PLANTS, seed) if any(one.names for one in model.likely) else None
+        plants = None if drawn is None else within_limit(first, drawn)
+        settings: TuneSettings = settings_for(
+            assumed, controller, plants, set_points=targets, seconds=seconds, seed=seed, **{**EFFORT, **(effort or {})}
+        )
+        found = tune(assumed, settings, plants=plants, progress=progress)
+        own = found.after.put(CONTROLLERS[controller].plant(assumed))
+        loops = tuple(judged(truth, own, float(target), seconds) for target in unit.to_own(np.asarray(targets)))
+        tuned.append(TunedOnModel(name, found.after, found.units, loops))
+    return ControlComparison(controller, plant[0], unit, seconds, tuple(tuned))
+
+
+def judged(plant: System, controller: AbstractController, set_point: float, seconds: float) -> JudgedLoop:
+    """The loop of a controller on a plant, from the start to one set point (rad or m)."""
+    reference = resting(jnp.full(round(seconds / STEP) + 1, set_point))
+    loop, figures, _ = measured_loop(ClosedLoopSetup(plant, controller, reference, STEP, 1))
+    return JudgedLoop(
+        set_point,
+        np.asarray(loop.run.time),
+        np.asarray(loop.run.position),
+        float(figures.settling_time),
+        float(figures.overshoot),
+        float(figures.steady_error),
+    )
