@@ -7,7 +7,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
 import typer
 
 from smajax.cli import completion
@@ -110,6 +109,8 @@ class PlantOptions:
         wanted = (0 if others or not fitted else DRAWN) if count is None else count
         if not wanted:
             return None
+        import numpy as np
+
         from smajax.control.kept_plant import within_limit
         from smajax.core.parameters import parameter_values, parameters, set_parameters
 

@@ -24,9 +24,10 @@ from smajax.core.progress import Progress, quiet
 from smajax.data.model_file.record import ModelRecord
 from smajax.model.system import System
 
-PLANTS = 4  # drawn from each model's posterior, of which gains are tuned on three of every four
+PLANTS = 8  # drawn from each model's posterior, of which gains are tuned on three of every four
 SET_POINTS = 3  # over the stroke, where none are given
 EFFORT = {"tried": 16, "starts": 3, "rounds": 10, "finish": 20, "unseen": 4}
+QUICK = {"tried": 8, "starts": 2, "rounds": 5, "finish": 10, "unseen": 2}  # for a demonstration
 
 
 @dataclass(frozen=True)

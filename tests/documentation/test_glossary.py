@@ -72,6 +72,7 @@ PLAIN = set(
         "before",
         "bench",
         "bic",
+        "measured",
         "predict",
         "prediction",
         "bound",

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import shlex
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from smajax.cli import completion
 from smajax.cli.options import FITS, Json, Open, Overwrite
 from smajax.cli.terminal import browse, console, resumable
 
@@ -16,8 +18,9 @@ if TYPE_CHECKING:
     from smajax.attribution.findings import Findings
 
 FINISHED_FITS = "Finished fits are cached: the same command resumes."
+CONTROL = ("*_gains.json", "control_*.json", "control_*.html")
 MODELS = ("model.toml", "model.nc", "base_model.toml", "base_model.nc")
-OWN = ("report.html", "report.json", "parameters.csv", "runs.csv", *MODELS, FITS)
+OWN = ("report.html", "report.json", "parameters.csv", "runs.csv", *MODELS, *CONTROL, FITS)
 
 
 def run_close_loop(
@@ -57,12 +60,85 @@ def print_findings(findings: Findings, page: Path) -> None:
     typer.echo(f"Report: {page.resolve()}")
 
 
+def tune_on_models(
+    out: Path,
+    controller: str,
+    set_points: Sequence[float],
+    command: str,
+    truth: Path | None = None,
+    quick: bool = False,
+) -> Path:
+    """Tune a controller on both models of a report and judge the gains on the extended one, or on `truth`; the path of the page.
+
+    `quick`: a search that takes half a minute, for a demonstration. Raises typer.BadParameter for a controller that this load cannot have, or set points that it cannot reach.
+    """
+    from smajax.cli.progress_display import displayed
+    from smajax.control.tuned_on_models import QUICK, tuned_on_models
+    from smajax.data.model_file.read import load_model
+    from smajax.report.control_page import conclusions, write_comparison
+
+    base, extended = load_model(out / "base_model.toml"), load_model(out / "model.toml")
+    models = (
+        {"base model": base, "extended model": extended} if extended.effects != base.effects else {"base model": base}
+    )
+    plant = ("extended model", extended) if truth is None else ("true model", load_model(truth))
+    effort = QUICK if quick else None
+    try:
+        with resumable(), displayed(console(), hint=False) as progress:
+            result = tuned_on_models(models, plant, controller, set_points, effort=effort, progress=progress)
+    except (KeyError, ValueError) as error:
+        raise typer.BadParameter(str(error.args[0]), param_hint="--tune") from None
+    for sentence in conclusions(result):
+        typer.echo(f"  {sentence}", err=True)
+    return write_comparison(result, out, command)
+
+
+def check_tuning(experiment: Path, controller: str, set_points: str) -> tuple[float, ...]:
+    """The set points in the unit that is shown, before anything is fitted. Raises typer.BadParameter, and ExperimentError of the experiment."""
+    from smajax.cli.options import numbers
+    from smajax.control.interface import check_set_points
+    from smajax.control.position_unit import unit_of
+    from smajax.control.presets import check_controller
+    from smajax.data.open_experiment import open_experiment
+    from smajax.fit.base_model import base_model
+
+    system = base_model(open_experiment(experiment))
+    try:
+        check_controller(controller, system)
+        unit = unit_of(system)
+    except (KeyError, ValueError) as error:
+        raise typer.BadParameter(str(error.args[0]), param_hint="--tune") from None
+    if not set_points:
+        return ()
+    found = numbers("--set-points", set_points, unit.shown)
+    try:
+        check_set_points(system, found)
+    except ValueError as error:
+        raise typer.BadParameter(str(error), param_hint="--set-points") from None
+    return found
+
+
 def close_loop_command(
     experiment: Annotated[Path, typer.Argument(help="experiment.toml, or the folder that holds it")],
     out: Annotated[
         Path,
         typer.Option(help="folder for report.html, report.json, its tables as CSV; finished fits are cached there too"),
     ] = Path("report"),
+    tune: Annotated[
+        str,
+        typer.Option(
+            help="then tune this controller on the extended model, and compare with gains tuned on the base model",
+            autocompletion=completion.controllers,
+        ),
+    ] = "",
+    set_points: Annotated[
+        str,
+        typer.Option(
+            "--set-points",
+            "--set-point",
+            help="of --tune, with commas, without a unit in deg or mm; default three over the stroke",
+        ),
+    ] = "",
     overwrite: Overwrite = False,
     json_out: Json = False,
     open_page: Open = False,
@@ -73,7 +149,12 @@ def close_loop_command(
     same --out resumes from the finished fits.
 
     Example:  smajax close-loop experiment.toml --out report
+
+    Example:  smajax close-loop experiment.toml --out report --tune pid --set-points 5mm,10mm
     """
+    if set_points and not tune:
+        raise typer.BadParameter("are those of a controller to be tuned: give --tune too.", param_hint="--set-points")
+    targets = check_tuning(experiment, tune, set_points) if tune else ()
     command = f"smajax close-loop {shlex.quote(str(experiment))} --out {shlex.quote(str(out))}"
     findings, page = run_close_loop(experiment, out, command, overwrite, not json_out)
     if json_out:
@@ -82,5 +163,8 @@ def close_loop_command(
         typer.echo(json.dumps(findings_to_json(findings)))
     else:
         print_findings(findings, page)
+    if tune:
+        shown = tune_on_models(out, tune, targets, command)
+        typer.echo(f"Controller: {shown.resolve()}", err=json_out)
     if open_page:
         browse(page)

@@ -10,9 +10,12 @@ from typing import Annotated
 import typer
 
 from smajax.cli import completion
-from smajax.cli.commands.close_loop import print_findings, run_close_loop
+from smajax.cli.commands.close_loop import print_findings, run_close_loop, tune_on_models
 from smajax.cli.options import DEMOS, Json, Open, Overwrite
 from smajax.cli.terminal import browse
+
+TRUE_MODEL = "true_model.toml"
+CONTROLLERS = ("pid", "sld")
 
 
 def demo(
@@ -20,6 +23,9 @@ def demo(
     only: Annotated[
         str | None, typer.Option(help=f"one of {', '.join(DEMOS)}", autocompletion=completion.demos)
     ] = None,
+    control: Annotated[
+        bool, typer.Option("--control/--no-control", help="tune controllers on the models of `latent` in the end")
+    ] = True,
     overwrite: Overwrite = False,
     json_out: Json = False,
     open_page: Open = False,
@@ -27,7 +33,8 @@ def demo(
     """Run `close-loop` on two virtual benches of the package: the base model of one lacks an effect, that of the other none.
 
     The data of each bench are from an independent simulator. Its true effects are in truth.toml, which `close-loop` does
-    not read and which is printed after each verdict.
+    not read and which is printed after each verdict. In the end a controller with a model and one without are tuned on the fitted models of
+    `latent` and judged on its true wire.
 
     Example:  smajax demo --only latent --out demo-report
     """
@@ -51,6 +58,13 @@ def demo(
                 typer.echo("The truth, which the loop did not read:")
                 for line in (folder / "truth.toml").read_text(encoding="utf-8").splitlines():
                     typer.echo(f"  {line}")
+            if control and (folder / TRUE_MODEL).is_file():
+                typer.echo(
+                    "\nControllers tuned on what was found, and on the base model, judged on the true wire:", err=True
+                )
+                for controller in CONTROLLERS:
+                    shown = tune_on_models(out / name, controller, (), "smajax demo", folder / TRUE_MODEL, quick=True)
+                    typer.echo(f"Controller: {shown.resolve()}", err=json_out)
         pages.append(page)
     if json_out:
         typer.echo(json.dumps(records))

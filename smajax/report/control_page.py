@@ -1,0 +1,183 @@
+"""Gains tuned on several models and judged on one plant: sentences, a table, a picture, JSON, a page, and a file of gains."""
+
+from __future__ import annotations
+
+import html
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from smajax.control.gains_file import write_gains
+from smajax.control.tuned_on_models import ControlComparison, TunedOnModel
+from smajax.core.display_units import digits, label
+from smajax.core.files import json_text, replace
+from smajax.core.provenance import made_with
+from smajax.report.drawing import UPRIGHT
+from smajax.report.html import picture
+from smajax.report.pictures import AFTER, as_png, new_figure, tidy
+from smajax.report.plain_page import bullets, table, whole
+
+COLOURS = ("#8a8f98", AFTER, "#c8553d")
+SAME = 0.02  # of a settling time: a smaller difference is none
+MORE_OVERSHOOT = 0.005  # of the largest set point
+
+
+def files_of(controller: str) -> tuple[str, ...]:
+    """What `write_comparison` writes."""
+    return f"{controller}_gains.json", f"control_{controller}.json", f"control_{controller}.html"
+
+
+def seconds_in_words(value: float) -> str:
+    """`4.1 s`, or `never`."""
+    return f"{digits(value, 3)} s" if math.isfinite(value) else "never"
+
+
+def head(result: ControlComparison) -> tuple[str, ...]:
+    """Of `rows`."""
+    unit = result.unit.label
+    return ("tuned on", f"set point ({unit})", "settling time (s)", f"overshoot ({unit})", f"steady error ({unit})")
+
+
+def rows(result: ControlComparison) -> list[list[str]]:
+    """A row a model and set point."""
+    shown = result.unit.of
+    return [
+        [
+            one.model,
+            digits(float(shown(loop.set_point)), 3),
+            digits(loop.settling_time, 3) if math.isfinite(loop.settling_time) else "never",
+            digits(float(shown(loop.overshoot)), 2),
+            digits(float(shown(loop.steady_error)), 2),
+        ]
+        for one in result.tuned
+        for loop in one.loops
+    ]
+
+
+def conclusions(result: ControlComparison) -> list[str]:
+    """Each model's loops in a sentence, and then what the last model's gains are worth over the first's."""
+    sentences = []
+    for one in result.tuned:
+        settled = sum(math.isfinite(loop.settling_time) for loop in one.loops)
+        if settled == len(one.loops):
+            text = f"settles after {seconds_in_words(one.settling_time)} on average"
+        else:
+            text = f"settles at {settled} of {len(one.loops)} set points" if settled else "settles at no set point"
+        overshoot = digits(float(result.unit.of(one.overshoot)), 2)
+        sentences.append(
+            f"{result.controller} tuned on the {one.model} {text}, with an overshoot of at most {overshoot} {result.unit.label}, on the {result.plant}."
+        )
+    return [*sentences, worth(result)] if len(result.tuned) > 1 else sentences
+
+
+def worth(result: ControlComparison) -> str:
+    """What the difference of the first and the last model comes to."""
+    before, after = result.tuned[0], result.tuned[-1]
+    first, last = before.settling_time, after.settling_time
+    if math.isfinite(first) and math.isfinite(last):
+        if abs(first - last) <= SAME * max(first, last):
+            what = "changes the settling time by less than 2 %"
+        else:
+            what = f"makes it settle {digits(abs(first - last), 2)} s {'earlier' if last < first else 'later'} ({last / first - 1.0:+.0%})"
+    elif math.isfinite(last):
+        what = "makes it settle where it did not"
+    elif math.isfinite(first):
+        what = "keeps it from settling"
+    else:
+        what = "does not make it settle at every set point"
+    return f"Tuning on the {after.model} in the place of the {before.model} {what}."
+
+
+def record(result: ControlComparison, command: str = "") -> dict[str, Any]:
+    """The numbers, SI, for a program."""
+    return {
+        "command": command,
+        "controller": result.controller,
+        "plant": result.plant,
+        "position_unit": result.unit.own,
+        "conclusions": conclusions(result),
+        "tuned_on": [
+            {
+                "model": one.model,
+                "gains": {name: {"value": value, "unit": one.units[name]} for name, value in one.gains.values.items()},
+                "loops": [
+                    {
+                        "set_point": loop.set_point,
+                        "settling_time": loop.settling_time,
+                        "overshoot": loop.overshoot,
+                        "steady_error": loop.steady_error,
+                    }
+                    for loop in one.loops
+                ],
+            }
+            for one in result.tuned
+        ],
+        "made_with": made_with(),
+    }
+
+
+def loops_picture(result: ControlComparison, upright: bool = False) -> bytes:
+    """The position over time at each set point, by the gains of each model."""
+    count = len(result.tuned[0].loops)
+    size = (4.6 if upright else 2.9 * count + 0.6, 2.2 * count + 0.6 if upright else 3.2)
+    figure = new_figure(size[1], UPRIGHT if upright else size[0])
+    panels = np.ravel(figure.subplots(*((count, 1) if upright else (1, count)), squeeze=False))
+    for number, axes in enumerate(panels):
+        for one, colour in zip(result.tuned, COLOURS, strict=False):
+            loop = one.loops[number]
+            axes.plot(
+                loop.time, result.unit.of(loop.position), color=colour, linewidth=1.4, label=f"tuned on the {one.model}"
+            )
+        axes.axhline(
+            float(result.unit.of(result.tuned[0].loops[number].set_point)),
+            color="#1d1d1f",
+            linewidth=0.7,
+            linestyle="--",
+        )
+        axes.set_xlabel("time (s)", fontsize=9)
+        tidy(axes)
+    panels[0].set_ylabel(result.unit.axis, fontsize=9)
+    figure.legend(
+        *panels[0].get_legend_handles_labels(),
+        loc="outside upper center",
+        ncols=1 if upright else 3,
+        frameon=False,
+        fontsize=9,
+    )
+    return as_png(figure)
+
+
+def page(result: ControlComparison, command: str = "") -> str:
+    """The whole page."""
+    title = f"{result.controller}: what the model is worth in control"
+    names = list(result.tuned[0].gains.values)
+    gains = [
+        [label(name), *(digits(one.gains.values[name], 4) for one in result.tuned), result.tuned[0].units[name]]
+        for name in names
+    ]
+    parts = [
+        f"<h1>{html.escape(title)}</h1>",
+        bullets([worth(result), *conclusions(result)[:-1]] if len(result.tuned) > 1 else conclusions(result)),
+        str(picture(loops_picture(result), "loops over time", "panels", loops_picture(result, upright=True))),
+        f"<p class=quiet>Each loop is a step from the start, cold and at rest, on the {html.escape(result.plant)}. Gains were tuned on each model and on plants drawn from its "
+        "posterior, with the same settings. The command stays within that of the fit runs.</p>",
+        table(head(result), rows(result), (1, 2, 3, 4)),
+        "<h2>Gains</h2>",
+        table(["gain", *(one.model for one in result.tuned), "unit"], gains, range(1, 1 + len(result.tuned))),
+        "<h2>Provenance</h2>",
+        table(["", ""], [["command", command], *map(list, made_with().items())]),
+        f"<p class=quiet>The same numbers: {files_of(result.controller)[1]}; the gains tuned on the {result.tuned[-1].model}: {files_of(result.controller)[0]}.</p>",
+    ]
+    return whole(title, parts)
+
+
+def write_comparison(result: ControlComparison, folder: Path, command: str = "") -> Path:
+    """The gains of the last model as `smajax sweep` and `simulate` read them, the numbers and the page; the path of the page."""
+    folder.mkdir(parents=True, exist_ok=True)
+    gains, numbers, shown = files_of(result.controller)
+    best: TunedOnModel = result.tuned[-1]
+    write_gains(folder / gains, best.gains, best.units, {"tuned on": best.model, "command": command, **made_with()})
+    replace(folder / numbers, json_text(record(result, command)))
+    return replace(folder / shown, page(result, command))
