@@ -23,7 +23,8 @@ def new_experiment(
     load: Annotated[
         str,
         typer.Option(
-            help="of a log with a position: dead_weight (default) or bias_spring", autocompletion=completion.loads
+            help="of a log with a position: dead_weight (default) or bias_spring; with a force: blocked_wire",
+            autocompletion=completion.loads,
         ),
     ] = "",
     wire: Annotated[

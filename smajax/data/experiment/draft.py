@@ -23,6 +23,8 @@ from smajax.data.experiment.column_guess import (
     times_not_read,
 )
 from smajax.data.experiment.draft_model import DraftModel, ModelChoice, choose_model
+from smajax.data.experiment.first_force import first_force
+from smajax.data.experiment.grouping import RunFiles
 from smajax.data.experiment.logs import Logs, logs_of
 from smajax.data.experiment.model_description import WIRE_SIZES
 from smajax.data.model_file.actuator_model import ActuatorModel
@@ -186,6 +188,29 @@ class _Inputs:
     def is_variable(self, quantity: str) -> bool:
         """Whether a file names it a variable: a signal with its own times."""
         return bool(self.logs.kinds[self.kind_of[quantity]].clocks)
+
+    @property
+    def first_forces(self) -> Mapping[str, float]:
+        """Run -> what the load cell of a blocked wire shows at its start, N; empty of another load, and of a cell set to zero there."""
+        if self.model.output != "force" or "force" not in self.columns:
+            return {}
+        found = {}
+        for run in self.logs.runs:
+            force, unit = self._signal(run, "force")
+            drive = self.model.inputs[0]
+            same = drive in self.columns and self.kind_of[drive] == self.kind_of["force"]
+            value = first_force(force, unit, self._signal(run, drive)[0] if same else None)
+            if value is None:
+                return {}
+            found[run.name] = value
+        return found
+
+    def _signal(self, run: RunFiles, quantity: str) -> tuple[np.ndarray, str]:
+        """A channel of a run as logged, and its unit."""
+        file = run.files[self.kind_of[quantity]]
+        column = self.overrides(file).get(quantity, self.columns[quantity])
+        table = self.tables[self.files.index(file)]
+        return table.columns[table.name_of(column.key)], column.unit
 
     def overrides(self, file: Path) -> Mapping[str, Column]:
         """Quantity -> the column of this file, where it differs from the first file's."""
@@ -395,6 +420,7 @@ def _runs(inputs: _Inputs, target: Path) -> _Section:
     base = (target.resolve().parent / _folder(inputs.files, target)).resolve()
     channels = {*model.inputs, model.output}
     lines: list[str] = []
+    forces = inputs.first_forces
     for run in runs:
         role = "held-out" if run is held_out else "fit"
         names = [json.dumps(str(file.resolve().relative_to(base)), ensure_ascii=False) for file in run.files]
@@ -408,12 +434,20 @@ def _runs(inputs: _Inputs, target: Path) -> _Section:
             "[[runs]]",
             f"name = {json.dumps(run.name, ensure_ascii=False)}",
             f'role = "{role}"' + ("  # not fitted: the error on it validates the model" if run is held_out else ""),
+            *(
+                [f'parameters = {{ pretension = "{forces[run.name]:.4g} N" }}  # {GUESS}: what the force begins with']
+                if forces
+                else []
+            ),
             f"file = {names[0]}" if len(names) == 1 else f"files = {{ {by_channel} }}",
             *_override_lines(
                 {name: one for name, one in overrides.items() if name in {TIME, *channels}}, inputs.columns
             ),
             "",
         ]
+    messages = [f"pretension: what the force of each run begins with ({GUESS})"] if forces else []
     if held_out is None:
-        return _Section(lines)
-    return _Section(lines, [f"held out: the last run, {held_out.name}; choose another one by its `role` in [[runs]]"])
+        return _Section(lines, messages)
+    return _Section(
+        lines, [*messages, f"held out: the last run, {held_out.name}; choose another one by its `role` in [[runs]]"]
+    )
