@@ -7,6 +7,7 @@ import re
 import tomllib
 from pathlib import Path
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -31,7 +32,7 @@ def log(path: Path, amperes: float, pretension: float, heading: str = "time [s],
     system = sma.set_parameters(
         sma.build("flexinol_table_3_2", "blocked_wire", "current"), {**TRUTH, "pretension": pretension}
     )
-    run = sma.simulate_dataset(system, {"current": current}, dt=0.05)
+    run = sma.simulate_dataset(system, {"current": jnp.asarray(current)}, dt=0.05)
     force = run["reading"].to_numpy() + np.random.default_rng(int(1e3 * amperes)).normal(0.0, NOISE, TIME.size)
     np.savetxt(path, np.stack([TIME, current, force], 1), delimiter=",", header=heading, comments="", fmt="%.6g")
     return path
@@ -113,7 +114,7 @@ def test_identify_finds_the_wire_behind_a_force_and_predict_another_run(folder: 
         off = abs(estimates[name]["value"] - TRUTH[name])
         assert off < 4.0 * estimates[name]["standard_error"], name
         assert off < 0.01 * TRUTH[name]
-    words = [
+    words: list[str | Path] = [
         "predict",
         folder / "fit" / "model.toml",
         folder / "c.csv",
@@ -137,7 +138,15 @@ def test_close_loop_takes_the_force_as_its_output(folder: Path) -> None:
 
 
 def test_simulate_has_the_force_as_its_reading(tmp_path: Path) -> None:
-    words = ["flexinol_table_3_2", "blocked_wire", "current", "--step", "0.42A:3s,0A:1s", "--out", tmp_path / "run"]
+    words: list[str | Path] = [
+        "flexinol_table_3_2",
+        "blocked_wire",
+        "current",
+        "--step",
+        "0.42A:3s,0A:1s",
+        "--out",
+        tmp_path / "run",
+    ]
     ended = smajax("simulate", *words)
     assert ended.code == 0, ended.said
     assert "The force starts at 2 N" in (tmp_path / "run" / "simulate.html").read_text()

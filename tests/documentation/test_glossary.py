@@ -220,6 +220,11 @@ PLAIN = set(
         "without",
         "write",
         "zipped",
+        "known",
+        "mass",
+        "metre",
+        "ohm",
+        "per",
     ]
 )
 

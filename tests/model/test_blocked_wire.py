@@ -121,7 +121,7 @@ def test_on_the_way_the_force_is_that_of_an_independent_integration(stiffness: f
     """Heated within the transformation, held, and cooled; mass and damping are so small here that the load cell follows within 0.05 ms."""
     system = bench(cell_stiffness=stiffness, damping=5e-5 * stiffness, fixture_mass=1e-4)
     times = 0.02 * np.arange(601)
-    run = simulate_dataset(system, {"voltage": np.where(times < 6.0 - 1e-9, 9.6, 0.0)}, 0.02)
+    run = simulate_dataset(system, {"voltage": jnp.where(times < 6.0 - 1e-9, 9.6, 0.0)}, 0.02)
     expected = _integrated(system, lambda time: 9.6 if time < 6.0 else 0.0, 6.0, times)
     assert 0.2 < float(run["martensite_fraction"].min()) < 0.9
     assert np.ptp(expected) > 4.0
@@ -134,7 +134,7 @@ def test_a_stiff_load_cell_is_integrated_within_the_tolerance(stiffness: float) 
     system = bench(drive="current", cell_stiffness=stiffness)
     for dt in (0.005, 0.1):
         times = dt * np.arange(round(16.0 / dt) + 1)
-        current = {"current": np.where(times < 8.0, 0.42, 0.0)}
+        current = {"current": jnp.where(times < 8.0, 0.42, 0.0)}
         run = simulate_dataset(system, current, dt)
         error = json.loads(run.attrs["integration_error"])
         moved = float(np.ptp(run["reading"].to_numpy()))
