@@ -81,6 +81,21 @@ def test_a_force_beside_a_position_is_taken_only_if_it_is_asked_for(tmp_path: Pa
         loads("arm")
 
 
+def test_a_load_cell_that_counts_tension_as_negative_is_a_warning(folder: Path, tmp_path: Path) -> None:
+    rows = np.loadtxt(folder / "a.csv", delimiter=",", skiprows=1)
+    rows[:, 2] *= -1.0
+    heading = "time [s],current [A],load cell [N]"
+    np.savetxt(tmp_path / "a.csv", rows, delimiter=",", header=heading, comments="", fmt="%.6g")
+    text = draft([tmp_path / "a.csv"], tmp_path / "e.toml").text
+    assert "# pretension = " in text  # not what the force begins with
+    (tmp_path / "e.toml").write_text(text)
+    (said,) = [one for one in load_experiment(tmp_path / "e.toml", CATALOGUE).warnings if "reversed" in one]
+    assert "the output 'force' moves against the model" in said
+    (tmp_path / "e.toml").write_text(text.replace("# reversed = true", "reversed = true"))
+    assert not any("reversed" in one for one in load_experiment(tmp_path / "e.toml", CATALOGUE).warnings)
+    assert not any("reversed" in one for one in load_experiment(folder / "experiment.toml", CATALOGUE).warnings)
+
+
 def test_logs_of_one_sensor_each_are_paired_where_one_of_them_is_a_force(tmp_path: Path) -> None:
     """A drive with a force in one file, and the position in another, are one run; as before the load cell was a load."""
     for name, heading, columns in (
