@@ -78,6 +78,7 @@ def _scale(system: System) -> Scale:
         float(heat.ambient_temperature),
         float(mass_per_metre(wire) * heat.specific_heat / cooling),
         warming,
+        system.load.reading[0],
     )
 
 

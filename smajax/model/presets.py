@@ -231,6 +231,7 @@ _LOADS: dict[str, Callable[[], AbstractMovingLoad | AbstractCoupon]] = resolved(
     {
         "dead_weight": dead_weight,
         "bias_spring": bias_spring,
+        "blocked_wire": "smajax.model.load.blocked_wire:blocked_wire",
         "arm": arm,
         "coupon": Coupon,
         "strain_coupon": StrainCoupon,

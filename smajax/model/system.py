@@ -103,7 +103,8 @@ def initial_state(system: System, inputs: Inputs) -> State:
         else:
             stress = inputs["stress"]
     else:
-        position = reading = system.load.start()
+        position = system.load.start()
+        reading = system.load.sensed(position)
         at_once = jnp.zeros_like(position)
         temperature = ambient_temperature(system, at_once, inputs)
         at_rest = load_resistance(system, at_once, position, jnp.zeros_like(position), inputs)

@@ -15,6 +15,7 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from PIL import Image
 
+from smajax.core.display_units import axis_label, display
 from smajax.core.files import replace
 from smajax.core.progress import Progress, Stage, quiet
 from smajax.model.load.arm import Arm
@@ -137,22 +138,25 @@ def _arm(axes: Axes, system: System, run: Run) -> Draw:
 
 
 def _slider(axes: Axes, system: System, run: Run) -> Draw:
-    """A weight or a slider that its wire pulls up; the stroke is drawn to its own scale."""
-    stroke = 1e3 * np.asarray(run.position)
+    """A weight or a slider that its wire pulls up; the stroke is drawn to its own scale. What a load cell holds rises with its force."""
+    name, own = system.load.reading
+    shown = display(own, name)
+    # A late or coarse sensor of the position is not what moves.
+    stroke = shown.of(np.asarray(run.position if name == "position" else run.reading))
     room = max(float(np.ptp(stroke)), 1e-3)
     top = float(stroke.max()) + 0.6 * room
     (wire,) = axes.plot([], [], linewidth=3.0, animated=True)
     (weight,) = axes.plot([], [], "s", color=MEASURED, markersize=22.0, animated=True)
     words = axes.text(0.02, 0.98, "", transform=axes.transAxes, va="top", fontsize=10, animated=True)
     axes.set(xlim=(-1.0, 1.0), ylim=(float(stroke.min()) - 0.4 * room, top), xticks=[])
-    axes.set_ylabel("position (mm)", fontsize=9)
+    axes.set_ylabel(axis_label(name, shown), fontsize=9)
     tidy(axes)
 
     def draw(at: int) -> list[Any]:
         wire.set_data([0.0, 0.0], [stroke[at], top])
         wire.set_color(SHADE(float(run.martensite_fraction[at])))
         weight.set_data([0.0], [stroke[at]])
-        words.set_text(_told(run, at, f"{stroke[at]:.1f} mm"))
+        words.set_text(_told(run, at, f"{stroke[at]:.1f} {shown.unit}"))
         return [wire, weight, words]
 
     return draw

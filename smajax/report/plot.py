@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
 INPUTS = ("voltage", "duty", "current", "power")
 MOVED = ("position", "temperature", "martensite_fraction", "stress")
+HELD = ("force", *MOVED[1:])  # of a load whose sensor is a load cell
 PULLED = ("temperature", "stress", "strain", "martensite_fraction")  # of a coupon
 
 
@@ -20,7 +21,7 @@ def plot(result: xr.Dataset, names: Sequence[str] = ()) -> Figure:
     """Draw `names` of a data set over time, one panel each, and return the figure of `pyplot`, for `plt.show()`.
 
     found: of `simulate_dataset` or `simulate_loop_dataset`. names: by default what the drive is given, position (with the set
-    point, dashed), temperature, martensite fraction and stress; of a coupon temperature, stress, strain and fraction. Raises
+    point, dashed; of a load cell the force), temperature, martensite fraction and stress; of a coupon temperature, stress, strain and fraction. Raises
     ValueError for a name that the data set has not, and for one that is no series over time, such as a whole batch;
     TypeError for what is no data set.
     """
@@ -60,4 +61,5 @@ def plot(result: xr.Dataset, names: Sequence[str] = ()) -> Figure:
 def main_series(result: xr.Dataset) -> list[str]:
     """What a look at a run is about, of the variables that are there."""
     moves = "position" not in result or result["position"].attrs.get("units") in ("m", "rad")
-    return [name for name in (*INPUTS, *(MOVED if moves else PULLED)) if name in result]
+    held = moves and {"force", "reading"} <= set(result) and result["reading"].equals(result["force"])
+    return [name for name in (*INPUTS, *(HELD if held else MOVED if moves else PULLED)) if name in result]

@@ -159,13 +159,23 @@ def _moves(data: xr.Dataset) -> bool:
     return bool(data["position"].attrs["units"] != "-")
 
 
+def _reads_force(data: xr.Dataset) -> bool:
+    """Whether the load's own sensor is a load cell."""
+    return "force" in data and np.array_equal(data["reading"], data["force"], equal_nan=True)
+
+
+def _path(data: xr.Dataset) -> str:
+    """The variable that a run is about."""
+    return "strain" if not _moves(data) else "force" if _reads_force(data) else "position"
+
+
 def picture_of(data: xr.Dataset, form: str = "png", upright: bool = False) -> bytes:
     """Input, position, temperature, fraction and stress over time, and the hysteresis of the position; `form`: png or svg.
 
-    Of a coupon the strain stands in the place of the position. upright: one below the other, for a telephone.
+    Of a coupon the strain stands in the place of the position, of a load cell the force. upright: one below the other, for a telephone.
     """
     inputs = _inputs(data)
-    path = "position" if _moves(data) else "strain"
+    path = _path(data)
     shown = [*inputs[:1], path, *PLAIN]
     figure = Figure(figsize=(UPRIGHT if upright else 10.0, 8.2))
     axes = panels(figure, 3, 2)
@@ -206,7 +216,7 @@ def picture_of(data: xr.Dataset, form: str = "png", upright: bool = False) -> by
 def _redundant(data: xr.Dataset) -> set[str]:
     """Variables to leave out: the position of a coupon, and a sensor reading that equals the true value."""
     moves = _moves(data)
-    true = ("position",) if moves else ("strain", "stress")
+    true = ("position", "force") if moves else ("strain", "stress")
     again = any(np.array_equal(data["reading"], data[name], equal_nan=True) for name in true)
     return {*(() if moves else ("position", "velocity")), *(("reading",) if again else ())}
 

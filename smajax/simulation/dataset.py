@@ -29,7 +29,7 @@ LABELS = {"martensite_fraction": "martensite fraction", "reading": "reading of t
 
 def _units(system: System) -> dict[str, str]:
     moves = isinstance(system.load, AbstractMovingLoad)
-    length = "rad" if system.load.reading[1] == "rad" else "m" if moves else "-"
+    length = system.load.position_unit if isinstance(system.load, AbstractMovingLoad) else "-"
     own = {"position": length, "velocity": f"{length}/s" if moves else "1/s", "reading": system.load.reading[1]}
     return {**SHOWN, **SENSORS, "detwinned_fraction": "-", **own}
 

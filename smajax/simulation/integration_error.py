@@ -134,8 +134,10 @@ def whole_transformation(system: System) -> dict[str, float]:
     ways = {"martensite_fraction": 1.0}
     if isinstance(load, AbstractMovingLoad):
         width = abs(float(law.austenite_finish) - float(law.martensite_finish))
-        stroke = strain / float(load.contraction(wire))
-        ways |= {"temperature": max(width, 1.0), "position": stroke, "reading": stroke}
+        start = jnp.asarray(load.start())
+        stroke = float(load.travel(wire, strain))
+        reading = float(load.sensed(start + stroke) - load.sensed(start))
+        ways |= {"temperature": max(width, 1.0), "position": stroke, "reading": reading}
     elif isinstance(load, Coupon):
         ways |= {"strain": strain, "reading": strain}
     else:

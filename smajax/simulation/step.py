@@ -260,7 +260,7 @@ def step(system: System, state: State, inputs: Inputs, dt: Scalar | float, once:
         new = _strain_coupon_step(system, state, inputs, dt)
         return _read(system, state, new, (state.wire.stress, new.wire.stress), dt)
     new, _ = _moving_step(system, state, inputs, dt, ORDER_TWO, once)
-    return _read(system, state, new, (state.motion.position, new.motion.position), dt)
+    return _read(system, state, new, _sensed(system, state, new), dt)
 
 
 def step_and_error(
@@ -269,8 +269,15 @@ def step_and_error(
     """The same of a moving load by the scheme of order 3, and what it may be off by: (C, m or rad, m/s or rad/s)."""
     new, (heat, position, velocity) = _moving_step(system, state, inputs, dt, ORDER_THREE, once)
     capacity = stored_heat(system.wire, (), jnp.ones_like(heat), new.wire.martensite_fraction)
-    read = _read(system, state, new, (state.motion.position, new.motion.position), dt)
+    read = _read(system, state, new, _sensed(system, state, new), dt)
     return read, (heat / capacity, position, velocity)
+
+
+def _sensed(system: System, old: State, new: State) -> tuple[Scalar, Scalar]:
+    """What the own sensor of a moving load measures before and after a step."""
+    load = system.load
+    assert isinstance(load, AbstractMovingLoad)
+    return load.sensed(old.motion.position), load.sensed(new.motion.position)
 
 
 def _read(system: System, old: State, new: State, shown: tuple[Scalar, Scalar], dt: Scalar) -> State:

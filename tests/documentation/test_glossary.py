@@ -224,6 +224,11 @@ PLAIN = set(
         "without",
         "write",
         "zipped",
+        "known",
+        "mass",
+        "metre",
+        "ohm",
+        "per",
     ]
 )
 

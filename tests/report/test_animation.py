@@ -8,13 +8,14 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from PIL import Image
 
 from smajax.core.progress import Event, Stage
 from smajax.model.presets import build
 from smajax.model.types import Trajectory
 from smajax.model.wire.kinetics import heating_temperature
-from smajax.report.animation import animate, animate_run, moving, ranges
+from smajax.report.animation import _slider, animate, animate_run, moving, ranges
 from smajax.simulation.compiled import simulate_compiled
 
 ARM = build("niti_table_3_1", "arm", "amplified_voltage")
@@ -80,6 +81,18 @@ def test_the_animation_of_a_weight_is_drawn(tmp_path: Path) -> None:
     path = animate_run(system, {"voltage": jnp.full(401, 5.5)}, tmp_path / "weight.gif", 0.02, frames=4)
     pictures = frames(path)
     assert len(pictures) == 4
+    assert np.abs(pictures[-1] - pictures[0]).max() > 50.0
+
+
+def test_the_animation_of_a_blocked_wire_shows_its_force_and_not_the_micrometres_that_it_moves(tmp_path: Path) -> None:
+    system = build("flexinol_table_3_2", "blocked_wire", "current")
+    run = simulate_compiled(system, {"current": jnp.full(201, 0.42)}, 0.02)
+    pictures = frames(animate(system, run, tmp_path / "held.gif", frames=4))
+    axes = Figure().subplots()
+    draw = _slider(axes, system, run)
+    words = draw(200)[-1].get_text()
+    assert axes.get_ylabel() == "force (N)"
+    assert f"{float(run.reading[-1]):.1f} N" in words
     assert np.abs(pictures[-1] - pictures[0]).max() > 50.0
 
 

@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
 from smajax.cli import completion
-from smajax.cli.options import UNMET, Json
+from smajax.cli.options import UNMET, Json, quantity, texts
+
+if TYPE_CHECKING:
+    from smajax.attribution.preset_ranking import PresetRanking
+
+KNOWN = "wire_length='0.5 m',wire_diameter='0.31 mm'"
 
 
 # More than 8 parameters: typer reads the options from them.
@@ -23,7 +30,8 @@ def new_experiment(
     load: Annotated[
         str,
         typer.Option(
-            help="of a log with a position: dead_weight (default) or bias_spring", autocompletion=completion.loads
+            help="of a log with a position: dead_weight (default) or bias_spring; with a force: blocked_wire",
+            autocompletion=completion.loads,
         ),
     ] = "",
     wire: Annotated[
@@ -41,59 +49,124 @@ def new_experiment(
     decimal: Annotated[
         str, typer.Option(help="`,` or `.`: the decimal mark, for logs that do not determine it (`1,234`)")
     ] = "",
+    known: Annotated[
+        list[str] | None,
+        typer.Option("--known", help="parameters that you measured: wire_length='0.5 m'; may be repeated"),
+    ] = None,
+    ohms: Annotated[
+        float | None, quantity("resistance of the cold wire, which gives its resistivities", "ohm", above=0.0)
+    ] = None,
+    ohms_per_metre: Annotated[
+        float | None, quantity("the same as data sheets have it, of each metre", "ohm/m", above=0.0)
+    ] = None,
+    mass: Annotated[
+        list[str] | None,
+        typer.Option("--mass", help="the mass of a run, RUN='500 g', where no column has it; may be repeated"),
+    ] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="replace an existing file")] = False,
     json_out: Json = False,
 ) -> None:
     """Draft an experiment file from measured logs: guess columns, units and sampling, with the certainty of each guess.
 
-    With three logs or more the last one is held out. Exit code 3 when the file cannot be loaded yet, with what is missing.
+    What is left to the presets is listed by how much it changes the outputs of the runs. With three logs or more the last one is held
+    out. Exit code 3 when the file cannot be loaded yet, with what is missing.
 
     Example:  smajax new-experiment logs/step1.csv logs/step2.csv logs/ramp.csv --out experiment.toml
+
+    Example:  smajax new-experiment logs/*.csv --known wire_length='0.5 m',wire_diameter='0.31 mm' --ohms 4.2ohm --mass ramp='500 g'
     """
+    _check_options(out, overwrite, decimal, model is not None and bool(load or wire or drive))
+    given, masses = texts("--known", known, KNOWN), _masses(mass or ())
+    from smajax.core.runtime import prepare
+
+    prepare()
+    from smajax.core.files import replace
+    from smajax.data.experiment.bench_facts import BenchFacts
+    from smajax.data.experiment.draft import draft
+    from smajax.data.experiment.draft_model import ModelChoice
+    from smajax.report.preset_words import remarks
+
+    bench = BenchFacts(given, ohms, ohms_per_metre, masses)
+    result = draft(files, out, title, ModelChoice(load, wire, drive, model), decimal, bench)
+    replace(out, result.text)
+    loaded = _loaded(out)
+    if loaded.ranking is not None:
+        replace(out, result.in_order(remarks(loaded.ranking)).text)
+    if json_out:
+        record = {
+            "file": str(out),
+            "guessed": result.messages,
+            "loads": not loaded.reason,
+            "why": loaded.reason,
+            "warnings": loaded.warnings,
+            "left_to_preset": [asdict(one) for one in loaded.ranking.influences] if loaded.ranking else [],
+        }
+        typer.echo(json.dumps(record))
+    else:
+        _print(result.messages, loaded, out)
+    if loaded.reason:
+        raise typer.Exit(UNMET)
+
+
+class _Loaded(NamedTuple):
+    """A draft as the other commands load it: warnings; why it cannot be loaded, or ""; what its runs depend on, None where that is not known."""
+
+    warnings: Sequence[str]
+    reason: str
+    ranking: PresetRanking | None
+
+
+def _check_options(out: Path, overwrite: bool, decimal: str, twice: bool) -> None:
+    """Raises typer.BadParameter. twice: the presets are named beside a model file."""
     if out.exists() and not overwrite:
         raise typer.BadParameter(f"{out} exists; give another name, or --overwrite.", param_hint="--out")
     if not out.parent.is_dir():
         raise typer.BadParameter(f"the folder {out.parent} does not exist.", param_hint="--out")
     if decimal not in ("", ",", "."):
         raise typer.BadParameter(f"`,` or `.`, not `{decimal}`.", param_hint="--decimal")
-    if model is not None and (load or wire or drive):
+    if twice:
         raise typer.BadParameter(
             "says wire, load and drive: leave --wire, --load and --drive out.", param_hint="--model"
         )
-    from smajax.core.runtime import prepare
 
-    prepare()
-    from smajax.core.files import replace
-    from smajax.data.experiment.draft import draft
-    from smajax.data.experiment.draft_model import ModelChoice
+
+def _masses(several: Sequence[str]) -> dict[str, str]:
+    """`RUN=500 g`, once a run; the name of a run may hold anything."""
+    result: dict[str, str] = {}
+    for one in several:
+        run, sign, value = (part.strip() for part in one.rpartition("="))
+        if not sign or not run or not value or run in result:
+            raise typer.BadParameter(
+                f"each run once with its mass, as in `ramp=500 g`, not `{one}`", param_hint="--mass"
+            )
+        result[run] = value
+    return result
+
+
+def _loaded(path: Path) -> _Loaded:
+    from smajax.attribution.preset_ranking import rank_presets
     from smajax.data.experiment.errors import ExperimentError
     from smajax.data.experiment.load import load_experiment
     from smajax.data.model_catalogue import CATALOGUE
 
-    result = draft(files, out, title, ModelChoice(load, wire, drive, model), decimal)
-    replace(out, result.text)
     try:
-        warnings, reason = list(load_experiment(out, CATALOGUE).warnings), ""
+        experiment = load_experiment(path, CATALOGUE)
     except ExperimentError as error:
-        warnings, reason = [], str(error)
-    if json_out:
-        record = {
-            "file": str(out),
-            "guessed": result.messages,
-            "loads": not reason,
-            "why": reason,
-            "warnings": warnings,
-        }
-        typer.echo(json.dumps(record))
-    else:
-        for line in result.messages:
-            typer.echo(f"  {line}")
-        for line in warnings:
-            typer.echo(f"  warning: {line}")
-        if reason:
-            typer.echo(f"It cannot be loaded yet: {reason}")
-        typer.echo(f"Written: {out.resolve()}")
-        if not reason:
-            typer.echo(f"Next: check it, then `smajax close-loop {out} --out report`")
-    if reason:
-        raise typer.Exit(UNMET)
+        return _Loaded([], str(error), None)
+    return _Loaded(experiment.warnings, "", rank_presets(experiment))
+
+
+def _print(messages: Sequence[str], loaded: _Loaded, out: Path) -> None:
+    from smajax.report.preset_words import NO_NUMBER, NOT_LOADED, sentence
+
+    for line in messages:
+        typer.echo(f"  {line}")
+    for line in loaded.warnings:
+        typer.echo(f"  warning: {line}")
+    if loaded.reason:
+        typer.echo(f"It cannot be loaded yet: {loaded.reason}")
+    ranked = NOT_LOADED if loaded.reason else NO_NUMBER if loaded.ranking is None else sentence(loaded.ranking)
+    typer.echo(ranked)
+    typer.echo(f"Written: {out.resolve()}")
+    if not loaded.reason:
+        typer.echo(f"Next: check it, then `smajax close-loop {out} --out report`")

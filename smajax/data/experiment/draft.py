@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from smajax.core.parameters import parameter_values, parameters
 from smajax.core.units import convert
 from smajax.core.wording import and_listed
+from smajax.data.experiment.bench_facts import BenchFacts, Known, facts_of
 from smajax.data.experiment.column_guess import (
     GUESS,
     LIKELY,
@@ -23,28 +23,29 @@ from smajax.data.experiment.column_guess import (
     times_not_read,
 )
 from smajax.data.experiment.draft_model import DraftModel, ModelChoice, choose_model
+from smajax.data.experiment.draft_parameters import PresetLine, kept_parameters, ordered, preset_parameters
+from smajax.data.experiment.first_force import first_force
+from smajax.data.experiment.grouping import RunFiles
 from smajax.data.experiment.logs import Logs, logs_of
-from smajax.data.experiment.model_description import WIRE_SIZES
-from smajax.data.model_file.actuator_model import ActuatorModel
 from smajax.data.model_file.read import load_model
 from smajax.data.readers.read import read_table
 from smajax.data.readers.table import MeasuredDataError, Table
-from smajax.model.presets import build
-from smajax.model.system import System
 
 MOST_SAMPLES = 2000  # of the longest run on the clock
 HELD_OUT_FROM = 3  # runs from which on the last one is held out
-# Parameter -> how far its bounds lie from the preset's value: factors, or kelvins.
-FACTORS = {"convection_coefficient": (0.2, 4.0), "specific_heat": (0.5, 3.0), "recoverable_strain": (0.3, 2.0)}
-KELVINS = {"austenite_start": 25.0, "austenite_finish": 30.0, "martensite_start": 25.0, "martensite_finish": 30.0}
 
 
 @dataclass(frozen=True)
 class Draft:
-    """The text of the file, and a message for each guess in it, with its certainty."""
+    """The text of the file, a message for each guess in it, with its certainty, and the values in it that are the preset's."""
 
     text: str
     messages: tuple[str, ...]
+    presets: tuple[PresetLine, ...] = ()
+
+    def in_order(self, remarks: Mapping[str, str]) -> Draft:
+        """With the values that are the preset's in the order of `remarks`, by name, each with its own beside it."""
+        return replace(self, text=ordered(self.text, self.presets, remarks))
 
 
 def _key(column: Column, variable: bool) -> str:
@@ -96,50 +97,23 @@ def _clock(table: Table, columns: Sequence[Column]) -> np.ndarray | None:
     return None if time is None else convert(table.columns[time.name], time.unit, "s")
 
 
-def _amount(value: float, unit: str, places: int) -> str:
-    return f"{value:.{places}g} {unit.replace('-', '')}".strip()
-
-
-def _known(model: DraftModel, system: System) -> dict[str, tuple[str, str]]:
-    """Parameters from a ruler, a balance or a data sheet: name -> (the preset's value, its meaning)."""
-    table, values = parameters(system), parameter_values(system)
-    heated, given = model.drive != "none", {"load_mass"} if "mass" in model.inputs else set()
-    sizes = [*WIRE_SIZES, *["ambient_temperature"] * heated] if model.load != "coupon" else []
-    names = [*sizes, *(name for name, one in table.items() if one.path[0] in ("load", "drive") and name not in given)]
-    return {name: (_amount(values[name], table[name].unit, 4), table[name].about) for name in names}
-
-
-def _unknowns(model: DraftModel, system: System) -> list[str]:
-    """The parameters that no data sheet has, with bounds around the preset's values."""
-    table, values = parameters(system), parameter_values(system)
-    heated = model.drive != "none"
-    lines = []
-    for name, (low, high) in FACTORS.items():
-        if not heated and name != "recoverable_strain":
-            continue
-        value = values[name]
-        box = (max(low * value, table[name].low), min(high * value, table[name].high), value)
-        shown = [_amount(one, table[name].unit, 3) for one in box]
-        lines.append(f'{name} = {{ low = "{shown[0]}", high = "{shown[1]}", start = "{shown[2]}" }}')
-    for name, width in KELVINS.items():
-        value = values[name]
-        lines.append(
-            f'{name} = {{ low = "{value - width:g} degC", high = "{value + width:g} degC", start = "{value:g} degC" }}'
-        )
-    return lines
-
-
 def _folder(files: Sequence[Path], target: Path) -> Path:
     common = Path(os.path.commonpath([file.resolve().parent for file in files]))
     return Path(os.path.relpath(common, target.resolve().parent))
 
 
 def draft(
-    files: Sequence[Path], target: Path, title: str = "", choice: ModelChoice | None = None, decimal: str = ""
+    files: Sequence[Path],
+    target: Path,
+    title: str = "",
+    choice: ModelChoice | None = None,
+    decimal: str = "",
+    bench: BenchFacts | None = None,
 ) -> Draft:
     """The experiment file `target` for these logs. Raises MeasuredDataError for a file that cannot be read.
 
-    decimal: the decimal mark, "," or ".", where the files do not determine it.
+    decimal: the decimal mark, "," or ".", where the files do not determine it. bench: what is known of it; ExperimentError where that
+    cannot be, as of the file.
     A file is a run, with the columns of the first one; another file without one of them has its own for the same quantity, or
     is refused by name. Where no file has an input and an output, a run is one file of each kind, by their names.
     """
@@ -151,14 +125,14 @@ def draft(
     logs = logs_of(files, tables)
     by_quantity = {one.quantity: one for one, _ in logs.columns if one.quantity}
     kind_of = {one.quantity: kind for one, kind in logs.columns if one.quantity}
-    inputs = _Inputs(tuple(files), tuple(tables), logs, by_quantity, kind_of, choose_model(by_quantity, choice))
+    model = choose_model(by_quantity, choice)
+    known, hint = facts_of(bench or BenchFacts(), target, model, kept, [run.name for run in logs.runs])
+    inputs = _Inputs(tuple(files), tuple(tables), logs, by_quantity, kind_of, model, known)
     time = _time(inputs)
+    own = preset_parameters(model, known) if kept is None else kept_parameters(kept, known)
     sections = [
-        *(
-            [_head(inputs, title or target.stem), _parameters(inputs.model)]
-            if kept is None
-            else [_head(inputs, title or target.stem, _relative(choice, target)), _kept_parameters(kept)]
-        ),
+        _head(inputs, title or target.stem, "" if kept is None else _relative(choice, target)),
+        _Section(own.lines, [*own.messages, *hint]),
         time,
         _channels(inputs),
         _data(inputs, target, decimal),
@@ -169,7 +143,7 @@ def draft(
         raise MeasuredDataError(f"two logs have the same name, {', '.join(names)}: rename one")
     first = time.messages if time.first else ()
     rest = [message for one in sections for message in one.messages if not (one is time and time.first)]
-    return Draft("\n".join(line for one in sections for line in one.lines), (*first, *rest))
+    return Draft("\n".join(line for one in sections for line in one.lines), (*first, *rest), own.presets)
 
 
 @dataclass(frozen=True)
@@ -182,10 +156,34 @@ class _Inputs:
     columns: Mapping[str, Column]
     kind_of: Mapping[str, int]
     model: DraftModel
+    known: Known
 
     def is_variable(self, quantity: str) -> bool:
         """Whether a file names it a variable: a signal with its own times."""
         return bool(self.logs.kinds[self.kind_of[quantity]].clocks)
+
+    @property
+    def first_forces(self) -> Mapping[str, float]:
+        """Run -> what the load cell of a blocked wire shows at its start, N; empty of another load, and of a cell set to zero there."""
+        if self.model.output != "force" or "force" not in self.columns:
+            return {}
+        found = {}
+        for run in self.logs.runs:
+            force, unit = self._signal(run, "force")
+            drive = self.model.inputs[0]
+            same = drive in self.columns and self.kind_of[drive] == self.kind_of["force"]
+            value = first_force(force, unit, self._signal(run, drive)[0] if same else None)
+            if value is None:
+                return {}
+            found[run.name] = value
+        return found
+
+    def _signal(self, run: RunFiles, quantity: str) -> tuple[np.ndarray, str]:
+        """A channel of a run as logged, and its unit."""
+        file = run.files[self.kind_of[quantity]]
+        column = self.overrides(file).get(quantity, self.columns[quantity])
+        table = self.tables[self.files.index(file)]
+        return table.columns[table.name_of(column.key)], column.unit
 
     def overrides(self, file: Path) -> Mapping[str, Column]:
         """Quantity -> the column of this file, where it differs from the first file's."""
@@ -247,52 +245,6 @@ def _head(inputs: _Inputs, title: str, model_file: str = "") -> _Section:
         ),
     ]
     return _Section(lines, messages)
-
-
-def _parameters(model: DraftModel) -> _Section:
-    """Known parameters as comments, unknown ones with bounds, and the nuisance parameters."""
-    preset = build(model.wire, model.load, model.drive)
-    known = _known(model, preset)
-    lines = [
-        "[model.parameters]  # known values of your bench, each with its unit; the others are the preset's",
-        *(f'# {name} = "{value}"  # {about}' for name, (value, about) in known.items()),
-        "",
-        f"[unknown]  # to be fitted: bounds around the values of {model.wire}, and the initial guess; for another wire",
-        "# draft again with `--wire NAME --overwrite`, or move them",
-        *_unknowns(model, preset),
-        "",
-        "[nuisance]",
-        "offset = true  # the sensor's zero may differ from run to run",
-        "",
-    ]
-    if not known:
-        return _Section(lines)
-    some = ", ".join(f"{name} {value}" for name, (value, _) in list(known.items())[:4])
-    message = (
-        f"the bench: the preset's {some}{' and others' if len(known) > 4 else ''} until [model.parameters] has yours; a "
-        "wrong one leads to a wrong fitted value"
-    )
-    return _Section(lines, [message])
-
-
-def _kept_parameters(kept: ActuatorModel) -> _Section:
-    """What was fitted before, as unknown again: its bounds, begun at the values of the file."""
-    fitted = {name: one for name, one in kept.parameters.items() if one.origin == "fitted"}
-    lines = [
-        "[model.parameters]  # known values that differ from the model file's, each with its unit",
-        "",
-        "[unknown]  # what was fitted before: bounds, and where the fit begins; without a line it is held to its error by the model file",
-    ]
-    for name, one in fitted.items():
-        unit = kept.table[name].unit
-        shown = {"low": one.low, "high": one.high, "start": one.value}
-        box = ", ".join(f"{key} = {json.dumps(_amount(value, unit, 10))}" for key, value in shown.items())
-        lines.append(f"{json.dumps(name) if '.' in name else name} = {{ {box} }}")
-    return _Section([*lines, "", "[nuisance]", f"offset = {str(_has_offset(kept)).lower()}", ""])
-
-
-def _has_offset(kept: ActuatorModel) -> bool:
-    return any(one.offset for one in kept.outputs) or not kept.outputs
 
 
 def _time(inputs: _Inputs) -> _Section:
@@ -395,6 +347,7 @@ def _runs(inputs: _Inputs, target: Path) -> _Section:
     base = (target.resolve().parent / _folder(inputs.files, target)).resolve()
     channels = {*model.inputs, model.output}
     lines: list[str] = []
+    forces, masses = inputs.first_forces, inputs.known.masses
     for run in runs:
         role = "held-out" if run is held_out else "fit"
         names = [json.dumps(str(file.resolve().relative_to(base)), ensure_ascii=False) for file in run.files]
@@ -408,12 +361,21 @@ def _runs(inputs: _Inputs, target: Path) -> _Section:
             "[[runs]]",
             f"name = {json.dumps(run.name, ensure_ascii=False)}",
             f'role = "{role}"' + ("  # not fitted: the error on it validates the model" if run is held_out else ""),
+            *(
+                [f'parameters = {{ pretension = "{forces[run.name]:.4g} N" }}  # {GUESS}: what the force begins with']
+                if forces
+                else []
+            ),
+            *([f"inputs = {{ mass = {json.dumps(masses[run.name])} }}"] if masses else []),
             f"file = {names[0]}" if len(names) == 1 else f"files = {{ {by_channel} }}",
             *_override_lines(
                 {name: one for name, one in overrides.items() if name in {TIME, *channels}}, inputs.columns
             ),
             "",
         ]
+    messages = [f"pretension: what the force of each run begins with ({GUESS})"] if forces else []
     if held_out is None:
-        return _Section(lines)
-    return _Section(lines, [f"held out: the last run, {held_out.name}; choose another one by its `role` in [[runs]]"])
+        return _Section(lines, messages)
+    return _Section(
+        lines, [*messages, f"held out: the last run, {held_out.name}; choose another one by its `role` in [[runs]]"]
+    )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 
 from smajax.core.names import close_matches
 from smajax.core.wording import and_listed
@@ -14,8 +15,13 @@ from smajax.data.readers.table import MeasuredDataError
 from smajax.model.presets import DRIVES as DRIVE_PRESETS
 from smajax.model.presets import WIRES, build
 
-# Loads whose reading is a position, and the wire of a bench with one.
-POSITIONED = {"dead_weight": "flexinol_table_3_2", "bias_spring": "flexinol_ht_500um"}
+# Reading -> the loads that have it, and the wire of a bench with one.
+WITH_READING: Mapping[str, Mapping[str, str]] = MappingProxyType(
+    {
+        "position": {"dead_weight": "flexinol_table_3_2", "bias_spring": "flexinol_ht_500um"},
+        "force": {"blocked_wire": "flexinol_table_3_2"},
+    }
+)
 
 
 @dataclass(frozen=True)
@@ -71,13 +77,16 @@ def _with_load(columns: Mapping[str, Column], load: str) -> DraftModel:
     guessed = _guessed(columns)
     if load in ("", guessed.load):
         return guessed
-    fitting = list(POSITIONED) if guessed.output == "position" else [guessed.load]
-    if load not in fitting:
+    readings = [guessed.output, *(name for name in WITH_READING if name in columns and name != guessed.output)]
+    wires = {one: (wire, name) for name in readings for one, wire in WITH_READING.get(name, {}).items()}
+    if load not in wires:
+        fitting = list(wires) or [guessed.load]
         raise MeasuredDataError(
-            f"the load {load!r} does not go with these columns, which have a reading of {guessed.output}: "
+            f"the load {load!r} does not go with these columns, which have a reading of {' and of '.join(readings)}: "
             f"{' or '.join(fitting)} does"
         )
-    return replace(guessed, wire=POSITIONED[load], load=load, inputs=guessed.inputs[:1])
+    wire, output = wires[load]
+    return replace(guessed, wire=wire, load=load, inputs=guessed.inputs[:1], output=output)
 
 
 def _guessed(columns: Mapping[str, Column]) -> DraftModel:
@@ -90,6 +99,9 @@ def _guessed(columns: Mapping[str, Column]) -> DraftModel:
         return DraftModel(
             "niti_table_3_1", "arm", drive or "voltage", (drive or "voltage",), "angle", "the output is an angle"
         )
+    if "force" in columns and "position" not in columns:
+        why = "the output is a force and nothing moves: a wire between a frame and a load cell"
+        return DraftModel("flexinol_table_3_2", "blocked_wire", drive or "voltage", (drive or "voltage",), "force", why)
     inputs = (drive or "voltage", *(["mass"] if "mass" in columns else []))
     why = "the output is a position; `--load bias_spring` takes the other load that has one"
     return DraftModel("flexinol_table_3_2", "dead_weight", drive or "voltage", inputs, "position", why)

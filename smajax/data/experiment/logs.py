@@ -28,7 +28,7 @@ def logs_of(files: Sequence[Path], tables: Sequence[Table]) -> Logs:
     seen = [columns_of(table) for table in tables]
     quantities = [frozenset(one.quantity for one in columns) - {"", TIME} for columns in seen]
     kinds = list(dict.fromkeys(quantities))
-    if len(kinds) == 1 or any(_is_whole(held) for held in quantities):
+    if len(kinds) == 1 or any(_is_whole(held, frozenset().union(*quantities)) for held in quantities):
         runs = tuple(RunFiles(file.stem, (file,)) for file in files)
         own = tuple(
             _otherwise(table, seen[0], columns) if table is not tables[0] else {}
@@ -68,7 +68,8 @@ def _otherwise(table: Table, usual: Sequence[Column], own: Sequence[Column]) -> 
     return result
 
 
-def _is_whole(quantities: Collection[str]) -> bool:
-    """Whether these are an input and an output of some model."""
-    moves = {"position", "angle"} & set(quantities) and set(DRIVES) & set(quantities)
+def _is_whole(quantities: Collection[str], every: Collection[str]) -> bool:
+    """Whether these are an input and an output of some model; of all that the files have, a force is one where nothing moves."""
+    outputs = {"position", "angle"} & set(every) or {"force"}
+    moves = outputs & set(quantities) and set(DRIVES) & set(quantities)
     return bool(moves) or {*COUPON, "strain"} <= set(quantities)

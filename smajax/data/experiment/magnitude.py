@@ -36,8 +36,8 @@ IN_COMMON = 0.9
 FOLLOWS, LEAST = 0.2, 20  # rank correlation of heat and output; samples
 AGAINST = 0.5  # rank correlation of heat and output from which on a wrong sign is a sign turned round
 LAGS = (1, 2, 4, 8)  # time constants through which an output may follow: latent heat and hysteresis hold it back
-# Whether heat makes an output rise or fall, on every moving load. Stress, force and resistance do one or the other by the
-# load and the alloy.
+# Whether heat makes an output rise or fall, on every moving load; the load's own sensor rises. Stress, resistance and a force that is not
+# that sensor's do one or the other by the load and the alloy.
 BY_HEAT: Mapping[str, int] = MappingProxyType({"position": 1, "angle": 1, "temperature": 1, "strain": -1})
 MOVES = 0.5  # share of its samples from which on a signal that never repeats a value moves all the time
 
@@ -182,15 +182,15 @@ def _unrelated_warnings(following: Mapping[str, Sequence[Array]]) -> list[str]:
     return []
 
 
-def _reversed_warnings(following: Mapping[str, Sequence[Array]]) -> list[str]:
-    """Outputs that move against the heat where the model's move with it, or the other way round."""
-    message = []
+def _reversed_warnings(following: Mapping[str, Sequence[Array]], own: str) -> list[str]:
+    """Outputs that move against the heat where the model's move with it, or the other way round. own: that of the load's sensor."""
+    message, signs = [], {**BY_HEAT, own: 1}
     for name, result in following.items():
         median = float(np.median([max(by_lag, key=abs) for by_lag in result]))
-        if name in BY_HEAT and BY_HEAT[name] * median < -AGAINST:
+        if name in signs and signs[name] * median < -AGAINST:
             message.append(
                 f"the output {name!r} moves against the model (rank correlation with the heat {median:.2f} in the median run; "
-                f"the model's {'rises' if BY_HEAT[name] > 0 else 'falls'} with it): is the sensor's sign reversed? Set "
+                f"the model's {'rises' if signs[name] > 0 else 'falls'} with it): is the sensor's sign reversed? Set "
                 f"reversed = true under [channels.{name}], or take it out where it is set"
             )
     return message
@@ -222,6 +222,6 @@ def magnitude_warnings(runs: Sequence[ReadRun], scale: Scale | None, heats: Sequ
             result += [
                 *_dynamics_warnings(runs, scale, step),
                 *_unrelated_warnings(following),
-                *_reversed_warnings(following),
+                *_reversed_warnings(following, scale.own),
             ]
     return result

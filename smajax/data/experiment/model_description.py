@@ -43,13 +43,14 @@ class Scale:
     """What magnitudes a model has at given values, by which measured ones are judged.
 
     wire_length: m. ambient: degC. time_constant: s, of the wire's temperature. warming: inputs (n,) -> the degrees above
-    the air (n,) at which the wire comes to rest under each.
+    the air (n,) at which the wire comes to rest under each. own: the output that the load's own sensor shows, which rises with heat.
     """
 
     wire_length: float
     ambient: float
     time_constant: float
     warming: Callable[[Mapping[str, NDArray[np.float64]]], NDArray[np.float64]]
+    own: str = "position"
 
 
 @dataclass(frozen=True)

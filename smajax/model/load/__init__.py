@@ -2,6 +2,6 @@
 
 In: position, velocity and the load's input channels. Out: inertia, resistance and friction in N (N m for an arm).
 
-Loads: `AbstractMovingLoad` (`base`), `DeadWeight`, `BiasSpring`, `Arm`, `Coupon`, `StrainCoupon`.
+Loads: `AbstractMovingLoad` (`base`), `DeadWeight`, `BiasSpring`, `BlockedWire`, `Arm`, `Coupon`, `StrainCoupon`.
 Contracts of effects: `ForceTerm` (`force`), `FrictionTerm` (`friction`), `MountingTerm` (`mounting`).
 """

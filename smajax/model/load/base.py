@@ -25,7 +25,7 @@ class AbstractMovingLoad(eqx.Module):
 
     inputs_required: ClassVar[frozenset[str]] = frozenset()
     inputs_optional: ClassVar[frozenset[str]] = frozenset()
-    reading: ClassVar[tuple[str, str]]  # what its sensor shows, and the SI unit
+    reading: ClassVar[tuple[str, str]]  # what its sensor shows (`sensed`), and the SI unit
     # Of the load's preset: parameter -> where its number comes from, "printed: Table 3.1", "corrected: ..." or "chosen: ...".
     origins: ClassVar[Mapping[str, str]] = {}
 
@@ -56,3 +56,16 @@ class AbstractMovingLoad(eqx.Module):
     @abc.abstractmethod
     def contraction(self, wire: Wire) -> Scalar:
         """Strain lost per unit of position: 1/l_0, or 2 r / l_0 for an arm (eq. 3.7, 3.14)."""
+
+    def sensed(self, position: Scalar) -> Scalar:
+        """What its own sensor measures at a position, in the unit of `reading`: the position, where it does not say otherwise."""
+        return position
+
+    def travel(self, wire: Wire, strain: Scalar | float) -> Scalar:
+        """How far it moves when the wire loses `strain`, m (rad for an arm): all of it, where the force hardly changes on the way."""
+        return strain / self.contraction(wire)
+
+    @property
+    def position_unit(self) -> str:
+        """SI."""
+        return "rad" if self.reading[1] == "rad" else "m"

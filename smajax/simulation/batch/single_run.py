@@ -8,6 +8,7 @@ import jax.numpy as jnp
 
 from smajax.core.parameters import get_parameters, parameters, set_parameters
 from smajax.model.channels import INPUT_UNITS
+from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.system import System, initial_state
 from smajax.model.types import Scalar, Series
 from smajax.simulation.input_delay import acting_inputs
@@ -38,8 +39,10 @@ class Recipe(eqx.Module):
 
     def units(self) -> dict[str, str]:
         """Of everything that a run gives, and of what may be varied."""
-        own = self.system.load.reading[1]
-        own_of = {name: unit or (f"{own}/s" if name == "velocity" else own) for name, unit in SHOWN.items()}
+        own, load = self.system.load.reading[1], self.system.load
+        moved = load.position_unit if isinstance(load, AbstractMovingLoad) else own
+        own_of = {name: unit or own for name, unit in SHOWN.items()}
+        own_of |= {"position": moved, "velocity": f"{moved}/s"}
         result = {name: own_of[name] for name in self.keep}
         measured = {one.name: one.unit or own_of.get(getattr(one, "of", ""), own) for one in self.measures}
         result |= measured

@@ -1,0 +1,179 @@
+"""What is said of a bench when its experiment is drafted: known values, the wire's resistance, masses; taken whole, or refused with the reason."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from smajax.core.parameters import parameter_values
+from smajax.data.experiment.bench_facts import BenchFacts
+from smajax.data.experiment.draft import Draft, draft
+from smajax.data.experiment.draft_model import ModelChoice
+from smajax.data.experiment.errors import ExperimentError
+from smajax.data.experiment.load import load_experiment
+from smajax.data.experiment.name_hints import hinted, mass_hint
+from smajax.data.model_catalogue import CATALOGUE
+from smajax.fit.base_model import base_model
+from smajax.model.presets import build
+
+AREA = 0.25 * math.pi * 0.31e-3**2
+KNOWN = {"wire_diameter": "0.31 mm", "wire_length": "0.5 m", "damping": "100 N s/m", "latent_heat.enthalpy": "20 J/g"}
+
+
+def logs(folder: Path, *names: str) -> list[Path]:
+    """A voltage that switches and a position."""
+    time = 0.1 * np.arange(200)
+    rows = np.stack([time, 5.0 * (time % 8.0 > 4.0), 3.0 + np.sin(time)], 1)
+    files = [folder / f"{name}.csv" for name in names or ("a", "b")]
+    for file in files:
+        np.savetxt(file, rows, delimiter=",", header="time [s],U [V],x [mm]", comments="", fmt="%.6g")
+    return files
+
+
+def drafted(folder: Path, *names: str, load: str = "", **facts: Any) -> Draft:
+    made = draft(logs(folder, *names), folder / "e.toml", choice=ModelChoice(load), bench=BenchFacts(**facts))
+    (folder / "e.toml").write_text(made.text, encoding="utf-8")
+    return made
+
+
+def test_known_values_are_those_of_the_base_model_and_no_longer_asked_for(tmp_path: Path) -> None:
+    made = drafted(tmp_path, known={**KNOWN, "specific_heat": "500 J/kg/K"})
+    experiment = load_experiment(tmp_path / "e.toml", CATALOGUE)
+    values = parameter_values(base_model(experiment))
+    assert values["wire_diameter"] == pytest.approx(0.31e-3)
+    assert values["latent_heat.enthalpy"] == pytest.approx(2e4)
+    assert values["specific_heat"] == 500.0
+    assert "specific_heat" not in {one.name for one in experiment.unknowns}
+    assert "# wire_diameter = " not in made.text
+    assert "# load_mass = " in made.text
+    assert not any("gives nothing of this bench" in one for one in experiment.warnings)
+
+
+def test_without_facts_a_draft_is_what_it_was(tmp_path: Path) -> None:
+    assert drafted(tmp_path).text == draft(logs(tmp_path), tmp_path / "e.toml").text
+
+
+@pytest.mark.parametrize(
+    ("known", "message"),
+    [
+        ({"wire_lenght": "0.5 m"}, "there is no parameter 'wire_lenght'"),
+        ({"wire_length": "0.5"}, "got '0.5' without a unit, expected one like 'm'; write '0.5 m'"),
+        ({"wire_length": "5 kg"}, "got unit 'kg', expected one like 'm', to which it cannot be converted"),
+        ({"wire_diameter": "31 mm"}, r"that is 0.031 m; expected 1e-05 to 0.01 m"),
+    ],
+)
+def test_a_known_value_is_refused_as_that_of_a_file(tmp_path: Path, known: dict[str, str], message: str) -> None:
+    with pytest.raises(ExperimentError, match=r"e.toml: model.parameters") as refused:
+        drafted(tmp_path, known=known)
+    (name, value), *_ = known.items()
+    text = draft(logs(tmp_path), tmp_path / "e.toml").text
+    written = text.replace("\n[unknown]", f'{name} = "{value}"\n\n[unknown]', 1)
+    (tmp_path / "e.toml").write_text(written, encoding="utf-8")
+    with pytest.raises(ExperimentError) as of_file:
+        load_experiment(tmp_path / "e.toml", CATALOGUE)
+    assert str(refused.value) == str(of_file.value)
+    assert message in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("facts", "per_metre"),
+    [({"ohms": 6.2, "known": KNOWN}, 12.4), ({"ohms_per_metre": 8.5, "known": KNOWN}, 8.5)],
+)
+def test_a_resistance_gives_both_resistivities(tmp_path: Path, facts: dict[str, Any], per_metre: float) -> None:
+    """R A/l_0 of the cold wire, and the hot one in the ratio of Table 3.2, 84 to 76."""
+    made = drafted(tmp_path, **facts)
+    values = parameter_values(base_model(load_experiment(tmp_path / "e.toml", CATALOGUE)))
+    assert values["resistivity_martensite"] == pytest.approx(per_metre * AREA, rel=1e-3)
+    assert values["resistivity_austenite"] == pytest.approx(per_metre * AREA * 84.0 / 76.0, rel=1e-3)
+    (said,) = [one for one in made.messages if "of the cold wire" in one]
+    assert "the preset's)" not in said
+    assert ("wire_length 0.5 m" in said) == ("ohms" in facts)
+
+
+def test_a_size_of_the_preset_is_named_where_a_resistance_is_computed_with_it(tmp_path: Path) -> None:
+    made = drafted(tmp_path, ohms=20.0)
+    own = parameter_values(build("flexinol_table_3_2", "dead_weight", "voltage"))
+    area = 0.25 * math.pi * own["wire_diameter"] ** 2
+    found = tomllib.loads(made.text)["model"]["parameters"]["resistivity_martensite"]
+    assert found == f"{20.0 * area / 0.537:.4g} ohm m"
+    (said,) = [one for one in made.messages if "of the cold wire" in one]
+    assert "wire_length 0.537 m (the preset's) and wire_diameter 0.00015 m (the preset's)" in said
+
+
+@pytest.mark.parametrize(
+    ("facts", "message"),
+    [
+        ({"ohms": 4.0, "ohms_per_metre": 8.0}, "got a resistance and one per metre, which say the same"),
+        (
+            {"ohms": 4.0, "known": {"resistivity_austenite": "8e-7 ohm m"}},
+            "got `resistivity_austenite` and a resistance",
+        ),
+        ({"ohms": 4e5}, "is the resistance in ohm, and are wire_length and wire_diameter those of this wire"),
+        ({"masses": {"c": "500 g"}}, "there is no run 'c'"),
+        ({"masses": {"a": "500"}}, "runs.a.inputs.mass: got '500' without a unit, expected one like 'kg'"),
+        ({"masses": {"a": "0 g", "b": "1 kg"}}, "got '0 g'; expected more than 0 kg"),
+        (
+            {"masses": {"a": "500 g"}},
+            "'a' has a mass; give --mass b=... too, or --known load_mass=... for all the others",
+        ),
+    ],
+)
+def test_facts_that_cannot_be_are_refused(tmp_path: Path, facts: dict[str, Any], message: str) -> None:
+    with pytest.raises(ExperimentError) as refused:
+        drafted(tmp_path, **facts)
+    assert message in str(refused.value)
+
+
+def test_each_run_has_its_own_mass(tmp_path: Path) -> None:
+    made = drafted(tmp_path, masses={"a": "500 g"}, known={"load_mass": "0.2 kg"})
+    experiment = load_experiment(tmp_path / "e.toml", CATALOGUE)
+    assert [float(run.inputs["mass"][0]) for run in experiment.runs] == [0.5, 0.2]
+    assert "# load_mass" not in made.text
+
+
+def test_a_load_without_a_hanging_mass_takes_none(tmp_path: Path) -> None:
+    with pytest.raises(ExperimentError, match="flexinol_ht_500um bias_spring voltage takes no mass of each run"):
+        drafted(tmp_path, load="bias_spring", masses={"a": "500 g", "b": "500 g"})
+
+
+def test_a_log_with_a_mass_takes_no_other(tmp_path: Path) -> None:
+    files = logs(tmp_path, "a")
+    rows = np.loadtxt(files[0], delimiter=",", skiprows=1)
+    rows = np.insert(rows, 2, 300.0 + np.arange(200) % 7, axis=1)
+    np.savetxt(files[0], rows, delimiter=",", header="time [s],U [V],mass [g],x [mm]", comments="", fmt="%.6g")
+    with pytest.raises(ExperimentError, match="the logs have a mass themselves"):
+        draft(files, tmp_path / "e.toml", bench=BenchFacts(masses={"a": "500 g"}))
+
+
+@pytest.mark.parametrize(
+    ("name", "found"),
+    [
+        ("step_500g", (500.0, "g")),
+        ("0.5kg-ramp", (0.5, "kg")),
+        ("100MPa", (100.0, "MPa")),
+        ("heat 1,5 kg", (1.5, "kg")),
+        ("run2", None),
+        ("test3gamma", None),
+        ("img500", None),
+        ("2026-11-12", None),
+    ],
+)
+def test_masses_are_seen_in_names(name: str, found: tuple[float, str] | None) -> None:
+    assert hinted(name) == found
+
+
+def test_a_mass_in_a_name_is_suggested_and_not_taken(tmp_path: Path) -> None:
+    made = drafted(tmp_path, "step_500g", "hold_100MPa", known={"wire_diameter": "0.31 mm"})
+    (hint,) = [one for one in made.messages if one.startswith("mass: ")]
+    assert "nothing is taken from them" in hint
+    assert "--mass 'step_500g=500 g' --mass 'hold_100MPa=0.7694 kg'" in hint  # 100 MPa on 0.0755 mm^2
+    assert "inputs" not in tomllib.loads(made.text)["runs"][0]
+    asked = drafted(tmp_path, "step_500g", "hold_100MPa", masses={"step_500g": "500 g", "hold_100MPa": "0.7694 kg"})
+    assert not any(one.startswith("mass: ") for one in asked.messages)
+    assert not any(one.startswith("mass: ") for one in drafted(tmp_path, "step_500g", load="bias_spring").messages)
+    assert mass_hint(["a", "b"], 1e-4) == ""
