@@ -36,7 +36,7 @@ def test_a_run_of_a_kept_model_is_held_against_a_log(tmp_path: Path, model: Path
 
 def test_what_cannot_be_held_against_a_log_is_refused(tmp_path: Path, model: Path) -> None:
     run = log(tmp_path / "run.csv", reading(kept_model()), heading="t,U,x")
-    step = ["simulate", "--model", model, "--step", "5V:5s", "--out", tmp_path / "out"]
+    step: list[str | Path] = ["simulate", "--model", model, "--step", "5V:5s", "--out", tmp_path / "out"]
     assert "no sensor 'angle'" in refused(*step, "--measured", f"angle={run}:x:mm")
     assert "expected a column of a log" in refused(*step, "--measured", "position=3mm")
     assert "leave these out" in refused(*step, "--law", "brinson")
@@ -66,7 +66,18 @@ def test_gains_are_tuned_and_compared_on_plants_from_the_posterior(tmp_path: Pat
     gains = tmp_path / "tuned" / "gains.json"
     ended = smajax("simulate", "--model", model, "--gains", gains, "--set-point", "5mm:4s", "--out", tmp_path / "loop")
     assert ended.code == 0, ended.said
-    words = ["--plants", "3", "--set-point", "5mm", "--gain-ratios", "1", "--seconds", "4", "--out", tmp_path / "swept"]
+    words: list[str | Path] = [
+        "--plants",
+        "3",
+        "--set-point",
+        "5mm",
+        "--gain-ratios",
+        "1",
+        "--seconds",
+        "4",
+        "--out",
+        tmp_path / "swept",
+    ]
     ended = smajax("sweep", "--model", model, "--gains", gains, *words)
     assert ended.code == 0, ended.said
     record = json.loads((tmp_path / "swept" / "sweep.json").read_text(encoding="utf-8"))
@@ -75,7 +86,7 @@ def test_gains_are_tuned_and_compared_on_plants_from_the_posterior(tmp_path: Pat
 
 def test_plants_need_a_model_of_which_something_was_fitted(tmp_path: Path, model: Path) -> None:
     known = dataclasses.replace(kept_model(), likely=()).save(tmp_path / "known.toml")
-    tune = ["tune", "pid", "--set-point", "5mm", "--out", tmp_path / "out"]
+    tune: list[str | Path] = ["tune", "pid", "--set-point", "5mm", "--out", tmp_path / "out"]
     assert "give --model" in refused(*tune, "--plants", "4")
     assert "has no covariance of fitted values" in refused(*tune, "--plants", "4", "--model", known)
     assert "give one of the two" in refused(*tune, "--plants", "4", "--model", model, "--variation", "damping=20%")

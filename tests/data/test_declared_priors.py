@@ -39,7 +39,7 @@ austenite_start = { width = "5 degC" }
     assert read.coefficients == {
         "latent_heat.enthalpy": PriorSpread(None, 1e4, False),
         "creep.time_constant": PriorSpread(60.0, 0.4, True),
-        "thermal_expansion.martensite": PriorSpread(None, pytest.approx(2e-6), False),
+        "thermal_expansion.martensite": PriorSpread(None, pytest.approx(2e-6), False),  # type: ignore[arg-type]
     }
     assert read.presets == {
         "young_modulus_austenite": PriorSpread(None, 0.1, True),

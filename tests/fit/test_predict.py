@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from pathlib import Path
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -23,7 +24,7 @@ VOLTS = np.where((TIME > 2.0) & (TIME < 15.0), 5.0, np.where(TIME < 22.0, 0.0, 4
 NOISE = 1e-4  # m
 
 
-def kept_model(volts: float = 5.0, **changes: object) -> ActuatorModel:
+def kept_model(volts: float = 5.0) -> ActuatorModel:
     """The preset's dead weight with two values known to a per cent, fitted to runs of up to `volts`."""
     preset = model_of_presets("flexinol_table_3_2", "dead_weight", "flexinol_voltage")
     known = dict(preset.parameters)
@@ -37,14 +38,13 @@ def kept_model(volts: float = 5.0, **changes: object) -> ActuatorModel:
         outputs=(ModelOutput("position", "m", NOISE, False),),
         likely=(LikelyModel((), 1.0, VALUES, tuple(VALUES), covariance),),
         fitted_range={"voltage": (0.0, volts), "temperature": (20.0, 200.0)},
-        **changes,
     )
 
 
 def reading(model: ActuatorModel, **values: float) -> np.ndarray:
     """What the load's sensor shows over `VOLTS`, m."""
     system = sma.set_parameters(model.system, values)
-    run = sma.simulate_dataset(system, {"voltage": VOLTS}, dt=0.1, tolerance=1e-6)
+    run = sma.simulate_dataset(system, {"voltage": jnp.asarray(VOLTS)}, dt=0.1, tolerance=1e-6)
     return run["reading"].to_numpy()
 
 
