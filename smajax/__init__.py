@@ -36,8 +36,11 @@ if TYPE_CHECKING:
     from smajax.core.parameters import parameter_values as parameter_values
     from smajax.core.parameters import set_parameters as set_parameters
     from smajax.core.runtime import prepare as prepare
+    from smajax.data.model_file.actuator_model import ActuatorModel as ActuatorModel
+    from smajax.data.model_file.read import load_model as load_model
     from smajax.data.open_experiment import open_experiment as open_experiment
     from smajax.fit.identify import identify as identify
+    from smajax.fit.predict import predict as predict
     from smajax.model import effects as effects
     from smajax.model import presets as presets
     from smajax.model.effects.base import AbstractEffect as AbstractEffect
@@ -53,6 +56,7 @@ if TYPE_CHECKING:
     from smajax.report.identify_page import write_identified as write_identified
     from smajax.report.narrative import narrate as narrate
     from smajax.report.plot import plot as plot
+    from smajax.report.predict_page import write_prediction as write_prediction
     from smajax.report.write import write_report as write_report
     from smajax.simulation import measures as _measures
     from smajax.simulation.batch.axes import grid as grid
@@ -73,6 +77,7 @@ NAMES = {
     "AbstractController": ("smajax.control.controllers.base", "AbstractController"),
     "AbstractEffect": ("smajax.model.effects.base", "AbstractEffect"),
     "AbstractMovingLoad": ("smajax.model.load.base", "AbstractMovingLoad"),
+    "ActuatorModel": ("smajax.data.model_file.actuator_model", "ActuatorModel"),
     "CONTROLLERS": ("smajax.control.presets", "CONTROLLERS"),
     "DRIVES": ("smajax.model.presets", "DRIVES"),
     "EFFECTS": ("smajax.model.effects.library", "LIBRARY"),
@@ -91,11 +96,13 @@ NAMES = {
     "grid": ("smajax.simulation.batch.axes", "grid"),
     "identify": ("smajax.fit.identify", "identify"),
     "load_experiment": ("smajax.data.open_experiment", "open_experiment"),
+    "load_model": ("smajax.data.model_file.read", "load_model"),
     "merit": ("smajax.control.figures_of_merit", "merit"),
     "narrate": ("smajax.report.narrative", "narrate"),
     "parameter": ("smajax.core.parameters", "parameter"),
     "parameter_values": ("smajax.core.parameters", "parameter_values"),
     "plot": ("smajax.report.plot", "plot"),
+    "predict": ("smajax.fit.predict", "predict"),
     "prepare": ("smajax.core.runtime", "prepare"),
     "run_batch": ("smajax.simulation.batch.run_batch", "run_batch"),
     "sampled": ("smajax.simulation.batch.axes", "sampled"),
@@ -108,6 +115,7 @@ NAMES = {
     "status_summary": ("smajax.simulation.batch.run_batch", "status_summary"),
     "under_law": ("smajax.model.wire.laws", "under_law"),
     "write_identified": ("smajax.report.identify_page", "write_identified"),
+    "write_prediction": ("smajax.report.predict_page", "write_prediction"),
     "write_report": ("smajax.report.write", "write_report"),
     "zipped": ("smajax.simulation.batch.axes", "zipped"),
 }

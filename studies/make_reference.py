@@ -52,6 +52,7 @@ STAGES = (
         ),
     ),
     ("Measured runs", ("load_experiment", "identify", "write_identified", "close_loop", "narrate", "write_report")),
+    ("A model that is kept", ("ActuatorModel", "load_model", "predict", "write_prediction")),
     ("Your own parts", ("AbstractEffect", "AbstractMovingLoad", "parameter", "effects")),
 )
 

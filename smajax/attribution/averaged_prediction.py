@@ -77,7 +77,7 @@ def averaged(
     weights = np.asarray([weight for _, weight in models])
     mean = np.tensordot(weights, np.stack(readings), 1)
     between = np.tensordot(weights, (np.stack(readings) - mean) ** 2, 1)
-    missed = _missed(setting, final)
+    missed = prediction_error(setting, final)
     normal = float(stats.norm.ppf(0.5 + 0.5 * BAND))
     half = np.sqrt(normal**2 * (np.tensordot(weights, np.stack(variances), 1) + between) + missed**2)
     return Averaged(
@@ -102,7 +102,7 @@ def _predicted(
     return problem.centred(predicted[0]), np.maximum(spread, 0.0)
 
 
-def _missed(setting: Search, final: Model) -> float:
+def prediction_error(setting: Search, final: Model) -> float:
     """The absolute error that the share `BAND` of the samples of runs left out stays below, SI."""
     mask = np.asarray(setting.problem.batch.mask) > 0
     return float(np.quantile(np.abs(final.left_out[mask]), BAND))

@@ -33,6 +33,7 @@ from smajax.attribution.neutral import check_neutral
 from smajax.attribution.outlier_run import outlier_runs
 from smajax.attribution.preset_priors import visible
 from smajax.attribution.refusal import refuse_keys_of_identify
+from smajax.attribution.saved_model import saved_model
 from smajax.attribution.step_size_check import finer_integration, integration_error_of
 from smajax.attribution.unknown_term import Lacking, in_place_of, unknown_terms
 from smajax.attribution.verdict import verdict_of
@@ -219,6 +220,10 @@ def findings_of(context: Context, outcome: Outcome, compared: Compared, rejected
     if len(job.fit_runs) > 1:  # else none can be left out, which the band is made of
         average = averaged(setting, outcome.search, final, every_run(job), base)
         runs = tuple(replace(run, average=one) for run, one in zip(runs, average.runs, strict=True))
+    extended_model = saved_model(job, setting, outcome.search, final, after, runs, average)
+    base_model = (
+        saved_model(job, setting, outcome.search, base, before, runs, None) if final.effects else extended_model
+    )
     mistaken = confounders(outcome.search, setting, final, job.fit_runs)
     integration = integration_error_of(setting, final)
     setting.progress(Stage(WRITING, 1.0))
@@ -262,6 +267,8 @@ def findings_of(context: Context, outcome: Outcome, compared: Compared, rejected
         unknown=lacking.terms,
         outlier_runs=outcome.outliers,
         config=setting.config,
+        base_model=base_model,
+        extended_model=extended_model,
     )
 
 

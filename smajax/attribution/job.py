@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from smajax.attribution.preset_priors import preset_bounds, preset_priors
+from smajax.attribution.preset_priors import fitted_priors, preset_bounds, preset_priors
 from smajax.attribution.run_extent import extent_of
 from smajax.core.parameters import parameter_values, parameters
 from smajax.data.experiment.record import Experiment, Run
@@ -42,7 +42,7 @@ def job_of(experiment: Experiment, integration: Integration | None = None) -> Jo
     base = base_model(experiment)
     declared = experiment.declared_effects
     names = candidates(base, experiment.effects_only, (*experiment.effects_excluded, *declared), experiment.clocked)
-    known = {**experiment.parameters, **{unknown.name: unknown.start for unknown in experiment.unknowns}}
+    known = experiment.base_values
     runs = tuple(run for run in experiment.runs if run.role == "fit")
 
     def problem_with(effects: tuple[str, ...]) -> Problem:
@@ -66,4 +66,9 @@ def job_of(experiment: Experiment, integration: Integration | None = None) -> Jo
     given = frozenset({*experiment.parameters, *unknowns, *of_runs})
     presets = preset_priors(parameters(base), parameter_values(base), given, experiment.priors.presets)
     bounds |= preset_bounds(presets, bounds)
+    if experiment.model_file is not None:
+        # What this experiment file says of them goes before what a fit left.
+        stated = experiment.priors.presets.keys()
+        presets |= fitted_priors(experiment.model_file, given | stated)
+        bounds |= {name: one for name, one in experiment.model_file.bounds.items() if name in presets.keys() - stated}
     return Job(experiment, runs, problem, held_out, unknowns, bounds, names, presets)

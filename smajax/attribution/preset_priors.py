@@ -12,7 +12,7 @@ from types import MappingProxyType
 import numpy as np
 
 from smajax.core.parameters import Parameter
-from smajax.data.experiment.record import PriorSpread
+from smajax.data.experiment.record import FromModelFile, PriorSpread
 from smajax.fit.sensitivity import Sensitivity
 from smajax.model.effects.prior_width import CoefficientPrior
 
@@ -57,6 +57,15 @@ def preset_priors(
     return found
 
 
+def fitted_priors(kept: FromModelFile, given: frozenset[str]) -> dict[str, CoefficientPrior]:
+    """Normal priors of what was fitted before, about those values (SI) by their standard errors, of what is not among those `given`."""
+    return {
+        name: CoefficientPrior(float(kept.values[name]), error, False)
+        for name, error in kept.errors.items()
+        if name not in given and error > 0.0
+    }
+
+
 def preset_bounds(
     presets: Mapping[str, CoefficientPrior], bounds: Mapping[str, tuple[float, float]]
 ) -> dict[str, tuple[float, float]]:
@@ -77,8 +86,10 @@ def visible(
     at: Sensitivity, values: Mapping[str, float], presets: Mapping[str, CoefficientPrior]
 ) -> dict[str, CoefficientPrior]:
     """Those of `presets` of which one width changes the runs by more than the noise, by the Jacobian at the base fit."""
+
+    def width(name: str, prior: CoefficientPrior) -> float:
+        return prior.sigma * values[name] if prior.logarithmic else prior.sigma
+
     return {
-        name: one
-        for name, one in presets.items()
-        if np.linalg.norm(at.columns([name])) * one.sigma * (values[name] if one.logarithmic else 1.0) > VISIBLE
+        name: one for name, one in presets.items() if np.linalg.norm(at.columns([name])) * width(name, one) > VISIBLE
     }

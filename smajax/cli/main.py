@@ -18,6 +18,7 @@ from smajax.cli.commands.effects import effects
 from smajax.cli.commands.figures import figures
 from smajax.cli.commands.identify import identify_command
 from smajax.cli.commands.new_experiment import new_experiment
+from smajax.cli.commands.predict import predict_command
 from smajax.cli.commands.presets import presets
 from smajax.cli.commands.simulate import simulate
 from smajax.cli.commands.sweep import sweep
@@ -69,6 +70,7 @@ def _all(
 COMMANDS: dict[str, Callable[..., None]] = {
     "close-loop": close_loop_command,
     "identify": identify_command,
+    "predict": predict_command,
     "effects": effects,
     "presets": presets,
     "demo": demo,

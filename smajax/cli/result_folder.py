@@ -23,6 +23,7 @@ MARK = ".smajax.json"
 LAST = {
     "report.html": "close-loop",
     "identify.html": "identify",
+    "predict.html": "predict",
     "tune.html": "tune",
     "sweep.json": "sweep",
     ".made-by": "figures",

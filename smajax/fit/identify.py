@@ -15,6 +15,7 @@ from smajax.core.result_cache import ResultCache
 from smajax.data.experiment.record import Experiment
 from smajax.fit.design import suggestions
 from smajax.fit.directions import Direction, directions, weak_combinations
+from smajax.fit.identified_model import identified_model
 from smajax.fit.identify_result import Estimate, Identified, IdentifiedOutput, IdentifiedRun, IdentifiedSeries
 from smajax.fit.identify_stages import (
     EDGE,
@@ -109,6 +110,7 @@ def identify(  # ten parameters: the options of the command, by keyword
         step=experiment.step,
         clocked=experiment.clocked,
         provenance=_provenance(command, seed, starts, clock.monotonic() - begin, options.cache),
+        model=identified_model(setup, fitted, statistics),
     )
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from smajax.data.experiment.record import Prior
+from smajax.data.model_file.actuator_model import ActuatorModel
 from smajax.fit.design import Suggestion
 from smajax.fit.directions import Direction
 from smajax.fit.integration import IntegrationError
@@ -99,3 +100,4 @@ class Identified:
     step: float  # s from sample to sample of every run; one where only the order of the samples is known
     clocked: bool  # whether the samples have times
     provenance: dict[str, str]
+    model: ActuatorModel | None = None  # as it is saved

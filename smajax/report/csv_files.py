@@ -13,6 +13,7 @@ from smajax.model.channels import INPUT_UNITS
 
 if TYPE_CHECKING:
     from smajax.fit.identify_result import Identified  # which is made with words of this package
+    from smajax.fit.predict import Prediction
 
 RUNS, PARAMETERS = "runs.csv", "parameters.csv"
 
@@ -81,3 +82,21 @@ def _runs(runs: Sequence[tuple[str, str, Mapping[str, np.ndarray]]], units: Mapp
                 yield [run, role, *row]
 
     return csv_text(["run", "role", *(heading(name, known.get(name, "1")) for name in names)], rows())
+
+
+def predicted_runs(result: Prediction) -> str:
+    """Inputs and, sensor by sensor, measurement, prediction and the half width of its band, of every run."""
+    units: dict[str, str] = {}
+    series = []
+    for run in result.runs:
+        columns = {"time": run.time, **run.inputs}
+        for one in run.series:
+            for what, values in (
+                ("measured", one.measured),
+                ("predicted", one.reading),
+                ("half width of the band", one.half_width),
+            ):
+                units[f"{one.output} {what}"] = one.unit
+                columns[f"{one.output} {what}"] = values
+        series.append((run.name, "fit" if run.fitted else "held-out", columns))
+    return _runs(series, units)

@@ -162,6 +162,8 @@ def write_identified(result: Identified, folder: Path) -> Path:
     """`identify.html`, `identify.json` and its tables in `folder`, each whole or not at all; the path of the page."""
     folder.mkdir(parents=True, exist_ok=True)
     replace(folder / "identify.json", json_text(record(result)))
+    if result.model is not None:
+        result.model.save(folder / "model.toml")
     replace(folder / PARAMETERS, identified_parameters(result))
     replace(folder / RUNS, identified_runs(result))
     return replace(folder / "identify.html", page(result))

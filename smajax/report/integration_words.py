@@ -10,10 +10,13 @@ from smajax.core.display_units import digits
 
 
 def integration_sentence(error: Mapping[str, Any]) -> str:
-    """Of an `IntegrationError.record` of a simulation; empty where nothing is known."""
+    """Of an `IntegrationError.record`; empty where nothing is known."""
     if not error:
         return ""
-    how, share = error["how"], error["largest_rms_over_stroke"]
+    how = error["how"]
+    if "largest_rms_over_noise" in error:
+        return f"Integrated with {how}; the error (root mean square) is {digits(error['largest_rms_over_noise'], 2)} times the noise."
+    share = error["largest_rms_over_stroke"]
     if share is None or not math.isfinite(share):
         return f"Integrated with {how}, as asked for; its error was not measured."
     return f"Integrated with {how}; the error is {digits(100.0 * share, 2)} % of a whole transformation (root mean square)."

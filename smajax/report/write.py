@@ -12,6 +12,8 @@ from smajax.report.html import findings_to_html
 from smajax.report.json_file import findings_to_json
 from smajax.report.narrative import narrate
 
+MODEL, BASE_MODEL = "model.toml", "base_model.toml"
+
 
 def write_report(findings: Findings, folder: Path) -> Path:
     """Writes the files into `folder`, creating it, and returns the path of report.html.
@@ -31,6 +33,9 @@ def write_report(findings: Findings, folder: Path) -> Path:
     record = json.dumps(findings_to_json(findings, narrative), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
     # The record goes first: where the page is, its numbers are too.
     replace(folder / "report.json", record)
+    if findings.extended_model is not None and findings.base_model is not None:
+        findings.base_model.save(folder / BASE_MODEL)
+        findings.extended_model.save(folder / MODEL)
     replace(folder / PARAMETERS, findings_parameters(findings))
     replace(folder / RUNS, findings_runs(findings))
     return replace(folder / "report.html", page)

@@ -71,7 +71,6 @@ def test_the_first_example_of_the_readme_prints_the_output_shown(tmp_path: Path)
 @pytest.mark.parametrize(
     ("page", "only"),
     [
-        ("README.md", "under_law"),
         ("docs/reference/control.md", "simulate_closed_loop"),
         ("docs/reference/batches.md", "run_batch"),
     ],

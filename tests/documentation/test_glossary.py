@@ -60,6 +60,7 @@ ALLOWED: set[str] = set()
 PLAIN = set(
     [
         "abstract",
+        "actuator",
         "added",
         "after",
         "alone",
@@ -70,6 +71,8 @@ PLAIN = set(
         "before",
         "bench",
         "bic",
+        "predict",
+        "prediction",
         "bound",
         "build",
         "coverage",

@@ -12,6 +12,7 @@ import signal
 import subprocess
 import sys
 import time as clock
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -69,6 +70,8 @@ def check_whole(out: Path) -> None:
                         assert all(held[name] is not None for name in held.files)
                 case ".nc":
                     xr.load_dataset(io.BytesIO(content), engine="scipy")
+                case ".toml":
+                    tomllib.loads(content.decode())
                 case ".csv" | ".md":
                     assert content.endswith(b"\n"), path
                 case other:

@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from smajax.attribution.findings import Findings
 
 FINISHED_FITS = "Finished fits are cached: the same command resumes."
-OWN = ("report.html", "report.json", "parameters.csv", "runs.csv", FITS)
+MODELS = ("model.toml", "model.nc", "base_model.toml", "base_model.nc")
+OWN = ("report.html", "report.json", "parameters.csv", "runs.csv", *MODELS, FITS)
 
 
 def run_close_loop(

@@ -16,7 +16,7 @@ from smajax.cli.terminal import browse, console, resumable
 if TYPE_CHECKING:
     from smajax.fit.identify_result import Identified
 
-OWN = ("identify.html", "identify.json", "parameters.csv", "runs.csv", FITS)
+OWN = ("identify.html", "identify.json", "parameters.csv", "runs.csv", "model.toml", "model.nc", FITS)
 
 
 def _may_resume(before: Mapping[str, Any], now: Mapping[str, Any]) -> bool:

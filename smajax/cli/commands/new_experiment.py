@@ -34,6 +34,10 @@ def new_experiment(
         str,
         typer.Option(help="of `smajax presets`; determines the input channels", autocompletion=completion.drives),
     ] = "",
+    model: Annotated[
+        Path | None,
+        typer.Option(help="a model.toml to begin from, in the place of presets; what it fitted is fitted again"),
+    ] = None,
     decimal: Annotated[
         str, typer.Option(help="`,` or `.`: the decimal mark, for logs that do not determine it (`1,234`)")
     ] = "",
@@ -52,6 +56,10 @@ def new_experiment(
         raise typer.BadParameter(f"the folder {out.parent} does not exist.", param_hint="--out")
     if decimal not in ("", ",", "."):
         raise typer.BadParameter(f"`,` or `.`, not `{decimal}`.", param_hint="--decimal")
+    if model is not None and (load or wire or drive):
+        raise typer.BadParameter(
+            "says wire, load and drive: leave --wire, --load and --drive out.", param_hint="--model"
+        )
     from smajax.core.runtime import prepare
 
     prepare()
@@ -62,7 +70,7 @@ def new_experiment(
     from smajax.data.experiment.load import load_experiment
     from smajax.data.model_catalogue import CATALOGUE
 
-    result = draft(files, out, title, ModelChoice(load, wire, drive), decimal)
+    result = draft(files, out, title, ModelChoice(load, wire, drive, model), decimal)
     replace(out, result.text)
     try:
         warnings, reason = list(load_experiment(out, CATALOGUE).warnings), ""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Collection, Sequence
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -56,10 +57,35 @@ def _entries(part: Any, without: Collection[str]) -> dict[str, dict[str, Any]]:
     }
 
 
+def _write(names: Sequence[str], out: Path) -> None:
+    """A model file of three presets. Raises typer.BadParameter."""
+    from smajax.data.experiment.errors import ExperimentError
+    from smajax.data.model_file.of_presets import model_of_presets
+    from smajax.model.presets import DRIVES, LOADS, WIRES
+
+    kinds: list[Collection[str]] = [WIRES, LOADS, DRIVES]
+    if len(names) != len(kinds) or any(name not in kind for name, kind in zip(names, kinds, strict=True)):
+        raise typer.BadParameter(
+            "expected a wire, a load and a drive before it, such as `flexinol_table_3_2 dead_weight voltage`",
+            param_hint="--out",
+        )
+    if out.exists():
+        raise typer.BadParameter(f"{out} exists; give another name.", param_hint="--out")
+    try:
+        path = model_of_presets(*names).save(out)
+    except (ExperimentError, ValueError) as error:
+        raise typer.BadParameter(str(error), param_hint="--out") from None
+    typer.echo(f"Written: {path.resolve()}")
+
+
 def presets(
     names: Annotated[
         list[str] | None,
         typer.Argument(help="a wire, a load, a drive: list their parameters", autocompletion=completion.presets),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="write a wire, a load and a drive as a model file, to be changed into your own bench's"),
     ] = None,
     json_out: Json = False,
 ) -> None:
@@ -70,10 +96,15 @@ def presets(
     Example:  smajax presets
 
     Example:  smajax presets flexinol_table_3_2 dead_weight voltage
+
+    Example:  smajax presets flexinol_table_3_2 dead_weight voltage --out my_bench.toml
     """
     from smajax.core.runtime import prepare
 
     prepare()
+    if out is not None:
+        _write(names or [], out)
+        return
     if names:
         parts = _parts(names)
         if json_out:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +25,8 @@ from smajax.data.experiment.column_guess import (
 from smajax.data.experiment.draft_model import DraftModel, ModelChoice, choose_model
 from smajax.data.experiment.logs import Logs, logs_of
 from smajax.data.experiment.model_description import WIRE_SIZES
+from smajax.data.model_file.actuator_model import ActuatorModel
+from smajax.data.model_file.read import load_model
 from smajax.data.readers.read import read_table
 from smajax.data.readers.table import MeasuredDataError, Table
 from smajax.model.presets import build
@@ -141,17 +143,22 @@ def draft(
     A file is a run, with the columns of the first one; another file without one of them has its own for the same quantity, or
     is refused by name. Where no file has an input and an output, a run is one file of each kind, by their names.
     """
+    choice = choice or ModelChoice()
+    kept = None if choice.model is None else load_model(choice.model)
+    if kept is not None:
+        choice = replace(choice, load=kept.load, wire=kept.wire, drive=kept.drive)
     tables = [read_table(file, decimal=decimal or None) for file in files]
     logs = logs_of(files, tables)
     by_quantity = {one.quantity: one for one, _ in logs.columns if one.quantity}
     kind_of = {one.quantity: kind for one, kind in logs.columns if one.quantity}
-    inputs = _Inputs(
-        tuple(files), tuple(tables), logs, by_quantity, kind_of, choose_model(by_quantity, choice or ModelChoice())
-    )
+    inputs = _Inputs(tuple(files), tuple(tables), logs, by_quantity, kind_of, choose_model(by_quantity, choice))
     time = _time(inputs)
     sections = [
-        _head(inputs, title or target.stem),
-        _parameters(inputs.model),
+        *(
+            [_head(inputs, title or target.stem), _parameters(inputs.model)]
+            if kept is None
+            else [_head(inputs, title or target.stem, _relative(choice, target)), _kept_parameters(kept)]
+        ),
         time,
         _channels(inputs),
         _data(inputs, target, decimal),
@@ -194,8 +201,14 @@ class _Section:
     first: bool = False
 
 
-def _head(inputs: _Inputs, title: str) -> _Section:
-    """Title and model; a message for every column, the model, and the files of each run."""
+def _relative(choice: ModelChoice, target: Path) -> str:
+    """The path of the model file, as the experiment file `target` says it."""
+    assert choice.model is not None
+    return Path(os.path.relpath(choice.model.resolve(), target.resolve().parent)).as_posix()
+
+
+def _head(inputs: _Inputs, title: str, model_file: str = "") -> _Section:
+    """Title and model, presets or a file; a message for every column, the model, and the files of each run."""
     logs, model = inputs.logs, inputs.model
     columns = [one for one, _ in logs.columns]
     messages = [f"{one.name}: {one.quantity} in {one.unit} ({one.sure}: {one.why})" for one in columns if one.quantity]
@@ -206,7 +219,12 @@ def _head(inputs: _Inputs, title: str) -> _Section:
         messages += [
             f"{file.name}: {one.name}: {name} in {one.unit} ({one.sure}: {one.why})" for name, one in overrides.items()
         ]
-    messages.append(f"model: {model.wire}, {model.load}, {model.drive} ({model.why}; `smajax presets` has the others)")
+    if model_file:
+        messages.append(f"model: that of {model_file}")
+    else:
+        messages.append(
+            f"model: {model.wire}, {model.load}, {model.drive} ({model.why}; `smajax presets` has the others)"
+        )
     if len(logs.kinds) > 1:
         runs = "; ".join(f"{run.name} of {and_listed([file.name for file in run.files])}" for run in logs.runs)
         messages.append(f"runs: {runs} ({GUESS}: by their names)")
@@ -216,11 +234,17 @@ def _head(inputs: _Inputs, title: str) -> _Section:
         "# of the documentation, and the parameters of `smajax effects`.",
         f"title = {json.dumps(title, ensure_ascii=False)}",
         "",
-        f"[model]  # {model.why}",
-        f'wire = "{model.wire}"',
-        f'load = "{model.load}"',
-        f'drive = "{model.drive}"',
-        "",
+        *(
+            ["[model]", f"file = {json.dumps(model_file, ensure_ascii=False)}", ""]
+            if model_file
+            else [
+                f"[model]  # {model.why}",
+                f'wire = "{model.wire}"',
+                f'load = "{model.load}"',
+                f'drive = "{model.drive}"',
+                "",
+            ]
+        ),
     ]
     return _Section(lines, messages)
 
@@ -249,6 +273,26 @@ def _parameters(model: DraftModel) -> _Section:
         "wrong one leads to a wrong fitted value"
     )
     return _Section(lines, [message])
+
+
+def _kept_parameters(kept: ActuatorModel) -> _Section:
+    """What was fitted before, as unknown again: its bounds, begun at the values of the file."""
+    fitted = {name: one for name, one in kept.parameters.items() if one.origin == "fitted"}
+    lines = [
+        "[model.parameters]  # known values that differ from the model file's, each with its unit",
+        "",
+        "[unknown]  # what was fitted before: bounds, and where the fit begins; without a line it is held to its error by the model file",
+    ]
+    for name, one in fitted.items():
+        unit = kept.table[name].unit
+        shown = {"low": one.low, "high": one.high, "start": one.value}
+        box = ", ".join(f"{key} = {json.dumps(_amount(value, unit, 10))}" for key, value in shown.items())
+        lines.append(f"{json.dumps(name) if '.' in name else name} = {{ {box} }}")
+    return _Section([*lines, "", "[nuisance]", f"offset = {str(_has_offset(kept)).lower()}", ""])
+
+
+def _has_offset(kept: ActuatorModel) -> bool:
+    return any(one.offset for one in kept.outputs) or not kept.outputs
 
 
 def _time(inputs: _Inputs) -> _Section:

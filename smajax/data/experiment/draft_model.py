@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 from smajax.core.names import close_matches
 from smajax.core.wording import and_listed
@@ -19,11 +20,12 @@ POSITIONED = {"dead_weight": "flexinol_table_3_2", "bias_spring": "flexinol_ht_5
 
 @dataclass(frozen=True)
 class ModelChoice:
-    """Names of presets that replace the guesses; "" for none."""
+    """Names of presets that replace the guesses, "" for none; or the path of a model file, which says all three."""
 
     load: str = ""
     wire: str = ""
     drive: str = ""
+    model: Path | None = None
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,9 @@ def _entries(place: str, value: Any) -> Iterator[tuple[str, str]]:
 def fingerprint(experiment: Experiment) -> dict[str, Any]:
     """Its name, the content of its file without comments and layout, and the digest of each run's files."""
     content = tomllib.loads(experiment.path.read_text(encoding="utf-8-sig"))
+    kept = {} if experiment.model_file is None else {"model file": experiment.model_file.sha256[:16]}
     return {
+        **kept,
         "experiment": experiment.name,
         "experiment file": dict(_entries("", content)),
         "data": {run.name: run.sha256[:16] for run in experiment.runs},

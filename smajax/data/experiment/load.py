@@ -15,6 +15,7 @@ from smajax.data.experiment.column_overrides import own_columns
 from smajax.data.experiment.data_folder import data_folder
 from smajax.data.experiment.declared_priors import declared_priors
 from smajax.data.experiment.errors import ExperimentError, at_key, check_name
+from smajax.data.experiment.from_model_file import with_model_file
 from smajax.data.experiment.headings import heading_warnings
 from smajax.data.experiment.magnitude import common_warnings, magnitude_warnings
 from smajax.data.experiment.model_description import WIRE_SIZES, Catalogue, ModelDescription
@@ -254,15 +255,20 @@ def load_experiment(path: str | Path, catalogue: Catalogue) -> Experiment:
     path = Path(path)
     if path.is_dir():
         path = path / "experiment.toml"
-    file = read_schema(path)
+    return experiment_of(path, read_schema(path), catalogue)
+
+
+def experiment_of(path: Path, file: ExperimentFile, catalogue: Catalogue) -> Experiment:
+    """The experiment that `file` says, read from `path`, with its runs. Raises ExperimentError as `load_experiment` does."""
+    file, kept = with_model_file(path, file)
     model = _describe(path, file, catalogue)
     fixed = given_parameters(path, "model.parameters", file.model.parameters, file, model.parameters)
     every = unknowns(path, file, model.parameters)
     fixed |= {unknown.name: unknown.start for unknown in every if file.unknown[unknown.name].fixed}
     free = tuple(unknown for unknown in every if unknown.name not in fixed) + run_starts(path, file, model)
     _check_effects(path, file, catalogue)
-    priors, not_tried = declared_priors(path, file, catalogue, model)
-    values = fixed | {unknown.name: unknown.start for unknown in free}
+    priors, not_tried = declared_priors(path, file, catalogue, model, kept)
+    values = (dict(kept.values) if kept else {}) | fixed | {unknown.name: unknown.start for unknown in free}
     _check_order(path, file, model, values)
     output_names, units = _channel_units(path, file, model)
     _check_runs(path, file, model)
@@ -303,7 +309,7 @@ def load_experiment(path: str | Path, catalogue: Catalogue) -> Experiment:
     heats = sorted(model.heats & runs[0].run.inputs.keys())
     warnings += magnitude_warnings(runs, None if model.scale is None else model.scale(values), heats, reading.step)
     warnings += _useless(file, model) + not_tried + _untold(file, free)
-    warnings += preset_warnings(file.model.wire, free, model.parameters)
+    warnings += [] if kept else preset_warnings(file.model.wire, free, model.parameters)
     warnings += role_warnings(file.runs)
     return Experiment(
         name=path.resolve().parent.name if path.name == "experiment.toml" else path.stem,
@@ -323,4 +329,6 @@ def load_experiment(path: str | Path, catalogue: Catalogue) -> Experiment:
         runs=tuple(read.run for read in runs),
         warnings=tuple(warnings),
         priors=priors,
+        log_format=file.log_format,
+        model_file=kept,
     )

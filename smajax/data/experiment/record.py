@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 
+from smajax.data.experiment.schema import LogFormat
 from smajax.data.readers.table import Array
 
 # What a run may start with that no parameter of the model says: the name in the file -> the parameter, if it is one.
@@ -106,6 +108,20 @@ class Run:
 
 
 @dataclass(frozen=True)
+class FromModelFile:
+    """What a base model has from a model file, beside the values that are known.
+
+    values: of a fit or of presets, SI, effects' coefficients with them. errors: standard errors of the fitted ones. bounds: theirs.
+    """
+
+    effects: tuple[str, ...]
+    values: Mapping[str, float]
+    errors: Mapping[str, float]
+    bounds: Mapping[str, tuple[float, float]]
+    sha256: str
+
+
+@dataclass(frozen=True)
 class Experiment:
     """A validated experiment; every number is in the program's own units (SI, degC, rad).
 
@@ -129,6 +145,14 @@ class Experiment:
     runs: tuple[Run, ...]
     warnings: tuple[str, ...]
     priors: DeclaredPriors = field(default_factory=DeclaredPriors)
+    log_format: LogFormat | None = None  # how the logs of its runs were read
+    model_file: FromModelFile | None = None
+
+    @property
+    def base_values(self) -> dict[str, float]:
+        """Values of the base model that are not the presets': of a model file, known ones, and starts of unknown ones, SI."""
+        starts = {unknown.name: unknown.start for unknown in self.unknowns if unknown.name not in RUN_STARTS}
+        return {**(self.model_file.values if self.model_file else {}), **self.parameters, **starts}
 
     @property
     def offset(self) -> bool:
@@ -154,6 +178,7 @@ class Experiment:
 
     @property
     def declared_effects(self) -> tuple[str, ...]:
-        """Effects that the base model has already: those of which a parameter is given or unknown."""
+        """Effects that the base model has already: those of its model file, and those of which a parameter is given or unknown."""
         named = [*self.parameters, *(unknown.name for unknown in self.unknowns)]
-        return tuple(dict.fromkeys(name.split(".", 1)[0] for name in named if "." in name))
+        own = self.model_file.effects if self.model_file else ()
+        return tuple(dict.fromkeys((*own, *(name.split(".", 1)[0] for name in named if "." in name))))

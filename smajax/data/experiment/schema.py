@@ -2,35 +2,30 @@
 
 from __future__ import annotations
 
-import tomllib
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
-from smajax.core.names import close_matches, listed, nearest
-from smajax.data.experiment.errors import ExperimentError
-
-Quantity = str | float
-LARGEST = 1 << 20  # bytes of an experiment file
-LONGEST = 200  # characters of what was got, in a message
-
-
-class Section(BaseModel):
-    """A table of the file: only the keys written here, each with what is expected of it."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+from smajax.data.experiment.toml_file import Places, Quantity, Section, read_toml, validated
 
 
 class ModelSection(Section):
-    """Which base model, and the parameters that are known."""
+    """Which base model, and the parameters that are known: presets by name, or a model file."""
 
-    wire: str = Field(description="the name of a wire, as text")
-    load: str = Field(description="the name of a load, as text")
-    drive: str = Field(description="the name of a drive, as text ('none' when nothing drives the wire)")
+    wire: str = Field(default="", description="the name of a wire, as text")
+    load: str = Field(default="", description="the name of a load, as text")
+    drive: str = Field(default="", description="the name of a drive, as text ('none' when nothing drives the wire)")
     law: str = Field(default="", description="the name of a kinetics law, as text; left out, the wire's own")
+    file: str | None = Field(default=None, description="the path of a model file, relative to this file, as text")
     parameters: dict[str, Quantity] = Field(default={}, description="a table of name = 'number unit'")
+
+    @model_validator(mode="after")
+    def _one_way(self) -> ModelSection:
+        named = [key for key in ("wire", "load", "drive", "law") if getattr(self, key)]
+        if self.file is not None and named:
+            raise ValueError(f"got file and {named[0]}; the file says its {named[0]}: remove one of the two")
+        return self
 
 
 class PriorSection(Section):
@@ -132,6 +127,15 @@ class ChannelSection(Section):
         if self.role == "output" and self.column is None and self.variable is None:
             raise ValueError("does not say where the output is; give column (text file) or variable (.mat file)")
         return self
+
+
+class LogFormat(Section):
+    """How logs are read: their channels, their time, and the clock that they are brought to."""
+
+    channels: dict[str, ChannelSection] = Field(description="sections [channels.NAME] with role, unit and a place")
+    time: TimeSection | None = Field(default=None, description="a section [time] with column and unit, or kind")
+    sampling: SamplingSection | None = Field(default=None, description="a section [sampling] with step")
+    decimal: Literal[",", "."] | None = Field(default=None, description="',' or '.': the decimal mark of text files")
 
 
 class DataSection(Section):
@@ -254,9 +258,14 @@ class ExperimentFile(Section):
         default=PriorsSection.model_validate({}), description="sections [priors.EFFECT], and [priors.presets]"
     )
 
+    @property
+    def log_format(self) -> LogFormat:
+        """How the logs of its runs are read."""
+        return LogFormat(channels=self.channels, time=self.time, sampling=self.sampling, decimal=self.data.decimal)
+
 
 # Sections by place in the file; "*" stands for any name or number.
-_PLACES: dict[tuple[str, ...], type[Section] | None] = {
+_PLACES: Places = {
     (): ExperimentFile,
     ("model",): ModelSection,
     ("unknown", "*"): UnknownSection,
@@ -280,66 +289,6 @@ _PLACES: dict[tuple[str, ...], type[Section] | None] = {
 }
 
 
-def _section_at(place: Sequence[str | int]) -> type[Section] | None:
-    for pattern, section in _PLACES.items():
-        if len(pattern) == len(place) and all(p in ("*", str(k)) for p, k in zip(pattern, place, strict=True)):
-            return section
-    return None
-
-
-def _key_path(place: Sequence[str | int], content: dict[str, Any]) -> str:
-    """`runs.Step02.role` for ("runs", 1, "role"); a run without a name is counted from 1."""
-    parts = [str(part) for part in place]
-    if len(place) > 1 and place[0] == "runs" and isinstance(place[1], int):
-        run = content["runs"][place[1]]
-        name = run.get("name") if isinstance(run, dict) else None
-        parts[1] = name if isinstance(name, str) and name else f"[{place[1] + 1}]"
-    return ".".join(parts)
-
-
-def _depth(place: Sequence[str | int]) -> int:
-    """How many parts of a pydantic location are keys of the file; the rest names members of a union."""
-    sections = [n for n in range(len(place) + 1) if _section_at(place[:n]) is not None]
-    return min(len(place), sections[-1] + 1)
-
-
-def _table(place: Sequence[str | int], depth: int, around: type[Section] | None) -> str:
-    """What is expected of an entry that has a section of its own; its name may be that of another key, misspelled."""
-    own = _section_at(place[:depth])
-    if own is None or around is None:
-        return "expected a section"
-    return f"expected a table with {listed(own.model_fields)}{nearest(str(place[depth - 1]), around.model_fields)}"
-
-
-def _message(error: Any, content: dict[str, Any]) -> tuple[str, str]:
-    """(key path, message) of one pydantic error."""
-    place = tuple(error["loc"])
-    depth = _depth(place)
-    section = _section_at(place[: depth - 1]) if depth else None
-    field = section.model_fields.get(str(place[depth - 1])) if section is not None and depth else None
-    expected = f"expected {field.description}" if field is not None else _table(place, depth, section)
-    # One step further for the entries of a table (parameters, files, inputs) and of a list.
-    entry = len(place) > depth and isinstance(error["input"], str | int | float | bool | list | dict)
-    table = field is not None and any(word in str(field.annotation) for word in ("dict[", "list["))
-    key = _key_path(place[: depth + 1] if entry and table else place[:depth], content)
-    match error["type"]:
-        case "extra_forbidden":
-            known = list(section.model_fields) if section is not None else []
-            return key, f"is not a known key{close_matches(str(place[depth - 1]), known, 'known here')}"
-        case "missing":
-            return key, f"is missing; {expected}"
-        case "value_error":
-            return key, str(error["ctx"]["error"])
-        case "too_short" | "string_too_short":
-            return key, f"is empty; {expected}"
-    return key, f"got {shortened(repr(error['input']))}, {expected}"
-
-
-def shortened(text: str) -> str:
-    """What a file holds, as far as a message needs it."""
-    return text if len(text) <= LONGEST else f"{text[:LONGEST]}..."
-
-
 def _begin(path: Path) -> str:
     """What to do with a log that was given in the place of an experiment file."""
     if path.suffix.lower() == ".toml":
@@ -349,35 +298,5 @@ def _begin(path: Path) -> str:
 
 def read_schema(path: Path) -> ExperimentFile:
     """Reads and checks the shape of an experiment file. Raises ExperimentError naming the file and the key."""
-    try:
-        if path.exists() and not path.is_file():
-            raise ExperimentError(
-                path, "", "is no file; expected an experiment file, or the folder of an experiment.toml"
-            )
-        if path.stat().st_size > LARGEST:
-            raise ExperimentError(
-                path, "", f"is larger than {LARGEST:,} bytes; expected an experiment file, not the data"
-            )
-        content = tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except FileNotFoundError as error:
-        raise ExperimentError(path, "", "there is no such file; expected an experiment file") from error
-    except OSError as error:
-        raise ExperimentError(path, "", f"cannot be read ({error.strerror})") from error
-    except UnicodeDecodeError as error:
-        raise ExperimentError(
-            path, "", f"is not UTF-8 text ({error.reason} at byte {error.start}){_begin(path)}"
-        ) from error
-    except (ValueError, RecursionError) as error:
-        # Beside its own error the parser lets through those of numbers too long and of brackets too deep.
-        if isinstance(error, ExperimentError):
-            raise
-        raise ExperimentError(path, "", f"is not TOML: {shortened(str(error))}{_begin(path)}") from error
-    try:
-        return ExperimentFile.model_validate(content)
-    except ValidationError as error:
-        result = dict.fromkeys(_message(one, content) for one in error.errors())
-        # A union reports once per member, and an unknown key may be why another is missing: the typo comes first.
-        ordered = sorted(result, key=lambda one: "not a known key" not in one[1])
-        first, *others = ordered
-        more = "".join(f"\n{path}: {key}: {message}" for key, message in others[:4])
-        raise ExperimentError(path, first[0], first[1] + more) from None
+    content = read_toml(path, "an experiment file", ", or the folder of an experiment.toml", _begin(path))
+    return validated(path, content, ExperimentFile, _PLACES)

@@ -10,7 +10,8 @@ from smajax.core.wording import and_listed
 from smajax.data.experiment.errors import ExperimentError, at_key, check_parameter
 from smajax.data.experiment.model_description import ModelDescription, ParameterInfo
 from smajax.data.experiment.record import RUN_STARTS, Prior, Unknown
-from smajax.data.experiment.schema import BoxSection, ExperimentFile, PriorSection, Quantity
+from smajax.data.experiment.schema import BoxSection, ExperimentFile, PriorSection
+from smajax.data.experiment.toml_file import Quantity
 
 CELSIUS = ParameterInfo("degC", -273.15, 1500.0)  # of a wire as a run starts, which no parameter says
 

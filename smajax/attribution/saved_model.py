@@ -1,0 +1,75 @@
+"""The models that a closed loop ends with, as they are saved: base and extended, with all that is likely beside the latter."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from smajax.attribution.averaged_prediction import Averaged, likely_models, prediction_error
+from smajax.attribution.findings import RunFinding
+from smajax.attribution.found import ParametersFound
+from smajax.attribution.job import Job
+from smajax.attribution.joint_search import JointSearch
+from smajax.attribution.laplace_evidence import FittedModel
+from smajax.attribution.model_fits import Model, Search
+from smajax.data.model_file.actuator_model import ActuatorModel
+from smajax.data.model_file.of_experiment import actuator_model, range_of, rounded
+from smajax.data.model_file.record import LikelyModel, ModelOutput
+
+
+def saved_model(
+    job: Job,
+    setting: Search,
+    search: JointSearch,
+    model: Model,
+    found: ParametersFound,
+    runs: Sequence[RunFinding],
+    average: Averaged | None,
+) -> ActuatorModel:
+    """`model` with its parameters `found`; with the likely models of `average`, where predictions are those of an average."""
+    own = search.joint.ordered(model.effects)
+    weighted = [(search.fitted[own], 1.0)]
+    if average is not None:  # of one fit run nothing is averaged, and no model has been checked
+        checked = [(search.fitted[one.effects], one.weight) for one in average.models]
+        weighted = checked or likely_models(search, model)
+    # The model itself first, whatever its weight.
+    weighted = sorted(weighted, key=lambda one: one[0].effects != own)
+    likely = [
+        _likely(job, search, one, model.values if one.effects == own else one.values, weight)
+        for one, weight in weighted
+    ]
+    (output,) = job.experiment.outputs[:1]
+    several = len(job.fit_runs) > 1  # else none could be left out
+    states = {run.name: run.states for run in runs}
+    return actuator_model(
+        job.experiment,
+        likely,
+        job.bounds,
+        {one.name: one.standard_error for one in found.parameters},
+        [
+            ModelOutput(
+                output.name,
+                output.unit,
+                output.noise_sigma,
+                output.offset,
+                rounded(prediction_error(setting, model)) if several else None,
+            )
+        ],
+        range_of((run, states[run.name]) for run in job.fit_runs),
+    )
+
+
+def _likely(job: Job, search: JointSearch, model: FittedModel, values: np.ndarray, weight: float) -> LikelyModel:
+    at = dict(zip(search.joint.problem.names, np.asarray(values).tolist(), strict=True))
+    covariance = model.covariance(search.error(model) ** 2) * np.outer(model.scales, model.scales)
+    declared = job.experiment.declared_effects
+    priors = search.joint.prior_records(model.effects)
+    return LikelyModel(
+        tuple(dict.fromkeys((*declared, *model.effects))),
+        weight,
+        {name: at[name] for name in model.names},
+        model.names,
+        covariance,
+        {name: priors[name] for name in model.names if name in priors},
+    )

@@ -1,0 +1,108 @@
+"""What a model file takes over from the experiment whose runs it was fitted to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
+
+from smajax.core.parameters import Parameter, parameter_values, parameters
+from smajax.data.experiment.record import Experiment, Run
+from smajax.data.model_file.actuator_model import ActuatorModel
+from smajax.data.model_file.record import (
+    FittedRun,
+    LikelyModel,
+    ModelOutput,
+    ModelParameter,
+)
+from smajax.model.extended import extended
+from smajax.model.presets import build
+
+
+def actuator_model(
+    experiment: Experiment,
+    likely: Sequence[LikelyModel],
+    bounds: Mapping[str, tuple[float, float]],
+    standard_errors: Mapping[str, float | None],
+    outputs: Sequence[ModelOutput],
+    fitted_range: Mapping[str, tuple[float, float]],
+) -> ActuatorModel:
+    """The first of the `likely` models, with what was given in the experiment file, and the rest of the presets.
+
+    bounds, standard_errors: of the fitted values, SI.
+    """
+    first = likely[0]
+    system = extended(build(experiment.wire, experiment.load, experiment.drive, experiment.law), first.effects)
+    start = {**parameter_values(system), **experiment.base_values}
+    values = {
+        name: _parameter(experiment, entry, start[name], first, bounds.get(name), standard_errors.get(name))
+        for name, entry in parameters(system).items()
+    }
+    return ActuatorModel(
+        title=experiment.title or experiment.name,
+        wire=experiment.wire,
+        load=experiment.load,
+        drive=experiment.drive,
+        law=experiment.law,
+        effects=tuple(one.effect_name for one in system.effects),
+        parameters=values,
+        outputs=tuple(outputs),
+        likely=tuple(likely),
+        fitted_range=fitted_range,
+        runs=tuple(FittedRun(run.name, run.role, run.sha256) for run in experiment.runs),
+        log_format=experiment.log_format,
+        made_with={"experiment": experiment.path.name},
+    )
+
+
+def _parameter(
+    experiment: Experiment,
+    entry: Parameter,
+    start: float,
+    fitted: LikelyModel,
+    bounds: tuple[float, float] | None,
+    error: float | None,
+) -> ModelParameter:
+    """One value: of this fit, given in the experiment file, of a fit before in its model file, or of a preset."""
+    name, kept = entry.name, experiment.model_file
+    low, high = (rounded(one) for one in bounds or (entry.low, entry.high))
+    if name in fitted.values:
+        return ModelParameter(
+            float(fitted.values[name]), "fitted", low, high, None if error is None else rounded(error)
+        )
+    if name in experiment.parameters:
+        return ModelParameter(float(start), "given", entry.low, entry.high)
+    if kept is not None and name in kept.errors:
+        return ModelParameter(float(start), "fitted", *kept.bounds[name], kept.errors[name])
+    return ModelParameter(float(start), "preset", entry.low, entry.high)
+
+
+def rounded(value: float) -> float:
+    """To what a reader needs: six digits, of a number with which nothing is simulated."""
+    return float(f"{value:.6g}")
+
+
+def range_of(runs: Iterable[tuple[Run, Mapping[str, np.ndarray]]]) -> dict[str, tuple[float, float]]:
+    """Lowest and highest of every input, and of the wire's temperature, its rate and its stress, over runs with their states (n,)."""
+    found: dict[str, list[np.ndarray]] = {}
+    for run, states in runs:
+        for name, series in quantities(run.time, run.inputs, states).items():
+            found.setdefault(name, []).append(series)
+    return {
+        name: (rounded(float(min(np.min(one) for one in many))), rounded(float(max(np.max(one) for one in many))))
+        for name, many in found.items()
+    }
+
+
+def quantities(
+    time: np.ndarray, inputs: Mapping[str, np.ndarray], states: Mapping[str, np.ndarray]
+) -> dict[str, np.ndarray]:
+    """What a fitted range holds, of one run: its inputs, temperature, temperature_rate and stress, each (n,), SI."""
+    temperature = np.asarray(states["temperature"])
+    rate = np.gradient(temperature, time) if len(time) > 1 else np.zeros_like(temperature)
+    return {
+        **{name: np.asarray(series) for name, series in inputs.items()},
+        "temperature": temperature,
+        "temperature_rate": rate,
+        "stress": np.asarray(states["stress"]),
+    }

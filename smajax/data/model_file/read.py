@@ -1,0 +1,272 @@
+"""`model.toml` back to an `ActuatorModel`, checked as an experiment file is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from smajax.core.parameters import parameter_values, parameters
+from smajax.core.units import parse_quantity
+from smajax.data.experiment.errors import ExperimentError, at_key, check_name, check_parameter
+from smajax.data.experiment.model_description import ParameterInfo
+from smajax.data.experiment.record import Prior
+from smajax.data.experiment.toml_file import Quantity, read_toml, validated
+from smajax.data.experiment.unknowns import bounded
+from smajax.data.model_catalogue import CATALOGUE, check_together
+from smajax.data.model_file.actuator_model import ActuatorModel
+from smajax.data.model_file.record import (
+    STATE_UNITS,
+    FittedRun,
+    LikelyModel,
+    ModelOutput,
+    ModelParameter,
+    range_unit,
+)
+from smajax.data.model_file.schema import FORMAT, PLACES, ModelFile, ParameterSection
+from smajax.model.channels import INPUT_UNITS
+from smajax.model.extended import extended
+from smajax.model.presets import build
+from smajax.simulation.sensors import sensors_of
+
+CLOSE = 1e-9  # of a value: nearer than that it is the fitted one
+
+
+def load_model(path: str | Path) -> ActuatorModel:
+    """The model in a file, or in the folder of a `model.toml`.
+
+    Parameters that the file leaves out have the presets' values. Raises ExperimentError, whose message names the file, the
+    key, what was got, what was expected and what to do.
+    """
+    path = Path(path)
+    if path.is_dir():
+        path = path / "model.toml"
+    hint = "; `smajax close-loop` and `smajax identify` write model files" if path.suffix != ".toml" else ""
+    content = read_toml(path, "a model file", ", or the folder of a model.toml", hint)
+    _check_kind(path, content)
+    file = validated(path, content, ModelFile, PLACES)
+    model = _model(path, file)
+    if file.uncertainty is None:
+        return model
+    return _with_uncertainty(path, file, model)
+
+
+def parameter_text(value: float, unit: str) -> Quantity:
+    """A value as a file has it, every digit."""
+    return float(value) if unit == "-" else f"{float(value)!r} {unit}"
+
+
+def _check_kind(path: Path, content: Mapping[str, Any]) -> None:
+    """Raises ExperimentError for an experiment file, and for a file of a later version."""
+    if "format" not in content and ("runs" in content or "unknown" in content):
+        raise ExperimentError(
+            path, "", "is an experiment file, expected a model file; `smajax close-loop` makes one from it"
+        )
+    number = content.get("format", FORMAT)
+    if isinstance(number, int) and not isinstance(number, bool) and not 1 <= number <= FORMAT:
+        raise ExperimentError(
+            path,
+            "format",
+            f"got {number}, expected 1 to {FORMAT}; it is from a later version of smajax: install that one",
+        )
+
+
+def _model(path: Path, file: ModelFile) -> ActuatorModel:
+    """Without what stands in the NetCDF file."""
+    part = file.model
+    for key, kind, name, known in (
+        ("wire", "wire", part.wire, CATALOGUE.wires),
+        ("load", "load", part.load, CATALOGUE.loads),
+        ("drive", "drive", part.drive, CATALOGUE.drives),
+        *([("law", "law", part.law, CATALOGUE.laws)] if part.law else []),
+        *(("effects", "effect", name, CATALOGUE.effects) for name in part.effects),
+        *(
+            (f"alternatives.[{k + 1}].effects", "effect", name, CATALOGUE.effects)
+            for k, one in enumerate(file.alternatives)
+            for name in one.effects
+        ),
+    ):
+        check_name(path, key if key.startswith("alternatives") else f"model.{key}", kind, name, known)
+    system = extended(build(part.wire, part.load, part.drive, part.law), part.effects)
+    try:
+        check_together(system, part.load, part.drive)
+    except ValueError as error:
+        raise ExperimentError(path, "model", str(error)) from error
+    table = {entry.name: ParameterInfo(entry.unit, entry.low, entry.high) for entry in parameters(system).values()}
+    presets = f"{part.wire} {part.load} {part.drive}"
+    for name in file.parameters:
+        _check_parameter(path, name, table, presets, part.effects)
+    preset = {
+        name: ModelParameter(value, "preset", table[name].low, table[name].high)
+        for name, value in parameter_values(system).items()
+    }
+    given = {name: _parameter(path, name, one, table[name]) for name, one in file.parameters.items()}
+    model = ActuatorModel(
+        title=file.title,
+        wire=part.wire,
+        load=part.load,
+        drive=part.drive,
+        law=part.law,
+        effects=tuple(one.effect_name for one in system.effects),
+        parameters={**preset, **given},
+        outputs=_outputs(path, file, sensors_of(system)),
+        fitted_range={name: _range(path, name, ends) for name, ends in file.fitted_range.items()},
+        runs=tuple(FittedRun(one.run, one.role, one.sha256) for one in file.fitted_to),
+        log_format=file.log_format,
+        made_with={name: text for name, text in file.made_with.items() if name != "smajax"},
+    )
+    disorder = CATALOGUE.describe(part.wire, part.load, part.drive, part.law).disorder(model.values)
+    if disorder is not None:
+        raise ExperimentError(path, f"parameters.{disorder[0]}", disorder[2])
+    return model
+
+
+def _check_parameter(
+    path: Path, name: str, table: Mapping[str, ParameterInfo], presets: str, effects: list[str]
+) -> None:
+    effect = name.split(".")[0]
+    if "." in name and effect not in effects and effect in CATALOGUE.effects:
+        raise ExperimentError(
+            path,
+            f"parameters.{name}",
+            f"is of an effect that the model has not; add {effect!r} to [model] effects, or remove it",
+        )
+    check_parameter(path, f"parameters.{name}", name, table, presets)
+
+
+def _parameter(path: Path, name: str, given: ParameterSection, info: ParameterInfo) -> ModelParameter:
+    key = f"parameters.{name}"
+    low = info.low if given.low is None else bounded(path, f"{key}.low", given.low, info)
+    high = info.high if given.high is None else bounded(path, f"{key}.high", given.high, info)
+    if low >= high:
+        raise ExperimentError(
+            path, f"{key}.low", f"got {given.low!r}, which is not below high = {given.high!r}; exchange them"
+        )
+    error = None
+    if given.standard_error is not None:
+        with at_key(path, f"{key}.standard_error"):
+            error = parse_quantity(given.standard_error, info.unit, difference=True)
+        if error < 0.0:
+            raise ExperimentError(path, f"{key}.standard_error", f"got {given.standard_error!r}, expected zero or more")
+    return ModelParameter(bounded(path, key, given.value, info), given.origin, low, high, error)
+
+
+def _outputs(path: Path, file: ModelFile, sensors: Mapping[str, str]) -> tuple[ModelOutput, ...]:
+    result = []
+    for name, one in file.outputs.items():
+        check_name(path, f"outputs.{name}", "output", name, sensors)
+        numbers: dict[str, float | None] = {}
+        for key, given in (("noise", one.noise), ("prediction_error", one.prediction_error)):
+            if given is None:
+                numbers[key] = None
+                continue
+            with at_key(path, f"outputs.{name}.{key}"):
+                number = parse_quantity(given, sensors[name], difference=True)
+            if not number > 0.0:
+                raise ExperimentError(path, f"outputs.{name}.{key}", f"got {given!r}, expected a size above zero")
+            numbers[key] = number
+        result.append(
+            ModelOutput(name, sensors[name], numbers["noise"] or 0.0, one.offset, numbers["prediction_error"])
+        )
+    return tuple(result)
+
+
+def _range(path: Path, name: str, ends: list[Quantity]) -> tuple[float, float]:
+    key = f"fitted_range.{name}"
+    check_name(path, key, "quantity", name, (*STATE_UNITS, *INPUT_UNITS))
+    if len(ends) != 2:
+        raise ExperimentError(path, key, f"got {len(ends)} values, expected two, the lowest and the highest")
+    with at_key(path, key):
+        low, high = (parse_quantity(end, range_unit(name)) for end in ends)
+    if low > high:
+        raise ExperimentError(path, key, f"got {ends[0]!r} and {ends[1]!r}, expected the lowest first; exchange them")
+    return low, high
+
+
+def _with_uncertainty(path: Path, file: ModelFile, model: ActuatorModel) -> ActuatorModel:
+    """The model with the likely models of the NetCDF file. Values that were changed by hand are known, not fitted."""
+    name = str(file.uncertainty)
+    beside = path.parent / name
+    if Path(name).name != name:
+        raise ExperimentError(path, "uncertainty", f"got {name!r}, expected the name of a file in the same folder")
+    remedy = "put it beside this file, or remove the key, and predict without the parameters' uncertainty"
+    try:
+        content = beside.read_bytes()
+    except OSError as error:
+        raise ExperimentError(path, "uncertainty", f"{beside} cannot be read ({error.strerror}); {remedy}") from None
+    likely, warnings = [], []
+    effects = [model.effects, *(tuple(one.effects) for one in file.alternatives)]
+    probabilities = [file.probability, *(one.probability for one in file.alternatives)]
+    try:
+        with xr.open_dataset(BytesIO(content), engine="scipy") as dataset:
+            dataset.load()
+        for number, (own, probability) in enumerate(zip(effects, probabilities, strict=True)):
+            likely.append(_likely(dataset, number, own, probability))
+    except (KeyError, ValueError, TypeError, OSError, AssertionError) as error:
+        raise ExperimentError(
+            path, "uncertainty", f"{beside} is not what was written with this file ({error}); {remedy}"
+        ) from None
+    changed = _changed(likely[0], model)
+    if changed:
+        warnings.append(
+            f"{path}: changed by hand and taken as known: {', '.join(changed)}; the other fitted values keep their covariance"
+        )
+    kept = tuple(_without(one, changed) for one in likely)
+    exact = {
+        name: replace(model.parameters[name], value=value)  # every digit of what the text has rounded
+        for name, value in kept[0].values.items()
+    }
+    return replace(model, parameters={**model.parameters, **exact}, likely=kept, warnings=tuple(warnings))
+
+
+def _likely(dataset: xr.Dataset, number: int, effects: tuple[str, ...], probability: float) -> LikelyModel:
+    if f"value_{number}" not in dataset:
+        if number == 0 and not effects:
+            return LikelyModel(effects, probability, {})
+        raise KeyError(f"no value_{number}")
+    names = [str(one) for one in dataset[f"parameter_{number}"].values]
+    columns = {
+        key: np.asarray(dataset[f"{key}_{number}"].values, dtype=float)
+        for key in ("value", "prior_mean", "prior_sigma", "prior_logarithmic")
+    }
+    priors = {
+        name: Prior(float(mean), float(sigma), bool(logarithmic))
+        for name, mean, sigma, logarithmic in zip(
+            names, columns["prior_mean"], columns["prior_sigma"], columns["prior_logarithmic"], strict=True
+        )
+        if np.isfinite(mean)
+    }
+    values = dict(zip(names, columns["value"].tolist(), strict=True))
+    if f"covariance_{number}" not in dataset:
+        return LikelyModel(effects, probability, values, priors=priors)
+    known = tuple(str(one) for one in dataset[f"determined_{number}"].values)
+    covariance = np.asarray(dataset[f"covariance_{number}"].values, dtype=float)
+    if covariance.shape != (len(known),) * 2 or not np.isfinite(covariance).all() or not set(known) <= set(values):
+        raise ValueError(f"covariance_{number} does not go with its names")
+    return LikelyModel(effects, probability, values, known, covariance, priors)
+
+
+def _changed(fitted: LikelyModel, model: ActuatorModel) -> list[str]:
+    """Names of the fitted values that are others in the text."""
+    return [
+        name
+        for name, value in fitted.values.items()
+        if name not in model.parameters or abs(model.parameters[name].value - value) > CLOSE * abs(value)
+    ]
+
+
+def _without(one: LikelyModel, gone: list[str]) -> LikelyModel:
+    """Without the values `gone`, over which the others are not conditioned."""
+    keep = [k for k, name in enumerate(one.names) if name not in gone]
+    return replace(
+        one,
+        values={name: value for name, value in one.values.items() if name not in gone},
+        names=tuple(one.names[k] for k in keep),
+        covariance=one.covariance[np.ix_(keep, keep)],
+        priors={name: prior for name, prior in one.priors.items() if name not in gone},
+    )

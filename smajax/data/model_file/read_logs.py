@@ -1,0 +1,127 @@
+"""Measured logs for a model: read as those that it was fitted to, else by guessed columns as a draft of an experiment is."""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from smajax.core.wording import and_listed
+from smajax.data.experiment.draft import draft
+from smajax.data.experiment.draft_model import ModelChoice
+from smajax.data.experiment.errors import ExperimentError
+from smajax.data.experiment.load import experiment_of
+from smajax.data.experiment.plausibility import role_warnings
+from smajax.data.experiment.record import Experiment
+from smajax.data.experiment.schema import DataSection, ExperimentFile, LogFormat, ModelSection, RunSection
+from smajax.data.experiment.toml_file import Quantity, validated
+from smajax.data.model_catalogue import CATALOGUE
+from smajax.data.model_file.actuator_model import ActuatorModel
+from smajax.data.model_file.read import parameter_text
+from smajax.data.readers.table import MeasuredDataError
+
+
+def read_logs(
+    model: ActuatorModel,
+    files: Sequence[str | Path],
+    inputs: Mapping[str, Quantity] | None = None,
+    parameters: Mapping[str, Quantity] | None = None,
+    decimal: str = "",
+) -> tuple[Experiment, tuple[str, ...]]:
+    """(the logs as runs of the model, a message for each guess about them).
+
+    A log is read by the channels in the model's file; where it has no such columns, by a guess at its own. inputs: constants that no
+    log has, as `{"mass": "0.2 kg"}`. parameters: values of these runs that replace the model's. decimal: the decimal mark, where the
+    logs do not determine it. Raises ExperimentError, whose message names the file.
+    """
+    paths = [Path(file) for file in files]
+    if not paths:
+        raise ValueError("No log was given: name at least one file.")
+    if gone := [path for path in paths if not path.is_file()]:
+        raise ExperimentError(gone[0], "", "there is no such file; expected a log, or an experiment file")
+    folder = Path(os.path.commonpath([path.resolve().parent for path in paths]))
+    constants, own = dict(inputs or {}), dict(parameters or {})
+    missed: ExperimentError | None = None
+    if model.log_format is not None:
+        runs = _runs(paths, folder, constants, own)
+        try:
+            return _experiment(model, model.log_format, folder, runs, decimal), ()
+        except ExperimentError as error:
+            missed = error
+    try:
+        file, messages = _guessed(model, paths, folder, decimal)
+        runs = [run.model_copy(update={"inputs": constants, "parameters": own, "role": "fit"}) for run in file.runs]
+        return _experiment(model, file.log_format, folder, runs, decimal), messages
+    except (ExperimentError, MeasuredDataError) as error:
+        if missed is not None:
+            raise missed from None
+        raise ExperimentError(
+            paths[0], "", f"{error}; or give an experiment file, which says what its columns are"
+        ) from None
+
+
+def _runs(
+    paths: Sequence[Path], folder: Path, inputs: Mapping[str, Quantity], parameters: Mapping[str, Quantity]
+) -> list[RunSection]:
+    """A run a file, named as its file; the roles mean nothing here."""
+    stems = [path.stem for path in paths]
+    names = stems if len(set(stems)) == len(stems) else [str(path) for path in paths]
+    return [
+        RunSection(
+            name=name,
+            role="fit",
+            file=str(path.resolve().relative_to(folder)),
+            inputs=dict(inputs),
+            parameters=dict(parameters),
+        )
+        for name, path in zip(names, paths, strict=True)
+    ]
+
+
+def _guessed(
+    model: ActuatorModel, paths: Sequence[Path], folder: Path, decimal: str
+) -> tuple[ExperimentFile, tuple[str, ...]]:
+    """A draft of an experiment of the model's wire, load and drive. Raises MeasuredDataError."""
+    drafted = draft(paths, folder / "logs.toml", "logs", ModelChoice(model.load, model.wire, model.drive), decimal)
+    file = validated(paths[0], tomllib.loads(drafted.text), ExperimentFile, {(): ExperimentFile})
+    if model.log_format is not None and model.log_format.sampling is not None and file.sampling is not None:
+        file = file.model_copy(update={"sampling": model.log_format.sampling})
+    columns = [message for message in drafted.messages if not message.startswith(("model:", "the bench:", "held out:"))]
+    return file, tuple(columns)
+
+
+def _experiment(
+    model: ActuatorModel, log_format: LogFormat, folder: Path, runs: Sequence[RunSection], decimal: str
+) -> Experiment:
+    """The logs as an experiment in which the model's values are known. Raises ExperimentError."""
+    constant = {name for run in runs for name in run.inputs}
+    channels = {name: one for name, one in log_format.channels.items() if name not in constant}
+    table = model.table
+    values = {name: parameter_text(one.value, table[name].unit) for name, one in model.parameters.items()}
+    file = ExperimentFile(
+        title=model.title,
+        model=ModelSection(wire=model.wire, load=model.load, drive=model.drive, law=model.law, parameters=values),
+        sampling=log_format.sampling,
+        time=log_format.time,
+        channels=channels,
+        data=DataSection(folder=".", decimal=decimal or log_format.decimal),  # type: ignore[arg-type]
+        runs=list(runs),
+    )
+    # The folder of the logs stands for that of an experiment file.
+    experiment = experiment_of(folder / "model.toml", file, CATALOGUE)
+    roles = set(role_warnings(file.runs))
+    return replace(experiment, warnings=tuple(text for text in experiment.warnings if text not in roles))
+
+
+def channels_read(experiment: Experiment) -> str:
+    """ "voltage from 'U_V' (V), position from 'pos_mm' (mm)", for a reader."""
+    if experiment.log_format is None:
+        return ""
+    named = [
+        f"{name} from {one.column if one.column is not None else one.variable!r} ({one.unit})"
+        for name, one in experiment.log_format.channels.items()
+        if one.column is not None or one.variable is not None
+    ]
+    return and_listed(named)

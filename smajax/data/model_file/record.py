@@ -1,0 +1,190 @@
+"""A fitted model that is kept: its parts by name, every parameter, what is known of them, and the runs that it was fitted to."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Literal
+
+import jax
+import numpy as np
+
+from smajax.core.parameters import Parameter, parameter_values, parameters, set_parameters
+from smajax.data.experiment.record import Prior
+from smajax.data.experiment.schema import LogFormat
+from smajax.model.channels import INPUT_UNITS
+from smajax.model.extended import extended
+from smajax.model.presets import build
+from smajax.model.system import System
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+Origin = Literal["fitted", "given", "preset"]
+
+
+# Quantities of a fitted range beside the inputs -> unit.
+STATE_UNITS = {"temperature": "degC", "stress": "Pa", "temperature_rate": "K/s"}
+
+
+def range_unit(name: str) -> str:
+    """Unit of a quantity of a fitted range: an input, or a state of the wire."""
+    return STATE_UNITS.get(name) or INPUT_UNITS[name]
+
+
+@dataclass(frozen=True)
+class ModelParameter:
+    """One value, in the program's own unit (SI, degC, rad).
+
+    origin: "fitted" to runs; "given" by the user; "preset": nobody gave it. low, high: the bounds of the fit, else what makes
+    physical sense. standard_error: of a fitted one that the runs determine.
+    """
+
+    value: float
+    origin: Origin
+    low: float
+    high: float
+    standard_error: float | None = None
+
+
+@dataclass(frozen=True)
+class LikelyModel:
+    """One set of effects with its fitted values, SI.
+
+    probability: posterior, 0..1; those of all likely models of a file sum to one. values: what was fitted. covariance: of `names`,
+    (K, K), SI. priors: of those of them that had one.
+    """
+
+    effects: tuple[str, ...]
+    probability: float
+    values: Mapping[str, float]
+    names: tuple[str, ...] = ()
+    covariance: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+    priors: Mapping[str, Prior] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class ModelOutput:
+    """A sensor that the model was fitted to, SI. noise: sigma of a sample. offset: whether each run has its own zero.
+
+    prediction_error: what nine of ten samples of runs that the fit had not seen stay within; None where none was left out.
+    """
+
+    name: str
+    unit: str
+    noise: float
+    offset: bool
+    prediction_error: float | None = None
+
+
+@dataclass(frozen=True)
+class FittedRun:
+    """A run that the model was fitted to or held against."""
+
+    name: str
+    role: str
+    sha256: str
+
+
+@dataclass(frozen=True)
+class ModelRecord:
+    """What a model file holds.
+
+    parameters: every one of the model, by name. likely: the models that predictions are averaged over, this one first; empty
+    where nothing was fitted. fitted_range: quantity -> (lowest, highest) in the fit runs, SI. log_format: how the logs are read.
+    """
+
+    title: str
+    wire: str
+    load: str
+    drive: str
+    law: str
+    effects: tuple[str, ...]
+    parameters: Mapping[str, ModelParameter]
+    outputs: tuple[ModelOutput, ...] = ()
+    likely: tuple[LikelyModel, ...] = ()
+    fitted_range: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    runs: tuple[FittedRun, ...] = ()
+    log_format: LogFormat | None = None
+    made_with: Mapping[str, str] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()  # of the file that it was read from
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Every parameter by name, SI."""
+        return {name: one.value for name, one in self.parameters.items()}
+
+    @cached_property
+    def table(self) -> dict[str, Parameter]:
+        """Unit, bounds and meaning of every parameter."""
+        return parameters(self.system)
+
+    @cached_property
+    def system(self) -> System:
+        """The model with its values, ready to be simulated."""
+        return self.system_of(self.effects, self.values)
+
+    def system_of(self, effects: Sequence[str], values: Mapping[str, float], carried: Sequence[str] = ()) -> System:
+        """The same wire, load and drive with `effects`, at this model's values and then at `values`, SI.
+
+        `carried`: further effects, which are there and change nothing.
+        """
+        model = extended(build(self.wire, self.load, self.drive, self.law), [*effects, *carried])
+        known = {
+            name: value
+            for name, value in {**self.values, **values}.items()
+            if "." not in name or name.split(".")[0] in effects
+        }
+        table = parameters(model)
+        return set_parameters(model, {name: value for name, value in known.items() if name in table})
+
+    @property
+    def every_effect(self) -> tuple[str, ...]:
+        """Effects of any of the likely models."""
+        return tuple(
+            dict.fromkeys(name for effects in (self.effects, *(one.effects for one in self.likely)) for name in effects)
+        )
+
+    def draws(self, count: int, seed: int = 0) -> list[System]:
+        """`count` models from the posterior, each of `plants` by itself."""
+        plants = self.plants(count, seed)
+        return [jax.tree.map(lambda leaf, at=at: leaf[at], plants) for at in range(count)]
+
+    def plants(self, count: int, seed: int = 0) -> System:
+        """`count` models from the posterior as one system, each of whose values has shape (count,), for `jax.vmap`.
+
+        Each is a likely model by its probability, then its values by their covariance, within bounds. All carry the effects of all
+        likely models, at base value where theirs has none. Where nothing was fitted all are the model itself.
+        """
+        random = np.random.default_rng(seed)
+        likely = self.likely or (LikelyModel(self.effects, 1.0, {}),)
+        weights = np.asarray([one.probability for one in likely])
+        chosen = random.choice(len(likely), size=count, p=weights / weights.sum())
+        base = self.system_of((), {}, self.every_effect)
+        columns = {name: np.full(count, value) for name, value in parameter_values(base).items()}
+        for number, model in enumerate(likely):
+            own = chosen == number
+            known = {name: value for name, value in self.values.items() if name.split(".")[0] in model.effects}
+            for name, value in {**known, **model.values, **self._drawn(model, int(own.sum()), random)}.items():
+                columns[name][own] = value
+        return set_parameters(base, columns)
+
+    def _drawn(self, model: LikelyModel, count: int, random: np.random.Generator) -> dict[str, np.ndarray]:
+        """Values of what the covariance of one likely model covers, (count,) each."""
+        if not model.names:
+            return {}
+        mean = np.asarray([model.values[name] for name in model.names])
+        size = np.sqrt(np.maximum(np.diag(model.covariance), 0.0))
+        size = np.where(size > 0.0, size, 1.0)
+        eigenvalues, vectors = np.linalg.eigh(model.covariance / np.outer(size, size))
+        steps = random.standard_normal((count, len(mean))) * np.sqrt(np.maximum(eigenvalues, 0.0)) @ vectors.T
+        values = mean + size * steps
+        return {name: np.clip(values[:, k], *self._bounds[name]) for k, name in enumerate(model.names)}
+
+    @cached_property
+    def _bounds(self) -> dict[str, tuple[float, float]]:
+        """Of the fit, for what was fitted in this model; what makes physical sense, for the other effects of likely ones."""
+        whole = parameters(self.system_of(self.every_effect, {}))
+        own = {name: (one.low, one.high) for name, one in self.parameters.items()}
+        return {name: (one.low, one.high) for name, one in whole.items()} | own

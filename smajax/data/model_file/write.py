@@ -1,0 +1,161 @@
+"""A `ModelRecord` as `model.toml`, and `model.nc` beside it: covariance, priors and alternatives of what was fitted."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from smajax.core.files import as_netcdf, replace
+from smajax.data.experiment.errors import ExperimentError
+from smajax.data.experiment.toml_file import Section
+from smajax.data.model_file.record import LikelyModel, ModelParameter, ModelRecord, range_unit
+from smajax.data.model_file.schema import FORMAT
+
+HEAD = """\
+# A model of an SMA wire actuator, for `smajax predict`, `simulate`, `sweep`, `tune`, and `[model] file = "..."` of an experiment file.
+# A value may be changed by hand: its line becomes name = "number unit", which is taken as known."""
+
+
+DIGITS = 10  # of a fitted value in the text, where the NetCDF file has all
+
+
+def write_model(model: ModelRecord, path: Path) -> Path:
+    """Write `path` and, where anything was fitted, the NetCDF file of the same name. Each is there whole or not at all.
+
+    Raises ExperimentError for a name without `.toml`.
+    """
+    if path.suffix != ".toml":
+        raise ExperimentError(path, "", "expected a name that ends in .toml, such as model.toml")
+    beside = path.with_suffix(".nc")
+    if model.likely:
+        # First, so that a file that names it never lacks it.
+        replace(beside, as_netcdf(_uncertainty(model)))
+    replace(path, model_text(model, beside.name if model.likely else ""))
+    return path
+
+
+def model_text(model: ModelRecord, uncertainty: str = "") -> str:
+    """The text of the file. `uncertainty`: name of the NetCDF file beside it."""
+    lines = [HEAD, f"format = {FORMAT}", f"title = {_text(model.title)}"]
+    if uncertainty:
+        lines.append(f"uncertainty = {_text(uncertainty)}  # covariance and priors of the fitted values")
+        lines.append(f"probability = {model.likely[0].probability!r}  # of this set of effects")
+    if model.log_format is not None and model.log_format.decimal:
+        lines.append(f"decimal = {_text(model.log_format.decimal)}  # the decimal mark of the logs")
+    parts = {"wire": model.wire, "load": model.load, "drive": model.drive, "law": model.law}
+    lines += ["", "[model]", *(f"{key} = {_text(name)}" for key, name in parts.items() if name)]
+    lines += [f"effects = {_list(model.effects)}", "", "[parameters]"]
+    kept = model.likely[0].values if model.likely else {}
+    for name, one in model.parameters.items():
+        known = model.table[name]
+        lines.append(f"{_key(name)} = {_parameter(one, known.unit, name in kept)}  # {known.about}")
+    for output in model.outputs:
+        lines += ["", f"[outputs.{_key(output.name)}]", f"noise = {_quantity(output.noise, output.unit)}"]
+        lines.append(f"offset = {str(output.offset).lower()}  # whether each run has its own zero")
+        if output.prediction_error is not None:
+            error = _quantity(output.prediction_error, output.unit)
+            lines.append(f"prediction_error = {error}  # nine of ten samples of runs left out stay within")
+    for other in model.likely[1:]:
+        lines += ["", "[[alternatives]]", f"effects = {_list(other.effects)}", f"probability = {other.probability!r}"]
+    if model.fitted_range:
+        lines += ["", "[fitted_range]  # of the runs that it was fitted to: beyond it is extrapolation"]
+        for name, ends in model.fitted_range.items():
+            unit = range_unit(name)
+            lines.append(f"{_key(name)} = [{', '.join(_quantity(end, unit) for end in ends)}]")
+    if model.log_format is not None:
+        lines += _log_format(model.log_format)
+    for run in model.runs:
+        lines += ["", "[[fitted_to]]", f"run = {_text(run.name)}", f"role = {_text(run.role)}"]
+        lines.append(f"sha256 = {_text(run.sha256)}")
+    made = {"smajax": metadata.version("smajax"), **model.made_with}
+    lines += ["", "[made_with]", *(f"{_key(name)} = {_text(value)}" for name, value in made.items())]
+    return "\n".join(lines) + "\n"
+
+
+def _parameter(one: ModelParameter, unit: str, kept: bool) -> str:
+    """`kept`: the NetCDF file has every digit."""
+    if one.origin == "given":
+        return _quantity(one.value, unit)
+    value = float(f"{one.value:.{DIGITS}g}") if kept else one.value
+    entries = {"value": _quantity(value, unit)}
+    if one.origin == "fitted":
+        if one.standard_error is not None:
+            entries["standard_error"] = _quantity(one.standard_error, "K" if unit == "degC" else unit)
+        entries |= {"low": _quantity(one.low, unit), "high": _quantity(one.high, unit)}
+    entries["origin"] = _text(one.origin)
+    return f"{{ {', '.join(f'{key} = {value}' for key, value in entries.items())} }}"
+
+
+def _log_format(shown: Section) -> list[str]:
+    """[channels], [time] and [sampling], as in an experiment file."""
+    content = shown.model_dump(exclude_defaults=True)
+    lines: list[str] = []
+    for name, channel in content.pop("channels").items():
+        lines += ["", f"[channels.{_key(name)}]", *_entries(channel)]
+    content.pop("decimal", None)  # at the head of the file
+    for name, section in content.items():
+        lines += ["", f"[{name}]", *_entries(section)]
+    return lines
+
+
+def _entries(section: dict[str, Any]) -> list[str]:
+    return [f"{_key(name)} = {_value(value)}" for name, value in section.items() if value is not None]
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    return _text(value) if isinstance(value, str) else repr(value)
+
+
+def _quantity(value: float, unit: str) -> str:
+    """With every digit, so that what is read back is what was written."""
+    return repr(float(value)) if unit in ("-", "1", "") else f'"{float(value)!r} {unit}"'
+
+
+def _text(value: str) -> str:
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def _key(name: str) -> str:
+    """A key of TOML, in quotation marks where it needs them."""
+    bare = name.replace("-", "").replace("_", "")
+    return name if bare.isascii() and bare.isalnum() else _text(name)
+
+
+def _list(names: Iterable[str]) -> str:
+    return f"[{', '.join(map(_text, names))}]"
+
+
+def _uncertainty(model: ModelRecord) -> xr.Dataset:
+    """What is known of the fitted values of each likely model: `value_0`, `covariance_0`, ... along `parameter_0`."""
+    result = xr.Dataset(attrs={"title": model.title, "format": FORMAT, "unit": "SI, degC, rad"})
+    for number, one in enumerate(model.likely):
+        if one.values:
+            result = result.merge(_likely(one, str(number)))
+    return result
+
+
+def _likely(one: LikelyModel, number: str) -> xr.Dataset:
+    every, known = f"parameter_{number}", f"determined_{number}"
+    names = list(one.values)
+    priors = [one.priors.get(name) for name in names]
+    columns = {
+        f"value_{number}": [one.values[name] for name in names],
+        f"prior_mean_{number}": [np.nan if prior is None else prior.mean for prior in priors],
+        f"prior_sigma_{number}": [np.nan if prior is None else prior.sigma for prior in priors],
+        f"prior_logarithmic_{number}": [0.0 if prior is None else float(prior.logarithmic) for prior in priors],
+    }
+    result = xr.Dataset(
+        {name: ((every,), np.asarray(column, dtype=float)) for name, column in columns.items()}, coords={every: names}
+    )
+    if one.names:
+        covariance = ((known, f"{known}_too"), np.asarray(one.covariance, dtype=float))
+        result = result.assign({f"covariance_{number}": covariance}).assign_coords({known: list(one.names)})
+    return result

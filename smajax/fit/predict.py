@@ -1,0 +1,256 @@
+"""A kept model against runs: what it predicts, with a band, and where a run lies outside of what it was fitted to."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+from scipy import stats
+
+from smajax.core.parameters import parameter_values
+from smajax.data.experiment.errors import ExperimentError
+from smajax.data.experiment.record import Experiment, Output, Run
+from smajax.data.experiment.toml_file import Quantity
+from smajax.data.model_file.actuator_model import ActuatorModel
+from smajax.data.model_file.of_experiment import quantities
+from smajax.data.model_file.read_logs import read_logs
+from smajax.data.model_file.record import LikelyModel, ModelOutput, range_unit
+from smajax.data.open_experiment import open_experiment
+from smajax.fit.integration import IntegrationError, choose_integration, integration_error, with_integration
+from smajax.fit.packed_runs import pack, simulate_batch
+from smajax.fit.predicted import predicted_and_derivatives
+from smajax.fit.problem import Problem
+
+BAND = 0.9  # share of the measured samples that are expected in the band
+BEYOND = 0.02  # of a fitted range: by less a run does not leave it
+FEW = 0.005  # of the samples: a single one of a rate is a jump of an input
+STATES = ("temperature", "martensite_fraction", "stress")
+
+
+@dataclass(frozen=True)
+class PredictedSeries:
+    """One sensor in one run, arrays of shape (n,), SI; nan in `measured` where a sample is missing."""
+
+    output: str
+    unit: str
+    measured: np.ndarray
+    reading: np.ndarray  # of the average of the likely models, with the run's offset
+    half_width: np.ndarray  # of the band
+    noise: float  # sigma of a sample
+    offset: float  # of the run, that was added to the reading
+    rmse: float
+    coverage: float  # share of the measured samples inside the band
+
+
+@dataclass(frozen=True)
+class Extrapolation:
+    """A quantity that leaves the range of the runs that the model was fitted to, SI."""
+
+    quantity: str
+    unit: str
+    fitted: tuple[float, float]  # lowest and highest
+    reached: tuple[float, float]
+    share: float  # of the samples
+    spans: tuple[tuple[float, float], ...]  # s, of the run's clock: from, to
+
+
+@dataclass(frozen=True)
+class PredictedRun:
+    """One run as the model predicts it."""
+
+    name: str
+    time: np.ndarray  # (n,), s
+    inputs: dict[str, np.ndarray]
+    series: tuple[PredictedSeries, ...]
+    states: dict[str, np.ndarray]  # of the likeliest model: temperature (degC), martensite_fraction (-), stress (Pa)
+    extrapolation: tuple[Extrapolation, ...]
+    sha256: str
+    fitted: bool  # whether the model was fitted to this run
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """A model's prediction of some runs. step: s, from sample to sample."""
+
+    model: ActuatorModel
+    runs: tuple[PredictedRun, ...]
+    step: float
+    integration: IntegrationError
+    warnings: tuple[str, ...] = ()
+
+
+def predict(  # keywords, which a caller names one by one
+    model: ActuatorModel,
+    runs: Experiment | str | Path | Sequence[str | Path],
+    *,
+    inputs: Mapping[str, Quantity] | None = None,
+    parameters: Mapping[str, Quantity] | None = None,
+    decimal: str = "",
+) -> Prediction:
+    """`runs` as `model` predicts them: nothing is fitted, and the roles of an experiment mean nothing.
+
+    runs: an experiment, the path of an experiment file or of a log, or paths of logs. inputs: constants that no log has, as
+    `{"mass": "0.2 kg"}`; parameters: values that replace the model's in these runs; decimal: the decimal mark; all three of logs only.
+    An output that has an offset in the model has each run's own, the mean of its residual. Raises ValueError in float32, and
+    ExperimentError for what cannot be read or is of another load.
+    """
+    if jnp.zeros(()).dtype != jnp.float64:
+        raise ValueError("predict needs float64: call `jax.config.update('jax_enable_x64', True)` first.")
+    if isinstance(runs, Experiment):
+        return _prediction(model, runs)
+    paths = [Path(runs)] if isinstance(runs, str | Path) else [Path(one) for one in runs]
+    tables = [path for path in paths if path.suffix == ".toml" or path.is_dir()]
+    if not tables:
+        experiment, messages = read_logs(model, paths, inputs, parameters, decimal)
+        found = _prediction(model, experiment)
+        return replace(found, warnings=(*messages, *found.warnings))
+    if len(paths) > 1:
+        raise ExperimentError(tables[0], "", "is an experiment file beside other files; give it alone, or logs alone")
+    if inputs or parameters or decimal:
+        raise ExperimentError(tables[0], "", "says inputs, parameters and the decimal mark itself; give them there")
+    return _prediction(model, open_experiment(tables[0]))
+
+
+def _prediction(model: ActuatorModel, experiment: Experiment) -> Prediction:
+    if experiment.load != model.load:
+        raise ExperimentError(
+            experiment.path,
+            "model.load",
+            f"got {experiment.load!r}, expected that of the model, {model.load!r}: its runs are of another load",
+        )
+    known = {one.name: one for one in model.outputs}
+    likely = model.likely or (LikelyModel(model.effects, 1.0, {}),)
+    noise, offset, missed = _of_outputs(model, experiment)
+    problems = [_problem(model, one, experiment, noise, offset) for one in likely]
+    integration = choose_integration(problems[0], problems[0].system)
+    problems = [with_integration(one, integration) for one in problems]
+    predicted = [_predicted(*pair) for pair in zip(problems, likely, strict=True)]
+    weights = np.asarray([one.probability for one in likely])
+    readings, variances = (np.stack([getattr(one, name) for one in predicted]) for name in ("reading", "variance"))
+    mean, half = averaged_band(readings, variances, weights / weights.sum(), missed)
+    states = simulate_batch(problems[0].system, problems[0].batch)
+    runs = []
+    for number, run in enumerate(experiment.runs):
+        n = len(run.time)
+        rows = range(number * len(experiment.outputs), (number + 1) * len(experiment.outputs))
+        series = tuple(
+            _series(output, run, (mean[row, :n], half[row, :n]), known.get(output.name), predicted[0].offset[row])
+            for row, output in zip(rows, experiment.outputs, strict=True)
+        )
+        own = {name: np.asarray(getattr(states, name))[number, :n] for name in STATES}
+        fitted = any(one.role == "fit" and one.sha256 == run.sha256 for one in model.runs)
+        beyond = extrapolations(model, run, own)
+        runs.append(PredictedRun(run.name, run.time, run.inputs, series, own, beyond, run.sha256, fitted))
+    error = integration_error(problems[0], problems[0].system)
+    return Prediction(model, tuple(runs), experiment.step, error, (*model.warnings, *experiment.warnings))
+
+
+def averaged_band(
+    readings: np.ndarray, variances: np.ndarray, weights: np.ndarray, missed: np.ndarray | float
+) -> tuple[np.ndarray, np.ndarray]:
+    """(mean, half width of the band) of the readings (M, ..., N) of likely models, with their variances by their parameters.
+
+    missed: the absolute error that `BAND` of the samples of runs left out stay below, which is in the band beside the variances of
+    parameters and between models; broadcast against (..., N).
+    """
+    mean = np.tensordot(weights, readings, 1)
+    between = np.tensordot(weights, (readings - mean) ** 2, 1)
+    normal = float(stats.norm.ppf(0.5 + 0.5 * BAND))
+    return mean, np.sqrt(normal**2 * (np.tensordot(weights, variances, 1) + between) + np.square(missed))
+
+
+def extrapolations(model: ActuatorModel, run: Run, states: Mapping[str, np.ndarray]) -> tuple[Extrapolation, ...]:
+    """Inputs, temperature, its rate and stress of a run that leave what the model was fitted to, and when."""
+    found = []
+    for name, series in quantities(run.time, run.inputs, states).items():
+        if name not in model.fitted_range:
+            continue
+        low, high = model.fitted_range[name]
+        slack = BEYOND * (high - low) + 1e-5 * max(abs(low), abs(high))
+        outside = (series < low - slack) | (series > high + slack)
+        if outside.mean() > FEW:
+            edges = np.flatnonzero(np.diff(np.concatenate([[False], outside, [False]]).astype(int)))
+            spans = tuple((float(run.time[a]), float(run.time[b - 1])) for a, b in edges.reshape(-1, 2))
+            reached = float(series.min()), float(series.max())
+            share = float(outside.mean())
+            found.append(Extrapolation(name, range_unit(name), (low, high), reached, share, spans))
+    return tuple(found)
+
+
+def _of_outputs(model: ActuatorModel, experiment: Experiment) -> tuple[np.ndarray, tuple[bool, ...], np.ndarray]:
+    """(noise, whether it has an offset, what the band has beside the variances), of each output and each series."""
+    known = {one.name: one for one in model.outputs}
+    normal = float(stats.norm.ppf(0.5 + 0.5 * BAND))
+    noise, offset, missed = [], [], []
+    for output in experiment.outputs:
+        own = known.get(output.name)
+        noise.append(output.noise_sigma if own is None else own.noise)
+        offset.append(output.offset if own is None else own.offset)
+        error = None if own is None else own.prediction_error
+        missed.append(normal * noise[-1] if error is None else error)
+    return np.asarray(noise), tuple(offset), np.tile(missed, len(experiment.runs))[:, None]
+
+
+def _problem(
+    model: ActuatorModel, likely: LikelyModel, experiment: Experiment, noise: np.ndarray, offset: tuple[bool, ...]
+) -> Problem:
+    system = model.system_of(likely.effects, likely.values)
+    batch = pack(experiment.runs, experiment.step, parameter_values(system))
+    return Problem.build(system, batch, jnp.asarray(noise) if len(noise) > 1 else float(noise[0]), offset)
+
+
+class _Predicted(NamedTuple):
+    """By one likely model: reading with the run's offset, its variance by the parameters, (series, N), and the offset, (series,)."""
+
+    reading: np.ndarray
+    variance: np.ndarray
+    offset: np.ndarray
+
+
+def _predicted(problem: Problem, likely: LikelyModel) -> _Predicted:
+    values = problem.start_values()
+    deviation = np.sqrt(np.maximum(np.diag(likely.covariance), 0.0))
+    tangents = np.zeros((1, len(likely.names), len(values)))
+    for row, name in enumerate(likely.names):
+        tangents[0, row, problem.names.index(name)] = deviation[row]
+    predicted, derivatives = predicted_and_derivatives(problem, values[None], tangents)
+    mask = np.asarray(problem.batch.mask) > 0
+    has_offset = np.tile(problem.offset, problem.batch.runs)
+
+    def mean(series: np.ndarray) -> np.ndarray:
+        """Over the measured samples of each series that has an offset; else 0."""
+        total = np.where(mask, series, 0.0).sum(axis=-1) / np.maximum(mask.sum(axis=-1), 1)
+        return np.where(has_offset, total, 0.0)
+
+    offset = mean(problem.measured - predicted[0])
+    reading = predicted[0] + offset[:, None]
+    if not likely.names:
+        return _Predicted(reading, np.zeros_like(reading), offset)
+    columns = derivatives[0] - mean(derivatives[0])[..., None]
+    size = np.where(deviation > 0.0, deviation, 1.0)
+    correlation = likely.covariance / np.outer(size, size)
+    return _Predicted(reading, np.maximum(np.einsum("psn,pq,qsn->sn", columns, correlation, columns), 0.0), offset)
+
+
+def _series(
+    output: Output, run: Run, predicted: tuple[np.ndarray, np.ndarray], known: ModelOutput | None, offset: float
+) -> PredictedSeries:
+    """`predicted`: (reading, half width of the band), (n,) each."""
+    measured, (reading, half) = run.outputs[output.name], predicted
+    present = np.isfinite(measured)
+    error, inside = (measured - reading)[present], (np.abs(measured - reading) <= half)[present]
+    return PredictedSeries(
+        output.name,
+        output.unit,
+        measured,
+        reading,
+        half,
+        output.noise_sigma if known is None else known.noise,
+        float(offset),
+        float(np.sqrt(np.mean(error**2))) if error.size else float("nan"),
+        float(np.mean(inside)) if error.size else float("nan"),
+    )

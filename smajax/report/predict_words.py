@@ -1,0 +1,113 @@
+"""A prediction in sentences and rows: how far off, within which band, and where it extrapolates."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from smajax.attribution.findings import ResidualDiagnostics
+from smajax.attribution.residual_diagnostics import diagnosed
+from smajax.core.display_units import digits, display, label
+from smajax.core.wording import and_listed, times_noise
+from smajax.fit.predict import Extrapolation, PredictedRun, Prediction
+from smajax.report.narrative.residual import residual_sentences
+
+LISTED = 3  # spans of time in a sentence
+HEAD = ("run", "output", "error (rms)", "noise", "error over noise", "in the 90 % band", "unit", "remark")
+
+
+def measured_runs(result: Prediction, output: int = 0) -> list[PredictedRun]:
+    """Those with a sample of that output."""
+    return [run for run in result.runs if np.isfinite(run.series[output].rmse)]
+
+
+def pooled(result: Prediction, output: int) -> tuple[float, float]:
+    """(rms error, share of the samples in the band) of one output over all samples of all runs, SI."""
+    errors = [run.series[output].measured - run.series[output].reading for run in result.runs]
+    widths = [run.series[output].half_width for run in result.runs]
+    error, width = np.concatenate(errors), np.concatenate(widths)
+    present = np.isfinite(error)
+    if not present.any():
+        return float("nan"), float("nan")
+    return float(np.sqrt(np.mean(error[present] ** 2))), float(np.mean(np.abs(error) <= width, where=present))
+
+
+def diagnostics(result: Prediction, output: int = 0) -> ResidualDiagnostics | None:
+    """Of the residual of one output over all runs; None where nothing was measured."""
+    runs = measured_runs(result, output)
+    if not runs:
+        return None
+    residuals, states = [], []
+    for run in runs:
+        one = run.series[output]
+        present = np.isfinite(one.measured)
+        held = {"time": run.time - run.time[0], **run.states}
+        held["temperature_rate"] = np.gradient(run.states["temperature"])
+        held |= {name: values for name, values in run.inputs.items() if name not in held}
+        residuals.append((one.measured - one.reading)[present])
+        states.append({name: np.asarray(values)[present] for name, values in held.items()})
+    return diagnosed(residuals, states, runs[0].series[output].noise)
+
+
+def conclusions(result: Prediction) -> list[str]:
+    """The answer first, then what is left, then where the model extrapolates."""
+    sentences = []
+    for k, one in enumerate(result.runs[0].series):
+        unit = display(one.unit, one.output)
+        error, share = pooled(result, k)
+        if not np.isfinite(error):
+            continue
+        size = f"{digits(unit.of(error), 3)} {unit.unit}".strip()
+        noise = f"{digits(unit.of(one.noise), 3)} {unit.unit}".strip()
+        count = len(measured_runs(result, k))
+        sentences.append(
+            f"The {label(one.output)} of {count} run{'s' if count > 1 else ''} is predicted with an error (rms) of {size}, "
+            f"{times_noise(error / one.noise, f'the noise of {noise}')}; {share:.0%} of the samples lie in the 90 % band."
+        )
+        found = diagnostics(result, k)
+        if found is not None:
+            # The first of its sentences, the size, has been said.
+            sentences += ["The residual is white."] if found.white else residual_sentences(found)[1:]
+    if fitted := [run.name for run in result.runs if run.fitted]:
+        sentences.append(f"The model was fitted to {and_listed(fitted)}: the error there says little of other runs.")
+    sentences += [extrapolation_sentence(run, one) for run in result.runs for one in run.extrapolation]
+    return sentences
+
+
+def extrapolation_sentence(run: PredictedRun, one: Extrapolation) -> str:
+    unit = display(one.unit, one.quantity)
+
+    def of(value: float) -> str:
+        return digits(unit.of(value), 4)
+
+    low, high = one.reached[0] < one.fitted[0], one.reached[1] > one.fitted[1]
+    reached = " and ".join([f"down to {of(one.reached[0])}"] * low + [f"up to {of(one.reached[1])}"] * high)
+    spans = [f"{start:.4g} s to {end:.4g} s" for start, end in one.spans]
+    if len(spans) > LISTED:
+        spans = [f"{one.spans[0][0]:.4g} s to {one.spans[-1][1]:.4g} s, with gaps"]
+    return (
+        f"Extrapolation in {run.name}: {label(one.quantity)} goes {reached} {unit.unit}; the model was fitted to {of(one.fitted[0])} to "
+        f"{of(one.fitted[1])} {unit.unit}. {one.share:.0%} of the samples, from {and_listed(spans)}."
+    ).replace(" ;", ";")
+
+
+def run_rows(result: Prediction) -> list[tuple[str, ...]]:
+    """A row a run and output, as `HEAD`."""
+    rows: list[tuple[str, ...]] = []
+    for run in result.runs:
+        remarks = ["fitted to it"] * run.fitted + ["extrapolation"] * bool(run.extrapolation)
+        for one in run.series:
+            unit = display(one.unit, one.output)
+            known = np.isfinite(one.rmse)
+            rows.append(
+                (
+                    run.name,
+                    label(one.output),
+                    digits(unit.of(one.rmse), 3) if known else "not measured",
+                    digits(unit.of(one.noise), 3),
+                    digits(one.rmse / one.noise, 3) if known else "",
+                    f"{one.coverage:.0%}" if known else "",
+                    unit.unit,
+                    ", ".join(remarks),
+                )
+            )
+    return rows

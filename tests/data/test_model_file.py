@@ -1,0 +1,260 @@
+"""A model as a file: what is written is read again, and what is wrong with one is said as of an experiment file."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from smajax.core.parameters import get_parameters, parameter_values
+from smajax.data.experiment.errors import ExperimentError
+from smajax.data.experiment.record import Prior
+from smajax.data.experiment.schema import ChannelSection, LogFormat, SamplingSection, TimeSection
+from smajax.data.model_file.actuator_model import ActuatorModel
+from smajax.data.model_file.of_presets import model_of_presets
+from smajax.data.model_file.read import load_model
+from smajax.data.model_file.record import FittedRun, LikelyModel, ModelOutput, ModelParameter
+from smajax.data.open_experiment import open_experiment
+from smajax.fit.base_model import base_model
+from smajax.model.extended import extended
+from smajax.model.presets import build
+from tests.helpers.small_bench import bench
+
+FITTED = {"convection_coefficient": 89.89379596500423, "specific_heat": 559.3696799656494}
+LATENT = {**FITTED, "latent_heat.enthalpy": 24243.742564828313}
+COVARIANCE = np.array([[0.0104, 0.02, 1.5], [0.02, 0.7207, 6.0], [1.5, 6.0, 997.0]])
+
+
+def fitted_model() -> ActuatorModel:
+    """A dead weight with a latent heat, another likely model without, everything that a file may hold."""
+    known = model_of_presets("flexinol_table_3_2", "dead_weight", "voltage", "brinson").parameters
+    system = extended(build("flexinol_table_3_2", "dead_weight", "voltage", "brinson"), ["latent_heat"])
+    values = {name: known.get(name) or ModelParameter(0.0, "preset", 0.0, 6e4) for name in parameter_values(system)}
+    boxes = {
+        "convection_coefficient": (30.0, 300.0),
+        "specific_heat": (200.0, 1500.0),
+        "latent_heat.enthalpy": (0.0, 6e4),
+    }
+    errors = np.sqrt(np.diag(COVARIANCE))
+    for (name, value), error in zip(LATENT.items(), errors, strict=True):
+        values[name] = ModelParameter(value, "fitted", *boxes[name], float(f"{error:.6g}"))
+    values["wire_diameter"] = ModelParameter(0.00031, "given", *_ends(known["wire_diameter"]))
+    return ActuatorModel(
+        title='A "bench" of 2 µm\ttabs',
+        wire="flexinol_table_3_2",
+        load="dead_weight",
+        drive="voltage",
+        law="brinson",
+        effects=("latent_heat",),
+        parameters=values,
+        outputs=(ModelOutput("position", "m", 1e-4, True, 1.65e-4),),
+        likely=(
+            LikelyModel(
+                ("latent_heat",), 0.9, LATENT, tuple(LATENT), COVARIANCE, {"specific_heat": Prior(600.0, 0.2, True)}
+            ),
+            LikelyModel((), 0.1, FITTED, tuple(FITTED), COVARIANCE[:2, :2]),
+        ),
+        fitted_range={"voltage": (0.0, 5.462), "temperature": (23.0, 117.358), "stress": (7.6e7, 1.43e8)},
+        runs=(FittedRun("steps", "fit", "ab12"), FittedRun("ramp", "held-out", "cd34")),
+        log_format=LogFormat(
+            channels={
+                "voltage": ChannelSection(role="input", column="U [V]", unit="V"),
+                "position": ChannelSection(role="output", column=3, unit="mm", noise="0.1 mm", reversed=True),
+            },
+            time=TimeSection(column="t", unit="ms"),
+            sampling=SamplingSection(step="100 ms"),
+            decimal=",",
+        ),
+        made_with={"experiment": "experiment.toml"},
+    )
+
+
+def _ends(one: ModelParameter) -> tuple[float, float]:
+    return one.low, one.high
+
+
+def same(one: ActuatorModel, other: ActuatorModel) -> None:
+    """Equal in every field; the covariances as arrays."""
+    for field in dataclasses.fields(ActuatorModel):
+        if field.name != "likely":
+            assert getattr(one, field.name) == getattr(other, field.name), field.name
+    for mine, its in zip(one.likely, other.likely, strict=True):
+        np.testing.assert_array_equal(mine.covariance, its.covariance)
+        empty = np.zeros((0, 0))
+        assert dataclasses.replace(mine, covariance=empty).__dict__.keys() == its.__dict__.keys()
+        for name in ("effects", "probability", "values", "names", "priors"):
+            assert getattr(mine, name) == getattr(its, name), name
+
+
+def test_what_is_written_is_read_again_to_the_last_bit(tmp_path: Path) -> None:
+    model = fitted_model()
+    path = model.save(tmp_path / "model.toml")
+    again = load_model(path)
+    same(model, again)
+    assert path.read_text(encoding="utf-8") == again.save(tmp_path / "again.toml").read_text(encoding="utf-8").replace(
+        "again.nc", "model.nc"
+    )
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["again.nc", "again.toml", "model.nc", "model.toml"]
+    same(again, load_model(tmp_path))  # the folder of a model.toml
+
+
+def test_presets_are_such_a_file_and_build_the_same_system(tmp_path: Path) -> None:
+    path = model_of_presets("niti_table_3_1", "arm", "amplified_voltage").save(tmp_path / "arm.toml")
+    model = load_model(path)
+    assert parameter_values(model.system) == parameter_values(build("niti_table_3_1", "arm", "amplified_voltage"))
+    assert not (tmp_path / "arm.nc").exists()
+
+
+def test_a_file_by_hand_needs_its_parts_and_the_values_that_differ(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(
+        'format = 1\n[model]\nwire = "flexinol_table_3_2"\nload = "dead_weight"\ndrive = "voltage"\n'
+        'effects = ["latent_heat"]\n[parameters]\nwire_length = "420 mm"\n"latent_heat.enthalpy" = "12 J/g"\n'
+        'convection_coefficient = { value = "90 W/m^2/K", origin = "fitted", standard_error = "3 W/m^2/K" }\n',
+        encoding="utf-8",
+    )
+    model = load_model(path)
+    assert model.values["wire_length"] == pytest.approx(0.42, rel=1e-12)
+    assert model.values["latent_heat.enthalpy"] == 12000.0
+    assert model.parameters["convection_coefficient"].standard_error == 3.0
+    assert model.parameters["wire_diameter"].origin == "preset"
+
+
+def test_a_value_that_is_changed_by_hand_is_known_and_the_others_keep_their_covariance(tmp_path: Path) -> None:
+    path = fitted_model().save(tmp_path / "model.toml")
+    text = path.read_text(encoding="utf-8")
+    line = next(one for one in text.splitlines() if one.startswith("specific_heat"))
+    path.write_text(text.replace(line, 'specific_heat = "600 J/kg/K"'), encoding="utf-8")
+    model = load_model(path)
+    assert model.values["specific_heat"] == 600.0
+    assert model.likely[0].names == ("convection_coefficient", "latent_heat.enthalpy")
+    np.testing.assert_array_equal(model.likely[0].covariance, COVARIANCE[np.ix_([0, 2], [0, 2])])
+    assert all("specific_heat" not in one.values for one in model.likely)
+    assert "specific_heat" in model.warnings[0]
+    # In the other likely model it is the changed value too.
+    assert parameter_values(model.system_of((), model.likely[1].values))["specific_heat"] == 600.0
+
+
+def test_draws_have_the_covariance_and_the_probabilities_of_the_file() -> None:
+    model = fitted_model()
+    drawn = np.asarray(get_parameters(model.plants(4000, seed=3), list(LATENT))).T
+    values = drawn[drawn[:, 2] > 0.0]
+    assert len(values) / len(drawn) == pytest.approx(0.9, abs=0.02)
+    np.testing.assert_allclose(values.mean(axis=0), list(LATENT.values()), rtol=2e-3)
+    scale = np.sqrt(np.outer(np.diag(COVARIANCE), np.diag(COVARIANCE)))
+    np.testing.assert_allclose(np.cov(values.T) / scale, COVARIANCE / scale, atol=0.06)
+    plants = model.plants(5, seed=1)
+    assert plants.wire.heat.convection_coefficient.shape == (5,)
+    assert [one.effect_name for one in plants.effects] == ["latent_heat"]
+
+
+def test_draws_lie_within_the_bounds() -> None:
+    model = fitted_model()
+    wide = dataclasses.replace(model.likely[0], covariance=1e6 * COVARIANCE)
+    drawn = [parameter_values(one) for one in dataclasses.replace(model, likely=(wide,)).draws(50)]
+    assert {one["convection_coefficient"] for one in drawn} >= {30.0, 300.0}
+    assert all(30.0 <= one["convection_coefficient"] <= 300.0 for one in drawn)
+
+
+GOOD = 'format = 1\n[model]\nwire = "flexinol_table_3_2"\nload = "dead_weight"\ndrive = "voltage"\n'
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (GOOD.replace("format = 1", "format = 7"), r"format: got 7, expected 1 to 1; it is from a later version"),
+        (GOOD.replace("format = 1\n", ""), r"format: is missing; expected a whole number, 1"),
+        (GOOD.replace("dead_weight", "dead_wieght"), r"model\.load: there is no load 'dead_wieght'; did you mean"),
+        (GOOD.replace('drive = "voltage"\n', ""), r"model\.drive: is missing; expected the name of a drive"),
+        (GOOD.replace('"voltage"', '"none"'), r"model: load `dead_weight` with drive `none`"),
+        (GOOD + 'effects = ["latent_hat"]\n', r"model\.effects: there is no effect 'latent_hat'; did you mean"),
+        (GOOD + '[parameters]\nwire_lenght = "1 m"\n', r"parameters\.wire_lenght: there is no parameter 'wire_lenght'"),
+        (
+            GOOD + '[parameters]\nwire_length = "1 kg"\n',
+            r"parameters\.wire_length: got unit 'kg', expected one like 'm'",
+        ),
+        (
+            GOOD + '[parameters]\nwire_length = "1000 m"\n',
+            r"parameters\.wire_length: got '1000 m', that is 1000 m; expected",
+        ),
+        (
+            GOOD + '[parameters]\n"latent_heat.enthalpy" = "1 J/g"\n',
+            r"is of an effect that the model has not; add 'latent_heat' to \[model\] effects",
+        ),
+        (
+            GOOD + '[parameters]\nwire_length = { value = "1 m", origin = "measured" }\n',
+            r"parameters\.wire_length\.origin: got 'measured', expected 'fitted', 'given' or 'preset'",
+        ),
+        (GOOD + '[parameters]\naustenite_start = "90 degC"\n', r"parameters\.austenite_start: "),
+        (GOOD + '[outputs.angle]\nnoise = "1 deg"\n', r"outputs\.angle: there is no output 'angle'"),
+        (GOOD + '[outputs.position]\nnoise = "0 mm"\n', r"outputs\.position\.noise: got '0 mm', expected a size above"),
+        (GOOD + '[fitted_range]\nvoltage = ["5 V", "1 V"]\n', r"fitted_range\.voltage: got '5 V' and '1 V'"),
+        (GOOD + '[fitted_range]\nvolts = ["5 V", "1 V"]\n', r"fitted_range\.volts: there is no quantity 'volts'"),
+        ("uncertainty = '../x.nc'\n" + GOOD, r"uncertainty: got '\.\./x\.nc', expected the name of a file in the same"),
+        ("uncertainty = 'x.nc'\n" + GOOD, r"uncertainty: .*x\.nc cannot be read .*put it beside this file"),
+        ("[[runs]]\nname = 'A'\n", r"is an experiment file, expected a model file; `smajax close-loop` makes one"),
+        ("not toml at all", r"is not TOML"),
+        ("a = " + "[" * 5000, r"is not TOML"),
+    ],
+)
+def test_what_is_wrong_with_a_file_is_said_with_its_key(tmp_path: Path, text: str, said: str) -> None:
+    path = tmp_path / "model.toml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(ExperimentError, match=said):
+        load_model(path)
+
+
+def test_a_foreign_or_a_cut_netcdf_file_is_refused(tmp_path: Path) -> None:
+    path = fitted_model().save(tmp_path / "model.toml")
+    beside = tmp_path / "model.nc"
+    whole = beside.read_bytes()
+    dataclasses.replace(fitted_model(), likely=fitted_model().likely[:1]).save(tmp_path / "other.toml")
+    for content in (b"", b"no NetCDF", whole[: len(whole) // 2], (tmp_path / "other.nc").read_bytes()):
+        beside.write_bytes(content)
+        with pytest.raises(ExperimentError, match=r"uncertainty: .*model\.nc is not what was written with this file"):
+            load_model(path)
+
+
+def test_no_other_name_and_no_folder_are_written_to(tmp_path: Path) -> None:
+    with pytest.raises(ExperimentError, match=r"expected a name that ends in \.toml"):
+        fitted_model().save(tmp_path / "model.nc")
+    with pytest.raises(ExperimentError, match="there is no such file; expected a model file"):
+        load_model(tmp_path / "none.toml")
+
+
+def test_an_experiment_may_begin_from_a_model_file(tmp_path: Path) -> None:
+    (tmp_path / "kept").mkdir()
+    fitted_model().save(tmp_path / "kept" / "model.toml")
+    presets = 'wire = "flexinol_table_3_2"\nload = "dead_weight"\ndrive = "voltage"\n'
+    file = bench(tmp_path, (presets, 'file = "kept/model.toml"\n'))
+    experiment = open_experiment(file)
+    values = parameter_values(base_model(experiment))
+    assert experiment.law == "brinson"
+    assert experiment.parameters == {"wire_diameter": 0.00031}
+    assert experiment.declared_effects == ("latent_heat",)
+    assert values["specific_heat"] == FITTED["specific_heat"]
+    assert values["latent_heat.enthalpy"] == LATENT["latent_heat.enthalpy"]
+    assert values["convection_coefficient"] == 100.0  # the start of the unknown
+    kept = experiment.model_file
+    assert kept is not None
+    assert kept.errors.keys() == LATENT.keys()
+
+
+@pytest.mark.parametrize(
+    ("new", "said"),
+    [
+        ('file = "model.toml"\nwire = "flexinol_table_3_2"\n', r"model: got file and wire; the file says its wire"),
+        (
+            'wire = "flexinol_table_3_2"\n',
+            r"model\.load: is missing; expected the name of a load, as text; or file = 'model.toml'",
+        ),
+        ('file = "none.toml"\n', r"model\.file: .*none\.toml: there is no such file; expected a model file"),
+        ('file = "experiment.toml"\n', r"model\.file: .*is an experiment file, expected a model file"),
+    ],
+)
+def test_a_model_section_names_presets_or_a_file(tmp_path: Path, new: str, said: str) -> None:
+    presets = 'wire = "flexinol_table_3_2"\nload = "dead_weight"\ndrive = "voltage"\n'
+    with pytest.raises(ExperimentError, match=said):
+        open_experiment(bench(tmp_path, (presets, new)))

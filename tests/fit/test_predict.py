@@ -1,0 +1,213 @@
+"""A kept model against runs: its reading, its band, and where a run is outside of what the model was fitted to."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import smajax as sma
+from smajax.data.experiment.errors import ExperimentError
+from smajax.data.model_file.actuator_model import ActuatorModel
+from smajax.data.model_file.of_presets import model_of_presets
+from smajax.data.model_file.record import FittedRun, LikelyModel, ModelOutput
+from smajax.fit.predict import Prediction, averaged_band
+from smajax.report.predict_words import conclusions
+from tests.helpers.small_bench import bench, smajax, table
+
+VALUES = {"convection_coefficient": 90.0, "specific_heat": 500.0}
+TIME = np.arange(0.0, 30.0, 0.1)
+VOLTS = np.where((TIME > 2.0) & (TIME < 15.0), 5.0, np.where(TIME < 22.0, 0.0, 4.0))
+NOISE = 1e-4  # m
+
+
+def kept_model(volts: float = 5.0, **changes: object) -> ActuatorModel:
+    """The preset's dead weight with two values known to a per cent, fitted to runs of up to `volts`."""
+    preset = model_of_presets("flexinol_table_3_2", "dead_weight", "flexinol_voltage")
+    known = dict(preset.parameters)
+    for name, value in VALUES.items():
+        known[name] = dataclasses.replace(known[name], value=value, origin="fitted", standard_error=0.01 * value)
+    covariance = np.diag([(0.01 * value) ** 2 for value in VALUES.values()])
+    return dataclasses.replace(
+        preset,
+        title="bench",
+        parameters=known,
+        outputs=(ModelOutput("position", "m", NOISE, False),),
+        likely=(LikelyModel((), 1.0, VALUES, tuple(VALUES), covariance),),
+        fitted_range={"voltage": (0.0, volts), "temperature": (20.0, 200.0)},
+        **changes,
+    )
+
+
+def reading(model: ActuatorModel, **values: float) -> np.ndarray:
+    """What the load's sensor shows over `VOLTS`, m."""
+    system = sma.set_parameters(model.system, values)
+    run = sma.simulate_dataset(system, {"voltage": VOLTS}, dt=0.1, tolerance=1e-6)
+    return run["reading"].to_numpy()
+
+
+def log(path: Path, position: np.ndarray, noise: float = NOISE, heading: str = "t [s],U [V],x [mm]") -> Path:
+    position = position + np.random.default_rng(5).normal(0.0, noise, position.size)
+    return table(path, TIME, VOLTS, 1e3 * position, heading)
+
+
+def of(prediction: Prediction) -> np.ndarray:
+    return prediction.runs[0].series[0].reading
+
+
+def test_a_run_of_the_same_wire_is_predicted_to_its_noise_and_nine_of_ten_samples_lie_in_the_band(
+    tmp_path: Path,
+) -> None:
+    model = kept_model()
+    truth = reading(model)
+    result = sma.predict(model, log(tmp_path / "run.csv", truth))
+    one = result.runs[0].series[0]
+    np.testing.assert_allclose(one.reading, truth, atol=0.1 * NOISE)
+    assert one.rmse == pytest.approx(NOISE, rel=0.15)
+    assert 0.85 < one.coverage <= 1.0
+    assert not result.runs[0].fitted
+    assert not result.runs[0].extrapolation
+    assert "0.96 times the noise of 0.1 mm; 92% of the samples lie in the 90 % band" in conclusions(result)[0]
+
+
+def test_the_band_holds_wires_that_differ_as_the_parameters_errors_say(tmp_path: Path) -> None:
+    model = kept_model()
+    inside = []
+    for number, plant in enumerate(model.draws(12, seed=4)):
+        values = {name: float(sma.parameter_values(plant)[name]) for name in VALUES}
+        path = log(tmp_path / f"{number}.csv", reading(model, **values), noise=1e-6)
+        one = sma.predict(dataclasses.replace(model, outputs=(ModelOutput("position", "m", 1e-6, False),)), path).runs[
+            0
+        ]
+        moving = one.series[0].half_width > 1e-5
+        error = np.abs(one.series[0].measured - one.series[0].reading)
+        inside.append(np.mean((error <= one.series[0].half_width)[moving]))
+    assert 0.7 < np.mean(inside) < 1.0  # of runs, not of samples: twelve wires
+
+
+def test_a_zero_of_the_sensor_is_each_runs_own_only_where_the_model_has_one(tmp_path: Path) -> None:
+    model = kept_model()
+    path = log(tmp_path / "run.csv", reading(model) + 3e-3)
+    assert sma.predict(model, path).runs[0].series[0].rmse == pytest.approx(3e-3, rel=0.05)
+    own = dataclasses.replace(model, outputs=(ModelOutput("position", "m", NOISE, True),))
+    one = sma.predict(own, path).runs[0].series[0]
+    assert one.rmse == pytest.approx(NOISE, rel=0.15)
+    assert one.offset == pytest.approx(3e-3, rel=0.02)
+
+
+def test_the_average_of_likely_models_lies_between_them_with_their_difference_in_the_band() -> None:
+    readings, variances = np.array([[[0.0, 0.0]], [[1.0, 2.0]]]), np.zeros((2, 1, 2))
+    mean, half = averaged_band(readings, variances, np.array([0.75, 0.25]), 0.0)
+    np.testing.assert_allclose(mean, [[0.25, 0.5]])
+    # The variance of a mixture of two points: w (1 - w) d^2; 1.645 standard deviations.
+    np.testing.assert_allclose(half, 1.6448536 * np.sqrt(0.75 * 0.25) * np.array([[1.0, 2.0]]), rtol=1e-6)
+
+
+def test_a_run_beyond_the_fitted_range_is_said_to_be_extrapolation_with_where(tmp_path: Path) -> None:
+    model = kept_model(volts=4.2)
+    result = sma.predict(model, log(tmp_path / "run.csv", reading(model)))
+    (beyond,) = result.runs[0].extrapolation
+    assert beyond.quantity == "voltage"
+    assert beyond.reached == (0.0, 5.0)
+    np.testing.assert_allclose(beyond.spans, [(2.1, 14.9)], atol=0.11)
+    text = conclusions(result)[-1]
+    assert "Extrapolation in run: voltage goes up to 5 V; the model was fitted to 0 to 4.2 V" in text
+
+
+def test_a_run_that_the_model_was_fitted_to_is_said_to_be_one(tmp_path: Path) -> None:
+    model = kept_model()
+    path = log(tmp_path / "run.csv", reading(model))
+    digest = sma.predict(model, path).runs[0].sha256
+    known = dataclasses.replace(model, runs=(FittedRun("steps", "fit", digest),))
+    result = sma.predict(known, path)
+    assert result.runs[0].fitted
+    assert any("was fitted to run" in one for one in conclusions(result))
+
+
+def test_missing_samples_are_predicted_and_not_counted(tmp_path: Path) -> None:
+    model, path = kept_model(), bench(tmp_path, ('noise = "0.1 mm"', 'noise = "0.1 mm"\nmissing = "skip"'))
+    text = path.read_text(encoding="utf-8").replace('drive = "voltage"', 'drive = "flexinol_voltage"')
+    path.write_text(text, encoding="utf-8")
+    truth = reading(model)
+    rows = np.stack([TIME, VOLTS, 1e3 * truth], axis=1)
+    lines = [",".join(f"{one:.6g}" for one in row) for row in rows]
+    lines[100:140] = [f"{row[0]:.6g},{row[1]:.6g}," for row in rows[100:140]]
+    for name in ("a.csv", "b.csv"):
+        (tmp_path / name).write_text("t,U,x\n" + "\n".join(lines) + "\n", encoding="utf-8")
+    one = sma.predict(model, path).runs[0].series[0]
+    assert np.isnan(one.measured[105:135]).all()
+    np.testing.assert_allclose(one.reading, truth, atol=0.1 * NOISE)
+    assert one.rmse < 0.2 * NOISE
+
+
+def test_columns_are_those_of_the_models_logs_or_guessed(tmp_path: Path) -> None:
+    model = kept_model()
+    path = log(tmp_path / "run.csv", reading(model))
+    guessed = sma.predict(model, path)
+    assert any("position in mm" in one for one in guessed.warnings)
+    file = bench(tmp_path / "other", ('drive = "voltage"', 'drive = "flexinol_voltage"'))
+    known = dataclasses.replace(model, log_format=sma.load_experiment(file).log_format)
+    again = log(tmp_path / "again.csv", reading(model), heading="t,U,x")
+    result = sma.predict(known, [again, again.rename(tmp_path / "b.csv")][1:])
+    np.testing.assert_array_equal(of(result), of(guessed))
+    assert result.warnings == ()
+
+
+@pytest.mark.parametrize(
+    ("logs", "said"),
+    [
+        (["none.csv"], r"none\.csv: there is no such file; expected a log, or an experiment file"),
+        (["bench/experiment.toml", "run.csv"], r"is an experiment file beside other files; give it alone"),
+        (["strange.csv"], r"strange\.csv: .*or give an experiment file, which says what its columns are"),
+    ],
+)
+def test_what_cannot_be_predicted_is_refused_by_name(tmp_path: Path, logs: list[str], said: str) -> None:
+    model = kept_model()
+    bench(tmp_path / "bench")
+    log(tmp_path / "run.csv", reading(model))
+    table(tmp_path / "strange.csv", TIME, VOLTS, VOLTS, "foo,bar,baz")
+    with pytest.raises(ExperimentError, match=said):
+        sma.predict(model, [tmp_path / one for one in logs])
+
+
+def test_runs_of_another_load_are_refused(tmp_path: Path) -> None:
+    file = bench(tmp_path, ('load = "dead_weight"', 'load = "bias_spring"'))
+    with pytest.raises(ExperimentError, match=r"got 'bias_spring', expected that of the model, 'dead_weight'"):
+        sma.predict(kept_model(), file)
+
+
+def test_the_command_writes_page_record_and_series_and_a_saved_model_predicts_the_same_bytes(tmp_path: Path) -> None:
+    model = kept_model()
+    path = model.save(tmp_path / "model.toml")
+    run = log(tmp_path / "run.csv", reading(model))
+    ended = smajax("predict", path, run, "--out", tmp_path / "out")
+    assert ended.code == 0, ended.said
+    assert "is predicted with an error (rms) of" in ended.out
+    written = {one.name for one in (tmp_path / "out").iterdir() if not one.name.startswith(".")}
+    assert written == {"predict.html", "predict.json", "runs.csv"}
+    from smajax.report.csv_files import predicted_runs
+
+    assert (tmp_path / "out" / "runs.csv").read_text(encoding="utf-8") == predicted_runs(sma.predict(model, run))
+    again = smajax("predict", path, run, "--out", tmp_path / "out", "--json")
+    assert '"band_coverage"' in again.out
+    one = sma.predict(sma.load_model(path), run)
+    assert of(one).tobytes() == of(sma.predict(model, run)).tobytes()
+    assert one.runs[0].series[0].half_width.tobytes() == sma.predict(model, run).runs[0].series[0].half_width.tobytes()
+
+
+def test_values_and_constant_inputs_of_the_runs_may_be_given_with_the_command(tmp_path: Path) -> None:
+    model = kept_model()
+    path = model.save(tmp_path / "model.toml")
+    run = log(tmp_path / "run.csv", reading(model, load_mass=0.5))
+    wrong = sma.predict(model, run).runs[0].series[0].rmse
+    for words in (["--set", "load_mass=500 g"], ["--input", "mass=0.5 kg"]):
+        ended = smajax("predict", path, run, *words, "--out", tmp_path / words[0].strip("-"))
+        assert ended.code == 0, ended.said
+    right = sma.predict(model, run, parameters={"load_mass": "500 g"}).runs[0].series[0]
+    assert wrong > 3.0 * NOISE
+    assert right.rmse == pytest.approx(NOISE, rel=0.15)
+    mass = sma.predict(model, run, inputs={"mass": "0.5 kg"}).runs[0]
+    assert mass.series[0].rmse == pytest.approx(NOISE, rel=0.15)
+    assert smajax("predict", path, run, "--set", "load_mas=1 kg", "--out", tmp_path / "x").code == 2
