@@ -15,6 +15,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 
 from smajax.attribution.config import AttributionConfig
+from smajax.attribution.prior_finding import PriorFinding
 from smajax.data.model_file.actuator_model import ActuatorModel
 from smajax.fit.integration import IntegrationError
 from smajax.fit.uncertainty import Remark
@@ -97,26 +98,6 @@ class AssumedParameter:
     unit: str
     value: float  # SI
     size_not_given: bool  # a size of the wire or a number of the load that is the preset's in every run
-
-
-@dataclass(frozen=True)
-class PriorFinding:
-    """What the experiment file says of a prior, as it was used, and what stands in its place without it (None: nothing, the value is held).
-
-    Of an effect, by its name, `odds` alone; of a coefficient ("latent_heat.enthalpy") and of a value of a preset the others, SI. `width` is of the
-    natural logarithm where `logarithmic`.
-    """
-
-    name: str
-    unit: str = ""
-    odds: float | None = None
-    base: float | None = None
-    width: float | None = None
-    logarithmic: bool = False
-    library_odds: float | None = None
-    library_base: float | None = None
-    library_width: float | None = None
-    library_logarithmic: bool = False
 
 
 @dataclass(frozen=True)

@@ -7,13 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from smajax.attribution.declared_priors import NONE_DECLARED
-from smajax.attribution.findings import CoefficientFinding, EffectFinding, ParameterFinding, PriorFinding
+from smajax.attribution.findings import CoefficientFinding, EffectFinding, ParameterFinding
 from smajax.attribution.job import Job
 from smajax.attribution.joint_parameters import JointParameters
 from smajax.attribution.leave_one_run_out import jackknife_error
 from smajax.attribution.model_fits import Evidence, Model, Search
 from smajax.attribution.nuisance_grid import scores_at
-from smajax.attribution.preset_priors import preset_priors
+from smajax.attribution.preset_priors import fitted_priors, preset_priors
+from smajax.attribution.prior_finding import PriorFinding
 from smajax.core.parameters import parameter_values, parameters
 from smajax.data.experiment.record import DeclaredPriors, Prior
 from smajax.fit.base_model import base_model
@@ -141,6 +142,8 @@ def priors_found(job: Job, setting: Search) -> tuple[PriorFinding, ...]:
     ]
     model = base_model(job.experiment)
     held_or_free = preset_priors(parameters(model), parameter_values(model), frozenset())
+    if job.experiment.model_file is not None:
+        held_or_free |= fitted_priors(job.experiment.model_file, frozenset())
     before = {**library.priors, **{name: held_or_free.get(name) for name in declared.presets}}
     for name in (*declared.coefficients, *declared.presets):
         if name not in ours.priors:

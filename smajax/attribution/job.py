@@ -67,6 +67,8 @@ def job_of(experiment: Experiment, integration: Integration | None = None) -> Jo
     presets = preset_priors(parameters(base), parameter_values(base), given, experiment.priors.presets)
     bounds |= preset_bounds(presets, bounds)
     if experiment.model_file is not None:
-        presets |= fitted_priors(experiment.model_file, given | experiment.priors.presets.keys())
-        bounds |= {name: one for name, one in experiment.model_file.bounds.items() if name in presets}
+        # What this experiment file says of them goes before what a fit left.
+        stated = experiment.priors.presets.keys()
+        presets |= fitted_priors(experiment.model_file, given | stated)
+        bounds |= {name: one for name, one in experiment.model_file.bounds.items() if name in presets.keys() - stated}
     return Job(experiment, runs, problem, held_out, unknowns, bounds, names, presets)

@@ -86,8 +86,10 @@ def visible(
     at: Sensitivity, values: Mapping[str, float], presets: Mapping[str, CoefficientPrior]
 ) -> dict[str, CoefficientPrior]:
     """Those of `presets` of which one width changes the runs by more than the noise, by the Jacobian at the base fit."""
+
+    def width(name: str, prior: CoefficientPrior) -> float:
+        return prior.sigma * values[name] if prior.logarithmic else prior.sigma
+
     return {
-        name: one
-        for name, one in presets.items()
-        if np.linalg.norm(at.columns([name])) * one.sigma * (values[name] if one.logarithmic else 1.0) > VISIBLE
+        name: one for name, one in presets.items() if np.linalg.norm(at.columns([name])) * width(name, one) > VISIBLE
     }

@@ -29,7 +29,10 @@ def saved_model(
 ) -> ActuatorModel:
     """`model` with its parameters `found`; with the likely models of `average`, where predictions are those of an average."""
     own = search.joint.ordered(model.effects)
-    weighted = likely_models(search, model) if average is not None else [(search.fitted[own], 1.0)]
+    weighted = [(search.fitted[own], 1.0)]
+    if average is not None:  # of one fit run nothing is averaged, and no model has been checked
+        checked = [(search.fitted[one.effects], one.weight) for one in average.models]
+        weighted = checked or likely_models(search, model)
     # The model itself first, whatever its weight.
     weighted = sorted(weighted, key=lambda one: one[0].effects != own)
     likely = [

@@ -68,6 +68,13 @@ def test_the_value_that_was_not_given_comes_out_with_its_standard_error(found: t
     assert modulus.prior_deviation == pytest.approx(np.log(modulus.value / modulus.start) / RELATIVE[NAME][0])
 
 
+def test_the_saved_model_has_the_models_that_predictions_are_averaged_over(found: tuple[Findings, float]) -> None:
+    findings, _ = found
+    assert findings.extended_model is not None
+    saved = {one.effects: one.probability for one in findings.extended_model.likely}
+    assert saved == {one.effects: one.weight for one in findings.averaged}
+
+
 @pytest.mark.slow  # another loop
 def test_values_that_the_file_gives_are_held_and_an_effect_stands_in_for_the_wrong_one() -> None:
     experiment, _ = _bench()

@@ -11,6 +11,8 @@ from smajax.data.experiment.errors import ExperimentError
 from smajax.data.experiment.load import load_experiment
 from smajax.data.experiment.record import DeclaredPriors, Experiment, PriorSpread
 from smajax.data.model_catalogue import CATALOGUE
+from smajax.data.model_file.of_presets import model_of_presets
+from smajax.data.model_file.write import write_model
 from smajax.model.effects.candidate import PRIOR_ODDS
 from tests.helpers.small_bench import bench
 
@@ -139,3 +141,12 @@ def test_the_page_of_keys_has_every_section_and_key_that_the_reader_knows() -> N
         for key in kind.model_fields if kind is not None else ():
             if (*section, key) not in schema._PLACES and (*section, key, "*") not in schema._PLACES:
                 assert f"`{key}`" in table or f"{key} = " in table or f"[{key}" in table, (section, key)
+
+
+def test_what_a_model_file_fitted_is_as_uncertain_as_the_experiment_file_says(tmp_path: Path) -> None:
+    model = model_of_presets("flexinol_table_3_2", "dead_weight", "voltage")
+    write_model(model, tmp_path / "model.toml")
+    own = 'wire = "flexinol_table_3_2"\nload = "dead_weight"\ndrive = "voltage"'
+    read = _load(tmp_path, "[priors.presets]\nthermal_modulus = { relative = 0.1 }", (own, 'file = "model.toml"'))
+    assert read.model_file is not None
+    assert read.priors.presets == {"thermal_modulus": PriorSpread(None, 0.1, True)}

@@ -190,12 +190,12 @@ def test_a_value_of_a_preset_far_from_its_prior_is_reported_with_the_distance() 
         for name, (value, widths) in fitted.items()
     )
     said = _summary(after=after)
-    far = "far_modulus ends 3.1 widths of its prior above the preset's value, 7.5e4 MPa"
+    far = "far_modulus ends 3.1 widths of its prior above the middle of that, 7.5e4 MPa"
     assert f"Mind: {far}; low_modulus ends 2.5 widths" in said.replace(" and low", "; low")
     assert "near_modulus" not in said
     assert "edge_modulus" not in said
     page = findings_to_html(dataclasses.replace(made_findings(), after=after))
-    assert "2.5 widths of its prior below the preset&#39;s value" in page
+    assert "2.5 widths of its prior below the middle of that" in page
     at_its_bound = dataclasses.replace(after[2], remark=Remark(RemarkKind.UPPER_BOUND))
     assert "widen its bounds" not in _summary(after=(at_its_bound,))  # the file has none of it
 

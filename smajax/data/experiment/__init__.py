@@ -1,7 +1,7 @@
 """`experiment.toml` and the measured files that it names, as one validated record.
 
 In: the file (`schema`), a `Catalogue` of presets and parameters (`model_description`), tables of measured files (`readers`).
-Out: `record.Experiment` with `Run`, `Output`, `Unknown` and `Prior`; warnings where data are implausible
+Out: `record.Experiment` with `Run`, `Output`, `Unknown`, `Prior` and `DeclaredPriors`; warnings where data are implausible
 (`plausibility`, `magnitude`, `headings`); `ExperimentError` with file, key, value and remedy.
 
 Public: `load.load_experiment`, `record.Experiment`, `errors.ExperimentError`, `fingerprint.fingerprint` (which experiment a

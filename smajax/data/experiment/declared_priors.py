@@ -9,7 +9,7 @@ from smajax.core.names import close_matches, of_many
 from smajax.core.units import parse_quantity
 from smajax.data.experiment.errors import ExperimentError, at_key, check_name
 from smajax.data.experiment.model_description import Catalogue, CoefficientInfo, ModelDescription, ParameterInfo
-from smajax.data.experiment.record import DeclaredPriors, PriorSpread
+from smajax.data.experiment.record import DeclaredPriors, FromModelFile, PriorSpread
 from smajax.data.experiment.schema import CoefficientPriorSection, EffectPriorSection, ExperimentFile, SpreadSection
 from smajax.data.experiment.unknowns import bounded
 
@@ -17,16 +17,19 @@ CELSIUS = "degC"
 
 
 def declared_priors(
-    path: Path, file: ExperimentFile, catalogue: Catalogue, model: ModelDescription
+    path: Path, file: ExperimentFile, catalogue: Catalogue, model: ModelDescription, kept: FromModelFile | None = None
 ) -> tuple[DeclaredPriors, list[str]]:
-    """(the priors that the file gives, what it says of effects that are not tried). Raises ExperimentError at the key."""
+    """(the priors that the file gives, what it says of effects that are not tried). Raises ExperimentError at the key.
+
+    `kept`: what its model file has, in the place of the presets.
+    """
     odds: dict[str, float] = {}
     coefficients: dict[str, PriorSpread] = {}
     sections: Mapping[str, EffectPriorSection] = file.priors.model_extra or {}
     for effect, section in sections.items():
         key = f"priors.{effect}"
         check_name(path, key, "effect", effect, (*catalogue.effects, "presets"))
-        _check_candidate(path, key, effect, file)
+        _check_candidate(path, key, effect, file, kept)
         if section.odds is not None:
             odds[effect] = _odds(path, f"{key}.odds", section.odds, catalogue.odds)
         known = catalogue.coefficients(effect)
@@ -36,16 +39,18 @@ def declared_priors(
                 near = close_matches(name, [*known, "odds"], "known here")
                 raise ExperimentError(path, f"{key}.{name}", f"{effect!r} has no coefficient {name!r}{near}")
             coefficients[f"{effect}.{name}"] = _coefficient(path, f"{key}.{name}", one, known[name])
-    presets = _presets(path, file, model)
+    presets = _presets(path, file, model, kept.values if kept else {})
     return DeclaredPriors(odds, coefficients, presets), _not_tried(file, model, tuple(sections))
 
 
-def _check_candidate(path: Path, key: str, effect: str, file: ExperimentFile) -> None:
+def _check_candidate(path: Path, key: str, effect: str, file: ExperimentFile, kept: FromModelFile | None) -> None:
     named = [name for name in (*file.model.parameters, *file.unknown) if name.split(".", 1)[0] == effect]
     if named:
         raise ExperimentError(
             path, key, f"{effect!r} is part of the model, since the file names {named[0]!r}; remove one of the two"
         )
+    if kept is not None and effect in kept.effects:
+        raise ExperimentError(path, key, f"{effect!r} is part of the model by its model file; remove this section")
 
 
 def _odds(path: Path, key: str, given: str | float, classes: Mapping[str, float]) -> float:
@@ -105,8 +110,10 @@ def _spread(path: Path, key: str, section: SpreadSection, info: ParameterInfo) -
     return width, False
 
 
-def _presets(path: Path, file: ExperimentFile, model: ModelDescription) -> dict[str, PriorSpread]:
-    """How uncertain values of the presets are, about what these have."""
+def _presets(
+    path: Path, file: ExperimentFile, model: ModelDescription, begun: Mapping[str, float]
+) -> dict[str, PriorSpread]:
+    """How uncertain values of the presets are, about what these have, or a model file in their place (`begun`, SI)."""
     own = {name: info for name, info in model.parameters.items() if "." not in name}
     found = {}
     for name, section in file.priors.presets.items():
@@ -122,8 +129,9 @@ def _presets(path: Path, file: ExperimentFile, model: ModelDescription) -> dict[
                 path, key, f"{given[0]} gives it too, so it is not the preset's; remove one of the two"
             )
         info = own[name]
-        if section.relative is not None and (info.unit == CELSIUS or not (info.preset or 0.0) > 0.0):
-            got = f"a preset of {info.preset or 0.0:g} {info.unit}".strip()
+        value = begun.get(name, info.preset or 0.0)
+        if section.relative is not None and (info.unit == CELSIUS or not value > 0.0):
+            got = f"a preset of {value:g} {info.unit}".strip()
             raise _no_logarithm(path, f"{key}.relative", got)
         found[name] = PriorSpread(None, *_spread(path, key, section, info))
     return found

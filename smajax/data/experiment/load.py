@@ -267,7 +267,7 @@ def experiment_of(path: Path, file: ExperimentFile, catalogue: Catalogue) -> Exp
     fixed |= {unknown.name: unknown.start for unknown in every if file.unknown[unknown.name].fixed}
     free = tuple(unknown for unknown in every if unknown.name not in fixed) + run_starts(path, file, model)
     _check_effects(path, file, catalogue)
-    priors, not_tried = declared_priors(path, file, catalogue, model)
+    priors, not_tried = declared_priors(path, file, catalogue, model, kept)
     values = (dict(kept.values) if kept else {}) | fixed | {unknown.name: unknown.start for unknown in free}
     _check_order(path, file, model, values)
     output_names, units = _channel_units(path, file, model)
@@ -328,7 +328,7 @@ def experiment_of(path: Path, file: ExperimentFile, catalogue: Catalogue) -> Exp
         effects_excluded=tuple(file.effects.exclude),
         runs=tuple(read.run for read in runs),
         warnings=tuple(warnings),
+        priors=priors,
         log_format=file.log_format,
         model_file=kept,
-        priors=priors,
     )

@@ -24,7 +24,7 @@ class Section(BaseModel):
 
 
 Whole = TypeVar("Whole", bound=Section)
-# Sections by place in the file; "*" stands for any name or number, () for the whole; None: a key that is no section.
+# Sections by place in the file; "*" stands for any name or number, () for the whole. None: a key, where "*" would make it a section.
 Places: TypeAlias = Mapping[tuple[str, ...], type[Section] | None]
 
 

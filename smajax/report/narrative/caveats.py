@@ -117,7 +117,7 @@ def of_priors_left(findings: Findings) -> Iterator[str]:
     ends = [f"{name} ends {text}" for name, text in far.items()]
     what, them, is_ = ("it stands", "it", "it is") if len(far) == 1 else ("they stand", "them", "they are")
     yield (
-        f"Mind: {and_listed(ends)}. The wire is not the preset's, or {what} in for what the model lacks: measure {them} and list {them} under "
+        f"Mind: {and_listed(ends)}. The wire is another one, or {what} in for what the model lacks: measure {them} and list {them} under "
         f"[model.parameters], or say under [priors.presets] how uncertain {is_}."
     )
 

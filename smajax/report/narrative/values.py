@@ -24,10 +24,10 @@ def assumed_text(parameter: AssumedParameter) -> str:
 
 
 def far_text(findings: Findings, parameter: ParameterFinding) -> str:
-    """`3.1 widths of its prior above the preset's value, 75000 MPa`, where it is far; else nothing."""
+    """`3.1 widths of its prior above the middle of that, 75000 MPa`, where it is far; else nothing."""
     base, deviation = parameter.prior_base, parameter.prior_deviation
     if base is None or deviation is None or abs(deviation) <= findings.config.far_from_prior:
         return ""
     seen, side = display(parameter.unit, parameter.name), "above" if deviation > 0.0 else "below"
     middle = f"{digits(seen.of(base))} {seen.unit}".strip()
-    return f"{abs(deviation):.1f} widths of its prior {side} the preset's value, {middle}"
+    return f"{abs(deviation):.1f} widths of its prior {side} the middle of that, {middle}"
