@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import time as clock
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -24,10 +25,10 @@ from smajax.attribution.findings import (
     Verdict,
 )
 from smajax.attribution.found import effects_found, parameters_found, priors_found
-from smajax.attribution.held_out import Compared, every_run, validated
+from smajax.attribution.held_out import Compared, compare, every_run, validated
 from smajax.attribution.job import Job, job_of
 from smajax.attribution.joint_search import JointSearch
-from smajax.attribution.joint_stage import search_by_evidence
+from smajax.attribution.joint_stage import base_alone, search_by_evidence
 from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.neutral import check_neutral
 from smajax.attribution.outlier_run import outlier_runs
@@ -47,6 +48,8 @@ from smajax.fit.uncertainty import identifiability
 from smajax.simulation.steppers import Integration
 
 SEED = 2004
+SEARCH_TO_COME = "the search for effects, and the checks of what it finds"
+CHECKS_TO_COME = "the checks against an unknown function, an outlier run and the held-out runs"
 CHECKING, WRITING = "checking what these runs determine", "standard errors and pictures"
 
 
@@ -88,13 +91,15 @@ def close_loop(  # keywords, which a caller names one by one
     compile_per_model: bool | None = None,
     config: AttributionConfig | None = None,
     apart: bool | None = None,
+    interim: Callable[[Findings], object] | None = None,
 ) -> Findings:
     """Fit the base model, look at what it leaves, find what it lacks, and validate on runs the fit never saw.
 
     `memory` is a folder for finished fits: a loop that was interrupted resumes from there.
     Held-out runs are simulated when the search is over: they reject what they do not validate, and nothing is added
     for them. The caller chooses precision; anything but float64 is refused with a ValueError, because the
-    differences that decide here are far below float32's rounding over a run. Raises PluginError for an effect of another
+    differences that decide here are far below float32's rounding over a run. `interim` gets what is known after the base fit, and again
+    after the search where other stages follow: findings without a verdict, which say what is still to come. Raises PluginError for an effect of another
     package that changes the model at its base value: every verdict would be wrong.
     """
     if jnp.zeros(()).dtype != jnp.float64:
@@ -111,12 +116,16 @@ def close_loop(  # keywords, which a caller names one by one
     cache = ResultCache(memory)
     settings = config or AttributionConfig()
     context = prepared(experiment, cache, as_progress(progress), seed, settings)
+    if interim is not None:
+        interim(known_so_far(context, base_alone(context.setting, context.base), SEARCH_TO_COME))
     outcome = searched(context)
     finer = finer_integration(context.setting, outcome.final)
     if finer is not None:
         # Models are compared as one integration gives them: all of them again.
         context = prepared(experiment, cache, as_progress(progress), seed, settings, finer)
         outcome = searched(context)
+    if interim is not None and not context.setting.is_noise(outcome.final):
+        interim(known_so_far(context, (outcome.search, outcome.base, outcome.final), CHECKS_TO_COME))
     outcome = against_an_unknown_term(context, outcome)
     outcome = against_an_outlier_run(context, outcome)
     final, compared, rejected = validated(context.job, context.setting, outcome.search, outcome.base, outcome.final)
@@ -206,8 +215,18 @@ def unknown_terms_of(context: Context, outcome: Outcome, verdict: Verdict) -> tu
     return lacking, outcome.superseded
 
 
-def findings_of(context: Context, outcome: Outcome, compared: Compared, rejected: Rejected | None) -> Findings:
-    """The record of all stages."""
+def known_so_far(context: Context, models: tuple[JointSearch, Model, Model], remaining: str) -> Findings:
+    """What a loop that goes on knows by then, as findings without a verdict. `models`: the search, base model, likeliest model."""
+    search, base, final = models
+    compared = compare(context.job, context.setting, base, final)
+    found = findings_of(context, Outcome(search, base, final, Lacking()), compared, None, brief=True)
+    return replace(found, verdict=Verdict.NOT_FINISHED, remaining=remaining)
+
+
+def findings_of(
+    context: Context, outcome: Outcome, compared: Compared, rejected: Rejected | None, brief: bool = False
+) -> Findings:
+    """The record of all stages. `brief`: without what takes long, the scores of effects that were not added and the averages."""
     job, setting, experiment = context.job, context.setting, context.job.experiment
     base, final = outcome.base, outcome.final
     runs, residual_before, residual_after = compared
@@ -215,9 +234,9 @@ def findings_of(context: Context, outcome: Outcome, compared: Compared, rejected
     error_of = outcome.search.error_of
     before = parameters_found(job, setting, base, context.start, error_of(()))
     after = parameters_found(job, setting, final, context.start, error_of(final.effects)) if final.effects else before
-    effects = effects_found(job, setting, final, after)
+    effects = effects_found(job, setting, final, after, scored=not brief)
     average = Averaged()
-    if len(job.fit_runs) > 1:  # else none can be left out, which the band is made of
+    if len(job.fit_runs) > 1 and not brief:  # else none can be left out, which the band is made of
         average = averaged(setting, outcome.search, final, every_run(job), base)
         runs = tuple(replace(run, average=one) for run, one in zip(runs, average.runs, strict=True))
     extended_model = saved_model(job, setting, outcome.search, final, after, runs, average)

@@ -30,6 +30,7 @@ class Verdict(StrEnum):
     EXPLAINED = "explained"
     PARTLY_EXPLAINED = "partly explained"
     NOT_IN_LIBRARY = "not in the library"
+    NOT_FINISHED = "not finished"  # of a loop that goes on, or was ended before its end
 
 
 @dataclass(frozen=True)
@@ -352,6 +353,7 @@ class Findings:
     provenance: dict[str, str] = field(default_factory=dict)  # versions, seed, data hashes, command, seconds
     base_model: ActuatorModel | None = None  # as they are saved
     extended_model: ActuatorModel | None = None
+    remaining: str = ""  # stages that were still to come, of what is known while a loop goes on
 
     @property
     def integration_error(self) -> float:

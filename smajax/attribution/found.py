@@ -66,9 +66,14 @@ def parameters_found(job: Job, setting: Search, model: Model, start: np.ndarray,
     )
 
 
-def effects_found(job: Job, setting: Search, final: Model, after: ParametersFound) -> tuple[EffectFinding, ...]:
-    """Every candidate with its evidence: added ones first, the strongest of them at the head, then the likeliest."""
-    left = [name for name in job.candidates if name not in final.effects]
+def effects_found(
+    job: Job, setting: Search, final: Model, after: ParametersFound, scored: bool = True
+) -> tuple[EffectFinding, ...]:
+    """Every candidate with its evidence: added ones first, the strongest of them at the head, then the likeliest.
+
+    `scored`: with the score of each that was not added.
+    """
+    left = [name for name in job.candidates if name not in final.effects] if scored else []
     last = {score.effects[0]: score for score in scores_at(setting, final, left)} if left else {}
     fitted = {parameter.name: parameter for parameter in after.parameters}
     findings = []

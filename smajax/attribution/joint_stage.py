@@ -84,6 +84,15 @@ class _Stage:
         self.setting.note(Round(len(self.setting.rounds) + 1, (), chosen, reason))
 
 
+def base_alone(setting: Search, base: Fit) -> tuple[JointSearch, Model, Model]:
+    """(a search of nothing, base model, the same) before anything is searched, as `search_by_evidence` gives it."""
+    settings = FitSettings(tolerance=setting.config.final_convergence, cache=setting.cache, progress=setting.progress)
+    search = _Stage(setting, settings).joint_search({})
+    search.fitted[()] = fitted_model(search.joint, (), base.values, ())
+    model = as_model(search, search.fitted[()], search.error_of(()))
+    return search, model, model
+
+
 def search_by_evidence(setting: Search, base: Fit) -> tuple[JointSearch, Model, Model]:
     """(the search, base model, likeliest model). Fills `setting.evidence` and `setting.rounds` on the way."""
     settings = FitSettings(tolerance=setting.config.final_convergence, cache=setting.cache, progress=setting.progress)

@@ -27,6 +27,7 @@ VERDICTS = {
     Verdict.ADEQUATE: ("The model is adequate", "good"),
     Verdict.EXPLAINED: ("The missing physics is found", "good"),
     Verdict.PARTLY_EXPLAINED: ("Part of the missing physics is found", "fair"),
+    Verdict.NOT_FINISHED: ("Not finished", "fair"),
     Verdict.NOT_IN_LIBRARY: ("Something is missing that the library does not hold", "poor"),
 }
 # Headings of the evidence in the order of the stages; a number with no heading here is shown under its own name.

@@ -166,6 +166,7 @@ def findings_to_json(findings: Findings, narrative: Narrative | None = None) -> 
         "title": findings.title,
         "source": findings.source,
         "verdict": findings.verdict,
+        "remaining": findings.remaining,
         "summary": words.summary,
         "output": {
             "name": findings.output_name,

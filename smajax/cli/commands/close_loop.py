@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shlex
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from smajax.cli import completion
-from smajax.cli.options import FITS, Json, Open, Overwrite
+from smajax.cli.options import FITS, UNMET, Json, Open, Overwrite, quantity
 from smajax.cli.terminal import browse, console, resumable
 
 if TYPE_CHECKING:
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 
 FINISHED_FITS = "Finished fits are cached: the same command resumes."
 CONTROL = ("*_gains.json", "control_*.json", "control_*.html")
+RECORD = "report.json"
 MODELS = ("model.toml", "model.nc", "base_model.toml", "base_model.nc")
 OWN = ("report.html", "report.json", "parameters.csv", "runs.csv", *MODELS, *CONTROL, FITS)
 
@@ -47,7 +49,13 @@ def run_close_loop(
         displayed(console(), show_hint) as progress,
     ):
         in_words = narrated(progress, loaded.output_unit, loaded.output_name)
-        findings = close_loop(loaded, memory=out / "fits", progress=in_words, command=command)
+        findings = close_loop(
+            loaded,
+            memory=out / "fits",
+            progress=in_words,
+            command=command,
+            interim=lambda known: write_report(known, out),
+        )
         return findings, write_report(findings, out)
 
 
@@ -58,6 +66,33 @@ def print_findings(findings: Findings, page: Path) -> None:
     for sentence in narrate(findings).summary:
         typer.echo(f"  {sentence}")
     typer.echo(f"Report: {page.resolve()}")
+
+
+def _within(seconds: float, out: Path, json_out: bool) -> None:
+    """The command without --budget, ended in that time; then the page says what is known. Exits with 3 where it was ended."""
+    from smajax.cli.budget import run_within, without
+
+    before = (out / RECORD).stat().st_mtime_ns if (out / RECORD).is_file() else None
+    code = run_within(seconds, without(sys.argv[1:], "--budget"))
+    if code is not None:
+        raise typer.Exit(code)
+    shown = out / RECORD
+    resumes = "the same command resumes from the finished fits"
+    if not shown.is_file() or shown.stat().st_mtime_ns == before:
+        typer.echo(
+            f"The time was over before the base model was fitted, so that there is no page; {resumes}.", err=True
+        )
+        raise typer.Exit(UNMET)
+    known = json.loads(shown.read_text(encoding="utf-8"))
+    if json_out:
+        typer.echo(json.dumps(known))
+    else:
+        typer.echo(f"\n{known['title']}\nVerdict: {known['verdict']}")
+        for sentence in known["summary"]:
+            typer.echo(f"  {sentence}")
+        typer.echo(f"Report: {(out / 'report.html').resolve()}")
+    typer.echo(f"The time was over before: {known['remaining'] or 'the controllers were tuned'}; {resumes}.", err=True)
+    raise typer.Exit(UNMET)
 
 
 def tune_on_models(
@@ -139,14 +174,18 @@ def close_loop_command(
             help="of --tune, with commas, without a unit in deg or mm; default three over the stroke",
         ),
     ] = "",
+    budget: Annotated[
+        float | None,
+        quantity("end in this time with what is known by then", "s", above=0.0, like="2min"),
+    ] = None,
     overwrite: Overwrite = False,
     json_out: Json = False,
     open_page: Open = False,
 ) -> None:
     """Fit the base model, find the physical effects that it lacks, and report the error before and after.
 
-    It takes a few minutes where little is missing, half an hour where several effects are. After Ctrl-C the same command with the
-    same --out resumes from the finished fits.
+    The page is there after the base fit, and is written again after the search and in the end. After Ctrl-C, and where --budget was
+    too short (exit code 3), the same command with the same --out resumes from the finished fits.
 
     Example:  smajax close-loop experiment.toml --out report
 
@@ -154,6 +193,9 @@ def close_loop_command(
     """
     if set_points and not tune:
         raise typer.BadParameter("are those of a controller to be tuned: give --tune too.", param_hint="--set-points")
+    if budget is not None:
+        _within(budget, out, json_out)
+        return
     targets = check_tuning(experiment, tune, set_points) if tune else ()
     command = f"smajax close-loop {shlex.quote(str(experiment))} --out {shlex.quote(str(out))}"
     findings, page = run_close_loop(experiment, out, command, overwrite, not json_out)

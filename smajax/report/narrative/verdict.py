@@ -48,6 +48,8 @@ def _opening(findings: Findings) -> str:
             return _explained(findings)
         case Verdict.PARTLY_EXPLAINED:
             return _partly(findings)
+        case Verdict.NOT_FINISHED:
+            return f"Not finished: {findings.remaining} were still to come when this was written. What stands here is what was known by then."
         case Verdict.NOT_IN_LIBRARY:
             return _not_in_library(findings)
 

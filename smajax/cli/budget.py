@@ -1,0 +1,44 @@
+"""A command that ends in time: it runs in a process of its own, which is ended when the time is over."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Sequence
+
+GRACE = 2.0  # s between Ctrl-C and the end of a process that does not answer: a compilation cannot be interrupted
+
+
+def run_within(seconds: float, words: Sequence[str]) -> int | None:
+    """The exit code of `smajax WORDS`; None where it was ended because the time was over.
+
+    Its output goes where ours does. Files are written whole or not at all, so none is half written when it is ended.
+    """
+    process = subprocess.Popen([sys.executable, "-m", "smajax", *words])
+    try:
+        return process.wait(timeout=seconds)
+    except subprocess.TimeoutExpired:
+        process.terminate()
+        try:
+            process.wait(timeout=GRACE)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+        return None
+    except KeyboardInterrupt:
+        # The process got it too, and says what there is to say.
+        return process.wait()
+
+
+def without(words: Sequence[str], option: str) -> list[str]:
+    """The words of a command without an option and its value, as `--option value` and as `--option=value`."""
+    result: list[str] = []
+    skip = False
+    for word in words:
+        if skip:
+            skip = False
+        elif word == option:
+            skip = True
+        elif not word.startswith(f"{option}="):
+            result.append(word)
+    return result

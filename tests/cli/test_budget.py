@@ -1,0 +1,74 @@
+"""A loop that is ended before its end leaves a page with what was known, and `--budget` ends it."""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+import smajax as sma
+from smajax.attribution.findings import Findings, Verdict
+from smajax.cli.budget import run_within, without
+from smajax.report.write import write_report
+from tests.helpers.small_bench import bench, smajax
+
+
+class EndedError(Exception):
+    """Raised in the place of the end of a process."""
+
+
+def test_the_page_is_there_after_the_base_fit_and_says_what_is_to_come(tmp_path: Path) -> None:
+    seen: list[Findings] = []
+
+    def end(known: Findings) -> None:
+        seen.append(known)
+        write_report(known, tmp_path / "report")
+        raise EndedError
+
+    with pytest.raises(EndedError):
+        sma.close_loop(sma.load_experiment(bench(tmp_path)), interim=end)
+    (known,) = seen
+    assert known.verdict is Verdict.NOT_FINISHED
+    assert not known.added
+    assert known.before[0].name == "convection_coefficient"
+    assert known.before[0].standard_error is not None
+    record = json.loads((tmp_path / "report" / "report.json").read_text(encoding="utf-8"))
+    assert record["verdict"] == "not finished"
+    assert record["remaining"] == known.remaining
+    assert record["summary"][0].startswith("Not finished: the search for effects")
+    assert "Not finished" in (tmp_path / "report" / "report.html").read_text(encoding="utf-8")
+    assert sma.load_model(tmp_path / "report").values["convection_coefficient"] == known.before[0].value
+
+
+def test_a_time_that_is_over_before_the_base_fit_leaves_no_page_and_says_so(tmp_path: Path) -> None:
+    words = ["close-loop", str(bench(tmp_path)), "--out", str(tmp_path / "report"), "--budget", "0.2s"]
+    began = time.monotonic()
+    ended = smajax(*words)
+    assert time.monotonic() - began < 30.0
+    assert ended.code == 3
+    assert "before the base model was fitted" in ended.said
+    assert not (tmp_path / "report" / "report.html").exists()
+
+
+def test_a_command_that_ends_in_time_is_as_without_a_budget() -> None:
+    assert run_within(60.0, ["--version"]) == 0
+    assert run_within(60.0, ["close-loop", "none.toml"]) == 2
+
+
+def test_a_command_that_does_not_end_in_time_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    endless = tmp_path / "endless"
+    endless.write_text("#!/bin/sh\nexec sleep 60\n", encoding="utf-8")
+    endless.chmod(0o755)
+    monkeypatch.setattr(sys, "executable", str(endless))
+    began = time.monotonic()
+    assert run_within(0.2, ["close-loop"]) is None
+    assert time.monotonic() - began < 10.0
+
+
+@pytest.mark.parametrize("given", [["--budget", "2min"], ["--budget=2min"]])
+def test_the_process_gets_all_other_words(given: list[str]) -> None:
+    words = ["close-loop", "a.toml", "--out", "b"]
+    assert without([*words[:2], *given, *words[2:]], "--budget") == words
