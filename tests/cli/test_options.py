@@ -27,11 +27,11 @@ def test_every_option_that_takes_a_quantity_says_its_unit(command: str) -> None:
     """A plain number is asked for where it is a share of something alone."""
     told = " ".join(CliRunner().invoke(app, [command, "--help"]).output.split())
     assert re.findall(r"--([\w-]+) (?:<float>|FLOAT)", told) == []
-    timed = {"simulate": 3, "sweep": 2, "tune": 2}.get(command, 0)
+    timed = {"simulate": 3, "sweep": 2, "tune": 2, "close-loop": 1}.get(command, 0)
     assert len(re.findall(r"<s> (?:(?!--).)*without a unit in s", told.replace("--dt;", "dt;"))) == timed
 
 
-@pytest.mark.parametrize("command", ["close-loop", "identify", "demo", "figures", "tune", "sweep", "simulate"])
+@pytest.mark.parametrize("command", ["close-loop", "identify", "predict", "demo", "figures", "tune", "sweep", "simulate"])
 def test_every_command_with_a_page_opens_it_on_the_same_word(command: str) -> None:
     told = " ".join(CliRunner().invoke(app, [command, "--help"], terminal_width=200).output.split())
     assert "--open / --no-open open the page in a browser when it is done [default: no-open]" in told
