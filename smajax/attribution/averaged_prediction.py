@@ -15,7 +15,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
 
 from smajax.attribution.findings import AveragedModel, AveragedRun, DroppedModel
 from smajax.attribution.joint_search import JointSearch
@@ -24,9 +23,9 @@ from smajax.attribution.likely_models_check import checked
 from smajax.attribution.model_fits import Model, Search
 from smajax.fit.packed_runs import RunBatch
 from smajax.fit.predicted import predicted_and_derivatives
+from smajax.fit.prediction_band import BAND, averaged_band
 from smajax.fit.problem import Problem
 
-BAND = 0.9
 LEAST_PROBABILITY = 0.02
 MOST_MODELS = 6
 
@@ -75,11 +74,7 @@ def averaged(
         readings.append(reading)
         variances.append(variance)
     weights = np.asarray([weight for _, weight in models])
-    mean = np.tensordot(weights, np.stack(readings), 1)
-    between = np.tensordot(weights, (np.stack(readings) - mean) ** 2, 1)
-    missed = prediction_error(setting, final)
-    normal = float(stats.norm.ppf(0.5 + 0.5 * BAND))
-    half = np.sqrt(normal**2 * (np.tensordot(weights, np.stack(variances), 1) + between) + missed**2)
+    mean, half = averaged_band(np.stack(readings), np.stack(variances), weights, prediction_error(setting, final))
     return Averaged(
         tuple(AveragedModel(model.effects, weight) for model, weight in models),
         tuple(

@@ -239,9 +239,11 @@ def findings_of(
     if len(job.fit_runs) > 1 and not brief:  # else none can be left out, which the band is made of
         average = averaged(setting, outcome.search, final, every_run(job), base)
         runs = tuple(replace(run, average=one) for run, one in zip(runs, average.runs, strict=True))
-    extended_model = saved_model(job, setting, outcome.search, final, after, runs, average)
+    extended_model = saved_model(job, setting, outcome.search, final, after, runs, average, final.effects)
     base_model = (
-        saved_model(job, setting, outcome.search, base, before, runs, None) if final.effects else extended_model
+        saved_model(job, setting, outcome.search, base, before, runs, None, final.effects)
+        if final.effects
+        else extended_model
     )
     mistaken = confounders(outcome.search, setting, final, job.fit_runs)
     integration = integration_error_of(setting, final)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import jax.numpy as jnp
 import numpy as np
 
 from smajax.attribution.averaged_prediction import Averaged, likely_models, prediction_error
@@ -16,6 +17,7 @@ from smajax.attribution.model_fits import Model, Search
 from smajax.data.model_file.actuator_model import ActuatorModel
 from smajax.data.model_file.of_experiment import actuator_model, range_of, rounded
 from smajax.data.model_file.record import LikelyModel, ModelOutput
+from smajax.fit.packed_runs import simulate_batch
 
 
 def saved_model(
@@ -26,8 +28,9 @@ def saved_model(
     found: ParametersFound,
     runs: Sequence[RunFinding],
     average: Averaged | None,
+    runs_of: Sequence[str],
 ) -> ActuatorModel:
-    """`model` with its parameters `found`; with the likely models of `average`, where predictions are those of an average."""
+    """`model` with its parameters `found`, `runs` as simulated by the model with the effects `runs_of`; with the likely models of `average`, where predictions are those of an average."""
     own = search.joint.ordered(model.effects)
     weighted = [(search.fitted[own], 1.0)]
     if average is not None:  # of one fit run nothing is averaged, and no model has been checked
@@ -41,7 +44,10 @@ def saved_model(
     ]
     (output,) = job.experiment.outputs[:1]
     several = len(job.fit_runs) > 1  # else none could be left out
-    states = {run.name: run.states for run in runs}
+    if own == search.joint.ordered(runs_of):
+        states = {run.name: run.states for run in runs}
+    else:
+        states = _states(job, setting, model)
     return actuator_model(
         job.experiment,
         likely,
@@ -58,6 +64,16 @@ def saved_model(
         ],
         range_of((run, states[run.name]) for run in job.fit_runs),
     )
+
+
+def _states(job: Job, setting: Search, model: Model) -> dict[str, dict[str, np.ndarray]]:
+    """Temperature and stress of each fit run by `model`, (n,)."""
+    problem, index = setting.restricted(model.effects)
+    found = simulate_batch(problem.system_at(jnp.asarray(model.values[index])), problem.batch)
+    return {
+        run.name: {name: np.asarray(getattr(found, name))[k, : len(run.time)] for name in ("temperature", "stress")}
+        for k, run in enumerate(job.fit_runs)
+    }
 
 
 def _likely(job: Job, search: JointSearch, model: FittedModel, values: np.ndarray, weight: float) -> LikelyModel:

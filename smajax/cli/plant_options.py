@@ -144,12 +144,15 @@ class PlantOptions:
         changed = self._changed
         try:
             if self.kept is not None:
-                from smajax.control.kept_plant import plant_of
+                from smajax.control.kept_plant import LIMIT, plant_of
 
-                system, sentence = plant_of(self.kept)
-                if sentence and "amplifier_limit" not in changed:
+                system = with_values(self.kept.system, changed)
+                if any(name.split(".")[-1] == LIMIT for name in changed):
+                    return system
+                system, sentence = plant_of(self.kept, system)
+                if sentence:
                     typer.echo(sentence, err=True)
-                return with_values(system, changed)
+                return system
             if missing:
                 return with_values(arm(self.law) if self.law else arm(), changed)
             return compose(self.wire, self.load, self.drive, law=self.law, values=changed)

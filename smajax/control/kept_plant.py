@@ -10,21 +10,22 @@ from smajax.model.system import System
 LIMIT = "amplifier_limit"
 
 
-def plant_of(model: ModelRecord) -> tuple[System, str]:
-    """(the model's system, a sentence on its limit of the command; "" where that is its own).
+def plant_of(model: ModelRecord, system: System | None = None) -> tuple[System, str]:
+    """(the model's system, or `system` made of it, with its limit of the command; a sentence on that limit, "" where it is its own).
 
-    Where nobody gave the amplifier's limit it is a preset's, which no bench has: the largest command of the fit runs takes its
-    place, since beyond it the model extrapolates.
+    Where nobody gave the limit of a voltage amplifier it is a preset's, which no bench has: the largest command of the fit runs takes its
+    place, since beyond it the model extrapolates. Other drives have no limit.
     """
-    name, unit = model.system.drive.command
+    system = model.system if system is None else system
+    name, unit = system.drive.command
     largest = _largest(model)
     if largest is None:
-        return model.system, ""
+        return system, ""
     sentence = (
         f"The {name} is limited to {digits(largest, 4)} {unit}, the largest of the runs that the model was fitted to; give "
         f"{LIMIT} in the model file or with --set for another limit."
     )
-    return within_limit(model, model.system), sentence
+    return within_limit(model, system), sentence
 
 
 def within_limit(model: ModelRecord, system: System) -> System:

@@ -21,7 +21,7 @@ from smajax.control.compose import compose, with_values
 from smajax.control.figures_of_merit import SetPointMerit, merit_by_set_point, set_point_spans
 from smajax.control.gains_file import Gains, read_gains
 from smajax.control.interface import between_in_words, check_interface, check_set_points, interface_of, noise_of
-from smajax.control.kept_plant import plant_of
+from smajax.control.kept_plant import LIMIT, plant_of
 from smajax.control.loop_dataset import labelled_loop
 from smajax.control.position_unit import PositionUnit, unit_of
 from smajax.control.presets import CONTROLLERS, check_controller
@@ -85,11 +85,21 @@ class RunRequest:
         """
         if self.model:
             kept = load_model(self.model)
-            bare = plant_of(kept)[0] if closed else kept.system
-        else:
-            bare = compose(self.wire, self.load, self.drive, law=self.law)
+            with _part("values"):
+                system = with_values(kept.system, self.values)
+            own = LIMIT in {name.split(".")[-1] for name in self.values}
+            return plant_of(kept, system)[0] if closed and not own else system
+        bare = compose(self.wire, self.load, self.drive, law=self.law)
         with _part("values"):
             return with_values(bare, self.values)
+
+    def limit(self) -> list[str]:
+        """A sentence on the limit of the command of a closed loop on a kept model, or none."""
+        if not self.model or LIMIT in {name.split(".")[-1] for name in self.values}:
+            return []
+        kept = load_model(self.model)
+        sentence = plant_of(kept, with_values(kept.system, self.values))[1]
+        return [sentence] if sentence else []
 
 
 @dataclass(frozen=True)
@@ -203,8 +213,14 @@ def _with_measured(request: RunRequest, system: System, data: xr.Dataset) -> xr.
             if not reads_file(text):
                 raise ValueError(f"got {text!r}, expected a column of a log, such as log.csv:COLUMN:UNIT.")
             log = given(text, own, request.time, bare=own)
-            values = np.interp(data["time"].to_numpy(), log.time, log.values, right=np.nan)
-            data = data.assign({f"{MEASURED}{name}": ("time", values, {"units": unit, "of": sensors[name]})})
+            clock = data["time"].to_numpy()
+            values = np.interp(clock, log.time, log.values, right=np.nan)
+            # At the log's own instants: between them its noise would be averaged.
+            within = log.time <= clock[-1] + 1e-9
+            error = log.values[within] - np.interp(log.time[within], clock, data[sensors[name]].to_numpy())
+            figures = {"error_rms": float(np.sqrt(np.mean(error**2))), "error_rms_without_mean": float(np.std(error))}
+            shown = {"units": unit, "of": sensors[name], **figures}
+            data = data.assign({f"{MEASURED}{name}": ("time", values, shown)})
     return data
 
 
@@ -300,7 +316,7 @@ def run_closed(request: RunRequest, loop: LoopRequest) -> RunResult:
         check_answers(run)
     except ValueError as error:
         notes.append(str(error))
-    notes += _set_point_notes(assumed, position)
+    notes += [*_set_point_notes(assumed, position), *request.limit()]
     figures = {name: float(value) for name, value in vars(merits).items()}
     by_set_point: tuple[SetPointMerit, ...] = ()
     if np.ptp(position) > 0.0:

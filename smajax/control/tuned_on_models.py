@@ -25,6 +25,7 @@ from smajax.data.model_file.record import ModelRecord
 from smajax.model.system import System
 
 PLANTS = 8  # drawn from each model's posterior, of which gains are tuned on three of every four
+KNOWN = 0.01  # of a known value: a smaller difference between model and plant is none
 SET_POINTS = 3  # over the stroke, where none are given
 EFFORT = {"tried": 16, "starts": 3, "rounds": 10, "finish": 20, "unseen": 4}
 QUICK = {"tried": 8, "starts": 2, "rounds": 5, "finish": 10, "unseen": 2}  # for a demonstration
@@ -71,6 +72,9 @@ class ControlComparison:
     unit: PositionUnit
     seconds: float  # length of a loop
     tuned: tuple[TunedOnModel, ...]
+    differs: tuple[
+        str, ...
+    ] = ()  # known values of the models that the plant has others of: "load_mass (0.64 and 1 kg)"
 
 
 def tuned_on_models(
@@ -105,7 +109,18 @@ def tuned_on_models(
         own = found.after.put(CONTROLLERS[controller].plant(assumed))
         loops = tuple(judged(truth, own, float(target), seconds) for target in unit.to_own(np.asarray(targets)))
         tuned.append(TunedOnModel(name, found.after, found.units, loops))
-    return ControlComparison(controller, plant[0], unit, seconds, tuple(tuned))
+    return ControlComparison(controller, plant[0], unit, seconds, tuple(tuned), differing(first, plant[1]))
+
+
+def differing(model: ModelRecord, plant: ModelRecord) -> tuple[str, ...]:
+    """Values that are given in a model, and others in the plant: no fit has found these, and no effect stands for them."""
+    return tuple(
+        f"{name} ({one.value:.4g} and {plant.values[name]:.4g} {model.table[name].unit})"
+        for name, one in model.parameters.items()
+        if one.origin == "given"
+        and name in plant.values
+        and abs(plant.values[name] - one.value) > KNOWN * abs(one.value)
+    )
 
 
 def judged(plant: System, controller: AbstractController, set_point: float, seconds: float) -> JudgedLoop:

@@ -77,6 +77,7 @@ def identify(  # ten parameters: the options of the command, by keyword
         options.fit("profiles"),
     )
     spread = np.sqrt(np.diag(statistics.covariance)) if statistics.correlated else np.ones(0)
+    runs = _runs(experiment, statistics)
     residual = _decorrelated(statistics.residual, statistics.independent)
     return Identified(
         experiment=experiment.name,
@@ -100,7 +101,7 @@ def identify(  # ten parameters: the options of the command, by keyword
         normality_p=_normality(residual),
         independent=statistics.independent,
         robust=robust,
-        runs=_runs(experiment, statistics),
+        runs=runs,
         suggestions=suggestions(
             fitted.weighted, fitted.best.values, statistics.correlated, setup.fit_runs, statistics.inflation
         )
@@ -110,7 +111,7 @@ def identify(  # ten parameters: the options of the command, by keyword
         step=experiment.step,
         clocked=experiment.clocked,
         provenance=_provenance(command, seed, starts, clock.monotonic() - begin, options.cache),
-        model=identified_model(setup, fitted, statistics),
+        model=identified_model(setup, fitted, statistics, runs),
     )
 
 

@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
-from scipy import stats
 
 from smajax.core.parameters import parameter_values
 from smajax.data.experiment.errors import ExperimentError
@@ -19,13 +18,15 @@ from smajax.data.model_file.actuator_model import ActuatorModel
 from smajax.data.model_file.of_experiment import quantities
 from smajax.data.model_file.read_logs import read_logs
 from smajax.data.model_file.record import LikelyModel, ModelOutput, range_unit
+from smajax.data.model_file.runs_of_model import runs_of_model
 from smajax.data.open_experiment import open_experiment
 from smajax.fit.integration import IntegrationError, choose_integration, integration_error, with_integration
 from smajax.fit.packed_runs import pack, simulate_batch
 from smajax.fit.predicted import predicted_and_derivatives
+from smajax.fit.prediction_band import BAND as BAND
+from smajax.fit.prediction_band import NORMAL, averaged_band
 from smajax.fit.problem import Problem
 
-BAND = 0.9  # share of the measured samples that are expected in the band
 BEYOND = 0.02  # of a fitted range: by less a run does not leave it
 FEW = 0.005  # of the samples: a single one of a rate is a jump of an input
 STATES = ("temperature", "martensite_fraction", "stress")
@@ -116,12 +117,7 @@ def predict(  # keywords, which a caller names one by one
 
 
 def _prediction(model: ActuatorModel, experiment: Experiment) -> Prediction:
-    if experiment.load != model.load:
-        raise ExperimentError(
-            experiment.path,
-            "model.load",
-            f"got {experiment.load!r}, expected that of the model, {model.load!r}: its runs are of another load",
-        )
+    experiment, notes = runs_of_model(model, experiment)
     known = {one.name: one for one in model.outputs}
     likely = model.likely or (LikelyModel(model.effects, 1.0, {}),)
     noise, offset, missed = _of_outputs(model, experiment)
@@ -146,21 +142,7 @@ def _prediction(model: ActuatorModel, experiment: Experiment) -> Prediction:
         beyond = extrapolations(model, run, own)
         runs.append(PredictedRun(run.name, run.time, run.inputs, series, own, beyond, run.sha256, fitted))
     error = integration_error(problems[0], problems[0].system)
-    return Prediction(model, tuple(runs), experiment.step, error, (*model.warnings, *experiment.warnings))
-
-
-def averaged_band(
-    readings: np.ndarray, variances: np.ndarray, weights: np.ndarray, missed: np.ndarray | float
-) -> tuple[np.ndarray, np.ndarray]:
-    """(mean, half width of the band) of the readings (M, ..., N) of likely models, with their variances by their parameters.
-
-    missed: the absolute error that `BAND` of the samples of runs left out stay below, which is in the band beside the variances of
-    parameters and between models; broadcast against (..., N).
-    """
-    mean = np.tensordot(weights, readings, 1)
-    between = np.tensordot(weights, (readings - mean) ** 2, 1)
-    normal = float(stats.norm.ppf(0.5 + 0.5 * BAND))
-    return mean, np.sqrt(normal**2 * (np.tensordot(weights, variances, 1) + between) + np.square(missed))
+    return Prediction(model, tuple(runs), experiment.step, error, (*model.warnings, *notes, *experiment.warnings))
 
 
 def extrapolations(model: ActuatorModel, run: Run, states: Mapping[str, np.ndarray]) -> tuple[Extrapolation, ...]:
@@ -177,21 +159,20 @@ def extrapolations(model: ActuatorModel, run: Run, states: Mapping[str, np.ndarr
             spans = tuple((float(run.time[a]), float(run.time[b - 1])) for a, b in edges.reshape(-1, 2))
             reached = float(series.min()), float(series.max())
             share = float(outside.mean())
-            found.append(Extrapolation(name, range_unit(name), (low, high), reached, share, spans))
+            found.append(Extrapolation(name, range_unit(name, model.table), (low, high), reached, share, spans))
     return tuple(found)
 
 
 def _of_outputs(model: ActuatorModel, experiment: Experiment) -> tuple[np.ndarray, tuple[bool, ...], np.ndarray]:
     """(noise, whether it has an offset, what the band has beside the variances), of each output and each series."""
     known = {one.name: one for one in model.outputs}
-    normal = float(stats.norm.ppf(0.5 + 0.5 * BAND))
     noise, offset, missed = [], [], []
     for output in experiment.outputs:
         own = known.get(output.name)
         noise.append(output.noise_sigma if own is None else own.noise)
         offset.append(output.offset if own is None else own.offset)
         error = None if own is None else own.prediction_error
-        missed.append(normal * noise[-1] if error is None else error)
+        missed.append(NORMAL * noise[-1] if error is None else error)
     return np.asarray(noise), tuple(offset), np.tile(missed, len(experiment.runs))[:, None]
 
 

@@ -69,6 +69,10 @@ def conclusions(result: ControlComparison) -> list[str]:
         sentences.append(
             f"{result.controller} tuned on the {one.model} {text}, with an overshoot of at most {overshoot} {result.unit.label}, on the {result.plant}."
         )
+    if result.differs:
+        sentences.append(
+            f"Mind: the {result.plant} differs from the models in what was taken as known: {', '.join(result.differs)}."
+        )
     return [*sentences, worth(result)] if len(result.tuned) > 1 else sentences
 
 

@@ -140,14 +140,9 @@ def measured_of(data: xr.Dataset) -> dict[str, tuple[str, np.ndarray]]:
 def measured_sentences(result: RunResult) -> list[str]:
     """How far the run is off from the logs that it is held against; and without the mean, which may be a sensor's zero."""
     sentences = []
-    for name, (of, values) in measured_of(result.data).items():
-        unit = display(result.data[of].attrs["units"], name)
-        error = values - result.data[of].to_numpy()
-        present = np.isfinite(error)
-        if not present.any():
-            continue
-        error = error[present]
-        off, about = (digits(unit.of(float(np.sqrt(np.mean(one**2)))), 3) for one in (error, error - error.mean()))
+    for name, (of, _) in measured_of(result.data).items():
+        unit, found = display(result.data[of].attrs["units"], name), result.data[f"{MEASURED}{name}"].attrs
+        off, about = (digits(unit.of(found[key]), 3) for key in ("error_rms", "error_rms_without_mean"))
         sentences.append(
             f"The measured {label(name)} is off by {off} {unit.unit} (rms), by {about} {unit.unit} without its mean."
         )

@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 
 from smajax.attribution import likely_models_check
-from smajax.attribution.averaged_prediction import BAND, averaged, likely_models
+from smajax.attribution.averaged_prediction import averaged, likely_models
 from smajax.attribution.findings import HeldOutWorse, StepDependent
 from smajax.attribution.joint_search import JointSearch, search_jointly
 from smajax.attribution.joint_stage import as_model
 from smajax.attribution.model_fits import Model, Search
 from smajax.core.result_cache import ResultCache
 from smajax.fit.packed_runs import RunBatch
+from smajax.fit.prediction_band import BAND
 from tests.helpers.hot_weight import CANDIDATES, NOISE, UNKNOWNS, hot_weight
 
 TRUTH = {"latent_heat.enthalpy": 1.2e4}

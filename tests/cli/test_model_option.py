@@ -30,6 +30,7 @@ def test_a_run_of_a_kept_model_is_held_against_a_log(tmp_path: Path, model: Path
     record = json.loads((tmp_path / "out" / "simulate.json").read_text(encoding="utf-8"))
     measured, simulated = (np.asarray(record["series"][name], dtype=float) for name in ("measured_position", "reading"))
     error = measured - simulated
+    assert ended.out.count("off by 2 mm") == 1
     # The last input of a log holds no longer than the log.
     assert np.nanmean(error[:-1]) == pytest.approx(2e-3, abs=0.2 * NOISE)
 
@@ -50,6 +51,8 @@ def test_a_closed_loop_stays_within_the_commands_of_the_fit_runs() -> None:
     assert float(system.drive.largest_command()) == pytest.approx(5.0)
     assert float(sma.get_parameters(system, ["amplifier_limit"])[0]) == pytest.approx(8.0)
     assert "limited to 5 V, the largest of the runs that the model was fitted to" in sentence
+    twice = sma.set_parameters(kept.system, {"amplifier_gain": 3.2})
+    assert float(plant_of(kept, twice)[0].drive.largest_command()) == pytest.approx(5.0)
     given = dataclasses.replace(kept.parameters["amplifier_limit"], value=20.0, origin="given")
     own = dataclasses.replace(kept, parameters={**kept.parameters, "amplifier_limit": given})
     assert plant_of(own)[1] == ""

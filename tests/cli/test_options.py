@@ -31,7 +31,9 @@ def test_every_option_that_takes_a_quantity_says_its_unit(command: str) -> None:
     assert len(re.findall(r"<s> (?:(?!--).)*without a unit in s", told.replace("--dt;", "dt;"))) == timed
 
 
-@pytest.mark.parametrize("command", ["close-loop", "identify", "predict", "demo", "figures", "tune", "sweep", "simulate"])
+@pytest.mark.parametrize(
+    "command", ["close-loop", "identify", "predict", "demo", "figures", "tune", "sweep", "simulate"]
+)
 def test_every_command_with_a_page_opens_it_on_the_same_word(command: str) -> None:
     told = " ".join(CliRunner().invoke(app, [command, "--help"], terminal_width=200).output.split())
     assert "--open / --no-open open the page in a browser when it is done [default: no-open]" in told

@@ -153,10 +153,97 @@ def test_draws_have_the_covariance_and_the_probabilities_of_the_file() -> None:
 
 def test_draws_lie_within_the_bounds() -> None:
     model = fitted_model()
-    wide = dataclasses.replace(model.likely[0], covariance=1e6 * COVARIANCE)
-    drawn = [parameter_values(one) for one in dataclasses.replace(model, likely=(wide,)).draws(50)]
-    assert {one["convection_coefficient"] for one in drawn} >= {30.0, 300.0}
-    assert all(30.0 <= one["convection_coefficient"] <= 300.0 for one in drawn)
+    # Correlated, and with half of it beyond a bound: cut off there, and not heaped up on it.
+    near = {**LATENT, "convection_coefficient": 31.0}
+    covariance = np.array([[4.0, 3.6, 0.0], [3.6, 4.0, 0.0], [0.0, 0.0, 1.0]])
+    wide = dataclasses.replace(model.likely[0], values=near, covariance=covariance)
+    plants = dataclasses.replace(model, likely=(wide,)).plants(2000, seed=2)
+    convection, heat = np.asarray(get_parameters(plants, ["convection_coefficient", "specific_heat"]))
+    assert convection.min() > 30.0
+    assert np.mean(convection < 30.01) < 0.02
+    # Given the one the other is as before: E = mean + 0.9 (x - mean), and its deviation 2 sqrt(1 - 0.81).
+    rest = heat - FITTED["specific_heat"] - 0.9 * (convection - 31.0)
+    assert abs(rest.mean()) < 0.08
+    assert rest.std() == pytest.approx(2.0 * np.sqrt(1.0 - 0.81), rel=0.06)
+
+
+def test_drawn_transformation_temperatures_are_in_their_order() -> None:
+    model = fitted_model()
+    values = {"austenite_start": 77.0, "austenite_finish": 78.0}
+    likely = LikelyModel(("latent_heat",), 1.0, values, tuple(values), np.diag([4.0, 4.0]))
+    start, finish = np.asarray(
+        get_parameters(dataclasses.replace(model, likely=(likely,)).plants(500, seed=1), list(values))
+    )
+    assert (start < finish).all()
+    assert finish.std() > 1.0
+
+
+def _edited(path: Path, *changes: tuple[str, str]) -> Path:
+    text = path.read_text(encoding="utf-8")
+    for old, new in changes:
+        assert old in text, old
+        text = text.replace(old, new, 1)
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_alternatives_are_found_by_their_effects(tmp_path: Path) -> None:
+    model = fitted_model()
+    creep = LikelyModel(("latent_heat", "creep"), 0.05, {**LATENT, "creep.austenite": 1e-4})
+    path = dataclasses.replace(model, likely=(*model.likely, creep)).save(tmp_path / "model.toml")
+    section = "[[alternatives]]\neffects = []\nprobability = 0.1\n\n"
+    assert load_model(_edited(path, (section, ""))).likely[1].values == creep.values
+    with pytest.raises(
+        ExperimentError, match=r"alternatives\.\[1\]\.effects: the file of the uncertainty has no model with radiation"
+    ):
+        load_model(_edited(path, ('effects = ["latent_heat", "creep"]', 'effects = ["radiation"]')))
+
+
+def test_effects_that_are_changed_by_hand_leave_no_errors_and_no_alternatives(tmp_path: Path) -> None:
+    path = fitted_model().save(tmp_path / "model.toml")
+    model = load_model(_edited(path, ('effects = ["latent_heat"]', 'effects = ["latent_heat", "creep"]')))
+    assert [one.effects for one in model.likely] == [("latent_heat", "creep")]
+    assert model.likely[0].names == ()
+    assert "effects were changed by hand" in model.warnings[0]
+
+
+def test_the_file_of_another_fit_is_refused(tmp_path: Path) -> None:
+    path = fitted_model().save(tmp_path / "model.toml")
+    other = dataclasses.replace(fitted_model().likely[0], values={name: 1.01 * value for name, value in LATENT.items()})
+    dataclasses.replace(fitted_model(), likely=(other,)).save(tmp_path / "other.toml")
+    (tmp_path / "other.nc").replace(tmp_path / "model.nc")
+    with pytest.raises(ExperimentError, match="its digest is another"):
+        load_model(path)
+
+
+def test_probabilities_that_are_all_zero_are_refused(tmp_path: Path) -> None:
+    path = fitted_model().save(tmp_path / "model.toml")
+    with pytest.raises(ExperimentError, match="the probabilities of all models are zero"):
+        load_model(
+            _edited(path, ("probability = 0.9", "probability = 0.0"), ("probability = 0.1", "probability = 0.0"))
+        )
+
+
+def test_a_fit_run_that_the_model_file_was_fitted_to_is_said_to_count_twice(tmp_path: Path) -> None:
+    presets = 'wire = "flexinol_table_3_2"\nload = "dead_weight"\ndrive = "voltage"\n'
+    digest = open_experiment(bench(tmp_path)).runs[0].sha256
+    dataclasses.replace(fitted_model(), runs=(FittedRun("steps", "fit", digest),)).save(tmp_path / "model.toml")
+    experiment = open_experiment(bench(tmp_path, (presets, 'file = "model.toml"\n')))
+    assert any("run 'A' is one that the model file was fitted to" in one for one in experiment.warnings)
+    with pytest.raises(ExperimentError, match=r"effects\.exclude: 'latent_heat' is part of the model"):
+        open_experiment(bench(tmp_path, (presets, 'file = "model.toml"\n[effects]\nexclude = ["latent_heat"]\n')))
+
+
+def test_values_of_single_runs_are_those_of_the_bench_and_a_range(tmp_path: Path) -> None:
+    own = 'file = "a.csv"\nparameters = { load_mass = "0.64 kg" }'
+    experiment = open_experiment(bench(tmp_path, ('file = "a.csv"', own)))
+    likely = [LikelyModel((), 1.0, {"convection_coefficient": 120.0})]
+    made = actuator_model(
+        experiment, likely, {"convection_coefficient": (40.0, 400.0)}, {}, [], {"voltage": (0.0, 5.0)}
+    )
+    assert (made.values["load_mass"], made.parameters["load_mass"].origin) == (0.64, "given")
+    assert made.fitted_range["load_mass"] == (0.64, 0.64)
+    same(made, load_model(made.save(tmp_path / "made.toml")))
 
 
 GOOD = 'format = 1\n[model]\nwire = "flexinol_table_3_2"\nload = "dead_weight"\ndrive = "voltage"\n'

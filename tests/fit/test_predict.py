@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import tomllib
 from pathlib import Path
 
 import jax.numpy as jnp
@@ -14,7 +15,8 @@ from smajax.data.experiment.errors import ExperimentError
 from smajax.data.model_file.actuator_model import ActuatorModel
 from smajax.data.model_file.of_presets import model_of_presets
 from smajax.data.model_file.record import FittedRun, LikelyModel, ModelOutput
-from smajax.fit.predict import Prediction, averaged_band
+from smajax.fit.predict import Prediction
+from smajax.fit.prediction_band import averaged_band
 from smajax.report.predict_words import conclusions
 from tests.helpers.small_bench import bench, smajax, table
 
@@ -170,6 +172,53 @@ def test_what_cannot_be_predicted_is_refused_by_name(tmp_path: Path, logs: list[
     table(tmp_path / "strange.csv", TIME, VOLTS, VOLTS, "foo,bar,baz")
     with pytest.raises(ExperimentError, match=said):
         sma.predict(model, [tmp_path / one for one in logs])
+
+
+def test_known_values_of_an_experiment_file_hold_in_its_runs_where_the_model_has_not_fitted_them(
+    tmp_path: Path,
+) -> None:
+    model = kept_model()
+    drive = (
+        'drive = "voltage"\n',
+        'drive = "flexinol_voltage"\n[model.parameters]\nload_mass = "0.5 kg"\nspecific_heat = "400 J/kg/K"\n',
+    )
+    file = bench(tmp_path, drive)
+    for name in ("a.csv", "b.csv"):
+        log(tmp_path / name, reading(model, load_mass=0.5), heading="t,U,x")
+    result = sma.predict(model, file)
+    assert result.runs[0].series[0].rmse == pytest.approx(NOISE, rel=0.15)
+    said = "\n".join(result.warnings)
+    assert "load_mass: the file gives 0.5 kg, the model has 0.075 kg; the file's is used" in said
+    assert "specific_heat: the file gives 400 J/(kg K), the model has 500 J/(kg K), fitted, which is used" in said
+    assert "held out" not in said
+
+
+def test_a_log_without_an_input_of_the_models_logs_is_refused(tmp_path: Path) -> None:
+    model = kept_model()
+    mass = '[channels.mass]\nrole = "input"\ncolumn = "m"\nunit = "kg"\n[channels.position]'
+    file = bench(tmp_path, ("[channels.position]", mass), ('drive = "voltage"', 'drive = "flexinol_voltage"'))
+    text = file.read_text(encoding="utf-8")
+    from smajax.data.experiment.schema import ExperimentFile
+
+    log_format = ExperimentFile.model_validate(tomllib.loads(text)).log_format
+    known = dataclasses.replace(model, log_format=log_format)
+    run = log(tmp_path / "run.csv", reading(model))
+    with pytest.raises(
+        ExperimentError, match=r"no column for the input 'mass'.*give a constant with --input mass=\.\.\."
+    ):
+        sma.predict(known, run)
+    assert sma.predict(known, run, inputs={"mass": "75 g"}).runs[0].series[0].rmse == pytest.approx(NOISE, rel=0.15)
+
+
+def test_runs_of_another_drive_and_values_that_the_model_has_not_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(
+        ExperimentError, match=r"model\.drive: got 'voltage', expected that of the model, 'flexinol_voltage'"
+    ):
+        sma.predict(kept_model(), bench(tmp_path))
+    own = ('file = "a.csv"', 'file = "a.csv"\nparameters = { "creep.austenite" = "1e-12 1/Pa" }')
+    file = bench(tmp_path, ('drive = "voltage"', 'drive = "flexinol_voltage"'), own)
+    with pytest.raises(ExperimentError, match=r"runs\.A\.parameters\.creep\.austenite: is no parameter of the model"):
+        sma.predict(kept_model(), file)
 
 
 def test_runs_of_another_load_are_refused(tmp_path: Path) -> None:

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from smajax.cli import completion
-from smajax.cli.options import Finely, Json, Noise, Open, Overwrite, quantity, texts, tolerance_of, within
+from smajax.cli.loop_options import Delay, Estimator
+from smajax.cli.options import Finely, Json, Noise, Open, Overwrite, quantity, texts, tolerance_of
 from smajax.cli.terminal import browse, command_line, console, resumable
 
 if TYPE_CHECKING:
@@ -202,7 +203,7 @@ def simulate(
     measured: Annotated[
         list[str] | None,
         typer.Option(
-            help="hold the run against a log: position=log.csv:COLUMN:mm, or temperature, stress, strain; may be repeated"
+            help="hold the run against a log, whose first sample is its start: position=log.csv:COLUMN:mm, or temperature, stress, strain; may be repeated"
         ),
     ] = None,
     dt: Annotated[float, quantity("time between samples", "s", above=0.0, like="5ms")] = 0.005,
@@ -231,13 +232,10 @@ def simulate(
             autocompletion=completion.values,
         ),
     ] = None,
-    estimator: Annotated[
-        str,
-        typer.Option(help="`printed` or `model` filter; default: the true state", autocompletion=completion.estimators),
-    ] = "",
+    estimator: Estimator = "",
     noise: Noise = "",
     period: Annotated[float, quantity("sample time of the controller, a multiple of --dt", "s")] = 0.01,
-    delay: Annotated[int, typer.Option(callback=within(0), help="control periods until a command arrives")] = 0,
+    delay: Delay = 0,
     seed: Annotated[int, typer.Option(help="of the noise")] = 0,
     gif: Annotated[
         bool, typer.Option("--gif", help="draw the load moving beside its wire's phase diagram: simulate.gif")

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from smajax.cli import completion
+from smajax.cli.loop_options import Delay, Estimator, LoopSeconds, Period
 from smajax.cli.options import (
     Finely,
     Json,
@@ -18,7 +19,6 @@ from smajax.cli.options import (
     alone,
     noise_option,
     numbers,
-    quantity,
     refused,
     tolerance_of,
     understood,
@@ -164,19 +164,11 @@ def sweep(
     gain_ratios: Annotated[
         str | None, typer.Option(help="multiples of the controller's main gain; default 0.5,0.7,1,1.4,2")
     ] = None,
-    seconds: Annotated[
-        float | None,
-        quantity(
-            "length of each closed loop; default 10 s, longer of a wire that cools more slowly", "s", 0.1, 86_400.0
-        ),
-    ] = None,
-    estimator: Annotated[
-        str,
-        typer.Option(help="`printed` or `model` filter; default: the true state", autocompletion=completion.estimators),
-    ] = "",
+    seconds: LoopSeconds = None,
+    estimator: Estimator = "",
     noise: Noise = "",
-    period: Annotated[float, quantity("sample time of the controller, a multiple of 10 ms", "s")] = 0.01,
-    delay: Annotated[int, typer.Option(callback=within(0), help="control periods until a command arrives")] = 0,
+    period: Period = 0.01,
+    delay: Delay = 0,
     tolerance: Finely = "auto",
     out: Annotated[
         Path,

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from smajax.cli import completion
+from smajax.cli.loop_options import Delay, Estimator, LoopSeconds, Period
 from smajax.cli.options import (
     UNMET,
     Finely,
@@ -21,7 +22,6 @@ from smajax.cli.options import (
     noise_option,
     numbers,
     pairs,
-    quantity,
     refused,
     texts,
     tolerance_of,
@@ -183,19 +183,11 @@ def tune(
             help="generations of CMA-ES, without gradients, after that, 24 candidates each; default 60, 0 for none",
         ),
     ] = None,
-    seconds: Annotated[
-        float | None,
-        quantity(
-            "length of each closed loop; default 10 s, longer of a wire that cools more slowly", "s", 0.1, 86_400.0
-        ),
-    ] = None,
-    estimator: Annotated[
-        str,
-        typer.Option(help="`printed` or `model` filter; default: the true state", autocompletion=completion.estimators),
-    ] = "",
+    seconds: LoopSeconds = None,
+    estimator: Estimator = "",
     noise: Noise = "",
-    period: Annotated[float, quantity("sample time of the controller, a multiple of 10 ms", "s")] = 0.01,
-    delay: Annotated[int, typer.Option(callback=within(0), help="control periods until a command arrives")] = 0,
+    period: Period = 0.01,
+    delay: Delay = 0,
     seed: Annotated[int, typer.Option(callback=within(0), help="of starting points, plants and noise")] = 0,
     tolerance: Finely = "auto",
     out: Annotated[Path, typer.Option(help="folder for gains.json, the page, the pictures and the numbers")] = Path(

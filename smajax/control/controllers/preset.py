@@ -52,6 +52,9 @@ class ControllerPreset:
         """What it needs and this plant does not give, in words; "" where it can be made."""
         if not isinstance(system.load, AbstractMovingLoad):
             return "it moves nothing that a controller could lead"
+        name, unit = system.load.reading
+        if unit != system.load.position_unit:
+            return f"its sensor shows the {name} ({unit}), and controllers lead a position"
         try:
             system.drive.from_command(jnp.zeros(()))
         except ValueError as error:

@@ -5,11 +5,14 @@ from __future__ import annotations
 import hashlib
 from pathlib import Path
 
+import numpy as np
+
 from smajax.data.experiment.errors import ExperimentError
 from smajax.data.experiment.record import FromModelFile
 from smajax.data.experiment.schema import ExperimentFile, ModelSection
 from smajax.data.experiment.toml_file import Quantity
 from smajax.data.model_file.read import load_model, parameter_text
+from smajax.data.model_file.record import ModelRecord
 
 
 def with_model_file(path: Path, file: ExperimentFile) -> tuple[ExperimentFile, FromModelFile | None]:
@@ -51,8 +54,21 @@ def with_model_file(path: Path, file: ExperimentFile) -> tuple[ExperimentFile, F
     kept = FromModelFile(
         effects=model.effects,
         values={name: one.value for name, one in open_.items()},
-        errors={name: one.standard_error for name, one in fitted.items() if one.standard_error},
+        errors={
+            **_deviations(model),
+            **{name: one.standard_error for name, one in fitted.items() if one.standard_error},
+        },
         bounds={name: (one.low, one.high) for name, one in fitted.items()},
+        fitted_to={one.sha256: one.name for one in model.runs if one.role == "fit"},
+        warnings=model.warnings,
         sha256=hashlib.sha256(source.read_bytes()).hexdigest(),
     )
     return file.model_copy(update={"model": section}), kept
+
+
+def _deviations(model: ModelRecord) -> dict[str, float]:
+    """Standard deviations of the fitted values by their covariance: also of those that the runs barely determine."""
+    if not model.likely:
+        return {}
+    first = model.likely[0]
+    return dict(zip(first.names, np.sqrt(np.maximum(np.diag(first.covariance), 0.0)).tolist(), strict=True))

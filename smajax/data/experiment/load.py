@@ -27,7 +27,7 @@ from smajax.data.experiment.plausibility import (
     role_warnings,
     run_warnings,
 )
-from smajax.data.experiment.record import Experiment, Output, Unknown
+from smajax.data.experiment.record import Experiment, FromModelFile, Output, Run, Unknown
 from smajax.data.experiment.schema import ExperimentFile, read_schema
 from smajax.data.experiment.signals import Reading, ReadRun, read_run, time_unit
 from smajax.data.experiment.unknowns import given_parameters, preset_warnings, run_starts, unknowns
@@ -186,6 +186,15 @@ def _output(path: Path, file: ExperimentFile, name: str, unit: str, runs: Sequen
     return Output(name, unit, sigma, how, False, offset), float(np.median(sensors))
 
 
+def _fitted_before(kept: FromModelFile, runs: Sequence[Run]) -> list[str]:
+    """That a fit run is one that the model file was fitted to: its values would count it twice."""
+    return [
+        f"run {run.name!r} is one that the model file was fitted to: with the errors of its values as priors it counts twice"
+        for run in runs
+        if run.role == "fit" and run.sha256 in kept.fitted_to
+    ]
+
+
 def _untold(file: ExperimentFile, free: Sequence[Unknown]) -> list[str]:
     """That no size of the bench is given: the preset's are another bench's."""
     if file.model.load == "coupon" or file.model.parameters or {*WIRE_SIZES} & {one.name for one in free}:
@@ -196,13 +205,14 @@ def _untold(file: ExperimentFile, free: Sequence[Unknown]) -> list[str]:
     ]
 
 
-def _check_effects(path: Path, file: ExperimentFile, catalogue: Catalogue) -> None:
+def _check_effects(path: Path, file: ExperimentFile, catalogue: Catalogue, kept: FromModelFile | None) -> None:
     """Names of effects, and lists of them that contradict each other or the model."""
     only, excluded = file.effects.only or [], file.effects.exclude
     for key, effects in (("effects.only", only), ("effects.exclude", excluded)):
         for effect in effects:
             check_name(path, key, "effect", effect, catalogue.effects)
-    declared = {name.split(".", 1)[0]: name for name in (*file.model.parameters, *file.unknown) if "." in name}
+    declared = {name: f"{name}, in its model file" for name in (kept.effects if kept else ())}
+    declared |= {name.split(".", 1)[0]: name for name in (*file.model.parameters, *file.unknown) if "." in name}
     for effect in excluded:
         if effect in only:
             raise ExperimentError(
@@ -266,7 +276,7 @@ def experiment_of(path: Path, file: ExperimentFile, catalogue: Catalogue) -> Exp
     every = unknowns(path, file, model.parameters)
     fixed |= {unknown.name: unknown.start for unknown in every if file.unknown[unknown.name].fixed}
     free = tuple(unknown for unknown in every if unknown.name not in fixed) + run_starts(path, file, model)
-    _check_effects(path, file, catalogue)
+    _check_effects(path, file, catalogue, kept)
     priors, not_tried = declared_priors(path, file, catalogue, model, kept)
     values = (dict(kept.values) if kept else {}) | fixed | {unknown.name: unknown.start for unknown in free}
     _check_order(path, file, model, values)
@@ -311,6 +321,7 @@ def experiment_of(path: Path, file: ExperimentFile, catalogue: Catalogue) -> Exp
     warnings += _useless(file, model) + not_tried + _untold(file, free)
     warnings += [] if kept else preset_warnings(file.model.wire, free, model.parameters)
     warnings += role_warnings(file.runs)
+    warnings += [] if kept is None else [*kept.warnings, *_fitted_before(kept, [read.run for read in runs])]
     return Experiment(
         name=path.resolve().parent.name if path.name == "experiment.toml" else path.stem,
         title=file.title,

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from smajax.core.wording import and_listed, counted
+from smajax.data.experiment.record import Run
 from smajax.data.experiment.schema import RunSection
 from smajax.data.experiment.signals import ReadRun, Signal
 from smajax.data.readers.table import Array
@@ -188,7 +189,7 @@ def length_warnings(runs: Sequence[ReadRun], unit: str) -> list[str]:
     ]
 
 
-def role_warnings(runs: Sequence[RunSection]) -> list[str]:
+def role_warnings(runs: Sequence[RunSection] | Sequence[Run]) -> list[str]:
     """What cannot be told from so few runs."""
     result: list[str] = []
     fit = sum(run.role == "fit" for run in runs)

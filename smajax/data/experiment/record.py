@@ -119,6 +119,8 @@ class FromModelFile:
     errors: Mapping[str, float]
     bounds: Mapping[str, tuple[float, float]]
     sha256: str
+    fitted_to: Mapping[str, str] = field(default_factory=dict)  # digest of a run that it was fitted to -> its name
+    warnings: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

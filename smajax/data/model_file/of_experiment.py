@@ -50,11 +50,22 @@ def actuator_model(
         parameters=values,
         outputs=tuple(outputs),
         likely=tuple(likely),
-        fitted_range=fitted_range,
+        fitted_range={**fitted_range, **_ranges_of_runs(experiment)},
         runs=tuple(FittedRun(run.name, run.role, run.sha256) for run in experiment.runs),
         log_format=experiment.log_format,
         made_with={"experiment": experiment.path.name},
     )
+
+
+def _ranges_of_runs(experiment: Experiment) -> dict[str, tuple[float, float]]:
+    """Lowest and highest of the parameters that fit runs have their own values of."""
+    fit = [run for run in experiment.runs if run.role == "fit"]
+    names = {name for run in fit for name in run.parameters if name != "initial_temperature"}
+    return {
+        name: (rounded(min(values)), rounded(max(values)))
+        for name in sorted(names)
+        if (values := [run.parameters[name] for run in fit if name in run.parameters])
+    }
 
 
 def _parameter(
@@ -83,13 +94,16 @@ def _parameter(
 
 
 def _logged(experiment: Experiment, name: str) -> float | None:
-    """The median over the fit runs of what an input channel gives in the place of a parameter; None where none does.
+    """The median over the fit runs of what an input channel, or each run's own value, gives in the place of a parameter; else None.
 
-    Runs have their own, but a closed loop or a simulation without that channel is of this bench all the same.
+    Runs have their own, but a closed loop or a simulation without them is of this bench all the same.
     """
-    if name not in LOGGED:
-        return None
-    series = [run.inputs[LOGGED[name]] for run in experiment.runs if run.role == "fit" and LOGGED[name] in run.inputs]
+    channel = LOGGED.get(name, "")
+    fit = [run for run in experiment.runs if run.role == "fit"]
+    series = [run.inputs[channel] for run in fit if channel in run.inputs]
+    series += [
+        np.asarray([run.parameters[name]]) for run in fit if name in run.parameters and channel not in run.inputs
+    ]
     if not series:
         return None
     return rounded(float(np.quantile(np.concatenate(series), 0.5, method="nearest")))  # one that was there

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping
 from dataclasses import replace
-from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import xarray as xr
 
 from smajax.core.parameters import parameter_values, parameters
 from smajax.core.units import parse_quantity
 from smajax.data.experiment.errors import ExperimentError, at_key, check_name, check_parameter
 from smajax.data.experiment.model_description import ParameterInfo
-from smajax.data.experiment.record import Prior
 from smajax.data.experiment.toml_file import Quantity, read_toml, validated
 from smajax.data.experiment.unknowns import bounded
 from smajax.data.model_catalogue import CATALOGUE, check_together
@@ -29,9 +27,11 @@ from smajax.data.model_file.record import (
     range_unit,
 )
 from smajax.data.model_file.schema import FORMAT, PLACES, ModelFile, ParameterSection
+from smajax.data.model_file.uncertainty import read_uncertainty
 from smajax.model.channels import INPUT_UNITS
 from smajax.model.extended import extended
 from smajax.model.presets import build
+from smajax.model.system import System
 from smajax.simulation.sensors import sensors_of
 
 CLOSE = 1e-9  # of a value: nearer than that it is the fitted one
@@ -69,11 +69,8 @@ def _check_kind(path: Path, content: Mapping[str, Any]) -> None:
         )
     number = content.get("format", FORMAT)
     if isinstance(number, int) and not isinstance(number, bool) and not 1 <= number <= FORMAT:
-        raise ExperimentError(
-            path,
-            "format",
-            f"got {number}, expected 1 to {FORMAT}; it is from a later version of smajax: install that one",
-        )
+        later = "; it is from a later version of smajax: install that one" if number > FORMAT else ""
+        raise ExperimentError(path, "format", f"got {number}, expected 1 to {FORMAT}{later}")
 
 
 def _model(path: Path, file: ModelFile) -> ActuatorModel:
@@ -115,7 +112,7 @@ def _model(path: Path, file: ModelFile) -> ActuatorModel:
         effects=tuple(one.effect_name for one in system.effects),
         parameters={**preset, **given},
         outputs=_outputs(path, file, sensors_of(system)),
-        fitted_range={name: _range(path, name, ends) for name, ends in file.fitted_range.items()},
+        fitted_range={name: _range(path, name, ends, system) for name, ends in file.fitted_range.items()},
         runs=tuple(FittedRun(one.run, one.role, one.sha256) for one in file.fitted_to),
         log_format=file.log_format,
         made_with={name: text for name, text in file.made_with.items() if name != "smajax"},
@@ -145,7 +142,9 @@ def _parameter(path: Path, name: str, given: ParameterSection, info: ParameterIn
     high = info.high if given.high is None else bounded(path, f"{key}.high", given.high, info)
     if low >= high:
         raise ExperimentError(
-            path, f"{key}.low", f"got {given.low!r}, which is not below high = {given.high!r}; exchange them"
+            path,
+            f"{key}.low",
+            f"got {low:g} {info.unit}, which is not below the high end, {high:g} {info.unit}; exchange them",
         )
     error = None
     if given.standard_error is not None:
@@ -176,13 +175,13 @@ def _outputs(path: Path, file: ModelFile, sensors: Mapping[str, str]) -> tuple[M
     return tuple(result)
 
 
-def _range(path: Path, name: str, ends: list[Quantity]) -> tuple[float, float]:
-    key = f"fitted_range.{name}"
-    check_name(path, key, "quantity", name, (*STATE_UNITS, *INPUT_UNITS))
+def _range(path: Path, name: str, ends: list[Quantity], system: System) -> tuple[float, float]:
+    key, table = f"fitted_range.{name}", parameters(system)
+    check_name(path, key, "quantity", name, (*STATE_UNITS, *INPUT_UNITS, *table))
     if len(ends) != 2:
         raise ExperimentError(path, key, f"got {len(ends)} values, expected two, the lowest and the highest")
     with at_key(path, key):
-        low, high = (parse_quantity(end, range_unit(name)) for end in ends)
+        low, high = (parse_quantity(end, range_unit(name, table)) for end in ends)
     if low > high:
         raise ExperimentError(path, key, f"got {ends[0]!r} and {ends[1]!r}, expected the lowest first; exchange them")
     return low, high
@@ -197,20 +196,51 @@ def _with_uncertainty(path: Path, file: ModelFile, model: ActuatorModel) -> Actu
     remedy = "put it beside this file, or remove the key, and predict without the parameters' uncertainty"
     try:
         content = beside.read_bytes()
-    except OSError as error:
-        raise ExperimentError(path, "uncertainty", f"{beside} cannot be read ({error.strerror}); {remedy}") from None
-    likely, warnings = [], []
-    effects = [model.effects, *(tuple(one.effects) for one in file.alternatives)]
-    probabilities = [file.probability, *(one.probability for one in file.alternatives)]
+    except (OSError, ValueError) as error:
+        raise ExperimentError(path, "uncertainty", f"{beside} cannot be read ({error}); {remedy}") from None
+    other = f"{beside} is not what was written with this file"
+    if file.uncertainty_sha256 not in (None, hashlib.sha256(content).hexdigest()):
+        raise ExperimentError(path, "uncertainty", f"{other} (its digest is another); {remedy}")
     try:
-        with xr.open_dataset(BytesIO(content), engine="scipy") as dataset:
-            dataset.load()
-        for number, (own, probability) in enumerate(zip(effects, probabilities, strict=True)):
-            likely.append(_likely(dataset, number, own, probability))
-    except (KeyError, ValueError, TypeError, OSError, AssertionError) as error:
-        raise ExperimentError(
-            path, "uncertainty", f"{beside} is not what was written with this file ({error}); {remedy}"
-        ) from None
+        kept = read_uncertainty(content)
+    except ValueError as error:
+        raise ExperimentError(path, "uncertainty", f"{other} ({error}); {remedy}") from None
+    return _with_likely(path, model, _matched(path, file, model, kept))
+
+
+def _matched(path: Path, file: ModelFile, model: ActuatorModel, kept: list[LikelyModel]) -> list[LikelyModel]:
+    """The model itself, then the alternatives of the text, with their probabilities; by their effects. Raises ExperimentError."""
+    by_effects = {frozenset(one.effects): one for one in kept}
+    if not kept:
+        return []
+    own = by_effects.get(frozenset(model.effects))
+    if own is None:
+        # Effects were added or removed by hand: what is known of the others' values is of another model.
+        return [replace(kept[0], effects=model.effects, probability=1.0, names=(), covariance=np.zeros((0, 0)))]
+    result = [replace(own, effects=model.effects, probability=file.probability)]
+    for number, one in enumerate(file.alternatives):
+        found = by_effects.get(frozenset(one.effects))
+        if found is None:
+            raise ExperimentError(
+                path,
+                f"alternatives.[{number + 1}].effects",
+                f"the file of the uncertainty has no model with {' + '.join(one.effects) or 'no effects'}; remove this section",
+            )
+        result.append(replace(found, effects=tuple(one.effects), probability=one.probability))
+    if not sum(one.probability for one in result) > 0.0:
+        raise ExperimentError(path, "probability", "the probabilities of all models are zero; expected some above it")
+    return result
+
+
+def _with_likely(path: Path, model: ActuatorModel, likely: list[LikelyModel]) -> ActuatorModel:
+    """The model with its likely models. Values that were changed by hand are given ones, without an error."""
+    if not likely:
+        return model
+    warnings = []
+    if likely[0].values and not likely[0].names and any(one.standard_error for one in model.parameters.values()):
+        warnings.append(
+            f"{path}: its effects were changed by hand, so that nothing is known of the fitted values' errors"
+        )
     changed = _changed(likely[0], model)
     if changed:
         warnings.append(
@@ -220,35 +250,15 @@ def _with_uncertainty(path: Path, file: ModelFile, model: ActuatorModel) -> Actu
     exact = {
         name: replace(model.parameters[name], value=value)  # every digit of what the text has rounded
         for name, value in kept[0].values.items()
+        if name in model.parameters
     }
-    return replace(model, parameters={**model.parameters, **exact}, likely=kept, warnings=tuple(warnings))
-
-
-def _likely(dataset: xr.Dataset, number: int, effects: tuple[str, ...], probability: float) -> LikelyModel:
-    if f"value_{number}" not in dataset:
-        if number == 0 and not effects:
-            return LikelyModel(effects, probability, {})
-        raise KeyError(f"no value_{number}")
-    names = [str(one) for one in dataset[f"parameter_{number}"].values]
-    columns = {
-        key: np.asarray(dataset[f"{key}_{number}"].values, dtype=float)
-        for key in ("value", "prior_mean", "prior_sigma", "prior_logarithmic")
+    given = {
+        name: replace(model.parameters[name], origin="given", standard_error=None)
+        for name in changed
+        if name in model.parameters
     }
-    priors = {
-        name: Prior(float(mean), float(sigma), bool(logarithmic))
-        for name, mean, sigma, logarithmic in zip(
-            names, columns["prior_mean"], columns["prior_sigma"], columns["prior_logarithmic"], strict=True
-        )
-        if np.isfinite(mean)
-    }
-    values = dict(zip(names, columns["value"].tolist(), strict=True))
-    if f"covariance_{number}" not in dataset:
-        return LikelyModel(effects, probability, values, priors=priors)
-    known = tuple(str(one) for one in dataset[f"determined_{number}"].values)
-    covariance = np.asarray(dataset[f"covariance_{number}"].values, dtype=float)
-    if covariance.shape != (len(known),) * 2 or not np.isfinite(covariance).all() or not set(known) <= set(values):
-        raise ValueError(f"covariance_{number} does not go with its names")
-    return LikelyModel(effects, probability, values, known, covariance, priors)
+    values = {**model.parameters, **exact, **given}
+    return replace(model, parameters=values, likely=kept, warnings=tuple(warnings))
 
 
 def _changed(fitted: LikelyModel, model: ActuatorModel) -> list[str]:

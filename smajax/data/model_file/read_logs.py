@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 
 from smajax.core.wording import and_listed
@@ -13,18 +12,17 @@ from smajax.data.experiment.draft import draft
 from smajax.data.experiment.draft_model import ModelChoice
 from smajax.data.experiment.errors import ExperimentError
 from smajax.data.experiment.load import experiment_of
-from smajax.data.experiment.plausibility import role_warnings
 from smajax.data.experiment.record import Experiment
 from smajax.data.experiment.schema import DataSection, ExperimentFile, LogFormat, ModelSection, RunSection
 from smajax.data.experiment.toml_file import Quantity, validated
 from smajax.data.model_catalogue import CATALOGUE
-from smajax.data.model_file.actuator_model import ActuatorModel
 from smajax.data.model_file.read import parameter_text
+from smajax.data.model_file.record import ModelRecord
 from smajax.data.readers.table import MeasuredDataError
 
 
 def read_logs(
-    model: ActuatorModel,
+    model: ModelRecord,
     files: Sequence[str | Path],
     inputs: Mapping[str, Quantity] | None = None,
     parameters: Mapping[str, Quantity] | None = None,
@@ -52,9 +50,12 @@ def read_logs(
             missed = error
     try:
         file, messages = _guessed(model, paths, folder, decimal)
+        _check_channels(model, file, constants, paths[0])
         runs = [run.model_copy(update={"inputs": constants, "parameters": own, "role": "fit"}) for run in file.runs]
         return _experiment(model, file.log_format, folder, runs, decimal), messages
     except (ExperimentError, MeasuredDataError) as error:
+        if isinstance(error, ExperimentError) and "no column for the input" in str(error):
+            raise
         if missed is not None:
             raise missed from None
         raise ExperimentError(
@@ -81,7 +82,7 @@ def _runs(
 
 
 def _guessed(
-    model: ActuatorModel, paths: Sequence[Path], folder: Path, decimal: str
+    model: ModelRecord, paths: Sequence[Path], folder: Path, decimal: str
 ) -> tuple[ExperimentFile, tuple[str, ...]]:
     """A draft of an experiment of the model's wire, load and drive. Raises MeasuredDataError."""
     drafted = draft(paths, folder / "logs.toml", "logs", ModelChoice(model.load, model.wire, model.drive), decimal)
@@ -92,8 +93,23 @@ def _guessed(
     return file, tuple(columns)
 
 
+def _check_channels(model: ModelRecord, file: ExperimentFile, constants: Mapping[str, Quantity], path: Path) -> None:
+    """ExperimentError where the model's own logs have an input that none of these columns is."""
+    if model.log_format is None:
+        return
+    inputs = [name for name, one in model.log_format.channels.items() if one.role == "input"]
+    for name in inputs:
+        if name not in file.channels and name not in constants:
+            raise ExperimentError(
+                path,
+                "",
+                f"no column for the input {name!r}, which the runs that the model was fitted to have; rename the column, or give a "
+                f"constant with --input {name}=...",
+            )
+
+
 def _experiment(
-    model: ActuatorModel, log_format: LogFormat, folder: Path, runs: Sequence[RunSection], decimal: str
+    model: ModelRecord, log_format: LogFormat, folder: Path, runs: Sequence[RunSection], decimal: str
 ) -> Experiment:
     """The logs as an experiment in which the model's values are known. Raises ExperimentError."""
     constant = {name for run in runs for name in run.inputs}
@@ -110,9 +126,7 @@ def _experiment(
         runs=list(runs),
     )
     # The folder of the logs stands for that of an experiment file.
-    experiment = experiment_of(folder / "model.toml", file, CATALOGUE)
-    roles = set(role_warnings(file.runs))
-    return replace(experiment, warnings=tuple(text for text in experiment.warnings if text not in roles))
+    return experiment_of(folder / "model.toml", file, CATALOGUE)
 
 
 def channels_read(experiment: Experiment) -> str:

@@ -17,6 +17,7 @@ from smajax.model.channels import INPUT_UNITS
 from smajax.model.extended import extended
 from smajax.model.presets import build
 from smajax.model.system import System
+from smajax.model.wire.order import ORDER
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -24,13 +25,14 @@ if TYPE_CHECKING:
 Origin = Literal["fitted", "given", "preset"]
 
 
+ROUNDS = 200  # of draws, twice as many as asked for each
 # Quantities of a fitted range beside the inputs -> unit.
 STATE_UNITS = {"temperature": "degC", "stress": "Pa", "temperature_rate": "K/s"}
 
 
-def range_unit(name: str) -> str:
-    """Unit of a quantity of a fitted range: an input, or a state of the wire."""
-    return STATE_UNITS.get(name) or INPUT_UNITS[name]
+def range_unit(name: str, table: Mapping[str, Parameter]) -> str:
+    """Unit of a quantity of a fitted range: a state of the wire, an input, or a parameter that runs have their own value of."""
+    return STATE_UNITS.get(name) or INPUT_UNITS.get(name) or table[name].unit
 
 
 @dataclass(frozen=True)
@@ -171,16 +173,44 @@ class ModelRecord:
         return set_parameters(base, columns)
 
     def _drawn(self, model: LikelyModel, count: int, random: np.random.Generator) -> dict[str, np.ndarray]:
-        """Values of what the covariance of one likely model covers, (count,) each."""
-        if not model.names:
+        """Values of what the covariance of one likely model covers, (count,) each: a normal distribution cut off at the bounds.
+
+        Draws with a value out of its bounds, or two in the wrong order, are drawn again as a whole. Where hardly any are inside, the
+        last are moved to the bounds.
+        """
+        if not model.names or not count:
             return {}
         mean = np.asarray([model.values[name] for name in model.names])
         size = np.sqrt(np.maximum(np.diag(model.covariance), 0.0))
         size = np.where(size > 0.0, size, 1.0)
         eigenvalues, vectors = np.linalg.eigh(model.covariance / np.outer(size, size))
-        steps = random.standard_normal((count, len(mean))) * np.sqrt(np.maximum(eigenvalues, 0.0)) @ vectors.T
-        values = mean + size * steps
-        return {name: np.clip(values[:, k], *self._bounds[name]) for k, name in enumerate(model.names)}
+        root = (vectors * np.sqrt(np.maximum(eigenvalues, 0.0))).T
+        low, high = np.asarray([self._bounds[name] for name in model.names]).T
+        found = np.empty((0, len(mean)))
+        values = mean[None]
+        for _ in range(ROUNDS):
+            values = mean + size * (random.standard_normal((2 * count, len(mean))) @ root)
+            inside = np.all((values >= low) & (values <= high), axis=1) & self._ordered(model, values)
+            found = np.concatenate([found, values[inside]])
+            if len(found) >= count:
+                break
+        missing = count - len(found)
+        if missing > 0:
+            found = np.concatenate([found, np.clip(values[np.arange(missing) % len(values)], low, high)])
+        return {name: found[:count, k] for k, name in enumerate(model.names)}
+
+    def _ordered(self, model: LikelyModel, values: np.ndarray) -> np.ndarray:
+        """Whether each of the draws (n, K) has its transformation temperatures in their order, (n,)."""
+        known = {**self.values, **model.values}
+        result = np.ones(len(values), dtype=bool)
+        for lower, higher, _ in ORDER:
+            if lower in known and higher in known:
+                ends = [
+                    values[:, model.names.index(name)] if name in model.names else known[name]
+                    for name in (lower, higher)
+                ]
+                result &= np.asarray(ends[0] < ends[1])
+        return result
 
     @cached_property
     def _bounds(self) -> dict[str, tuple[float, float]]:

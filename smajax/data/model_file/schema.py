@@ -69,6 +69,7 @@ class ModelFile(Section):
     format: int = Field(description=f"a whole number, {FORMAT} of this version")
     title: str = Field(default="", description="one line of text")
     uncertainty: str | None = Field(default=None, description="the name of a NetCDF file beside this one")
+    uncertainty_sha256: str | None = Field(default=None, description="the digest of that file, as text")
     probability: float = Field(default=1.0, ge=0.0, le=1.0, description="a number from 0 to 1")
     model: PartsSection = Field(description="a section [model] with wire, load and drive")
     parameters: dict[str, ParameterSection] = Field(

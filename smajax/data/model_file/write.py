@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Iterable
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import xarray as xr
-
 from smajax.core.files import as_netcdf, replace
 from smajax.data.experiment.errors import ExperimentError
 from smajax.data.experiment.toml_file import Section
-from smajax.data.model_file.record import LikelyModel, ModelParameter, ModelRecord, range_unit
+from smajax.data.model_file.record import ModelParameter, ModelRecord, range_unit
 from smajax.data.model_file.schema import FORMAT
+from smajax.data.model_file.uncertainty import uncertainty_of
 
 HEAD = """\
 # A model of an SMA wire actuator, for `smajax predict`, `simulate`, `sweep`, `tune`, and `[model] file = "..."` of an experiment file.
@@ -35,16 +34,20 @@ def write_model(model: ModelRecord, path: Path) -> Path:
     beside = path.with_suffix(".nc")
     if model.likely:
         # First, so that a file that names it never lacks it.
-        replace(beside, as_netcdf(_uncertainty(model)))
-    replace(path, model_text(model, beside.name if model.likely else ""))
+        content = as_netcdf(uncertainty_of(model))
+        replace(beside, content)
+        replace(path, model_text(model, beside.name, hashlib.sha256(content).hexdigest()))
+    else:
+        replace(path, model_text(model))
     return path
 
 
-def model_text(model: ModelRecord, uncertainty: str = "") -> str:
-    """The text of the file. `uncertainty`: name of the NetCDF file beside it."""
+def model_text(model: ModelRecord, uncertainty: str = "", sha256: str = "") -> str:
+    """The text of the file. `uncertainty`: name of the NetCDF file beside it, and `sha256` its digest."""
     lines = [HEAD, f"format = {FORMAT}", f"title = {_text(model.title)}"]
     if uncertainty:
         lines.append(f"uncertainty = {_text(uncertainty)}  # covariance and priors of the fitted values")
+        lines.append(f"uncertainty_sha256 = {_text(sha256)}")
         lines.append(f"probability = {model.likely[0].probability!r}  # of this set of effects")
     if model.log_format is not None and model.log_format.decimal:
         lines.append(f"decimal = {_text(model.log_format.decimal)}  # the decimal mark of the logs")
@@ -60,13 +63,15 @@ def model_text(model: ModelRecord, uncertainty: str = "") -> str:
         lines.append(f"offset = {str(output.offset).lower()}  # whether each run has its own zero")
         if output.prediction_error is not None:
             error = _quantity(output.prediction_error, output.unit)
-            lines.append(f"prediction_error = {error}  # nine of ten samples of runs left out stay within")
+            lines.append(
+                f"prediction_error = {error}  # nine of ten samples of runs that the fit did not see stay within"
+            )
     for other in model.likely[1:]:
         lines += ["", "[[alternatives]]", f"effects = {_list(other.effects)}", f"probability = {other.probability!r}"]
     if model.fitted_range:
         lines += ["", "[fitted_range]  # of the runs that it was fitted to: beyond it is extrapolation"]
         for name, ends in model.fitted_range.items():
-            unit = range_unit(name)
+            unit = range_unit(name, model.table)
             lines.append(f"{_key(name)} = [{', '.join(_quantity(end, unit) for end in ends)}]")
     if model.log_format is not None:
         lines += _log_format(model.log_format)
@@ -131,31 +136,3 @@ def _key(name: str) -> str:
 
 def _list(names: Iterable[str]) -> str:
     return f"[{', '.join(map(_text, names))}]"
-
-
-def _uncertainty(model: ModelRecord) -> xr.Dataset:
-    """What is known of the fitted values of each likely model: `value_0`, `covariance_0`, ... along `parameter_0`."""
-    result = xr.Dataset(attrs={"title": model.title, "format": FORMAT, "unit": "SI, degC, rad"})
-    for number, one in enumerate(model.likely):
-        if one.values:
-            result = result.merge(_likely(one, str(number)))
-    return result
-
-
-def _likely(one: LikelyModel, number: str) -> xr.Dataset:
-    every, known = f"parameter_{number}", f"determined_{number}"
-    names = list(one.values)
-    priors = [one.priors.get(name) for name in names]
-    columns = {
-        f"value_{number}": [one.values[name] for name in names],
-        f"prior_mean_{number}": [np.nan if prior is None else prior.mean for prior in priors],
-        f"prior_sigma_{number}": [np.nan if prior is None else prior.sigma for prior in priors],
-        f"prior_logarithmic_{number}": [0.0 if prior is None else float(prior.logarithmic) for prior in priors],
-    }
-    result = xr.Dataset(
-        {name: ((every,), np.asarray(column, dtype=float)) for name, column in columns.items()}, coords={every: names}
-    )
-    if one.names:
-        covariance = ((known, f"{known}_too"), np.asarray(one.covariance, dtype=float))
-        result = result.assign({f"covariance_{number}": covariance}).assign_coords({known: list(one.names)})
-    return result
