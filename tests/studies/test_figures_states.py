@@ -6,7 +6,9 @@ import json
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
+from smajax.cli.main import app
 from smajax.core.progress import quiet
 from studies.source.row import Result, Row, State, judgement
 from studies.source.write import as_csv, as_markdown, as_page, as_text, draw, holding, lying_in
@@ -56,3 +58,12 @@ def test_a_record_with_two_states_is_not_taken(tmp_path: Path, monkeypatch: pyte
     del old["state"]
     record.write_text(json.dumps(old | {"holds": True}))
     assert lying_in(tmp_path) == []
+
+
+def test_a_claim_that_holds_in_part_is_exit_code_3(tmp_path: Path) -> None:
+    ended = CliRunner().invoke(app, ["figures", "M9", "M11", "--fast", "--json", "--out", str(tmp_path / "out")])
+    told = json.loads(ended.stdout)
+    assert ended.exit_code == 3
+    assert (told["M9"]["holds"], told["M9"]["state"], told["M9"]["in_part"]) == (True, "holds", "")
+    assert (told["M11"]["holds"], told["M11"]["state"]) == (False, "holds in part")
+    assert "16 V" in told["M11"]["in_part"]
