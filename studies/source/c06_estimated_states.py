@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
@@ -21,7 +22,7 @@ from smajax.report.drawing import BLACK, BLUE, RED, keyed, named, panels
 from smajax.simulation.simulate import DEFAULT_STEP
 
 from .rigs import Batched, Recorded, recorded, simulated
-from .row import Result, Row
+from .row import Result, Row, State, judgement
 
 VOLTS, ON, SECONDS, PERIOD = 8.0, 3.0, 6.0, 0.01
 GUESS_GONE = 0.1  # s: the printed first guess of the stress is 23 MPa off
@@ -106,6 +107,22 @@ def _draw(
     named(axes[5], "temperature (°C)", "arm angle (°)", "hysteresis loop")
 
 
+def judged(numbers: Mapping[str, float]) -> State:
+    """The estimates follow while the arm moves, and mechanical errors peak where it turns round, by the printed filter.
+
+    As worded the error is largest there of all: of the temperature too, and of the landing on the stop as well.
+    """
+    follows = numbers["largest_rms_over_its_limit"] < 1.0
+    largest, worded = True, True
+    for shown, unit in (("position", "deg"), ("velocity", "rad_s"), ("stress", "MPa"), ("temperature", "C")):
+        turn = numbers[f"printed_{shown}_peak_turning_{unit}"]
+        elsewhere = turn > numbers[f"printed_{shown}_peak_elsewhere_{unit}"]
+        largest &= elsewhere or shown == "temperature"
+        worded &= elsewhere and turn > numbers[f"printed_{shown}_peak_landing_{unit}"]
+    loop = abs(numbers["printed_martensite_fraction_loop_exact"] - 1.0) < 0.05
+    return judgement(follows and largest and loop, worded)
+
+
 def work(fast: bool) -> Result:
     """One run of the arm; both filters over its angle, exact and with noise."""
     # The plant always in finer steps than the filter's: on its own transition, without noise, the model's is exact.
@@ -141,27 +158,33 @@ def work(fast: bool) -> Result:
         for shown, (factor, _, _) in SHOWN.items()
     }
     spans = {shown: factor * float(np.ptp(getattr(true, shown))) for shown, (factor, _, _) in SHOWN.items()}
-    follows = all(
-        rms[name, shown, lane] < SHOWN[shown][2] * spans[shown] for name, lane in READINGS.items() for shown in SHOWN
+    limits = max(
+        rms[name, shown, lane] / (SHOWN[shown][2] * spans[shown]) for name, lane in READINGS.items() for shown in SHOWN
     )
     peaks = {key: (float(error[turning].max()), float(error[elsewhere].max())) for key, error in errors.items()}
-    mechanical = ("position", "velocity", "stress")
-    largest = all(peaks["printed", shown][0] > peaks["printed", shown][1] for shown in mechanical)
     loops = {
         (name, lane): _area(one.temperature[lane], one.martensite_fraction[lane])
         / _area(true.temperature, true.martensite_fraction)
         for name, one in estimates.items()
         for lane in (0, 1)
     }
-    landing = {shown: float(errors["printed", shown][time >= lands].max()) for shown in mechanical}
+    landing = {shown: float(errors["printed", shown][time >= lands].max()) for shown in SHOWN}
     stress_errors = {name: errors[name, "stress"] for name in estimates}
     at_rest = float(errors["printed", "stress"][-1])
 
     def listed(name: str) -> str:
         return ", ".join(f"{rms[name, shown, READINGS[name]]:.2g} {unit}" for shown, (_, unit, _) in SHOWN.items())
 
+    numbers = {"turns_s": turns, "lands_s": lands, "printed_stress_error_on_the_stop_MPa": at_rest}
+    numbers |= {"largest_rms_over_its_limit": limits} | _numbers(peaks, rms, loops, landing)
+    state = judged(numbers)
+    turn, heats = peaks["printed", "stress"][0], peaks["printed", "temperature"]
     return Result(
-        holds=follows and largest and abs(loops["printed", 0] - 1.0) < 0.05,
+        holds=state is not State.FAILS,
+        in_part=f"the error is not largest where the arm turns round: of the stress it is {landing['stress']:.0f} MPa where the arm lands on its lower stop "
+        f"({turn:.0f} MPa at the turn), and of the temperature {heats[1]:.2f} °C while the wire heats ({heats[0]:.2f} °C at the turn)"
+        if state is State.IN_PART
+        else "",
         found=f"angle, rate, stress and temperature off by {listed('printed')} (rms while the arm moves one way) with the "
         f"printed filter; where the arm turns round its angle, rate and stress are off by up to "
         f"{peaks['printed', 'position'][0]:.1f}°, {peaks['printed', 'velocity'][0]:.1f} rad/s and "
@@ -169,8 +192,7 @@ def work(fast: bool) -> Result:
         f"{peaks['printed', 'velocity'][1]:.1f} rad/s and {peaks['printed', 'stress'][1]:.0f} MPa; its loop of the "
         f"fraction over temperature has {100 * loops['printed', 0]:.0f} % of the true area on exact readings and "
         f"{100 * loops['printed', 1]:.0f} % with {NOISE:g} rad of noise; the filter over the simulator's step is off by {listed('model')} on readings with {NOISE:g} rad of noise",
-        numbers={"turns_s": turns, "lands_s": lands, "printed_stress_error_on_the_stop_MPa": at_rest}
-        | _numbers(peaks, rms, loops, landing),
+        numbers=numbers,
         draw=partial(_draw, true=true, estimates=estimates, stress_errors=stress_errors, turns=turns),
         caveat="R is not printed; here it equals Q. The temperature, which no reading corrects in the printed filter, is "
         f"off most while the wire heats, {max(peaks['printed', 'temperature']):.2f} °C (Euler's step), not where the arm "
@@ -179,7 +201,7 @@ def work(fast: bool) -> Result:
         f"at rest there the stress stays {at_rest:.0f} MPa too high, which is what the stop carries. With {NOISE:g} rad of "
         f"noise the printed filter's stress is off by {rms['printed', 'stress', 1]:.1f} MPa, from differences of "
         f"differences: the claim is checked on exact readings, as in the source's simulation, and the loop by its fraction, for the "
-        "angle is read.",
+        "angle is read. C8, C12, C13 and C15 have the estimate in control.",
     )
 
 

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Mapping
+
 import jax.numpy as jnp
 import numpy as np
 from matplotlib.figure import Figure
 
 from smajax.control.load_equation import moving_load
-from smajax.control.presets import printed_filter, quick_stress_sliding
+from smajax.control.presets import printed_filter, quick_stress_sliding, stress_sliding
 from smajax.core.parameters import set_parameters
 from smajax.model.rigs import arm
 from smajax.report.drawing import GREY, keyed, named, panels
 
 from .backstepping_runs import shades
-from .row import Result, Row
-from .set_points import at_set_points, overshoot, steady
+from .row import Result, Row, State, judgement
+from .set_points import SECONDS, at_set_points, overshoot, steady, time_of
 
 TARGETS = tuple(range(-40, 61, 10))  # degrees
 SLACK = {
@@ -26,12 +29,27 @@ SLACK = {
 }
 
 
+def judged(numbers: Mapping[str, float]) -> State:
+    """Within 4 s everywhere, an overshoot that grows beyond the summit with gains chosen for it; as worded with others."""
+    slow = ("slowest_reach_s", "slowest_reach_slack_s", "slowest_reach_with_filter_s")
+    checked = max(numbers[name] for name in slow) < 4.0
+    checked &= numbers["largest_steady_error_deg"] < 0.2 and numbers["largest_steady_error_with_filter_deg"] < 0.5
+    summit = numbers["angle_of_greatest_stress_deg"]
+    checked &= max(numbers[f"overshoot_slack_{at}_deg"] for at in TARGETS if at <= summit) < 0.5
+    beyond = [numbers[f"overshoot_slack_{at}_deg"] for at in TARGETS if at > summit]
+    checked &= beyond[-1] > 1.0 and all(later > sooner for sooner, later in itertools.pairwise(beyond))
+    return judgement(
+        checked, numbers["overshoot_beyond_deg"] > 1.0 or numbers["overshoot_beyond_chapter_3_gains_deg"] > 1.0
+    )
+
+
 def work(fast: bool) -> Result:
     """All set points with one set of gains, searched; and with a stress controller that follows less closely."""
     system = arm()
     tuned = quick_stress_sliding(system)
     slack = set_parameters(tuned, SLACK)
     with_searched, with_slack = at_set_points(tuned, fast, TARGETS), at_set_points(slack, fast, TARGETS)
+    third = {at: one for at, (_, one) in at_set_points(stress_sliding(system), fast, TARGETS).items()}
     filtered = [one for _, one in at_set_points(tuned, fast, TARGETS, printed_filter(system)).values()]
     reach_filtered = max(float(one.reach_time) for one in filtered)
     error_filtered = max(steady(one) for one in filtered)
@@ -61,31 +79,37 @@ def work(fast: bool) -> Result:
             named(axes, "time (s)", "arm angle (°)", title)
             keyed(axes)
 
+    numbers = {
+        "slowest_reach_s": float(reach.max()),
+        "slowest_reach_slack_s": float(reach_slack.max()),
+        "slowest_reach_with_filter_s": reach_filtered,
+        "largest_steady_error_with_filter_deg": error_filtered,
+        "largest_overshoot_deg": largest,
+        "overshoot_beyond_deg": max(overshoot(one) for at, (_, one) in with_searched.items() if at > summit),
+        "overshoot_beyond_chapter_3_gains_deg": max(overshoot(one) for at, one in third.items() if at > summit),
+        "largest_overshoot_chapter_3_gains_deg": max(overshoot(one) for one in third.values()),
+        "slowest_reach_chapter_3_gains_s": max(time_of(one.reach_time) for one in third.values()),
+        **{f"overshoot_slack_{at}_deg": float(o) for at, o in zip(TARGETS, loose, strict=True)},
+        "largest_steady_error_deg": error,
+        "angle_of_greatest_stress_deg": summit,
+    }
+    highest = max(third, key=lambda at: overshoot(third[at]))
+    reached = {at: float(one.reach_time) for at, one in third.items() if np.isfinite(one.reach_time)}
+    missed = [at for at in TARGETS if at not in reached]
+    state = judged(numbers)
     return Result(
-        holds=bool(
-            reach.max() < 4.0
-            and reach_slack.max() < 4.0
-            and reach_filtered < 4.0
-            and error < 0.2
-            and error_filtered < 0.5
-            and loose[~beyond].max() < 0.5
-            and loose[-1] > 1.0
-            and (np.diff(loose[beyond]) > 0.0).all()
-        ),
+        holds=state is not State.FAILS,
+        in_part=f"the overshoot beyond the angle of greatest stress needs gains that are used in this figure alone: with those of C11 and C13 it is "
+        f"{largest:.2f}° at most; with those of M5, M6 and M8 it is {overshoot(third[highest]):.1f}° at most, at {highest}°, and the arm takes up to "
+        f"{max(reached.values()):.1f} s"
+        + (f" and does not come to {', '.join(f'{at}°' for at in missed)} in {SECONDS:.0f} s" if missed else "")
+        if state is State.IN_PART
+        else "",
         found=f"every set point is reached in {reach.min():.1f} to {reach.max():.1f} s; with the searched gains the largest overshoot is "
         f"{largest:.2f}°; with a slacker stress controller ({reach_slack.max():.1f} s at most) the overshoot stays within {loose[~beyond].max():.1f}° up to "
         f"the angle of greatest stress ({summit:.0f}°) and grows beyond it to {loose[-1]:.1f}° at 60°; on the printed filter's stress instead of the true one every set point is "
         f"reached in {reach_filtered:.1f} s at most and held within {error_filtered:.2f}°",
-        numbers={
-            "slowest_reach_s": float(reach.max()),
-            "slowest_reach_slack_s": float(reach_slack.max()),
-            "slowest_reach_with_filter_s": reach_filtered,
-            "largest_steady_error_with_filter_deg": error_filtered,
-            "largest_overshoot_deg": largest,
-            **{f"overshoot_slack_{at}_deg": float(o) for at, o in zip(TARGETS, loose, strict=True)},
-            "largest_steady_error_deg": error,
-            "angle_of_greatest_stress_deg": summit,
-        },
+        numbers=numbers,
         draw=draw,
         caveat="drawn with the true state; the filter's readings of the angle are exact. Gains are not printed; the searched ones avoid the overshoot that the source sees, "
         f"those with {', '.join(f'{name} = {value:g}' for name, value in SLACK.items())} show it.",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import partial
 
 import numpy as np
@@ -17,7 +18,7 @@ from smajax.report.drawing import BLACK, BLUE, GREY, RED, keyed, named, panels
 
 from .backstepping_runs import ON_ITS_PLANT, SECONDS, degrees, plant, runs
 from .rigs import Recorded, austenite_range, martensite_range
-from .row import Result, Row
+from .row import Result, Row, State, judgement
 
 SHOWN = 40.0  # degrees
 FILTERED, NOISE = 20.0, 1e-3  # degrees, rad: the runs on estimated states
@@ -48,6 +49,15 @@ def _draw(figure: Figure, system: System, loops: Recorded, shown: int, tight: in
     named(heat, "time (s)", "temperature (°C)", f"K = {LOW_GAIN:g} 1/s")
 
 
+def judged(numbers: Mapping[str, float]) -> State:
+    """Settles, overshoots with a small K, the voltage falls; as worded with the searched gains, by the degree that counts."""
+    checked = max(numbers["largest_settling_s"], numbers["settling_s"]) < SECONDS
+    checked &= numbers["least_overshoot_deg"] > 0.1 and numbers["overshoot_deg"] > 5.0
+    checked &= numbers["voltage_at_top_V"] < 0.2 * numbers["first_voltage_V"]
+    checked &= numbers["holding_voltage_V"] < numbers["first_voltage_V"]
+    return judgement(checked, numbers["overshoot_searched_deg"] > 1.0)
+
+
 def work(fast: bool) -> Result:
     """The searched gains and a smaller K, on the section's plant; then on the plant of chapter 3."""
     system = plant()
@@ -59,12 +69,12 @@ def work(fast: bool) -> Result:
     other, _ = runs(
         [rate_form, set_parameters(rate_form, {"thermal_modulus": 0.0})], [loose, loose], [SHOWN, SHOWN], fast
     )
-    estimated, judged = runs(
+    estimated, seen = runs(
         [system] * 2, [tuned] * 2, [FILTERED] * 2, fast, estimator=printed_filter(system), noise=[0.0, NOISE]
     )
-    error, over = np.degrees(judged.steady_error), np.degrees(judged.overshoot)
+    error, over = np.degrees(seen.steady_error), np.degrees(seen.overshoot)
     ends = degrees(estimated)[:, -1]
-    settles = [f"settles in {t:.1f} s" if np.isfinite(t) else "does not settle" for t in judged.settling_time]
+    settles = [f"settles in {t:.1f} s" if np.isfinite(t) else "does not settle" for t in seen.settling_time]
     # Eq. 4.51 at the angle and fraction of the plant of chapter 3, against its own stress.
     law, xi = system.wire.constitutive, other.run.martensite_fraction
     modulus = np.asarray(young_modulus(system.wire, xi))
@@ -77,33 +87,39 @@ def work(fast: bool) -> Result:
     first, after, last = float(volts[shown][:top].max()), float(volts[shown][top]), float(volts[shown][-2])
     elsewhere = degrees(other)[:, time > 16.0]
 
+    numbers = {
+        "largest_settling_s": float(np.minimum(settling, 2.0 * SECONDS).max()),
+        "least_overshoot_deg": float(overshoot.min()),
+        "settling_s": float(settling[shown]),
+        "overshoot_deg": float(overshoot[shown]),
+        "settling_searched_s": float(settling[tight]),
+        "overshoot_searched_deg": float(overshoot[tight]),
+        "first_voltage_V": first,
+        "voltage_at_top_V": after,
+        "holding_voltage_V": last,
+        "settling_filter_s": float(min(seen.settling_time[0], 2.0 * SECONDS)),
+        "steady_error_filter_deg": float(error[0]),
+        "overshoot_filter_deg": float(over[0]),
+        "settling_filter_noisy_s": float(min(seen.settling_time[1], 2.0 * SECONDS)),
+        "steady_error_filter_noisy_deg": float(error[1]),
+        "overshoot_filter_noisy_deg": float(over[1]),
+        "rate_form_stress_off_MPa": float(apart[0]),
+        "rate_form_no_thermal_term_stress_off_MPa": float(apart[1]),
+        "rate_form_last_seconds_low_deg": float(elsewhere[0].min()),
+        "rate_form_last_seconds_high_deg": float(elsewhere[0].max()),
+        "rate_form_no_thermal_term_end_deg": float(elsewhere[1, -1]),
+    }
+    state = judged(numbers)
     return Result(
-        holds=bool(np.isfinite(settling).all() and overshoot.min() > 0.1 and overshoot[shown] > 5.0)
-        and after < 0.2 * first
-        and last < first,
+        holds=state is not State.FAILS,
+        in_part=f"the overshoot is by the choice of K = {LOW_GAIN:g} 1/s (C17 has it too): with the searched gains, those of C18 to C21, it is {overshoot[tight]:.1f}°, within the "
+        "degree that counts as there"
+        if state is State.IN_PART
+        else "",
         found=f"the arm settles at {SHOWN:.0f}° within {settling[shown]:.1f} s after an overshoot of {overshoot[shown]:.1f}° "
         f"(K = {LOW_GAIN:g} 1/s; searched gains: {settling[tight]:.1f} s and {overshoot[tight]:.1f}°); the voltage falls from "
         f"{first:.1f} V at first to {after:.1f} V at the top of the overshoot, and holds the arm with {last:.1f} V",
-        numbers={
-            "settling_s": float(settling[shown]),
-            "overshoot_deg": float(overshoot[shown]),
-            "settling_searched_s": float(settling[tight]),
-            "overshoot_searched_deg": float(overshoot[tight]),
-            "first_voltage_V": first,
-            "voltage_at_top_V": after,
-            "holding_voltage_V": last,
-            "settling_filter_s": float(min(judged.settling_time[0], 2.0 * SECONDS)),
-            "steady_error_filter_deg": float(error[0]),
-            "overshoot_filter_deg": float(over[0]),
-            "settling_filter_noisy_s": float(min(judged.settling_time[1], 2.0 * SECONDS)),
-            "steady_error_filter_noisy_deg": float(error[1]),
-            "overshoot_filter_noisy_deg": float(over[1]),
-            "rate_form_stress_off_MPa": float(apart[0]),
-            "rate_form_no_thermal_term_stress_off_MPa": float(apart[1]),
-            "rate_form_last_seconds_low_deg": float(elsewhere[0].min()),
-            "rate_form_last_seconds_high_deg": float(elsewhere[0].max()),
-            "rate_form_no_thermal_term_end_deg": float(elsewhere[1, -1]),
-        },
+        numbers=numbers,
         draw=partial(_draw, system=system, loops=loops, shown=shown, tight=tight),
         caveat=f"{ON_ITS_PLANT}. On the states of the printed filter, with exact readings, the arm with the searched gains {settles[0]} at {FILTERED:.0f}° with {over[0]:.1f}° of overshoot "
         f"and {error[0]:.2f}° of steady error; with {NOISE:g} rad of noise the arm {settles[1]}, is {error[1]:.1f}° off on average over the last fifth, and ends at {ends[1]:.0f}°. On the plant of chapter 3 (rate form, theta_T = 0.55 MPa/K), whose stress is up to {apart[0]:.0f} MPa off eq. 4.51, "

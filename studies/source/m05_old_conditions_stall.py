@@ -2,20 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from smajax.model.rigs import arm
 
 from .regulation import draw_regulation, to_85_degrees
 from .rigs import austenite_range
-from .row import Result, Row
+from .row import Result, Row, State, judgement
+
+
+def judged(numbers: Mapping[str, float]) -> State:
+    """The arm stalls with T above A_f', which it crosses cooling; as worded it cools on the whole stretch above A_f'."""
+    checked, as_worded = True, True
+    for law in ("liang", "brinson"):
+        checked &= numbers[f"{law}_end_deg"] < 84.0 and numbers[f"{law}_end_fraction"] > 0.01
+        checked &= numbers[f"{law}_end_temperature_above_finish_C"] > 0.0
+        checked &= numbers[f"{law}_missed_seconds"] > 0.0 and numbers[f"{law}_crosses_cooling"] == 1.0
+        as_worded &= numbers[f"{law}_cooling_share_above_finish"] > 0.99
+    return judgement(checked, as_worded)
 
 
 def work(fast: bool) -> Result:
     """Sliding control to 85 degrees under each law."""
     loops = to_85_degrees(fast)
     numbers: dict[str, float] = {}
-    holds = True
     for law in ("liang", "brinson"):
         run = loops[law].run
         slope = float(arm(law).wire.kinetics.stress_slope_austenite)
@@ -26,25 +38,31 @@ def work(fast: bool) -> Result:
         warmer, nearer = np.diff(run.temperature), np.diff(run.temperature - run.stress / slope)
         missed = (warmer < 0.0) & (nearer > 0.0) & (run.temperature > start)[1:]
         dt = float(run.time[1] - run.time[0])
-        after = np.arange(len(warmer)) >= crossing
-        cooling_after = float((after & (warmer < 0.0) & (nearer > 0.0)).sum() * dt)
+        cooling = (warmer < 0.0) & (nearer > 0.0)
+        # The stretch begins with the step in which T passes A_f', and lasts to the end of the run.
+        stretch = np.arange(len(warmer)) >= crossing - 1
         missed[crossing:] = False
         numbers |= {
             f"{law}_end_deg": float(np.degrees(run.position[-1])),
             f"{law}_end_fraction": float(run.martensite_fraction[-1]),
             f"{law}_end_temperature_above_finish_C": float(run.temperature[-1] - finish[-1]),
             f"{law}_missed_seconds": float(missed.sum() * dt),
-            f"{law}_cooling_seconds_above_finish": cooling_after,
+            f"{law}_crosses_cooling": float(beyond.size > 0 and cooling[crossing - 1]),
+            f"{law}_cooling_seconds_above_finish": float((stretch & cooling).sum() * dt),
+            f"{law}_cooling_share_above_finish": float(cooling[stretch].mean()),
             f"{law}_warming_above_finish_C": float(run.temperature[-1] - run.temperature[crossing]),
             f"{law}_missed_warming_C": float(warmer[missed].sum()),
             f"{law}_missed_drive_C": float(nearer[missed].sum()),
         }
-        holds &= bool(beyond.size) and numbers[f"{law}_end_deg"] < 84.0 and run.martensite_fraction[-1] > 0.01
-        # The crossing itself is such a moment: the wire cools and still comes to lie above its range.
-        holds &= bool(missed.any()) and bool(warmer[crossing - 1] < 0.0 < nearer[crossing - 1])
+    state = judged(numbers)
     tanaka = float(np.degrees(loops["tanaka"].run.position[-1]))
     return Result(
-        holds=holds,
+        holds=state is not State.FAILS,
+        in_part="dT/dt < 0 holds in moments on the way to A_f', of the stretch above it for the first "
+        f"{numbers['liang_cooling_seconds_above_finish']:.2g} s ({100 * numbers['liang_cooling_share_above_finish']:.2g} %); from there on the controller heats the wire by "
+        f"{numbers['liang_warming_above_finish_C']:.0f} °C"
+        if state is State.IN_PART
+        else "",
         found=f"the arm stalls at {numbers['liang_end_deg']:.1f}° (Liang) and {numbers['brinson_end_deg']:.1f}° (Brinson) "
         f"with xi = {numbers['liang_end_fraction']:.2f} and T above A_f'; on its way there it cools by "
         f"{-numbers['liang_missed_warming_C']:.2f} °C in moments in which T - sigma/C_A rises by "
@@ -61,6 +79,6 @@ ROW = Row(
     "M5",
     "Fig. 3.7-3.10",
     "arm, stress-based sliding control to 85°, Liang and Brinson conditions",
-    "the arm does not reach 85°; T exceeds A_f' while xi > 0; as it comes to exceed it dT/dt < 0 and dT/dt - (dsigma/dt)/C_A > 0",
+    "the arm does not reach 85°; T exceeds A_f' while xi > 0; on that stretch dT/dt < 0 and dT/dt - (dsigma/dt)/C_A > 0",
     work,
 )

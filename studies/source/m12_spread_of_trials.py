@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -13,11 +15,22 @@ from smajax.model.rigs import dead_weight
 from smajax.report.drawing import BLUE, named, panels
 from smajax.simulation.simulate import simulate
 
-from .row import Result, Row
+from .row import Result, Row, State, judgement
 
 # One trial against the next: the room's air, the draught, and how the wire sits in its clamps.
 SPREAD = {"ambient_temperature": 0.5, "convection_coefficient": 3.0, "austenite_start": 0.3, "austenite_finish": 0.3}
 SECONDS = 30.0
+
+
+MIDDLE = (6.0, 14.0)  # V, of the 4 to 16 V over which the source's strain rises
+
+
+def judged(numbers: Mapping[str, float]) -> State:
+    """Largest where the strain is half recovered, small at both ends; as worded at the middle voltages."""
+    widest = numbers["widest_spread_percent_strain"]
+    checked = 0.15 < numbers["recovered_share_there"] < 0.85
+    checked &= numbers["widest_spread_at_the_ends_percent_strain"] < 0.2 * widest
+    return judgement(checked, MIDDLE[0] < numbers["volts_of_widest_spread"] < MIDDLE[1])
 
 
 def work(fast: bool) -> Result:
@@ -53,17 +66,24 @@ def work(fast: bool) -> Result:
         right.plot(mean, spread, "o", color=BLUE)
         named(right, "mean recovered strain (%)", "standard deviation over trials (%)")
 
+    numbers = {
+        "volts_of_widest_spread": float(volts[widest]),
+        "recovered_share_there": float(share[widest]),
+        "widest_spread_percent_strain": float(spread[widest]),
+        "widest_spread_at_the_ends_percent_strain": float(ends.max()),
+        "spread_at_8_V_percent_strain": float(spread[volts == 8.0][0]),
+    }
+    state = judged(numbers)
     return Result(
-        holds=bool(0.15 < share[widest] < 0.85) and float(ends.max()) < 0.2 * float(spread[widest]),
+        holds=state is not State.FAILS,
+        in_part=f"the spread is largest in the middle of the recovered strain, not of the voltage: at {volts[widest]:.1f} V, just above the onset, "
+        f"and {numbers['spread_at_8_V_percent_strain']:.3f} % at 8 V, where the source's strain still rises up to 16 V"
+        if state is State.IN_PART
+        else "",
         found=f"the spread is largest, {spread[widest]:.2f} % strain, where {100 * share[widest]:.0f} % of the strain is "
         f"recovered ({volts[widest]:.1f} V), and at most {ends.max():.3f} % below 2 % and above 98 %; "
         f"{len(volts)} voltages by {trials} trials in one batch",
-        numbers={
-            "volts_of_widest_spread": float(volts[widest]),
-            "recovered_share_there": float(share[widest]),
-            "widest_spread_percent_strain": float(spread[widest]),
-            "widest_spread_at_the_ends_percent_strain": float(ends.max()),
-        },
+        numbers=numbers,
         draw=draw,
         caveat="the shape over the recovered strain is reproduced; over the voltage the middle is narrower than in the "
         "source, for the reason given under M11. The trials' spread is chosen here (0.5 °C air, 2 % h_c, 0.3 °C A_s, A_f).",

@@ -2,24 +2,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from matplotlib.figure import Figure
 
 from smajax.report.drawing import BLUE, GREY, RED, keyed, named, panels
 
-from .row import Result, Row
+from .row import Result, Row, State, judgement
 from .unloading import VOLTS, net_deflection, unloaded
 
 FULL_STROKE = 24.75  # mm
 # From half transformed to nearly all: the voltage of M13 is the fourth.
 LEVELS = (5.45, 5.5, 5.55, VOLTS, 5.6)
+PRINTED = 0.011
+
+
+def judged(numbers: Mapping[str, float]) -> State:
+    """Deflection and fraction agree at every voltage; as worded 0.011 is what is left at the experiment's 16 V."""
+    checked = abs(numbers["printed"] - PRINTED) < 5e-4 and numbers["largest_relative_difference"] < 0.05
+    checked &= abs(numbers["carried"] - PRINTED) < 0.25 * PRINTED
+    return judgement(checked, abs(numbers["carried_16_V"] - PRINTED) < 0.25 * PRINTED)
 
 
 def work(fast: bool) -> Result:
     """96 g taken off and put back at several voltages: deflection over full stroke against the simulated fraction."""
-    runs, before, _ = unloaded("enhanced", fast, *(("96 g", volts) for volts in LEVELS))
-    result = net_deflection(runs, before) / FULL_STROKE
-    carried = runs.martensite_fraction[:, before] - runs.martensite_fraction[:, -1]
+    runs, before, _ = unloaded("enhanced", fast, *(("96 g", volts) for volts in (*LEVELS, 16.0)))
+    every = runs.martensite_fraction[:, before] - runs.martensite_fraction[:, -1]
+    result, carried = net_deflection(runs, before)[:-1] / FULL_STROKE, every[:-1]
     at = LEVELS.index(VOLTS)
     printed = 0.27 / FULL_STROKE
     off = float(np.abs(result / carried - 1.0).max())
@@ -35,16 +45,24 @@ def work(fast: bool) -> Result:
         keyed(axes)
         named(axes, "change of the simulated fraction", "net deflection / 24.75 mm")
 
+    numbers = {
+        "printed": printed,
+        "from_deflection": float(result[at]),
+        "carried": float(carried[at]),
+        "carried_16_V": float(every[-1]),
+        **{f"carried_{volts:g}_V": float(value) for volts, value in zip(LEVELS, carried, strict=True)},
+        "largest_relative_difference": off,
+    }
+    state = judged(numbers)
     return Result(
-        holds=abs(printed - 0.011) < 5e-4 and off < 0.05 and abs(float(carried[at]) - 0.011) < 0.25 * 0.011,
+        holds=state is not State.FAILS,
+        in_part=f"deflection and fraction agree at every voltage, but the size is tuned by it: {', '.join(f'{value:.3f} at {volts:g} V' for volts, value in zip(LEVELS, carried, strict=True))}, "
+        f"and {abs(every[-1]):.3f} at the experiment's 16 V (M13)"
+        if state is State.IN_PART
+        else "",
         found=f"0.27/24.75 = {printed:.4f}; simulated: {result[at]:.4f} from the deflection, {carried[at]:.4f} carried; at "
         f"all voltages the two agree within {100 * off:.0f} %",
-        numbers={
-            "printed": printed,
-            "from_deflection": float(result[at]),
-            "carried": float(carried[at]),
-            "largest_relative_difference": off,
-        },
+        numbers=numbers,
         draw=draw,
         caveat="the size is that of M13, chosen there; what is checked is that deflection and fraction agree. Eq. 3.22 prints xi_2 - xi_1 as positive: heating lowers xi, the magnitude is meant. The difference is "
         "elastic: under the same stress a wire of less martensite is stiffer, which eq. 3.21 leaves out.",

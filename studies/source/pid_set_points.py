@@ -5,12 +5,12 @@ from __future__ import annotations
 from smajax.control.presets import pid, pid_tuned_at
 from smajax.model.rigs import arm
 
-from .set_points import Runs, at_set_points, overshoot, regulated, steady, time_of
+from .set_points import SECONDS, Runs, at_set_points, overshoot, regulated, steady, time_of
 
 
-def tuned_at(degrees: int, fast: bool) -> Runs:
+def tuned_at(degrees: int, fast: bool, seconds: float = SECONDS) -> Runs:
     """Every set point under the gains of one."""
-    return at_set_points(pid_tuned_at(arm(), degrees), fast)
+    return at_set_points(pid_tuned_at(arm(), degrees), fast, seconds=seconds)
 
 
 def unwound(fast: bool) -> str:

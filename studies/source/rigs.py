@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import equinox as eqx
@@ -10,6 +11,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from smajax.control.closed_loop import ClosedLoop, simulate_closed_loop
+from smajax.control.controllers.base import AbstractController
 from smajax.control.presets import stress_sliding
 from smajax.model.system import System
 from smajax.model.types import Series, Trajectory
@@ -48,13 +50,19 @@ def batch(system: System, inputs: dict[str, Batched], dt: float) -> Recorded:
 
 
 @eqx.filter_jit
-def _controlled(system: System, target: Series, dt: float, every: int) -> ClosedLoop:
-    return simulate_closed_loop(system, stress_sliding(system), target, dt, every)
+def _controlled(system: System, controller: AbstractController, target: Series, dt: float, every: int) -> ClosedLoop:
+    return simulate_closed_loop(system, controller, target, dt, every)
 
 
-def controlled(system: System, target: Series, dt: float, period: float) -> Recorded:
-    """The arm under stress-based sliding control, compiled, in numpy."""
-    return recorded(_controlled(system, target, dt, round(period / dt)))
+def controlled(
+    system: System,
+    target: Series,
+    dt: float,
+    period: float,
+    make: Callable[[System], AbstractController] = stress_sliding,
+) -> Recorded:
+    """The arm under stress-based sliding control, with the gains of a preset, compiled, in numpy."""
+    return recorded(_controlled(system, make(system), target, dt, round(period / dt)))
 
 
 def austenite_range(system: System, stress: Any) -> tuple[Any, Any]:

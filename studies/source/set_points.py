@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 from collections.abc import Callable, Sequence
 
@@ -15,7 +16,7 @@ from matplotlib.figure import Figure
 
 from smajax.control.closed_loop import ClosedLoop, simulate_closed_loop
 from smajax.control.controllers.base import AbstractController
-from smajax.control.controllers.temperature_vsc import TemperatureVsc
+from smajax.control.controllers.temperature_vsc import AsPrinted, TemperatureVsc
 from smajax.control.estimators.base import AbstractEstimator
 from smajax.control.figures_of_merit import Merit, merit
 from smajax.control.presets import temperature_vsc
@@ -44,8 +45,9 @@ def _batch(
     targets: Float[Array, " runs"],
     dt: float,
     estimator: AbstractEstimator | None = None,
+    seconds: float = SECONDS,
 ) -> tuple[ClosedLoop, Merit]:
-    time = clock(SECONDS, dt)
+    time = clock(seconds, dt)
 
     def one(row: Float[Array, " names"], target: Scalar) -> tuple[ClosedLoop, Merit]:
         tuned = set_vector(controller, names, row)
@@ -66,6 +68,7 @@ def at_set_points(
     fast: bool,
     degrees: Sequence[float] = SET_POINTS,
     estimator: AbstractEstimator | None = None,
+    seconds: float = SECONDS,
 ) -> Runs:
     """(run, figures of merit) at each set point; the controller is called every 0.01 s, `fast` steps the arm as seldom.
 
@@ -73,7 +76,7 @@ def at_set_points(
     """
     targets = jnp.radians(jnp.asarray(degrees, dtype=float))
     none = jnp.zeros((len(degrees), 0))
-    result = _batch(arm(), controller, (), none, targets, PERIOD if fast else DEFAULT_STEP, estimator)
+    result = _batch(arm(), controller, (), none, targets, PERIOD if fast else DEFAULT_STEP, estimator, seconds)
     return dict(zip(degrees, _unstacked(result, len(degrees)), strict=True))
 
 
@@ -86,6 +89,11 @@ def regulated(preset: Callable[[System], AbstractController], fast: bool) -> Run
 def nvsc_without_temperature(system: System) -> TemperatureVsc:
     """NVSC with K_p = 0: it takes voltage away while the arm moves up, and controls no temperature."""
     return set_parameters(temperature_vsc(system), {"temperature_gain": 0.0})
+
+
+def nvsc_as_printed(system: System) -> TemperatureVsc:
+    """NVSC with eq. 4.37 as printed: temperature control wherever A_f' stands still, without the factor v/v_p."""
+    return dataclasses.replace(temperature_vsc(system), band=AsPrinted())
 
 
 def swept(controller: AbstractController, gain: str, values: Sequence[float], degrees: float, fast: bool) -> Runs:

@@ -24,6 +24,22 @@ CASES = {
 }
 
 
+SWEPT = (
+    4.8,
+    5.0,
+    5.1,
+    5.2,
+    5.3,
+    5.4,
+    5.5,
+    5.55,
+    VOLTS,
+    5.6,
+    6.0,
+    8.0,
+    16.0,
+)  # V: from no transformation to a whole one
+
 PERIODS = 6  # of HELD seconds, enough for three steps down and three up; shorter cases rest at the end
 Lane = tuple[str, float]  # (a key of CASES, volts)
 
@@ -51,4 +67,4 @@ def net_deflection(runs: Recorded, before: int) -> np.ndarray:
     return 1e3 * (runs.position[:, -1] - runs.position[:, before])
 
 
-__all__ = ["CASES", "INITIAL_MASS", "LAWS", "VOLTS", "net_deflection", "unloaded"]
+__all__ = ["CASES", "INITIAL_MASS", "LAWS", "SWEPT", "VOLTS", "net_deflection", "unloaded"]

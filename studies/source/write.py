@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import html
 import json
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,11 +20,12 @@ from smajax.report.html import picture
 from smajax.report.plain_page import table, whole
 
 from .catalogue import every_row
-from .row import Row
+from .row import Row, State
 
 SIZE = (9.0, 5.6)  # inches
 DPI, FINE = 90, 140  # of a desk and of a telephone, which has more of them
 UP = ".upright.png"  # the same panels one below the other, for a telephone
+IN_PART = "In part: not as the source words it, or with a value chosen so that this one figure holds; the reason stands with the figure."
 MARK = ".made-by"  # which code and setting the folder's files come from
 
 
@@ -32,14 +34,20 @@ class Drawn:
     """A row whose picture and record lie in the folder."""
 
     row: Row
-    holds: bool
+    state: State
     found: str
     caveat: str
+    in_part: str = ""
+
+    @property
+    def holds(self) -> bool:
+        """As the source words it."""
+        return self.state is State.HOLDS
 
     @property
     def verdict(self) -> str:
-        """One word or two for the table."""
-        return ("holds, see note" if self.caveat else "holds") if self.holds else "fails"
+        """A few words for the table."""
+        return "holds, see note" if self.holds and self.caveat else str(self.state)
 
 
 def _kept(row: Row, folder: Path) -> Drawn | None:
@@ -48,9 +56,9 @@ def _kept(row: Row, folder: Path) -> Drawn | None:
         return None
     try:
         result = json.loads(record.read_text(encoding="utf-8"))
-    except ValueError:
-        return None  # damaged: drawn again
-    return Drawn(row, result["holds"], result["found"], result["caveat"])
+        return Drawn(row, State(result["state"]), result["found"], result["caveat"], result["in_part"])
+    except (ValueError, KeyError):
+        return None  # damaged, or of a version that had two states: drawn again
 
 
 def _made(row: Row, folder: Path, fast: bool) -> Drawn:
@@ -65,14 +73,16 @@ def _made(row: Row, folder: Path, fast: bool) -> Drawn:
         "where": row.where,
         "system": row.system,
         "claim": row.claim,
-        "holds": bool(result.holds),
+        "holds": result.state is State.HOLDS,
+        "state": str(result.state),
+        "in_part": result.in_part,
         "found": result.found,
         "numbers": result.numbers,
         "caveat": result.caveat,
     }
     # Last and at once: a record means that its picture is there too.
     replace(folder / f"{row.name}.json", json.dumps(record, indent=2, ensure_ascii=False) + "\n")
-    return Drawn(row, bool(result.holds), result.found, result.caveat)
+    return Drawn(row, result.state, result.found, result.caveat, result.in_part)
 
 
 def _figures_mark() -> str:
@@ -133,6 +143,8 @@ def as_markdown(drawn: Sequence[Drawn]) -> str:
         "",
         "Source: M. H. Elahinia (2004). Made by `smajax figures`; beside each picture lies a JSON file with its numbers.",
         "",
+        f"{holding(drawn)} {IN_PART}",
+        "",
         "| | system | what the source says | what was measured | |",
         "|---|---|---|---|---|",
     ]
@@ -147,6 +159,7 @@ def as_markdown(drawn: Sequence[Drawn]) -> str:
             "",
             f"{one.row.system} ({one.row.where}). {one.found[0].upper()}{one.found[1:]}.",
         ]
+        lines += ["", f"Holds in part: {one.in_part}."] if one.state is State.IN_PART else []
         lines += ["", f"Note: {one.caveat}"] if one.caveat else []
         lines += ["", f"![{one.row.name}]({one.row.name}.png)"]
     return "\n".join(lines) + "\n"
@@ -158,18 +171,19 @@ def as_page(drawn: Sequence[Drawn], folder: Path) -> str:
     rows = "".join(
         f'<tr><td data-v="{index}"><a href="#{one.row.name}">{one.row.name}</a><br>{say(one.row.where)}</td>'
         f"<td>{say(one.row.system)}</td><td>{say(one.row.claim)}</td><td>{say(one.found)}</td>"
-        f'<td class="{"holds" if one.holds else "fails"}">{one.verdict}</td></tr>'
+        f'<td class="{one.state.name.lower()}">{one.verdict}</td></tr>'
         for index, one in enumerate(drawn)
     )
     parts = [
         f'<h2 id="{one.row.name}">{one.row.name}: {say(one.row.system)}</h2><p>{say(one.found)}.</p>'
+        + (f"<p>Holds in part: {say(one.in_part)}.</p>" if one.state is State.IN_PART else "")
         + (f"<p>Note: {say(one.caveat)}</p>" if one.caveat else "")
         + _picture(one, folder)
         for one in drawn
     ]
     head = (
-        "<style>.fails{color:#c8553d;font-weight:600}</style>"
-        f"<h1>Figures of the source, reproduced</h1><p>Source: M. H. Elahinia (2004). {say(holding(drawn))}</p>"
+        "<style>.fails{color:#c8553d;font-weight:600}.in_part{color:#9a6a00;font-weight:600}</style>"
+        f"<h1>Figures of the source, reproduced</h1><p>Source: M. H. Elahinia (2004). {say(holding(drawn))} {say(IN_PART)}</p>"
         "<div class=scroll><table class=sortable><thead><tr>"
         "<th>figure</th><th>system</th><th>what the source says</th><th>what was measured</th><th>holds</th></tr></thead>"
         f"<tbody>{rows}</tbody></table></div>"
@@ -199,8 +213,9 @@ def as_csv(drawn: Sequence[Drawn], folder: Path) -> str:
 
 
 def holding(drawn: Sequence[Drawn]) -> str:
-    """How many claims hold."""
-    return f"{sum(one.holds for one in drawn)} of {len(drawn)} hold."
+    """How many claims are in each of the three states."""
+    count = Counter(one.state for one in drawn)
+    return f"{count[State.HOLDS]} of {len(drawn)} hold, {count[State.IN_PART]} hold in part, {count[State.FAILS]} fail."
 
 
 def as_text(drawn: Sequence[Drawn]) -> str:
@@ -208,6 +223,7 @@ def as_text(drawn: Sequence[Drawn]) -> str:
     lines = []
     for one in drawn:
         lines += [f"{one.row.name:>4}  {one.row.claim}", f"      {one.verdict}: {one.found}"]
+        lines += [f"      in part: {one.in_part}."] if one.state is State.IN_PART else []
         lines += [f"      note: {one.caveat}"] if one.caveat else []
     lines.append(holding(drawn))
     return "\n".join(lines)

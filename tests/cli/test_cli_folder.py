@@ -169,7 +169,7 @@ def test_a_figure_beside_others_stays_on_the_page(tmp_path: Path, monkeypatch: p
     assert [one.row.name for one in lying_in(tmp_path)] == ["M9", "M14"]
     assert page.count('src="data:image/png;base64,') == page.count('srcset="data:image/png;base64,') == 2
     assert (tmp_path / "figures.csv").read_text().splitlines()[1:] == ["M9,holds,a,1", "M14,holds,a,1"]
-    assert "2 of 2 hold." in page
+    assert "2 of 2 hold, 0 hold in part, 0 fail." in page
     assert "&lt;found&gt;" in page
     assert "<found>" not in page
     (tmp_path / FIGURES_MARK).write_text("fast another version")

@@ -7,6 +7,7 @@ from typing import Any
 
 from smajax.core.progress import quiet
 from studies.source.catalogue import CHAPTERS
+from studies.source.row import State
 from studies.source.write import Drawn, as_page, draw, lying_in
 from tests.helpers.in_browser import HOSTILE, faults
 
@@ -27,7 +28,7 @@ def test_pictures_of_figures_fit_a_narrow_window(browser: Any, tmp_path: Path) -
 
 
 def test_the_page_of_figures_has_no_fault_in_a_browser(browser: Any, tmp_path: Path) -> None:
-    drawn = [Drawn(row, True, HOSTILE, HOSTILE) for row in CHAPTERS["chapter3"][:4]]
+    drawn = [Drawn(row, State.IN_PART, HOSTILE, HOSTILE, HOSTILE) for row in CHAPTERS["chapter3"][:4]]
     page = as_page(drawn, Path(__file__).parents[2] / "studies" / "chapter3")
     (tmp_path / "index.html").write_text(page, encoding="utf-8")
     assert faults(browser, tmp_path / "index.html") == []

@@ -31,9 +31,9 @@ def figures(
     json_out: Json = False,
     open_page: Open = False,
 ) -> None:
-    """Draw the source's figures, each with the number that proves it, and print which claims hold.
+    """Draw the source's figures, each with the number that proves it, and print which claims hold, hold in part or fail.
 
-    Exit code 3 when one that was asked for does not. Figures that lie in the folder already stay on its page. After
+    Exit code 3 when one that was asked for fails or holds in part. Figures that lie in the folder already stay on its page. After
     Ctrl-C the same command draws the figures that are missing.
 
     The figures are not part of the package `smajax`: a wheel brings them as `smajax_studies`, a checkout as `studies/source`.
@@ -63,7 +63,18 @@ def figures(
         page = write.write_pages(out)
     if json_out:
         typer.echo(
-            json.dumps({one.row.name: {"holds": one.holds, "found": one.found, "note": one.caveat} for one in drawn})
+            json.dumps(
+                {
+                    one.row.name: {
+                        "holds": one.holds,
+                        "state": one.state,
+                        "in_part": one.in_part,
+                        "found": one.found,
+                        "note": one.caveat,
+                    }
+                    for one in drawn
+                }
+            )
         )
     else:
         typer.echo(write.as_text(drawn))
