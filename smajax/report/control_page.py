@@ -21,12 +21,17 @@ from smajax.report.plain_page import bullets, table, whole
 
 COLOURS = ("#8a8f98", AFTER, "#c8553d")
 SAME = 0.02  # of a settling time: a smaller difference is none
-MORE_OVERSHOOT = 0.005  # of the largest set point
+ROUNDING = 1e-6  # of a set point: a smaller error is none
 
 
 def files_of(controller: str) -> tuple[str, ...]:
     """What `write_comparison` writes."""
     return f"{controller}_gains.json", f"control_{controller}.json", f"control_{controller}.html"
+
+
+def _seen(error: float, set_point: float) -> float:
+    """An error, or zero where it is a rounding error of the set point."""
+    return 0.0 if error < ROUNDING * abs(set_point) else error
 
 
 def seconds_in_words(value: float) -> str:
@@ -48,8 +53,8 @@ def rows(result: ControlComparison) -> list[list[str]]:
             one.model,
             digits(float(shown(loop.set_point)), 3),
             digits(loop.settling_time, 3) if math.isfinite(loop.settling_time) else "never",
-            digits(float(shown(loop.overshoot)), 2),
-            digits(float(shown(loop.steady_error)), 2),
+            digits(float(shown(_seen(loop.overshoot, loop.set_point))), 2),
+            digits(float(shown(_seen(loop.steady_error, loop.set_point))), 2),
         ]
         for one in result.tuned
         for loop in one.loops
@@ -65,7 +70,8 @@ def conclusions(result: ControlComparison) -> list[str]:
             text = f"settles after {seconds_in_words(one.settling_time)} on average"
         else:
             text = f"settles at {settled} of {len(one.loops)} set points" if settled else "settles at no set point"
-        overshoot = digits(float(result.unit.of(one.overshoot)), 2)
+        largest = max(abs(loop.set_point) for loop in one.loops)
+        overshoot = digits(float(result.unit.of(_seen(one.overshoot, largest))), 2)
         sentences.append(
             f"{result.controller} tuned on the {one.model} {text}, with an overshoot of at most {overshoot} {result.unit.label}, on the {result.plant}."
         )

@@ -183,18 +183,19 @@ def bench(number: int, out: Path) -> dict[str, Any]:
 
 
 def _figures(compared: ControlComparison) -> dict[str, Any]:
-    return {
+    by_model: dict[str, Any] = {
         one.model: {
             "settling_time": [loop.settling_time for loop in one.loops],
             "overshoot": [loop.overshoot for loop in one.loops],
         }
         for one in compared.tuned
     }
+    return {"seconds": compared.seconds, **by_model}
 
 
 def gain(figures: dict[str, Any]) -> float:
     """Mean settling time by the base model's gains over that by the extended one's; a loop that never settles counts as its length."""
-    length = figures.get("length", 20.0)
+    length = figures["seconds"]
     means = [
         np.mean([min(one if one is not None else math.inf, length) for one in figures[model]["settling_time"]])
         for model in ("base model", "extended model")

@@ -64,7 +64,13 @@ def predict_command(
     constants, changed = texts("--input", inputs, INPUTS), texts("--set", values, VALUES)
     command = command_line()
     loaded = load_model(model)
-    settings = {"model": str(model), "logs": [str(one) for one in logs], "inputs": constants, "values": changed}
+    settings = {
+        "model": str(model),
+        "logs": [str(one) for one in logs],
+        "inputs": constants,
+        "values": changed,
+        "decimal": decimal,
+    }
     with resumable(), claimed(out, "predict", settings, FILES, overwrite), displayed(console()) as progress:
         progress(Stage("predicting the runs", 0.0))
         result = predict(loaded, logs, inputs=constants, parameters=changed, decimal=decimal)

@@ -74,7 +74,7 @@ class _Options:
                 "run is --seconds).",
                 param_hint="--time",
             )
-        if self.animated and load == "coupon":
+        if self.animated and load.endswith("coupon"):
             raise typer.BadParameter("a coupon moves nothing that could be drawn.", param_hint="--gif")
         if not self.closed and self.mismatch:
             raise typer.BadParameter("--mismatch is for closed loops; use --set.")
@@ -271,15 +271,16 @@ def simulate(
     from smajax.cli.result_folder import check_path, claimed
     from smajax.control.run_request import LoopRequest, RunRequest
     from smajax.core.files import json_text
+    from smajax.data.model_file.read import load_model
     from smajax.report.simulate_page import FILES, record, write_run
 
     check_path(out)
     perturbed = texts("--mismatch", mismatch, VALUES)
     series = _inputs("--input", inputs)
     options = _Options(step, series, gains, controller, set_point, perturbed, time, gif)
-    options.check(load)
     if model is not None and (wire, load, drive, law) != (WIRE, LOAD, DRIVE, ""):
         raise typer.BadParameter("says wire, load, drive and law: leave these out.", param_hint="--model")
+    options.check(load if model is None else load_model(model).load)
     changed, finely = texts("--set", values, VALUES), tolerance_of(tolerance)
     compared = _inputs("--measured", measured)
     kept = "" if model is None else str(model)
