@@ -220,7 +220,16 @@ def known_so_far(context: Context, models: tuple[JointSearch, Model, Model], rem
     search, base, final = models
     compared = compare(context.job, context.setting, base, final)
     found = findings_of(context, Outcome(search, base, final, Lacking()), compared, None, brief=True)
-    return replace(found, verdict=Verdict.NOT_FINISHED, remaining=remaining)
+    base_model, extended_model = (
+        None if one is None else replace(one, unfinished=remaining) for one in (found.base_model, found.extended_model)
+    )
+    return replace(
+        found,
+        verdict=Verdict.NOT_FINISHED,
+        remaining=remaining,
+        base_model=base_model,
+        extended_model=extended_model,
+    )
 
 
 def findings_of(

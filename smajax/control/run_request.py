@@ -26,10 +26,12 @@ from smajax.control.loop_dataset import labelled_loop
 from smajax.control.position_unit import PositionUnit, unit_of
 from smajax.control.presets import CONTROLLERS, check_controller
 from smajax.control.reference import resting
+from smajax.core.display_units import digits
 from smajax.core.names import close_matches
 from smajax.core.parameters import parameter_values, parameters
 from smajax.core.wording import and_listed
 from smajax.data.experiment.magnitude import MELTS
+from smajax.data.model_file.of_experiment import LOGGED
 from smajax.data.model_file.read import load_model
 from smajax.data.text_input import clock_of, given, reads_file
 from smajax.model.channels import INPUT_UNITS
@@ -92,6 +94,21 @@ class RunRequest:
         bare = compose(self.wire, self.load, self.drive, law=self.law)
         with _part("values"):
             return with_values(bare, self.values)
+
+    def inputs_left_out(self) -> list[str]:
+        """A sentence for each input that the logs of a kept model had, and that this run leaves to a parameter."""
+        if not self.model:
+            return []
+        kept = load_model(self.model)
+        replaced = {channel: name for name, channel in LOGGED.items()}
+        return [
+            f"The model was fitted to runs with their own {channel}, {digits(low, 4)} to {digits(high, 4)} {INPUT_UNITS[channel]}; here it is "
+            f"{replaced[channel]}, {digits(kept.values[replaced[channel]], 4)}. Give --input {channel}=... for another."
+            for channel, (low, high) in kept.fitted_range.items()
+            if channel in replaced
+            and channel not in self.inputs
+            and not {channel, replaced[channel]} & self.values.keys()
+        ]
 
     def limit(self) -> list[str]:
         """A sentence on the limit of the command of a closed loop on a kept model, or none."""
@@ -194,9 +211,10 @@ def run_open(request: RunRequest) -> RunResult:
         name: one.on(clock, request.dt, squared=name in system.drive.inputs_squared, sampled=name in measured)
         for name, one in several.items()
     }
+    left_out = request.inputs_left_out()
     data = simulate_dataset(system, series, request.dt, request.tolerance)
     data = data.assign_coords(time=data["time"].copy(data=clock))  # a sum of steps has rounding errors
-    notes = _notes(data)
+    notes = [*left_out, *_notes(data)]
     data = _with_measured(request, system, data)
     return RunResult(data, system, {}, tuple(notes))
 

@@ -90,7 +90,8 @@ def worth(result: ControlComparison) -> str:
         if abs(first - last) <= SAME * max(first, last):
             what = "changes the settling time by less than 2 %"
         else:
-            what = f"makes it settle {digits(abs(first - last), 2)} s {'earlier' if last < first else 'later'} ({last / first - 1.0:+.0%})"
+            earlier = "earlier" if last < first else "later"
+            what = f"makes it settle {abs(last / first - 1.0):.0%} {earlier}, after {digits(last, 3)} s and not {digits(first, 3)} s on average"
     elif math.isfinite(last):
         what = "makes it settle where it did not"
     elif math.isfinite(first):

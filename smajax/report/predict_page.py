@@ -163,6 +163,14 @@ def _run(run: PredictedRun) -> dict[str, Any]:
     }
 
 
+def band_sentence(result: Prediction) -> str:
+    """What the band is made of."""
+    fitted = "Nothing is fitted to these runs, but for the zero of a sensor that has one in each run. "
+    if not any(one.names for one in result.model.likely):
+        return f"{fitted}Nothing in this model was fitted either: the band is the noise's alone, and no range is known beyond which it extrapolates."
+    return f"{fitted}The band is that of the parameters' posterior, of the likely models, and of the error on runs that the fit did not see."
+
+
 def page(result: Prediction, command: str = "") -> str:
     """The whole page: the answer, the picture that proves it, then the rest."""
     model = result.model
@@ -171,8 +179,7 @@ def page(result: Prediction, command: str = "") -> str:
         f"<h1>{html.escape(title)}</h1>",
         bullets(conclusions(result)),
         str(picture(overview(result), "measured and predicted runs", "panels", overview(result, upright=True))),
-        "<p class=quiet>Nothing is fitted to these runs, but for the zero of a sensor that has one in each run. The band is that "
-        "of the parameters' posterior, of the likely models, and of the error on runs that the fit left out.</p>",
+        f"<p class=quiet>{html.escape(band_sentence(result))}</p>",
         "<h2>Runs</h2>",
         table(HEAD, run_rows(result), (2, 3, 4, 5)),
     ]

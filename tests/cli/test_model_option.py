@@ -95,3 +95,13 @@ def test_plants_need_a_model_of_which_something_was_fitted(tmp_path: Path, model
     assert "give one of the two" in refused(*tune, "--plants", "4", "--model", model, "--variation", "damping=20%")
     assert "leave --wire, --load, --drive" in refused(*tune, "--model", model, "--load", "arm")
     assert not (tmp_path / "out").exists()
+
+
+def test_an_input_that_the_models_logs_had_and_a_run_has_not_is_said(tmp_path: Path) -> None:
+    kept = dataclasses.replace(kept_model(), fitted_range={"voltage": (0.0, 5.0), "mass": (0.5, 1.0)})
+    path = kept.save(tmp_path / "model.toml")
+    step: list[str | Path] = ["simulate", "--model", path, "--step", "4V:2s", "--dt", "100ms"]
+    said = smajax(*step, "--out", tmp_path / "without").said
+    assert "fitted to runs with their own mass, 0.5 to 1 kg; here it is load_mass, 0.075. Give --input mass=..." in said
+    assert "their own mass" not in smajax(*step, "--input", "mass=0.6kg", "--out", tmp_path / "with").said
+    assert "their own mass" not in smajax(*step, "--set", "load_mass=0.6 kg", "--out", tmp_path / "set").said

@@ -26,6 +26,7 @@ from smajax.data.readers.table import MeasuredDataError
 from smajax.fit.base_model import base_model
 from smajax.model.presets import build
 from tests.helpers.command_line import DEMO
+from tests.helpers.small_bench import log, smajax
 
 run = CliRunner()
 
@@ -359,3 +360,21 @@ def test_units_that_a_file_states_come_before_magnitudes(tmp_path: Path) -> None
     held.to_netcdf(tmp_path / "run.nc", engine="scipy")
     found = {one.quantity: (one.key, one.unit) for one in columns_of(read_table(tmp_path / "run.nc"))}
     assert found == {"time": ("time", "s"), "voltage": ("voltage", "V"), "angle": ("position", "rad")}
+
+
+def test_a_model_file_in_which_nothing_was_fitted_leaves_the_usual_unknowns(tmp_path: Path) -> None:
+    model = tmp_path / "bench.toml"
+    assert smajax("presets", "flexinol_table_3_2", "dead_weight", "voltage", "--out", model).code == 0
+    text = model.read_text(encoding="utf-8")
+    line = next(one for one in text.splitlines() if one.startswith("specific_heat"))
+    model.write_text(text.replace(line, 'specific_heat = "450 J/kg/K"'), encoding="utf-8")
+    runs = [log(tmp_path / f"{name}.csv") for name in ("a", "b")]
+    table = [run.read_text(encoding="utf-8").replace("t,U,x", "t [s],U [V],x [mm]", 1) for run in runs]
+    for run, content in zip(runs, table, strict=True):
+        run.write_text(content, encoding="utf-8")
+    ended = smajax("new-experiment", *runs, "--model", model, "--out", tmp_path / "experiment.toml")
+    assert ended.code == 0, ended.said + ended.out
+    experiment = load_experiment(tmp_path / "experiment.toml", CATALOGUE)
+    names = {one.name for one in experiment.unknowns}
+    assert "convection_coefficient" in names
+    assert "specific_heat" not in names  # known since it was changed by hand

@@ -206,7 +206,8 @@ def close_loop_command(
     else:
         print_findings(findings, page)
     if tune:
-        shown = tune_on_models(out, tune, targets, command)
+        points = f" --set-points {shlex.quote(set_points)}" if set_points else ""
+        shown = tune_on_models(out, tune, targets, f"{command} --tune {tune}{points}")
         typer.echo(f"Controller: {shown.resolve()}", err=json_out)
     if open_page:
         browse(page)

@@ -260,7 +260,7 @@ def simulate(
 
     Example:  smajax simulate flexinol_ht_500um bias_spring voltage --controller pid --set-point 5mm:30s,2mm:30s
 
-    Example:  smajax simulate --model report/model.toml --input voltage=ramp.csv:U:V --measured position=ramp.csv:x:mm
+    Example:  smajax simulate --model report/model.toml --input voltage=ramp.csv:U:V --input mass=ramp.csv:m:g --measured position=ramp.csv:x:mm
 
     Example:  smajax simulate --gains tune/gains.json --set-point 40deg:5s,10deg:5s --mismatch damping=+20% --out loop
     """

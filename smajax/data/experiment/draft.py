@@ -129,7 +129,7 @@ def draft(
     known, hint = facts_of(bench or BenchFacts(), target, model, kept, [run.name for run in logs.runs])
     inputs = _Inputs(tuple(files), tuple(tables), logs, by_quantity, kind_of, model, known)
     time = _time(inputs)
-    own = preset_parameters(model, known) if kept is None else kept_parameters(kept, known)
+    own = preset_parameters(model, known) if kept is None else kept_parameters(model, kept, known)
     sections = [
         _head(inputs, title or target.stem, "" if kept is None else _relative(choice, target)),
         _Section(own.lines, [*own.messages, *hint]),
@@ -273,7 +273,7 @@ def _time(inputs: _Inputs) -> _Section:
     step = _round(max(usual, max(float(np.ptp(clock)) for clock in clocks) / MOST_SAMPLES))
     irregular = any(np.ptp(np.diff(clock)) > 0.5 * period for clock, period in zip(clocks, periods, strict=True))
     lines += ["[sampling]  # the clock to which all signals are resampled", f'step = "{1e3 * step:g} ms"', ""]
-    message = f"sampling: every {usual:.4g} s{', irregular' if irregular else ''}; the fit takes {step:g} s ({LIKELY})"
+    message = f"sampling: every {usual:.4g} s{', irregular' if irregular else ''}; the clock of the fit: {step:g} s ({LIKELY})"
     return _Section(lines, [message])
 
 

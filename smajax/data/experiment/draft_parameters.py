@@ -135,15 +135,23 @@ def preset_parameters(model: DraftModel, known: Known) -> ParameterSections:
     return ParameterSections(lines, [*known.messages, message], presets)
 
 
-def kept_parameters(kept: ActuatorModel, known: Known) -> ParameterSections:
-    """What was fitted before, as unknown again: its bounds, begun at the values of the file; and what is known."""
+def kept_parameters(model: DraftModel, kept: ActuatorModel, known: Known) -> ParameterSections:
+    """What was fitted before, as unknown again: its bounds, begun at the values of the file; and what is known.
+
+    Of a file in which nothing was fitted those that no data sheet has, with bounds around its values.
+    """
     fitted = {name: one for name, one in kept.parameters.items() if one.origin == "fitted" and name not in known.values}
     lines = [
         "[model.parameters]  # known values that differ from the model file's, each with its unit",
         *_given(known),
         "",
-        "[unknown]  # what was fitted before: bounds, and where the fit begins; without a line it is held to its error by the model file",
+        "[unknown]  # what was fitted before: bounds, and where the fit begins; without a line it is held to its error by the model file"
+        if fitted
+        else "[unknown]  # to be fitted: bounds around the values of the model file, in which nothing was",
     ]
+    if not fitted:
+        given = {name for name, one in kept.parameters.items() if one.origin == "given"}
+        lines += [line for name, line in _unknowns(model, kept.system, known).items() if name not in given]
     for name, one in fitted.items():
         unit = kept.table[name].unit
         shown = {"low": one.low, "high": one.high, "start": one.value}

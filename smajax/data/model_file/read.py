@@ -51,6 +51,9 @@ def load_model(path: str | Path) -> ActuatorModel:
     _check_kind(path, content)
     file = validated(path, content, ModelFile, PLACES)
     model = _model(path, file)
+    if file.unfinished:
+        said = f"{path}: of a loop that was not finished: {file.unfinished} were still to come"
+        model = replace(model, unfinished=file.unfinished, warnings=(said,))
     if file.uncertainty is None:
         return model
     return _with_uncertainty(path, file, model)
@@ -258,7 +261,7 @@ def _with_likely(path: Path, model: ActuatorModel, likely: list[LikelyModel]) ->
         if name in model.parameters
     }
     values = {**model.parameters, **exact, **given}
-    return replace(model, parameters=values, likely=kept, warnings=tuple(warnings))
+    return replace(model, parameters=values, likely=kept, warnings=(*model.warnings, *warnings))
 
 
 def _changed(fitted: LikelyModel, model: ActuatorModel) -> list[str]:

@@ -110,6 +110,7 @@ class ModelRecord:
     runs: tuple[FittedRun, ...] = ()
     log_format: LogFormat | None = None
     made_with: Mapping[str, str] = field(default_factory=dict)
+    unfinished: str = ""  # what was still to come when it was written
     warnings: tuple[str, ...] = ()  # of the file that it was read from
 
     @property

@@ -71,6 +71,7 @@ class ModelFile(Section):
     uncertainty: str | None = Field(default=None, description="the name of a NetCDF file beside this one")
     uncertainty_sha256: str | None = Field(default=None, description="the digest of that file, as text")
     probability: float = Field(default=1.0, ge=0.0, le=1.0, description="a number from 0 to 1")
+    unfinished: str = Field(default="", description="what was still to come when it was written, as text")
     model: PartsSection = Field(description="a section [model] with wire, load and drive")
     parameters: dict[str, ParameterSection] = Field(
         default={}, description="a table of name = 'number unit', or name = { value = 'number unit', origin = 'given' }"

@@ -45,6 +45,8 @@ def write_model(model: ModelRecord, path: Path) -> Path:
 def model_text(model: ModelRecord, uncertainty: str = "", sha256: str = "") -> str:
     """The text of the file. `uncertainty`: name of the NetCDF file beside it, and `sha256` its digest."""
     lines = [HEAD, f"format = {FORMAT}", f"title = {_text(model.title)}"]
+    if model.unfinished:
+        lines.append(f"unfinished = {_text(model.unfinished)}  # were still to come when this was written")
     if uncertainty:
         lines.append(f"uncertainty = {_text(uncertainty)}  # covariance and priors of the fitted values")
         lines.append(f"uncertainty_sha256 = {_text(sha256)}")

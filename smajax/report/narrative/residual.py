@@ -23,13 +23,13 @@ def residual_sentences(result: ResidualDiagnostics) -> tuple[str, ...]:
     worst = max(phases, key=lambda name: phases[name]["share_of_squared_error"])
     samples = sum(entry["samples"] for entry in phases.values())
     sentences.append(
-        f"{phases[worst]['share_of_squared_error']:.0%} of its square falls into the phase “{worst}” "
+        f"{phases[worst]['share_of_squared_error']:.0%} of the residual's square falls into the phase “{worst}” "
         f"({phases[worst]['samples'] / samples:.0%} of the samples)."
     )
     strongest = max(result.correlation, key=lambda name: abs(result.correlation[name]))
     if abs(result.correlation[strongest]) > MENTIONED:
         sentences.append(
-            f"It is correlated most with {strongest.replace('_', ' ')} (correlation {result.correlation[strongest]:+.2f})."
+            f"The residual is correlated most with {strongest.replace('_', ' ')} (correlation {result.correlation[strongest]:+.2f})."
         )
     return tuple(sentences)
 
