@@ -26,7 +26,7 @@ from smajax.attribution.findings import (
 )
 from smajax.attribution.found import effects_found, parameters_found, priors_found
 from smajax.attribution.held_out import Compared, compare, every_run, validated
-from smajax.attribution.job import Job, job_of
+from smajax.attribution.job import Job, effects_left_out, job_of
 from smajax.attribution.joint_search import JointSearch
 from smajax.attribution.joint_stage import base_alone, search_by_evidence
 from smajax.attribution.model_fits import Model, Search
@@ -297,6 +297,7 @@ def findings_of(
         unknown=lacking.terms,
         outlier_runs=outcome.outliers,
         config=setting.config,
+        left_out=effects_left_out(experiment),
         base_model=base_model,
         extended_model=extended_model,
     )

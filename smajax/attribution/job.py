@@ -72,3 +72,10 @@ def job_of(experiment: Experiment, integration: Integration | None = None) -> Jo
         presets |= fitted_priors(experiment.model_file, given | stated)
         bounds |= {name: one for name, one in experiment.model_file.bounds.items() if name in presets.keys() - stated}
     return Job(experiment, runs, problem, held_out, unknowns, bounds, names, presets)
+
+
+def effects_left_out(experiment: Experiment) -> int:
+    """How many effects that the model can show are no candidates, because [effects] of the experiment file says so."""
+    every = candidates(base_model(experiment), None, experiment.declared_effects, experiment.clocked)
+    only, excluded = experiment.effects_only, experiment.effects_excluded
+    return sum((only is not None and name not in only) or name in excluded for name in every)

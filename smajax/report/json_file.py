@@ -167,6 +167,7 @@ def findings_to_json(findings: Findings, narrative: Narrative | None = None) -> 
         "source": findings.source,
         "verdict": findings.verdict,
         "remaining": findings.remaining,
+        "effects_excluded": findings.left_out,
         "summary": words.summary,
         "output": {
             "name": findings.output_name,

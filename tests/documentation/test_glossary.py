@@ -73,6 +73,7 @@ PLAIN = set(
         "bench",
         "bic",
         "budget",
+        "excluded",
         "measured",
         "remaining",
         "predict",

@@ -337,3 +337,11 @@ def test_an_equation_is_named_only_if_no_other_explains_as_much() -> None:
     assert "less likely than none by 2.0 in log odds" in none
     assert "on those held out" in _with_terms(True, held_out=(2.0, 1.0))[1]
     assert "is not validated on the held-out runs" in _with_terms(False, held_out=(1.0, 2.0))[1]
+
+
+def test_effects_that_the_file_keeps_from_being_candidates_are_counted() -> None:
+
+    findings = dataclasses.replace(made_findings(), left_out=48)
+    (said,) = [one for one in narrate(findings).summary if "were not tried" in one]
+    assert said.startswith(f"{len(findings.effects)} effects of the library were candidates; 48 more")
+    assert not any("were not tried" in one for one in narrate(made_findings()).summary)

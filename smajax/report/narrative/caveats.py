@@ -202,3 +202,14 @@ def of_the_test(findings: Findings) -> Iterator[str]:
             f"What is left is {after.ratio:.2f} times the declared noise: the noise was declared too large, and an effect "
             "smaller than it may hide. Declare it smaller, or as 'estimate', and run again."
         )
+
+
+def of_effects_left_out(findings: Findings) -> list[str]:
+    """That the experiment file keeps effects from being candidates: none of these can be named."""
+    if not findings.left_out:
+        return []
+    tried = len(findings.effects)
+    return [
+        f"{tried} effect{'s' if tried != 1 else ''} of the library {'were candidates' if tried != 1 else 'was a candidate'}; {findings.left_out} more "
+        "that this model can show were not tried, because [effects] of the experiment file leaves them out."
+    ]
