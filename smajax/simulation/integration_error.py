@@ -93,7 +93,7 @@ def with_tolerance(value: float) -> Integration:
 
 
 def _double() -> bool:
-    return bool(jax.config.jax_enable_x64)
+    return bool(jax.config.read("jax_enable_x64"))
 
 
 def coarse_to_fine(system: System, reverse: bool = False) -> Iterator[Integration]:
