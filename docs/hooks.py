@@ -27,7 +27,7 @@ TAKEN = (
     "CHANGELOG.md",
     "CONTRIBUTING.md",
 )
-PICTURES = ("studies/*.png", "studies/*/*.png", "docs/*.png")
+PICTURES = ("studies/*.png", "studies/*/*.png", "docs/*.png", "docs/*.svg")
 LINK = re.compile(r"(\]\()([^)#\s]+)((?:#[^)\s]*)?\))")
 LABELLED = re.compile(r"\[([^\[\]]*)\]\(([^)#\s]+)\)")
 FENCED = re.compile(r"^(```|~~~).*?^\1[ \t]*$", re.MULTILINE | re.DOTALL)
