@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -27,6 +26,7 @@ from smajax.data.experiment.draft_parameters import PresetLine, kept_parameters,
 from smajax.data.experiment.first_force import first_force
 from smajax.data.experiment.grouping import RunFiles
 from smajax.data.experiment.logs import Logs, logs_of
+from smajax.data.experiment.toml_file import toml_value
 from smajax.data.model_file.read import load_model
 from smajax.data.readers.read import read_table
 from smajax.data.readers.table import MeasuredDataError, Table
@@ -50,7 +50,7 @@ class Draft:
 
 def _key(column: Column, variable: bool) -> str:
     word = "variable" if variable else "column"
-    return f"{word} = {json.dumps(column.key, ensure_ascii=False)}"
+    return f"{word} = {toml_value(column.key)}"
 
 
 def _channel(name: str, role: str, column: Column, variable: bool, off: bool) -> list[str]:
@@ -58,7 +58,7 @@ def _channel(name: str, role: str, column: Column, variable: bool, off: bool) ->
         f"[channels.{name}]  # {column.sure}: {column.why}",
         f'role = "{role}"',
         _key(column, variable),
-        f"unit = {json.dumps(column.unit, ensure_ascii=False)}",
+        f"unit = {toml_value(column.unit)}",
     ]
     if role == "output":
         lines.append('noise = "estimate"  # or its sigma, such as "0.01 mm"')
@@ -70,11 +70,9 @@ def _override_lines(overrides: Mapping[str, Column], usual: Mapping[str, Column]
     """Columns and units of a run whose log has other names for them."""
     if not overrides:
         return []
-    columns = ", ".join(f"{name} = {json.dumps(one.key, ensure_ascii=False)}" for name, one in overrides.items())
+    columns = ", ".join(f"{name} = {toml_value(one.key)}" for name, one in overrides.items())
     units = ", ".join(
-        f"{name} = {json.dumps(one.unit, ensure_ascii=False)}"
-        for name, one in overrides.items()
-        if one.unit != usual[name].unit
+        f"{name} = {toml_value(one.unit)}" for name, one in overrides.items() if one.unit != usual[name].unit
     )
     sure = max((one.sure for one in overrides.values()), key=[SURE, LIKELY, GUESS].index)
     return [
@@ -230,10 +228,10 @@ def _head(inputs: _Inputs, title: str, model_file: str = "") -> _Section:
         f'# A draft by `smajax new-experiment`. Check the lines that say "{GUESS}" or "{LIKELY}"; "{SURE}" ones come from',
         "# headings with units. Possible models: `smajax presets`; parameters that may be fitted: the page 'Parameters of the presets'",
         "# of the documentation, and the parameters of `smajax effects`.",
-        f"title = {json.dumps(title, ensure_ascii=False)}",
+        f"title = {toml_value(title)}",
         "",
         *(
-            ["[model]", f"file = {json.dumps(model_file, ensure_ascii=False)}", ""]
+            ["[model]", f"file = {toml_value(model_file)}", ""]
             if model_file
             else [
                 f"[model]  # {model.why}",
@@ -264,7 +262,7 @@ def _time(inputs: _Inputs) -> _Section:
         time = inputs.columns[TIME]
         lines += [
             f"[time]  # {time.sure}: {time.why}",
-            f"column = {json.dumps(time.key, ensure_ascii=False)}",
+            f"column = {toml_value(time.key)}",
             f'unit = "{time.unit}"',
             "",
         ]
@@ -286,7 +284,7 @@ def _no_time(tables: Sequence[Table]) -> _Section:
     table, name, why = wrong
     lines = [
         f"[time]  # NOT READ: {why}",
-        f"column = {json.dumps(name, ensure_ascii=False)}",
+        f"column = {toml_value(name)}",
         f'unit = "{time_unit_of(table, name)}"',
         "",
         f"[sampling]  # {GUESS}",
@@ -334,7 +332,7 @@ def _channels(inputs: _Inputs) -> _Section:
 
 def _data(inputs: _Inputs, target: Path, decimal: str) -> _Section:
     """[data]: the folder and the decimal mark."""
-    folder = json.dumps(str(_folder(inputs.files, target)), ensure_ascii=False)
+    folder = toml_value(str(_folder(inputs.files, target)))
     mark = f'decimal = "{decimal or ","}"  # the decimal mark'
     hint = mark if decimal else f"# {mark}, where no number determines it: 1,234 may be a thousand"
     return _Section(["[data]", f"folder = {folder}", hint, ""])
@@ -350,7 +348,7 @@ def _runs(inputs: _Inputs, target: Path) -> _Section:
     forces, masses = inputs.first_forces, inputs.known.masses
     for run in runs:
         role = "held-out" if run is held_out else "fit"
-        names = [json.dumps(str(file.resolve().relative_to(base)), ensure_ascii=False) for file in run.files]
+        names = [toml_value(str(file.resolve().relative_to(base))) for file in run.files]
         by_channel = ", ".join(
             f"{name} = {names[inputs.kind_of[name]]}"
             for name in (*model.inputs, model.output)
@@ -359,14 +357,14 @@ def _runs(inputs: _Inputs, target: Path) -> _Section:
         overrides = inputs.overrides(run.files[0])
         lines += [
             "[[runs]]",
-            f"name = {json.dumps(run.name, ensure_ascii=False)}",
+            f"name = {toml_value(run.name)}",
             f'role = "{role}"' + ("  # not fitted: the error on it validates the model" if run is held_out else ""),
             *(
                 [f'parameters = {{ pretension = "{forces[run.name]:.4g} N" }}  # {GUESS}: what the force begins with']
                 if forces
                 else []
             ),
-            *([f"inputs = {{ mass = {json.dumps(masses[run.name])} }}"] if masses else []),
+            *([f"inputs = {{ mass = {toml_value(masses[run.name])} }}"] if masses else []),
             f"file = {names[0]}" if len(names) == 1 else f"files = {{ {by_channel} }}",
             *_override_lines(
                 {name: one for name, one in overrides.items() if name in {TIME, *channels}}, inputs.columns

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -10,6 +9,7 @@ from smajax.core.parameters import parameter_values, parameters
 from smajax.data.experiment.bench_facts import Known
 from smajax.data.experiment.draft_model import DraftModel
 from smajax.data.experiment.model_description import WIRE_SIZES
+from smajax.data.experiment.toml_file import toml_key, toml_value
 from smajax.data.model_file.actuator_model import ActuatorModel
 from smajax.model.presets import build
 from smajax.model.system import System
@@ -53,11 +53,6 @@ def ordered(text: str, presets: Sequence[PresetLine], remarks: Mapping[str, str]
     return text.replace("\n".join([HEAD, *before]), "\n".join([HEAD, *first, *rest]), 1)
 
 
-def _quoted(name: str) -> str:
-    """A key of TOML: with quotes where it has a dot."""
-    return json.dumps(name) if "." in name else name
-
-
 def _amount(value: float, unit: str, places: int) -> str:
     return f"{value:.{places}g} {unit.replace('-', '')}".strip()
 
@@ -67,7 +62,7 @@ def _given(known: Known) -> list[str]:
     lines = []
     for name, value in known.values.items():
         why = known.origins.get(name, "")
-        lines.append(f"{_quoted(name)} = {json.dumps(value, ensure_ascii=False)}" + (f"  # {why}" if why else ""))
+        lines.append(f"{toml_key(name)} = {toml_value(value)}" + (f"  # {why}" if why else ""))
     return lines
 
 
@@ -155,7 +150,7 @@ def kept_parameters(model: DraftModel, kept: ActuatorModel, known: Known) -> Par
     for name, one in fitted.items():
         unit = kept.table[name].unit
         shown = {"low": one.low, "high": one.high, "start": one.value}
-        box = ", ".join(f"{key} = {json.dumps(_amount(value, unit, 10))}" for key, value in shown.items())
-        lines.append(f"{_quoted(name)} = {{ {box} }}")
+        box = ", ".join(f"{key} = {toml_value(_amount(value, unit, 10))}" for key, value in shown.items())
+        lines.append(f"{toml_key(name)} = {{ {box} }}")
     offset = any(one.offset for one in kept.outputs) or not kept.outputs
-    return ParameterSections([*lines, "", "[nuisance]", f"offset = {str(offset).lower()}", ""], known.messages)
+    return ParameterSections([*lines, "", "[nuisance]", f"offset = {toml_value(offset)}", ""], known.messages)

@@ -5,14 +5,11 @@ from __future__ import annotations
 import hashlib
 from pathlib import Path
 
-import numpy as np
-
 from smajax.data.experiment.errors import ExperimentError
 from smajax.data.experiment.record import FromModelFile
 from smajax.data.experiment.schema import ExperimentFile, ModelSection
-from smajax.data.experiment.toml_file import Quantity
-from smajax.data.model_file.read import load_model, parameter_text
-from smajax.data.model_file.record import ModelRecord
+from smajax.data.experiment.toml_file import Quantity, quantity
+from smajax.data.model_file.read import load_model
 
 
 def with_model_file(path: Path, file: ExperimentFile) -> tuple[ExperimentFile, FromModelFile | None]:
@@ -37,7 +34,7 @@ def with_model_file(path: Path, file: ExperimentFile) -> tuple[ExperimentFile, F
     except ExperimentError as error:
         raise ExperimentError(path, "model.file", str(error)) from None
     given: dict[str, Quantity] = {
-        name: parameter_text(one.value, model.table[name].unit)
+        name: quantity(one.value, model.table[name].unit)
         for name, one in model.parameters.items()
         if one.origin == "given" and name not in file.unknown
     }
@@ -55,7 +52,12 @@ def with_model_file(path: Path, file: ExperimentFile) -> tuple[ExperimentFile, F
         effects=model.effects,
         values={name: one.value for name, one in open_.items()},
         errors={
-            **_deviations(model),
+            # Of those, too, that the runs barely determine, which have no error in the text.
+            **{
+                name: float(error)
+                for one in model.likely[:1]
+                for name, error in zip(one.names, one.deviations, strict=True)
+            },
             **{name: one.standard_error for name, one in fitted.items() if one.standard_error},
         },
         bounds={name: (one.low, one.high) for name, one in fitted.items()},
@@ -64,11 +66,3 @@ def with_model_file(path: Path, file: ExperimentFile) -> tuple[ExperimentFile, F
         sha256=hashlib.sha256(source.read_bytes()).hexdigest(),
     )
     return file.model_copy(update={"model": section}), kept
-
-
-def _deviations(model: ModelRecord) -> dict[str, float]:
-    """Standard deviations of the fitted values by their covariance: also of those that the runs barely determine."""
-    if not model.likely:
-        return {}
-    first = model.likely[0]
-    return dict(zip(first.names, np.sqrt(np.maximum(np.diag(first.covariance), 0.0)).tolist(), strict=True))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -15,6 +16,26 @@ from smajax.data.experiment.errors import ExperimentError
 Quantity = str | float
 LARGEST = 1 << 20  # bytes of a file of settings
 LONGEST = 200  # characters of what was got, in a message
+
+
+def toml_key(name: str) -> str:
+    """A key of TOML, in quotation marks where it needs them."""
+    bare = name.replace("-", "").replace("_", "")
+    return name if bare.isascii() and bare.isalnum() else toml_value(name)
+
+
+def toml_value(value: str | bool | float | Sequence[str | float]) -> str:
+    """Text, a truth value, a number with every digit, or a list of such, as TOML writes it."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    return repr(value) if isinstance(value, int | float) else f"[{', '.join(map(toml_value, value))}]"
+
+
+def quantity(value: float, unit: str) -> Quantity:
+    """A value as a file has it, every digit: a number with its unit, or a plain number."""
+    return float(value) if unit in ("-", "1", "") else f"{float(value)!r} {unit}"
 
 
 class Section(BaseModel):

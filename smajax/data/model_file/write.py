@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import hashlib
-import json
-from collections.abc import Iterable
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 from smajax.core.files import as_netcdf, replace
 from smajax.data.experiment.errors import ExperimentError
-from smajax.data.experiment.toml_file import Section
+from smajax.data.experiment.toml_file import Section, quantity, toml_key, toml_value
 from smajax.data.model_file.record import ModelParameter, ModelRecord, range_unit
 from smajax.data.model_file.schema import FORMAT
 from smajax.data.model_file.uncertainty import uncertainty_of
@@ -44,44 +42,49 @@ def write_model(model: ModelRecord, path: Path) -> Path:
 
 def model_text(model: ModelRecord, uncertainty: str = "", sha256: str = "") -> str:
     """The text of the file. `uncertainty`: name of the NetCDF file beside it, and `sha256` its digest."""
-    lines = [HEAD, f"format = {FORMAT}", f"title = {_text(model.title)}"]
+    lines = [HEAD, f"format = {FORMAT}", f"title = {toml_value(model.title)}"]
     if model.unfinished:
-        lines.append(f"unfinished = {_text(model.unfinished)}  # were still to come when this was written")
+        lines.append(f"unfinished = {toml_value(model.unfinished)}  # were still to come when this was written")
     if uncertainty:
-        lines.append(f"uncertainty = {_text(uncertainty)}  # covariance and priors of the fitted values")
-        lines.append(f"uncertainty_sha256 = {_text(sha256)}")
+        lines.append(f"uncertainty = {toml_value(uncertainty)}  # covariance and priors of the fitted values")
+        lines.append(f"uncertainty_sha256 = {toml_value(sha256)}")
         lines.append(f"probability = {model.likely[0].probability!r}  # of this set of effects")
     if model.log_format is not None and model.log_format.decimal:
-        lines.append(f"decimal = {_text(model.log_format.decimal)}  # the decimal mark of the logs")
+        lines.append(f"decimal = {toml_value(model.log_format.decimal)}  # the decimal mark of the logs")
     parts = {"wire": model.wire, "load": model.load, "drive": model.drive, "law": model.law}
-    lines += ["", "[model]", *(f"{key} = {_text(name)}" for key, name in parts.items() if name)]
-    lines += [f"effects = {_list(model.effects)}", "", "[parameters]"]
+    lines += ["", "[model]", *(f"{key} = {toml_value(name)}" for key, name in parts.items() if name)]
+    lines += [f"effects = {toml_value(model.effects)}", "", "[parameters]"]
     kept = model.likely[0].values if model.likely else {}
     for name, one in model.parameters.items():
         known = model.table[name]
-        lines.append(f"{_key(name)} = {_parameter(one, known.unit, name in kept)}  # {known.about}")
+        lines.append(f"{toml_key(name)} = {_parameter(one, known.unit, name in kept)}  # {known.about}")
     for output in model.outputs:
-        lines += ["", f"[outputs.{_key(output.name)}]", f"noise = {_quantity(output.noise, output.unit)}"]
-        lines.append(f"offset = {str(output.offset).lower()}  # whether each run has its own zero")
+        lines += ["", f"[outputs.{toml_key(output.name)}]", f"noise = {_quantity(output.noise, output.unit)}"]
+        lines.append(f"offset = {toml_value(output.offset)}  # whether each run has its own zero")
         if output.prediction_error is not None:
             error = _quantity(output.prediction_error, output.unit)
             lines.append(
                 f"prediction_error = {error}  # nine of ten samples of runs that the fit did not see stay within"
             )
     for other in model.likely[1:]:
-        lines += ["", "[[alternatives]]", f"effects = {_list(other.effects)}", f"probability = {other.probability!r}"]
+        lines += [
+            "",
+            "[[alternatives]]",
+            f"effects = {toml_value(other.effects)}",
+            f"probability = {other.probability!r}",
+        ]
     if model.fitted_range:
         lines += ["", "[fitted_range]  # of the runs that it was fitted to: beyond it is extrapolation"]
         for name, ends in model.fitted_range.items():
             unit = range_unit(name, model.table)
-            lines.append(f"{_key(name)} = [{', '.join(_quantity(end, unit) for end in ends)}]")
+            lines.append(f"{toml_key(name)} = {toml_value([quantity(end, unit) for end in ends])}")
     if model.log_format is not None:
         lines += _log_format(model.log_format)
     for run in model.runs:
-        lines += ["", "[[fitted_to]]", f"run = {_text(run.name)}", f"role = {_text(run.role)}"]
-        lines.append(f"sha256 = {_text(run.sha256)}")
+        lines += ["", "[[fitted_to]]", f"run = {toml_value(run.name)}", f"role = {toml_value(run.role)}"]
+        lines.append(f"sha256 = {toml_value(run.sha256)}")
     made = {"smajax": metadata.version("smajax"), **model.made_with}
-    lines += ["", "[made_with]", *(f"{_key(name)} = {_text(value)}" for name, value in made.items())]
+    lines += ["", "[made_with]", *(f"{toml_key(name)} = {toml_value(value)}" for name, value in made.items())]
     return "\n".join(lines) + "\n"
 
 
@@ -95,7 +98,7 @@ def _parameter(one: ModelParameter, unit: str, kept: bool) -> str:
         if one.standard_error is not None:
             entries["standard_error"] = _quantity(one.standard_error, "K" if unit == "degC" else unit)
         entries |= {"low": _quantity(one.low, unit), "high": _quantity(one.high, unit)}
-    entries["origin"] = _text(one.origin)
+    entries["origin"] = toml_value(one.origin)
     return f"{{ {', '.join(f'{key} = {value}' for key, value in entries.items())} }}"
 
 
@@ -104,7 +107,7 @@ def _log_format(shown: Section) -> list[str]:
     content = shown.model_dump(exclude_defaults=True)
     lines: list[str] = []
     for name, channel in content.pop("channels").items():
-        lines += ["", f"[channels.{_key(name)}]", *_entries(channel)]
+        lines += ["", f"[channels.{toml_key(name)}]", *_entries(channel)]
     content.pop("decimal", None)  # at the head of the file
     for name, section in content.items():
         lines += ["", f"[{name}]", *_entries(section)]
@@ -112,29 +115,8 @@ def _log_format(shown: Section) -> list[str]:
 
 
 def _entries(section: dict[str, Any]) -> list[str]:
-    return [f"{_key(name)} = {_value(value)}" for name, value in section.items() if value is not None]
-
-
-def _value(value: Any) -> str:
-    if isinstance(value, bool):
-        return str(value).lower()
-    return _text(value) if isinstance(value, str) else repr(value)
+    return [f"{toml_key(name)} = {toml_value(value)}" for name, value in section.items() if value is not None]
 
 
 def _quantity(value: float, unit: str) -> str:
-    """With every digit, so that what is read back is what was written."""
-    return repr(float(value)) if unit in ("-", "1", "") else f'"{float(value)!r} {unit}"'
-
-
-def _text(value: str) -> str:
-    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-
-
-def _key(name: str) -> str:
-    """A key of TOML, in quotation marks where it needs them."""
-    bare = name.replace("-", "").replace("_", "")
-    return name if bare.isascii() and bare.isalnum() else _text(name)
-
-
-def _list(names: Iterable[str]) -> str:
-    return f"[{', '.join(map(_text, names))}]"
+    return toml_value(quantity(value, unit))
