@@ -12,14 +12,13 @@ from smajax.attribution.job import Job
 from smajax.core.parameters import get_parameters, parameters
 from smajax.data.experiment.model_description import WIRE_SIZES
 from smajax.fit.base_model import base_model
-
-LOGGED = {"mass": "load_mass", "ambient_temperature": "ambient_temperature"}  # input channel -> what it replaces
+from smajax.model.channels import REPLACED
 
 
 def assumed(job: Job, presets: Collection[str] = ()) -> tuple[AssumedParameter, ...]:
     """Parameters of the base model that are not fitted and that no log gives. `presets`: those of presets that are fitted."""
     experiment, model = job.experiment, base_model(job.experiment)
-    logged = {own for channel, own in LOGGED.items() if all(channel in run.inputs for run in experiment.runs)}
+    logged = {own for own, channel in REPLACED.items() if all(channel in run.inputs for run in experiment.runs)}
     table = {name: entry for name, entry in parameters(model).items() if name not in {*job.unknowns, *logged, *presets}}
     values = np.asarray(get_parameters(model, list(table))) if table else ()
     own = set.intersection(*({*run.parameters} for run in experiment.runs))

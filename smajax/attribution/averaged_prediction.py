@@ -22,8 +22,7 @@ from smajax.attribution.laplace_evidence import FittedModel
 from smajax.attribution.likely_models_check import checked
 from smajax.attribution.model_fits import Model, Search
 from smajax.fit.packed_runs import RunBatch
-from smajax.fit.predicted import predicted_and_derivatives
-from smajax.fit.prediction_band import BAND, averaged_band
+from smajax.fit.prediction_band import BAND, averaged_band, reading_of
 from smajax.fit.problem import Problem
 
 LEAST_PROBABILITY = 0.02
@@ -65,36 +64,21 @@ def averaged(
         models, dropped = checked(setting, search, base, final, models)
     problem, index = setting.restricted([effect for model, _ in models for effect in model.effects])
     problem = Problem.build(problem.system, batch, problem.noise_sigma, problem.offset)
-    offset = problem.measured - problem.centred(problem.measured)
     own = search.joint.ordered(final.effects)
     readings, variances = [], []
     for model, _ in models:
         values = (final if model.effects == own else model).values[index]
-        reading, variance = _predicted(problem, model, values, search.error(model) ** 2)
-        readings.append(reading)
-        variances.append(variance)
+        covariance = model.covariance(search.error(model) ** 2)
+        found = reading_of(problem, values, model.names, model.scales, covariance)
+        readings.append(found.reading)
+        variances.append(found.variance)
     weights = np.asarray([weight for _, weight in models])
     mean, half = averaged_band(np.stack(readings), np.stack(variances), weights, prediction_error(setting, final))
     return Averaged(
         tuple(AveragedModel(model.effects, weight) for model, weight in models),
-        tuple(
-            _run(*one) for one in zip(problem.measured, mean + offset, half, np.asarray(batch.mask) > 0, strict=True)
-        ),
+        tuple(_run(*one) for one in zip(problem.measured, mean, half, np.asarray(batch.mask) > 0, strict=True)),
         dropped,
     )
-
-
-def _predicted(
-    problem: Problem, model: FittedModel, values: np.ndarray, variance: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """(reading, its variance by the parameters' posterior), (R, N) each, each run's mean taken off where it has an offset."""
-    tangents = np.zeros((1, len(model.names), len(values)))
-    for row, name in enumerate(model.names):
-        tangents[0, row, problem.names.index(name)] = model.scales[row]
-    predicted, derivatives = predicted_and_derivatives(problem, values[None], tangents)
-    columns = problem.centred(derivatives[0])
-    spread = np.einsum("psn,pq,qsn->sn", columns, model.covariance(variance), columns)
-    return problem.centred(predicted[0]), np.maximum(spread, 0.0)
 
 
 def prediction_error(setting: Search, final: Model) -> float:

@@ -26,7 +26,7 @@ from smajax.attribution.findings import (
 )
 from smajax.attribution.found import effects_found, parameters_found, priors_found
 from smajax.attribution.held_out import Compared, compare, every_run, validated
-from smajax.attribution.job import Job, effects_left_out, job_of
+from smajax.attribution.job import Job, effects_excluded, job_of
 from smajax.attribution.joint_search import JointSearch
 from smajax.attribution.joint_stage import base_alone, search_by_evidence
 from smajax.attribution.model_fits import Model, Search
@@ -34,7 +34,7 @@ from smajax.attribution.neutral import check_neutral
 from smajax.attribution.outlier_run import outlier_runs
 from smajax.attribution.preset_priors import visible
 from smajax.attribution.refusal import refuse_keys_of_identify
-from smajax.attribution.saved_model import saved_model
+from smajax.attribution.saved_model import fit_run_states, saved_model
 from smajax.attribution.step_size_check import finer_integration, integration_error_of
 from smajax.attribution.unknown_term import Lacking, in_place_of, unknown_terms
 from smajax.attribution.verdict import verdict_of
@@ -248,12 +248,11 @@ def findings_of(
     if len(job.fit_runs) > 1 and not brief:  # else none can be left out, which the band is made of
         average = averaged(setting, outcome.search, final, every_run(job), base)
         runs = tuple(replace(run, average=one) for run, one in zip(runs, average.runs, strict=True))
-    extended_model = saved_model(job, setting, outcome.search, final, after, runs, average, final.effects)
-    base_model = (
-        saved_model(job, setting, outcome.search, base, before, runs, None, final.effects)
-        if final.effects
-        else extended_model
-    )
+    states = {run.name: run.states for run in runs}
+    extended_model = base_model = saved_model(job, setting, outcome.search, final, after, average, states)
+    if final.effects:
+        states = fit_run_states(job, setting, base)
+        base_model = saved_model(job, setting, outcome.search, base, before, None, states)
     mistaken = confounders(outcome.search, setting, final, job.fit_runs)
     integration = integration_error_of(setting, final)
     setting.progress(Stage(WRITING, 1.0))
@@ -297,7 +296,7 @@ def findings_of(
         unknown=lacking.terms,
         outlier_runs=outcome.outliers,
         config=setting.config,
-        left_out=effects_left_out(experiment),
+        effects_excluded=effects_excluded(experiment),
         base_model=base_model,
         extended_model=extended_model,
     )

@@ -353,7 +353,7 @@ class Findings:
     provenance: dict[str, str] = field(default_factory=dict)  # versions, seed, data hashes, command, seconds
     base_model: ActuatorModel | None = None  # as they are saved
     extended_model: ActuatorModel | None = None
-    left_out: int = 0  # effects that this model can show and the experiment file keeps from being candidates
+    effects_excluded: int = 0  # effects that this model can show and the experiment file keeps from being candidates
     remaining: str = ""  # stages that were still to come, of what is known while a loop goes on
 
     @property

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Literal
 
 import jax.numpy as jnp
@@ -15,7 +16,8 @@ from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.residual_diagnostics import diagnosed
 from smajax.core.parameters import parameter_values
 from smajax.data.experiment.record import Run
-from smajax.fit.packed_runs import RunBatch, pack, simulate_batch
+from smajax.fit.packed_runs import RunBatch, pack, simulate_batch, states_by_run
+from smajax.model.channels import SHOWN
 from smajax.model.types import Trajectory
 
 Compared = tuple[tuple[RunFinding, ...], ResidualDiagnostics, ResidualDiagnostics]
@@ -69,6 +71,7 @@ def compare(job: Job, setting: Search, first: Model, final: Model) -> Compared:
     experiment, batch = job.experiment, every_run(job)
     before = _simulated(setting, first, batch)
     after = _simulated(setting, final, batch)
+    shown = {which: states_by_run(one, experiment.runs, SHOWN) for which, one in (("before", before), ("after", after))}
     runs = []
     residuals: dict[str, list[np.ndarray]] = {"before": [], "after": []}
     states: dict[str, list[dict[str, np.ndarray]]] = {"before": [], "after": []}
@@ -82,11 +85,7 @@ def compare(job: Job, setting: Search, first: Model, final: Model) -> Compared:
             errors[which] = float(np.sqrt(np.mean((run.output - readings[which]) ** 2)))
             if run.role == "fit":
                 residuals[which].append(run.output - readings[which])
-                states[which].append(_series(run, trajectory, index))
-        shown = {
-            name: np.asarray(getattr(after, name))[index, :n]
-            for name in ("temperature", "martensite_fraction", "stress")
-        }
+                states[which].append(_series(run, shown[which][run.name]))
         runs.append(
             RunFinding(
                 run.name,
@@ -96,7 +95,7 @@ def compare(job: Job, setting: Search, first: Model, final: Model) -> Compared:
                 run.output,
                 readings["before"],
                 readings["after"],
-                shown,
+                shown["after"][run.name],
                 offsets["before"],
                 offsets["after"],
                 errors["before"],
@@ -111,15 +110,7 @@ def compare(job: Job, setting: Search, first: Model, final: Model) -> Compared:
     )
 
 
-def _series(run: Run, trajectory: Trajectory, index: int) -> dict[str, np.ndarray]:
+def _series(run: Run, states: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     """What a residual is held against."""
-    n = len(run.time)
-    temperature = np.asarray(trajectory.temperature)[index, :n]
-    series = {
-        "time": run.time - run.time[0],
-        "temperature": temperature,
-        "martensite_fraction": np.asarray(trajectory.martensite_fraction)[index, :n],
-        "stress": np.asarray(trajectory.stress)[index, :n],
-        "temperature_rate": np.gradient(temperature),
-    }
+    series = {"time": run.time - run.time[0], **states, "temperature_rate": np.gradient(states["temperature"])}
     return series | {name: values for name, values in run.inputs.items() if name not in series}

@@ -74,7 +74,7 @@ def job_of(experiment: Experiment, integration: Integration | None = None) -> Jo
     return Job(experiment, runs, problem, held_out, unknowns, bounds, names, presets)
 
 
-def effects_left_out(experiment: Experiment) -> int:
+def effects_excluded(experiment: Experiment) -> int:
     """How many effects that the model can show are no candidates, because [effects] of the experiment file says so."""
     every = candidates(base_model(experiment), None, experiment.declared_effects, experiment.clocked)
     only, excluded = experiment.effects_only, experiment.effects_excluded

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 
 import jax.numpy as jnp
 import numpy as np
 
 from smajax.attribution.averaged_prediction import Averaged, likely_models, prediction_error
-from smajax.attribution.findings import RunFinding
 from smajax.attribution.found import ParametersFound
 from smajax.attribution.job import Job
 from smajax.attribution.joint_search import JointSearch
@@ -17,7 +16,8 @@ from smajax.attribution.model_fits import Model, Search
 from smajax.data.model_file.actuator_model import ActuatorModel
 from smajax.data.model_file.of_experiment import actuator_model, range_of, rounded
 from smajax.data.model_file.record import LikelyModel, ModelOutput
-from smajax.fit.packed_runs import simulate_batch
+from smajax.fit.packed_runs import simulate_batch, states_by_run
+from smajax.model.channels import RANGED
 
 
 def saved_model(
@@ -26,11 +26,13 @@ def saved_model(
     search: JointSearch,
     model: Model,
     found: ParametersFound,
-    runs: Sequence[RunFinding],
     average: Averaged | None,
-    runs_of: Sequence[str],
+    states: Mapping[str, Mapping[str, np.ndarray]],
 ) -> ActuatorModel:
-    """`model` with its parameters `found`, `runs` as simulated by the model with the effects `runs_of`; with the likely models of `average`, where predictions are those of an average."""
+    """`model` with its parameters `found`, and with the likely models of `average`, where predictions are those of an average.
+
+    states: temperature and stress of each fit run by it, (n,), by the run's name.
+    """
     own = search.joint.ordered(model.effects)
     weighted = [(search.fitted[own], 1.0)]
     if average is not None:  # of one fit run nothing is averaged, and no model has been checked
@@ -44,10 +46,6 @@ def saved_model(
     ]
     (output,) = job.experiment.outputs[:1]
     several = len(job.fit_runs) > 1  # else none could be left out
-    if own == search.joint.ordered(runs_of):
-        states = {run.name: run.states for run in runs}
-    else:
-        states = _states(job, setting, model)
     return actuator_model(
         job.experiment,
         likely,
@@ -66,14 +64,11 @@ def saved_model(
     )
 
 
-def _states(job: Job, setting: Search, model: Model) -> dict[str, dict[str, np.ndarray]]:
-    """Temperature and stress of each fit run by `model`, (n,)."""
+def fit_run_states(job: Job, setting: Search, model: Model) -> dict[str, dict[str, np.ndarray]]:
+    """Temperature and stress of each fit run by `model`, (n,), by the run's name."""
     problem, index = setting.restricted(model.effects)
     found = simulate_batch(problem.system_at(jnp.asarray(model.values[index])), problem.batch)
-    return {
-        run.name: {name: np.asarray(getattr(found, name))[k, : len(run.time)] for name in ("temperature", "stress")}
-        for k, run in enumerate(job.fit_runs)
-    }
+    return states_by_run(found, job.fit_runs, RANGED)
 
 
 def _likely(job: Job, search: JointSearch, model: FittedModel, values: np.ndarray, weight: float) -> LikelyModel:

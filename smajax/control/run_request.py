@@ -31,10 +31,9 @@ from smajax.core.names import close_matches
 from smajax.core.parameters import parameter_values, parameters
 from smajax.core.wording import and_listed
 from smajax.data.experiment.magnitude import MELTS
-from smajax.data.model_file.of_experiment import LOGGED
 from smajax.data.model_file.read import load_model
 from smajax.data.text_input import clock_of, given, reads_file
-from smajax.model.channels import INPUT_UNITS
+from smajax.model.channels import INPUT_UNITS, REPLACED
 from smajax.model.load.coupon import AbstractCoupon
 from smajax.model.system import System
 from smajax.simulation.dataset import simulate_dataset
@@ -100,7 +99,7 @@ class RunRequest:
         if not self.model:
             return []
         kept = load_model(self.model)
-        replaced = {channel: name for name, channel in LOGGED.items()}
+        replaced = {channel: name for name, channel in REPLACED.items()}
         return [
             f"The model was fitted to runs with their own {channel}, {digits(low, 4)} to {digits(high, 4)} {INPUT_UNITS[channel]}; here it is "
             f"{replaced[channel]}, {digits(kept.values[replaced[channel]], 4)}. Give --input {channel}=... for another."

@@ -13,10 +13,9 @@ from smajax.data.model_file.of_experiment import actuator_model, range_of, round
 from smajax.data.model_file.record import LikelyModel, ModelOutput
 from smajax.fit.identify_result import IdentifiedRun
 from smajax.fit.identify_stages import Fitted, Setup, Statistics
-from smajax.fit.packed_runs import simulate_batch
+from smajax.fit.packed_runs import simulate_batch, states_by_run
 from smajax.fit.prediction_band import BAND
-
-STATES = ("temperature", "stress")
+from smajax.model.channels import RANGED
 
 
 def identified_model(
@@ -50,11 +49,8 @@ def identified_model(
     )
     problem = fitted.problem
     system = problem.system_at(jnp.asarray(fitted.best.values))
-    states = simulate_batch(system, problem.batch)
-    ranges = range_of(
-        (run, {name: np.asarray(getattr(states, name))[number, : len(run.time)] for name in STATES})
-        for number, run in enumerate(setup.fit_runs)
-    )
+    states = states_by_run(simulate_batch(system, problem.batch), setup.fit_runs, RANGED)
+    ranges = range_of((run, states[run.name]) for run in setup.fit_runs)
     return actuator_model(
         experiment,
         [likely],

@@ -133,6 +133,15 @@ def simulate_batch(system: System, batch: RunBatch) -> Trajectory:
     return jax.tree.map(lambda *leaves: np.stack(leaves), *runs)
 
 
+def states_by_run(packed: Trajectory, runs: Sequence[Run], names: Sequence[str]) -> dict[str, dict[str, np.ndarray]]:
+    """Of what `simulate_batch` returned of these R `runs`, the states `names` of each, (n,) without the padding, by the run's name."""
+    series = {name: np.asarray(getattr(packed, name)) for name in names}
+    return {
+        run.name: {name: values[number, : len(run.time)] for name, values in series.items()}
+        for number, run in enumerate(runs)
+    }
+
+
 def predict_compiled(
     system: System, batch: RunBatch, more_names: Sequence[str] = (), more: np.ndarray | None = None
 ) -> np.ndarray:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -21,15 +20,14 @@ from smajax.data.model_file.record import LikelyModel, ModelOutput, range_unit
 from smajax.data.model_file.runs_of_model import runs_of_model
 from smajax.data.open_experiment import open_experiment
 from smajax.fit.integration import IntegrationError, choose_integration, integration_error, with_integration
-from smajax.fit.packed_runs import pack, simulate_batch
-from smajax.fit.predicted import predicted_and_derivatives
+from smajax.fit.packed_runs import pack, simulate_batch, states_by_run
 from smajax.fit.prediction_band import BAND as BAND
-from smajax.fit.prediction_band import NORMAL, averaged_band
+from smajax.fit.prediction_band import NORMAL, averaged_band, reading_of
 from smajax.fit.problem import Problem
+from smajax.model.channels import SHOWN
 
 BEYOND = 0.02  # of a fitted range: by less a run does not leave it
 FEW = 0.005  # of the samples: a single one of a rate is a jump of an input
-STATES = ("temperature", "martensite_fraction", "stress")
 
 
 @dataclass(frozen=True)
@@ -119,16 +117,18 @@ def predict(  # keywords, which a caller names one by one
 def _prediction(model: ActuatorModel, experiment: Experiment) -> Prediction:
     experiment, notes = runs_of_model(model, experiment)
     known = {one.name: one for one in model.outputs}
-    likely = model.likely or (LikelyModel(model.effects, 1.0, {}),)
+    likely, weights = model.weighted
     noise, offset, missed = _of_outputs(model, experiment)
     problems = [_problem(model, one, experiment, noise, offset) for one in likely]
     integration = choose_integration(problems[0], problems[0].system)
     problems = [with_integration(one, integration) for one in problems]
-    predicted = [_predicted(*pair) for pair in zip(problems, likely, strict=True)]
-    weights = np.asarray([one.probability for one in likely])
+    predicted = [
+        reading_of(problem, problem.start_values(), one.names, one.deviations, one.correlation)
+        for problem, one in zip(problems, likely, strict=True)
+    ]
     readings, variances = (np.stack([getattr(one, name) for one in predicted]) for name in ("reading", "variance"))
-    mean, half = averaged_band(readings, variances, weights / weights.sum(), missed)
-    states = simulate_batch(problems[0].system, problems[0].batch)
+    mean, half = averaged_band(readings, variances, weights, missed)
+    states = states_by_run(simulate_batch(problems[0].system, problems[0].batch), experiment.runs, SHOWN)
     runs = []
     for number, run in enumerate(experiment.runs):
         n = len(run.time)
@@ -137,7 +137,7 @@ def _prediction(model: ActuatorModel, experiment: Experiment) -> Prediction:
             _series(output, run, (mean[row, :n], half[row, :n]), known.get(output.name), predicted[0].offset[row])
             for row, output in zip(rows, experiment.outputs, strict=True)
         )
-        own = {name: np.asarray(getattr(states, name))[number, :n] for name in STATES}
+        own = states[run.name]
         fitted = any(one.role == "fit" and one.sha256 == run.sha256 for one in model.runs)
         beyond = extrapolations(model, run, own)
         runs.append(PredictedRun(run.name, run.time, run.inputs, series, own, beyond, run.sha256, fitted))
@@ -182,39 +182,6 @@ def _problem(
     system = model.system_of(likely.effects, likely.values)
     batch = pack(experiment.runs, experiment.step, parameter_values(system))
     return Problem.build(system, batch, jnp.asarray(noise) if len(noise) > 1 else float(noise[0]), offset)
-
-
-class _Predicted(NamedTuple):
-    """By one likely model: reading with the run's offset, its variance by the parameters, (series, N), and the offset, (series,)."""
-
-    reading: np.ndarray
-    variance: np.ndarray
-    offset: np.ndarray
-
-
-def _predicted(problem: Problem, likely: LikelyModel) -> _Predicted:
-    values = problem.start_values()
-    deviation = np.sqrt(np.maximum(np.diag(likely.covariance), 0.0))
-    tangents = np.zeros((1, len(likely.names), len(values)))
-    for row, name in enumerate(likely.names):
-        tangents[0, row, problem.names.index(name)] = deviation[row]
-    predicted, derivatives = predicted_and_derivatives(problem, values[None], tangents)
-    mask = np.asarray(problem.batch.mask) > 0
-    has_offset = np.tile(problem.offset, problem.batch.runs)
-
-    def mean(series: np.ndarray) -> np.ndarray:
-        """Over the measured samples of each series that has an offset; else 0."""
-        total = np.where(mask, series, 0.0).sum(axis=-1) / np.maximum(mask.sum(axis=-1), 1)
-        return np.where(has_offset, total, 0.0)
-
-    offset = mean(problem.measured - predicted[0])
-    reading = predicted[0] + offset[:, None]
-    if not likely.names:
-        return _Predicted(reading, np.zeros_like(reading), offset)
-    columns = derivatives[0] - mean(derivatives[0])[..., None]
-    size = np.where(deviation > 0.0, deviation, 1.0)
-    correlation = likely.covariance / np.outer(size, size)
-    return _Predicted(reading, np.maximum(np.einsum("psn,pq,qsn->sn", columns, correlation, columns), 0.0), offset)
 
 
 def _series(

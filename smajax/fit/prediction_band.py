@@ -2,11 +2,53 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import NamedTuple
+
 import numpy as np
 from scipy import stats
 
+from smajax.fit.predicted import predicted_and_derivatives
+from smajax.fit.problem import Problem
+
 BAND = 0.9  # share of the measured samples that are expected in the band
 NORMAL = float(stats.norm.ppf(0.5 + 0.5 * BAND))  # standard deviations on either side that have that share
+
+
+class Reading(NamedTuple):
+    """By one model: its reading with each run's offset, its variance by the parameters, (series, N), and that offset, (series,)."""
+
+    reading: np.ndarray
+    variance: np.ndarray
+    offset: np.ndarray
+
+
+def reading_of(
+    problem: Problem, values: np.ndarray, names: Sequence[str], deviations: np.ndarray, covariance: np.ndarray
+) -> Reading:
+    r"""What a model predicts of every run at its `values` (P,), with the variance $J \Sigma J^T$ of that.
+
+    deviations (K,), covariance (K, K): sizes of the parameters `names`, SI, and their covariance over these sizes on either side.
+    """
+    tangents = np.zeros((1, len(names), len(values)))
+    for row, name in enumerate(names):
+        tangents[0, row, problem.names.index(name)] = deviations[row]
+    predicted, derivatives = predicted_and_derivatives(problem, values[None], tangents)
+    mask = np.asarray(problem.batch.mask) > 0
+    has_offset = np.tile(problem.offset, problem.batch.runs)
+
+    def mean(series: np.ndarray) -> np.ndarray:
+        """Over the measured samples of each series that has an offset; else 0."""
+        total = np.where(mask, series, 0.0).sum(axis=-1) / np.maximum(mask.sum(axis=-1), 1)
+        return np.where(has_offset, total, 0.0)
+
+    offset = mean(problem.measured - predicted[0])
+    reading = predicted[0] + offset[:, None]
+    if not names:
+        return Reading(reading, np.zeros_like(reading), offset)
+    columns = derivatives[0] - mean(derivatives[0])[..., None]
+    variance = np.einsum("psn,pq,qsn->sn", columns, covariance, columns)
+    return Reading(reading, np.maximum(variance, 0.0), offset)
 
 
 def averaged_band(

@@ -1,4 +1,4 @@
-"""Input channels that a load or a drive may have, and the unit of each (SI, temperatures in degrees Celsius)."""
+"""Input channels that a load or a drive may have, with the unit of each (SI, temperatures in degrees Celsius), and states by name."""
 
 from __future__ import annotations
 
@@ -21,6 +21,12 @@ INPUT_UNITS: Mapping[str, str] = MappingProxyType(
         "ambient_temperature": "degC",
     }
 )
+
+# Parameter -> the channel whose series stands in its place where a log has it.
+REPLACED: Mapping[str, str] = MappingProxyType({"load_mass": "mass", "ambient_temperature": "ambient_temperature"})
+# States of the wire that say how far a model was tested.
+RANGED = ("temperature", "stress")
+SHOWN = ("temperature", "martensite_fraction", "stress")  # of each run, beside its outputs
 
 # The record keeps input channels and model states by name only.
 _CHANNELS = {**INPUT_UNITS, "martensite_fraction": "1"}

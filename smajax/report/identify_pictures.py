@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -15,13 +17,18 @@ from smajax.report.pictures import (
     AFTER,
     NOISE,
     QUIET,
-    THICK,
     as_png,
-    extremes,
+    draw_band,
+    draw_predicted,
+    draw_residual,
     new_figure,
     panels_done,
     run_panels,
     tidy,
+)
+
+WHOLE: Mapping[str, Any] = MappingProxyType(
+    {"color": NOISE, "zorder": 0, "linewidth": None, "label": "95 %: noise and parameters"}
 )
 
 
@@ -31,15 +38,11 @@ def run_with_band(result: Identified, run: IdentifiedRun, k: int = 0) -> bytes:
     shown = display(sensor.unit, sensor.name)
     figure, rows = run_panels(run.time, run.inputs, sensor.name, shown)
     output, residual = rows[:2]
-    # A sample whose neighbours are missing is on no line.
-    dots: dict[str, Any] = {"marker": ".", "markersize": 3.0} if np.isnan(one.measured).any() else {}
-    output.plot(*extremes(run.time, shown.of(one.measured)), **THICK, **dots, label="measured")
-    output.plot(*extremes(run.time, shown.of(one.simulated)), color=AFTER, linewidth=1.2, label="simulated")
+    measured, simulated = shown.of(one.measured), shown.of(one.simulated)
+    draw_predicted(output, run.time, measured, simulated, "simulated")
     both = 1.96 * np.hypot(one.spread, sensor.noise_sigma)
-    residual.fill_between(
-        run.time, shown.of(-both), shown.of(both), color=NOISE, zorder=0, label="95 %: noise and parameters"
-    )
-    residual.plot(*extremes(run.time, shown.of(one.measured - one.simulated)), color=AFTER, linewidth=0.9, **dots)
+    draw_band(residual, run.time, 0.0, shown.of(both), WHOLE)
+    draw_residual(residual, run.time, measured, simulated)
     return panels_done(figure, rows, 3)
 
 

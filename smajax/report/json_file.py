@@ -167,7 +167,7 @@ def findings_to_json(findings: Findings, narrative: Narrative | None = None) -> 
         "source": findings.source,
         "verdict": findings.verdict,
         "remaining": findings.remaining,
-        "effects_excluded": findings.left_out,
+        "effects_excluded": findings.effects_excluded,
         "summary": words.summary,
         "output": {
             "name": findings.output_name,

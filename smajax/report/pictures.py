@@ -7,19 +7,21 @@ plots on its own is not disturbed.
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from smajax.attribution.findings import AveragedRun, EffectFinding, Findings, ResidualDiagnostics, RunFinding
+from smajax.attribution.findings import EffectFinding, Findings, ResidualDiagnostics, RunFinding
 from smajax.core.display_units import Display, axis_label, display, label
 from smajax.model.channels import channel
 
 MEASURED, BEFORE, AFTER, NOISE, QUIET = "#1d1d1f", "#c8553d", "#1f6fb2", "#d9dce1", "#9aa0a8"
 THICK: dict[str, Any] = {"color": MEASURED, "linewidth": 2.2, "alpha": 0.55}  # the measured curve, under the models
+BAND_STYLE: Mapping[str, Any] = MappingProxyType({"color": AFTER, "alpha": 0.22, "label": "90 % band"})
 WIDTH = 6.6  # inches; with the text size below still readable on a telephone
 NARROW = 5.2  # for pictures of one simple panel
 DPI = 150
@@ -67,6 +69,38 @@ def extremes(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarr
     picked = np.sort(np.stack([rows + lowest, rows + highest]), axis=0).T.ravel()
     picked = np.append(picked, np.arange(whole, len(time)))
     return time[picked], values[picked]
+
+
+def literal(text: str) -> str:
+    """Text as it stands: a dollar sign would begin a formula."""
+    return text.replace("$", r"\$")
+
+
+def dots_of(measured: np.ndarray) -> dict[str, Any]:
+    """The style of a measured curve that lacks samples: one whose neighbours are missing is on no line."""
+    return {"marker": ".", "markersize": 3.0} if np.isnan(measured).any() else {}
+
+
+def draw_predicted(
+    axes: Axes, time: np.ndarray, measured: np.ndarray, predicted: np.ndarray, name: str = "predicted"
+) -> None:
+    """The measured curve and a model's, in the unit shown; `name` is that of the model's."""
+    axes.plot(*extremes(time, measured), **THICK, **dots_of(measured), label="measured")
+    axes.plot(*extremes(time, predicted), color=AFTER, linewidth=1.2, label=name)
+
+
+def draw_residual(axes: Axes, time: np.ndarray, measured: np.ndarray, predicted: np.ndarray) -> None:
+    """What is left of the measured curve, in the unit shown."""
+    axes.plot(*extremes(time, measured - predicted), color=AFTER, linewidth=0.9, **dots_of(measured))
+
+
+def draw_band(
+    axes: Axes, time: np.ndarray, middle: np.ndarray | float, half: np.ndarray, style: Mapping[str, Any] = BAND_STYLE
+) -> None:
+    """A band of some half width about a curve, in the unit shown."""
+    thin = _thinned(len(time))
+    low, high = np.broadcast_arrays(middle - half, middle + half)
+    axes.fill_between(time[thin], low[thin], high[thin], **{"linewidth": 0.0, **style})
 
 
 def nothing_added(findings: Findings) -> bool:
@@ -124,17 +158,10 @@ def run_over_time(findings: Findings, run: RunFinding) -> bytes:
         output.plot(*extremes(run.time, shown.of(values)), color=colour, linewidth=1.2, label=name)
         residual.plot(*extremes(run.time, shown.of(run.measured - values)), color=colour, linewidth=0.9)
     if run.role == "held-out" and run.average is not None:
-        _draw_band(output, run.time, run.average, shown)
+        draw_band(output, run.time, shown.of(run.average.reading), shown.of(run.average.half_width))
     band = 2.0 * shown.of(findings.noise_sigma)
     residual.axhspan(-band, band, color=NOISE, zorder=0, label="noise, ± 2 σ")
     return panels_done(figure, rows, 5)
-
-
-def _draw_band(axes: Axes, time: np.ndarray, average: AveragedRun, shown: Display) -> None:
-    thin = _thinned(len(time))
-    low, high = average.reading - average.half_width, average.reading + average.half_width
-    style: dict[str, Any] = {"color": AFTER, "alpha": 0.22, "linewidth": 0.0, "label": "90 % band"}
-    axes.fill_between(time[thin], shown.of(low[thin]), shown.of(high[thin]), **style)
 
 
 def run_hysteresis(findings: Findings, run: RunFinding) -> bytes | None:
@@ -180,7 +207,7 @@ def errors_by_run(findings: Findings) -> bytes:
         for value, colour, shift in bars:
             axes.barh(row + shift, shown.of(value), 0.36, color=colour, hatch=hatch, edgecolor="white", linewidth=0.0)
     names = [f"{_short(run.name)}\n(held out)" if run.role == "held-out" else _short(run.name) for run in runs]
-    axes.set_yticks(places, [_literal(name) for name in names])
+    axes.set_yticks(places, [literal(name) for name in names])
     for name, colour in [("base model", AFTER)] if single else [("before", BEFORE), ("after", AFTER)]:
         axes.barh(0.0, np.nan, color=colour, label=name)
     axes.axvline(shown.of(findings.noise_sigma), color=MEASURED, linestyle="--", linewidth=1.0, label="noise")
@@ -203,10 +230,9 @@ def held_out_bands(findings: Findings) -> bytes | None:
     for axes, run in zip(figure.subplots(len(runs), 1, squeeze=False)[:, 0], runs, strict=True):
         average = run.average
         assert average is not None
-        axes.plot(*extremes(run.time, shown.of(run.measured)), **THICK, label="measured")
-        axes.plot(*extremes(run.time, shown.of(average.reading)), color=AFTER, linewidth=1.2, label="predicted")
-        _draw_band(axes, run.time, average, shown)
-        axes.set_title(f"{_literal(_short(run.name))} (held out)", fontsize=9, loc="left")
+        draw_predicted(axes, run.time, shown.of(run.measured), shown.of(average.reading))
+        draw_band(axes, run.time, shown.of(average.reading), shown.of(average.half_width))
+        axes.set_title(f"{literal(_short(run.name))} (held out)", fontsize=9, loc="left")
         axes.set_ylabel(axis_label(findings.output_name, shown), fontsize=9)
         axes.margins(x=0.01)
         tidy(axes)
@@ -217,11 +243,6 @@ def held_out_bands(findings: Findings) -> bytes | None:
 
 def _short(name: str, width: int = 26) -> str:
     return name if len(name) <= width else name[: width - 1] + "…"
-
-
-def _literal(text: str) -> str:
-    """Text as it stands: a dollar sign would begin a formula."""
-    return text.replace("$", r"\$")
 
 
 def effect_probabilities(findings: Findings) -> bytes | None:
@@ -290,7 +311,7 @@ def residual_by_phase(findings: Findings) -> bytes | None:
             share.plot(100.0 * samples / whole, places + shift, "|", color=MEASURED, markersize=11)
     share.plot([], [], "|", color=MEASURED, markersize=11, label="share of the samples")
     error.axvline(shown.of(findings.noise_sigma), color=MEASURED, linestyle="--", linewidth=1.0, label="noise")
-    share.set_yticks(places, [_literal(phase) for phase in phases])
+    share.set_yticks(places, [literal(phase) for phase in phases])
     share.set_xlabel("share of the squared error (%)", fontsize=9)
     error.set_xlabel(f"rms error ({shown.unit})" if shown.unit else "rms error", fontsize=9)
     figure.legend(loc="outside upper center", ncols=4, frameon=False, fontsize=9)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import html
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
-import numpy as np
 from matplotlib.axes import Axes
 
 from smajax.attribution.findings import ResidualDiagnostics
@@ -18,13 +19,23 @@ from smajax.report.csv_files import RUNS, predicted_runs
 from smajax.report.drawing import UPRIGHT
 from smajax.report.html import picture
 from smajax.report.integration_words import integration_sentence
-from smajax.report.pictures import AFTER, THICK, as_png, extremes, new_figure, panels_done, run_panels, tidy
+from smajax.report.pictures import (
+    as_png,
+    draw_band,
+    draw_predicted,
+    draw_residual,
+    literal,
+    new_figure,
+    panels_done,
+    run_panels,
+    tidy,
+)
 from smajax.report.plain_page import bullets, table, whole
 from smajax.report.predict_words import HEAD, conclusions, diagnostics, pooled, run_rows
 
 FILES = ("predict.html", "predict.json", RUNS)
 SHOWN = 6  # runs in the first picture
-BAND_COLOUR = "#9fc5b8"
+BAND_STYLE: Mapping[str, Any] = MappingProxyType({"color": "#9fc5b8", "alpha": 0.6, "label": "90 % band"})
 
 
 def _tint(run: PredictedRun, *several: Axes) -> None:
@@ -40,16 +51,11 @@ def run_picture(run: PredictedRun, k: int = 0) -> bytes:
     shown = display(one.unit, one.output)
     figure, rows = run_panels(run.time, run.inputs, one.output, shown)
     output, residual = rows[:2]
-    dots: dict[str, Any] = {"marker": ".", "markersize": 3.0} if np.isnan(one.measured).any() else {}
-    output.plot(*extremes(run.time, shown.of(one.measured)), **THICK, **dots, label="measured")
-    output.plot(*extremes(run.time, shown.of(one.reading)), color=AFTER, linewidth=1.2, label="predicted")
-    half = shown.of(one.half_width)
-    middle = shown.of(one.reading)
-    output.fill_between(
-        run.time, middle - half, middle + half, color=BAND_COLOUR, alpha=0.45, linewidth=0, label="90 % band"
-    )
-    residual.fill_between(run.time, -half, half, color=BAND_COLOUR, alpha=0.45, linewidth=0)
-    residual.plot(*extremes(run.time, shown.of(one.measured - one.reading)), color=AFTER, linewidth=0.9, **dots)
+    measured, middle, half = shown.of(one.measured), shown.of(one.reading), shown.of(one.half_width)
+    draw_predicted(output, run.time, measured, middle)
+    draw_band(output, run.time, middle, half, {**BAND_STYLE, "alpha": 0.45})
+    draw_band(residual, run.time, 0.0, half, {"color": BAND_STYLE["color"], "alpha": 0.45})
+    draw_residual(residual, run.time, measured, middle)
     _tint(run, output, residual)
     return panels_done(figure, rows, 3)
 
@@ -65,15 +71,10 @@ def overview(result: Prediction, upright: bool = False) -> bytes:
     for axes, run in zip(panels, runs, strict=False):
         one = run.series[0]
         middle, half = shown.of(one.reading), shown.of(one.half_width)
-        axes.plot(*extremes(run.time, shown.of(one.measured)), **THICK, label="measured")
-        axes.plot(*extremes(run.time, middle), color=AFTER, linewidth=1.2, label="predicted")
-        axes.fill_between(
-            run.time, middle - half, middle + half, color=BAND_COLOUR, alpha=0.6, linewidth=0, label="90 % band"
-        )
+        draw_predicted(axes, run.time, shown.of(one.measured), middle)
+        draw_band(axes, run.time, middle, half, BAND_STYLE)
         _tint(run, axes)
-        axes.set_title(
-            run.name.replace("$", r"\$") + " (extrapolation)" * bool(run.extrapolation), fontsize=9, loc="left"
-        )
+        axes.set_title(literal(run.name) + " (extrapolation)" * bool(run.extrapolation), fontsize=9, loc="left")
         axes.set_ylabel(axis_label(one.output, shown), fontsize=9)
         axes.margins(x=0.01)
         tidy(axes)

@@ -341,7 +341,7 @@ def test_an_equation_is_named_only_if_no_other_explains_as_much() -> None:
 
 def test_effects_that_the_file_keeps_from_being_candidates_are_counted() -> None:
 
-    findings = dataclasses.replace(made_findings(), left_out=48)
+    findings = dataclasses.replace(made_findings(), effects_excluded=48)
     (said,) = [one for one in narrate(findings).summary if "were not tried" in one]
     assert said.startswith(f"{len(findings.effects)} effects of the library were candidates; 48 more")
     assert not any("were not tried" in one for one in narrate(made_findings()).summary)

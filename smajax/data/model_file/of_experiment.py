@@ -15,10 +15,9 @@ from smajax.data.model_file.record import (
     ModelOutput,
     ModelParameter,
 )
+from smajax.model.channels import REPLACED
 from smajax.model.extended import extended
 from smajax.model.presets import build
-
-LOGGED = {"load_mass": "mass", "ambient_temperature": "ambient_temperature"}  # parameter -> the input that replaces it
 
 
 def actuator_model(
@@ -98,7 +97,7 @@ def _logged(experiment: Experiment, name: str) -> float | None:
 
     Runs have their own, but a closed loop or a simulation without them is of this bench all the same.
     """
-    channel = LOGGED.get(name, "")
+    channel = REPLACED.get(name, "")
     fit = [run for run in experiment.runs if run.role == "fit"]
     series = [run.inputs[channel] for run in fit if channel in run.inputs]
     series += [

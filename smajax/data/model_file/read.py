@@ -32,6 +32,7 @@ from smajax.model.channels import INPUT_UNITS
 from smajax.model.extended import extended
 from smajax.model.presets import build
 from smajax.model.system import System
+from smajax.model.wire.order import disorder
 from smajax.simulation.sensors import sensors_of
 
 CLOSE = 1e-9  # of a value: nearer than that it is the fitted one
@@ -57,11 +58,6 @@ def load_model(path: str | Path) -> ActuatorModel:
     if file.uncertainty is None:
         return model
     return _with_uncertainty(path, file, model)
-
-
-def parameter_text(value: float, unit: str) -> Quantity:
-    """A value as a file has it, every digit."""
-    return float(value) if unit == "-" else f"{float(value)!r} {unit}"
 
 
 def _check_kind(path: Path, content: Mapping[str, Any]) -> None:
@@ -120,9 +116,9 @@ def _model(path: Path, file: ModelFile) -> ActuatorModel:
         log_format=file.log_format,
         made_with={name: text for name, text in file.made_with.items() if name != "smajax"},
     )
-    disorder = CATALOGUE.describe(part.wire, part.load, part.drive, part.law).disorder(model.values)
-    if disorder is not None:
-        raise ExperimentError(path, f"parameters.{disorder[0]}", disorder[2])
+    contradiction = disorder(model.system)
+    if contradiction is not None:
+        raise ExperimentError(path, f"parameters.{contradiction[0]}", contradiction[2])
     return model
 
 

@@ -7,16 +7,14 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from smajax.core.wording import and_listed
 from smajax.data.experiment.draft import draft
 from smajax.data.experiment.draft_model import ModelChoice
 from smajax.data.experiment.errors import ExperimentError
 from smajax.data.experiment.load import experiment_of
 from smajax.data.experiment.record import Experiment
 from smajax.data.experiment.schema import DataSection, ExperimentFile, LogFormat, ModelSection, RunSection
-from smajax.data.experiment.toml_file import Quantity, validated
+from smajax.data.experiment.toml_file import Quantity, quantity, validated
 from smajax.data.model_catalogue import CATALOGUE
-from smajax.data.model_file.read import parameter_text
 from smajax.data.model_file.record import ModelRecord
 from smajax.data.readers.table import MeasuredDataError
 
@@ -50,17 +48,22 @@ def read_logs(
             missed = error
     try:
         file, messages = _guessed(model, paths, folder, decimal)
-        _check_channels(model, file, constants, paths[0])
-        runs = [run.model_copy(update={"inputs": constants, "parameters": own, "role": "fit"}) for run in file.runs]
-        return _experiment(model, file.log_format, folder, runs, decimal), messages
+        lacking = _lacking(model, file, constants)
+        if not lacking:
+            runs = [run.model_copy(update={"inputs": constants, "parameters": own, "role": "fit"}) for run in file.runs]
+            return _experiment(model, file.log_format, folder, runs, decimal), messages
     except (ExperimentError, MeasuredDataError) as error:
-        if isinstance(error, ExperimentError) and "no column for the input" in str(error):
-            raise
         if missed is not None:
             raise missed from None
         raise ExperimentError(
             paths[0], "", f"{error}; or give an experiment file, which says what its columns are"
         ) from None
+    raise ExperimentError(
+        paths[0],
+        "",
+        f"no column for the input {lacking!r}, which the runs that the model was fitted to have; rename the column, or give a constant "
+        f"with --input {lacking}=...",
+    )
 
 
 def _runs(
@@ -93,19 +96,11 @@ def _guessed(
     return file, tuple(columns)
 
 
-def _check_channels(model: ModelRecord, file: ExperimentFile, constants: Mapping[str, Quantity], path: Path) -> None:
-    """ExperimentError where the model's own logs have an input that none of these columns is."""
-    if model.log_format is None:
-        return
-    inputs = [name for name, one in model.log_format.channels.items() if one.role == "input"]
-    for name in inputs:
-        if name not in file.channels and name not in constants:
-            raise ExperimentError(
-                path,
-                "",
-                f"no column for the input {name!r}, which the runs that the model was fitted to have; rename the column, or give a "
-                f"constant with --input {name}=...",
-            )
+def _lacking(model: ModelRecord, file: ExperimentFile, constants: Mapping[str, Quantity]) -> str:
+    """The first input of the model's own logs that none of these columns is; "" where they have all."""
+    channels = {} if model.log_format is None else model.log_format.channels
+    inputs = [name for name, one in channels.items() if one.role == "input"]
+    return next((name for name in inputs if name not in file.channels and name not in constants), "")
 
 
 def _experiment(
@@ -115,7 +110,7 @@ def _experiment(
     constant = {name for run in runs for name in run.inputs}
     channels = {name: one for name, one in log_format.channels.items() if name not in constant}
     table = model.table
-    values = {name: parameter_text(one.value, table[name].unit) for name, one in model.parameters.items()}
+    values = {name: quantity(one.value, table[name].unit) for name, one in model.parameters.items()}
     file = ExperimentFile(
         title=model.title,
         model=ModelSection(wire=model.wire, load=model.load, drive=model.drive, law=model.law, parameters=values),
@@ -127,15 +122,3 @@ def _experiment(
     )
     # The folder of the logs stands for that of an experiment file.
     return experiment_of(folder / "model.toml", file, CATALOGUE)
-
-
-def channels_read(experiment: Experiment) -> str:
-    """ "voltage from 'U_V' (V), position from 'pos_mm' (mm)", for a reader."""
-    if experiment.log_format is None:
-        return ""
-    named = [
-        f"{name} from {one.column if one.column is not None else one.variable!r} ({one.unit})"
-        for name, one in experiment.log_format.channels.items()
-        if one.column is not None or one.variable is not None
-    ]
-    return and_listed(named)

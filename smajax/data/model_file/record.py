@@ -65,6 +65,17 @@ class LikelyModel:
     covariance: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     priors: Mapping[str, Prior] = field(default_factory=dict)
 
+    @cached_property
+    def deviations(self) -> np.ndarray:
+        """Standard deviation of each of `names` by the covariance, (K,), SI; 0 where that has none."""
+        return np.asarray(np.sqrt(np.maximum(np.diag(self.covariance), 0.0)))
+
+    @cached_property
+    def correlation(self) -> np.ndarray:
+        """The covariance over these deviations on either side, (K, K)."""
+        size = np.where(self.deviations > 0.0, self.deviations, 1.0)
+        return np.asarray(self.covariance / np.outer(size, size))
+
 
 @dataclass(frozen=True)
 class ModelOutput:
@@ -143,6 +154,13 @@ class ModelRecord:
         return set_parameters(model, {name: value for name, value in known.items() if name in table})
 
     @property
+    def weighted(self) -> tuple[tuple[LikelyModel, ...], np.ndarray]:
+        """(the M likely models, their weights (M,), which sum to one); where nothing was fitted the model itself."""
+        likely = self.likely or (LikelyModel(self.effects, 1.0, {}),)
+        probabilities = np.asarray([one.probability for one in likely])
+        return likely, probabilities / probabilities.sum()
+
+    @property
     def every_effect(self) -> tuple[str, ...]:
         """Effects of any of the likely models."""
         return tuple(
@@ -161,9 +179,8 @@ class ModelRecord:
         likely models, at base value where theirs has none. Where nothing was fitted all are the model itself.
         """
         random = np.random.default_rng(seed)
-        likely = self.likely or (LikelyModel(self.effects, 1.0, {}),)
-        weights = np.asarray([one.probability for one in likely])
-        chosen = random.choice(len(likely), size=count, p=weights / weights.sum())
+        likely, weights = self.weighted
+        chosen = random.choice(len(likely), size=count, p=weights)
         base = self.system_of((), {}, self.every_effect)
         columns = {name: np.full(count, value) for name, value in parameter_values(base).items()}
         for number, model in enumerate(likely):
@@ -182,15 +199,13 @@ class ModelRecord:
         if not model.names or not count:
             return {}
         mean = np.asarray([model.values[name] for name in model.names])
-        size = np.sqrt(np.maximum(np.diag(model.covariance), 0.0))
-        size = np.where(size > 0.0, size, 1.0)
-        eigenvalues, vectors = np.linalg.eigh(model.covariance / np.outer(size, size))
+        eigenvalues, vectors = np.linalg.eigh(model.correlation)
         root = (vectors * np.sqrt(np.maximum(eigenvalues, 0.0))).T
         low, high = np.asarray([self._bounds[name] for name in model.names]).T
         found = np.empty((0, len(mean)))
         values = mean[None]
         for _ in range(ROUNDS):
-            values = mean + size * (random.standard_normal((2 * count, len(mean))) @ root)
+            values = mean + model.deviations * (random.standard_normal((2 * count, len(mean))) @ root)
             inside = np.all((values >= low) & (values <= high), axis=1) & self._ordered(model, values)
             found = np.concatenate([found, values[inside]])
             if len(found) >= count:

@@ -204,12 +204,12 @@ def of_the_test(findings: Findings) -> Iterator[str]:
         )
 
 
-def of_effects_left_out(findings: Findings) -> list[str]:
+def of_effects_excluded(findings: Findings) -> list[str]:
     """That the experiment file keeps effects from being candidates: none of these can be named."""
-    if not findings.left_out:
+    if not findings.effects_excluded:
         return []
     tried = len(findings.effects)
     return [
-        f"{tried} effect{'s' if tried != 1 else ''} of the library {'were candidates' if tried != 1 else 'was a candidate'}; {findings.left_out} more "
+        f"{tried} effect{'s' if tried != 1 else ''} of the library {'were candidates' if tried != 1 else 'was a candidate'}; {findings.effects_excluded} more "
         "that this model can show were not tried, because [effects] of the experiment file leaves them out."
     ]
