@@ -36,6 +36,18 @@ _SHOWN = {
     "1": Display("", 1.0),
     "": Display("", 1.0),
 }
+# Of a file: the unit, how many of it make one of the program's own, and the size of a value in that from which and below which it is used.
+_WRITTEN = {
+    "m": (("mm", 1e3, 0.0, 0.1),),
+    "m/s": (("mm/s", 1e3, 0.0, 0.1),),
+    "m/N": (("mm/N", 1e3, 0.0, 0.1),),
+    "rad": (("deg", math.degrees(1.0), 0.0, math.inf),),
+    "Pa": (("MPa", 1e-6, 1e4, 1e9), ("GPa", 1e-9, 1e9, math.inf)),
+    "Pa/K": (("MPa/K", 1e-6, 1e4, math.inf),),
+    "ohm m": (("µΩ m", 1e6, 0.0, 1e-3),),
+    "J/kg": (("J/g", 1e-3, 1e3, math.inf),),
+    "kg": (("g", 1e3, 0.0, 0.1),),
+}
 LARGE = 1e6  # from here on numbers are written with a power of ten
 _PERCENT = Display("%", 100.0)
 
@@ -49,6 +61,16 @@ def display(unit: str, quantity: str = "") -> Display:
     if unit in ("-", "1", "") and quantity.split("[")[0].endswith("strain"):
         return _PERCENT
     return _SHOWN.get(unit) or Display(unit.replace("^2", "²").replace("^3", "³").replace("^4", "⁴"), 1.0)
+
+
+def written(unit: str, value: float) -> Display:
+    """The unit in which an engineer would write a `value` given in `unit`: 75 GPa, and 0.31 mm beside 0.5 m."""
+    fitting = (
+        Display(name, factor)
+        for name, factor, low, high in _WRITTEN.get(unit, ())
+        if low <= abs(value) < high and value
+    )
+    return next(fitting, Display(unit, 1.0))
 
 
 def digits(value: float | None, count: int = 4, zeros: bool = False) -> str:

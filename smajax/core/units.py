@@ -192,11 +192,13 @@ def parse_quantity(
                 else f"a number and a unit like '1.5 {_plain(_unit(expected))}'"
             )
             raise UnitError(f"got {value!r}, expected {like}")
-        number, unit = float(match.group(1)), match.group(2)
+        digits, unit = match.groups()
+        number = float(digits)
         if re.match(r",\d", unit):
             raise UnitError(f"got {value!r}, expected a decimal point; write {value.replace(',', '.', 1)!r}")
     else:
         number, unit = float(value), ""
+        digits = repr(number)
     if not math.isfinite(number):
         raise UnitError(f"got {value!r}, expected a finite number in {expected!r}")
     if unit in _DIMENSIONLESS and bare:
@@ -204,7 +206,22 @@ def parse_quantity(
     if unit in _DIMENSIONLESS and expected not in _DIMENSIONLESS:
         like = offered or expected
         raise UnitError(f"got {value!r} without a unit, expected one like {like!r}; write '{number:g} {like}'")
-    return float(convert(number, unit, expected, difference))
+    shift = _shift(unit, expected, difference)
+    if shift is None or len(digits) > LONGEST:
+        return float(convert(number, unit, expected, difference))
+    # As if it were written in the unit expected: 0.31 mm is 0.00031 m, and not a bit beside it.
+    mantissa, _, exponent = digits.lower().partition("e")
+    return float(f"{mantissa}e{int(exponent or 0) + shift}")
+
+
+@lru_cache(maxsize=512)
+def _shift(unit: str, expected: str, difference: bool) -> int | None:
+    """By how many places the decimal point moves from `unit` to `expected`; None where the conversion is no power of ten."""
+    zero, one = (float(convert(number, unit, expected, difference)) for number in (0.0, 1.0))
+    if zero != 0.0:
+        return None
+    power = round(math.log10(one)) if one > 0.0 else 0
+    return power if math.isclose(one, 10.0**power, rel_tol=1e-12) else None
 
 
 def to_si(value: str | float, unit: str) -> float:

@@ -102,3 +102,13 @@ def test_arrays_keep_their_shape() -> None:
 def test_a_decimal_comma_in_a_quantity_is_named(text: str) -> None:
     with pytest.raises(UnitError, match=f"expected a decimal point; write '{re.escape(text.replace(',', '.'))}'"):
         parse_quantity(text, "mm")
+
+
+def test_a_prefix_moves_the_point_and_changes_no_bit() -> None:
+    """A fifth of these are another float where the number is multiplied by the prefix, 0.84e-6 among them."""
+    for unit, expected, power in (("mm", "m", -3), ("µΩ m", "ohm m", -6), ("MPa/K", "Pa/K", 6), ("%", "1", -2)):
+        for number in ("0.84", "-6.894757", "1.7E-3", *(f"{k / 100:g}" for k in range(1, 100))):
+            value = float(f"{float(number):.9f}e{power}")
+            assert parse_quantity(f"{number} {unit}", expected) == value
+            assert parse_quantity(f"{number} {unit}", expected, difference=True) == value
+    assert parse_quantity("0." + "0" * 80 + "1e81 mm", "m") == pytest.approx(0.001)

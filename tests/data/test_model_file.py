@@ -101,6 +101,36 @@ def test_what_is_written_is_read_again_to_the_last_bit(tmp_path: Path) -> None:
     same(again, load_model(tmp_path))  # the folder of a model.toml
 
 
+def test_values_are_in_units_of_a_data_sheet_and_read_again_to_the_last_bit(tmp_path: Path) -> None:
+    model = fitted_model()
+    odd = dict(model.parameters)
+    for name, value in {
+        "young_modulus_martensite": 28.3e9,
+        "young_modulus_austenite": 75e9 / 1.0000001,  # sixteen digits in either unit
+        "resistivity_austenite": 8.4e-7,
+        "load_mass": 0.075,
+        "wire_length": 0.537,
+    }.items():
+        odd[name] = dataclasses.replace(odd[name], value=value, origin="given")
+    model = dataclasses.replace(model, parameters=odd)
+    path = model.save(tmp_path / "model.toml")
+    text = path.read_text(encoding="utf-8")
+    for line in (
+        'young_modulus_martensite = "28.3 GPa"',
+        'resistivity_austenite = "0.84 µΩ m"',
+        'load_mass = "75 g"',
+        'wire_length = "0.537 m"',
+        'wire_diameter = "0.31 mm"',
+        'stress = ["76 MPa", "143 MPa"]',
+        'noise = "0.1 mm"',
+        'temperature = ["23 degC", "117.358 degC"]',
+    ):
+        assert f"\n{line}" in text, line
+    same(model, load_model(path))
+    (enthalpy,) = [one for one in text.splitlines() if one.startswith('"latent_heat.enthalpy"')]
+    assert enthalpy.count(" J/g") == 4, enthalpy  # its error and bounds too
+
+
 def test_presets_are_such_a_file_and_build_the_same_system(tmp_path: Path) -> None:
     path = model_of_presets("niti_table_3_1", "arm", "amplified_voltage").save(tmp_path / "arm.toml")
     model = load_model(path)

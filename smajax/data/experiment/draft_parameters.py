@@ -9,7 +9,7 @@ from smajax.core.parameters import parameter_values, parameters
 from smajax.data.experiment.bench_facts import Known
 from smajax.data.experiment.draft_model import DraftModel
 from smajax.data.experiment.model_description import WIRE_SIZES
-from smajax.data.experiment.toml_file import toml_key, toml_value
+from smajax.data.experiment.toml_file import quantity, toml_key, toml_value
 from smajax.data.model_file.actuator_model import ActuatorModel
 from smajax.model.presets import build
 from smajax.model.system import System
@@ -53,8 +53,10 @@ def ordered(text: str, presets: Sequence[PresetLine], remarks: Mapping[str, str]
     return text.replace("\n".join([HEAD, *before]), "\n".join([HEAD, *first, *rest]), 1)
 
 
-def _amount(value: float, unit: str, places: int) -> str:
-    return f"{value:.{places}g} {unit.replace('-', '')}".strip()
+def _amount(value: float, unit: str, places: int, like: float | None = None) -> str:
+    rounded = float(f"{value:.{places}g}")
+    text = quantity(rounded, unit, like)
+    return text if isinstance(text, str) else f"{rounded:.{places}g}"
 
 
 def _given(known: Known) -> list[str]:
@@ -91,7 +93,7 @@ def _unknowns(model: DraftModel, system: System, known: Known) -> dict[str, str]
             continue
         value = values[name]
         box = (max(low * value, table[name].low), min(high * value, table[name].high), value)
-        shown = [_amount(one, table[name].unit, 3) for one in box]
+        shown = [_amount(one, table[name].unit, 3, value) for one in box]
         lines[name] = f'{name} = {{ low = "{shown[0]}", high = "{shown[1]}", start = "{shown[2]}" }}'
     for name, width in KELVINS.items():
         value = values[name]
@@ -150,7 +152,7 @@ def kept_parameters(model: DraftModel, kept: ActuatorModel, known: Known) -> Par
     for name, one in fitted.items():
         unit = kept.table[name].unit
         shown = {"low": one.low, "high": one.high, "start": one.value}
-        box = ", ".join(f"{key} = {toml_value(_amount(value, unit, 10))}" for key, value in shown.items())
+        box = ", ".join(f"{key} = {toml_value(_amount(value, unit, 10, one.value))}" for key, value in shown.items())
         lines.append(f"{toml_key(name)} = {{ {box} }}")
     offset = any(one.offset for one in kept.outputs) or not kept.outputs
     return ParameterSections([*lines, "", "[nuisance]", f"offset = {toml_value(offset)}", ""], known.messages)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -10,7 +11,9 @@ from typing import Any, TypeAlias, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from smajax.core.display_units import written
 from smajax.core.names import close_matches, listed, nearest
+from smajax.core.units import parse_quantity
 from smajax.data.experiment.errors import ExperimentError
 
 Quantity = str | float
@@ -33,9 +36,27 @@ def toml_value(value: str | bool | float | Sequence[str | float]) -> str:
     return repr(value) if isinstance(value, int | float) else f"[{', '.join(map(toml_value, value))}]"
 
 
-def quantity(value: float, unit: str) -> Quantity:
-    """A value as a file has it, every digit: a number with its unit, or a plain number."""
-    return float(value) if unit in ("-", "1", "") else f"{float(value)!r} {unit}"
+def quantity(value: float, unit: str, like: float | None = None) -> Quantity:
+    """A value given in `unit`, one of the program's own, as a file has it: a plain number, or text that is read back as the same float.
+
+    It is in the unit that an engineer would write (that of the value `like`, if given), where that takes no more digits: `75 GPa`.
+    """
+    number = float(value)
+    if unit in ("-", "1", ""):
+        return number
+    own, shown = repr(number), written(unit, number if like is None else like)
+    if shown.unit != unit and math.isfinite(number):
+        for places in (15, 16, 17):
+            text = f"{shown.of(number):.{places}g}"
+            if _places(text) <= _places(own) and parse_quantity(f"{text} {shown.unit}", unit) == number:
+                return f"{text} {shown.unit}"
+    return f"{own.removesuffix('.0')} {unit}"
+
+
+def _places(number: str) -> int:
+    """Significant digits of a number as text."""
+    mantissa = number.lstrip("+-").split("e")[0]
+    return len(mantissa.replace(".", "").strip("0"))
 
 
 class Section(BaseModel):

@@ -77,7 +77,7 @@ def model_text(model: ModelRecord, uncertainty: str = "", sha256: str = "") -> s
         lines += ["", "[fitted_range]  # of the runs that it was fitted to: beyond it is extrapolation"]
         for name, ends in model.fitted_range.items():
             unit = range_unit(name, model.table)
-            lines.append(f"{toml_key(name)} = {toml_value([quantity(end, unit) for end in ends])}")
+            lines.append(f"{toml_key(name)} = {toml_value([quantity(end, unit, max(ends, key=abs)) for end in ends])}")
     if model.log_format is not None:
         lines += _log_format(model.log_format)
     for run in model.runs:
@@ -93,11 +93,12 @@ def _parameter(one: ModelParameter, unit: str, kept: bool) -> str:
     if one.origin == "given":
         return _quantity(one.value, unit)
     value = float(f"{one.value:.{DIGITS}g}") if kept else one.value
-    entries = {"value": _quantity(value, unit)}
+    like = value or one.high
+    entries = {"value": _quantity(value, unit, like)}
     if one.origin == "fitted":
         if one.standard_error is not None:
-            entries["standard_error"] = _quantity(one.standard_error, "K" if unit == "degC" else unit)
-        entries |= {"low": _quantity(one.low, unit), "high": _quantity(one.high, unit)}
+            entries["standard_error"] = _quantity(one.standard_error, "K" if unit == "degC" else unit, like)
+        entries |= {"low": _quantity(one.low, unit, like), "high": _quantity(one.high, unit, like)}
     entries["origin"] = toml_value(one.origin)
     return f"{{ {', '.join(f'{key} = {value}' for key, value in entries.items())} }}"
 
@@ -118,5 +119,5 @@ def _entries(section: dict[str, Any]) -> list[str]:
     return [f"{toml_key(name)} = {toml_value(value)}" for name, value in section.items() if value is not None]
 
 
-def _quantity(value: float, unit: str) -> str:
-    return toml_value(quantity(value, unit))
+def _quantity(value: float, unit: str, like: float | None = None) -> str:
+    return toml_value(quantity(value, unit, like))
