@@ -73,7 +73,7 @@ def test_facts_that_cannot_be_are_refused_before_a_file_is_written(tmp_path: Pat
         (("--known", "wire_length"), "each name once with its number"),
         (("--ohms", "-1"), "more than 0 ohm, not `-1`"),
         (("--ohms", "4 ohm", "--ohms-per-metre", "8"), "which say the same"),
-        (("--mass", "steps"), "each run once with its mass, as in `ramp=500 g`"),
+        (("--mass", "steps"), "`500 g` for all runs, or each run once as in `ramp=500 g`, not `steps`"),
         (("--mass", "steps=500 g"), "the logs have a mass themselves"),
     ):
         assert message in refused("new-experiment", *LOGS, *options, "--out", out)

@@ -116,10 +116,12 @@ def test_a_size_of_the_preset_is_named_where_a_resistance_is_computed_with_it(tm
         ({"ohms": 4e5}, "is the resistance in ohm, and are wire_length and wire_diameter those of this wire"),
         ({"masses": {"c": "500 g"}}, "there is no run 'c'"),
         ({"masses": {"a": "500"}}, "runs.a.inputs.mass: got '500' without a unit, expected one like 'kg'"),
+        ({"mass": "0.5 m"}, "runs.a.inputs.mass: got unit 'm', expected one like 'kg'"),
+        ({"mass": "1 kg", "known": {"load_mass": "1 kg"}}, "load_mass: got it and a mass of every run"),
         ({"masses": {"a": "0 g", "b": "1 kg"}}, "got '0 g'; expected more than 0 kg"),
         (
             {"masses": {"a": "500 g"}},
-            "'a' has a mass; give --mass b=... too, or --known load_mass=... for all the others",
+            "'a' has a mass; give --mass b=... too, or one --mass without a name for all the others",
         ),
     ],
 )
@@ -136,9 +138,28 @@ def test_each_run_has_its_own_mass(tmp_path: Path) -> None:
     assert "# load_mass" not in made.text
 
 
+def test_one_mass_is_that_of_every_run_without_another(tmp_path: Path) -> None:
+    drafted(tmp_path, "a", mass="0.5kg")
+    (alone,) = load_experiment(tmp_path / "e.toml", CATALOGUE).runs
+    assert (float(alone.inputs["mass"].min()), float(alone.inputs["mass"].max())) == (0.5, 0.5)
+    drafted(tmp_path, mass="500 g", masses={"b": "1 kg"})
+    assert [float(run.inputs["mass"][0]) for run in load_experiment(tmp_path / "e.toml", CATALOGUE).runs] == [0.5, 1.0]
+
+
+def test_a_title_says_which_runs_of_which_bench(tmp_path: Path) -> None:
+    drafted(tmp_path, "ramp")
+    assert load_experiment(tmp_path / "e.toml", CATALOGUE).title == "ramp: flexinol_table_3_2, dead_weight, voltage"
+    (tmp_path / "wire 2").mkdir()
+    found = tomllib.loads(draft(logs(tmp_path / "wire 2"), tmp_path / "e.toml").text)["title"]
+    assert found == "2 runs of wire 2: flexinol_table_3_2, dead_weight, voltage"
+    assert tomllib.loads(draft(logs(tmp_path), tmp_path / "e.toml", "mine").text)["title"] == "mine"
+
+
 def test_a_load_without_a_hanging_mass_takes_none(tmp_path: Path) -> None:
     with pytest.raises(ExperimentError, match="flexinol_ht_500um bias_spring voltage takes no mass of each run"):
         drafted(tmp_path, load="bias_spring", masses={"a": "500 g", "b": "500 g"})
+    with pytest.raises(ExperimentError, match="flexinol_ht_500um bias_spring voltage takes no mass of each run"):
+        drafted(tmp_path, load="bias_spring", mass="500 g")
 
 
 def test_a_log_with_a_mass_takes_no_other(tmp_path: Path) -> None:

@@ -26,7 +26,7 @@ def new_experiment(
         typer.Argument(help="a log a run, or one a sensor, paired by their names: CSV, text, .mat, Parquet, NetCDF"),
     ],
     out: Annotated[Path, typer.Option(help="the file to write")] = Path("experiment.toml"),
-    title: Annotated[str, typer.Option(help="one line; default: the file's name")] = "",
+    title: Annotated[str, typer.Option(help="one line; default: the logs, wire, load and drive")] = "",
     load: Annotated[
         str,
         typer.Option(
@@ -61,7 +61,10 @@ def new_experiment(
     ] = None,
     mass: Annotated[
         list[str] | None,
-        typer.Option("--mass", help="the mass of a run, RUN='500 g', where no column has it; may be repeated"),
+        typer.Option(
+            "--mass",
+            help="hanging mass where no column has it: '500 g' of all runs, RUN='1 kg' of one; may be repeated",
+        ),
     ] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="replace an existing file")] = False,
     json_out: Json = False,
@@ -76,7 +79,7 @@ def new_experiment(
     Example:  smajax new-experiment logs/*.csv --known wire_length='0.5 m',wire_diameter='0.31 mm' --ohms 4.2ohm --mass ramp='500 g'
     """
     _check_options(out, overwrite, decimal, model is not None and bool(load or wire or drive))
-    given, masses = texts("--known", known, KNOWN), _masses(mass or ())
+    given, (masses, others) = texts("--known", known, KNOWN), _masses(mass or ())
     from smajax.core.runtime import prepare
 
     prepare()
@@ -86,7 +89,7 @@ def new_experiment(
     from smajax.data.experiment.draft_model import ModelChoice
     from smajax.report.preset_words import remarks
 
-    bench = BenchFacts(given, ohms, ohms_per_metre, masses)
+    bench = BenchFacts(given, ohms, ohms_per_metre, masses, others)
     result = draft(files, out, title, ModelChoice(load, wire, drive, model), decimal, bench)
     replace(out, result.text)
     loaded = _loaded(out)
@@ -130,17 +133,18 @@ def _check_options(out: Path, overwrite: bool, decimal: str, twice: bool) -> Non
         )
 
 
-def _masses(several: Sequence[str]) -> dict[str, str]:
-    """`RUN=500 g`, once a run; the name of a run may hold anything."""
+def _masses(several: Sequence[str]) -> tuple[dict[str, str], str]:
+    """(by run: `RUN=500 g`, once a run, whose name may hold anything; of all other runs: `500 g`)."""
     result: dict[str, str] = {}
     for one in several:
         run, sign, value = (part.strip() for part in one.rpartition("="))
-        if not sign or not run or not value or run in result:
+        bare = not sign and value.lstrip("+.")[:1].isdigit()
+        if not (bare or (run and value)) or run in result:
             raise typer.BadParameter(
-                f"each run once with its mass, as in `ramp=500 g`, not `{one}`", param_hint="--mass"
+                f"`500 g` for all runs, or each run once as in `ramp=500 g`, not `{one}`", param_hint="--mass"
             )
         result[run] = value
-    return result
+    return result, result.pop("", "")
 
 
 def _loaded(path: Path) -> _Loaded:

@@ -23,12 +23,16 @@ PHASES = ("resistivity_martensite", "resistivity_austenite")
 
 @dataclass(frozen=True)
 class BenchFacts:
-    """As given: values with their units by parameter; resistance (ohm, or ohm/m) of the cold wire; mass with its unit by run."""
+    """As given: values with their units by parameter; resistance (ohm, or ohm/m) of the cold wire; mass with its unit by run.
+
+    mass: with its unit, of every run that `masses` does not name.
+    """
 
     known: Mapping[str, str] = field(default_factory=dict)
     ohms: float | None = None
     ohms_per_metre: float | None = None
     masses: Mapping[str, str] = field(default_factory=dict)
+    mass: str = ""
 
 
 @dataclass(frozen=True)
@@ -52,8 +56,8 @@ def facts_of(
         values |= {name: one.value for name, one in kept.parameters.items()}
     presets = f"{model.wire} {model.load} {model.drive}"
     given = {"mass"} & set(model.inputs)
-    if given and bench.masses:
-        key = f"runs.{next(iter(bench.masses))}.inputs.mass"
+    if given and (bench.masses or bench.mass):
+        key = f"runs.{next(iter(bench.masses), runs[0])}.inputs.mass"
         raise ExperimentError(target, key, "the logs have a mass themselves; leave --mass out")
     known = checked(bench, target, presets, described, values, runs)
     if given or known.masses or "mass" not in described.inputs_optional:
@@ -130,9 +134,9 @@ def _masses(
     facts: BenchFacts, path: Path, presets: str, model: ModelDescription, runs: Sequence[str]
 ) -> dict[str, str]:
     """Mass by run, of all runs or of none."""
-    if not facts.masses:
+    if not facts.masses and not facts.mass:
         return {}
-    first = next(iter(facts.masses))
+    first = next(iter(facts.masses), runs[0])
     if "mass" not in model.inputs_optional:
         raise ExperimentError(
             path,
@@ -140,22 +144,29 @@ def _masses(
             f"the model of {presets} takes no mass of each run (a dead_weight does); give a parameter of it with --known, "
             f"`smajax presets {presets}` lists them",
         )
-    for run, value in facts.masses.items():
+    if facts.mass and "load_mass" in facts.known:
+        raise ExperimentError(
+            path, "model.parameters.load_mass", "got it and a mass of every run, which say the same; give one of them"
+        )
+    unknown = [run for run in facts.masses if run not in runs]
+    if unknown:
+        near = close_matches(unknown[0], runs, "there are")
+        raise ExperimentError(path, f"runs.{unknown[0]}.inputs.mass", f"there is no run {unknown[0]!r}{near}")
+    for run, value in {**(dict.fromkeys(runs, facts.mass) if facts.mass else {}), **facts.masses}.items():
         key = f"runs.{run}.inputs.mass"
-        if run not in runs:
-            raise ExperimentError(path, key, f"there is no run {run!r}{close_matches(run, runs, 'there are')}")
         try:
             number = parse_quantity(value, model.input_units["mass"])
         except UnitError as error:
             raise ExperimentError(path, key, str(error)) from None
         if not number > 0.0:
             raise ExperimentError(path, key, f"got {value!r}; expected more than 0 kg")
+    others = facts.mass or facts.known.get("load_mass", "")
     missing = [run for run in runs if run not in facts.masses]
-    if missing and "load_mass" not in facts.known:
+    if missing and not others:
         raise ExperimentError(
             path,
             f"runs.{missing[0]}.inputs.mass",
             f"is missing: {and_listed([repr(run) for run in facts.masses])} {'has' if len(facts.masses) == 1 else 'have'} a mass; give "
-            f"--mass {missing[0]}=... too, or --known load_mass=... for all the others",
+            f"--mass {missing[0]}=... too, or one --mass without a name for all the others",
         )
-    return {run: facts.masses.get(run) or facts.known["load_mass"] for run in runs}
+    return {run: facts.masses.get(run) or others for run in runs}

@@ -129,7 +129,7 @@ def draft(
     time = _time(inputs)
     own = preset_parameters(model, known) if kept is None else kept_parameters(model, kept, known)
     sections = [
-        _head(inputs, title or target.stem, "" if kept is None else _relative(choice, target)),
+        _head(inputs, title or _title(inputs), "" if kept is None else _relative(choice, target)),
         _Section(own.lines, [*own.messages, *hint]),
         time,
         _channels(inputs),
@@ -201,6 +201,15 @@ def _relative(choice: ModelChoice, target: Path) -> str:
     """The path of the model file, as the experiment file `target` says it."""
     assert choice.model is not None
     return Path(os.path.relpath(choice.model.resolve(), target.resolve().parent)).as_posix()
+
+
+def _title(inputs: _Inputs) -> str:
+    """What the bench is, and where its runs are from: "3 runs of wire_2: flexinol_table_3_2, dead_weight, voltage"."""
+    model, runs = inputs.model, inputs.logs.runs
+    folder = Path(os.path.commonpath([file.resolve().parent for file in inputs.files])).name
+    of = f" of {folder}" if folder else ""
+    which = runs[0].name if len(runs) == 1 else f"{len(runs)} runs{of}"
+    return f"{which}: {model.wire}, {model.load}, {model.drive}"
 
 
 def _head(inputs: _Inputs, title: str, model_file: str = "") -> _Section:
