@@ -58,12 +58,26 @@ def preset_priors(
 
 
 def fitted_priors(kept: FromModelFile, given: frozenset[str]) -> dict[str, CoefficientPrior]:
-    """Normal priors of what was fitted before, about those values (SI) by their standard errors, of what is not among those `given`."""
-    return {
+    """Priors of what was fitted before and is not among those `given`: normal ones about those values (SI), by their standard errors.
+
+    What no run determined has the prior that it had, else the width of `RELATIVE`, else that of a uniform distribution over its bounds.
+    """
+    found = {
         name: CoefficientPrior(float(kept.values[name]), error, False)
         for name, error in kept.errors.items()
-        if name not in given and error > 0.0
+        if name not in given
     }
+    for name in kept.undetermined:
+        if name in given:
+            continue
+        value, (low, high), own = float(kept.values[name]), kept.bounds[name], kept.priors.get(name)
+        if own is not None:
+            found[name] = CoefficientPrior(own.mean, own.sigma, own.logarithmic)
+        elif name in RELATIVE and value > 0.0:
+            found[name] = CoefficientPrior(value, RELATIVE[name][0], True)
+        else:
+            found[name] = CoefficientPrior(value, (high - low) / math.sqrt(12.0), False)
+    return found
 
 
 def preset_bounds(

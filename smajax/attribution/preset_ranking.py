@@ -80,7 +80,7 @@ def rank_presets(experiment: Experiment) -> PresetRanking | None:
     given = {*experiment.parameters, *(one.name for one in experiment.unknowns)}
     given |= set.intersection(*(set(run.parameters) for run in runs))
     if experiment.model_file is not None:
-        given |= set(experiment.model_file.errors)
+        given |= {*experiment.model_file.errors, *experiment.model_file.bounds}
     names = [name for name, one in table.items() if one.path[0] in PARTS and name not in given]
     start = problem.start_values()
     free = next((one for one in experiment.unknowns if one.name == COOLED and not one.per_run), None)

@@ -8,7 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from smajax.attribution.job import job_of
 from smajax.core.parameters import get_parameters, parameter_values
+from smajax.data.experiment.draft import draft
+from smajax.data.experiment.draft_model import ModelChoice
 from smajax.data.experiment.errors import ExperimentError
 from smajax.data.experiment.record import Prior
 from smajax.data.experiment.schema import ChannelSection, LogFormat, SamplingSection, TimeSection
@@ -19,6 +22,7 @@ from smajax.data.model_file.read import load_model
 from smajax.data.model_file.record import FittedRun, LikelyModel, ModelOutput, ModelParameter
 from smajax.data.open_experiment import open_experiment
 from smajax.fit.base_model import base_model
+from smajax.model.effects.prior_width import CoefficientPrior
 from smajax.model.extended import extended
 from smajax.model.presets import build
 from tests.helpers.small_bench import bench
@@ -358,6 +362,58 @@ def test_an_experiment_may_begin_from_a_model_file(tmp_path: Path) -> None:
     kept = experiment.model_file
     assert kept is not None
     assert kept.errors.keys() == LATENT.keys()
+
+
+def undetermined_model() -> ActuatorModel:
+    """`fitted_model` with three more fitted values that its runs did not determine: one of them had a prior."""
+    model = fitted_model()
+    more = {"austenite_start": 68.0, "young_modulus_martensite": 28e9, "recoverable_strain": 0.045}
+    boxes = {
+        "austenite_start": (43.0, 93.0),
+        "young_modulus_martensite": (20e9, 40e9),
+        "recoverable_strain": (0.0, 0.1),
+    }
+    parameters = {**model.parameters, **{name: ModelParameter(more[name], "fitted", *boxes[name]) for name in more}}
+    own = dataclasses.replace(
+        model.likely[0],
+        values={**model.likely[0].values, **more},
+        priors={**model.likely[0].priors, "recoverable_strain": Prior(0.047, 0.1, True)},
+    )
+    return dataclasses.replace(model, parameters=parameters, likely=(own, *model.likely[1:]))
+
+
+def test_fitted_values_that_no_run_determined_take_part_in_a_following_loop(tmp_path: Path) -> None:
+    undetermined_model().save(tmp_path / "model.toml")
+    presets = 'wire = "flexinol_table_3_2"\nload = "dead_weight"\ndrive = "voltage"\n'
+    experiment = open_experiment(bench(tmp_path, (presets, 'file = "model.toml"\n')))
+    kept = experiment.model_file
+    assert kept is not None
+    assert set(kept.undetermined) == {"austenite_start", "young_modulus_martensite", "recoverable_strain"}
+    (said,) = [one for one in experiment.warnings if "did not determine" in one]
+    assert "austenite_start, young_modulus_martensite and recoverable_strain" in said
+    job = job_of(experiment)
+    assert job.presets["recoverable_strain"] == CoefficientPrior(0.047, 0.1, True)  # what it had
+    assert job.presets["young_modulus_martensite"] == CoefficientPrior(28e9, 0.25, True)  # data sheets
+    assert job.presets["austenite_start"] == CoefficientPrior(68.0, pytest.approx(50.0 / 12.0**0.5), False)
+    assert job.bounds["austenite_start"] == (43.0, 93.0)
+    assert job.presets["specific_heat"].sigma == pytest.approx(COVARIANCE[1, 1] ** 0.5)  # determined: by its error
+
+    known = 'file = "model.toml"\n[model.parameters]\naustenite_start = "67 degC"\n'
+    given = open_experiment(bench(tmp_path, (presets, known)))
+    assert "austenite_start" not in job_of(given).presets
+    assert not any("austenite_start" in one for one in given.warnings)
+
+
+def test_a_draft_from_a_model_says_which_values_no_run_determined(tmp_path: Path) -> None:
+    undetermined_model().save(tmp_path / "model.toml")
+    bench(tmp_path)
+    text = draft([tmp_path / "a.csv"], tmp_path / "e.toml", choice=ModelChoice(model=tmp_path / "model.toml")).text
+    (line,) = [one for one in text.splitlines() if one.startswith("young_modulus_martensite")]
+    assert line == (
+        'young_modulus_martensite = { low = "20 GPa", high = "40 GPa", start = "28 GPa" }  # the runs of before did not determine it'
+    )
+    (determined,) = [one for one in text.splitlines() if one.startswith("specific_heat")]
+    assert determined.endswith("}")
 
 
 @pytest.mark.parametrize(

@@ -153,6 +153,7 @@ def kept_parameters(model: DraftModel, kept: ActuatorModel, known: Known) -> Par
         unit = kept.table[name].unit
         shown = {"low": one.low, "high": one.high, "start": one.value}
         box = ", ".join(f"{key} = {toml_value(_amount(value, unit, 10, one.value))}" for key, value in shown.items())
-        lines.append(f"{toml_key(name)} = {{ {box} }}")
+        why = "" if name in kept.errors else "  # the runs of before did not determine it"
+        lines.append(f"{toml_key(name)} = {{ {box} }}{why}")
     offset = any(one.offset for one in kept.outputs) or not kept.outputs
     return ParameterSections([*lines, "", "[nuisance]", f"offset = {toml_value(offset)}", ""], known.messages)

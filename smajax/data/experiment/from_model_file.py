@@ -51,18 +51,11 @@ def with_model_file(path: Path, file: ExperimentFile) -> tuple[ExperimentFile, F
     kept = FromModelFile(
         effects=model.effects,
         values={name: one.value for name, one in open_.items()},
-        errors={
-            # Of those, too, that the runs barely determine, which have no error in the text.
-            **{
-                name: float(error)
-                for one in model.likely[:1]
-                for name, error in zip(one.names, one.deviations, strict=True)
-            },
-            **{name: one.standard_error for name, one in fitted.items() if one.standard_error},
-        },
+        errors=model.errors,
         bounds={name: (one.low, one.high) for name, one in fitted.items()},
         fitted_to={one.sha256: one.name for one in model.runs if one.role == "fit"},
         warnings=model.warnings,
+        priors=dict(model.likely[0].priors) if model.likely else {},
         sha256=hashlib.sha256(source.read_bytes()).hexdigest(),
     )
     return file.model_copy(update={"model": section}), kept

@@ -11,6 +11,7 @@ import numpy as np
 
 from smajax.core.names import close_matches
 from smajax.core.units import UnitError, convert, parse_quantity
+from smajax.core.wording import and_listed
 from smajax.data.experiment.column_overrides import own_columns
 from smajax.data.experiment.data_folder import data_folder
 from smajax.data.experiment.declared_priors import declared_priors
@@ -195,6 +196,19 @@ def _fitted_before(kept: FromModelFile, runs: Sequence[Run]) -> list[str]:
     ]
 
 
+def _undetermined(kept: FromModelFile, file: ExperimentFile) -> list[str]:
+    """That the model file has fitted values which no run determined, where the experiment file says nothing of them."""
+    names = [name for name in kept.undetermined if name not in {*file.model.parameters, *file.unknown}]
+    if not names:
+        return []
+    one = len(names) == 1
+    return [
+        f"{and_listed(names)} {'is a value' if one else 'are values'} of a fit whose runs did not determine {'it' if one else 'them'} "
+        f"([model] file): `close-loop` fits {'it' if one else 'them'} again, with the prior that a value had, else with the width that "
+        "data sheets leave a preset, else with that of the former bounds; `identify` only fits what [unknown] has"
+    ]
+
+
 def _untold(file: ExperimentFile, free: Sequence[Unknown]) -> list[str]:
     """That no size of the bench is given: the preset's are another bench's."""
     if file.model.load == "coupon" or file.model.parameters or {*WIRE_SIZES} & {one.name for one in free}:
@@ -321,7 +335,15 @@ def experiment_of(path: Path, file: ExperimentFile, catalogue: Catalogue) -> Exp
     warnings += _useless(file, model) + not_tried + _untold(file, free)
     warnings += [] if kept else preset_warnings(file.model.wire, free, model.parameters)
     warnings += role_warnings(file.runs)
-    warnings += [] if kept is None else [*kept.warnings, *_fitted_before(kept, [read.run for read in runs])]
+    warnings += (
+        []
+        if kept is None
+        else [
+            *kept.warnings,
+            *_fitted_before(kept, [read.run for read in runs]),
+            *_undetermined(kept, file),
+        ]
+    )
     return Experiment(
         name=path.resolve().parent.name if path.name == "experiment.toml" else path.stem,
         title=file.title,

@@ -111,7 +111,8 @@ class Run:
 class FromModelFile:
     """What a base model has from a model file, beside the values that are known.
 
-    values: of a fit or of presets, SI, effects' coefficients with them. errors: standard errors of the fitted ones. bounds: theirs.
+    values: of a fit or of presets, SI, effects' coefficients with them. errors: standard errors of the fitted ones that the runs
+    determined. bounds: of all fitted ones. priors: of those of them that had one.
     """
 
     effects: tuple[str, ...]
@@ -121,6 +122,12 @@ class FromModelFile:
     sha256: str
     fitted_to: Mapping[str, str] = field(default_factory=dict)  # digest of a run that it was fitted to -> its name
     warnings: tuple[str, ...] = ()
+    priors: Mapping[str, Prior] = field(default_factory=dict)
+
+    @property
+    def undetermined(self) -> tuple[str, ...]:
+        """Fitted ones that no run determined."""
+        return tuple(name for name in self.bounds if name not in self.errors)
 
 
 @dataclass(frozen=True)

@@ -154,6 +154,16 @@ class ModelRecord:
         return set_parameters(model, {name: value for name, value in known.items() if name in table})
 
     @property
+    def errors(self) -> dict[str, float]:
+        """Standard errors of the fitted values that runs determined, SI: also barely, which have none in the text of the file."""
+        barely = {
+            name: float(error) for one in self.likely[:1] for name, error in zip(one.names, one.deviations, strict=True)
+        }
+        fitted = {name: one.standard_error for name, one in self.parameters.items() if one.origin == "fitted"}
+        found = {**barely, **{name: error for name, error in fitted.items() if error is not None}}
+        return {name: error for name, error in found.items() if error > 0.0}
+
+    @property
     def weighted(self) -> tuple[tuple[LikelyModel, ...], np.ndarray]:
         """(the M likely models, their weights (M,), which sum to one); where nothing was fitted the model itself."""
         likely = self.likely or (LikelyModel(self.effects, 1.0, {}),)
