@@ -11,10 +11,15 @@ from smajax.data.experiment.record import Prior
 from smajax.data.model_file.record import LikelyModel, ModelRecord
 from smajax.data.model_file.schema import FORMAT
 
+ERRORS = (
+    "A value that each run has its own of is the mean over the fit runs; its variance is what these values scatter by, and it is taken as "
+    "uncorrelated with all others."
+)
+
 
 def uncertainty_of(model: ModelRecord) -> xr.Dataset:
     """What is known of the fitted values of each likely model: `value_0`, `covariance_0`, ... along `parameter_0`."""
-    result = xr.Dataset(attrs={"title": model.title, "format": FORMAT, "unit": "SI, degC, rad"})
+    result = xr.Dataset(attrs={"title": model.title, "format": FORMAT, "unit": "SI, degC, rad", "errors": ERRORS})
     for number, one in enumerate(model.likely):
         result.attrs[f"effects_{number}"] = " ".join(one.effects)
         if one.values:
