@@ -37,11 +37,15 @@ HELD_OUT_FROM = 3  # runs from which on the last one is held out
 
 @dataclass(frozen=True)
 class Draft:
-    """The text of the file, a message for each guess in it, with its certainty, and the values in it that are the preset's."""
+    """The text of the file, a message for each guess in it, with its certainty, and the values in it that are the preset's.
+
+    of_bench: those of the messages that are of the model, its values and the runs' roles, and not of what the logs hold.
+    """
 
     text: str
     messages: tuple[str, ...]
     presets: tuple[PresetLine, ...] = ()
+    of_bench: tuple[str, ...] = ()
 
     def in_order(self, remarks: Mapping[str, str]) -> Draft:
         """With the values that are the preset's in the order of `remarks`, by name, each with its own beside it."""
@@ -128,9 +132,10 @@ def draft(
     inputs = _Inputs(tuple(files), tuple(tables), logs, by_quantity, kind_of, model, known)
     time = _time(inputs)
     own = preset_parameters(model, known) if kept is None else kept_parameters(model, kept, known)
+    of_own = [*own.messages, *hint]
     sections = [
         _head(inputs, title or _title(inputs), "" if kept is None else _relative(choice, target)),
-        _Section(own.lines, [*own.messages, *hint]),
+        _Section(own.lines, of_own, of_bench=of_own),
         time,
         _channels(inputs),
         _data(inputs, target, decimal),
@@ -141,7 +146,8 @@ def draft(
         raise MeasuredDataError(f"two logs have the same name, {', '.join(names)}: rename one")
     first = time.messages if time.first else ()
     rest = [message for one in sections for message in one.messages if not (one is time and time.first)]
-    return Draft("\n".join(line for one in sections for line in one.lines), (*first, *rest), own.presets)
+    of_bench = tuple(message for one in sections for message in one.of_bench)
+    return Draft("\n".join(line for one in sections for line in one.lines), (*first, *rest), own.presets, of_bench)
 
 
 @dataclass(frozen=True)
@@ -195,6 +201,7 @@ class _Section:
     lines: Sequence[str]
     messages: Sequence[str] = ()
     first: bool = False
+    of_bench: Sequence[str] = ()  # those of the messages that are of no log
 
 
 def _relative(choice: ModelChoice, target: Path) -> str:
@@ -224,12 +231,9 @@ def _head(inputs: _Inputs, title: str, model_file: str = "") -> _Section:
         messages += [
             f"{file.name}: {one.name}: {name} in {one.unit} ({one.sure}: {one.why})" for name, one in overrides.items()
         ]
-    if model_file:
-        messages.append(f"model: that of {model_file}")
-    else:
-        messages.append(
-            f"model: {model.wire}, {model.load}, {model.drive} ({model.why}; `smajax presets` has the others)"
-        )
+    presets = f"{model.wire}, {model.load}, {model.drive} ({model.why}; `smajax presets` has the others)"
+    whose = f"model: {f'that of {model_file}' if model_file else presets}"
+    messages.append(whose)
     if len(logs.kinds) > 1:
         runs = "; ".join(f"{run.name} of {and_listed([file.name for file in run.files])}" for run in logs.runs)
         messages.append(f"runs: {runs} ({GUESS}: by their names)")
@@ -251,7 +255,7 @@ def _head(inputs: _Inputs, title: str, model_file: str = "") -> _Section:
             ]
         ),
     ]
-    return _Section(lines, messages)
+    return _Section(lines, messages, of_bench=[whose])
 
 
 def _time(inputs: _Inputs) -> _Section:
@@ -383,6 +387,5 @@ def _runs(inputs: _Inputs, target: Path) -> _Section:
     messages = [f"pretension: what the force of each run begins with ({GUESS})"] if forces else []
     if held_out is None:
         return _Section(lines, messages)
-    return _Section(
-        lines, [*messages, f"held out: the last run, {held_out.name}; choose another one by its `role` in [[runs]]"]
-    )
+    role = f"held out: the last run, {held_out.name}; choose another one by its `role` in [[runs]]"
+    return _Section(lines, [*messages, role], of_bench=[role])

@@ -92,8 +92,7 @@ def _guessed(
     file = validated(paths[0], tomllib.loads(drafted.text), ExperimentFile, {(): ExperimentFile})
     if model.log_format is not None and model.log_format.sampling is not None and file.sampling is not None:
         file = file.model_copy(update={"sampling": model.log_format.sampling})
-    columns = [message for message in drafted.messages if not message.startswith(("model:", "the bench:", "held out:"))]
-    return file, tuple(columns)
+    return file, tuple(message for message in drafted.messages if message not in drafted.of_bench)
 
 
 def _lacking(model: ModelRecord, file: ExperimentFile, constants: Mapping[str, Quantity]) -> str:
