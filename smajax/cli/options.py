@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
-    from smajax.control.position_unit import PositionUnit
     from smajax.simulation.integration_error import Tolerance
 
 DEMOS = ("latent", "complete")  # the benches of `smajax demo`
@@ -36,9 +35,15 @@ Finely = Annotated[
 ]
 
 
-Noise = Annotated[
+def _mark(text: str) -> str:
+    if text not in ("", ",", "."):
+        raise typer.BadParameter(f"`,` or `.`, not `{text}`.")
+    return text
+
+
+Decimal = Annotated[
     str,
-    typer.Option(help="noise of the readings (1 sigma), 0.1deg or 20um; without a unit in deg, or in mm of a length"),
+    typer.Option(callback=_mark, help="`,` or `.`: the decimal mark, for logs that do not determine it (`1,234`)"),
 ]
 
 
@@ -49,14 +54,6 @@ def refused(option: str | None = None) -> Iterator[None]:
         yield
     except ValueError as error:
         raise typer.BadParameter(str(error), param_hint=option) from None
-
-
-def noise_option(text: str, unit: PositionUnit) -> float:
-    """A noise in the unit shown; none of "". Raises typer.BadParameter."""
-    from smajax.control.interface import noise_of
-
-    with refused("'--noise'"):
-        return noise_of(text, unit) if text else 0.0
 
 
 def quantity(

@@ -13,6 +13,7 @@ from smajax.cli import completion
 from smajax.cli.options import texts
 
 if TYPE_CHECKING:
+    from smajax.control.position_unit import PositionUnit
     from smajax.data.model_file.actuator_model import ActuatorModel
     from smajax.model.system import System
 
@@ -29,6 +30,8 @@ Drawn = Annotated[
     ),
 ]
 DRAWN = 16
+FEW = 3  # set points with --fast, over the stroke
+FAST_OF_ARM = (-20.0, 20.0, 60.0)  # deg
 WireName = Annotated[
     str,
     typer.Option(
@@ -87,8 +90,8 @@ class PlantOptions:
             )
         return load_model(self.model)
 
-    def draws(self, count: int | None, seed: int, others: bool) -> System | None:
-        """Plants from the posterior of the model, stacked; None for none. others: whether mismatches are asked for too.
+    def draws(self, count: int | None, seed: int, others: bool, limit: float | None = None) -> System | None:
+        """Plants from the posterior of the model, stacked; None for none. others: whether mismatches are asked for too. limit: as `system`'s.
 
         Raises typer.BadParameter for plants without a model, or of one of which nothing was fitted.
         """
@@ -111,13 +114,14 @@ class PlantOptions:
             return None
         import numpy as np
 
-        from smajax.control.kept_plant import within_limit
+        from smajax.control.kept_plant import with_limit, within_limit
         from smajax.core.parameters import parameter_values, parameters, set_parameters
 
-        plants = within_limit(self.kept, self.kept.plants(wanted, seed))
+        plants = self.kept.plants(wanted, seed)
+        plants = within_limit(self.kept, plants) if limit is None else with_limit(plants, limit)
         if not self._changed:
             return plants
-        own, changed = self.kept.values, parameter_values(self.system())
+        own, changed = self.kept.values, parameter_values(self.system(limit, said=False))
         values = {name: value for name, value in changed.items() if value != own.get(name) or name in self._changed}
         if new := sorted(values.keys() - parameters(plants).keys()):
             raise typer.BadParameter(
@@ -130,9 +134,24 @@ class PlantOptions:
     def _changed(self) -> dict[str, str]:
         return texts("--set", self.values, EXAMPLE)
 
-    def system(self) -> System:
-        """Raises typer.BadParameter for presets there are not, or some without the others; ExperimentError of --model."""
+    def bare(self) -> System:
+        """The plant, whose command has the limit of its drive. Raises as `system`."""
+        return self._made(None, False)[0]
+
+    def system(self, limit: float | None = None, said: bool = True) -> System:
+        """The plant of closed loops; its limit of the command is that of --set, else `limit`, else that of the fit runs, which stderr says.
+
+        Raises typer.BadParameter for presets there are not, or some without the others; ExperimentError of --model.
+        """
+        system, sentence = self._made(limit, True)
+        if sentence and said:
+            typer.echo(sentence, err=True)
+        return system
+
+    def _made(self, limit: float | None, limited: bool) -> tuple[System, str]:
+        """(the plant; a sentence on its limit, or "")."""
         from smajax.control.compose import compose, with_values
+        from smajax.control.kept_plant import gives_limit, plant_of, with_limit
         from smajax.model.rigs import arm
 
         named = {"--wire": self.wire, "--load": self.load, "--drive": self.drive}
@@ -144,19 +163,44 @@ class PlantOptions:
         changed = self._changed
         try:
             if self.kept is not None:
-                from smajax.control.kept_plant import LIMIT, plant_of
-
-                system = with_values(self.kept.system, changed)
-                if any(name.split(".")[-1] == LIMIT for name in changed):
-                    return system
-                system, sentence = plant_of(self.kept, system)
-                if sentence:
-                    typer.echo(sentence, err=True)
-                return system
+                return plant_of(self.kept, changed, limit) if limited else (with_values(self.kept.system, changed), "")
             if missing:
-                return with_values(arm(self.law) if self.law else arm(), changed)
-            return compose(self.wire, self.load, self.drive, law=self.law, values=changed)
+                system = with_values(arm(self.law) if self.law else arm(), changed)
+            else:
+                system = compose(self.wire, self.load, self.drive, law=self.law, values=changed)
         except KeyError as error:
             raise typer.BadParameter(error.args[0]) from None
         except ValueError as error:
             raise typer.BadParameter(str(error), param_hint="--set" if changed else None) from None
+        return system if gives_limit(changed) else with_limit(system, limit), ""
+
+    @property
+    def gives_limit(self) -> bool:
+        """Whether --set has the limit of the command."""
+        from smajax.control.kept_plant import gives_limit
+
+        return gives_limit(self._changed)
+
+    def noise(self, text: str, unit: PositionUnit) -> tuple[float, str]:
+        """(noise of the readings in the unit shown: that of --noise, else that of the model's file, else none; a sentence on the second)."""
+        from smajax.cli.loop_options import noise_option
+        from smajax.control.kept_plant import noise_of_file
+
+        typed = noise_option(text, unit)
+        if typed is not None:
+            return typed, ""
+        own, sentence = noise_of_file(self.kept)
+        return float(f"{float(unit.of(own)):.6g}"), sentence
+
+
+def set_points_of(plant: System, text: str | None, fast: bool) -> dict[str, tuple[float, ...]]:
+    """The field `set_points` of settings, in the unit shown: as typed, few with --fast, and none where their own default holds."""
+    from smajax.cli.options import numbers
+    from smajax.control.position_unit import default_set_points, unit_of
+    from smajax.control.scales import is_arm
+
+    if text is not None:
+        return {"set_points": numbers("--set-points", text, unit_of(plant).shown)}
+    if not fast:
+        return {}
+    return {"set_points": FAST_OF_ARM if is_arm(plant) else default_set_points(plant, FEW)}

@@ -1,27 +1,35 @@
 """A file of gains: what tuning writes, and what `smajax sweep --gains` reads back.
 
-    {"format": "smajax gains 1", "controller": "pid", "gains": {"proportional_gain": {"value": 12.8, "unit": "V/rad"}, ...}}
+    {"format": "smajax gains 1", "controller": "pid",
+     "gains": {"proportional_gain": {"value": 12.8, "unit": "V/rad"}, ...},
+     "fixed": {"largest_voltage": {"value": 10.0, "unit": "V"}, "rate_filter": {"value": 0.02, "unit": "s"}, ...},
+     "loop": {"command_limit": {"value": 10.0, "unit": "V"}, "period": {"value": 0.01, "unit": "s"}, ...}}
 
-A plain number in the place of value and unit will do; values are SI. What else is in the file says where it comes from.
+A plain number in the place of value and unit will do; values are SI. `fixed` are the controller's parameters that were not tuned, `loop` is what the gains were
+tuned with (`LoopSettings`). Files of before have neither: then both are those of the plant and of whoever runs the loop. What else is
+in the file says where it comes from.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from dataclasses import replace as replaced
 from pathlib import Path
 from typing import Any
 
 from smajax.control.controllers.base import AbstractController
+from smajax.control.loop_settings import NOT_KNOWN, LoopSettings, is_number, read_settings
 from smajax.control.presets import CONTROLLERS, check_controller
 from smajax.control.scales import unit_on
 from smajax.core.files import json_text, replace
 from smajax.core.names import close_matches
-from smajax.core.parameters import check_bounds, parameters, set_parameters
+from smajax.core.parameters import check_bounds, parameter_values, parameters, set_parameters
 from smajax.model.system import System
 
 FORMAT = "smajax gains 1"
+LARGEST = "largest_voltage"  # of a controller that limits its command
 
 
 class GainsFileError(ValueError):
@@ -30,33 +38,57 @@ class GainsFileError(ValueError):
 
 @dataclass(frozen=True)
 class Gains:
-    """Gains of a controller by the name of each, SI."""
+    """Gains of a controller by the name of each, SI.
+
+    fixed: its parameters that were not tuned, such as the limit of its command and its filter; what is not named is that of the plant
+    that it is put on. loop: what the gains were tuned with.
+    """
 
     controller: str
     values: Mapping[str, float]
+    fixed: Mapping[str, float] = field(default_factory=dict)
+    loop: LoopSettings = NOT_KNOWN
 
     def units(self, system: System) -> dict[str, str]:
         """The unit of each gain of the controller on this plant: V/rad of an arm is V/m where the position is a length."""
         table = parameters(CONTROLLERS[self.controller].make(system))
         return {name: unit_on(entry.unit, system) for name, entry in table.items()}
 
+    def without_limit(self) -> Gains:
+        """The same, whose limit of the command is that of the plant that it is put on."""
+        loop = replaced(self.loop, command_limit=None)
+        return replaced(self, fixed={name: one for name, one in self.fixed.items() if name != LARGEST}, loop=loop)
+
     def put(self, system: System) -> AbstractController:
         """The controller's preset on `system`, the plant that it believes in, with these gains.
 
         Raises ValueError for a gain that it has not, or one out of its bounds.
         """
-        tuned = set_parameters(CONTROLLERS[self.controller].make(system), self.values)
+        tuned = set_parameters(CONTROLLERS[self.controller].make(system), {**self.fixed, **self.values})
         check_bounds(tuned)
         return tuned
 
 
+def fixed_parameters(controller: str, made: AbstractController) -> dict[str, float]:
+    """The parameters that tuning leaves as they are, SI, without those that are of the plant. made: the controller on its plant."""
+    preset, values = CONTROLLERS[controller], parameter_values(made)
+    return {
+        name: values[name]
+        for name, entry in parameters(made).items()
+        if name not in preset.box and not {name, str(entry.path[0])} & preset.known
+    }
+
+
 def write_gains(path: Path, gains: Gains, units: Mapping[str, str], more: Mapping[str, Any]) -> Path:
-    """Write the file in one step; `more` says where the gains come from."""
-    gains_with_units = {name: {"value": value, "unit": units[name]} for name, value in gains.values.items()}
-    return replace(
-        path,
-        json_text({"format": FORMAT, "controller": gains.controller, "gains": gains_with_units, "from": dict(more)}),
-    )
+    """Write the file in one step. units: of every gain and fixed parameter; `more` says where the gains come from."""
+
+    def with_units(values: Mapping[str, float]) -> dict[str, Any]:
+        return {name: {"value": value, "unit": units[name]} for name, value in values.items()}
+
+    whole = {"format": FORMAT, "controller": gains.controller, "gains": with_units(gains.values)}
+    whole |= {"fixed": with_units(gains.fixed)} if gains.fixed else {}
+    whole |= {"loop": gains.loop.record()} if gains.loop != NOT_KNOWN else {}
+    return replace(path, json_text({**whole, "from": dict(more)}))
 
 
 def read_gains(path: Path, system: System) -> Gains:
@@ -90,20 +122,35 @@ def read_gains(path: Path, system: System) -> Gains:
     preset = CONTROLLERS[name]
     plant = preset.plant(system)
     known = Gains(name, {}).units(plant)
-    values = {}
-    for gain, entry in held["gains"].items():
-        if gain not in known:
-            raise GainsFileError(f"{where}: {name} has no gain {gain!r}{close_matches(gain, preset.box, 'tuned are')}.")
-        unit = entry.get("unit", known[gain]) if isinstance(entry, dict) else known[gain]
-        value = entry.get("value") if isinstance(entry, dict) else entry
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise GainsFileError(f"{where}: {gain} must be a number, not {value!r}.")
-        if unit != known[gain]:
-            raise GainsFileError(f"{where}: {gain} is given in {unit!r}; expected {known[gain]!r}.")
-        values[gain] = float(value)
-    gains = Gains(name, values)
     try:
+        gains = Gains(
+            name,
+            _values(name, "gain", held["gains"], known),
+            _values(name, "fixed parameter", held.get("fixed", {}), known),
+            read_settings(held.get("loop", {}), plant),
+        )
         gains.put(plant)
     except ValueError as error:
         raise GainsFileError(f"{where}: {error}") from None
     return gains
+
+
+def _values(controller: str, kind: str, held: Any, known: Mapping[str, str]) -> dict[str, float]:
+    """Values by name, SI, of a table with or without units. Raises ValueError."""
+    if not isinstance(held, dict):
+        raise ValueError(f"`{kind.split()[0]}` must be a table of names and values, not {held!r}.")
+    values = {}
+    for name, entry in held.items():
+        if name not in known:
+            tuned = CONTROLLERS[controller].box
+            raise ValueError(
+                f"{controller} has no {kind} {name!r}{close_matches(name, tuned if kind == 'gain' else known, 'tuned are' if kind == 'gain' else 'there are')}."
+            )
+        unit = entry.get("unit", known[name]) if isinstance(entry, dict) else known[name]
+        value = entry.get("value") if isinstance(entry, dict) else entry
+        if not is_number(value):
+            raise ValueError(f"{name} must be a number, not {value!r}.")
+        if unit != known[name]:
+            raise ValueError(f"{name} is given in {unit!r}; expected {known[name]!r}.")
+        values[name] = float(value)
+    return values

@@ -2,46 +2,97 @@
 
 from __future__ import annotations
 
-from smajax.core.display_units import digits
-from smajax.core.parameters import get_parameters, set_parameters
+from collections.abc import Iterable, Mapping
+
+from smajax.control.compose import with_values
+from smajax.control.loop_settings import LIMIT_PARAMETER
+from smajax.control.presets import CONTROLLERS
+from smajax.core.display_units import digits, display
+from smajax.core.parameters import get_parameters, parameters, set_parameters
 from smajax.data.model_file.record import ModelRecord
 from smajax.model.system import System
 
-LIMIT = "amplifier_limit"
 
+def plant_of(
+    model: ModelRecord, changed: Mapping[str, str | float] | None = None, limit: float | None = None
+) -> tuple[System, str]:
+    """(the model's system with the values in `changed`; a sentence on the limit of its command, "" where it is its own).
 
-def plant_of(model: ModelRecord, system: System | None = None) -> tuple[System, str]:
-    """(the model's system, or `system` made of it, with its limit of the command; a sentence on that limit, "" where it is its own).
-
-    Where nobody gave the limit of a voltage amplifier it is a preset's, which no bench has: the largest command of the fit runs takes its
-    place, since beyond it the model extrapolates. Other drives have no limit.
+    Where nobody gave the limit of a voltage amplifier it is a preset's, which no bench has: `limit` takes its place, in the command's
+    unit, or by default the largest command of the fit runs, since beyond it the model extrapolates. Other drives have no limit.
     """
-    system = model.system if system is None else system
-    name, unit = system.drive.command
-    largest = _largest(model)
+    system = with_values(model.system, changed or {})
+    if gives_limit(changed or {}):
+        return system, ""
+    if limit is not None:
+        return with_limit(system, limit), ""
+    largest = largest_fitted(model)
     if largest is None:
         return system, ""
+    name, unit = system.drive.command
     sentence = (
         f"The {name} is limited to {digits(largest, 4)} {unit}, the largest of the runs that the model was fitted to; give "
-        f"{LIMIT} in the model file or with --set for another limit."
+        f"{LIMIT_PARAMETER} in the model file or with --set for another limit."
     )
-    return within_limit(model, system), sentence
+    return with_limit(system, largest), sentence
+
+
+def gives_limit(changed: Iterable[str]) -> bool:
+    """Whether the limit of the command is among parameters that somebody gave."""
+    return LIMIT_PARAMETER in {name.split(".")[-1] for name in changed}
+
+
+def with_limit(system: System, limit: float | None) -> System:
+    """`system`, or a stack of systems, with this limit of its command; as it is with none, and of a drive without a limit."""
+    if limit is None or LIMIT_PARAMETER not in parameters(system):
+        return system
+    gain = get_parameters(system, ["amplifier_gain"])[0]
+    return set_parameters(system, {LIMIT_PARAMETER: gain * limit})
 
 
 def within_limit(model: ModelRecord, system: System) -> System:
     """`system`, or a stack of systems, with the limit that `plant_of` gives the model."""
-    largest = _largest(model)
-    if largest is None:
-        return system
-    gain = get_parameters(system, ["amplifier_gain"])[0]
-    return set_parameters(system, {LIMIT: gain * largest})
+    return with_limit(system, largest_fitted(model))
 
 
-def _largest(model: ModelRecord) -> float | None:
+def largest_fitted(model: ModelRecord) -> float | None:
     """The largest command of the fit runs, where it takes the place of the amplifier's limit."""
     name, _ = model.system.drive.command
-    known = model.parameters.get(LIMIT)
+    known = model.parameters.get(LIMIT_PARAMETER)
     if known is None or known.origin != "preset" or name not in model.fitted_range:
         return None
     largest = max(abs(end) for end in model.fitted_range[name])
     return largest if 0.0 < model.values["amplifier_gain"] * largest < known.value else None
+
+
+def noise_of_file(model: ModelRecord | None) -> tuple[float, str]:
+    """(standard deviation of a sample of the position's sensor as the model's file has it, rad or m; a sentence on it). Zero where it has none."""
+    if model is None:
+        return 0.0, ""
+    name, unit = model.system.load.reading
+    noise = next((one.noise for one in model.outputs if (one.name, one.unit) == (name, unit)), 0.0)
+    if not noise:
+        return 0.0, ""
+    shown = display(unit, name)
+    said = f"{digits(shown.of(noise), 3)} {shown.unit}"
+    return (
+        noise,
+        f"The sensor has the noise of the model file, {said} (1 sigma); --noise gives another one, --noise 0 none.",
+    )
+
+
+def true_plant(model: ModelRecord, changed: Mapping[str, str | float], assumed: System, controller: str) -> System:
+    """The plant of a model file, with the limit of the command of the system that the controller assumes.
+
+    Raises ValueError for one with another load or drive than that system.
+    """
+    plant = with_values(model.system, changed)
+    for part in ("load", "drive"):
+        own, other = (type(getattr(one, part)).__name__ for one in (assumed, plant))
+        if own != other:
+            raise ValueError(
+                f"the plant has the {part} {other} ({getattr(model, part)}), and the controller's model the {part} {own}: give a plant with "
+                f"the same {part}, or a controller's model of {getattr(model, part)}."
+            )
+    limit = float(assumed.drive.largest_command())
+    return CONTROLLERS[controller].plant(plant if gives_limit(changed) else with_limit(plant, limit))

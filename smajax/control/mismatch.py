@@ -44,6 +44,11 @@ def mismatches_of(system: System) -> dict[str, str]:
     return result | {name: name for name in parameters(system.load) if name not in result.values()}
 
 
+def default_mismatches(system: System) -> tuple[str, str]:
+    """The two that a sweep varies where nobody says: convection, and damping or, of a load without, the air."""
+    return "convection", "damping" if "damping" in mismatches_of(system) else "ambient"
+
+
 def short_name(name: str) -> str:
     """`convection` of `convection_coefficient`; any other name as it is."""
     names = {own: short for short, several in _OTHER.items() for own in several}

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -21,17 +21,20 @@ from smajax.control.compose import compose, with_values
 from smajax.control.figures_of_merit import SetPointMerit, merit_by_set_point, set_point_spans
 from smajax.control.gains_file import Gains, read_gains
 from smajax.control.interface import between_in_words, check_interface, check_set_points, interface_of, noise_of
-from smajax.control.kept_plant import LIMIT, plant_of
+from smajax.control.kept_plant import gives_limit, noise_of_file, plant_of, true_plant, with_limit
 from smajax.control.loop_dataset import labelled_loop
+from smajax.control.loop_settings import LoopInUse, LoopSettings, joined, sentences, settings_of
 from smajax.control.position_unit import PositionUnit, unit_of
 from smajax.control.presets import CONTROLLERS, check_controller
+from smajax.control.reach import reach_of, reach_sentence
 from smajax.control.reference import resting
+from smajax.control.run_result import RunResult, mismatches
 from smajax.core.display_units import digits
 from smajax.core.names import close_matches
-from smajax.core.parameters import parameter_values, parameters
+from smajax.core.parameters import parameter_values
 from smajax.core.wording import and_listed
 from smajax.data.experiment.magnitude import MELTS
-from smajax.data.model_file.read import load_model
+from smajax.data.model_file.record import ModelRecord
 from smajax.data.text_input import clock_of, given, reads_file
 from smajax.model.channels import INPUT_UNITS, REPLACED
 from smajax.model.load.coupon import AbstractCoupon
@@ -74,31 +77,33 @@ class RunRequest:
     seconds: float | None = None
     dt: float = DEFAULT_STEP
     tolerance: Tolerance = AUTO  # as `simulate_dataset`'s
-    model: str = ""  # path of a model file, in the place of the presets
+    model: ModelRecord | None = None  # a model file, in the place of the presets
     measured: Mapping[str, str] = field(
         default_factory=dict
     )  # sensor -> FILE:COLUMN:UNIT of a log to hold the run against
 
-    def system(self, closed: bool = False) -> System:
-        """The model. Raises KeyError and ValueError as `compose`, ExperimentError of the model file, RequestError of `values`.
-
-        closed: of a closed loop, whose commands stay within those that a model file was fitted to.
-        """
-        if self.model:
-            kept = load_model(self.model)
-            with _part("values"):
-                system = with_values(kept.system, self.values)
-            own = LIMIT in {name.split(".")[-1] for name in self.values}
-            return plant_of(kept, system)[0] if closed and not own else system
-        bare = compose(self.wire, self.load, self.drive, law=self.law)
+    def system(self) -> System:
+        """The model. Raises KeyError and ValueError as `compose`, RequestError of `values`."""
+        bare = compose(self.wire, self.load, self.drive, law=self.law) if self.model is None else self.model.system
         with _part("values"):
             return with_values(bare, self.values)
 
+    def plant(self, limit: float | None = None) -> tuple[System, str]:
+        """(the model of a closed loop, whose command has this limit, or that of the model file; a sentence on the latter). Raises as `system`.
+
+        A limit among the `values` goes first.
+        """
+        if self.model is None:
+            system = self.system()
+            return system if gives_limit(self.values) else with_limit(system, limit), ""
+        with _part("values"):
+            return plant_of(self.model, self.values, limit)
+
     def inputs_left_out(self) -> list[str]:
         """A sentence for each input that the logs of a kept model had, and that this run leaves to a parameter."""
-        if not self.model:
+        if self.model is None:
             return []
-        kept = load_model(self.model)
+        kept = self.model
         replaced = {channel: name for name, channel in REPLACED.items()}
         return [
             f"The model was fitted to runs with their own {channel}, {digits(low, 4)} to {digits(high, 4)} {INPUT_UNITS[channel]}; here it is "
@@ -109,56 +114,31 @@ class RunRequest:
             and not {channel, replaced[channel]} & self.values.keys()
         ]
 
-    def limit(self) -> list[str]:
-        """A sentence on the limit of the command of a closed loop on a kept model, or none."""
-        if not self.model or LIMIT in {name.split(".")[-1] for name in self.values}:
-            return []
-        kept = load_model(self.model)
-        sentence = plant_of(kept, with_values(kept.system, self.values))[1]
-        return [sentence] if sentence else []
-
 
 @dataclass(frozen=True)
 class LoopRequest:
-    """A closed loop around the model of a `RunRequest`."""
+    """A closed loop around the model of a `RunRequest`.
+
+    What is None is that of the file of gains; without one the noise is that of the model file's sensor, the period 10 ms, and there is neither
+    delay nor filter.
+    """
 
     controller: str
     set_points: str  # levels: `40deg:5s,10deg:5s`, or of a length `3mm:10s`
     gains: Path | None = None
     # Values of the plant that the controller does not assume, or changes of what it assumes: `+20%`.
     mismatch: Mapping[str, str] = field(default_factory=dict)
-    estimator: str = ""
-    noise: float | str = 0.0  # degrees or millimetres, or text with a unit
-    period: float = 0.01  # s
-    delay: int = 0  # periods
+    estimator: str | None = None  # "": the true state
+    noise: float | str | None = None  # degrees or millimetres, or text with a unit
+    period: float | None = None  # s
+    delay: int | None = None  # periods
     seed: int = 0
-
-
-@dataclass(frozen=True)
-class Mismatch:
-    """A parameter in which the plant differs from the controller's model, in the program's own unit."""
-
-    name: str
-    unit: str
-    assumed: float | None  # None: its effect is not in the controller's model
-    true: float
+    plant: ModelRecord | None = None  # the plant that runs, where it is another model than the controller's
 
     @property
-    def ratio(self) -> float | None:
-        """Plant over the assumed value; None where there is none, or where it is zero."""
-        return self.true / self.assumed if self.assumed else None
-
-
-@dataclass(frozen=True)
-class RunResult:
-    """A run over time, figures of merit of a closed loop (SI), and notes on what may be wrong."""
-
-    data: xr.Dataset
-    system: System
-    merit: Mapping[str, float]
-    notes: tuple[str, ...]
-    by_set_point: tuple[SetPointMerit, ...] = ()  # figures of merit by set point, where there are several
-    mismatches: tuple[Mismatch, ...] = ()
+    def given(self) -> LoopSettings:
+        """What options say of the loop."""
+        return LoopSettings(period=self.period, delay=self.delay, estimator=self.estimator)
 
 
 def channels(system: System) -> tuple[frozenset[str], frozenset[str]]:
@@ -241,16 +221,6 @@ def _with_measured(request: RunRequest, system: System, data: xr.Dataset) -> xr.
     return data
 
 
-def mismatches(assumed: System, plant: System) -> tuple[Mismatch, ...]:
-    """Every parameter in which they differ by more than a unit's rounding."""
-    before, units = parameter_values(assumed), parameters(plant)
-    return tuple(
-        Mismatch(name, units[name].unit, before.get(name), value)
-        for name, value in parameter_values(plant).items()
-        if not math.isclose(before.get(name, math.nan), value, rel_tol=1e-12)
-    )
-
-
 def _set_point_notes(system: System, position: np.ndarray) -> list[str]:
     """A note on a set point beyond the stops of the load."""
     try:
@@ -260,20 +230,49 @@ def _set_point_notes(system: System, position: np.ndarray) -> list[str]:
     return []
 
 
-def _gains(request: RunRequest, loop: LoopRequest) -> tuple[System, Gains]:
-    """(the system that the controller assumes, its gains)."""
-    system = request.system(closed=True)
-    gains = Gains(loop.controller, {}) if loop.gains is None else read_gains(loop.gains, system)
+class _Assumed(NamedTuple):
+    """What the controller is told: its model, its gains, the loop that it is in, and sentences on where these come from."""
+
+    system: System
+    gains: Gains
+    loop: LoopInUse
+    noise: float  # of the sensor, rad or m
+    sentences: tuple[str, ...]
+
+
+def _assumed(request: RunRequest, loop: LoopRequest) -> _Assumed:
+    """Raises as `run_open`, and GainsFileError."""
+    bare = request.system()
+    gains = Gains(loop.controller, {}) if loop.gains is None else read_gains(loop.gains, bare)
     if gains.controller not in CONTROLLERS:
         raise ValueError(
             f"no controller {gains.controller!r}{close_matches(gains.controller, CONTROLLERS, 'there are')}"
         )
-    check_controller(gains.controller, system)
-    return CONTROLLERS[gains.controller].plant(system), gains
+    check_controller(gains.controller, bare)
+    gains = gains.without_limit() if gives_limit(request.values) else gains
+    merged = joined({gains.controller: gains.loop}, loop.given)
+    system, sentence = request.plant(merged.command_limit)
+    system = CONTROLLERS[gains.controller].plant(system)
+    with _part("noise"):
+        noise, source = _noise(request, loop, system)
+    own = settings_of(system, merged, noise)
+    said = [sentence, source]
+    if loop.gains is not None:
+        said += sentences({gains.controller: (gains.loop, gains.fixed)}, loop.given, own)
+    return _Assumed(system, gains, merged, noise, tuple(one for one in said if one))
+
+
+def _noise(request: RunRequest, loop: LoopRequest, system: System) -> tuple[float, str]:
+    """(standard deviation of the reading, rad or m; a sentence where it is that of the plant's model file)."""
+    if loop.noise is not None:
+        unit = unit_of(system)
+        return float(unit.to_own(noise_of(loop.noise, unit))), ""
+    model = request.model if loop.plant is None else loop.plant
+    return noise_of_file(model)
 
 
 def _set_points(
-    request: RunRequest, loop: LoopRequest, every: int, unit: PositionUnit
+    request: RunRequest, loop: LoopRequest, own: LoopInUse, every: int, unit: PositionUnit
 ) -> tuple[np.ndarray, np.ndarray]:
     """(time, position) of a whole number of control periods, (n,), s and rad or m."""
     with _part("set_points"):
@@ -281,7 +280,7 @@ def _set_points(
     clock = clock_of([levels], request.seconds, request.dt)
     periods = (clock.size - 1) // every
     if periods < 1:
-        raise ValueError(f"the run is shorter than one control period of {loop.period:g} s.")
+        raise ValueError(f"the run is shorter than one control period of {own.period:g} s.")
     clock = clock[: periods * every + 1]
     # A set point holds from its instant on: a mean over the step before it would come early.
     return clock, levels.at(clock)
@@ -293,15 +292,18 @@ MEASURED = "measured_"  # before the name of a sensor: the variable of its log
 
 def run_closed(request: RunRequest, loop: LoopRequest) -> RunResult:
     """The closed loop. Raises as `run_open`, and GainsFileError."""
-    assumed, gains = _gains(request, loop)
-    with _part("mismatch"):
-        plant = with_values(assumed, loop.mismatch)
+    assumed, gains, own, sigma, said = _assumed(request, loop)
+    with _part("mismatch" if loop.plant is None else "plant"):
+        plant = (
+            with_values(assumed, loop.mismatch)
+            if loop.plant is None
+            else true_plant(loop.plant, loop.mismatch, assumed, gains.controller)
+        )
     unit = unit_of(assumed)
-    with _part("noise"):
-        noise = noise_of(loop.noise, unit)
-    check_interface(loop.estimator, noise, loop.period, request.dt)
-    interface = interface_of(assumed, loop.estimator, noise, loop.period, request.dt, loop.delay)
-    clock, position = _set_points(request, loop, interface.every, unit)
+    between = own.estimator, float(unit.of(sigma)), own.period
+    check_interface(*between, request.dt)
+    interface = interface_of(assumed, *between, request.dt, own.delay)
+    clock, position = _set_points(request, loop, own, interface.every, unit)
     controller = gains.put(assumed)
     setup = ClosedLoopSetup(
         plant,
@@ -317,7 +319,6 @@ def run_closed(request: RunRequest, loop: LoopRequest) -> RunResult:
     run, merits, error = measured_loop(setup, request.tolerance)
     # As in `run_open`.
     run = eqx.tree_at(lambda one: one.run.time, run, jnp.asarray(clock))
-    between = between_in_words(loop.estimator, noise, loop.period, loop.delay, unit)
     data = labelled_loop(
         plant,
         run,
@@ -325,7 +326,7 @@ def run_closed(request: RunRequest, loop: LoopRequest) -> RunResult:
         dt=request.dt,
         controller=gains.controller,
         gains=parameter_values(controller),
-        between=between,
+        between=between_in_words(*between, own.delay, unit),
     )
     notes = _notes(data)
     data = _with_measured(request, plant, data)
@@ -333,7 +334,6 @@ def run_closed(request: RunRequest, loop: LoopRequest) -> RunResult:
         check_answers(run)
     except ValueError as error:
         notes.append(str(error))
-    notes += [*_set_point_notes(assumed, position), *request.limit()]
     figures = {name: float(value) for name, value in vars(merits).items()}
     by_set_point: tuple[SetPointMerit, ...] = ()
     if np.ptp(position) > 0.0:
@@ -345,4 +345,29 @@ def run_closed(request: RunRequest, loop: LoopRequest) -> RunResult:
             notes.append(
                 f"Figures of merit are for constant set points, {MOST_RESTS} at most: this reference has {count}."
             )
-    return RunResult(data, plant, figures, tuple(notes), by_set_point, mismatches(assumed, plant))
+    notes += _set_point_notes(assumed, position) or _reach_notes(setup, position, figures, by_set_point)
+    return RunResult(
+        data,
+        plant,
+        figures,
+        tuple(notes),
+        by_set_point,
+        mismatches(assumed, plant),
+        said,
+        settings_of(assumed, own, sigma),
+    )
+
+
+def _reach_notes(
+    setup: ClosedLoopSetup, position: np.ndarray, figures: Mapping[str, float], by_set_point: Sequence[SetPointMerit]
+) -> list[str]:
+    """A note on set points where the loop does not settle, and which no controller could reach."""
+    missed = [one.set_point for one in by_set_point if not np.isfinite(one.merit.settling_time)]
+    if figures and not math.isfinite(figures["settling_time"]):
+        missed = [float(position[0])]
+    if not missed:
+        return []
+    plant = setup.system
+    shown = [float(f"{one:.6g}") for one in unit_of(plant).of(missed)]
+    sentence = reach_sentence(reach_of(plant, setup.controller), plant, [*dict.fromkeys(shown)])
+    return [sentence] if sentence else []

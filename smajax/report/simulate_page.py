@@ -15,7 +15,8 @@ from matplotlib.figure import Figure
 
 from smajax.control.figures_of_merit import STEADY_SHARE, SetPointMerit, merit_units
 from smajax.control.mismatch import in_words
-from smajax.control.run_request import MEASURED, RunResult
+from smajax.control.run_request import MEASURED
+from smajax.control.run_result import RunResult
 from smajax.core.display_units import axis_label, digits, display, label
 from smajax.core.files import as_netcdf, csv_text, heading, json_text, replace
 from smajax.core.parameters import parameter_values, parameters

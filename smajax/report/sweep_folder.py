@@ -52,8 +52,12 @@ def write_sweep(
     progress: Progress = quiet,
     command: str = "",
     plants: Plants | None = None,
+    remarks: Sequence[str] = (),
 ) -> SweepResults:
-    """Write the files of each controller as it comes, then those of all; `sweeps` are of `sweep_controllers`, as are the others."""
+    """Write the files of each controller as it comes, then those of all; `sweeps` are of `sweep_controllers`, as are the others.
+
+    remarks: sentences on where the settings come from, and on set points out of reach.
+    """
     out.mkdir(parents=True, exist_ok=True)
     found = plant_set(system, plants)
     grid = settings.grid_on(found)
@@ -78,10 +82,10 @@ def write_sweep(
     whole = SweepResults(settings, tuple(results), assumed_air(system), found)
     comparison = partial(draw_comparison, targets=grid.targets, merits=whole.nominal, position=found.unit)
     write_picture("comparison.png", (10.0, 11.0), comparison)
-    replace(out / "sweep.json", as_json(whole, command))
+    replace(out / "sweep.json", as_json(whole, command, remarks))
     replace(out / "sweep.nc", as_netcdf(as_dataset(whole, command)))
     pictures = {name: ((out / name).read_bytes(), narrow) for name, narrow in upright.items()}
-    replace(out / "index.html", page(whole, pictures, command))
+    replace(out / "index.html", page(whole, pictures, command, remarks))
     return whole
 
 

@@ -7,7 +7,7 @@ import dataclasses
 import html
 import io
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -100,7 +100,7 @@ def _controller_part(results: SweepResults, sweep: ControllerSweep, pictures: Pi
     )
 
 
-def page(results: SweepResults, pictures: Pictures, command: str = "") -> str:
+def page(results: SweepResults, pictures: Pictures, command: str = "", remarks: Sequence[str] = ()) -> str:
     """One page for a browser, with the pictures inside; the rows as CSV are beside it."""
     say, settings, grid, unit = html.escape, results.settings, results.grid, results.unit
     low, high = min(settings.set_points), max(settings.set_points)
@@ -184,7 +184,7 @@ def failures(sweep: ControllerSweep) -> str:
     )
 
 
-def as_json(results: SweepResults, command: str = "") -> str:
+def as_json(results: SweepResults, command: str = "", remarks: Sequence[str] = ()) -> str:
     """The comparison and the grid, SI; infinite times are null."""
     settings, grid, own = results.settings, results.grid, results.unit.own
 
@@ -195,6 +195,7 @@ def as_json(results: SweepResults, command: str = "") -> str:
     record = {
         "conclusions": conclusions(results),
         "between": settings.between,
+        "remarks": list(remarks),
         f"set_points_{own}": plain(grid.targets),
         "controllers": {
             name: {field.name: plain(getattr(one, field.name)) for field in dataclasses.fields(one)}

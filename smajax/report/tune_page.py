@@ -238,6 +238,20 @@ def _figures(result: TuningResult, check: Check) -> list[list[str]]:
     return rows
 
 
+def settings_rows(result: TuningResult) -> list[list[str]]:
+    """What shapes the gains and was not tuned: the loop that they were tuned in, and the controller's other parameters."""
+    loop = result.after.loop
+    limit = "none" if loop.command_limit is None else f"{digits(loop.command_limit, 4)} {loop.command_unit}"
+    rows = [
+        ["limit of the command", limit if loop.command_limit is None else f"up to {limit}"],
+        ["control period", f"{1e3 * result.settings.period:g} ms"],
+        ["delay of the command", counted(result.settings.delay, "control period")],
+        ["what the controller reads", f"filter `{loop.estimator}`" if loop.estimator else "the true state"],
+        ["sensor", loop.noise_words()],
+    ]
+    return rows + [[name, f"{digits(one, 4)} {result.units[name]}"] for name, one in result.after.fixed.items()]
+
+
 def page(result: TuningResult, pictures: Mapping[str, bytes], command: str) -> str:
     """The whole page, pictures inside."""
     say, settings = html.escape, result.settings
@@ -258,6 +272,8 @@ def page(result: TuningResult, pictures: Mapping[str, bytes], command: str) -> s
         "<h2>Gains</h2>",
         "" if settings.shown.is_angle else f"<p class=quiet>{SCALED}</p>",
         table(["gain", "before", "after", "unit", "box", "remark"], gain_rows(gains_of(result)), (1, 2)),
+        "<h2>What the gains were tuned with</h2>",
+        table(["", ""], settings_rows(result)),
     ]
     for name, check in result.checks.items():
         what = checked_on(result, name)
@@ -299,6 +315,8 @@ def record(result: TuningResult, command: str) -> dict[str, Any]:
         "price": price(result),
         "settings": result.settings.record(),
         "gains": gains_of(result),
+        "fixed": {name: {"value": one, "unit": result.units[name]} for name, one in result.after.fixed.items()},
+        "loop": result.after.loop.record(),
         "cost": {"before": result.costs[0], "after": result.costs[1]},
         "limits_met": result.within_limits if result.settings.limits else None,
         "checks": {

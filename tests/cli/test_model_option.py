@@ -51,8 +51,11 @@ def test_a_closed_loop_stays_within_the_commands_of_the_fit_runs() -> None:
     assert float(system.drive.largest_command()) == pytest.approx(5.0)
     assert float(sma.get_parameters(system, ["amplifier_limit"])[0]) == pytest.approx(8.0)
     assert "limited to 5 V, the largest of the runs that the model was fitted to" in sentence
-    twice = sma.set_parameters(kept.system, {"amplifier_gain": 3.2})
-    assert float(plant_of(kept, twice)[0].drive.largest_command()) == pytest.approx(5.0)
+    assert float(plant_of(kept, {"amplifier_gain": 3.2})[0].drive.largest_command()) == pytest.approx(5.0)
+    assert float(plant_of(kept, limit=4.0)[0].drive.largest_command()) == pytest.approx(4.0)
+    given_by_set, sentence = plant_of(kept, {"amplifier_limit": "9 V"}, limit=4.0)
+    assert float(sma.get_parameters(given_by_set, ["amplifier_limit"])[0]) == pytest.approx(9.0)
+    assert sentence == ""
     given = dataclasses.replace(kept.parameters["amplifier_limit"], value=20.0, origin="given")
     own = dataclasses.replace(kept, parameters={**kept.parameters, "amplifier_limit": given})
     assert plant_of(own)[1] == ""
@@ -67,6 +70,18 @@ def test_gains_are_tuned_and_compared_on_plants_from_the_posterior(tmp_path: Pat
         == 4
     )
     gains = tmp_path / "tuned" / "gains.json"
+    written = json.loads(gains.read_text(encoding="utf-8"))
+    assert written["loop"]["command_limit"] == {"value": pytest.approx(5.0), "unit": "V"}
+    assert written["loop"]["period"] == {"value": 0.01, "unit": "s"}
+    assert written["loop"]["noise"] == {"value": pytest.approx(NOISE), "unit": "m"}  # of the model file
+    assert written["fixed"]["rate_filter"]["unit"] == "s"
+    assert written["fixed"]["largest_voltage"]["value"] <= 5.0 * (1.0 + 1e-12)
+    record = json.loads((tmp_path / "tuned" / "tune.json").read_text(encoding="utf-8"))
+    assert record["loop"] == written["loop"]
+    assert record["fixed"] == written["fixed"]
+    page = (tmp_path / "tuned" / "tune.html").read_text(encoding="utf-8")
+    assert "up to 5 V" in page
+    assert "0.1 mm of noise" in page
     ended = smajax("simulate", "--model", model, "--gains", gains, "--set-point", "5mm:4s", "--out", tmp_path / "loop")
     assert ended.code == 0, ended.said
     words: list[str | Path] = [

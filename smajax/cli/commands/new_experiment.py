@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 import typer
 
 from smajax.cli import completion
-from smajax.cli.options import UNMET, Json, quantity, texts
+from smajax.cli.options import UNMET, Decimal, Json, quantity, texts
 
 if TYPE_CHECKING:
     from smajax.attribution.preset_ranking import PresetRanking
@@ -46,9 +46,7 @@ def new_experiment(
         Path | None,
         typer.Option(help="a model.toml to begin from, in the place of presets; what it fitted is fitted again"),
     ] = None,
-    decimal: Annotated[
-        str, typer.Option(help="`,` or `.`: the decimal mark, for logs that do not determine it (`1,234`)")
-    ] = "",
+    decimal: Decimal = "",
     known: Annotated[
         list[str] | None,
         typer.Option("--known", help="parameters that you measured: wire_length='0.5 m'; may be repeated"),
@@ -78,7 +76,7 @@ def new_experiment(
 
     Example:  smajax new-experiment logs/*.csv --known wire_length='0.5 m',wire_diameter='0.31 mm' --ohms 4.2ohm --mass ramp='500 g'
     """
-    _check_options(out, overwrite, decimal, model is not None and bool(load or wire or drive))
+    _check_options(out, overwrite, model is not None and bool(load or wire or drive))
     given, (masses, others) = texts("--known", known, KNOWN), _masses(mass or ())
     from smajax.core.runtime import prepare
 
@@ -119,14 +117,12 @@ class _Loaded(NamedTuple):
     ranking: PresetRanking | None
 
 
-def _check_options(out: Path, overwrite: bool, decimal: str, twice: bool) -> None:
+def _check_options(out: Path, overwrite: bool, twice: bool) -> None:
     """Raises typer.BadParameter. twice: the presets are named beside a model file."""
     if out.exists() and not overwrite:
         raise typer.BadParameter(f"{out} exists; give another name, or --overwrite.", param_hint="--out")
     if not out.parent.is_dir():
         raise typer.BadParameter(f"the folder {out.parent} does not exist.", param_hint="--out")
-    if decimal not in ("", ",", "."):
-        raise typer.BadParameter(f"`,` or `.`, not `{decimal}`.", param_hint="--decimal")
     if twice:
         raise typer.BadParameter(
             "says wire, load and drive: leave --wire, --load and --drive out.", param_hint="--model"

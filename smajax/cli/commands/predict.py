@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from smajax.cli.options import Json, Open, Overwrite, texts
+from smajax.cli.options import Decimal, Json, Open, Overwrite, texts
 from smajax.cli.terminal import browse, command_line, console, resumable
 
 if TYPE_CHECKING:
@@ -32,9 +32,7 @@ def predict_command(
         list[str] | None,
         typer.Option("--set", help="parameters that differ in these runs: load_mass='0.2 kg'; may be repeated"),
     ] = None,
-    decimal: Annotated[
-        str, typer.Option(help="`,` or `.`: the decimal mark, for logs that do not determine it (`1,234`)")
-    ] = "",
+    decimal: Decimal = "",
     out: Annotated[Path, typer.Option(help="folder for predict.html, predict.json and runs.csv")] = Path("predicted"),
     overwrite: Overwrite = False,
     json_out: Json = False,
@@ -59,8 +57,6 @@ def predict_command(
     from smajax.report.predict_page import FILES, record, write_prediction
 
     check_path(out)
-    if decimal not in ("", ",", "."):
-        raise typer.BadParameter(f"`,` or `.`, not `{decimal}`.", param_hint="--decimal")
     constants, changed = texts("--input", inputs, INPUTS), texts("--set", values, VALUES)
     command = command_line()
     loaded = load_model(model)

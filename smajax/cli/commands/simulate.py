@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from smajax.cli import completion
-from smajax.cli.loop_options import Delay, Estimator
-from smajax.cli.options import Finely, Json, Noise, Open, Overwrite, quantity, texts, tolerance_of
+from smajax.cli.loop_options import Delay, Estimator, Noise, Period
+from smajax.cli.options import Finely, Json, Open, Overwrite, quantity, texts, tolerance_of
 from smajax.cli.terminal import browse, command_line, console, resumable
 
 if TYPE_CHECKING:
-    from smajax.control.run_request import LoopRequest, RunRequest, RunResult
+    from smajax.control.run_request import LoopRequest, RunRequest
+    from smajax.control.run_result import RunResult
 
 SHOWN = 7  # columns of a table of set points on a terminal
 OPTIONS = {
@@ -23,6 +24,7 @@ OPTIONS = {
     "mismatch": "--mismatch",
     "set_points": "--set-point",
     "noise": "'--noise'",
+    "plant": "--plant",
 }  # part of a run -> its option
 WIRE, LOAD, DRIVE = "niti_table_3_1", "arm", "amplified_voltage"
 VALUES = "damping=+20%,wire_length='1 m'"
@@ -51,6 +53,7 @@ class _Options:
     mismatch: Mapping[str, str]
     time: str
     animated: bool
+    plant: Path | None
 
     @property
     def closed(self) -> bool:
@@ -78,6 +81,8 @@ class _Options:
             raise typer.BadParameter("a coupon moves nothing that could be drawn.", param_hint="--gif")
         if not self.closed and self.mismatch:
             raise typer.BadParameter("--mismatch is for closed loops; use --set.")
+        if not self.closed and self.plant is not None:
+            raise typer.BadParameter("--plant is for closed loops; an open run of a model is --model.")
 
     def stepped(self, request: RunRequest) -> RunRequest:
         """The request with --step as the one required input. Raises ValueError for a model with none or several."""
@@ -232,10 +237,16 @@ def simulate(
             autocompletion=completion.values,
         ),
     ] = None,
-    estimator: Estimator = "",
+    plant: Annotated[
+        Path | None,
+        typer.Option(
+            help="a closed loop on this other model file, whose controller knows --model (or wire, load and drive)"
+        ),
+    ] = None,
+    estimator: Estimator = None,
     noise: Noise = "",
-    period: Annotated[float, quantity("sample time of the controller, a multiple of --dt", "s")] = 0.01,
-    delay: Delay = 0,
+    period: Period = None,
+    delay: Delay = None,
     seed: Annotated[int, typer.Option(help="of the noise")] = 0,
     gif: Annotated[
         bool, typer.Option("--gif", help="draw the load moving beside its wire's phase diagram: simulate.gif")
@@ -277,23 +288,28 @@ def simulate(
     check_path(out)
     perturbed = texts("--mismatch", mismatch, VALUES)
     series = _inputs("--input", inputs)
-    options = _Options(step, series, gains, controller, set_point, perturbed, time, gif)
+    options = _Options(step, series, gains, controller, set_point, perturbed, time, gif, plant)
     if model is not None and (wire, load, drive, law) != (WIRE, LOAD, DRIVE, ""):
         raise typer.BadParameter("says wire, load, drive and law: leave these out.", param_hint="--model")
-    options.check(load if model is None else load_model(model).load)
+    kept, true = (None if path is None else load_model(path) for path in (model, plant))
+    options.check(load if kept is None else kept.load)
     changed, finely = texts("--set", values, VALUES), tolerance_of(tolerance)
     compared = _inputs("--measured", measured)
-    kept = "" if model is None else str(model)
     request = RunRequest(wire, load, drive, law, changed, series, time, seconds, dt, finely, kept, compared)
-    loop = LoopRequest(controller, set_point or "", gains, perturbed, estimator, noise or 0.0, period, delay, seed)
+    loop = LoopRequest(
+        controller, set_point or "", gains, perturbed, estimator, noise or None, period, delay, seed, true
+    )
     request, result = _run(options, request, loop)
     command = command_line()
     what = f"{wire}, {load}, {drive}" if model is None else str(model)
     title = what + (f", {result.data.attrs['controller']}" if options.closed else "")
+    title += "" if plant is None else f", on {plant}"
     settings = {
         **vars(request),
         **(vars(loop) if options.closed else {}),
         "gains": None if gains is None else gains.read_text(),
+        "model": None if model is None else str(model),
+        "plant": None if plant is None else str(plant),
     }
     with resumable(), claimed(out, "simulate", settings, FILES, overwrite), displayed(console()) as progress:
         page = write_run(result, out, title, command, gif, progress)

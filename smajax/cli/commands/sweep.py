@@ -2,120 +2,120 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from smajax.cli import completion
-from smajax.cli.loop_options import Delay, Estimator, LoopSeconds, Period
+from smajax.cli.loop_options import Delay, Estimator, LoopSeconds, Noise, Period
 from smajax.cli.options import (
     Finely,
     Json,
-    Noise,
     Open,
     Overwrite,
     alone,
-    noise_option,
     numbers,
     refused,
     tolerance_of,
     understood,
     within,
 )
-from smajax.cli.plant_options import Changes, Drawn, DriveName, LawName, LoadName, ModelFile, PlantOptions, WireName
+from smajax.cli.plant_options import (
+    Changes,
+    Drawn,
+    DriveName,
+    LawName,
+    LoadName,
+    ModelFile,
+    PlantOptions,
+    WireName,
+    set_points_of,
+)
 from smajax.cli.terminal import browse, command_line, console, resumable
 
 if TYPE_CHECKING:
+    from smajax.control.gains_file import Gains
+    from smajax.control.loop_settings import LoopSettings
     from smajax.control.sweep.run_sweep import SweepSettings
     from smajax.model.system import System
 
-SET_POINTS, FAST_AT, GAINS = "-40,-20,0,10,20,40,50,60,80", "-20,20,60", "0.5,0.7,1,1.4,2"  # of the arm
 SEED = 0  # of plants drawn from a posterior
-FEW, MANY = 3, 6  # set points of another load, with --fast and without
+
+
+def _tuned(files: Sequence[Path], options: PlantOptions) -> tuple[Gains, ...]:
+    """The gains of --gains; without their limit of the command where --set gives one. Raises typer.BadParameter."""
+    from smajax.control.gains_file import GainsFileError, read_gains
+
+    bare = options.bare()
+    try:
+        with refused():
+            tuned = tuple(read_gains(path, bare) for path in files)
+    except GainsFileError as error:
+        hint = " Ratios of the main gain are `--gain-ratios`." if any(not one.suffix for one in files) else ""
+        raise typer.BadParameter(f"{error}{hint}", param_hint="--gains") from None
+    return tuple(one.without_limit() for one in tuned) if options.gives_limit else tuned
 
 
 @dataclass(frozen=True)
 class _Options:
     """Options of `sweep` as typed, where more than one decides."""
 
-    plant: System
     controllers: str | None
     over: str | None
     points: int | None
     set_points: str | None
-    gain_files: tuple[Path, ...]
     gain_ratios: str | None
     fast: bool
 
-    def mismatches(self) -> tuple[str, str]:
-        """Both names of --over, "" for the second where there is one alone. Raises typer.BadParameter."""
+    def mismatches(self, plant: System) -> dict[str, str]:
+        """Both names of --over, "" for the second where there is one alone; nothing without the option. Raises typer.BadParameter."""
         from smajax.control.mismatch import mismatches_of, short_name
         from smajax.control.sweep.grid import check_mismatches
 
-        there = tuple(mismatches_of(self.plant))
-        over = self.over or "convection," + ("damping" if "damping" in there else "ambient")
-        first, _, second = (part.strip() for part in over.strip(" ,").partition(","))
-        if "=" in over:
+        if self.over is None:
+            return {}
+        first, _, second = (part.strip() for part in self.over.strip(" ,").partition(","))
+        if "=" in self.over:
             raise typer.BadParameter(
-                f"names alone, as in `convection,damping`, not `{over}`: each goes from -50% to +100% in --points steps.",
+                f"names alone, as in `convection,damping`, not `{self.over}`: each goes from -50% to +100% in --points steps.",
                 param_hint="--over",
             )
         if not first or "," in second:
             raise typer.BadParameter(
-                f"one mismatch, or two with a comma between them, not `{over}`", param_hint="--over"
+                f"one mismatch, or two with a comma between them, not `{self.over}`", param_hint="--over"
             )
         first, second = short_name(first), short_name(second)
         try:
-            check_mismatches(first, second, there)
+            check_mismatches(first, second, tuple(mismatches_of(plant)))
         except ValueError as error:
             raise typer.BadParameter(str(error), param_hint="--over") from None
-        return first, second
+        return {"first": first, "second": second}
 
-    def settings(self, seconds: float | None, estimator: str, noise: str, period: float, delay: int) -> SweepSettings:
-        """Raises typer.BadParameter."""
-        from smajax.control.gains_file import GainsFileError, read_gains
-        from smajax.control.position_unit import default_set_points, unit_of
-        from smajax.control.scales import is_arm, seconds_for
+    def settings(self, plant: System, tuned: tuple[Gains, ...], **loop: Any) -> SweepSettings:
+        """loop: further fields of `SweepSettings`. Raises typer.BadParameter."""
         from smajax.control.sweep.run_sweep import sweep_settings_for
 
-        with refused():
-            unit = unit_of(self.plant)
-        try:
-            tuned = tuple(read_gains(path, self.plant) for path in self.gain_files)
-        except GainsFileError as error:
-            hint = (
-                " Ratios of the main gain are `--gain-ratios`."
-                if any(not one.suffix for one in self.gain_files)
-                else ""
-            )
-            raise typer.BadParameter(f"{error}{hint}", param_hint="--gains") from None
         request = self.controllers or ",".join(dict.fromkeys(one.controller for one in tuned)) or "all"
         named = [part.strip() for part in request.split(",")]
-        if self.set_points is not None:
-            set_points = numbers("--set-points", self.set_points, unit.shown)
-        elif is_arm(self.plant):
-            set_points = numbers("", FAST_AT if self.fast else SET_POINTS)
-        else:
-            set_points = default_set_points(self.plant, FEW if self.fast else MANY)
-        ratios = self.gain_ratios if self.gain_ratios is not None else "1" if self.fast else GAINS
-        first, second = self.mismatches()
-        return sweep_settings_for(
-            self.plant,
-            None if named == ["all"] else [*dict.fromkeys(part for part in named if part)],
-            first=first,
-            second=second,
-            points=self.points or (3 if self.fast else 15),
-            set_points=set_points,
-            gain_ratios=numbers("--gain-ratios", ratios),
-            seconds=seconds_for(self.plant) if seconds is None else seconds,
-            estimator=estimator,
-            noise=noise_option(noise, unit),
-            period=period,
-            delay=delay,
-            tuned=tuned,
-        )
+        given: dict[str, Any] = {**self.mismatches(plant), **set_points_of(plant, self.set_points, self.fast), **loop}
+        if self.points or self.fast:
+            given["points"] = self.points or 3
+        if self.gain_ratios is not None or self.fast:
+            given["gain_ratios"] = numbers("--gain-ratios", "1" if self.gain_ratios is None else self.gain_ratios)
+        controllers = None if named == ["all"] else [*dict.fromkeys(part for part in named if part)]
+        with refused():
+            return sweep_settings_for(plant, controllers, tuned=tuned, **given)
+
+
+def _sentences(tuned: Sequence[Gains], given: LoopSettings, plant: System, settings: SweepSettings) -> tuple[str, ...]:
+    """What the loops take from the files of gains."""
+    from smajax.control.loop_settings import LoopInUse, sentences, settings_of
+
+    own = settings_of(plant, LoopInUse(None, settings.period, settings.delay, settings.estimator), settings.noise)
+    return tuple(sentences({one.controller: (one.loop, one.fixed) for one in tuned}, given, own))
 
 
 # More than 8 parameters and 80 lines: typer reads the options from them.
@@ -165,10 +165,10 @@ def sweep(
         str | None, typer.Option(help="multiples of the controller's main gain; default 0.5,0.7,1,1.4,2")
     ] = None,
     seconds: LoopSeconds = None,
-    estimator: Estimator = "",
+    estimator: Estimator = None,
     noise: Noise = "",
-    period: Period = 0.01,
-    delay: Delay = 0,
+    period: Period = None,
+    delay: Delay = None,
     tolerance: Finely = "auto",
     out: Annotated[
         Path,
@@ -206,23 +206,44 @@ def sweep(
     prepare(cores=True)
     from smajax.cli.progress_display import displayed
     from smajax.cli.result_folder import FolderTaken, claimed
+    from smajax.control.loop_settings import LoopSettings, joined
+    from smajax.control.position_unit import unit_of
+    from smajax.control.reach import reach_of, reach_sentence
     from smajax.control.scales import is_arm
     from smajax.control.sweep.run_sweep import may_resume, sweep_controllers
     from smajax.core.provenance import digest
     from smajax.report.sweep_folder import as_text, files_of, write_sweep
 
     plant_options = PlantOptions(wire, load, drive, law, values or [], model)
-    plant, plants = plant_options.system(), plant_options.draws(drawn, SEED, others=over is not None)
-    options = _Options(plant, controllers, over, points, set_points, tuple(gains or ()), gain_ratios, fast)
-    settings = replace(options.settings(seconds, estimator, noise, period, delay), tolerance=tolerance_of(tolerance))
+    tuned = _tuned(tuple(gains or ()), plant_options)
+    given = LoopSettings(period=period, delay=delay, estimator=estimator)
+    with refused():
+        loop = joined({one.controller: one.loop for one in tuned}, given)
+    plant = plant_options.system(loop.command_limit)
+    plants = plant_options.draws(drawn, SEED, others=over is not None, limit=loop.command_limit)
+    with refused():
+        sigma, source = plant_options.noise(noise, unit_of(plant))
+    between: dict[str, Any] = {"period": loop.period, "delay": loop.delay, "estimator": loop.estimator, "noise": sigma}
+    between |= {} if seconds is None else {"seconds": seconds}
+    options = _Options(controllers, over, points, set_points, gain_ratios, fast)
+    settings = options.settings(plant, tuned, tolerance=tolerance_of(tolerance), **between)
+    with refused():
+        settings.check(plant, plants)
+    said = (
+        source,
+        *_sentences(tuned, given, plant, settings),
+        reach_sentence(reach_of(plant), plant, settings.set_points),
+    )
+    said = tuple(one for one in said if one)
     for sentence in (
         understood("Set points", set_points, settings.set_points, settings.unit),
         understood("Ratios of the main gain", gain_ratios, settings.gain_ratios),
+        *said,
     ):
         if sentence and not json_out:
             typer.echo(sentence, err=True)
     request = settings.record()
-    if not is_arm(plant) or law or values:
+    if not is_arm(plant) or law or values or loop.command_limit is not None:
         request["plant"] = digest(plant)[:16]
     if plants is not None:
         request["plants"] = digest(plants)[:16]
@@ -234,7 +255,7 @@ def sweep(
             displayed(console(), hint=not json_out) as progress,
         ):
             sweeps = sweep_controllers(plant, settings, out, progress, plants)
-            results = write_sweep(plant, settings, sweeps, out, progress, command_line(), plants)
+            results = write_sweep(plant, settings, sweeps, out, progress, command_line(), plants, said)
     except FolderTaken:
         raise
     except ValueError as error:

@@ -10,17 +10,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from smajax.cli import completion
-from smajax.cli.loop_options import Delay, Estimator, LoopSeconds, Period
+from smajax.cli.loop_options import Delay, Estimator, LoopSeconds, Noise, Period
 from smajax.cli.options import (
     UNMET,
     Finely,
     Json,
-    Noise,
     Open,
     Overwrite,
     alone,
-    noise_option,
-    numbers,
     pairs,
     refused,
     texts,
@@ -28,16 +25,23 @@ from smajax.cli.options import (
     understood,
     within,
 )
-from smajax.cli.plant_options import Changes, Drawn, DriveName, LawName, LoadName, ModelFile, PlantOptions, WireName
+from smajax.cli.plant_options import (
+    Changes,
+    Drawn,
+    DriveName,
+    LawName,
+    LoadName,
+    ModelFile,
+    PlantOptions,
+    WireName,
+    set_points_of,
+)
 from smajax.cli.terminal import browse, command_line, console, resumable
 
 if TYPE_CHECKING:
     from smajax.control.gains_file import Gains
     from smajax.control.tune.settings import TuneSettings
     from smajax.model.system import System
-
-TUNED_AT, FAST_AT = "-40,-20,0,20,40,60,85", "-20,20,60"  # of the arm
-FEW, MANY = 3, 6  # set points of another load, with --fast and without
 
 
 @dataclass(frozen=True)
@@ -96,6 +100,8 @@ def _run(
     """The record of the tuning, from the folder where it is finished there. Raises typer.BadParameter."""
     from smajax.cli.progress_display import displayed
     from smajax.cli.result_folder import FolderTaken, claimed
+    from smajax.control.presets import CONTROLLERS
+    from smajax.control.reach import reach_of, reach_sentence
     from smajax.control.tune.tuning_folder import FILES, STATE, tune_in_folder
     from smajax.report.tune_folder import finished, write_tuning
 
@@ -103,6 +109,9 @@ def _run(
     request = {"tuning": settings.controller}  # the other settings are in a file of the tuning itself, which it checks
     try:
         settings.check(plant, plants)
+        made = CONTROLLERS[settings.controller].make(plant)
+        if sentence := reach_sentence(reach_of(plant, made), plant, settings.set_points):
+            raise ValueError(sentence)
         with (
             resumable(resume, out, STATE),
             claimed(out, "tune", request, sorted(FILES), overwrite),
@@ -184,10 +193,10 @@ def tune(
         ),
     ] = None,
     seconds: LoopSeconds = None,
-    estimator: Estimator = "",
+    estimator: Estimator = None,
     noise: Noise = "",
-    period: Period = 0.01,
-    delay: Delay = 0,
+    period: Period = None,
+    delay: Delay = None,
     seed: Annotated[int, typer.Option(callback=within(0), help="of starting points, plants and noise")] = 0,
     tolerance: Finely = "auto",
     out: Annotated[Path, typer.Option(help="folder for gains.json, the page, the pictures and the numbers")] = Path(
@@ -223,9 +232,8 @@ def tune(
     from smajax.core.runtime import prepare
 
     prepare(cores=True)
-    from smajax.control.position_unit import default_set_points, unit_of
-    from smajax.control.scales import is_arm, seconds_for
-    from smajax.control.tune.settings import regulation_weights, settings_for
+    from smajax.control.position_unit import unit_of
+    from smajax.control.tune.settings import settings_for
     from smajax.control.tune.terms import terms_in
     from smajax.report.tune_page import gain_rows
 
@@ -235,35 +243,32 @@ def tune(
         unit = unit_of(plant)
     initial = _initial_gains(start, controller, plant)
     units = {name: term.unit for name, term in terms_in(unit).items()}
-    if set_points is None:
-        given = (
-            numbers("", FAST_AT if fast else TUNED_AT)
-            if is_arm(plant)
-            else default_set_points(plant, FEW if fast else MANY)
-        )
-    else:
-        given = numbers("--set-points", set_points, unit.shown)
-    effort: dict[str, Any] = _Search(starts, rounds, finish, fast).effort()
+    sigma, source = options.noise(noise, unit)
+    given: dict[str, Any] = {
+        "weights": pairs("--weights", weights, {}, "settling_time=1,overshoot=1") or None,
+        "seconds": seconds,
+        "estimator": estimator,
+        "period": period,
+        "delay": delay,
+        "start": None if initial is None else initial.values,
+        **_Search(starts, rounds, finish, fast).effort(),
+    }
     settings = settings_for(
         plant,
         controller,
         plants,
-        set_points=given,
         variation=_variation(variation, plant),
         objective=objective,
-        weights=pairs("--weights", weights, {}, "settling_time=1,overshoot=1") or regulation_weights(plant),
         limits=pairs("--limits", limits, units, "settling_time=4,overshoot=2deg"),
         by=by,
-        seconds=seconds_for(plant) if seconds is None else seconds,
-        estimator=estimator,
-        noise=noise_option(noise, unit),
-        period=period,
-        delay=delay,
+        noise=sigma,
         seed=seed,
-        start={} if initial is None else initial.values,
         tolerance=tolerance_of(tolerance),
-        **effort,
+        **set_points_of(plant, set_points, fast),
+        **{name: one for name, one in given.items() if one is not None},
     )
+    if source and not json_out:
+        typer.echo(source, err=True)
     sentence = understood("Set points", set_points, settings.set_points, unit.shown)
     if sentence and not json_out:
         typer.echo(sentence, err=True)

@@ -14,7 +14,7 @@ import numpy as np
 from smajax.control.figures_of_merit import Merit
 from smajax.control.gains_file import Gains
 from smajax.control.interface import between_in_words, check_interface, check_set_points, interface_of
-from smajax.control.mismatch import MISMATCHES, mismatches_of
+from smajax.control.mismatch import MISMATCHES, default_mismatches
 from smajax.control.plants import Plants, PlantSet, carrying, plant_set
 from smajax.control.position_unit import PositionUnit, check_unit, default_set_points, unit_named, unit_of
 from smajax.control.presets import CONTROLLERS, check_controller, controllers_for
@@ -69,7 +69,9 @@ class SweepSettings:
 
     def record(self) -> dict[str, Any]:
         """For JSON."""
-        return json.loads(json.dumps({**vars(self), "tuned": [vars(one) for one in self.tuned]}, default=dict))
+        return json.loads(
+            json.dumps({**vars(self), "tuned": [dataclasses.asdict(one) for one in self.tuned]}, default=dict)
+        )
 
     @property
     def between(self) -> str:
@@ -106,9 +108,8 @@ def sweep_settings_for(system: System, controllers: Sequence[str] | None = None,
 
     controllers: by default all that this plant gives what they need. given: fields of `SweepSettings`.
     """
-    there = mismatches_of(system)
     defaults: dict[str, Any] = {"unit": unit_of(system).shown, "seconds": seconds_for(system)}
-    defaults["second"] = "damping" if "damping" in there else "ambient"
+    defaults["first"], defaults["second"] = default_mismatches(system)
     if not is_arm(system):
         defaults["set_points"] = default_set_points(system)
     return SweepSettings(

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from smajax.control.controllers.base import AbstractController
-from smajax.control.gains_file import Gains
+from smajax.control.gains_file import Gains, fixed_parameters
 from smajax.control.interface import interface_of
+from smajax.control.loop_settings import LoopInUse, LoopSettings, settings_of
 from smajax.control.mismatch import MISMATCHES
 from smajax.control.plants import Plants, PlantSet, carrying, plant_set
 from smajax.control.presets import CONTROLLERS
@@ -57,7 +58,7 @@ class TuningResult:
     before: Mapping[str, float]
     after: Gains
     box: Mapping[str, tuple[float, float]]
-    units: Mapping[str, str]
+    units: Mapping[str, str]  # of the gains and of the parameters that were not tuned
     checks: Mapping[str, Check]  # `tuned on`, `inside`, `beyond`
     costs: tuple[float, float]  # before and after, on what was tuned on
     excesses: Mapping[str, tuple[float, float]]  # by which a limit is exceeded, of each check
@@ -179,7 +180,8 @@ def _validated(
     pair = np.stack([problem.before, problem.point(best)])
     held = held_out(settings.set_points, settings.variation, settings.unseen, settings.seed, problem.plants)
     checks: dict[str, Check] = {}
-    tuned = Gains(settings.controller, best)
+    fixed = fixed_parameters(settings.controller, problem.controller)
+    tuned = Gains(settings.controller, best, fixed, loop_settings(problem.system, settings))
     # What is small for the preset's gains need not be for those that were found.
     error = _integrated(problem, settings, tuned.put(problem.system), task.scenarios, FINE)
     for name, scenarios in {"tuned on": task.scenarios, **held}.items():
@@ -197,7 +199,7 @@ def _validated(
         dict(zip(problem.names, preset, strict=True)),
         tuned,
         problem.box,
-        {name: unit_on(table[name].unit, problem.system) for name in problem.names},
+        {name: unit_on(table[name].unit, problem.system) for name in (*problem.names, *fixed)},
         checks,
         (float(cost[0]), float(cost[1])),
         {name: (float(one[0]), float(one[1])) for name, one in excesses.items()},
@@ -210,6 +212,12 @@ def _validated(
         problem.plants,
         error,
     )
+
+
+def loop_settings(system: System, settings: TuneSettings) -> LoopSettings:
+    """What lies between plant and controller, as a file of gains has it."""
+    noise = float(settings.shown.to_own(settings.noise))
+    return settings_of(system, LoopInUse(None, settings.period, settings.delay, settings.estimator), noise)
 
 
 def _integrated(

@@ -1,0 +1,182 @@
+"""What gains were tuned with beside the model: limit of the command, control period, delay, filter, noise of the sensor."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple, TypeGuard
+
+from smajax.control.load_equation import moving_load
+from smajax.control.presets import FILTERS
+from smajax.core.display_units import digits, display
+from smajax.core.names import close_matches
+from smajax.core.wording import and_listed, counted
+from smajax.model.system import System
+
+PERIOD = 0.01  # s, where nobody says another
+LIMIT_PARAMETER = "amplifier_limit"  # of a drive whose command has one
+
+
+@dataclass(frozen=True)
+class LoopSettings:
+    """Each None where it is not known; command_limit in `command_unit`, noise (standard deviation) in `position_unit`."""
+
+    command_limit: float | None = None  # None too: a drive without a limit
+    period: float | None = None  # s
+    delay: int | None = None  # control periods until a command arrives
+    estimator: str | None = None  # the filter; "": the true state
+    noise: float | None = None
+    command_unit: str = "V"
+    position_unit: str = "m"
+
+    def record(self) -> dict[str, Any]:
+        """For JSON, what is known."""
+        whole: dict[str, Any] = {
+            "command_limit": _with_unit(self.command_limit, self.command_unit),
+            "period": _with_unit(self.period, "s"),
+            "delay_periods": self.delay,
+            "filter": self.estimator,
+            "noise": _with_unit(self.noise, self.position_unit),
+        }
+        return {name: one for name, one in whole.items() if one is not None}
+
+    def words(self) -> str:
+        """`the command up to 6 V, a control period of 10 ms`; "" of nothing known. The noise is the plant's, and left out."""
+        parts = []
+        if self.command_limit is not None:
+            parts.append(f"the command up to {digits(self.command_limit, 4)} {self.command_unit}")
+        if self.period is not None:
+            parts.append(f"a control period of {1e3 * self.period:g} ms")
+        if self.delay:
+            parts.append(f"a delay of {counted(self.delay, 'period')}")
+        if self.estimator:
+            parts.append(f"the filter `{self.estimator}`")
+        return and_listed(parts) if parts else ""
+
+    def noise_words(self) -> str:
+        """`0.1 mm of noise`, or `no noise`."""
+        if not self.noise:
+            return "no noise"
+        shown = display(self.position_unit)
+        return f"{digits(shown.of(self.noise), 3)} {shown.unit} of noise"
+
+
+NOT_KNOWN = LoopSettings()
+
+
+def _with_unit(value: float | None, unit: str) -> dict[str, Any] | None:
+    return None if value is None else {"value": value, "unit": unit}
+
+
+class LoopInUse(NamedTuple):
+    """Of a loop that runs: as `LoopSettings`, known but for the limit, which is None where the plant's own holds."""
+
+    command_limit: float | None = None
+    period: float = PERIOD
+    delay: int = 0
+    estimator: str = ""
+
+
+def settings_of(system: System, loop: LoopInUse, noise: float) -> LoopSettings:
+    """Those of a loop on this plant, whose own limit they have. noise: rad or m."""
+    limit = float(system.drive.largest_command())
+    return LoopSettings(
+        limit if math.isfinite(limit) else None,
+        loop.period,
+        loop.delay,
+        loop.estimator,
+        noise,
+        system.drive.command[1],
+        moving_load(system).reading[1],
+    )
+
+
+def read_settings(held: Any, system: System) -> LoopSettings:
+    """What `LoopSettings.record` wrote. Raises ValueError for what it cannot have written."""
+    if not isinstance(held, dict):
+        raise ValueError(f"`loop` must be a table such as {{'period': {{'value': 0.01, 'unit': 's'}}}}, not {held!r}.")
+    known = ("command_limit", "period", "delay_periods", "filter", "noise")
+    for name in held:
+        if name not in known:
+            raise ValueError(f"`loop` has no {name!r}{close_matches(str(name), known, 'there are')}.")
+    command, position = system.drive.command[1], moving_load(system).reading[1]
+    delay, estimator = held.get("delay_periods"), held.get("filter")
+    if delay is not None and (isinstance(delay, bool) or not isinstance(delay, int) or delay < 0):
+        raise ValueError(f"`loop`: delay_periods must be a whole number, 0 or more, not {delay!r}.")
+    if estimator is not None and estimator != "" and estimator not in FILTERS:
+        raise ValueError(f"`loop`: no filter {estimator!r}{close_matches(str(estimator), FILTERS, 'there are')}.")
+    return LoopSettings(
+        _number("command_limit", held.get("command_limit"), command),
+        _number("period", held.get("period"), "s"),
+        delay,
+        estimator,
+        _number("noise", held.get("noise"), position, zero=True),
+        command,
+        position,
+    )
+
+
+def is_number(value: Any) -> TypeGuard[float]:
+    """A finite number, and no `true`."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= sys.float_info.max
+
+
+def _number(name: str, held: Any, unit: str, zero: bool = False) -> float | None:
+    """SI. zero: whether it may be 0. Raises ValueError for no number, one that is not positive, or one in another unit."""
+    if held is None:
+        return None
+    value, own = (held.get("value"), held.get("unit", unit)) if isinstance(held, dict) else (held, unit)
+    if not is_number(value) or value < 0.0 or (value == 0.0 and not zero):
+        raise ValueError(f"`loop`: {name} must be a number, {'0 or more' if zero else 'more than 0'}, not {value!r}.")
+    if own != unit:
+        raise ValueError(f"`loop`: {name} is given in {own!r}; expected {unit!r}.")
+    return float(value)
+
+
+OPTIONS = {
+    "command_limit": f"--set {LIMIT_PARAMETER}",
+    "period": "--period",
+    "delay": "--delay",
+    "estimator": "--estimator",
+}
+
+
+def joined(files: Mapping[str, LoopSettings], given: LoopSettings) -> LoopInUse:
+    """What is given, and for the rest what the files of gains say, each by its controller.
+
+    Raises ValueError where files differ in what is not given.
+    """
+    chosen: dict[str, Any] = {}
+    for name, option in OPTIONS.items():
+        own = getattr(given, name)
+        said = {controller: getattr(one, name) for controller, one in files.items() if getattr(one, name) is not None}
+        if own is None and len(set(said.values())) > 1:
+            each = and_listed([f"{value!r} ({controller})" for controller, value in said.items()])
+            raise ValueError(f"the gains were tuned with several values of {name}, {each}: say which with {option}.")
+        value = own if own is not None else next(iter(said.values()), None)
+        chosen |= {} if value is None else {name: value}
+    return LoopInUse(**chosen)
+
+
+def sentences(
+    files: Mapping[str, tuple[LoopSettings, Mapping[str, float]]], given: LoopSettings, own: LoopSettings
+) -> Iterator[str]:
+    """Of each file of gains what the loop takes from it, and what it means where the file is older and says nothing.
+
+    files: controller -> (its loop, its parameters that were not tuned, SI). given: by options, which go first. own: those of the loop that runs.
+    """
+    for controller, (loop, fixed) in files.items():
+        if loop == NOT_KNOWN and not fixed:
+            yield (
+                f"The gains of {controller} are from a file that says neither limit, filter nor control period (an older version, or written "
+                f"by hand): those of this plant and of the options hold, {own.words()}."
+            )
+            continue
+        over: dict[str, Any] = {name: None for name in OPTIONS if getattr(given, name) is not None}
+        taken = replace(loop, **over)
+        others = [f"{name} {digits(value, 4)}" for name, value in fixed.items()]
+        words = [one for one in (taken.words(), *others) if one]
+        if words:
+            yield f"As in the file of the gains of {controller}: {', '.join(words)}."

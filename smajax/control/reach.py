@@ -1,0 +1,89 @@
+"""Where a load comes to rest between no command and the largest one: set points beyond are out of reach of every controller."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+
+from smajax.control.controllers.base import AbstractController
+from smajax.control.gains_file import LARGEST
+from smajax.control.load_equation import moving_load
+from smajax.control.position_unit import PositionUnit, band_shown, unit_of
+from smajax.control.scales import seconds_for
+from smajax.core.display_units import digits
+from smajax.core.parameters import parameter_values
+from smajax.model.system import System
+from smajax.simulation.compiled import simulate_compiled
+
+STEP = 0.02  # s
+LONGER = 2.0  # times a closed loop's length, in which the wire comes to rest
+AT_REST = 0.2  # of the run, at its end
+TOLERANCE = 1e-3  # of a step: enough for a reach that is said to three digits
+
+
+class Reach(NamedTuple):
+    """Positions in the unit shown; command: the largest one, in the drive's unit."""
+
+    low: float
+    high: float
+    command: float
+    unit: PositionUnit
+
+    def words(self) -> str:
+        """`with up to 5 V this load comes to rest between 0 and 12.3 mm`."""
+        ends = [digits(0.0 if abs(end) < 1e-6 * abs(self.high - self.low) else end, 3) for end in (self.low, self.high)]
+        return f"with up to {digits(self.command, 4)} {self.unit.command} this load comes to rest between {ends[0]} and {ends[1]} {self.unit.shown}"
+
+
+def reach_of(system: System, controller: AbstractController | None = None) -> Reach | None:
+    """The reach of a plant, by a run without a command and one with the largest, from the start, cold and at rest.
+
+    The largest command is that of the drive, or of the controller where it stays below. None where the reach cannot be known: neither has a
+    limit, or the load follows an input.
+    """
+    load = moving_load(system)
+    own = {} if controller is None else parameter_values(controller)
+    largest = min(float(system.drive.largest_command()), own.get(LARGEST, math.inf))
+    if not math.isfinite(largest) or load.inputs_required:
+        return None
+    samples = round(LONGER * seconds_for(system) / STEP) + 1
+    ends = []
+    for command in (0.0, largest):
+        inputs = system.drive.from_command(jnp.full(samples, command))
+        position = np.asarray(simulate_compiled(system, inputs, STEP, TOLERANCE).position)
+        ends.append(position[-round(AT_REST * samples) :])
+    if not np.isfinite(ends).all():
+        return None
+    unit = unit_of(system)
+    low, high = float(unit.of(np.min(ends))), float(unit.of(np.max(ends)))
+    return Reach(low, high, largest, unit)
+
+
+def out_of_reach(reach: Reach | None, system: System, set_points: Sequence[float]) -> list[float]:
+    """Those of the set points, in the unit shown, that are farther from the reach than what counts as there."""
+    if reach is None:
+        return []
+    near = band_shown(system)
+    return [point for point in set_points if not reach.low - near <= point <= reach.high + near]
+
+
+def reach_sentence(reach: Reach | None, system: System, set_points: Sequence[float]) -> str:
+    """Which set points are out of reach, what the reach is, and what to do; "" for none."""
+    beyond = out_of_reach(reach, system, set_points)
+    if reach is None or not beyond:
+        return ""
+    several = len(beyond) > 1
+    named = ", ".join(f"{point:g}" for point in beyond)
+    higher = (
+        " a higher limit of the command (--set amplifier_limit=..., largest_voltage of the gains),"
+        if max(beyond) > reach.high
+        else ""
+    )
+    return (
+        f"The set point{'s' * several} {named} {reach.unit.shown} {'are' if several else 'is'} out of reach of every controller: {reach.words()}. "
+        f"Give a set point within,{higher} or another load (--set)."
+    )

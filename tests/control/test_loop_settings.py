@@ -1,0 +1,168 @@
+"""Gains in another loop: limit, filter and period of their file, another plant, the noise of a model file, set points out of reach."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from smajax.control.gains_file import GainsFileError, read_gains
+from smajax.control.loop_settings import LoopSettings, joined
+from smajax.control.run_request import LoopRequest, RunRequest, run_closed
+from smajax.control.run_result import RunResult
+from smajax.data.model_file.of_presets import model_of_presets
+from tests.fit.test_predict import NOISE, kept_model
+from tests.helpers.small_bench import refused, smajax
+
+pytestmark = pytest.mark.usefixtures("blank_pictures")
+
+GAINS: dict[str, Any] = {
+    "format": "smajax gains 1",
+    "controller": "pid",
+    "gains": {"proportional_gain": 1200.0, "integral_gain": 200.0, "derivative_gain": 20.0, "unwinding_time": 0.5},
+    "fixed": {"largest_voltage": {"value": 4.5, "unit": "V"}, "rate_filter": {"value": 0.05, "unit": "s"}},
+    "loop": {"command_limit": {"value": 4.5, "unit": "V"}, "period": {"value": 0.02, "unit": "s"}, "delay_periods": 1},
+}
+
+
+@pytest.fixture
+def gains(tmp_path: Path) -> Path:
+    path = tmp_path / "gains.json"
+    path.write_text(json.dumps(GAINS), encoding="utf-8")
+    return path
+
+
+def loop(gains: Path, **given: Any) -> RunResult:
+    request = RunRequest(
+        model=kept_model(volts=7.0),
+        dt=0.01 if "loop" not in gains.read_text() else 0.02,
+        values=given.pop("values", {}),
+    )  # type: ignore[arg-type]
+    return run_closed(request, LoopRequest("", "5mm:1s", gains, noise=0.0, **given))
+
+
+def test_a_loop_takes_limit_filter_and_period_of_the_gains_file_unless_an_option_says_otherwise(gains: Path) -> None:
+    """On another model than the one of the gains, which was fitted to runs of up to 7 V."""
+    own = loop(gains)
+    assert own.loop is not None
+    assert own.loop.command_limit == pytest.approx(4.5)
+    assert (own.loop.period, own.loop.delay) == (0.02, 1)
+    used = json.loads(own.data.attrs["gains"])
+    assert (used["largest_voltage"], used["rate_filter"]) == (4.5, 0.05)
+    assert float(own.data["voltage"].max()) == pytest.approx(4.5)
+    (said,) = own.settings
+    assert said == (
+        "As in the file of the gains of pid: the command up to 4.5 V, a control period of 20 ms and a delay of 1 period, "
+        "largest_voltage 4.5, rate_filter 0.05."
+    )
+    other = loop(gains, period=0.04, delay=0, values={"amplifier_limit": "9.6 V"})  # 6 V by its gain
+    assert other.loop is not None
+    assert other.loop.command_limit == pytest.approx(6.0)
+    assert (other.loop.period, other.loop.delay) == (0.04, 0)
+    assert float(other.data["voltage"].max()) > 4.6
+    assert other.settings == ("As in the file of the gains of pid: rate_filter 0.05.",)
+
+
+def test_an_older_file_of_gains_is_read_and_what_it_means_is_said(gains: Path) -> None:
+    older = {name: one for name, one in GAINS.items() if name not in ("fixed", "loop")}
+    gains.write_text(json.dumps(older), encoding="utf-8")
+    result = loop(gains)
+    assert result.loop is not None
+    assert result.loop.command_limit == pytest.approx(7.0)
+    assert result.loop.period == 0.01
+    assert "says neither limit, filter nor control period" in result.settings[1]
+    assert "the command up to 7 V and a control period of 10 ms" in result.settings[1]
+
+
+@pytest.mark.parametrize(
+    ("part", "entry", "said"),
+    [
+        ("loop", {"period": {"value": 0.0, "unit": "s"}}, "period must be a number, more than 0, not 0.0"),
+        ("loop", {"period": {"value": 10.0, "unit": "ms"}}, "period is given in 'ms'; expected 's'"),
+        ("loop", {"command_limit": "much"}, "command_limit must be a number"),
+        ("loop", {"delay_periods": 0.5}, "delay_periods must be a whole number, 0 or more, not 0.5"),
+        ("loop", {"filter": "kalman"}, "no filter 'kalman'"),
+        ("loop", {"limit": 5.0}, "`loop` has no 'limit'"),
+        ("loop", [], "`loop` must be a table"),
+        ("fixed", {"rate_filter": {"value": 0.02, "unit": "ms"}}, "rate_filter is given in 'ms'; expected 's'"),
+        ("fixed", {"rate": 0.02}, "pid has no fixed parameter 'rate'"),
+        ("fixed", {"rate_filter": -1.0}, "outside of the bounds"),
+    ],
+)
+def test_a_wrong_limit_filter_or_period_of_a_gains_file_is_an_error(
+    gains: Path, part: str, entry: object, said: str
+) -> None:
+    gains.write_text(json.dumps({**GAINS, part: entry}), encoding="utf-8")
+    with pytest.raises(GainsFileError, match=r"gains file") as error:
+        read_gains(gains, kept_model().system)
+    assert said in str(error.value)
+
+
+def test_files_of_gains_that_differ_need_an_option_that_says_which() -> None:
+    files = {"pid": LoopSettings(period=0.01), "sld": LoopSettings(period=0.02), "vsc1": LoopSettings()}
+    with pytest.raises(
+        ValueError, match=r"several values of period, 0.01 \(pid\) and 0.02 \(sld\): say which with --period"
+    ):
+        joined(files, LoopSettings())
+    assert joined(files, LoopSettings(period=0.05)).period == 0.05
+    assert joined({"vsc1": LoopSettings()}, LoopSettings()).period == 0.01
+
+
+def test_the_plant_may_be_another_model_than_the_controllers(tmp_path: Path, gains: Path) -> None:
+    """The controller has its own model and limit; the plant has another heat capacity and an effect more."""
+    heavier = kept_model(volts=7.0)
+    heat = dataclasses.replace(heavier.parameters["specific_heat"], value=900.0)
+    plant = dataclasses.replace(heavier, parameters={**heavier.parameters, "specific_heat": heat})
+    there, same = loop(gains, plant=plant), loop(gains)
+    assert [(one.name, one.assumed, one.true) for one in there.mismatches] == [("specific_heat", 500.0, 900.0)]
+    assert same.mismatches == ()
+    assert float(there.data["temperature"][25]) < float(same.data["temperature"][25]) - 5.0
+    assert there.loop == same.loop
+    path, model = plant.save(tmp_path / "plant.toml"), heavier.save(tmp_path / "model.toml")
+    words: list[str | Path] = ["simulate", "--model", model, "--gains", gains, "--set-point", "5mm:1s", "--dt", "20ms"]
+    arm = model_of_presets("niti_table_3_1", "arm", "amplified_voltage").save(tmp_path / "arm.toml")
+    said = refused(*words, "--plant", arm, "--out", tmp_path / "out")
+    assert "the plant has the load Arm (arm), and the controller's model the load DeadWeight" in said
+    assert "--plant is for closed loops" in refused(
+        "simulate", "--model", model, "--step", "5V:1s", "--plant", path, "--out", tmp_path / "out"
+    )
+    ended = smajax(*words, "--plant", path, "--out", tmp_path / "out", "--json")
+    assert ended.code == 0, ended.said
+    assert json.loads(ended.out)["mismatch"]["specific_heat"]["true"] == 900.0
+
+
+def test_the_noise_is_that_of_the_model_file_unless_an_option_says_otherwise(gains: Path) -> None:
+    request = RunRequest(model=kept_model(), dt=0.02, seconds=0.4)
+    own = run_closed(request, LoopRequest("", "5mm:0.4s", gains))
+    assert own.loop is not None
+    assert own.loop.noise == NOISE
+    assert own.settings[0].startswith("The sensor has the noise of the model file, 0.1 mm (1 sigma)")
+    assert "with 0.1 mm of noise" in own.data.attrs["between"]
+    assert "without noise" in loop(gains).data.attrs["between"]
+    other = run_closed(request, LoopRequest("", "5mm:0.4s", gains, noise="50 um"))
+    assert other.loop is not None
+    assert other.loop.noise == pytest.approx(5e-5)
+
+
+def test_a_set_point_out_of_reach_is_told_apart_from_a_controller_that_fails(tmp_path: Path, gains: Path) -> None:
+    """3.5 V hold this wire within its transformation; a weak controller is no matter of reach."""
+    kept = kept_model()
+    request = RunRequest(model=kept, dt=0.02, values={"amplifier_limit": "5.6 V"})
+    (note,) = run_closed(request, LoopRequest("", "20mm:6s", gains, noise=0.0)).notes
+    assert note.startswith(
+        "The set point 20 mm is out of reach of every controller: with up to 3.5 V this load comes to rest between 0 and"
+    )
+    assert "a higher limit of the command" in note
+    weak = {**GAINS, "gains": {**GAINS["gains"], "proportional_gain": 1.0, "integral_gain": 1.0}}
+    gains.write_text(json.dumps(weak), encoding="utf-8")
+    lazy = run_closed(RunRequest(model=kept, dt=0.02), LoopRequest("", "5mm:6s", gains, noise=0.0))
+    assert not np.isfinite(lazy.merit["settling_time"])
+    assert lazy.notes == ()
+    tune: list[str | Path] = ["tune", "pid", "--model", kept.save(tmp_path / "m.toml"), "--out", tmp_path / "out"]
+    said = refused(*tune, "--set", "amplifier_limit=5.6 V", "--set-point", "5mm,20mm")
+    assert "The set point 20 mm is out of reach of every controller" in said
+    assert not (tmp_path / "out").exists()
