@@ -355,6 +355,7 @@ def run_closed(request: RunRequest, loop: LoopRequest) -> RunResult:
         mismatches(assumed, plant),
         said,
         settings_of(assumed, own, sigma),
+        controller,
     )
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import xarray as xr
 
+from smajax.control.controllers.base import AbstractController
 from smajax.control.figures_of_merit import SetPointMerit
 from smajax.control.loop_settings import LoopSettings
 from smajax.core.parameters import parameter_values, parameters
@@ -43,6 +44,7 @@ class RunResult:
     mismatches: tuple[Mismatch, ...] = ()
     settings: tuple[str, ...] = ()  # sentences on what a closed loop takes from files of gains and of models
     loop: LoopSettings | None = None  # of a closed loop: limit of the command, period, delay, filter, noise
+    controller: AbstractController | None = None
 
 
 def mismatches(assumed: System, plant: System) -> tuple[Mismatch, ...]:

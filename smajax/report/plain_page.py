@@ -19,11 +19,12 @@ STYLE = (
     "td.n,th.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}"
     "th.n{white-space:normal}img{max-width:100%;display:block;margin:0 auto}.quiet{color:#626973}h2{margin-top:1.6em}"
     "p,ul,h1,h2,h3{overflow-wrap:anywhere}"
+    ".headline{font-size:1.2em;line-height:1.4;font-weight:600;border-left:4px solid #1f6fb2;padding:.1em 0 .1em .7em;margin:1em 0}"
     # On a telephone names and numbers break where they may, so that the numbers are on the screen; sentences keep some width,
     # and only a table that is too wide even so moves sideways.
     "@media(max-width:720px){td.w{white-space:normal!important}td.t{min-width:9em}}"
     "@media(min-width:721px){wbr{display:none}}"
-    "@media(max-width:520px){body{margin:1em auto;padding:0 .6em}table{font-size:13px}td,th{padding:.3em .35em}}"
+    "@media(max-width:520px){body{margin:1em auto;padding:0 .6em}h1{font-size:1.5em}.headline{font-size:1.05em}table{font-size:13px}td,th{padding:.3em .35em}}"
 )
 
 
@@ -49,6 +50,11 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequence[
     body = "".join(f"<tr>{cells('td', row)}</tr>" for row in rows)
     top = f"<thead><tr>{cells('th', head)}</tr></thead>" if any(head) else ""
     return f"<div class=scroll><table{' class=sortable' if top else ''}>{top}<tbody>{body}</tbody></table></div>"
+
+
+def headline(sentence: str) -> str:
+    """The answer, first thing below the title; nothing for none."""
+    return f"<p class=headline>{html.escape(sentence)}</p>" if sentence else ""
 
 
 def bullets(sentences: Sequence[str]) -> str:

@@ -28,6 +28,8 @@ from smajax.model.system import System
 from smajax.report.drawing import UPRIGHT
 from smajax.report.sweep_dataset import as_dataset
 from smajax.report.sweep_page import (
+    NO_REMARKS,
+    Remarks,
     as_json,
     comparison_rows,
     failures,
@@ -52,11 +54,11 @@ def write_sweep(
     progress: Progress = quiet,
     command: str = "",
     plants: Plants | None = None,
-    remarks: Sequence[str] = (),
+    remarks: Remarks = NO_REMARKS,
 ) -> SweepResults:
     """Write the files of each controller as it comes, then those of all; `sweeps` are of `sweep_controllers`, as are the others.
 
-    remarks: sentences on where the settings come from, and on set points out of reach.
+    remarks: sentences on set points out of reach, and on where the settings come from.
     """
     out.mkdir(parents=True, exist_ok=True)
     found = plant_set(system, plants)

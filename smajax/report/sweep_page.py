@@ -7,8 +7,9 @@ import dataclasses
 import html
 import io
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,10 +22,21 @@ from smajax.core.provenance import made_with
 from smajax.core.wording import and_listed, counted
 from smajax.report.html import picture
 from smajax.report.integration_words import integration_sentence
-from smajax.report.plain_page import bullets, table, whole
+from smajax.report.plain_page import bullets, headline, table, whole
 from smajax.report.sweep_pictures import ROUNDING, SHOWN, merit_values, nominal_gain, shown_in
 
 Pictures = Mapping[str, tuple[bytes, bytes]]  # file name -> the picture, and the one for a telephone
+
+
+class Remarks(NamedTuple):
+    """Sentences beside the results. notes: what a reader has to know first; settings: where these come from."""
+
+    notes: tuple[str, ...] = ()
+    settings: tuple[str, ...] = ()
+
+
+NO_REMARKS = Remarks()
+NAMED = 3  # controllers of a headline
 
 
 def write_rows(path: Path, grid: Grid, sweep: ControllerSweep) -> None:
@@ -100,7 +112,7 @@ def _controller_part(results: SweepResults, sweep: ControllerSweep, pictures: Pi
     )
 
 
-def page(results: SweepResults, pictures: Pictures, command: str = "", remarks: Sequence[str] = ()) -> str:
+def page(results: SweepResults, pictures: Pictures, command: str = "", remarks: Remarks = NO_REMARKS) -> str:
     """One page for a browser, with the pictures inside; the rows as CSV are beside it."""
     say, settings, grid, unit = html.escape, results.settings, results.grid, results.unit
     low, high = min(settings.set_points), max(settings.set_points)
@@ -117,11 +129,12 @@ def page(results: SweepResults, pictures: Pictures, command: str = "", remarks: 
     )
     head = ["controller", "settles at", *(f"{label} ({symbol})" for label, symbol, _ in shown_in(unit).values())]
     parts = [
-        f"<h1>Controllers compared</h1>{bullets(conclusions(results))}<p>The unperturbed plant, "
-        f"{len(settings.set_points)} set points from {low:{precision}}{unit.symbol} to {high:{precision}}{unit.symbol}; "
-        f"median / worst over the set points. {arrived} {say(settings.between)}</p>",
-        table(head, comparison_rows(results)),
+        f"<h1>Controllers compared</h1>{headline(answer(results))}{bullets(remarks.notes)}",
         _panels(pictures, "comparison.png", "figures of merit over the set point"),
+        f"{bullets(conclusions(results))}<p>The unperturbed plant, "
+        f"{len(settings.set_points)} set points from {low:{precision}}{unit.symbol} to {high:{precision}}{unit.symbol}; "
+        f"median / worst over the set points. {arrived} {say(settings.between)}</p>{bullets(remarks.settings)}",
+        table(head, comparison_rows(results)),
         _what_differs(results, drawn_as),
         *(_controller_part(results, one, pictures) for one in results.sweeps),
         "<h2>Provenance</h2>",
@@ -165,6 +178,30 @@ def conclusions(results: SweepResults) -> list[str]:
     return sentences
 
 
+def answer(results: SweepResults) -> str:
+    """The controllers by the share of the runs on perturbed plants in which they settle; then the quicker ones first."""
+    at, unit = nominal_gain(results.grid), results.unit
+    rows = []
+    for one in results.sweeps:
+        times = merit_values(one.merits, "settling_time")[..., at]
+        settled = np.isfinite(times)
+        overshoot = float(np.nanmax(merit_values(one.merits, "overshoot", unit)[..., at]))
+        median = float(np.median(times[settled])) if settled.any() else np.inf
+        rows.append((-float(settled.mean()), median, one.name, overshoot))
+    each = [
+        f"{name} settles in {-100 * share:.0f} %"
+        + (
+            f" (after {median:.3g} s in the median, overshoot up to {overshoot:.2g}{unit.symbol})"
+            if np.isfinite(median)
+            else ""
+        )
+        for share, median, name, overshoot in sorted(rows)
+    ]
+    rest = f"; then {counted(len(each) - NAMED, 'other')}" if len(each) > NAMED else ""
+    plants = "plants drawn from the batch" if results.grid.numbered else "perturbed plants"
+    return f"Of the runs on {plants} {', '.join(each[:NAMED])}{rest}."
+
+
 def description(name: str, unit: PositionUnit = DEGREES) -> str:
     """What a controller reads, and of which plant: that of a section is an arm."""
     preset = CONTROLLERS[name]
@@ -184,7 +221,7 @@ def failures(sweep: ControllerSweep) -> str:
     )
 
 
-def as_json(results: SweepResults, command: str = "", remarks: Sequence[str] = ()) -> str:
+def as_json(results: SweepResults, command: str = "", remarks: Remarks = NO_REMARKS) -> str:
     """The comparison and the grid, SI; infinite times are null."""
     settings, grid, own = results.settings, results.grid, results.unit.own
 
@@ -193,9 +230,11 @@ def as_json(results: SweepResults, command: str = "", remarks: Sequence[str] = (
 
     batch = grid.plants.batch
     record = {
+        "headline": answer(results),
         "conclusions": conclusions(results),
         "between": settings.between,
-        "remarks": list(remarks),
+        "notes": list(remarks.notes),
+        "settings": list(remarks.settings),
         f"set_points_{own}": plain(grid.targets),
         "controllers": {
             name: {field.name: plain(getattr(one, field.name)) for field in dataclasses.fields(one)}

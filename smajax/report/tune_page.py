@@ -19,7 +19,9 @@ from smajax.core.provenance import made_with
 from smajax.core.wording import and_listed, counted
 from smajax.report.html import picture
 from smajax.report.integration_words import integration_sentence
-from smajax.report.plain_page import bullets, table, whole
+from smajax.report.loop_words import loop_rows
+from smajax.report.plain_page import bullets, headline, table, whole
+from smajax.report.tune_answer import answer, set_point_rows
 from smajax.report.tune_pictures import before_after
 
 SCALED = "The preset's gains and the box are those of the arm, scaled to this load's stroke, force and time and to the drive's limit."
@@ -240,16 +242,8 @@ def _figures(result: TuningResult, check: Check) -> list[list[str]]:
 
 def settings_rows(result: TuningResult) -> list[list[str]]:
     """What shapes the gains and was not tuned: the loop that they were tuned in, and the controller's other parameters."""
-    loop = result.after.loop
-    limit = "none" if loop.command_limit is None else f"{digits(loop.command_limit, 4)} {loop.command_unit}"
-    rows = [
-        ["limit of the command", limit if loop.command_limit is None else f"up to {limit}"],
-        ["control period", f"{1e3 * result.settings.period:g} ms"],
-        ["delay of the command", counted(result.settings.delay, "control period")],
-        ["what the controller reads", f"filter `{loop.estimator}`" if loop.estimator else "the true state"],
-        ["sensor", loop.noise_words()],
-    ]
-    return rows + [[name, f"{digits(one, 4)} {result.units[name]}"] for name, one in result.after.fixed.items()]
+    fixed = [[name, f"{digits(one, 4)} {result.units[name]}"] for name, one in result.after.fixed.items()]
+    return [*loop_rows(result.after.loop), *fixed]
 
 
 def page(result: TuningResult, pictures: Mapping[str, bytes], command: str) -> str:
@@ -257,18 +251,21 @@ def page(result: TuningResult, pictures: Mapping[str, bytes], command: str) -> s
     say, settings = html.escape, result.settings
     head = ["figure", "median before", "worst before", "median after", "worst after"]
     head += ["limit"] if settings.limits else []
+    points, rows = set_point_rows(result)
     parts = [
         f"<h1>Gains of {say(settings.controller)}, tuned</h1>",
-        bullets(conclusions(result)),
-        f"<p>Tuned on {say(settings.plants_sentence(result.air))}. {say(settings.goal_sentence())}.</p>",
+        headline(answer(result)),
         picture(
             pictures["before_after.png"],
             "positions and figures of merit before and after",
             "panels",
             before_after(result, upright=True),
         ),
-        "<p class=quiet>Above: thick, the plant as believed; thin, plants never seen. Below: from the least to the largest "
+        "<p class=quiet>Above: thick, the plant as assumed; thin, plants never seen. Below: from the least to the largest "
         "over the plants at each set point; squares were tuned on, circles never seen.</p>",
+        table(points, rows, range(len(points))),
+        bullets(conclusions(result)),
+        f"<p>Tuned on {say(settings.plants_sentence(result.air))}. {say(settings.goal_sentence())}.</p>",
         "<h2>Gains</h2>",
         "" if settings.shown.is_angle else f"<p class=quiet>{SCALED}</p>",
         table(["gain", "before", "after", "unit", "box", "remark"], gain_rows(gains_of(result)), (1, 2)),
@@ -311,6 +308,7 @@ def record(result: TuningResult, command: str) -> dict[str, Any]:
     descent = result.descent
     return {
         "controller": result.settings.controller,
+        "headline": answer(result),
         "conclusions": conclusions(result),
         "price": price(result),
         "settings": result.settings.record(),

@@ -24,7 +24,8 @@ from smajax.core.parameters import parameter_values, set_parameters
 from smajax.core.units import UnitError
 from smajax.data.text_input import clock_of, given, levels
 from smajax.model.presets import build
-from smajax.report.simulate_page import as_csv, conclusions, summary_rows, write_run
+from smajax.report.simulate_page import as_csv, write_run
+from smajax.report.simulate_words import conclusions, summary_rows
 from smajax.simulation.compiled import simulate_compiled
 
 pytestmark = pytest.mark.usefixtures("blank_pictures")

@@ -41,7 +41,7 @@ def loop(gains: Path, **given: Any) -> RunResult:
         model=kept_model(volts=7.0),
         dt=0.01 if "loop" not in gains.read_text() else 0.02,
         values=given.pop("values", {}),
-    )  # type: ignore[arg-type]
+    )
     return run_closed(request, LoopRequest("", "5mm:1s", gains, noise=0.0, **given))
 
 

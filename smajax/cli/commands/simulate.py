@@ -133,9 +133,10 @@ def _print(result: RunResult, title: str) -> None:
     """The run for a terminal."""
     from smajax.core.wording import aligned
     from smajax.report.integration_words import integration_sentence
-    from smajax.report.simulate_page import (
+    from smajax.report.measured_log import measured_sentences
+    from smajax.report.simulate_words import (
+        answer,
         integration_error,
-        measured_sentences,
         merit_rows,
         mismatch_rows,
         set_point_rows,
@@ -143,11 +144,15 @@ def _print(result: RunResult, title: str) -> None:
     )
 
     typer.echo(title)
+    typer.echo(f"  {answer(result)}")
+    for sentence in result.settings:
+        typer.echo(f"  {sentence}")
     for row in summary_rows(result.data):
         typer.echo(f"  {row[0]:<28} {row[1]:>11} … {row[2]:<11} last {row[3]:<11} {row[4]}")
     typer.echo(f"  {integration_sentence(integration_error(result.data))}")
     for sentence in measured_sentences(result):
-        typer.echo(f"  {sentence}")
+        if sentence != answer(result):
+            typer.echo(f"  {sentence}")
     for row in mismatch_rows(result):
         unit, ratio = f" {row[3]}" * (row[3] != "-"), f", {row[4]}" * bool(row[4])
         typer.echo(f"  {row[0]:<28} assumed {row[1]} -> true {row[2]}{unit}{ratio}")
@@ -301,9 +306,9 @@ def simulate(
     )
     request, result = _run(options, request, loop)
     command = command_line()
-    what = f"{wire}, {load}, {drive}" if model is None else str(model)
+    what = f"{wire}, {load}, {drive}" if model is None else model.name
     title = what + (f", {result.data.attrs['controller']}" if options.closed else "")
-    title += "" if plant is None else f", on {plant}"
+    title += "" if plant is None else f", on {plant.name}"
     settings = {
         **vars(request),
         **(vars(loop) if options.closed else {}),

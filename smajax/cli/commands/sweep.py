@@ -213,6 +213,7 @@ def sweep(
     from smajax.control.sweep.run_sweep import may_resume, sweep_controllers
     from smajax.core.provenance import digest
     from smajax.report.sweep_folder import as_text, files_of, write_sweep
+    from smajax.report.sweep_page import Remarks, answer
 
     plant_options = PlantOptions(wire, load, drive, law, values or [], model)
     tuned = _tuned(tuple(gains or ()), plant_options)
@@ -229,16 +230,13 @@ def sweep(
     settings = options.settings(plant, tuned, tolerance=tolerance_of(tolerance), **between)
     with refused():
         settings.check(plant, plants)
-    said = (
-        source,
-        *_sentences(tuned, given, plant, settings),
-        reach_sentence(reach_of(plant), plant, settings.set_points),
-    )
-    said = tuple(one for one in said if one)
+    said = tuple(one for one in (source, *_sentences(tuned, given, plant, settings)) if one)
+    out_of_reach = tuple(one for one in [reach_sentence(reach_of(plant), plant, settings.set_points)] if one)
     for sentence in (
         understood("Set points", set_points, settings.set_points, settings.unit),
         understood("Ratios of the main gain", gain_ratios, settings.gain_ratios),
         *said,
+        *out_of_reach,
     ):
         if sentence and not json_out:
             typer.echo(sentence, err=True)
@@ -255,7 +253,9 @@ def sweep(
             displayed(console(), hint=not json_out) as progress,
         ):
             sweeps = sweep_controllers(plant, settings, out, progress, plants)
-            results = write_sweep(plant, settings, sweeps, out, progress, command_line(), plants, said)
+            results = write_sweep(
+                plant, settings, sweeps, out, progress, command_line(), plants, Remarks(out_of_reach, said)
+            )
     except FolderTaken:
         raise
     except ValueError as error:
@@ -264,6 +264,7 @@ def sweep(
     if json_out:
         typer.echo((out / "sweep.json").read_text(encoding="utf-8"), nl=False)
     else:
+        typer.echo(answer(results))
         typer.echo(as_text(results))
         typer.echo(f"Page: {page.resolve()}")
     if open_page:

@@ -279,6 +279,7 @@ def tune(
     if json_out:
         typer.echo((out / "tune.json").read_text(encoding="utf-8"), nl=False)
     else:
+        typer.echo(record["headline"])
         for sentence in record["conclusions"]:
             if sentence not in record["price"]:  # on stderr already
                 typer.echo(sentence)
