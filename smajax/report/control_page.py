@@ -16,8 +16,9 @@ from smajax.core.files import json_text, replace
 from smajax.core.provenance import made_with
 from smajax.report.drawing import UPRIGHT
 from smajax.report.html import picture
+from smajax.report.loop_words import loop_rows
 from smajax.report.pictures import AFTER, as_png, new_figure, tidy
-from smajax.report.plain_page import bullets, table, whole
+from smajax.report.plain_page import bullets, headline, table, whole
 
 COLOURS = ("#8a8f98", AFTER, "#c8553d")
 SAME = 0.02  # of a settling time: a smaller difference is none
@@ -32,11 +33,6 @@ def files_of(controller: str) -> tuple[str, ...]:
 def _seen(error: float, set_point: float) -> float:
     """An error, or zero where it is a rounding error of the set point."""
     return 0.0 if error < ROUNDING * abs(set_point) else error
-
-
-def seconds_in_words(value: float) -> str:
-    """`4.1 s`, or `never`."""
-    return f"{digits(value, 3)} s" if math.isfinite(value) else "never"
 
 
 def head(result: ControlComparison) -> tuple[str, ...]:
@@ -67,7 +63,7 @@ def conclusions(result: ControlComparison) -> list[str]:
     for one in result.tuned:
         settled = sum(math.isfinite(loop.settling_time) for loop in one.loops)
         if settled == len(one.loops):
-            text = f"settles after {seconds_in_words(one.settling_time)} on average"
+            text = f"settles after {digits(one.settling_time, 3)} s on average"
         else:
             text = f"settles at {settled} of {len(one.loops)} set points" if settled else "settles at no set point"
         largest = max(abs(loop.set_point) for loop in one.loops)
@@ -113,6 +109,8 @@ def record(result: ControlComparison, command: str = "") -> dict[str, Any]:
             {
                 "model": one.model,
                 "gains": {name: {"value": value, "unit": one.units[name]} for name, value in one.gains.values.items()},
+                "fixed": {name: {"value": value, "unit": one.units[name]} for name, value in one.gains.fixed.items()},
+                "loop": one.gains.loop.record(),
                 "loops": [
                     {
                         "set_point": loop.set_point,
@@ -160,6 +158,16 @@ def loops_picture(result: ControlComparison, upright: bool = False) -> bytes:
     return as_png(figure)
 
 
+def _settings(result: ControlComparison) -> list[list[str]]:
+    """A row a setting of the loop and a parameter that was not tuned, a column a model."""
+    loops = [loop_rows(one.gains.loop) for one in result.tuned]
+    rows = [[several[0][0], *(one[1] for one in several)] for several in zip(*loops, strict=True)]
+    for name in result.tuned[0].gains.fixed:
+        values = [f"{digits(one.gains.fixed[name], 4)} {one.units[name]}" for one in result.tuned]
+        rows.append([label(name), *values])
+    return rows
+
+
 def page(result: ControlComparison, command: str = "") -> str:
     """The whole page."""
     title = f"{result.controller}: what the model is worth in control"
@@ -170,13 +178,16 @@ def page(result: ControlComparison, command: str = "") -> str:
     ]
     parts = [
         f"<h1>{html.escape(title)}</h1>",
-        bullets([worth(result), *conclusions(result)[:-1]] if len(result.tuned) > 1 else conclusions(result)),
+        headline(worth(result) if len(result.tuned) > 1 else conclusions(result)[0]),
         str(picture(loops_picture(result), "loops over time", "panels", loops_picture(result, upright=True))),
         f"<p class=quiet>Each loop is a step from the start, cold and at rest, on the {html.escape(result.plant)}. Gains were tuned on each model and on plants drawn from its "
         "posterior, with the same settings. The command stays within that of the fit runs.</p>",
         table(head(result), rows(result), (1, 2, 3, 4)),
+        bullets(conclusions(result)[:-1] if len(result.tuned) > 1 else conclusions(result)[1:]),
         "<h2>Gains</h2>",
         table(["gain", *(one.model for one in result.tuned), "unit"], gains, range(1, 1 + len(result.tuned))),
+        "<h2>What the gains were tuned with</h2>",
+        table(["", *(one.model for one in result.tuned)], _settings(result)),
         "<h2>Provenance</h2>",
         table(["", ""], [["command", command], *map(list, made_with().items())]),
         f"<p class=quiet>The same numbers: {files_of(result.controller)[1]}; the gains tuned on the {result.tuned[-1].model}: {files_of(result.controller)[0]}.</p>",

@@ -17,6 +17,7 @@ from smajax.cli.terminal import browse, console, resumable
 
 if TYPE_CHECKING:
     from smajax.attribution.findings import Findings
+    from smajax.data.experiment.record import Experiment
 
 FINISHED_FITS = "Finished fits are cached: the same command resumes."
 CONTROL = ("*_gains.json", "control_*.json", "control_*.html")
@@ -25,24 +26,28 @@ MODELS = ("model.toml", "model.nc", "base_model.toml", "base_model.nc")
 OWN = ("report.html", "report.json", "parameters.csv", "runs.csv", *MODELS, *CONTROL, FITS)
 
 
-def run_close_loop(
-    experiment: Path, out: Path, command: str, overwrite: bool, show_hint: bool
-) -> tuple[Findings, Path]:
+def load(experiment: Path) -> Experiment:
+    """The experiment with its runs. Raises ExperimentError."""
     # Imported here so that `--help` does not wait for JAX; x64 is the caller's choice, and this is the caller.
     from smajax.core.runtime import prepare
 
     prepare()
+    from smajax.data.open_experiment import open_experiment
+
+    return open_experiment(experiment)
+
+
+def run_close_loop(
+    loaded: Experiment, out: Path, command: str, overwrite: bool, show_hint: bool
+) -> tuple[Findings, Path]:
+    """The findings and the path of their page, in the folder `out`. Raises FolderTaken."""
     from smajax.attribution.close_loop import close_loop
     from smajax.cli.progress_display import displayed
-    from smajax.cli.result_folder import check_path, claimed
+    from smajax.cli.result_folder import claimed
     from smajax.data.experiment.fingerprint import fingerprint
-    from smajax.data.experiment.load import load_experiment
-    from smajax.data.model_catalogue import CATALOGUE
     from smajax.report.narrative import narrated
     from smajax.report.write import write_report
 
-    check_path(out)
-    loaded = load_experiment(experiment, CATALOGUE)
     with (
         resumable(FINISHED_FITS, out, FITS),
         claimed(out, "close-loop", fingerprint(loaded), OWN, overwrite),
@@ -96,6 +101,7 @@ def _within(seconds: float, out: Path, json_out: bool) -> None:
 
 
 def tune_on_models(
+    findings: Findings,
     out: Path,
     controller: str,
     set_points: Sequence[float],
@@ -103,7 +109,7 @@ def tune_on_models(
     truth: Path | None = None,
     quick: bool = False,
 ) -> Path:
-    """Tune a controller on both models of a report and judge the gains on the extended one, or on `truth`; the path of the page.
+    """Tune a controller on both models of the findings and judge the gains on the extended one, or on `truth`; the path of the page.
 
     `quick`: a search that takes half a minute, for a demonstration. Raises typer.BadParameter for a controller that this load cannot have, or set points that it cannot reach.
     """
@@ -112,7 +118,11 @@ def tune_on_models(
     from smajax.data.model_file.read import load_model
     from smajax.report.control_page import conclusions, write_comparison
 
-    base, extended = load_model(out / "base_model.toml"), load_model(out / "model.toml")
+    base, extended = findings.base_model, findings.extended_model
+    if base is None or extended is None:
+        raise typer.BadParameter(
+            "the findings have no models to tune on: the base model was not fitted.", param_hint="--tune"
+        )
     models = (
         {"base model": base, "extended model": extended} if extended.effects != base.effects else {"base model": base}
     )
@@ -128,16 +138,15 @@ def tune_on_models(
     return write_comparison(result, out, command)
 
 
-def check_tuning(experiment: Path, controller: str, set_points: str) -> tuple[float, ...]:
-    """The set points in the unit that is shown, before anything is fitted. Raises typer.BadParameter, and ExperimentError of the experiment."""
+def check_tuning(loaded: Experiment, controller: str, set_points: str) -> tuple[float, ...]:
+    """The set points in the unit that is shown, before anything is fitted. Raises typer.BadParameter."""
     from smajax.cli.options import numbers
     from smajax.control.interface import check_set_points
     from smajax.control.position_unit import unit_of
     from smajax.control.presets import check_controller
-    from smajax.data.open_experiment import open_experiment
     from smajax.fit.base_model import base_model
 
-    system = base_model(open_experiment(experiment))
+    system = base_model(loaded)
     try:
         check_controller(controller, system)
         unit = unit_of(system)
@@ -196,9 +205,13 @@ def close_loop_command(
     if budget is not None:
         _within(budget, out, json_out)
         return
-    targets = check_tuning(experiment, tune, set_points) if tune else ()
+    from smajax.cli.result_folder import check_path
+
+    check_path(out)
+    loaded = load(experiment)
+    targets = check_tuning(loaded, tune, set_points) if tune else ()
     command = f"smajax close-loop {shlex.quote(str(experiment))} --out {shlex.quote(str(out))}"
-    findings, page = run_close_loop(experiment, out, command, overwrite, not json_out)
+    findings, page = run_close_loop(loaded, out, command, overwrite, not json_out)
     if json_out:
         from smajax.report.json_file import findings_to_json
 
@@ -207,7 +220,7 @@ def close_loop_command(
         print_findings(findings, page)
     if tune:
         points = f" --set-points {shlex.quote(set_points)}" if set_points else ""
-        shown = tune_on_models(out, tune, targets, f"{command} --tune {tune}{points}")
+        shown = tune_on_models(findings, out, tune, targets, f"{command} --tune {tune}{points}")
         typer.echo(f"Controller: {shown.resolve()}", err=json_out)
     if open_page:
         browse(page)

@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from smajax.cli import completion
-from smajax.cli.commands.close_loop import print_findings, run_close_loop, tune_on_models
+from smajax.cli.commands.close_loop import load, print_findings, run_close_loop, tune_on_models
 from smajax.cli.options import DEMOS, Json, Open, Overwrite
 from smajax.cli.terminal import browse
 
@@ -40,14 +40,17 @@ def demo(
     """
     if only is not None and only not in DEMOS:
         raise typer.BadParameter(f"there is no demo `{only}`; choose one of {', '.join(DEMOS)}.", param_hint="--only")
+    from smajax.cli.result_folder import check_path
+
     pages: list[Path] = []
     records = {}
     for name in DEMOS if only is None else (only,):
+        check_path(out / name)
         with resources.as_file(resources.files("smajax") / "data" / "demo" / name) as folder:
             if not json_out:
                 typer.echo(f"\n=== {name} ===")
             findings, page = run_close_loop(
-                folder / "experiment.toml", out / name, f"smajax demo --only {name}", overwrite, not (json_out or pages)
+                load(folder), out / name, f"smajax demo --only {name}", overwrite, not (json_out or pages)
             )
             if json_out:
                 from smajax.report.json_file import findings_to_json
@@ -63,7 +66,9 @@ def demo(
                     "\nControllers tuned on what was found, and on the base model, judged on the true wire:", err=True
                 )
                 for controller in CONTROLLERS:
-                    shown = tune_on_models(out / name, controller, (), "smajax demo", folder / TRUE_MODEL, quick=True)
+                    shown = tune_on_models(
+                        findings, out / name, controller, (), "smajax demo", folder / TRUE_MODEL, quick=True
+                    )
                     typer.echo(f"Controller: {shown.resolve()}", err=json_out)
         pages.append(page)
     if json_out:
