@@ -114,7 +114,7 @@ def _sentences(tuned: Sequence[Gains], given: LoopSettings, plant: System, setti
     """What the loops take from the files of gains."""
     from smajax.control.loop_settings import LoopInUse, sentences, settings_of
 
-    own = settings_of(plant, LoopInUse(None, settings.period, settings.delay, settings.estimator), settings.noise)
+    own = settings_of(plant, LoopInUse(None, settings.period, settings.delay, settings.estimator), 0.0)
     return tuple(sentences({one.controller: (one.loop, one.fixed) for one in tuned}, given, own))
 
 
