@@ -19,7 +19,7 @@ from smajax.control.reference import resting
 from smajax.control.scales import seconds_for
 from smajax.control.tune.evaluate import STEP
 from smajax.control.tune.settings import TuneSettings, settings_for
-from smajax.control.tune.tuning import tune
+from smajax.control.tune.tuning import TuningResult, best_gains, tune
 from smajax.core.progress import Progress, quiet
 from smajax.data.model_file.record import ModelRecord
 from smajax.model.system import System
@@ -90,25 +90,30 @@ def tuned_on_models(
     """`controller` tuned on each of the `models` and on plants from its posterior, and judged on the `plant`, each by its name.
 
     The first model's load has the unit and the default of the set points, shown in mm or deg. All have the first model's limit of the
-    command, and the same settings. Raises ValueError and KeyError as `tune`.
+    command, and the same settings. Each model has the gains that cost least on its own plants, of those that the searches on all the
+    models found: what differs is then the model, and not where a search happened to end. Raises ValueError and KeyError as `tune`.
     """
     first = next(iter(models.values()))
     system, _ = plant_of(first)
     unit, seconds = unit_of(system), seconds_for(system)
     targets = tuple(set_points) or tuple(default_set_points(system, SET_POINTS))
     truth = within_limit(first, plant[1].system)
-    tuned = []
+    searched: list[tuple[str, System, System | None, TuneSettings, TuningResult]] = []
     for name, model in models.items():
         assumed = within_limit(first, model.system)
         drawn = model.plants(PLANTS, seed) if any(one.names for one in model.likely) else None
         plants = None if drawn is None else within_limit(first, drawn)
-        settings: TuneSettings = settings_for(
+        settings = settings_for(
             assumed, controller, plants, set_points=targets, seconds=seconds, seed=seed, **{**EFFORT, **(effort or {})}
         )
-        found = tune(assumed, settings, plants=plants, progress=progress)
-        own = found.after.put(CONTROLLERS[controller].plant(assumed))
+        searched.append((name, assumed, plants, settings, tune(assumed, settings, plants=plants, progress=progress)))
+    every = [found.after for *_, found in searched]
+    tuned = []
+    for name, assumed, plants, settings, found in searched:
+        gains = best_gains(assumed, settings, every, plants=plants)
+        own = gains.put(CONTROLLERS[controller].plant(assumed))
         loops = tuple(judged(truth, own, float(target), seconds) for target in unit.to_own(np.asarray(targets)))
-        tuned.append(TunedOnModel(name, found.after, found.units, loops))
+        tuned.append(TunedOnModel(name, gains, found.units, loops))
     return ControlComparison(controller, plant[0], unit, seconds, tuple(tuned), differing(first, plant[1]))
 
 

@@ -141,6 +141,21 @@ def tune(
     return _validated(task, settings, best, descent, evolution, progress)
 
 
+def best_gains(
+    system: System, settings: TuneSettings, candidates: Sequence[Gains], *, plants: Plants | None = None
+) -> Gains:
+    """Of gains that were found elsewhere, those that cost least on what these settings tune on; held in the box of this plant.
+
+    Raises as `tune`.
+    """
+    found, system = settings.check(system, plants), carrying(system, plants)
+    scenarios = tuned_on(settings.set_points, settings.variation, settings.seed, found)
+    task = SearchTask(problem_of(system, settings, found), settings.goal, scenarios)
+    _integrated(task.problem, settings, task.problem.controller, scenarios, STEP)
+    best = _best_of(task, [task.problem.point(one.values) for one in candidates])
+    return dataclasses.replace(candidates[0], values=best)
+
+
 def _by_gradient(
     task: SearchTask,
     settings: TuneSettings,
