@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import jax.numpy as jnp
@@ -11,8 +11,8 @@ import numpy as np
 
 from smajax.control.controllers.base import AbstractController
 from smajax.control.gains_file import LARGEST
-from smajax.control.load_equation import moving_load
-from smajax.control.position_unit import PositionUnit, band_shown, unit_of
+from smajax.control.load_equation import moving_load, stroke_of
+from smajax.control.position_unit import SHARES, PositionUnit, band_shown, unit_of
 from smajax.control.scales import seconds_for
 from smajax.core.display_units import digits
 from smajax.core.parameters import parameter_values
@@ -61,6 +61,26 @@ def reach_of(system: System, controller: AbstractController | None = None) -> Re
     unit = unit_of(system)
     low, high = float(unit.of(np.min(ends))), float(unit.of(np.max(ends)))
     return Reach(low, high, largest, unit)
+
+
+def shared_set_points(systems: Iterable[System], count: int) -> tuple[float, ...]:
+    """Evenly over what all these plants reach (their stroke where that cannot be known), in the unit shown, to three digits.
+
+    Raises ValueError where nothing is within the reach of all.
+    """
+    lows, highs = [], []
+    for system in systems:
+        reach, unit = reach_of(system), unit_of(system)
+        start = float(moving_load(system).start())
+        stroke = tuple(float(unit.of(end)) for end in (start, start + float(stroke_of(system))))
+        lows.append(max(stroke[0], reach.low) if reach else stroke[0])
+        highs.append(min(stroke[1], reach.high) if reach else stroke[1])
+    low, high = max(lows), min(highs)
+    if not low < high:
+        raise ValueError(
+            f"no set point is within the reach of all models: they have from {lows} to {highs}; give set points."
+        )
+    return tuple(float(f"{one:.3g}") for one in low + np.linspace(SHARES[0], SHARES[-1], count) * (high - low))
 
 
 def out_of_reach(reach: Reach | None, system: System, set_points: Sequence[float]) -> list[float]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import jax.numpy as jnp
 import numpy as np
@@ -13,8 +13,9 @@ from smajax.control.compiled_loop import measured_loop
 from smajax.control.controllers.base import AbstractController
 from smajax.control.gains_file import Gains
 from smajax.control.kept_plant import plant_of, within_limit
-from smajax.control.position_unit import PositionUnit, default_set_points, unit_of
+from smajax.control.position_unit import PositionUnit, unit_of
 from smajax.control.presets import CONTROLLERS
+from smajax.control.reach import reach_of, reach_sentence, shared_set_points
 from smajax.control.reference import resting
 from smajax.control.scales import seconds_for
 from smajax.control.tune.evaluate import STEP
@@ -26,7 +27,7 @@ from smajax.model.system import System
 
 PLANTS = 8  # drawn from each model's posterior, of which gains are tuned on three of every four
 KNOWN = 0.01  # of a known value: a smaller difference between model and plant is none
-SET_POINTS = 3  # over the stroke, where none are given
+SET_POINTS = 3  # over the reach, where none are given
 EFFORT = {"tried": 16, "starts": 3, "rounds": 10, "finish": 20, "unseen": 4}
 QUICK = {"tried": 8, "starts": 2, "rounds": 5, "finish": 10, "unseen": 2}  # for a demonstration
 
@@ -89,28 +90,33 @@ def tuned_on_models(
 ) -> ControlComparison:
     """`controller` tuned on each of the `models` and on plants from its posterior, and judged on the `plant`, each by its name.
 
-    The first model's load has the unit and the default of the set points, shown in mm or deg. All have the first model's limit of the
-    command, and the same settings. Each model has the gains that cost least on its own plants, of those that the searches on all the
-    models found: what differs is then the model, and not where a search happened to end. Raises ValueError and KeyError as `tune`.
+    The first model's load has the unit of the set points, mm or deg; by default they are spread over what all the models reach. All
+    have the first model's limit of the command, and the same settings. Each model has the gains that cost least on its own plants, of
+    those that the searches on all the models found: what differs is then the model, and not where a search happened to end.
+    Raises ValueError and KeyError as `tune`, and ValueError for set points out of a model's reach.
     """
     first = next(iter(models.values()))
     system, _ = plant_of(first)
     unit, seconds = unit_of(system), seconds_for(system)
-    targets = tuple(set_points) or tuple(default_set_points(system, SET_POINTS))
+    every = {name: within_limit(first, model.system) for name, model in models.items()}
+    targets = tuple(set_points) or shared_set_points(every.values(), SET_POINTS)
+    for name, assumed in every.items():
+        if sentence := reach_sentence(reach_of(assumed), assumed, targets):
+            raise ValueError(f"{name}: {sentence}")
     truth = within_limit(first, plant[1].system)
     searched: list[tuple[str, System, System | None, TuneSettings, TuningResult]] = []
     for name, model in models.items():
-        assumed = within_limit(first, model.system)
+        assumed = every[name]
         drawn = model.plants(PLANTS, seed) if any(one.names for one in model.likely) else None
         plants = None if drawn is None else within_limit(first, drawn)
         settings = settings_for(
             assumed, controller, plants, set_points=targets, seconds=seconds, seed=seed, **{**EFFORT, **(effort or {})}
         )
         searched.append((name, assumed, plants, settings, tune(assumed, settings, plants=plants, progress=progress)))
-    every = [found.after for *_, found in searched]
+    pool = [found.after for *_, found in searched]
     tuned = []
     for name, assumed, plants, settings, found in searched:
-        gains = best_gains(assumed, settings, every, plants=plants)
+        gains = replace(found.after, values=best_gains(assumed, settings, pool, plants=plants))
         own = gains.put(CONTROLLERS[controller].plant(assumed))
         loops = tuple(judged(truth, own, float(target), seconds) for target in unit.to_own(np.asarray(targets)))
         tuned.append(TunedOnModel(name, gains, found.units, loops))

@@ -180,7 +180,7 @@ def close_loop_command(
         typer.Option(
             "--set-points",
             "--set-point",
-            help="of --tune, with commas, without a unit in deg or mm; default three over the stroke",
+            help="of --tune, with commas, without a unit in deg or mm; default three over what the models reach",
         ),
     ] = "",
     budget: Annotated[

@@ -143,7 +143,7 @@ def tune(
 
 def best_gains(
     system: System, settings: TuneSettings, candidates: Sequence[Gains], *, plants: Plants | None = None
-) -> Gains:
+) -> dict[str, float]:
     """Of gains that were found elsewhere, those that cost least on what these settings tune on; held in the box of this plant.
 
     Raises as `tune`.
@@ -152,8 +152,7 @@ def best_gains(
     scenarios = tuned_on(settings.set_points, settings.variation, settings.seed, found)
     task = SearchTask(problem_of(system, settings, found), settings.goal, scenarios)
     _integrated(task.problem, settings, task.problem.controller, scenarios, STEP)
-    best = _best_of(task, [task.problem.point(one.values) for one in candidates])
-    return dataclasses.replace(candidates[0], values=best)
+    return _best_of(task, [task.problem.point(one.values) for one in candidates])
 
 
 def _by_gradient(
