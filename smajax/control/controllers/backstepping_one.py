@@ -26,6 +26,7 @@ from smajax.control.controllers.inverse_wire import (
     temperature_for,
     voltage_for,
 )
+from smajax.control.controllers.position_integral import next_integral
 from smajax.control.load_equation import equation_of, force_per_stress
 from smajax.control.measured_state import MeasuredState
 from smajax.control.reference import Reference
@@ -39,6 +40,8 @@ class BacksteppingOneMemory(eqx.Module):
 
     stress: Scalar  # Pa, at the last call
     heating: Scalar  # 1 while martensite is to become austenite, else 0
+    integral: Scalar  # rad/s, m/s: of w, the pull back to the set point
+    inner_integral: Scalar  # Pa s: of the stress error
 
 
 class Asked(eqx.Module):
@@ -72,24 +75,41 @@ class BacksteppingOne(AbstractController):
     position_gain: Scalar = parameter(
         "1/s^2", 0.0, 1e4, "weight of the error in the stress wanted: 1 as eq. 4.57 prints", default=1.0
     )
+    integral_rate: Scalar = parameter(
+        "1/s", 0.0, 1e3, "1/T_i: weight of the integral of the pull beside the pull itself; 0 as printed", default=0.0
+    )
     measured_rate_share: Scalar = parameter(
         "-", 0.0, 1.0, "1: the stress's rate as measured (sec. 4.8.2); 0: the rate that is wanted", default=1.0
+    )
+    stress_integral_rate: Scalar = parameter(
+        "1/s",
+        0.0,
+        1e3,
+        "1/T_z: weight of the integral of the stress error beside that error; 0 as printed",
+        default=0.0,
     )
 
     # The wire read backwards from the measured state (`inverse_wire.strain_offset`), for laws other than eq. 4.51.
     anchored: bool = eqx.field(static=True, default=False)
 
     def start(self, measured: MeasuredState, wanted: Reference) -> BacksteppingOneMemory:
-        return BacksteppingOneMemory(measured.stress, jnp.ones_like(measured.stress))
+        return BacksteppingOneMemory(
+            measured.stress,
+            jnp.ones_like(measured.stress),
+            jnp.zeros_like(measured.position),
+            jnp.zeros_like(measured.stress),
+        )
 
-    def stress_wanted(self, position: Scalar, velocity: Scalar, wanted: Reference) -> Scalar:
+    def stress_wanted(
+        self, position: Scalar, velocity: Scalar, wanted: Reference, integral: Scalar | float = 0.0
+    ) -> Scalar:
         """Phi of eq. 4.57, Pa; never negative: a wire cannot push."""
         equation, inertia = equation_of(self.believed), self._inertia()
-        off, off_rate = position - wanted.position, velocity - wanted.velocity
         torque = equation.resistance(position, velocity) - self.rest_torque_share * equation.resistance(
             wanted.position, jnp.zeros_like(velocity)
         )
-        torque = torque + inertia * (wanted.acceleration - self.position_gain * off - self.damping_gain * off_rate)
+        pull = self._pull(position, velocity, wanted) + self.integral_rate * integral
+        torque = torque + inertia * (wanted.acceleration - pull)
         stress = torque / force_per_stress(self.believed)
         return jnp.where(stress < 0.0, 0.0, stress)  # so that nan stays nan
 
@@ -102,12 +122,14 @@ class BacksteppingOne(AbstractController):
         moving = Reference(wanted.velocity, wanted.acceleration, jnp.zeros_like(wanted.acceleration))
         stress, stress_wanted_rate = jax.jvp(
             self.stress_wanted,
-            (measured.position, measured.velocity, wanted),
-            (measured.velocity, acceleration, moving),
+            (measured.position, measured.velocity, wanted, memory.integral),
+            (measured.velocity, acceleration, moving, self._pull(measured.position, measured.velocity, wanted)),
         )
         error = measured.stress - stress
         # In pascals and radians the first term is next to nothing; it is there for the Lyapunov function of eq. 4.64.
-        pull = -push * (measured.velocity - wanted.velocity) - self.stress_gain * error
+        pull = -push * (measured.velocity - wanted.velocity) - self.stress_gain * (
+            error + self.stress_integral_rate * memory.inner_integral
+        )
         stress_rate = pull + stress_wanted_rate
         offset = strain_offset(believed, measured) if self.anchored else 0.0
         per_fraction, per_radian = stress_slopes(believed, measured.position, measured.martensite_fraction, offset)
@@ -132,7 +154,15 @@ class BacksteppingOne(AbstractController):
         voltage = voltage_for(
             self.believed, unlimited.power, unlimited.temperature, measured.martensite_fraction, self.largest_voltage
         )
-        return BacksteppingOneMemory(measured.stress, unlimited.heating), voltage
+        pull = self._pull(measured.position, measured.velocity, wanted)
+        integral = next_integral(memory.integral, pull, period, voltage, self.largest_voltage)
+        inner = next_integral(memory.inner_integral, unlimited.stress_error, period, voltage, self.largest_voltage)
+        return BacksteppingOneMemory(measured.stress, unlimited.heating, integral, inner), voltage
 
     def _inertia(self) -> Scalar:
         return equation_of(self.believed).inertia()
+
+    def _pull(self, position: Scalar, velocity: Scalar, wanted: Reference) -> Scalar:
+        """w = K_0 x_1 + K x_2, rad/s^2, which the integral sums up."""
+        off, off_rate = position - wanted.position, velocity - wanted.velocity
+        return self.position_gain * off + self.damping_gain * off_rate
