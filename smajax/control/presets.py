@@ -283,6 +283,7 @@ CONTROLLERS: dict[str, ControllerPreset] = resolved(
             needs=EQUATION,
             scales=MOTION_TWO,
         ),
+        "feedforward_pi": "smajax.control.controllers.feedforward_pi:PRESET",
     }
 )
 # Name on the command line -> filter.
