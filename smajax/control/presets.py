@@ -283,9 +283,12 @@ CONTROLLERS: dict[str, ControllerPreset] = resolved(
             needs=EQUATION,
             scales=MOTION_TWO,
         ),
+        "backstepping1_integral": "smajax.control.controllers.backstepping_integral:ONE",
+        "backstepping2_integral": "smajax.control.controllers.backstepping_integral:TWO",
         "feedforward_pi": "smajax.control.controllers.feedforward_pi:PRESET",
     }
 )
+OF_THE_SOURCE = ("pid", "vsc1", "vsc2", "vsc3", "nvsc", "sld", "backstepping1", "backstepping2")  # chapter 4's eight
 # Name on the command line -> filter.
 FILTERS: dict[str, Callable[[System], AbstractEstimator]] = {"printed": printed_filter, "model": model_filter}
 

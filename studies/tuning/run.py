@@ -10,7 +10,7 @@ import sys
 from collections.abc import Mapping
 from pathlib import Path
 
-from smajax.control.presets import CONTROLLERS
+from smajax.control.presets import OF_THE_SOURCE
 from smajax.core.files import replace
 from smajax.core.progress import Event, Message, Progress
 from smajax.core.runtime import prepare
@@ -70,9 +70,9 @@ def main(arguments: list[str]) -> None:
     """The parts asked for."""
     fast = "--fast" in arguments
     parts = [part for part in arguments if part != "--fast"]
-    unknown = [part for part in parts if part not in ("peers", "picture", *CONTROLLERS)]
+    unknown = [part for part in parts if part not in ("peers", "picture", *OF_THE_SOURCE)]
     if unknown:
-        raise SystemExit(f"no part {', '.join(unknown)}; there are peers, picture, {', '.join(CONTROLLERS)}.")
+        raise SystemExit(f"no part {', '.join(unknown)}; there are peers, picture, {', '.join(OF_THE_SOURCE)}.")
     prepare(cores=True)
     path = HERE / ("fast.json" if fast else "results.json")
     if not parts or "peers" in parts:
@@ -83,7 +83,7 @@ def main(arguments: list[str]) -> None:
             bool(parts),
             FAST_WAYS if fast else WAYS,
         )
-    names = [part for part in parts if part in CONTROLLERS] or ([] if parts else list(CONTROLLERS))
+    names = [part for part in parts if part in OF_THE_SOURCE] or ([] if parts else list(OF_THE_SOURCE))
     require(path, ["vsc3"] if fast and names else names, FAST_PLAN if fast else Plan(), bool(parts))
     if not fast:
         results, words = kept(path), (HERE / "words.md").read_text(encoding="utf-8")

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from smajax.control.presets import CONTROLLERS
+from smajax.control.presets import OF_THE_SOURCE
 from studies.tuning.requirement import LIMITS
 
 FIFTH = 0.2
@@ -94,7 +94,7 @@ def first_below(results: Mapping[str, Any]) -> str:
 def requirement_table(results: Mapping[str, Any]) -> str:
     """A row a controller: what the worst loop does."""
     rows = []
-    for name in CONTROLLERS:
+    for name in OF_THE_SOURCE:
         if name not in results["requirement"]:
             continue
         one = results["requirement"][name]
@@ -129,7 +129,7 @@ def requirement_table(results: Mapping[str, Any]) -> str:
 def finer_table(results: Mapping[str, Any]) -> str:
     """A row a controller that comes near: its worst loops at a finer step."""
     rows = []
-    for name in CONTROLLERS:
+    for name in OF_THE_SOURCE:
         again = results["requirement"].get(name, {}).get("again_at_a_finer_step")
         if again is None or again["failed_at_the_coarser_step"] == again["loops"]:
             continue

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from smajax.control.presets import CONTROLLERS
+from smajax.control.presets import OF_THE_SOURCE
 from studies.tuning import picture, record, requirement, run
 from studies.tuning.peers import PROBLEMS
 from studies.tuning.record import kept
@@ -42,7 +42,7 @@ def test_the_requirement_is_judged_on_loops_that_nothing_has_touched(results: Pa
     assert found["met"] <= (found["after"]["loops_that_meet_all"] == members.size)
     assert found["passes"] >= 1
     assert sorted(one.name for one in (record.HERE / "gains").iterdir()) == [
-        f"{one}.json" for one in sorted(CONTROLLERS)
+        f"{one}.json" for one in sorted(OF_THE_SOURCE)
     ]
 
 
@@ -95,7 +95,7 @@ def test_the_stored_results_are_complete() -> None:
     whole = kept(record.HERE / "results.json")
     names = {f"{one.name}; {way}; {seed}" for one in PROBLEMS for way, seeds in run.WAYS.items() for seed in seeds}
     assert set(whole["peers"]) == names
-    assert set(whole["requirement"]) == set(CONTROLLERS)
+    assert set(whole["requirement"]) == set(OF_THE_SOURCE)
     assert len(picture.draw(whole)) > 1000
     gains = {one.stem for one in (record.HERE / "gains").glob("*.json")}
-    assert gains == set(CONTROLLERS)
+    assert gains == set(OF_THE_SOURCE)

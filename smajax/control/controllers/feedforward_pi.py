@@ -75,15 +75,15 @@ class FeedforwardPi(AbstractController):
 
 
 def feedforward_pi(system: System) -> FeedforwardPi:
-    """Gains of the arm."""
+    """Gains of the arm, found on the filter with noise and delay: studies/requirement/gains/feedforward_pi.json."""
     return FeedforwardPi(
         hysteresis=hysteresis_of(system),
-        proportional_gain=30.0,
-        integral_gain=30.0,
-        path_speed=1.0,
-        path_time=0.3,
+        proportional_gain=53.5,
+        integral_gain=37.7,
+        path_speed=2.13,
+        path_time=0.313,
         largest_voltage=10.0,
-        derivative_gain=5.0,
+        derivative_gain=8.43,
     )
 
 
