@@ -1,0 +1,77 @@
+"""`python -m studies.time_optimal.run`: the least times of the arm, and `results.json` (some minutes)."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from smajax.control.closed_loop import ClosedLoopSetup
+from smajax.control.compiled_loop import evaluated_loop_compiled
+from smajax.control.least_time import least_reach_times
+from smajax.control.reference import clock, constant
+from smajax.core.files import json_text, replace
+from smajax.core.parameters import set_parameters
+from smajax.core.runtime import prepare
+from smajax.model.rigs import arm
+from smajax.model.system import System
+from studies.time_optimal.bang import bang, switching_times
+from studies.time_optimal.direct import DT, HELD, PIECE, earliest
+
+HERE = Path(__file__).parent
+SET_POINTS = (-40.0, -10.0, 20.0, 50.0, 85.0)  # degrees
+UNREACHABLE = (94.0,)  # degrees: below the stop, and beyond what the wire can do
+LIMITS = (10.0, 8.7)  # V, of the presets
+SECONDS = 6.0
+
+
+def commanded(system: System, degrees: float, limit: float, full_until: float, pause: float) -> np.ndarray:
+    """The command of the two switching times, a value each `DT`."""
+    controller = set_parameters(bang(system, limit), {"full_until": full_until, "pause": pause})
+    time = clock(SECONDS, DT)
+    loop, _ = evaluated_loop_compiled(ClosedLoopSetup(system, controller, constant(time, np.radians(degrees)), DT))
+    return np.asarray(loop.voltage)
+
+
+def least_times(system: System, degrees: tuple[float, ...], limit: float) -> list[dict[str, Any]]:
+    """Of each set point: the least time to reach it, and the least found to settle by either method, s; None: unreachable."""
+    reach = least_reach_times(system, np.radians(degrees), limit)
+    rows: list[dict[str, Any]] = []
+    for angle, least in zip(degrees, reach, strict=True):
+        row: dict[str, Any] = {"set_point_deg": angle, "limit_V": limit, "reach_s": None}
+        if np.isfinite(least):
+            settled, full, pause = switching_times(system, angle, limit, float(least), SECONDS)
+            row |= {"reach_s": float(least), "settle_by_switching_s": settled, "full_until_s": full, "pause_s": pause}
+        rows.append(row)
+    found = [row for row in rows if row["reach_s"] is not None and np.isfinite(row["settle_by_switching_s"])]
+    if found:
+        settled = np.asarray([row["settle_by_switching_s"] for row in found])
+        count = int(np.ceil((settled.max() + HELD + 0.1) / PIECE))
+        commands = np.stack(
+            [commanded(system, row["set_point_deg"], limit, row["full_until_s"], row["pause_s"]) for row in found]
+        )
+        each = round(PIECE / DT)
+        # The same heat in each piece.
+        pieces = np.sqrt((commands[:, : count * each].reshape(len(found), count, each) ** 2).mean(axis=2))
+        targets = np.radians([row["set_point_deg"] for row in found])
+        least = np.asarray([row["reach_s"] for row in found])
+        times, _ = earliest(system, targets, settled + 0.04, pieces, limit, least)
+        for row, time in zip(found, times, strict=True):
+            row["settle_by_derivatives_s"] = float(time) if np.isfinite(time) else None
+    return rows
+
+
+def main(arguments: list[str]) -> None:
+    """All limits; the results stay beside the script."""
+    prepare(cores=True)
+    limits = LIMITS[:1] if "--fast" in arguments else LIMITS
+    rows = [row for limit in limits for row in least_times(arm(), (*SET_POINTS, *UNREACHABLE), limit)]
+    replace(HERE / "results.json", json_text({"rows": rows}))
+    for row in rows:
+        print(row)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
