@@ -78,7 +78,6 @@ def earliest(
     open_ = np.ones(runs, bool)
     at = jnp.asarray(targets)
     while open_.any():
-        print("T", np.round(wanted, 3), open_, np.round(best, 3), flush=True)  # DEBUG
         residual, slope = (
             np.asarray(one) for one in _residuals(system, jnp.asarray(now), at, jnp.asarray(wanted), True)
         )

@@ -25,6 +25,7 @@ SET_POINTS = (-40.0, -10.0, 20.0, 50.0, 85.0)  # degrees
 UNREACHABLE = (94.0,)  # degrees: below the stop, and beyond what the wire can do
 LIMITS = (10.0, 8.7)  # V, of the presets
 SECONDS = 6.0
+MARK = "<!-- table -->"
 
 
 def commanded(system: System, degrees: float, limit: float, full_until: float, pause: float) -> np.ndarray:
@@ -35,8 +36,8 @@ def commanded(system: System, degrees: float, limit: float, full_until: float, p
     return np.asarray(loop.voltage)
 
 
-def least_times(system: System, degrees: tuple[float, ...], limit: float) -> list[dict[str, Any]]:
-    """Of each set point: the least time to reach it, and the least found to settle by either method, s; None: unreachable."""
+def switched(system: System, degrees: tuple[float, ...], limit: float) -> list[dict[str, Any]]:
+    """Of each set point: the least time to reach it, and the least to settle by switching, s; None: unreachable."""
     reach = least_reach_times(system, np.radians(degrees), limit)
     rows: list[dict[str, Any]] = []
     for angle, least in zip(degrees, reach, strict=True):
@@ -45,32 +46,61 @@ def least_times(system: System, degrees: tuple[float, ...], limit: float) -> lis
             settled, full, pause = switching_times(system, angle, limit, float(least), SECONDS)
             row |= {"reach_s": float(least), "settle_by_switching_s": settled, "full_until_s": full, "pause_s": pause}
         rows.append(row)
-    found = [row for row in rows if row["reach_s"] is not None and np.isfinite(row["settle_by_switching_s"])]
-    if found:
-        settled = np.asarray([row["settle_by_switching_s"] for row in found])
-        count = int(np.ceil((settled.max() + HELD + 0.1) / PIECE))
-        commands = np.stack(
-            [commanded(system, row["set_point_deg"], limit, row["full_until_s"], row["pause_s"]) for row in found]
-        )
-        each = round(PIECE / DT)
-        # The same heat in each piece.
-        pieces = np.sqrt((commands[:, : count * each].reshape(len(found), count, each) ** 2).mean(axis=2))
-        targets = np.radians([row["set_point_deg"] for row in found])
-        least = np.asarray([row["reach_s"] for row in found])
-        times, _ = earliest(system, targets, settled + 0.04, pieces, limit, least)
-        for row, time in zip(found, times, strict=True):
-            row["settle_by_derivatives_s"] = float(time) if np.isfinite(time) else None
     return rows
+
+
+def by_derivatives(system: System, rows: list[dict[str, Any]]) -> None:
+    """Adds the least time to settle by derivatives, s, from the command of the switches on; None: none was found."""
+    found = [row for row in rows if row["reach_s"] is not None and np.isfinite(row["settle_by_switching_s"])]
+    settled = np.asarray([row["settle_by_switching_s"] for row in found])
+    limit, each = found[0]["limit_V"], round(PIECE / DT)
+    count = int(np.ceil((settled.max() + HELD + 0.1) / PIECE))
+    commands = np.stack(
+        [commanded(system, row["set_point_deg"], limit, row["full_until_s"], row["pause_s"]) for row in found]
+    )
+    # The same heat in each piece.
+    pieces = np.sqrt((commands[:, : count * each].reshape(len(found), count, each) ** 2).mean(axis=2))
+    targets = np.radians([row["set_point_deg"] for row in found])
+    least = np.asarray([row["reach_s"] for row in found])
+    times, _ = earliest(system, targets, settled + 0.04, pieces, limit, least)
+    for row, time in zip(found, times, strict=True):
+        row["settle_by_derivatives_s"] = float(time) if np.isfinite(time) else None
+
+
+def table(rows: list[dict[str, Any]]) -> str:
+    """A row a set point and limit."""
+    lines = [
+        "| set point, ° | limit, V | there, s | settled, by switching, s | settled, by derivatives, s | full voltage until, s | none for, s |",
+        "|---|---|---|---|---|---|---|",
+    ]
+
+    def shown(row: dict[str, Any], name: str) -> str:
+        return "–" if row.get(name) is None else f"{row[name]:.3f}"
+
+    for row in rows:
+        there = "unreachable" if row["reach_s"] is None else shown(row, "reach_s")
+        names = ("settle_by_switching_s", "settle_by_derivatives_s", "full_until_s", "pause_s")
+        cells = [f"{row['set_point_deg']:g}", f"{row['limit_V']:g}", there, *(shown(row, name) for name in names)]
+        lines.append(f"| {' | '.join(cells)} |")
+    return "\n".join(lines)
 
 
 def main(arguments: list[str]) -> None:
     """All limits; the results stay beside the script."""
     prepare(cores=True)
     limits = LIMITS[:1] if "--fast" in arguments else LIMITS
-    rows = [row for limit in limits for row in least_times(arm(), (*SET_POINTS, *UNREACHABLE), limit)]
+    rows = [row for limit in limits for row in switched(arm(), (*SET_POINTS, *UNREACHABLE), limit)]
+    _write(rows)
+    # The other method from the largest limit alone: it takes minutes.
+    by_derivatives(arm(), [row for row in rows if row["limit_V"] == LIMITS[0]])
+    _write(rows)
+
+
+def _write(rows: list[dict[str, Any]]) -> None:
     replace(HERE / "results.json", json_text({"rows": rows}))
-    for row in rows:
-        print(row)
+    before, _, rest = (HERE / "README.md").read_text(encoding="utf-8").partition(MARK)
+    _, _, after = rest.partition(MARK)
+    replace(HERE / "README.md", f"{before}{MARK}\n\n{table(rows)}\n\n{MARK}{after}")
 
 
 if __name__ == "__main__":

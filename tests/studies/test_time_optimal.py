@@ -1,0 +1,77 @@
+"""The least times: nothing is quicker than the largest command, what it does not reach is unreachable, and switching settles soon after."""
+
+from __future__ import annotations
+
+import json
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from smajax.control.figures_of_merit import band_of
+from smajax.control.least_time import least_reach_times
+from smajax.model.rigs import arm
+from smajax.model.system import System
+from smajax.simulation.simulate import simulate
+from studies.time_optimal.bang import switching_times
+from studies.time_optimal.direct import _step
+from studies.time_optimal.run import HERE, MARK, table
+
+TARGETS = np.radians([-20.0, 20.0, 60.0])
+DT = 0.01
+
+
+@eqx.filter_jit
+def _positions(system: System, voltages: jax.Array) -> jax.Array:
+    return jax.vmap(lambda one: simulate(system, {"voltage": one}, DT).position)(voltages)
+
+
+def test_no_other_command_is_there_earlier() -> None:
+    """128 commands in pieces of 0.1 s: random, full with a pause anywhere, and full."""
+    draw, pieces = np.random.default_rng(0), 15
+    random = draw.uniform(0.0, 10.0, (64, pieces))
+    paused = np.where(draw.random((63, pieces)) < 0.1, draw.uniform(0.0, 10.0, (63, pieces)), 10.0)
+    commands = np.repeat(np.concatenate([random, paused, np.full((1, pieces), 10.0)]), 10, axis=1)
+    positions = np.asarray(_positions(arm(), jnp.asarray(commands)))
+    least = least_reach_times(arm(), TARGETS, 10.0, 2.0, DT)
+    for target, time in zip(TARGETS, least, strict=True):
+        there = positions >= target - float(band_of(arm()))
+        first = np.where(there.any(axis=1), there.argmax(axis=1) * DT, np.inf)
+        assert first.min() == pytest.approx(time, abs=1e-9) == first[-1]
+
+
+def test_what_the_largest_command_does_not_reach_is_unreachable() -> None:
+    assert np.isinf(least_reach_times(arm(), TARGETS, 6.0)).all()
+    reach = least_reach_times(arm(), np.radians([60.0, 94.0]), 10.0)
+    assert np.isfinite(reach[0])
+    assert np.isinf(reach[1])
+
+
+def test_two_switches_settle_soon_after_the_least_time() -> None:
+    least = float(least_reach_times(arm(), np.radians([20.0]), 10.0)[0])
+    settled, full, pause = switching_times(arm(), 20.0, 10.0, least, 4.0)
+    assert least <= settled < least + 0.2
+    assert full < least
+    assert pause < 0.5
+
+
+def test_a_step_of_the_pieces_keeps_the_limits_and_solves_what_they_allow() -> None:
+    """A linear residual whose least squares want one piece beyond its limit: that one stays, the other takes over."""
+    slope = np.asarray([[1.0, 1.0], [1.0, -0.1]])
+    residual = slope @ np.asarray([10.0, 2.0]) - np.asarray([14.0, 12.0])
+    moved = _step(residual, slope, np.asarray([10.0, 2.0]), 1e-12, 10.0)
+    assert moved[0] == 10.0
+    alone = -(slope[:, 1] @ residual) / (slope[:, 1] @ slope[:, 1])
+    assert moved[1] == pytest.approx(2.0 + alone, abs=1e-4)
+
+
+def test_the_stored_times_are_in_order_and_in_the_table() -> None:
+    rows = json.loads((HERE / "results.json").read_text(encoding="utf-8"))["rows"]
+    assert any(row["reach_s"] is None for row in rows)
+    for row in rows:
+        for name in ("settle_by_switching_s", "settle_by_derivatives_s"):
+            if row["reach_s"] is not None and row.get(name) is not None:
+                assert row[name] >= row["reach_s"] - 1e-9
+    assert (HERE / "README.md").read_text(encoding="utf-8").split(MARK)[1].strip() == table(rows)
