@@ -1,1 +1,1 @@
-"""The least time to settle at a set point, by two methods that share nothing but the simulator."""
+"""The least time to a set point, and the least found to settle there."""

@@ -9,17 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from smajax.control.closed_loop import ClosedLoopSetup
-from smajax.control.compiled_loop import evaluated_loop_compiled
 from smajax.control.least_time import least_reach_times
-from smajax.control.reference import clock, constant
 from smajax.core.files import json_text, replace
-from smajax.core.parameters import set_parameters
 from smajax.core.runtime import prepare
 from smajax.model.rigs import arm
 from smajax.model.system import System
-from studies.time_optimal.bang import bang, switching_times
-from studies.time_optimal.direct import DT, HELD, PIECE, earliest
+from studies.time_optimal.bang import switching_times
 
 HERE = Path(__file__).parent
 SET_POINTS = (-40.0, -10.0, 20.0, 50.0, 85.0)  # degrees
@@ -27,14 +22,6 @@ SWUNG_TO = (94.0,)  # degrees: above where all of the wire is transformed; the a
 LIMITS = (10.0, 8.7)  # V, of the presets
 SECONDS = 6.0
 MARK = "<!-- table -->"
-
-
-def commanded(system: System, degrees: float, limit: float, full_until: float, pause: float) -> np.ndarray:
-    """The command of the two switching times, a value each `DT`."""
-    controller = set_parameters(bang(system, limit), {"full_until": full_until, "pause": pause})
-    time = clock(SECONDS, DT)
-    loop, _ = evaluated_loop_compiled(ClosedLoopSetup(system, controller, constant(time, np.radians(degrees)), DT))
-    return np.asarray(loop.voltage)
 
 
 def switched(system: System, degrees: tuple[float, ...], limit: float) -> list[dict[str, Any]]:
@@ -50,29 +37,11 @@ def switched(system: System, degrees: tuple[float, ...], limit: float) -> list[d
     return rows
 
 
-def by_derivatives(system: System, rows: list[dict[str, Any]]) -> None:
-    """Adds the least time to settle by derivatives, s, from the command of the switches on; None: none was found."""
-    found = [row for row in rows if row["reach_s"] is not None and np.isfinite(row["settle_by_switching_s"])]
-    settled = np.asarray([row["settle_by_switching_s"] for row in found])
-    limit, each = found[0]["limit_V"], round(PIECE / DT)
-    count = int(np.ceil((settled.max() + HELD + 0.1) / PIECE))
-    commands = np.stack(
-        [commanded(system, row["set_point_deg"], limit, row["full_until_s"], row["pause_s"]) for row in found]
-    )
-    # The same heat in each piece.
-    pieces = np.sqrt((commands[:, : count * each].reshape(len(found), count, each) ** 2).mean(axis=2))
-    targets = np.radians([row["set_point_deg"] for row in found])
-    least = np.asarray([row["reach_s"] for row in found])
-    times, _ = earliest(system, targets, settled + 0.04, pieces, limit, least)
-    for row, time in zip(found, times, strict=True):
-        row["settle_by_derivatives_s"] = float(time) if np.isfinite(time) else None
-
-
 def table(rows: list[dict[str, Any]]) -> str:
     """A row a set point and limit."""
     lines = [
-        "| set point, ° | limit, V | there, s | settled, by switching, s | settled, by derivatives, s | full voltage until, s | none for, s |",
-        "|---|---|---|---|---|---|---|",
+        "| set point, ° | limit, V | there, s | settled, by switching, s | full voltage until, s | none for, s |",
+        "|---|---|---|---|---|---|",
     ]
 
     def shown(row: dict[str, Any], name: str) -> str:
@@ -82,7 +51,7 @@ def table(rows: list[dict[str, Any]]) -> str:
 
     for row in rows:
         there = "unreachable" if row["reach_s"] is None else shown(row, "reach_s")
-        names = ("settle_by_switching_s", "settle_by_derivatives_s", "full_until_s", "pause_s")
+        names = ("settle_by_switching_s", "full_until_s", "pause_s")
         cells = [f"{row['set_point_deg']:g}", f"{row['limit_V']:g}", there, *(shown(row, name) for name in names)]
         lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines)
@@ -93,9 +62,6 @@ def main(arguments: list[str]) -> None:
     prepare(cores=True)
     limits = LIMITS[:1] if "--fast" in arguments else LIMITS
     rows = [row for limit in limits for row in switched(arm(), (*SET_POINTS, *SWUNG_TO), limit)]
-    _write(rows)
-    # The other method from the largest limit alone: it takes minutes.
-    by_derivatives(arm(), [row for row in rows if row["limit_V"] == LIMITS[0]])
     _write(rows)
 
 
