@@ -71,6 +71,7 @@ EFFECTS: dict[str, Effect] = {
     "quantisation": Effect("sensor", 0.01, 0.15, "of the stroke", EVERYWHERE),
     "dead_band": Effect("sensor", 0.005, 0.15, "play, of the stroke", EVERYWHERE),
     "sensor_drift": Effect("sensor", 0.005, 0.2, "of the stroke over a run", EVERYWHERE),
+    "sensor_limit": Effect("sensor", 0.05, 0.6, "of the stroke, at its far end, that is not read", EVERYWHERE),
     # command
     "input_gain": Effect("command", 0.02, 0.3, "less one"),
     "input_delay": Effect("command", 0.02, 2.0, "s"),

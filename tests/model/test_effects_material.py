@@ -71,6 +71,7 @@ RIGS = {
             "sensor_drift",
             "sensor_offset",
             "sensor_backlash",
+            "sensor_limit",
         ),
     ),
     "unloaded": (_under(DEAD_WEIGHT, "liang"), UNLOADED, ("enhanced_conditions",)),
