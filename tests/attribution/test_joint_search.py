@@ -19,7 +19,6 @@ from smajax.fit.starts import logarithmic_points
 from smajax.model.effects.library import LIBRARY
 from tests.helpers.hot_weight import CANDIDATES, NOISE, UNKNOWNS, hot_weight
 
-
 LIMITED = (*CANDIDATES, "sensor_limit")
 
 

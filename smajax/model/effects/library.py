@@ -47,6 +47,7 @@ _NAMES = (
     "lagging_transformation",
     "drifting_temperatures",
     "phase_modulus",
+    "elastic_mismatch",
     "thermal_expansion",
     "stress_dependent_strain",
     "two_way_memory",
