@@ -19,13 +19,13 @@ from smajax.attribution.confounders import confounders
 from smajax.attribution.findings import (
     Findings,
     NoiseWithoutRun,
-    OutlierRun,
     PredictsTooLittle,
     Rejected,
     Verdict,
 )
 from smajax.attribution.found import effects_found, parameters_found, priors_found
 from smajax.attribution.held_out import Compared, compare, every_run, validated
+from smajax.attribution.input_of_run import corrected, record_error
 from smajax.attribution.job import Job, effects_excluded, job_of
 from smajax.attribution.joint_search import JointSearch
 from smajax.attribution.joint_stage import base_alone, search_by_evidence
@@ -33,6 +33,7 @@ from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.neutral import check_neutral
 from smajax.attribution.outlier_run import outlier_runs
 from smajax.attribution.preset_priors import visible
+from smajax.attribution.record_error import OutlierRun, RecordError
 from smajax.attribution.refusal import refuse_keys_of_identify
 from smajax.attribution.saved_model import fit_run_states, saved_model
 from smajax.attribution.step_size_check import finer_integration, integration_error_of
@@ -48,6 +49,7 @@ from smajax.fit.uncertainty import identifiability
 from smajax.simulation.steppers import Integration
 
 SEED = 2004
+MOST_RECORD_ERRORS = 2  # of single runs that are corrected: with more of them nothing is left that says which is right
 SEARCH_TO_COME = "the search for effects, and the checks of what it finds"
 CHECKS_TO_COME = "the checks against an unknown function, an outlier run and the held-out runs"
 CHECKING, WRITING = "checking what these runs determine", "standard errors and pictures"
@@ -61,6 +63,7 @@ class Context:
     setting: Search
     start: np.ndarray  # (P,), start values of the parameters of base model and library
     base: Fit  # the base model
+    seed: int
     check: tuple[str, ...]
 
 
@@ -118,19 +121,21 @@ def close_loop(  # keywords, which a caller names one by one
     context = prepared(experiment, cache, as_progress(progress), seed, settings)
     if interim is not None:
         interim(known_so_far(context, base_alone(context.setting, context.base), SEARCH_TO_COME))
-    outcome = searched(context)
-    finer = finer_integration(context.setting, outcome.final)
-    if finer is not None:
-        # Models are compared as one integration gives them: all of them again.
-        context = prepared(experiment, cache, as_progress(progress), seed, settings, finer)
-        outcome = searched(context)
+    context, outcome = searched_finely(context)
+    errors: list[RecordError] = []
+    while len(errors) < MOST_RECORD_ERRORS and (wrong := wrong_record(context, outcome)) is not None:
+        # All else is asked of the runs as they should have been recorded.
+        errors.append(wrong)
+        context = prepared(corrected(context.job.experiment, wrong), cache, context.setting.progress, seed, settings)
+        context, outcome = searched_finely(context)
     if interim is not None and not context.setting.is_noise(outcome.final):
         interim(known_so_far(context, (outcome.search, outcome.base, outcome.final), CHECKS_TO_COME))
     outcome = against_an_unknown_term(context, outcome)
     outcome = against_an_outlier_run(context, outcome)
     final, compared, rejected = validated(context.job, context.setting, outcome.search, outcome.base, outcome.final)
     found = findings_of(context, replace(outcome, final=final), compared, rejected)
-    return replace(found, provenance=_provenance(experiment, cache, command, seed, clock.monotonic() - began))
+    provenance = _provenance(experiment, cache, command, seed, clock.monotonic() - began)
+    return replace(found, record_errors=tuple(errors), provenance=provenance)
 
 
 def prepared(  # the stage's inputs, each once
@@ -166,12 +171,32 @@ def prepared(  # the stage's inputs, each once
     identifiable = identifiability(at_fit, job.unknowns, job.bounds, "at the base model's fit")
     progress(Stage(CHECKING, 1.0))
     report_checks(progress, (), identifiable)
-    return Context(job, setting, start, base, (*experiment.warnings, *identifiable))
+    return Context(job, setting, start, base, seed, (*experiment.warnings, *identifiable))
 
 
 def searched(context: Context) -> Outcome:
     """The base model and the one that the search ends with."""
     return Outcome(*search_by_evidence(context.setting, context.base))
+
+
+def searched_finely(context: Context) -> tuple[Context, Outcome]:
+    """The search; where the model that it ends with asks for a finer integration, all of it again with that."""
+    outcome, setting = searched(context), context.setting
+    finer = finer_integration(setting, outcome.final)
+    if finer is None:
+        return context, outcome
+    # Models are compared as one integration gives them.
+    experiment, seed = context.job.experiment, context.seed
+    context = prepared(experiment, setting.cache, setting.progress, seed, setting.config, finer)
+    return context, searched(context)
+
+
+def wrong_record(context: Context, outcome: Outcome) -> RecordError | None:
+    """An input of one run that was recorded wrongly; asked where something is missing."""
+    setting, base, final = context.setting, outcome.base, outcome.final
+    if not final.effects and setting.is_noise(final):
+        return None
+    return record_error(setting, base, final, context.job.fit_runs)
 
 
 def against_an_unknown_term(context: Context, outcome: Outcome) -> Outcome:

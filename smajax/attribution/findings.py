@@ -16,6 +16,7 @@ import numpy as np
 
 from smajax.attribution.config import AttributionConfig
 from smajax.attribution.prior_finding import PriorFinding
+from smajax.attribution.record_error import OutlierRun, RecordError
 from smajax.data.model_file.actuator_model import ActuatorModel
 from smajax.fit.integration import IntegrationError
 from smajax.fit.uncertainty import Remark
@@ -240,18 +241,6 @@ class Confounder:
 
 
 @dataclass(frozen=True)
-class OutlierRun:
-    """A fit run that does not agree with the others, by the model fitted to these alone; errors in SI."""
-
-    run: str
-    effects: tuple[str, ...]  # of that model; none: the base model
-    residual_is_noise: bool  # whether what it leaves of the others is noise
-    others_with: float  # error on the others, fitted to all runs
-    others_without: float  # and to the others alone
-    predicted_rmse: float  # error on this run, by the fit to the others
-
-
-@dataclass(frozen=True)
 class Rejected:
     """Effects that the held-out runs did not validate, and the error there; SI."""
 
@@ -349,6 +338,7 @@ class Findings:
     rejected: Rejected | None = None
     unknown: tuple[UnknownTerm, ...] = ()  # terms sought for what the library does not hold, best first
     outlier_runs: tuple[OutlierRun, ...] = ()
+    record_errors: tuple[RecordError, ...] = ()  # inputs of single runs, which were corrected
     config: AttributionConfig = field(default_factory=AttributionConfig)
     provenance: dict[str, str] = field(default_factory=dict)  # versions, seed, data hashes, command, seconds
     base_model: ActuatorModel | None = None  # as they are saved

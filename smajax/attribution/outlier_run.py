@@ -12,8 +12,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from smajax.attribution.findings import OutlierRun
 from smajax.attribution.model_fits import Model, Search, Start
+from smajax.attribution.record_error import OutlierRun
 from smajax.fit.predicted import misfits
 
 SETTLED = 0.02  # of what one sample adds to the cost

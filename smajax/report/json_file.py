@@ -191,6 +191,7 @@ def findings_to_json(findings: Findings, narrative: Narrative | None = None) -> 
         "rounds": [_round(entry, why) for entry, why in zip(findings.rounds, words.rounds, strict=True)],
         "confounders": [dataclasses.asdict(one) for one in findings.confounders],
         "outlier_runs": [dataclasses.asdict(one) for one in findings.outlier_runs],
+        "record_errors": [dataclasses.asdict(one) for one in findings.record_errors],
         "unknown": [_unknown(term, why) for term, why in zip(findings.unknown, words.unknown, strict=True)],
         "unexplained": words.unexplained,
         "cannot_know": words.cannot_know,

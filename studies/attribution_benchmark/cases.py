@@ -13,6 +13,7 @@ import numpy as np
 from studies.attribution_benchmark.effects import EFFECTS, absorbed, applies
 from studies.attribution_benchmark.parameters import Wire
 from studies.attribution_benchmark.rigs import RIGS, Rig
+from studies.attribution_benchmark.sheet import drawn_about, on_the_sheet
 from studies.attribution_benchmark.strength import Found, Ruler
 
 STRENGTHS = (1.0, 3.0, 10.0)  # noises, after a refit
@@ -69,6 +70,11 @@ class Case:
         return ("null", "single", "pair")[len(self.effects)]
 
     @property
+    def fresh(self) -> bool:
+        """Whether it is drawn anew: the values of the sheet are then only as true as their widths say."""
+        return self.number >= ANEW
+
+    @property
     def seed(self) -> int:
         """The same on every machine."""
         return zlib.crc32(self.name.encode())
@@ -109,7 +115,7 @@ def cases(drawn: int = 0) -> list[Case]:
 
 
 def true_wire(case: Case) -> Wire:
-    """The rig's wire with every unknown off its nominal value."""
+    """The rig's wire with every unknown off its nominal value, and of a fresh case the values of the sheet too."""
     rig, random = RIGS[case.rig], np.random.default_rng([case.seed, 0])
     w = rig.wire
     changed: dict[str, float] = {}
@@ -124,7 +130,8 @@ def true_wire(case: Case) -> Wire:
             (getattr(w, high) - getattr(w, low)) / 2 * width,
         )
         changed[low], changed[high] = middle - half, middle + half
-    return replace(w, **changed)  # type: ignore[arg-type]
+    wire = replace(w, **changed)  # type: ignore[arg-type]
+    return drawn_about(rig, wire, case.seed) if case.fresh else wire
 
 
 def truth(case: Case) -> Truth:
@@ -135,7 +142,7 @@ def truth(case: Case) -> Truth:
     if case.kind == "absorbed":
         effects = {name: ABSORBED_SHARE * EFFECTS[name].largest for name in case.effects}
         return Truth(case.rig, wire, effects, {name: Found(c, 0.0, False) for name, c in effects.items()}, 0.0)
-    ruler = Ruler(rig, wire)
+    ruler = Ruler(rig, wire, on_the_sheet(rig) if case.fresh else {})
     found = {name: ruler.find(name, case.strength) for name in case.effects}
     effects = {name: f.coefficient for name, f in found.items()}
     alone = len(found) == 1

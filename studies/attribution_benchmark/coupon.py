@@ -54,6 +54,7 @@ def strain(wire: Wire, times: Vector, run: Run, effects: Effects) -> Vector:
         modulus = wire.young_modulus_austenite + middle * (wire.young_modulus_martensite - wire.young_modulus_austenite)
         total += (strains.expansion - wire.thermal_modulus / modulus) * change
         total += strains.per_fraction(middle, stress, sign) * (xi - old)
+        total += strains.softened(old, xi, stress, (path[k] + path[k - 1]) / 2)
         if strains.creep:
             rate = strains.creep_rate(creep, stress, middle)
             creep += rate * step

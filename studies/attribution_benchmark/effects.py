@@ -55,6 +55,7 @@ EFFECTS: dict[str, Effect] = {
     "stress_dependent_strain": Effect("constitutive", 2e-3, 6e-2, "largest strain added, 100 MPa"),
     "residual_strain": Effect("constitutive", 2e-4, 1e-2, "strain left per transformation passed"),
     "creep": Effect("constitutive", 5e-4, 2e-2, "strain of martensite under 100 MPa, behind 8 s"),
+    "elastic_mismatch": Effect("constitutive", 0.1, 1.2, "of the change of sigma/E with the phase", ("coupon",)),
     # mechanics
     "coulomb_friction": Effect("mechanics", 0.02, 0.5, "of the load at rest"),
     "stribeck_friction": Effect(
@@ -71,6 +72,7 @@ EFFECTS: dict[str, Effect] = {
     "quantisation": Effect("sensor", 0.01, 0.15, "of the stroke", EVERYWHERE),
     "dead_band": Effect("sensor", 0.005, 0.15, "play, of the stroke", EVERYWHERE),
     "sensor_drift": Effect("sensor", 0.005, 0.2, "of the stroke over a run", EVERYWHERE),
+    "sensor_limit": Effect("sensor", 0.05, 0.6, "of the stroke, at its far end, that is not read", EVERYWHERE),
     # command
     "input_gain": Effect("command", 0.02, 0.3, "less one"),
     "input_delay": Effect("command", 0.02, 2.0, "s"),

@@ -65,6 +65,16 @@ class Strains:
         self.quadratic = get("quadratic_strain", 0.0)
         self.compliance = get("series_compliance", 0.0) / wire.young_modulus_austenite
         self.creep = get("creep", 0.0)
+        self.mismatch = get("elastic_mismatch", 0.0)
+        self.wire = wire
+
+    def softened(self, old: float, xi: float, stress: float, temperature: float) -> float:
+        """Strain gained as the fraction goes from `old` to `xi`, and the modulus with it: of sigma = E eps_elastic + theta_T (T - T_inf)."""
+        wire = self.wire
+        hot, cold = wire.young_modulus_austenite, wire.young_modulus_martensite
+        before, after = (hot + one * (cold - hot) for one in (old, xi))
+        elastic = stress - wire.thermal_modulus * (temperature - wire.ambient_temperature)
+        return self.mismatch * elastic * (1.0 / after - 1.0 / before)
 
     def per_fraction(self, xi: float, stress: float, sign: int) -> float:
         """Strain per unit of martensite fraction; `sign` of the active branch, +1 heating."""

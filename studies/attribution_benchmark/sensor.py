@@ -37,5 +37,8 @@ def reading(times: Vector, value: Vector, effects: Effects, stroke: float) -> Ve
     if flat:  # the sensor's slope falls over the far half of the stroke
         x = np.maximum(np.abs(shown) / stroke - 0.5, 0.0)
         shown -= np.sign(shown) * flat * stroke * x**2
+    if get("sensor_limit", 0.0):  # the sensor shows nothing beyond it, either way from the start
+        end = (1 - get("sensor_limit", 0.0)) * stroke
+        shown = np.clip(shown, -end, end)
     cell = get("quantisation", 0.0) * stroke
     return np.round(shown / cell) * cell if cell else shown

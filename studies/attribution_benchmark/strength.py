@@ -1,7 +1,8 @@
 """How strong an effect is: what of its change in the readings no refit of the base model takes up, in noises.
 
-The refit is that of the unknowns of the experiment file and of each run's zero, on noise-free readings, by steps of
-Gauss and Newton with the derivatives at the truth. The root mean square of what is left over the noise is the strength.
+The refit is that of the unknowns of the experiment file, of the values of the sheet within their widths and of each run's zero,
+on noise-free readings, by steps of Gauss and Newton with the derivatives at the truth. The root mean square of what is left over
+the noise is the strength.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,16 +41,22 @@ class Found:
 
 
 class Ruler:
-    """Measures the strength of effects on one rig with one wire."""
+    """Measures the strength of effects on one rig with one wire; `widths`: of values that a refit may move, of the logarithm."""
 
-    def __init__(self, rig: Rig, wire: Wire) -> None:
+    def __init__(self, rig: Rig, wire: Wire, widths: Mapping[str, float] = MappingProxyType({})) -> None:
         self.rig, self.wire = rig, wire
+        self.names = (*rig.unknowns, *widths)
+        self.spread = {name: width * getattr(wire, name) for name, width in widths.items()}
         self._values: dict[tuple[object, ...], list[Vector]] = {}  # a sensor's effects need no new simulation
         self.runs = [run for run in rig.runs(wire) if run.role == "fit"]
         self.null = self.readings(wire, {})
-        columns = self._columns()
-        self.sizes = np.array([np.linalg.norm(column) for column in columns])
-        self.basis, self.corner = np.linalg.qr(np.column_stack(columns) / self.sizes)
+        matrix = np.column_stack(self._columns())
+        rows = np.zeros((len(widths), matrix.shape[1]))
+        for row, (name, spread) in enumerate(self.spread.items()):
+            rows[row, self.names.index(name)] = 1.0 / spread
+        matrix = np.concatenate([matrix, rows])
+        self.sizes = np.linalg.norm(matrix, axis=0)
+        self.basis, self.corner = np.linalg.qr(matrix / self.sizes)
 
     def readings(self, wire: Wire, effects: Effects) -> Vector:
         """Noise-free readings of all fit runs, in noises."""
@@ -61,7 +69,7 @@ class Ruler:
 
     def _columns(self) -> list[Vector]:
         columns = []
-        for name in self.rig.unknowns:
+        for name in self.names:
             nominal = getattr(self.wire, name)
             step = DEGREES if name.endswith(("start", "finish")) else SHARE * nominal
             columns.append((self.readings(replace(self.wire, **{name: nominal + step}), {}) - self.null) / step)
@@ -78,8 +86,9 @@ class Ruler:
         wire, rest = self.wire, shown - self.null
         left = self._without_zeros(rest)
         for _ in range(REFITS):
-            move = np.linalg.solve(self.corner, self.basis.T @ rest) / self.sizes
-            moved = {name: getattr(wire, name) + float(d) for name, d in zip(self.rig.unknowns, move, strict=False)}
+            off = [(getattr(self.wire, name) - getattr(wire, name)) / one for name, one in self.spread.items()]
+            move = np.linalg.solve(self.corner, self.basis.T @ np.concatenate([rest, off])) / self.sizes
+            moved = {name: getattr(wire, name) + float(d) for name, d in zip(self.names, move, strict=False)}
             wire = replace(wire, **moved)
             if not _possible(wire):
                 break

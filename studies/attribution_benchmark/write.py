@@ -23,6 +23,7 @@ from studies.attribution_benchmark.effects import EFFECTS
 from studies.attribution_benchmark.parameters import Wire
 from studies.attribution_benchmark.rigs import Rig, show
 from studies.attribution_benchmark.runs import Run
+from studies.attribution_benchmark.sheet import on_the_sheet
 
 Vector = NDArray[np.float64]
 LARGEST_OFFSET = 3.0  # noises: zero of a run
@@ -32,7 +33,11 @@ PRESETS = {  # wire, load, drive of the experiment file
     "bias_spring": ("flexinol_ht_500um", "bias_spring", "duty"),
     "coupon": ("flexinol_isobaric", "coupon", "none"),
 }
-KNOWN = {"dead_weight": ('wire_diameter = "0.31 mm"', 'damping = "100 N s/m"')}
+KNOWN = {  # of the bench: exact
+    "arm": ('damping = "3e-3 N m s/rad"',),
+    "dead_weight": ('wire_diameter = "0.31 mm"', 'damping = "100 N s/m"'),
+    "bias_spring": ('damping = "20 N s/m"',),
+}
 OUTPUT = {  # channel, column, unit, SI value of the unit
     "arm": ("angle", "angle_deg", "deg", np.pi / 180),
     "dead_weight": ("position", "position_mm", "mm", 1e-3),
@@ -105,6 +110,8 @@ def experiment_text(rig: Rig, runs: tuple[Run, ...]) -> str:
         lines.append(
             f'{name} = {{ low = "{low:.6g} {unit}", high = "{high:.6g} {unit}", start = "{nominal:.6g} {unit}" }}'
         )
+    lines += ["", "[priors.presets]"]
+    lines += [f"{name} = {{ relative = {width:g} }}" for name, width in on_the_sheet(rig).items()]
     lines += ["", "[nuisance]", "offset = true", "", "[sampling]", f'step = "{1e3 * rig.clock.step:g} ms"']
     channel, column, unit = COMMAND[rig.name]
     lines += ["", f"[channels.{channel}]", 'role = "input"', f'column = "{column}"', f'unit = "{unit}"']
@@ -144,7 +151,7 @@ def write(case: Case, out: Path) -> Truth:
         },
         "strength_asked": case.strength,
         "strength_together": true.together,
-        "parameters": {name: getattr(true.wire, name) for name in true.rig.unknowns},
+        "parameters": {name: getattr(true.wire, name) for name in (*true.rig.unknowns, *on_the_sheet(true.rig))},
         "noise": true.rig.noise,
         "seed": case.seed,
     }

@@ -19,9 +19,13 @@ from smajax.fit.starts import logarithmic_points
 from smajax.model.effects.library import LIBRARY
 from tests.helpers.hot_weight import CANDIDATES, NOISE, UNKNOWNS, hot_weight
 
+LIMITED = (*CANDIDATES, "sensor_limit")
 
-def _found(truth: dict[str, float]) -> tuple[JointSearch, dict[str, float], dict[str, float]]:
-    search = hot_weight(truth)
+
+def _found(
+    truth: dict[str, float], candidates: tuple[str, ...] = CANDIDATES
+) -> tuple[JointSearch, dict[str, float], dict[str, float]]:
+    search = hot_weight(truth, candidates)
     model = search_jointly(search, {(): search.joint.problem.start_values()})
     slots = search.joint.slots
     values = {
@@ -46,6 +50,27 @@ def test_two_effects_are_found_together() -> None:
     assert values["phase_resistance.contrast"] == pytest.approx(-0.2, abs=5.0 * errors["phase_resistance.contrast"])
     # The gain of the sensor and the recoverable strain, which is unknown, are nearly one.
     assert "rising_convection.slope" not in values
+
+
+@pytest.mark.parametrize(("side", "limit"), [("upper", 0.016), ("lower", 0.003)])
+def test_a_sensor_that_ends_before_the_motion_is_found_with_its_limit(side: str, limit: float) -> None:
+    """Of a stroke of 25 mm; the other end, which no reading comes near, stays unused."""
+    truth = {f"sensor_limit.{side}_cut": 1.0, f"sensor_limit.{side}": limit}
+    search, values, errors = _found(truth, LIMITED)
+    assert {name.split(".")[0] for name in values} == {"sensor_limit"}
+    assert values[f"sensor_limit.{side}_cut"] == pytest.approx(1.0, abs=0.02)
+    assert values[f"sensor_limit.{side}"] == pytest.approx(limit, abs=4.0 * errors[f"sensor_limit.{side}"])
+    other = {"upper": "lower", "lower": "upper"}[side]
+    assert values[f"sensor_limit.{other}_cut"] < 0.01
+    assert search.rounds[-1].present == ("sensor_limit",)
+
+
+def test_a_sensor_that_shows_the_whole_motion_is_given_no_limit() -> None:
+    """The wire rests at both ends of its transformation, where readings pile up as at a limit."""
+    search, values, _ = _found({}, LIMITED)
+    assert values == {}
+    reading = search.joint.problem.measured
+    assert np.mean(reading > search.extent.highest - 0.1 * search.extent.stroke) > 0.1
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])

@@ -75,6 +75,7 @@ PLAIN = set(
         "budget",
         "excluded",
         "measured",
+        "record",
         "remaining",
         "predict",
         "prediction",

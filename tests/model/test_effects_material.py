@@ -55,6 +55,7 @@ UNLOADED = _inputs(
     mass=np.where((np.arange(480) // 120) % 2 == 1, 0.267, 0.363),
 )
 UNSTRESSED = _inputs(temperature=_ramps(90.0, 20.0, 90.0, 60.0, 50.0), stress=np.full(360, 5e6))
+HELD = _inputs(temperature=_ramps(20.0, 110.0, 20.0, 90.0), stress=np.repeat([150e6, 80e6, 150e6], 90))
 RIGS = {
     "strokes": (
         DEAD_WEIGHT,
@@ -71,10 +72,12 @@ RIGS = {
             "sensor_drift",
             "sensor_offset",
             "sensor_backlash",
+            "sensor_limit",
         ),
     ),
     "unloaded": (_under(DEAD_WEIGHT, "liang"), UNLOADED, ("enhanced_conditions",)),
     "unloaded, enhanced": (_under(DEAD_WEIGHT, "enhanced"), UNLOADED, ("liang_conditions",)),
+    "held": (COUPON, HELD, ("elastic_mismatch",)),
     "split": (_under(COUPON, "brinson"), UNSTRESSED, ("two_way_memory",)),
 }
 

@@ -16,7 +16,7 @@ from smajax.model.load.force import force_at_rest
 from smajax.model.presets import build
 
 # A usual bench, as the initial guesses have it: runs of 20 s, a stroke of 20 mm read in steps of 1 mm, 100 g.
-EXTENT = Extent(seconds=20.0, stroke=0.02, increment=1e-3)
+EXTENT = Extent(seconds=20.0, stroke=0.02, increment=1e-3, lowest=-1e-3, highest=0.019)
 FORCE = 0.98  # N
 OWN = {name: effect for name, effect in LIBRARY.items() if name not in of_others()}
 COEFFICIENTS = [(name, one.split(".")[1]) for name, effect in OWN.items() for one in parameters(effect.base())]
@@ -86,6 +86,7 @@ def test_an_event_needs_more_evidence_than_a_bench_and_a_bench_more_than_a_mater
         ("draught", "time", CoefficientPrior(10.0, 10.0, False)),  # of a run
         ("ambient_drift", "rate", CoefficientPrior(0.0, 2.0 / 20.0, False)),  # one over a run
         ("sensor_drift", "rate", CoefficientPrior(0.0, 0.01 * 0.02 / 20.0, False)),  # the stroke over a run
+        ("sensor_limit", "upper", CoefficientPrior(0.019, 1e-3, False)),  # of the stroke, about the highest reading
         ("coulomb_friction", "limit", CoefficientPrior(0.0, 0.098, False)),  # of the load at rest
         ("stress_dependent_strain", "scale", CoefficientPrior(1e8, 0.7, True)),  # no switch: about its initial guess
     ],
@@ -152,6 +153,7 @@ def test_an_unknown_coefficient_is_an_error_with_close_matches() -> None:
         ("K/s", Width(1.0, "", of="1/run"), "K per run"),
         ("m/s", Width(1.0, "", of="stroke/run"), "of the stroke per run"),
         ("s", Width(1.0, "", of="run", logarithmic=True), "of a run's length"),
+        ("m", Width(1.0, "", of="stroke", above="highest"), "of the stroke above the highest reading"),
     ],
 )
 def test_a_width_is_shown_in_its_own_unit(unit: str, width: Width, expected: str) -> None:

@@ -18,7 +18,6 @@ from smajax.attribution.findings import (
     LikelierModel,
     NoiseWithoutRun,
     NoLikelierModel,
-    OutlierRun,
     ParameterFinding,
     PredictsTooLittle,
     Reason,
@@ -30,6 +29,7 @@ from smajax.attribution.findings import (
     Verdict,
     pooled_rmse,
 )
+from smajax.attribution.record_error import OutlierRun
 from smajax.attribution.unknown.terms import UNKNOWN
 from smajax.core.progress import Event, Message, Result, Stage
 from smajax.fit.integration import IntegrationError

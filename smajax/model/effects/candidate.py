@@ -27,6 +27,8 @@ PRIOR_ODDS: Mapping[PriorClass, float] = MappingProxyType({"material": 0.1, "ben
 
 Scale = Literal["", "stroke", "increment", "run", "load", "1/run", "stroke/run"]
 SCALES: tuple[str, ...] = get_args(Scale)
+Origin = Literal["", "lowest", "highest"]
+ORIGINS: tuple[str, ...] = get_args(Origin)
 
 
 class Extent(NamedTuple):
@@ -35,6 +37,8 @@ class Extent(NamedTuple):
     seconds: float  # length of one
     stroke: float  # between the smallest and the largest reading of all, SI
     increment: float  # from one level to the next where the readings lie on levels, SI; 0 where they do not
+    lowest: float = 0.0  # reading of all, SI
+    highest: float = 0.0  # reading of all, SI; as `lowest`: not known
 
 
 class Width(NamedTuple):
@@ -43,6 +47,7 @@ class Width(NamedTuple):
     `of` says what `sigma` and `base` are multiplied by: "stroke" is the range of all readings (m, rad on an arm, - for a
     strain), "increment" that of the readings, "run" the length of a run (s), "load" the load's force at rest at its start
     (N, N m on an arm), "1/run" one over the length of a run and "stroke/run" the stroke over it, for rates; "" is nothing.
+    `above`: what `base` counts from, zero or the lowest or the highest of all readings.
     """
 
     sigma: (
@@ -53,6 +58,7 @@ class Width(NamedTuple):
     logarithmic: bool = False
     # Middle of the prior, times `of`; None for the base value of a switch and the initial guess of any other coefficient.
     base: float | None = None
+    above: Origin = ""
 
 
 class Actuator(Protocol):

@@ -10,7 +10,7 @@ from typing import Any
 from smajax.core.names import close_matches
 from smajax.core.plugins import EFFECTS, brought
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import EQUATIONS, PRIOR_CLASSES, SCALES
+from smajax.model.effects.candidate import EQUATIONS, ORIGINS, PRIOR_CLASSES, SCALES
 from smajax.model.effects.contracts import contract_fault
 from smajax.model.effects.old_contract import adopt
 
@@ -47,6 +47,7 @@ _NAMES = (
     "lagging_transformation",
     "drifting_temperatures",
     "phase_modulus",
+    "elastic_mismatch",
     "thermal_expansion",
     "stress_dependent_strain",
     "two_way_memory",
@@ -68,6 +69,7 @@ _NAMES = (
     "sensor_drift",
     "sensor_offset",
     "sensor_backlash",
+    "sensor_limit",
     "sensor_resolution",
 )
 
@@ -112,8 +114,11 @@ def _wrong(name: str, effect: Any) -> str:
         if strange:
             return f"has {which} of what is none of its parameters: {', '.join(strange)}; these are {', '.join(fields)}"
     for coefficient, width in candidate.widths.items():
-        if width.of not in SCALES or not width.sigma > 0.0:
-            return f"has {width!r} for {coefficient}; expected a sigma above 0, and `of` one of {', '.join(map(repr, SCALES))}"
+        if width.of not in SCALES or width.above not in ORIGINS or not width.sigma > 0.0:
+            return (
+                f"has {width!r} for {coefficient}; expected a sigma above 0, `of` one of {', '.join(map(repr, SCALES))}, "
+                f"and `above` one of {', '.join(map(repr, ORIGINS))}"
+            )
     return contract_fault(effect)
 
 

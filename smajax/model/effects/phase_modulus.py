@@ -32,7 +32,7 @@ class PhaseModulus(AbstractEffect, ConstitutiveTerm):
     In the source's rate form of eq. 3.2 the modulus multiplies rates alone: transforming under a constant stress $\sigma$ leaves no
     elastic mismatch $\sigma(1/E_A - 1/E_M)$, and a cycle that heats under one stress and cools under another does not
     close. The integrated form (`wire.constitutive.IntegratedForm`) has the first and not the second. So a coupon whose
-    stress is given has no such candidate in rate form; `stress_dependent_strain` shows what depends on stress there.
+    stress is given has no such candidate in rate form; `elastic_mismatch` is what the rate form leaves out there.
     """
 
     contrast: Scalar = parameter("-", -0.5, 5.0, "a: relative change of E from martensite to austenite", default=0.0)

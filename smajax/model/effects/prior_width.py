@@ -13,7 +13,7 @@ from typing import NamedTuple
 from smajax.core.names import close_matches
 from smajax.core.parameters import Parameter, parameters
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Extent, Scale, Width
+from smajax.model.effects.candidate import Extent, Origin, Scale, Width
 
 # Of what a `Width` does not say.
 SWITCH_GUESSES = 2.0  # width of a switch over its initial guess, which is a usual size
@@ -27,6 +27,7 @@ _PHRASES: dict[Scale, str] = {
     "load": "of the load at rest",
     "stroke/run": "of the stroke per run",
 }
+_ORIGIN_PHRASES: dict[Origin, str] = {"lowest": " above the lowest reading", "highest": " above the highest reading"}
 
 
 class CoefficientPrior(NamedTuple):
@@ -66,7 +67,8 @@ def width_of(
     scale = _scale(width.of, extent, load_at_rest)
     if not scale > 0.0:
         width, scale = _unlisted(effect, coefficient, (low, high)), 1.0
-    base = min(max(scale * _base(effect, coefficient, width), low), high)
+    origins: dict[Origin, float] = {"": 0.0, "lowest": extent.lowest, "highest": extent.highest}
+    base = min(max(origins[width.above] + scale * _base(effect, coefficient, width), low), high)
     if width.logarithmic:
         widest = 0.5 * math.log(high / low) if low > 0.0 else math.inf
         return CoefficientPrior(base, min(width.sigma, widest), True)
@@ -95,11 +97,11 @@ def entry_of(effect: type[AbstractEffect], coefficient: str) -> Parameter:
 def unit_of_width(unit: str, width: Width) -> str:
     """What the base of a width is in, and its sigma where it is not logarithmic, of a coefficient in `unit`.
 
-    As "J/kg", "of the stroke" or "K per run".
+    As "J/kg", "of the stroke" or "K per run"; a base also with what it counts from.
     """
     if width.of == "1/run":
         return f"{unit.removesuffix('/s')} per run"
-    return _PHRASES.get(width.of, unit)
+    return _PHRASES.get(width.of, unit) + _ORIGIN_PHRASES.get(width.above, "")
 
 
 def _scale(of: Scale, extent: Extent, load_at_rest: float) -> float:

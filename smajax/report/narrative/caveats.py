@@ -6,7 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from smajax.attribution.findings import EffectFinding, Findings, OutlierRun, RunFinding, Verdict, pooled_rmse
+from smajax.attribution.findings import EffectFinding, Findings, RunFinding, Verdict, pooled_rmse
+from smajax.attribution.record_error import OutlierRun
 from smajax.core.display_units import digits
 from smajax.core.wording import and_listed
 from smajax.report.narrative.values import assumed_text, error_text, far_text, value_text

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from smajax.attribution.findings import Findings, OutlierRun, Role, Verdict, coverage, pooled_rmse
+from smajax.attribution.findings import Findings, Role, Verdict, coverage, pooled_rmse
+from smajax.attribution.record_error import OutlierRun
 from smajax.core.wording import and_listed
 from smajax.model.effects.library import LIBRARY
 from smajax.report.narrative import caveats
+from smajax.report.narrative.record_errors import of_wrong_records
 from smajax.report.narrative.rounds import reason_text
 from smajax.report.narrative.unknown import unknown_sentences
 from smajax.report.narrative.values import error_text
@@ -18,6 +20,7 @@ def summary(findings: Findings) -> tuple[str, ...]:
     outliers = [] if _in_one_run(findings) else caveats.of_an_outlier(findings)
     sentences = [
         _opening(findings),
+        *of_wrong_records(findings),
         *outliers,
         *caveats.of_the_noise(findings),
         *caveats.of_a_faint_trace(findings),

@@ -1,0 +1,193 @@
+"""An input that was recorded wrongly in one run: late, on another clock, at another level, or with another load than noted.
+
+Each is an effect of the library with a value of that run alone, and an event with the prior odds of one, shared among the runs. It
+is fitted together with all parameters of the base model and of the likeliest model, in the runs that these leave most of, and
+compared by its evidence as sets of effects are. Asked only where something is missing. Where one is likelier, the loop goes on
+with the run corrected by it (`corrected`): what the search named in its place was a stand-in.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+
+from smajax.attribution.joint_parameters import JointParameters
+from smajax.attribution.joint_search import comparison_settings
+from smajax.attribution.laplace_evidence import FittedModel, fitted_model, independent_error
+from smajax.attribution.model_fits import Model, Search
+from smajax.attribution.record_error import RecordError
+from smajax.core.parameters import parameters
+from smajax.data.experiment.record import Experiment, Run
+from smajax.fit.levenberg_marquardt import FitSettings, levenberg_marquardt
+from smajax.fit.predicted import misfits
+from smajax.fit.problem import PerRun, Problem
+from smajax.fit.starts import nearest
+from smajax.model.effects.candidate import PRIOR_ODDS
+from smajax.model.effects.library import LIBRARY
+from smajax.model.effects.prior_width import CoefficientPrior
+from smajax.model.extended import with_effects
+from smajax.model.system import System, recorded_apart
+
+MOST_RUNS = 2  # looked at, those of the largest residual first: each costs a fit for every kind of error
+LEAST_ODDS = 3.0  # in log odds: twenty to one that the record is wrong, before a run is corrected by it
+CLOSER = 3.0  # by which a fit is expected to come nearer: what its error is counted in while it runs
+LEAST_RUNS = 3  # of two runs that disagree either may be the wrong one
+
+
+class Kind(NamedTuple):
+    """One way in which a record may be wrong. `sigma`: of its prior about zero, SI. `tried`: where fits begin."""
+
+    coefficient: str
+    sigma: float
+    tried: tuple[float, ...]
+    source: str
+
+
+KINDS = (
+    Kind(
+        "input_delay.delay",
+        0.3,
+        (-0.4, -0.15, -0.03, 0.03, 0.15, 0.4, 0.8, 1.6),
+        "a recorder that is started by hand or waits for a trigger: tenths of a second to a second",
+    ),
+    Kind("input_clock.rate", 0.01, (-0.02, -0.003, 0.003, 0.02), "loops timed by software: up to 1 %"),
+    Kind("input_level.gain", 0.1, (-0.2, -0.03, 0.03, 0.2), "a range or a set value that was noted wrongly: 5 to 20 %"),
+    Kind("wrong_load.share", 0.1, (-0.2, -0.03, 0.03, 0.2), "a weight that was noted wrongly or added to: 5 to 20 %"),
+)
+
+
+@dataclass(frozen=True)
+class _EventParameters(JointParameters):
+    """Those of a model with one value of one run's own; its problem is whole already."""
+
+    def restricted(self, effects: Sequence[str]) -> tuple[Problem, np.ndarray]:
+        own = self.problem
+        priors = self.prior_records(effects)
+        same = Problem.build(own.system, own.batch, own.noise_sigma, own.offset, own.per_run, priors)
+        return same, np.arange(len(own.names))
+
+
+def record_error(setting: Search, base: Model, final: Model, runs: Sequence[Run]) -> RecordError | None:
+    """The likeliest error of the record of one fit run, where it is likelier than `final` by `LEAST_ODDS`; `runs` of the fit, in order.
+
+    Beside the base model, in the place of all effects of `final`, and beside `final`.
+    """
+    if len(runs) < LEAST_RUNS:
+        return None
+    hosts = [base, final] if final.effects else [base]
+    fits = [(host, *one) for host in hosts for one in _fits(setting, host, [run.name for run in runs])]
+    if not fits:
+        return None
+    joint = setting.joint(setting.candidates)
+    present = fitted_model(joint, final.effects, final.values, final.effects)
+    best = min([present, *(model for *_, model in fits)], key=lambda model: model.rms)
+    error = independent_error(best, float(setting.problem.noise_sigma), setting.noise_given)
+    host, event, model = max(fits, key=lambda one: one[2].log_evidence(error**2))
+    ahead = model.log_evidence(error**2) - present.log_evidence(error**2)
+    if ahead < LEAST_ODDS:
+        return None
+    run = next(one for one in runs if one.name == event.run)
+    return RecordError(
+        run.name,
+        _channel(setting.problem.system, event.coefficient, run),
+        event.coefficient,
+        event.value,
+        model.standard_errors(error**2)[event.name],
+        ahead,
+        () if host.effects else final.effects,
+        float(run.time[-1] - run.time[0]),
+    )
+
+
+class _Event(NamedTuple):
+    coefficient: str
+    run: str
+    value: float
+
+    @property
+    def name(self) -> str:
+        return f"{self.coefficient}[{self.run}]"
+
+
+def _fits(setting: Search, host: Model, runs: Sequence[str]) -> list[tuple[_Event, FittedModel]]:
+    """`host` with each kind of error in each of the runs that it leaves most of, fitted."""
+    own, slots = setting.restricted(host.effects)
+    system = own.system_at(jnp.asarray(host.values[slots]))
+    kinds = [kind for kind in KINDS if _possible(kind, system)]
+    if not kinds:
+        return []
+    whole = with_effects(system, [kind.coefficient.split(".")[0] for kind in kinds])
+    start = jnp.zeros((len(runs), len(kinds)))
+    per_run = PerRun(tuple(kind.coefficient for kind in kinds), tuple(runs), start)
+    problem = Problem.build(whole, own.batch, own.noise_sigma, own.offset, per_run)
+    (left,) = misfits(own, [host.values[slots]])
+    worst = np.argsort(-(left**2).sum(axis=1), kind="stable")[:MOST_RUNS]
+    events = {f"{kind.coefficient}[{runs[run]}]": (kind, runs[run]) for run in worst for kind in kinds}
+    joint = _with_events(setting, host, problem, events)
+    groups = []
+    for name, (kind, _) in events.items():
+        at, point = joint.slots[name], problem.start_values()
+        groups.append([np.where(np.arange(len(point)) == at, value, point) for value in kind.tried])
+    error = max(float(own.noise_sigma), float(np.sqrt(np.mean(left**2))) / CLOSER)
+    joint_problem, _ = joint.restricted([*host.effects, *events])
+    joint_problem = joint_problem.with_noise(error)
+    tasks = [
+        joint_problem.task(joint.free((*host.effects, name)), joint.bounds, begun)
+        for name, begun in zip(events, nearest(joint_problem, groups), strict=True)
+    ]
+    settings = FitSettings(cache=setting.cache, progress=setting.progress)
+    fits = levenberg_marquardt(joint_problem, tasks, comparison_settings(settings, "inputs of single runs"))
+    return [
+        (
+            _Event(kind.coefficient, run, float(fit.values[joint.slots[name]])),
+            fitted_model(joint, (*host.effects, name), fit.values, ()),
+        )
+        for (name, (kind, run)), fit in zip(events.items(), fits, strict=True)
+    ]
+
+
+def _possible(kind: Kind, system: System) -> bool:
+    """Whether a record of this system can be wrong in that way, and is not already taken to be."""
+    effect = kind.coefficient.split(".")[0]
+    return effect not in {one.effect_name for one in system.effects} and LIBRARY[effect].candidate.applies(system)
+
+
+def _with_events(
+    setting: Search, host: Model, problem: Problem, events: Mapping[str, tuple[Kind, str]]
+) -> _EventParameters:
+    """Parameters of models with the effects of `host` and one of `events`, with their priors."""
+    plain = setting.joint(host.effects)
+    table = parameters(problem.system)
+    odds = math.log(PRIOR_ODDS["event"] / problem.batch.runs)
+    return _EventParameters(
+        problem,
+        plain.unknowns,
+        {
+            **plain.bounds,
+            **{name: (table[kind.coefficient].low, table[kind.coefficient].high) for name, (kind, _) in events.items()},
+        },
+        {**plain.coefficients, **{name: (name,) for name in events}},
+        {**plain.priors, **{name: CoefficientPrior(0.0, kind.sigma, False) for name, (kind, _) in events.items()}},
+        {**plain.log_odds, **dict.fromkeys(events, odds)},
+    )
+
+
+def _channel(system: System, coefficient: str, run: Run) -> str:
+    """The input of `run` that a coefficient says something of; "load" where none of its inputs is the load."""
+    if coefficient.startswith("wrong_load"):
+        return next((name for name in ("mass", "stress") if name in run.inputs), "load")
+    return next(name for name in sorted(recorded_apart(system)) if name in run.inputs)
+
+
+def corrected(experiment: Experiment, found: RecordError) -> Experiment:
+    """The experiment with one run as it should have been recorded: the effect in the base model, off in all other runs."""
+    runs = tuple(
+        replace(run, parameters={**run.parameters, found.coefficient: found.value}) if run.name == found.run else run
+        for run in experiment.runs
+    )
+    return replace(experiment, runs=runs, parameters={**experiment.parameters, found.coefficient: 0.0})

@@ -1,0 +1,31 @@
+"""What the loop finds of single runs: an input that was recorded wrongly, and a run that does not agree with the others."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class RecordError:
+    """An input of one run that was recorded wrongly, and by how much; the loop went on with the run so corrected."""
+
+    run: str
+    channel: str  # of the run's inputs, or "load" where no input gives it
+    coefficient: str  # "input_delay.delay"
+    value: float  # SI, with that run alone
+    standard_error: float
+    log_odds: float  # over the model that it takes the place of, or stands beside
+    instead_of: tuple[str, ...]  # effects that the search had named in its place
+    seconds: float  # length of the run
+
+
+@dataclass(frozen=True)
+class OutlierRun:
+    """A fit run that does not agree with the others, by the model fitted to these alone; errors in SI."""
+
+    run: str
+    effects: tuple[str, ...]  # of that model; none: the base model
+    residual_is_noise: bool  # whether what it leaves of the others is noise
+    others_with: float  # error on the others, fitted to all runs
+    others_without: float  # and to the others alone
+    predicted_rmse: float  # error on this run, by the fit to the others

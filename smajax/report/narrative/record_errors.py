@@ -1,0 +1,37 @@
+"""Inputs of single runs that were recorded wrongly, and what they should have been, in sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from smajax.attribution.findings import Findings
+from smajax.attribution.record_error import RecordError
+from smajax.core.display_units import digits
+from smajax.core.wording import and_listed
+
+
+def of_wrong_records(findings: Findings) -> Iterator[str]:
+    """What was recorded wrongly, that the run was corrected by it, and what it takes the place of."""
+    for one in findings.record_errors:
+        instead = f" Without that the search names {and_listed(one.instead_of)} in its place." if one.instead_of else ""
+        yield (
+            f"An input of one run cannot be right: {what_was_wrong(one)}. It is corrected by that here and everything else is said of the corrected "
+            f"run; look at its log, and correct it or leave the run out.{instead}"
+        )
+
+
+def what_was_wrong(one: RecordError) -> str:
+    """As "the recorded voltage of steps is 0.8 ± 0.001 s early: what it shows acted so much later"."""
+    channel = f"recorded {one.channel} of {one.run}"
+    if one.coefficient == "input_delay.delay":
+        when, then = ("early", "later") if one.value > 0.0 else ("late", "earlier")
+        return f"the {channel} is {_number(abs(one.value), one.standard_error)} s {when}: what it shows acted so much {then}"
+    if one.coefficient == "input_clock.rate":
+        when = "early" if one.value > 0.0 else "late"
+        off, error = (abs(value) * one.seconds for value in (one.value, one.standard_error))
+        return f"the {channel} is on another clock: right at its start, and {_number(off, error)} s {when} at its end"
+    return f"the {channel} should have been {_number(1.0 + one.value, one.standard_error)} of what it is"
+
+
+def _number(value: float, error: float) -> str:
+    return f"{digits(value, 3)} ± {digits(error, 1)}"

@@ -1,0 +1,131 @@
+"""An input that was recorded wrongly in one run is named with what it should have been, and none is where all are right."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from importlib import resources
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from smajax.attribution.close_loop import close_loop
+from smajax.attribution.input_of_run import corrected, record_error
+from smajax.attribution.model_fits import Model, Search, Start
+from smajax.attribution.record_error import RecordError
+from smajax.core.result_cache import ResultCache
+from smajax.data.experiment.load import load_experiment
+from smajax.data.experiment.record import Experiment, Run
+from smajax.data.model_catalogue import CATALOGUE
+from smajax.fit.base_model import base_model
+from smajax.report.narrative.record_errors import of_wrong_records, what_was_wrong
+from tests.helpers.hot_weight import DT, SAMPLES, UNKNOWNS, hot_weight
+from tests.helpers.made_findings import made_findings
+
+NAMES = ("first", "second", "third", "fourth")
+
+
+def _searched(
+    truth: dict[str, float], wrong: Callable[[jax.Array], jax.Array], run: int | None
+) -> tuple[Search, Model, Model, list[Run]]:
+    """A base model and one with latent heat, fitted to runs of which the record of `run` is changed by `wrong`."""
+    joint = hot_weight(truth, ("latent_heat",)).joint
+    batch = joint.problem.batch
+    volts = batch.inputs["voltage"]
+    if run is not None:
+        volts = volts.at[run].set(wrong(volts[run]))
+    problem = dataclasses.replace(joint.problem, batch=dataclasses.replace(batch, inputs={"voltage": volts}))
+    setting = Search(problem, UNKNOWNS, joint.bounds, ("latent_heat",), ResultCache())
+    start = problem.start_values()
+    models: list[Model] = []
+    for effects in ((), ("latent_heat",)):
+        (fit,), _ = setting.fit([Start(effects, start)], "a fit", settled=1e-3)
+        models.append(Model(effects, fit.values, fit.cost, np.zeros(volts.shape), 0.0))
+    time = np.asarray(DT * np.arange(SAMPLES), dtype=np.float64)
+    runs = [
+        Run(name, "fit", time, {"voltage": np.asarray(volts[k])}, {"position": problem.measured[k]}, {}, (), "")
+        for k, name in enumerate(NAMES)
+    ]
+    base, extended = models
+    return setting, base, extended, runs
+
+
+def _early(volts: jax.Array) -> jax.Array:
+    """Written down 0.6 s before it acted."""
+    return jnp.concatenate([volts[6:], jnp.full(6, volts[-1])])
+
+
+@pytest.mark.parametrize(
+    ("truth", "wrong", "run", "coefficient", "value"),
+    [
+        ({}, _early, 0, "input_delay.delay", 0.6),
+        ({"latent_heat.enthalpy": 1.2e4}, lambda volts: volts / 0.9, 2, "input_level.gain", -0.1),
+    ],
+    ids=["recorded early", "noted too high beside a latent heat"],
+)
+def test_a_wrong_record_is_named_with_its_run_and_size(
+    truth: dict[str, float], wrong: Callable[[jax.Array], jax.Array], run: int, coefficient: str, value: float
+) -> None:
+    setting, base, extended, runs = _searched(truth, wrong, run)
+    found = record_error(setting, base, extended, runs)
+    assert found is not None
+    assert (found.run, found.channel, found.coefficient) == (NAMES[run], "voltage", coefficient)
+    assert found.value == pytest.approx(value, abs=max(4.0 * found.standard_error, 1e-3 * abs(value)))
+    # Where nothing else is missing the latent heat was a stand-in; where it is, it stays beside the record's error.
+    assert found.instead_of == (() if truth else ("latent_heat",))
+
+
+def test_where_every_record_is_right_none_is_named() -> None:
+    setting, base, extended, runs = _searched({"latent_heat.enthalpy": 1.2e4}, _early, None)
+    assert record_error(setting, base, extended, runs) is None
+    assert record_error(setting, base, base, runs[:2]) is None  # of two that disagree either may be wrong
+
+
+def _demo(which: str) -> Experiment:
+    with resources.as_file(resources.files("smajax") / "data" / "demo" / which) as folder:
+        return load_experiment(folder / "experiment.toml", CATALOGUE)
+
+
+FOUND = RecordError("steps", "voltage", "input_delay.delay", 0.8, 1e-3, 50.0, ("draught",), 60.0)
+
+
+def test_a_corrected_run_has_the_value_and_all_others_have_none() -> None:
+    experiment = corrected(_demo("complete"), FOUND)
+    (delayed,) = [run for run in experiment.runs if run.parameters]
+    assert (delayed.name, delayed.parameters) == ("steps", {"input_delay.delay": 0.8})
+    assert experiment.declared_effects == ("input_delay",)
+    (effect,) = base_model(experiment).effects
+    assert float(effect.delay) == 0.0
+
+
+def test_the_page_says_what_the_record_should_have_been() -> None:
+    findings = dataclasses.replace(made_findings(), record_errors=(FOUND,))
+    (said,) = of_wrong_records(findings)
+    assert "the recorded voltage of steps is 0.8 ± 0.001 s early: what it shows acted so much later" in said
+    assert "Without that the search names draught in its place." in said
+    clock = dataclasses.replace(FOUND, coefficient="input_clock.rate", value=-0.01, standard_error=1e-3)
+    assert what_was_wrong(clock).endswith("right at its start, and 0.6 ± 0.06 s late at its end")
+    load = dataclasses.replace(FOUND, channel="mass", coefficient="wrong_load.share", value=-0.1, standard_error=2e-3)
+    assert what_was_wrong(load) == "the recorded mass of steps should have been 0.9 ± 0.002 of what it is"
+
+
+@pytest.mark.slow  # a loop, made twice
+def test_the_loop_goes_on_with_the_corrected_run() -> None:
+    experiment = _demo("complete")
+    late = round(0.8 / experiment.step)
+
+    def wrong(run: Run) -> Run:
+        volts = run.inputs["voltage"]
+        early = np.concatenate([volts[late:], np.full(late, volts[-1])])
+        return dataclasses.replace(run, inputs={**run.inputs, "voltage": early}) if run.name == "steps" else run
+
+    only = ("latent_heat", "input_delay", "draught", "rising_convection")
+    runs = tuple(wrong(run) for run in experiment.runs)
+    findings = close_loop(dataclasses.replace(experiment, runs=runs, effects_only=only))
+    (found,) = findings.record_errors
+    assert (found.run, found.coefficient) == ("steps", "input_delay.delay")
+    assert found.value == pytest.approx(0.8, abs=4.0 * found.standard_error)
+    assert findings.verdict == "adequate"
+    assert all(run.rmse_after < 1.2 * findings.noise_sigma for run in findings.runs)
