@@ -293,7 +293,7 @@ def simulate(
     settings = {
         **vars(request),
         **(vars(loop) if options.closed else {}),
-        "gains": None if gains is None else gains.read_text(),
+        "gains": None if gains is None else gains.read_text(encoding="utf-8"),
     }
     with resumable(), claimed(out, "simulate", settings, FILES, overwrite), displayed(console()) as progress:
         page = write_run(result, out, title, command, gif, progress)
