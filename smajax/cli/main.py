@@ -19,6 +19,7 @@ from smajax.cli.commands.identify import identify_command
 from smajax.cli.commands.new_experiment import new_experiment
 from smajax.cli.commands.predict import predict_command
 from smajax.cli.commands.presets import presets
+from smajax.cli.commands.reports import reports
 from smajax.cli.commands.simulate import simulate
 from smajax.cli.commands.sweep import sweep
 from smajax.cli.commands.tune import tune
@@ -69,6 +70,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "close-loop": close_loop_command,
     "identify": identify_command,
     "predict": predict_command,
+    "reports": reports,
     "effects": effects,
     "presets": presets,
     "demo": demo,
