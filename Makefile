@@ -8,7 +8,7 @@ READY := $(VENV)/.ready
 # The demo's pages are opened where a person looks, not in a build.
 OPEN = $$(test -t 2 && test -z "$$CI" && echo --open)
 
-.PHONY: demo test pytest test-studies test-all coverage audit docs lint format package clean
+.PHONY: demo test pytest test-studies test-all coverage audit docs notebooks lint format package clean
 
 demo: $(READY)
 	SMAJAX_PROGRESS=lines $(BIN)/smajax demo --out demo-report $(OPEN)
@@ -49,6 +49,10 @@ lint: $(READY)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+
+# The notebooks with their outputs, from notebooks/*.py; 05 and 07 read measured data (SMAJAX_DATA).
+notebooks: $(READY)
+	$(BIN)/python -m studies.make_notebooks
 
 # Wheel and source archive; the wheel must work from an empty folder in an environment of its own.
 package: $(READY)

@@ -1,8 +1,8 @@
 """What the site takes from the repository when it is built, and its equations as MathML: nothing is stored twice.
 
 A page links a file of the repository by its path, so that the link also works in the repository (`../tests/x.py`).
-Pages and pictures of `studies/` become part of the site; any other text file that a page links becomes a page that
-shows it. A broken link ends the build.
+Pages and pictures of `studies/` become part of the site, and so do the notebooks with their stored outputs; any other text file
+that a page links becomes a page that shows it. A broken link ends the build.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from typing import Any
 from latex2mathml.converter import convert
 from mkdocs.exceptions import PluginError
 from mkdocs.structure.files import File, Files
+from nbconvert import MarkdownExporter
 
 ROOT = Path(__file__).parents[1]
 TAKEN = (
@@ -58,6 +59,8 @@ def place(path: str) -> str:
         return path.removeprefix("docs/")
     if Path(path).suffix == ".png" or any(Path(path).match(one) for one in TAKEN):
         return path
+    if path.endswith(".ipynb"):
+        return path.replace(".ipynb", ".md")
     # A page of its own by a command (`studies/sweep/index.html`) would lie where its README's does.
     if path.endswith(".html"):
         return path.replace("index.html", "page.html")
@@ -77,6 +80,27 @@ def linked(page: str, text: str) -> list[str]:
     return found
 
 
+def notebook_files(config: Any, path: Path) -> list[File]:
+    """A notebook as a page with its outputs, its pictures, and the notebook itself to download."""
+    here, prefix = path.relative_to(ROOT).as_posix(), f"{path.stem}_"
+    text, resources = MarkdownExporter().from_filename(
+        str(path), resources={"unique_key": path.stem, "output_files_dir": ""}
+    )
+    title, _, rest = text.strip().partition("\n")
+    source = path.with_suffix(".py").name
+    note = (
+        f'<p class="quiet">A notebook with its outputs: <a href="{path.name}" download>download {path.name}</a>; edited as '
+        f"<code>notebooks/{source}</code>.</p>"
+    )
+    page = File.generated(config, place(here), content=f"{title}\n\n{note}\n\n{rest}\n")
+    pictures = [
+        File.generated(config, f"notebooks/{Path(name).name}", content=content)
+        for name, content in resources["outputs"].items()
+    ]
+    assert all(Path(one.src_uri).name.startswith(prefix) for one in pictures), [one.src_uri for one in pictures]
+    return [page, *pictures, File.generated(config, here, abs_src_path=str(path))]
+
+
 def on_files(files: Files, config: Any) -> Files:
     """Add what the pages of the site and of the studies link."""
     taken = [path.relative_to(ROOT).as_posix() for one in TAKEN for path in sorted(ROOT.glob(one))]
@@ -84,6 +108,9 @@ def on_files(files: Files, config: Any) -> Files:
     pages = [f"docs/{file.src_uri}" for file in files.documentation_pages()]
     pages += [path for path in taken if path.endswith(".md")]
     more = [path for page in pages for path in linked(page, (ROOT / page).read_text(encoding="utf-8"))]
+    for path in sorted((ROOT / "notebooks").glob("*.ipynb")):
+        for file in notebook_files(config, path):
+            files.append(file)
     for path in dict.fromkeys([*taken, *more]):
         source = ROOT / path
         if source.is_dir() or files.get_file_from_path(place(path)) is not None:
@@ -113,6 +140,8 @@ def unlisted(source: str, files: Files) -> list[str]:
 
 def origin(source: str) -> str:
     """The inverse of `place`, for a page."""
+    if source.startswith("notebooks/"):
+        return source
     return source if any(Path(source).match(one) for one in TAKEN) else f"docs/{source}"
 
 

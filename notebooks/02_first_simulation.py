@@ -3,29 +3,28 @@
 #
 # An arm on a wire, a step of voltage, and the states of the wire: wire x load x drive, by name.
 
+# %% tags=["skip-execution"]
+# %pip install -q smajax
+
 # %%
-import jax
+import matplotlib.pyplot as plt
+import numpy as np
 
-jax.config.update("jax_enable_x64", True)
+import smajax as sma
 
-import matplotlib.pyplot as plt  # noqa: E402
-import numpy as np  # noqa: E402
+sma.prepare()  # float64, and compiled programs are kept for the next time
 
-from smajax.core.parameters import parameters, set_parameters  # noqa: E402
-from smajax.model.presets import DRIVES, LOADS, WIRES, build  # noqa: E402
-from smajax.simulation.compiled import simulate_compiled  # noqa: E402
-
-print("wires: ", ", ".join(WIRES))
-print("loads: ", ", ".join(LOADS))
-print("drives:", ", ".join(DRIVES))
+print("wires: ", ", ".join(sma.WIRES))
+print("loads: ", ", ".join(sma.LOADS))
+print("drives:", ", ".join(sma.DRIVES))
 
 # %% [markdown]
 # The source's rotary arm. Every parameter has a unit, bounds and a meaning, and may be changed by name.
 
 # %%
-arm = build("niti_table_3_1", "arm", "amplified_voltage")
+arm = sma.compose("niti_table_3_1", "arm", "amplified_voltage")
 for name in ("convection_coefficient", "austenite_finish", "payload_mass"):
-    entry = parameters(arm)[name]
+    entry = sma.parameters(arm)[name]
     print(f"{name:24s} {entry.low:g} to {entry.high:g} {entry.unit}: {entry.about}")
 
 # %% [markdown]
@@ -35,7 +34,7 @@ for name in ("convection_coefficient", "austenite_finish", "payload_mass"):
 # %%
 dt = 0.005
 time = np.arange(4001) * dt  # s
-runs = {volts: simulate_compiled(arm, {"voltage": np.full(time.size, volts)}, dt) for volts in (7.2, 7.3)}
+runs = {volts: sma.simulate_compiled(arm, {"voltage": np.full(time.size, volts)}, dt) for volts in (7.2, 7.3)}
 ends = {volts: float(np.degrees(run.position[-1])) for volts, run in runs.items()}
 for volts, run in runs.items():
     print(
@@ -50,11 +49,12 @@ for volts, run in runs.items():
 angle.set(xlabel="time (s)", ylabel="angle (degrees)")
 angle.legend()
 plane.set(xlabel="temperature (°C)", ylabel="stress (MPa)")
+plt.show()
 
 # %% [markdown]
 # A heavier payload at the same voltage. The program is compiled once, because values are not part of it.
 
 # %%
-heavier = set_parameters(arm, {"payload_mass": 0.065})  # kg
-run = simulate_compiled(heavier, {"voltage": np.full(time.size, 7.3)}, dt)
+heavier = sma.set_parameters(arm, {"payload_mass": 0.065})  # kg
+run = sma.simulate_compiled(heavier, {"voltage": np.full(time.size, 7.3)}, dt)
 print(f"with 65 g instead of 57 g it ends at {np.degrees(run.position[-1]):.1f} degrees")

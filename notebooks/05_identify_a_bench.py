@@ -2,33 +2,32 @@
 # # Identify a measured wire
 #
 # Flexinol in an oven at constant stress: strain over temperature at 50, 100, 172 and 200 MPa, published openly. The folder with the measured data is
-# the one that `SMAJAX_DATA` names; the experiment file is `studies/flexinol_isobaric/identify.toml`. One stress is held out.
+# the one that `SMAJAX_DATA` names; the experiment file is `studies/flexinol_isobaric/identify.toml`. One stress is held out. So this notebook
+# needs a clone of the repository and the data.
+
+# %% tags=["skip-execution"]
+# %pip install -q smajax
 
 # %%
-import os
 from pathlib import Path
 
-import jax
+import matplotlib.pyplot as plt
 
-jax.config.update("jax_enable_x64", True)
+import smajax as sma
 
-import matplotlib.pyplot as plt  # noqa: E402
-
-from smajax.data.experiment.load import load_experiment  # noqa: E402
-from smajax.data.model_catalogue import CATALOGUE  # noqa: E402
-from smajax.fit.identify import identify  # noqa: E402
-
+sma.prepare()  # float64, and compiled programs are kept for the next time
 studies = next(one / "studies" for one in (Path.cwd(), *Path.cwd().parents) if (one / "studies").is_dir())
-experiment = load_experiment(studies / "flexinol_isobaric" / "identify.toml", CATALOGUE)
+experiment = sma.load_experiment(studies / "flexinol_isobaric" / "identify.toml")
 for run in experiment.runs:
     print(f"{run.name:10s} {run.role:10s} {run.time.size} samples")
 print(len(experiment.unknowns), "unknowns, of them of effects:", ", ".join(experiment.declared_effects))
 
 # %% [markdown]
-# The fit starts from many points of the box, and the best converge with exact derivatives. Fewer starts are quicker, and may end in a higher local minimum.
+# Here the fit starts from the values of the file. `starts=64` starts from as many points of the box as well, and the best converge: slower, and it may end in a lower
+# local minimum.
 
 # %%
-result = identify(experiment, starts=0 if os.environ.get("SMAJAX_FAST") else 64)
+result = sma.identify(experiment, starts=0)
 for one in result.estimates:
     error = "not identifiable from these runs" if one.standard_error is None else f"± {one.standard_error:.3g}"
     print(f"{one.name:42s} {one.value:12.5g} {error} {one.unit} {one.remark}")
@@ -50,3 +49,4 @@ for panel, run, measured in zip(axes, result.runs, experiment.runs, strict=True)
     panel.set(xlabel="temperature (°C)", title=f"{run.name}, {run.role}")
 axes[0].set_ylabel("strain (%)")
 axes[0].legend()
+plt.show()

@@ -6,35 +6,35 @@
 #
 #     smajax tune vsc3 --set-points 0,30 --variation damping=20% --limits overshoot=0.1 --out tuned
 
+# %% tags=["skip-execution"]
+# %pip install -q 'smajax[tune]'
+
 # %%
-import os
 import tempfile
 from pathlib import Path
 
-import jax
+import matplotlib.pyplot as plt
+import numpy as np
 
-jax.config.update("jax_enable_x64", True)
+import smajax as sma
 
-import matplotlib.pyplot as plt  # noqa: E402
-import numpy as np  # noqa: E402
+sma.prepare()  # float64, and compiled programs are kept for the next time
 
-from smajax.control.tune.settings import TuneSettings  # noqa: E402
-from smajax.control.tune.tuning_folder import tune_in_folder  # noqa: E402
-from smajax.model.rigs import arm  # noqa: E402
-from smajax.report.tune_folder import write_tuning  # noqa: E402
+# %% [markdown]
+# The settings are small, for a short wait. Left out, `tried` (points of the box), `starts`, `rounds`, `finish` and `unseen` (plants of the check) are several times as large.
 
-fast = bool(os.environ.get("SMAJAX_FAST"))
-settings = TuneSettings(
+# %%
+settings = sma.TuneSettings(
     "vsc3",
     (0.0, 30.0),
     {"damping": 0.2},
     limits={"overshoot": 0.1},  # degrees
-    tried=4 if fast else 32,
-    starts=2 if fast else 6,
-    rounds=4 if fast else 30,
-    finish=3 if fast else 60,
+    tried=4,
+    starts=2,
+    rounds=4,
+    finish=3,
     seconds=3.0,
-    unseen=2 if fast else 32,
+    unseen=2,
 )
 print(settings.plants_sentence())
 print(settings.goal_sentence())
@@ -46,8 +46,9 @@ print(settings.goal_sentence())
 
 # %%
 out = Path(tempfile.mkdtemp()) / "tuned"
-result = tune_in_folder(arm(), settings, out)
-write_tuning(result, out)
+arm = sma.compose("niti_table_3_1", "arm", "amplified_voltage")
+result = sma.tune_in_folder(arm, settings, out)
+sma.write_tuning(result, out)
 for name, before in result.before.items():
     print(f"{name:16s} {before:8.3g} -> {result.after.values[name]:8.3g} {result.units[name]}")
 print(f"worst cost {result.costs[0]:.2f} -> {result.costs[1]:.2f}")
@@ -59,6 +60,7 @@ for panel, angles, title in zip(panels, result.lines.angles, ("before", "after")
     panel.plot(result.lines.time, np.degrees(angles.T), linewidth=0.8)
     panel.set(xlabel="time (s)", title=title)
 panels[0].set_ylabel("angle (degrees)")
+plt.show()
 
 # %% [markdown]
 # `smajax sweep --gains tuned/gains.json` runs the tuned gains on ten thousand plants.

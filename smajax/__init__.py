@@ -30,21 +30,27 @@ if TYPE_CHECKING:
     from smajax.control.loop_dataset import simulate_loop_dataset as simulate_loop_dataset
     from smajax.control.measured_state import Sensor as Sensor
     from smajax.control.presets import CONTROLLERS as CONTROLLERS
+    from smajax.control.tune.settings import TuneSettings as TuneSettings
+    from smajax.control.tune.tuning_folder import tune_in_folder as tune_in_folder
     from smajax.core import units as units
     from smajax.core.parameters import check_bounds as check_bounds
     from smajax.core.parameters import get_parameters as get_parameters
     from smajax.core.parameters import parameter as parameter
     from smajax.core.parameters import parameter_values as parameter_values
+    from smajax.core.parameters import parameters as parameters
     from smajax.core.parameters import set_parameters as set_parameters
     from smajax.core.runtime import prepare as prepare
     from smajax.data.model_file.actuator_model import ActuatorModel as ActuatorModel
     from smajax.data.model_file.read import load_model as load_model
     from smajax.data.open_experiment import open_experiment as open_experiment
+    from smajax.fit.base_model import base_model as base_model
     from smajax.fit.identify import identify as identify
     from smajax.fit.predict import predict as predict
+    from smajax.model import contracts as contracts
     from smajax.model import effects as effects
     from smajax.model import presets as presets
     from smajax.model.effects.base import AbstractEffect as AbstractEffect
+    from smajax.model.effects.candidate import Candidate as Candidate
     from smajax.model.effects.library import LIBRARY as LIBRARY
     from smajax.model.extended import extended as extended
     from smajax.model.load.base import AbstractMovingLoad as AbstractMovingLoad
@@ -53,11 +59,14 @@ if TYPE_CHECKING:
     from smajax.model.presets import WIRES as WIRES
     from smajax.model.presets import build as build
     from smajax.model.system import System as System
+    from smajax.model.types import Scalar as Scalar
+    from smajax.model.wire.form import IntegratedForm as IntegratedForm
     from smajax.model.wire.laws import under_law as under_law
     from smajax.report.identify_page import write_identified as write_identified
     from smajax.report.narrative import narrate as narrate
     from smajax.report.plot import plot as plot
     from smajax.report.predict_page import write_prediction as write_prediction
+    from smajax.report.tune_folder import write_tuning as write_tuning
     from smajax.report.write import write_report as write_report
     from smajax.simulation import measures as _measures
     from smajax.simulation.batch.axes import grid as grid
@@ -80,13 +89,18 @@ NAMES = {
     "AbstractMovingLoad": ("smajax.model.load.base", "AbstractMovingLoad"),
     "ActuatorModel": ("smajax.data.model_file.actuator_model", "ActuatorModel"),
     "CONTROLLERS": ("smajax.control.presets", "CONTROLLERS"),
+    "Candidate": ("smajax.model.effects.candidate", "Candidate"),
     "DRIVES": ("smajax.model.presets", "DRIVES"),
     "EFFECTS": ("smajax.model.effects.library", "LIBRARY"),
+    "IntegratedForm": ("smajax.model.wire.form", "IntegratedForm"),
     "LOADS": ("smajax.model.presets", "LOADS"),
     "Loop": ("smajax.control.loop_dataset", "Loop"),
+    "Scalar": ("smajax.model.types", "Scalar"),
     "Sensor": ("smajax.control.measured_state", "Sensor"),
     "System": ("smajax.model.system", "System"),
+    "TuneSettings": ("smajax.control.tune.settings", "TuneSettings"),
     "WIRES": ("smajax.model.presets", "WIRES"),
+    "base_model": ("smajax.fit.base_model", "base_model"),
     "build": ("smajax.model.presets", "build"),
     "check_bounds": ("smajax.core.parameters", "check_bounds"),
     "close_loop": ("smajax.attribution.close_loop", "close_loop"),
@@ -103,6 +117,7 @@ NAMES = {
     "narrate": ("smajax.report.narrative", "narrate"),
     "parameter": ("smajax.core.parameters", "parameter"),
     "parameter_values": ("smajax.core.parameters", "parameter_values"),
+    "parameters": ("smajax.core.parameters", "parameters"),
     "plot": ("smajax.report.plot", "plot"),
     "predict": ("smajax.fit.predict", "predict"),
     "prepare": ("smajax.core.runtime", "prepare"),
@@ -115,16 +130,19 @@ NAMES = {
     "simulate_dataset": ("smajax.simulation.dataset", "simulate_dataset"),
     "simulate_loop_dataset": ("smajax.control.loop_dataset", "simulate_loop_dataset"),
     "status_summary": ("smajax.simulation.batch.run_batch", "status_summary"),
+    "tune_in_folder": ("smajax.control.tune.tuning_folder", "tune_in_folder"),
     "under_law": ("smajax.model.wire.laws", "under_law"),
     "write_identified": ("smajax.report.identify_page", "write_identified"),
     "write_prediction": ("smajax.report.predict_page", "write_prediction"),
     "write_report": ("smajax.report.write", "write_report"),
+    "write_tuning": ("smajax.report.tune_folder", "write_tuning"),
     "zipped": ("smajax.simulation.batch.axes", "zipped"),
 }
 # A public name that was renamed -> (the new one, the version that will not have the old one): it works and warns till then.
 RENAMED: dict[str, tuple[str, str]] = {"told_of": ("status_summary", "0.3")}
 # Modules that are asked for by their own name.
 MODULES = {
+    "contracts": "smajax.model.contracts",
     "control_presets": "smajax.control.presets",
     "effects": "smajax.model.effects",
     "measure": "smajax.simulation.measures",

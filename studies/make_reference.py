@@ -27,6 +27,7 @@ SAID = {
     "EFFECTS": "The library of effects by name.",
     "LOADS": "Presets of loads by name.",
     "WIRES": "Presets of wires by name.",
+    "Scalar": "A number as an array of JAX without axes: the annotation of a parameter.",
     "effects": "The effects, each in a module of its own.",
     "load_experiment": "Read an experiment file and its runs, with all presets, effects and parameters.",
 }
@@ -34,9 +35,21 @@ SAID = {
 STAGES = (
     (
         "A model",
-        ("compose", "build", "under_law", "extended", "System", "WIRES", "LOADS", "DRIVES", "EFFECTS", "presets"),
+        (
+            "compose",
+            "build",
+            "under_law",
+            "IntegratedForm",
+            "extended",
+            "System",
+            "WIRES",
+            "LOADS",
+            "DRIVES",
+            "EFFECTS",
+            "presets",
+        ),
     ),
-    ("Its parameters", ("parameter_values", "get_parameters", "set_parameters", "check_bounds", "units")),
+    ("Its parameters", ("parameters", "parameter_values", "get_parameters", "set_parameters", "check_bounds", "units")),
     ("One run", ("simulate_dataset", "plot", "simulate_compiled", "simulate")),
     ("Many runs", ("run_batch", "grid", "zipped", "sampled", "good", "status_summary", "measure", "prepare")),
     (
@@ -52,9 +65,16 @@ STAGES = (
             "reference",
         ),
     ),
-    ("Measured runs", ("load_experiment", "identify", "write_identified", "close_loop", "narrate", "write_report")),
+    ("Its gains", ("TuneSettings", "tune_in_folder", "write_tuning")),
+    (
+        "Measured runs",
+        ("load_experiment", "base_model", "identify", "write_identified", "close_loop", "narrate", "write_report"),
+    ),
     ("A model that is kept", ("ActuatorModel", "load_model", "predict", "write_prediction")),
-    ("Your own parts", ("AbstractEffect", "AbstractMovingLoad", "parameter", "effects")),
+    (
+        "Your own parts",
+        ("AbstractEffect", "Candidate", "contracts", "AbstractMovingLoad", "parameter", "Scalar", "effects"),
+    ),
 )
 
 

@@ -62,7 +62,7 @@ MODEL = [
     "types",
     "channels wire",
     "load drive sensor_reading",
-    "effects",
+    "contracts effects",
     "system",
     "extended presets preset_sources",
     "rigs",

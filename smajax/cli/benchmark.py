@@ -15,9 +15,9 @@ import numpy as np
 
 from smajax.cli import explicit_arm
 from smajax.core.machine import machine
+from smajax.core.operating_system import available_cores
 from smajax.core.parameters import parameter_values
 from smajax.core.progress import Progress, Stage, quiet
-from smajax.engine import available_cores
 from smajax.model.rigs import arm
 from smajax.simulation.batch.axes import sampled, zipped
 from smajax.simulation.batch.run_batch import run_batch

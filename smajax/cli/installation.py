@@ -8,7 +8,8 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from smajax.core.machine import available_memory, machine
+from smajax.core.machine import machine
+from smajax.core.operating_system import available_memory
 from smajax.core.plugins import PluginError, versions
 from smajax.core.runtime import TRIED, kept_programs
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import sys
 import warnings
 from collections.abc import Callable
@@ -20,12 +19,14 @@ from smajax.cli.commands.identify import identify_command
 from smajax.cli.commands.new_experiment import new_experiment
 from smajax.cli.commands.predict import predict_command
 from smajax.cli.commands.presets import presets
+from smajax.cli.commands.reports import reports
 from smajax.cli.commands.simulate import simulate
 from smajax.cli.commands.sweep import sweep
 from smajax.cli.commands.tune import tune
 from smajax.cli.positional import Command
 from smajax.cli.renamed import with_new_names
 from smajax.cli.terminal import answer_interrupts, console
+from smajax.core.operating_system import no_room
 
 EXIT_CODES = """\
 Exit codes: 0 success; 1 a defect of smajax, with a traceback; 2 wrong input or options, with a message; 3 success, but the
@@ -36,8 +37,6 @@ A folder that holds another result is refused; --overwrite deletes that result a
 terminal only; SMAJAX_PROGRESS=lines writes one line a stage to stderr elsewhere. SMAJAX_ENGINE=xla runs every program by
 XLA, not by smajax's own compiler.
 """
-
-FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)  # no room on the disk, in the quota, in a file
 
 app = typer.Typer(
     name="smajax",
@@ -71,6 +70,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "close-loop": close_loop_command,
     "identify": identify_command,
     "predict": predict_command,
+    "reports": reports,
     "effects": effects,
     "presets": presets,
     "demo": demo,
@@ -124,7 +124,7 @@ def main() -> None:
         from smajax.data.readers.table import MeasuredDataError
         from smajax.engine import EngineError
 
-        if isinstance(error, OSError) and error.errno in FULL:
+        if isinstance(error, OSError) and no_room(error):
             error = OSError(
                 f"{error.filename or 'the disk'}: {error.strerror}: free some space and give the same command again. Finished "
                 "results are cached."

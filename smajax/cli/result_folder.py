@@ -6,19 +6,19 @@ with another request, is refused, unless it is to overwrite.
 
 from __future__ import annotations
 
-import fcntl
 import json
-import os
 import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 from smajax.cli.options import INSIDE
 from smajax.core.files import json_text, replace, sweep_up
+from smajax.core.operating_system import Taken, locked
 
 MARK = ".smajax.json"
+LOCK = ".smajax.lock"  # stays, so that programs that come at the same moment lock the same file
 # The last file of each command: a folder that has one but no hidden file is refused, since it may be the user's own.
 LAST = {
     "report.html": "close-loop",
@@ -130,17 +130,23 @@ def _create(out: Path) -> list[Path]:
 
 
 def _abandon(out: Path, new: Sequence[Path]) -> None:
-    """Remove the created folders, where nothing was written into them."""
-    if any(one.is_file() and one.name != MARK for one in out.rglob("*")):
+    """Where nothing was written, remove the mark and, of a created folder, the folders in it."""
+    if any(one.is_file() and one.name not in (MARK, LOCK) for one in out.rglob("*")):
         return
-    if not new:
-        (out / MARK).unlink(missing_ok=True)
+    (out / MARK).unlink(missing_ok=True)
+    for one in out.iterdir() if new else ():
+        if one.is_dir():
+            shutil.rmtree(one)
+
+
+def _leave(out: Path, new: Sequence[Path]) -> None:
+    """A folder that was not marked is as it was before. Without the lock, since Windows does not delete a file that is open."""
+    if (out / MARK).exists():
         return
-    shutil.rmtree(out)
-    for part in new[1:]:
-        if any(part.iterdir()):
-            break
-        part.rmdir()
+    with suppress(OSError):  # not empty, or another program has come
+        (out / LOCK).unlink(missing_ok=True)
+        for part in new:
+            part.rmdir()
 
 
 def check_path(out: Path) -> None:
@@ -174,26 +180,16 @@ def claimed(
         raise FolderUnusable(
             f"--out {out} cannot be created ({error.strerror}); give the name of another folder"
         ) from None
-    with _locked(out):
-        yield from _marked(out, command, request, patterns, overwrite, may_resume, there, new)
-
-
-@contextmanager
-def _locked(out: Path) -> Iterator[None]:
-    """A lock: no other smajax writes into `out` meanwhile. It is released when the program ends, in any way."""
-    handle = os.open(out, os.O_RDONLY)
     try:
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise FolderTaken(
-                f"--out {out}: another smajax is writing into it; wait until it has ended, or give the name of another folder."
-            ) from None
-        except OSError:
-            pass  # a file system without locks
-        yield
-    finally:
-        os.close(handle)
+        with locked(out / LOCK):
+            yield from _marked(out, command, request, patterns, overwrite, may_resume, there, new)
+    except Taken:
+        raise FolderTaken(
+            f"--out {out}: another smajax is writing into it; wait until it has ended, or give the name of another folder."
+        ) from None
+    except BaseException:
+        _leave(out, new)
+        raise
 
 
 def _marked(

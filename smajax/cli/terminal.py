@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shlex
 import signal
 import sys
 import threading
@@ -13,18 +12,14 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING
 
+from smajax.core.operating_system import as_typed, is_closed_pipe, repeated_interrupts
+
 if TYPE_CHECKING:
     from rich.console import Console
 
 INTERRUPTED = 130
-
-
 REPEAT = 1.0  # s after which an unanswered Ctrl-C is repeated
-
-
 RETRY = 0.02  # s, where it came at a moment at which no exception can be raised
-
-
 CALLBACKS = ("_xla_gc_callback",)  # an exception in them is lost
 
 
@@ -44,7 +39,7 @@ def browse(page: Path) -> None:
 
 def command_line() -> str:
     """The command as it was typed."""
-    return "smajax " + shlex.join(sys.argv[1:])
+    return "smajax " + as_typed(sys.argv[1:])
 
 
 @contextmanager
@@ -57,18 +52,12 @@ def answer_interrupts() -> Iterator[None]:
 
     def interrupt(number: int, frame: FrameType | None) -> None:
         called_back = frame is not None and frame.f_code.co_name in CALLBACKS
-        signal.setitimer(signal.ITIMER_REAL, RETRY if called_back else REPEAT)
+        repeat(RETRY if called_back else REPEAT)
         if not called_back:
             raise KeyboardInterrupt
 
-    alarm = signal.signal(signal.SIGALRM, interrupt)
-    signal.signal(signal.SIGINT, interrupt)
-    try:
+    with repeated_interrupts(interrupt) as repeat:
         yield
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-        signal.signal(signal.SIGALRM, alarm or signal.SIG_DFL)
 
 
 @contextmanager
@@ -77,7 +66,9 @@ def until_pipe_closes() -> Iterator[None]:
     try:
         yield
         sys.stdout.flush()
-    except BrokenPipeError:
+    except OSError as error:
+        if not is_closed_pipe(error):
+            raise
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # the rest of the buffer is dropped
 
 

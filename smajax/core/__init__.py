@@ -7,6 +7,7 @@ In: arrays, pytrees of modules, text. Out: the services below.
     plugins, moved_modules               entry points of other packages; old module paths
     progress, result_cache, files        typed events; cached results; files written in one step
     provenance, machine                  versions, code and parameters of a result; the machine
+    operating_system                     what differs between Linux, macOS and Windows
     checkpointed_scan, limited           a scan with a reverse derivative in little memory; clipping with derivatives at the ends
     whiteness, wording, display_units, names    tests of a series; words for numbers; close matches of names
 """

@@ -37,7 +37,9 @@ def git_state() -> str:
 
     def asked(*words: str) -> str:
         try:
-            return subprocess.run(["git", *words], capture_output=True, text=True, timeout=5, check=True).stdout.strip()
+            # Without optional locks: a `status` that is killed while it refreshes the index would leave the repository locked.
+            command = ["git", "--no-optional-locks", *words]
+            return subprocess.run(command, capture_output=True, text=True, timeout=5, check=True).stdout.strip()
         except (OSError, subprocess.SubprocessError):
             return ""
 

@@ -6,6 +6,8 @@ import os
 from importlib.metadata import version
 from pathlib import Path
 
+from smajax.core.operating_system import user_cache
+
 # XLA's newer way of compiling loops for a CPU takes two to four times as long for a fit, which runs as fast either way; a
 # batch of many members runs up to three times as fast by it, and a little faster in the widest vectors. A flag that a version does not know ends the process: each has the versions of jaxlib with which it was tried.
 FLAG = "--xla_cpu_use_fusion_emitters=false"
@@ -17,8 +19,7 @@ TRIED = ((0, 7), (0, 12))  # versions of jaxlib that the tests ran with
 def kept_programs() -> Path:
     """Where compiled programs are kept: `JAX_COMPILATION_CACHE_DIR`, or `smajax` in the user's cache. May be deleted."""
     own = os.environ.get("JAX_COMPILATION_CACHE_DIR")
-    cache = os.environ.get("XDG_CACHE_HOME")
-    return Path(own) if own else (Path(cache) if cache else Path.home() / ".cache") / "smajax" / "programs"
+    return Path(own) if own else user_cache() / "smajax" / "programs"
 
 
 def prepare(cores: bool = False) -> None:

@@ -17,7 +17,6 @@ from smajax.engine.facade import Engine as Engine
 from smajax.engine.facade import EngineError as EngineError
 from smajax.engine.facade import EngineWarning as EngineWarning
 from smajax.engine.facade import Program as Program
-from smajax.engine.facade import available_cores as available_cores
 from smajax.engine.facade import engine_of as engine_of
 from smajax.engine.facade import program as program
 from smajax.engine.text import Unsupported as Unsupported

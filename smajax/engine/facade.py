@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar, cast, get_args
 import jax
 import numpy as np
 
+from smajax.core.operating_system import WINDOWS, available_cores
 from smajax.engine import xla
 from smajax.engine.arguments import check_arguments, checked_threads, key_of, signature
 from smajax.engine.cache import versions
@@ -37,6 +38,13 @@ class EngineWarning(UserWarning):
 
 class EngineError(ValueError):
     """An engine that there is not was asked for."""
+
+
+# What goes wrong in machine code can end the process, so a system without a test has it on request only.
+UNTRIED = (
+    f"machine code was never tried on Windows, so XLA runs the programs, several times slower. {VARIABLE}=native tries it; "
+    f"with {VARIABLE}=xla nothing is said."
+)
 
 
 class Program:
@@ -107,11 +115,6 @@ class Program:
         return coming.result
 
 
-def available_cores() -> int:
-    """Cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
 def engine_of(requested: str = "auto") -> Engine:
     """The engine that is meant, with SMAJAX_ENGINE for "auto". Raises EngineError for one that there is not."""
     named = requested
@@ -163,6 +166,9 @@ def _made(function: Function, model: Any, names: tuple[str, ...], alone: bool, e
     if engine == "xla":
         return Program(function, model, names, alone, None)
     traced = Traced(function, model, names)  # what goes wrong in here goes wrong by XLA too
+    if engine == "auto" and WINDOWS:
+        _say(UNTRIED)
+        return Program(function, model, names, alone, None)
     try:
         # Imported here: the translator reads names of JAX that a release may move, and then XLA has to run all the same.
         from smajax.engine.native import NativeProgram
@@ -189,8 +195,11 @@ _said: set[str] = set()  # Python forgets what it has shown wherever a library c
 
 
 def _warn(error: BaseException, what: str) -> None:
+    _say(_message(error, what))
+
+
+def _say(message: str) -> None:
     """Once in a process for each reason."""
-    message = _message(error, what)
     if message not in _said:
         warnings.warn(message, EngineWarning, stacklevel=1)
         _said.add(message)

@@ -36,11 +36,18 @@ def breakable(text: str) -> str:
     return re.sub(r"_(?=\w{3})", "_<wbr>", html.escape(text))
 
 
-def table(head: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequence[int] = ()) -> str:
-    """Cells are text; the columns `numbers` are set to the right. A head without a word is left out, and nothing sorts."""
+def table(
+    head: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequence[int] = (), links: Sequence[str] = ()
+) -> str:
+    """Cells are text; the columns `numbers` are set to the right. A head without a word is left out, and nothing sorts.
 
-    def cells(kind: str, row: Sequence[str]) -> str:
-        return "".join(f"<{kind}{_class(k, cell)}>{breakable(cell)}</{kind}>" for k, cell in enumerate(row))
+    links: where the first cell of each row leads, if anywhere.
+    """
+
+    def cells(kind: str, row: Sequence[str], first: int = 0) -> str:
+        return "".join(
+            f"<{kind}{_class(k, cell)}>{breakable(cell)}</{kind}>" for k, cell in enumerate(row) if k >= first
+        )
 
     def _class(k: int, cell: str) -> str:
         if k in numbers:
@@ -48,6 +55,11 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequence[
         return " class=t" if len(cell) > SENTENCE else ""
 
     body = "".join(f"<tr>{cells('td', row)}</tr>" for row in rows)
+    if links:
+        body = "".join(
+            f'<tr><td{_class(0, row[0])}><a href="{html.escape(link)}">{breakable(row[0])}</a></td>{cells("td", row, 1)}</tr>'
+            for row, link in zip(rows, links, strict=True)
+        )
     top = f"<thead><tr>{cells('th', head)}</tr></thead>" if any(head) else ""
     return f"<div class=scroll><table{' class=sortable' if top else ''}>{top}<tbody>{body}</tbody></table></div>"
 

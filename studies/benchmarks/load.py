@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from smajax.core.machine import peak_memory
+from smajax.core.operating_system import peak_memory
 from smajax.core.runtime import prepare
 
 COLUMNS = 10  # of the text log

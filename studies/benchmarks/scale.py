@@ -8,7 +8,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from smajax.core.machine import peak_memory
+from smajax.core.operating_system import peak_memory
 from smajax.core.runtime import prepare
 from smajax.model.rigs import arm
 from smajax.simulation.batch.run_batch import run_batch

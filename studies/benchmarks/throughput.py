@@ -16,9 +16,8 @@ from typing import Any
 import jax
 import numpy as np
 
-from smajax.core.machine import peak_memory
+from smajax.core.operating_system import available_cores, peak_memory
 from smajax.core.runtime import prepare
-from smajax.engine import available_cores
 from smajax.model.rigs import arm
 from smajax.simulation.batch.axes import zipped
 from smajax.simulation.batch.run_batch import run_batch

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from smajax.cli.main import app
 from smajax.cli.options import FITS
-from smajax.cli.result_folder import MARK, FolderTaken, claimed
+from smajax.cli.result_folder import LOCK, MARK, FolderTaken, claimed
 from smajax.core.progress import quiet
 from studies.source.row import Result, Row
 from studies.source.write import MARK as FIGURES_MARK
@@ -59,7 +59,7 @@ def test_overwriting_leaves_files_of_the_user(tmp_path: Path) -> None:
     _done(out)
     (out / "thesis.tex").write_text("mine")
     with claimed(out, "sweep", {}, ["index.html"], overwrite=True):
-        assert sorted(one.name for one in out.iterdir()) == [MARK, "thesis.tex"]
+        assert sorted(one.name for one in out.iterdir()) == [MARK, LOCK, "thesis.tex"]
 
 
 def test_a_file_of_the_users_is_not_written_over(tmp_path: Path) -> None:

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from smajax.cli.result_folder import MARK
+from smajax.cli.result_folder import LOCK, MARK
 from tests.helpers.small_bench import bench
 
 FAST, SLOW = 1, 10  # kills of each command
@@ -148,4 +148,6 @@ def kill_and_resume(tmp_path: Path, name: str, kills: int) -> None:
     assert _finished(out).items() >= before.items()
     assert killed or kills == FAST, "no kill found the command at work"
     assert result(out) == result(whole)
-    assert not [one for one in out.rglob(".*") if one.name != MARK and one.name != ".made-by"], "left behind"
+    assert not [one for one in out.rglob(".*") if one.name not in (MARK, LOCK) and one.name != ".made-by"], (
+        "left behind"
+    )

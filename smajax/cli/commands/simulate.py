@@ -312,7 +312,7 @@ def simulate(
     settings = {
         **vars(request),
         **(vars(loop) if options.closed else {}),
-        "gains": None if gains is None else gains.read_text(),
+        "gains": None if gains is None else gains.read_text(encoding="utf-8"),
         "model": None if model is None else str(model),
         "plant": None if plant is None else str(plant),
     }

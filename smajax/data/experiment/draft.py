@@ -361,7 +361,7 @@ def _runs(inputs: _Inputs, target: Path) -> _Section:
     forces, masses = inputs.first_forces, inputs.known.masses
     for run in runs:
         role = "held-out" if run is held_out else "fit"
-        names = [toml_value(str(file.resolve().relative_to(base))) for file in run.files]
+        names = [toml_value(file.resolve().relative_to(base).as_posix()) for file in run.files]
         by_channel = ", ".join(
             f"{name} = {names[inputs.kind_of[name]]}"
             for name in (*model.inputs, model.output)

@@ -76,7 +76,7 @@ def _runs(
         RunSection(
             name=name,
             role="fit",
-            file=str(path.resolve().relative_to(folder)),
+            file=path.resolve().relative_to(folder).as_posix(),
             inputs=dict(inputs),
             parameters=dict(parameters),
         )

@@ -16,7 +16,7 @@ model contains the base model. What it may change is said beside each equation, 
 | sensor | `sensor_reading.SensorTerm`, `SensorLagTerm` |
 | recorded input | `drive.inputs.InputLagTerm` |
 
-The equations know these contracts and no effect; `effects.grouping` sorts the effects of a system by them.
+`sma.contracts` has all of them. The equations know these contracts and no effect; `effects.grouping` sorts the effects of a system by them.
 """
 
 from __future__ import annotations

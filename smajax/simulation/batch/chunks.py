@@ -13,7 +13,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from smajax.engine import Engine, available_cores, program
+from smajax.core.operating_system import available_cores
+from smajax.engine import Engine, program
 from smajax.engine.arguments import key_of
 from smajax.engine.facade import cached
 from smajax.engine.xla import block_size, rounded

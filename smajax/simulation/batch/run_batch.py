@@ -10,7 +10,7 @@ import jax
 import numpy as np
 import xarray as xr
 
-from smajax.core.machine import available_memory
+from smajax.core.operating_system import available_memory
 from smajax.core.progress import Progress, Stage, as_progress, quiet
 from smajax.core.provenance import digest, provenance
 from smajax.engine import Engine
