@@ -53,7 +53,7 @@ def held(system: System, shares: list[float], seconds: float) -> list[float]:
         commands.append(float(leading_command(loop, turns, position, jnp.zeros(()))))
     count = round(seconds / DT)
     voltage = np.append(np.repeat(commands, count), commands[-1])
-    run = sma.simulate_compiled(system, {"voltage": voltage}, dt=DT)
+    run = sma.simulate_compiled(system, {"voltage": jnp.asarray(voltage)}, dt=DT)
     ends = np.asarray(run.position)[count::count]
     return [(end - at_share(system, 0.0)) / float(stroke_of(system)) for end in ends]
 

@@ -188,6 +188,7 @@ PLAIN = set(
         "probability",
         "ratio",
         "reference",
+        "record",
         "remaining",
         "remark",
         "report",
