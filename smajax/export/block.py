@@ -48,7 +48,12 @@ class Block:
     period: float | None = None
 
 
+KEYWORDS = frozenset(
+    ["auto", "bool", "break", "case", "char", "const", "continue", "default", "do", "double", "else", "enum", "extern", "false", "float", "for", "goto", "if", "inline", "int", "long", "register", "restrict", "return", "short", "signed", "sizeof", "static", "struct", "switch", "true", "typedef", "union", "unsigned", "void", "volatile", "while"]
+)
+
+
 def identifier(text: str) -> str:
-    """`text` as a name in C."""
-    name = re.sub(r"\W+", "_", text).strip("_") or "block"
-    return f"_{name}" if name[0].isdigit() else name
+    """`text` as a name in C: letters, digits and `_`, the first no digit, and none of C's own words."""
+    name = re.sub(r"[^A-Za-z0-9]+", "_", text).strip("_") or "block"
+    return f"x{name}" if name[0].isdigit() else f"{name}_" if name in KEYWORDS else name

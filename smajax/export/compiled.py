@@ -130,13 +130,13 @@ class _Function:
 
 def entry_names(state: Any) -> list[str]:
     """A C name for each leaf of a state: the names on its path, with a number where two are the same."""
-    names: list[str] = []
+    names = ["parameters", "started"]  # other members of the structure
     for path, _ in jax.tree_util.tree_leaves_with_path(state):
         keys = (str(getattr(key, "name", getattr(key, "key", ""))) for key in path)
         name = identifier("_".join(key for key in keys if key)) if path else "memory"
         alike = sum(re.fullmatch(rf"{name}(_[0-9]+)?", one) is not None for one in names)
         names.append(f"{name}_{alike + 1}" if alike else name)
-    return names
+    return names[2:]
 
 
 def _texts(entry: Entry) -> list[str]:

@@ -80,7 +80,7 @@ def _outputs(system: System) -> tuple[Quantity, ...]:
         Quantity("position", position, "of the load, positive when the wire contracts"),
         Quantity("velocity", f"{position}/s", "of the load"),
     )
-    return (
+    quantities = (
         Quantity("reading", unit, f"what the sensor shows of the {shown}"),
         *(motion if moving else ()),
         Quantity("temperature", "degC", "of the wire"),
@@ -91,6 +91,9 @@ def _outputs(system: System) -> tuple[Quantity, ...]:
         Quantity("resistance", "ohm", "of the wire"),
         *((Quantity("unsolved", "-", "stages so far that did not converge: 0 in a run to rely on"),) if moving else ()),
     )
+    return tuple(
+        one for one in quantities if one.name not in system.load.inputs_required
+    )  # of a coupon they are prescribed
 
 
 def shown(system: System, state: State) -> dict[str, Scalar]:

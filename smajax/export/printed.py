@@ -12,7 +12,7 @@ from smajax.export.operations import type_of
 from smajax.export.statements import NAMES, Assign, Branch, Cell, Fill, Item, Loop, Store
 
 WIDTH = 96  # characters of an expression into which another one is put
-CELL = re.compile(r"\b[ac][0-9]+\b")
+CELL = re.compile(r"(?<![>.])\b[ac][0-9]+\b")
 CALL = re.compile(r"^(F\(\w+\)|\w+)?\(")
 CONSTANT = re.compile(r"\bR\(([^()]*)\)")
 COUNT = re.compile(r"\bint(?:64|32)_t\b|\bwhole(?:64|32)\b")

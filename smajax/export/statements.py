@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-NAMES = re.compile(r"\b[aciv][0-9]+\b")  # arrays, cells, indices and values
+NAMES = re.compile(r"(?<![>.])\b[aciv][0-9]+\b")  # arrays, cells, indices and values; not members of a structure
 
 
 @dataclass(frozen=True, slots=True)
