@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import jax.numpy as jnp
+from jax import lax
 
 from smajax.core.names import listed
 from smajax.core.parameters import check_bounds, parameter_values, parameters, set_parameters
@@ -20,10 +21,14 @@ from smajax.model.types import Scalar, State
 from smajax.model.wire.heat import cross_section
 from smajax.model.wire.resistance import resistance_per_metre
 from smajax.simulation.adaptive_steps import advance
+from smajax.simulation.simulate import DEFAULT_STEP
 from smajax.simulation.steppers import CouponSubsteps
 
 TOLERANCE = "integration_tolerance"
 DEFAULT_TOLERANCE = 1e-5  # shares of 1 C and of 1 % strain a step: a tenth of what one run by itself begins with
+# s: error-controlled steps go through no more at a time. Where a load hits a stop they become as short as a thousandth of that and no shorter,
+# so that a communication step ten times as long would leave ten times the error there.
+LONGEST = DEFAULT_STEP
 COUPON_STEPS = 32  # between two communication points, along a straight line
 ABOUT = {
     "voltage": "voltage at the amplifier's input",
@@ -114,6 +119,22 @@ def shown(system: System, state: State) -> dict[str, Scalar]:
     }
 
 
+def _moved(
+    system: System, state: State, inputs: Values, seconds: Scalar, tried: Scalar, tolerance: Scalar
+) -> tuple[State, Scalar]:
+    """(the state after `seconds`, the step to try next). tried: 0 before the first one."""
+    parts = jnp.maximum(jnp.ceil(seconds / LONGEST - 1e-9), 1.0)
+    part = seconds / parts
+
+    def one(at: tuple[State, Scalar, Scalar]) -> tuple[State, Scalar, Scalar]:
+        following = jnp.where(at[1] > 0.0, at[1], part)
+        new, following, _ = advance(system, at[0], inputs, part, following, tolerance)
+        return new, following, at[2] + 1.0
+
+    end, following, _ = lax.while_loop(lambda at: at[2] < parts, one, (state, tried, jnp.zeros_like(parts)))
+    return end, following
+
+
 def plant_block(system: System, name: str = "actuator", title: str = "", tolerance: float = DEFAULT_TOLERANCE) -> Block:
     """`system` with its values as start values. Raises ExportError for what no block can be.
 
@@ -145,9 +166,7 @@ def plant_block(system: System, name: str = "actuator", title: str = "", toleran
     def step(p: Values, x: Any, u: Values, seconds: Scalar) -> tuple[Any, Values]:
         plant, (state, memory) = with_values(p), x
         if moving:
-            before = memory["next_step"]
-            tried = jnp.where(before > 0.0, before, seconds)
-            state, following, _ = advance(plant, state, u, seconds, tried, p[TOLERANCE])
+            state, following = _moved(plant, state, u, seconds, memory["next_step"], p[TOLERANCE])
             return (state, {"next_step": following}), shown(plant, state)
         substeps = CouponSubsteps(plant, seconds, COUPON_STEPS)
         end = substeps(substeps.start(state, memory), u)
