@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,7 @@ from smajax.export.source import CSource, c_source
 from smajax.model.presets import build
 from smajax.model.rigs import arm
 from smajax.model.system import System
-from tests.helpers.c_programs import Running, compiled_c, needs_gcc
+from tests.helpers.c_programs import STRICT, Running, compiled_c, needs_gcc
 from tests.helpers.machine_code import by_machine_code
 
 RUN = by_machine_code(simulate_closed_loop)
@@ -133,3 +134,41 @@ def test_a_command_that_is_no_number_is_zero_from_there_on(tmp_path):
     assert instance.run({"reading": 0.0})["command"] == 0.0
     instance.call("init")
     assert instance.run({"reading": 0.0})["command"] > 0.0
+
+
+BOARD = r"""
+#include <math.h>
+#include "bench.c"
+static double position = 0.0, volts = 0.0;
+static int left = 600;
+float read_position(void) { return (float)position; }
+void write_voltage(float value) { volts = value; }
+int wait_for_the_next_period(void)
+{
+    position += 0.01 * (0.001 * volts - position); /* something that follows */
+    return left-- > 0;
+}
+static void at_end(void) { if (!(fabs(position - 0.004) < 1e-4) || volts != 0.0) { _Exit(1); } }
+__attribute__((constructor)) static void ask(void) { atexit(at_end); }
+"""
+
+
+@needs_gcc
+@pytest.mark.parametrize("single", [0, 1])
+def test_the_bench_of_the_how_to_page_runs_in_twenty_lines(single, tmp_path):
+    page = (Path(__file__).parents[2] / "docs" / "how-to" / "to-a-microcontroller.md").read_text("utf-8")
+    bench = page.partition('```c title="bench.c"\n')[2].partition("```")[0]
+    assert len(bench.splitlines()) <= 20
+    pid = loop_around(SPRING, "pid").controller
+    source = c_source(lambda: controller_block(SPRING, pid, None, PERIOD, 0, "pid"), "pid", SHORT)
+    files = {
+        "bench.c": bench,
+        "board.c": f"#include <stdlib.h>\n{BOARD}",
+        "pid.h": source.header,
+        "pid.c": source.source,
+    }
+    for name, text in files.items():
+        (tmp_path / name).write_text(text)
+    sanitizers = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all", f"-DSMAJAX_SINGLE={single}"]
+    subprocess.run(["gcc", *STRICT, *sanitizers, "board.c", "pid.c", "-o", "bench", "-lm"], cwd=tmp_path, check=True)
+    subprocess.run(["./bench"], cwd=tmp_path, check=True, timeout=20)
