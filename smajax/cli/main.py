@@ -14,6 +14,7 @@ from smajax.cli.commands.close_loop import close_loop_command
 from smajax.cli.commands.demo import demo
 from smajax.cli.commands.doctor import doctor
 from smajax.cli.commands.effects import effects
+from smajax.cli.commands.export import export
 from smajax.cli.commands.figures import figures
 from smajax.cli.commands.identify import identify_command
 from smajax.cli.commands.new_experiment import new_experiment
@@ -78,6 +79,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "tune": tune,
     "sweep": sweep,
     "simulate": simulate,
+    "export": export,
     "doctor": doctor,
     "bench": bench,
     "new-experiment": new_experiment,
@@ -123,6 +125,7 @@ def main() -> None:
         from smajax.data.experiment.errors import ExperimentError
         from smajax.data.readers.table import MeasuredDataError
         from smajax.engine import EngineError
+        from smajax.export.errors import ExportError
 
         if isinstance(error, OSError) and no_room(error):
             error = OSError(
@@ -134,6 +137,7 @@ def main() -> None:
             (
                 EngineError,
                 ExperimentError,
+                ExportError,
                 FolderTaken,
                 MeasuredDataError,
                 MissingExtraError,

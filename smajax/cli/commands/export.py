@@ -1,0 +1,137 @@
+"""`smajax export`: a model or a controller as C99 or as an FMU."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from smajax.cli.loop_options import Delay, Estimator
+from smajax.cli.options import Json, quantity, refused, within
+from smajax.cli.plant_options import Changes, DriveName, LawName, LoadName, ModelFile, PlantOptions, WireName
+
+if TYPE_CHECKING:
+    from smajax.export.source import CSource
+    from smajax.model.system import System
+
+Sample = Annotated[float, quantity("of a controller: time between two calls", "s", above=0.0, like="10ms")]
+
+
+# More than 8 parameters: typer reads the options from them.
+def export(
+    file: Annotated[
+        Path,
+        typer.Argument(help="model.toml (or its folder) of close-loop or identify; gains.json of tune"),
+    ],
+    to: Annotated[str, typer.Option("--to", help="`fmu`, or `c` for C99")],
+    out: Annotated[
+        Path | None,
+        typer.Option(help="the .fmu file, or the folder of the C; default: named after FILE, here"),
+    ] = None,
+    fmi: Annotated[str, typer.Option(help="version of the interface of an FMU: 2.0 or 3.0")] = "2.0",
+    wire: WireName = "",
+    load: LoadName = "",
+    drive: DriveName = "",
+    law: LawName = "",
+    values: Changes = None,
+    model: ModelFile = None,
+    estimator: Estimator = "",
+    period: Sample = 0.01,
+    delay: Delay = 0,
+    tolerance: Annotated[
+        float,
+        typer.Option(help="of a model: error of a step, a share of 1 C and of 1 % strain", callback=within(1e-9, 1e-2)),
+    ] = 1e-5,
+    source_only: Annotated[
+        bool, typer.Option("--source-only", help="an FMU without a binary, for the importing tool to compile")
+    ] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="replace files of the same name")] = False,
+    json_out: Json = False,
+) -> None:
+    """Take a model or a tuned controller out of Python: an FMU for Simulink and others, or C99 for a microcontroller.
+
+    Of gains --wire, --load and --drive, or --model, say which plant the controller assumes; default: the arm. Nothing of Python or JAX is
+    in what is written.
+
+    Example:  smajax export report/model.toml --to fmu --out actuator.fmu
+    Example:  smajax export tuned/gains.json --to c --model report/model.toml --estimator model --out bench
+    """
+    from smajax.core.runtime import prepare
+
+    prepare()
+    from smajax.core.files import json_text
+    from smajax.export.block import identifier
+    from smajax.export.source import record
+    from smajax.export.write import c_paths, check_free, write_c, write_fmu
+
+    if to not in ("c", "fmu"):
+        raise typer.BadParameter(f"`c` or `fmu`, not `{to}`.", param_hint="--to")
+    if fmi not in ("2.0", "3.0"):
+        raise typer.BadParameter(f"`2.0` or `3.0`, not `{fmi}`.", param_hint="--fmi")
+    stem = file.parent.resolve().name if file.stem in ("model", "gains") and file.parent.name else file.stem
+    path = out or (Path(f"{stem}.fmu") if to == "fmu" else Path(f"{stem}_c"))
+    name = identifier(path.stem if to == "fmu" else stem)
+    check_free([path] if to == "fmu" else c_paths(path, name), overwrite)
+    plant = PlantOptions(wire, load, drive, law, values or [], model)
+    source = _source(file, plant, name, estimator, period, delay, tolerance)
+    if to == "fmu":
+        written = [write_fmu(source, path, fmi, not source_only, overwrite)]
+    else:
+        written = write_c(source, path, overwrite)
+    if json_out:
+        typer.echo(json_text({**record(source), "files": [str(one) for one in written]}), nl=False)
+        return
+    _print(source, written)
+
+
+def _source(
+    file: Path, plant: PlantOptions, name: str, estimator: str, period: float, delay: int, tolerance: float
+) -> CSource:
+    """Raises typer.BadParameter for options of the other kind of file, ExportError for what cannot be exported."""
+    from smajax.control.gains_file import GainsFileError
+    from smajax.export.from_files import controller_source, plant_source
+
+    if file.suffix == ".json":
+        system = plant.system()
+        try:
+            return controller_source(system, file, name, estimator=estimator, period=period, delay=delay)
+        except GainsFileError as error:
+            raise typer.BadParameter(str(error), param_hint="FILE") from None
+        except KeyError as error:
+            raise typer.BadParameter(str(error.args[0]), param_hint="--estimator") from None
+    if estimator or delay or plant.model or plant.wire or plant.load or plant.drive or plant.law:
+        raise typer.BadParameter(
+            "--estimator, --delay, --model, --wire, --load, --drive and --law are for gains.json; a model file says all of a model but "
+            "what --set changes.",
+            param_hint="FILE",
+        )
+    system, title = _model(file, plant.values)
+    return plant_source(system, name, title, tolerance)
+
+
+def _model(file: Path, values: list[str]) -> tuple[System, str]:
+    """(the system of a model file, its title). Raises ExperimentError of the file, typer.BadParameter of --set."""
+    from smajax.cli.options import texts
+    from smajax.cli.plant_options import EXAMPLE
+    from smajax.control.compose import with_values
+    from smajax.data.model_file.read import load_model
+
+    kept = load_model(file)
+    with refused("--set"):
+        return with_values(kept.system, texts("--set", values, EXAMPLE)), f"Model of an actuator: {kept.title}"
+
+
+def _print(source: CSource, written: list[Path]) -> None:
+    """What was written, for a terminal."""
+    from smajax.export.compiled import DOUBLE, SINGLE
+
+    block, sizes = source.block, source.state_bytes
+    every = "" if block.period is None else f", called every {1e3 * block.period:g} ms"
+    typer.echo(f"{block.title}{every}")
+    for label, many in (("inputs", source.inputs), ("outputs", source.outputs)):
+        typer.echo(f"  {label}: {', '.join(f'{one.name} [{one.unit}]' for one in many)}")
+    typer.echo(f"  parameters: {len(source.parameters)}")
+    typer.echo(f"  state: {sizes[DOUBLE]} bytes in double precision, {sizes[SINGLE]} in single")
+    for path in written:
+        typer.echo(f"Written: {path.resolve()}")

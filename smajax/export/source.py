@@ -1,0 +1,330 @@
+"""A block as C99: a header that says what it takes and costs, and its source. Both compile to double and, by a macro, to single precision.
+
+No allocation, no other library than math.h; what a block remembers is one structure that the caller owns.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from smajax.export.block import Block, Quantity
+from smajax.export.compiled import DOUBLE, SINGLE, Body, Compiled, Entry, compiled
+from smajax.export.operations import type_of
+from smajax.export.printed import helpers_of, merged, printed
+
+MACRO = "SMAJAX_SINGLE"
+
+
+@dataclass(frozen=True)
+class ShortCall:
+    """A function of a few inputs that returns one output, others being at their start values: `step(state, reading, set_point)`."""
+
+    inputs: tuple[str, ...]
+    output: str
+
+
+@dataclass(frozen=True)
+class CSource:
+    """C of a block. parameters, inputs, outputs: those that it has, for whoever calls it; state_bytes by precision."""
+
+    name: str
+    block: Block
+    header: str
+    source: str
+    parameters: tuple[Quantity, ...]
+    inputs: tuple[Quantity, ...]
+    outputs: tuple[Quantity, ...]
+    state_bytes: dict[str, int]
+    operations: dict[str, int]
+
+
+class _Both:
+    """A block compiled in both precisions."""
+
+    def __init__(self, build: Callable[[], Block], name: str) -> None:
+        self.double, self.single = compiled(build, DOUBLE), compiled(build, SINGLE)
+        self.name, self.block = name, self.double.block
+        used = self.double.parameters | self.single.parameters
+        self.parameters = [one for one in self.block.parameters if one.name in used]
+        taken = self.double.inputs | self.single.inputs
+        self.inputs = [one for one in self.block.inputs if one.name in taken]
+        single = {one.name: one for one in self.single.state}
+        both = {one.name: one for one in (*self.double.state, *self.single.state)}
+        self.state = [(one, single.get(one.name, one)) for one in both.values()]
+
+    def body(self, of: Callable[[Compiled], Body]) -> list[str]:
+        texts = []
+        for one in (self.double, self.single):
+            body = of(one)
+            lines = printed(body.items, [what for _, what in body.written])
+            texts.append([*lines, *(f"    {where} = {what};" for where, what in body.written)])
+        return merged(*texts)
+
+
+def number(value: float) -> str:
+    """As C writes it, every digit."""
+    if math.isinf(value) or math.isnan(value):
+        return "NAN" if math.isnan(value) else ("INFINITY" if value > 0 else "-INFINITY")
+    return repr(float(value))
+
+
+def _shown(value: float) -> str:
+    return f"{value:.6g}"
+
+
+def _meaning(one: Quantity) -> str:
+    """Unit, bounds, start value and meaning, for a comment."""
+    parts = [one.unit]
+    if math.isfinite(one.low) or math.isfinite(one.high):
+        parts.append(f"{_shown(one.low)} to {_shown(one.high)}")
+    text = ", ".join([*parts, f"start {_shown(one.start)}"])
+    return f"{text}: {one.about}".replace("*/", "* /") if one.about else text
+
+
+def _structure(name: str, members: Sequence[str]) -> list[str]:
+    return ["typedef struct {", *(f"    {one}" for one in members), f"}} {name};", ""] if members else []
+
+
+def _members(quantities: Iterable[Quantity], name: str) -> list[str]:
+    return [f"{name}_real {one.c_name}; /* {_meaning(one)} */" for one in quantities]
+
+
+def _member(double: Entry, single: Entry, name: str) -> str:
+    """Of the state."""
+    kinds = [type_of(one.dtype).replace("real", f"{name}_real") for one in (double, single)]
+    kind = kinds[0] if kinds[0] == kinds[1] else f"{name}_count"
+    return f"{kind} {double.name}{f'[{double.size}]' if double.shape else ''};"
+
+
+def _bytes(state: Sequence[Entry], parameters: int, real: int) -> int:
+    """Of the structure, as a compiler lays it out: members on multiples of their size."""
+    sizes = [*([(real, parameters)] if parameters else []), (1, 1)]
+    for entry in state:
+        sizes.append((real if entry.dtype.startswith("float") else np.dtype(entry.dtype).itemsize, entry.size))
+    total = 0
+    for size, count in sizes:
+        total = -(-total // size) * size + size * count
+    largest = max(size for size, _ in sizes)
+    return -(-total // largest) * largest
+
+
+def _prototypes(name: str, both: _Both, short: ShortCall | None) -> list[str]:
+    seconds = "" if both.block.period is not None else f", {name}_real seconds"
+    taken = f"{name}_state *state{_inputs_argument(both, name)}, {name}_outputs *outputs"
+    lines = [
+        "/* Sets parameters to their start values and forgets all else: call it first. */",
+        f"void {name}_init({name}_state *state);",
+        "",
+    ]
+    if both.block.period is not None:
+        lines += [f"/* One period of {_shown(both.block.period)} s: call it at each sample, the first too. */"]
+    else:
+        lines += ["/* The state at rest with these inputs: call it once before the first step. */"]
+        lines += [f"void {name}_start({taken});", "", "/* As many seconds on, with these inputs held. */"]
+    lines += [f"void {name}_run({taken}{seconds});"]
+    if short is not None:
+        lines += ["", "/* The same with other inputs at their start values. */", f"{_short_head(name, short)};"]
+    return lines
+
+
+def _inputs_argument(both: _Both, name: str) -> str:
+    return f", const {name}_inputs *inputs" if both.inputs else ""
+
+
+def _short_head(name: str, short: ShortCall) -> str:
+    given = "".join(f", {name}_real {one}" for one in short.inputs)
+    return f"{name}_real {name}_step({name}_state *state{given})"
+
+
+def _header(both: _Both, short: ShortCall | None, state_bytes: dict[str, int]) -> str:
+    name, block = both.name, both.block
+    state = _structure(
+        f"{name}_state",
+        [
+            *([f"{name}_parameters parameters;"] if both.parameters else []),
+            "bool started;",
+            *(_member(*one, name) for one in both.state),
+        ],
+    )
+    step, start = both.double.step.cost, both.double.start.cost
+    bounded = "" if step.bounded else ", each loop whose length depends on the numbers counted once,"
+    lines = [
+        f"/* {block.title}",
+        " *",
+        " * Written by smajax: change the model and write it again, not this file. SI units, temperatures in degrees Celsius,",
+        " * angles in radians. Double precision; with -DSMAJAX_SINGLE=1 single precision.",
+        " *",
+        f" * State: {state_bytes[DOUBLE]} bytes in double and {state_bytes[SINGLE]} in single precision, one structure that the caller owns;",
+        " * nothing is allocated, and of the libraries math.h alone is used.",
+        f" * Operations of a step at worst{bounded}: {step.total}",
+        f" * ({step.words()}); of the first one {start.total}.",
+        " */",
+        f"#ifndef {name.upper()}_H",
+        f"#define {name.upper()}_H",
+        "",
+        "#include <stdbool.h>",
+        "#include <stdint.h>",
+        "",
+        f"#ifndef {MACRO}",
+        f"#define {MACRO} 0",
+        "#endif",
+        f"#if {MACRO}",
+        f"typedef float {name}_real;",
+        f"typedef int32_t {name}_count;",
+        "#else",
+        f"typedef double {name}_real;",
+        f"typedef int64_t {name}_count;",
+        "#endif",
+        "",
+        *(
+            [f"#define {name.upper()}_PERIOD {number(block.period)} /* s, between two calls */", ""]
+            if block.period
+            else []
+        ),
+        *_structure(f"{name}_parameters", _members(both.parameters, name)),
+        *_structure(f"{name}_inputs", _members(both.inputs, name)),
+        *_structure(
+            f"{name}_outputs", [f"{name}_real {one.c_name}; /* {one.unit}: {one.about} */" for one in block.outputs]
+        ),
+        *state,
+        *_prototypes(name, both, short),
+        "",
+        "#endif",
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def _function(name: str, both: _Both, kind: str, body: list[str]) -> list[str]:
+    """`start` or `step` of the block, as a function of the file."""
+    text = "\n".join(body)
+    seconds = kind == "step" and both.block.period is None
+    arguments = [
+        *([f"const {name}_parameters *p"] if both.parameters else []),
+        f"{name}_state *x",
+        *([f"const {name}_inputs *u"] if both.inputs else []),
+        f"{name}_outputs *y",
+        *(["real seconds"] if seconds else []),
+    ]
+    unused = [
+        f"    (void){one};"
+        for one, used in (("p", "p->"), ("x", "x->"), ("u", "u->"), ("seconds", "seconds"))
+        if used not in text and any(argument.replace("*", " ").split()[-1] == one for argument in arguments)
+    ]
+    return [f"static void {kind}({', '.join(arguments)})", "{", *unused, *body, "}", ""]
+
+
+def _public(name: str, both: _Both, short: ShortCall | None) -> list[str]:
+    """The functions of the header."""
+    sampled = both.block.period is not None
+    given = "".join(["&state->parameters, " if both.parameters else "", "state"])
+    rest = f"{', inputs' if both.inputs else ''}, outputs"
+    taken = f"{name}_state *state{_inputs_argument(both, name)}, {name}_outputs *outputs"
+    lines = [
+        f"void {name}_init({name}_state *state)",
+        "{",
+        f"    static const {name}_state rest = {{0}};",
+        "    *state = rest;",
+    ]
+    lines += [f"    state->parameters.{one.c_name} = R({number(one.start)});" for one in both.parameters]
+    lines += ["}", ""]
+    if sampled:
+        lines += [
+            f"void {name}_run({taken})",
+            "{",
+            "    if (state->started) {",
+            f"        step({given}{rest});",
+            "    } else {",
+            f"        start({given}{rest});",
+            "        state->started = true;",
+            "    }",
+            "}",
+            "",
+        ]
+    else:
+        lines += [
+            f"void {name}_start({taken})",
+            "{",
+            f"    start({given}{rest});",
+            "    state->started = true;",
+            "}",
+            "",
+        ]
+        lines += [f"void {name}_run({taken}, real seconds)", "{", f"    step({given}{rest}, seconds);", "}", ""]
+    if short is not None:
+        lines += [_short_head(name, short), "{"]
+        if both.inputs:
+            values = [one.c_name if one.name in short.inputs else f"R({number(one.start)})" for one in both.inputs]
+            lines += [f"    const {name}_inputs inputs = {{{', '.join(values)}}};"]
+        used = {one.name for one in both.inputs}
+        lines += [f"    (void){one};" for one in short.inputs if one not in used]
+        given_inputs = "&inputs, " if both.inputs else ""
+        lines += [
+            f"    {name}_outputs outputs;",
+            f"    {name}_run(state, {given_inputs}&outputs);",
+            f"    return outputs.{short.output};",
+            "}",
+            "",
+        ]
+    return lines
+
+
+def c_source(build: Callable[[], Block], name: str, short: ShortCall | None = None) -> CSource:
+    """The C of the block that `build` makes, in whichever precision JAX computes at the time. Raises NoTranslation."""
+    both = _Both(build, name)
+    start, step = both.body(lambda one: one.start), both.body(lambda one: one.step)
+    entries = {DOUBLE: [one for one, _ in both.state], SINGLE: [one for _, one in both.state]}
+    sizes = {kind: _bytes(entries[kind], len(both.parameters), real) for kind, real in ((DOUBLE, 8), (SINGLE, 4))}
+    source = [
+        f"/* {both.block.title}: see {name}.h. */",
+        f'#include "{name}.h"',
+        "",
+        "#include <math.h>",
+        "",
+        f"typedef {name}_real real;",
+        f"typedef {name}_count count;",
+        "#define R(value) ((real)(value))",
+        f"#if {MACRO}",
+        "#define R2(of_double, of_single) R(of_single)",
+        "#define F(name) name##f",
+        "#else",
+        "#define R2(of_double, of_single) R(of_double)",
+        "#define F(name) name",
+        "#endif",
+        "",
+        *helpers_of([*start, *step]),
+        "",
+        *_function(name, both, "start", start),
+        *_function(name, both, "step", step),
+        *_public(name, both, short),
+    ]
+    return CSource(
+        name,
+        both.block,
+        _header(both, short, sizes),
+        "\n".join(source),
+        tuple(both.parameters),
+        tuple(both.inputs),
+        both.block.outputs,
+        sizes,
+        {"start": both.double.start.cost.total, "step": both.double.step.cost.total},
+    )
+
+
+def record(source: CSource) -> dict[str, Any]:
+    """What the header says, for JSON: state and operations."""
+    return {
+        "name": source.name,
+        "title": source.block.title,
+        "period": source.block.period,
+        "state_bytes": dict(source.state_bytes),
+        "operations": dict(source.operations),
+        "parameters": [one.name for one in source.parameters],
+        "inputs": [one.name for one in source.inputs],
+        "outputs": [one.name for one in source.outputs],
+    }

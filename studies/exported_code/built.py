@@ -1,0 +1,73 @@
+"""The C of a block as a library of this machine, driven over whole series by a few lines of C beside it."""
+
+from __future__ import annotations
+
+import ctypes
+import subprocess
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from smajax.export.compiled import DOUBLE
+from smajax.export.source import CSource
+
+FLAGS = ("-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-O2", "-fPIC", "-shared")
+
+# Of a controller: series of readings and set points, one row a loop -> its commands. Of a model: inputs held for `seconds`.
+CONTROLLER = """
+void drive(long loops, long samples, const double *readings, const double *points, double *commands);
+void drive(long loops, long samples, const double *readings, const double *points, double *commands)
+{{
+    for (long loop = 0; loop < loops; loop++) {{
+        {0}_state state;
+        {0}_init(&state);
+        for (long k = loop * samples; k < (loop + 1) * samples; k++) {{
+            commands[k] = {0}_step(&state, (real)readings[k], (real)points[k]);
+        }}
+    }}
+}}
+"""
+MODEL = """
+void drive(long samples, const {0}_inputs *inputs, {0}_outputs *outputs, double seconds);
+void drive(long samples, const {0}_inputs *inputs, {0}_outputs *outputs, double seconds)
+{{
+    {0}_state state;
+    {0}_init(&state);
+    {0}_start(&state, &inputs[0], &outputs[0]);
+    for (long k = 0; k + 1 < samples; k++) {{
+        {0}_run(&state, &inputs[k], &outputs[k + 1], (real)seconds);
+    }}
+}}
+"""
+
+
+def library(source: CSource, kind: str, driver: str) -> ctypes.CDLL:
+    """Compiled with every warning an error."""
+    folder = Path(tempfile.mkdtemp())
+    (folder / f"{source.name}.h").write_text(source.header)
+    (folder / f"{source.name}.c").write_text(source.source + driver.format(source.name))
+    path = folder / f"{source.name}.so"
+    macro = f"-DSMAJAX_SINGLE={int(kind != DOUBLE)}"
+    subprocess.run(["gcc", *FLAGS, macro, folder / f"{source.name}.c", "-o", path, "-lm"], check=True)
+    return ctypes.CDLL(str(path))
+
+
+def commands(source: CSource, kind: str, readings: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Of a controller, (loops, samples)."""
+    given = [np.ascontiguousarray(one, dtype=np.float64) for one in (readings, points)]
+    found = np.empty_like(given[0])
+    pointers = [one.ctypes.data_as(ctypes.c_void_p) for one in (*given, found)]
+    library(source, kind, CONTROLLER).drive(ctypes.c_long(len(found)), ctypes.c_long(found.shape[1]), *pointers)
+    return found
+
+
+def open_loop(source: CSource, inputs: dict[str, np.ndarray], seconds: float) -> dict[str, np.ndarray]:
+    """Of a model in double precision: its outputs by name, (samples,), for inputs held from sample to sample."""
+    samples = len(next(iter(inputs.values())))
+    rows = np.stack([inputs.get(one.name, np.full(samples, one.start)) for one in source.inputs], axis=1)
+    found = np.empty((samples, len(source.outputs)))
+    given = [np.ascontiguousarray(rows, dtype=np.float64), found]
+    pointers = [one.ctypes.data_as(ctypes.c_void_p) for one in given]
+    library(source, DOUBLE, MODEL).drive(ctypes.c_long(samples), *pointers, ctypes.c_double(seconds))
+    return {one.name: found[:, k] for k, one in enumerate(source.outputs)}

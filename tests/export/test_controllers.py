@@ -1,0 +1,174 @@
+"""A controller in C, with its estimator, commands what the package's own commands, and compiles without a warning anywhere."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from smajax.control.closed_loop import simulate_closed_loop
+from smajax.control.loop_around import loop_around
+from smajax.control.loop_dataset import Loop
+from smajax.control.measured_state import Sensor
+from smajax.control.presets import CONTROLLERS
+from smajax.control.reference import clock, sine, steps
+from smajax.export.compiled import DOUBLE, SINGLE
+from smajax.export.controller import SHORT, check_reads, controller_block
+from smajax.export.errors import ExportError
+from smajax.export.source import CSource, c_source
+from smajax.model.presets import build
+from smajax.model.rigs import arm
+from smajax.model.system import System
+from tests.helpers.c_programs import STRICT, Running, compiled_c, needs_gcc
+from tests.helpers.machine_code import by_machine_code
+
+RUN = by_machine_code(simulate_closed_loop)
+ARM = arm()
+PERIOD, NAME = 0.01, "own"
+SANITIZED = ["-O1", "-g", "-fsanitize=undefined", "-fno-sanitize-recover=undefined", "-ffp-contract=off"]
+
+
+def source_of(loop: Loop, controller: str, delay: int = 0) -> CSource:
+    known = CONTROLLERS[controller].known
+    return c_source(
+        lambda: controller_block(loop.system, loop.controller, loop.estimator, PERIOD, delay, NAME, known), NAME, SHORT
+    )
+
+
+def loop_and_readings(loop: Loop, number: int, delay: int) -> tuple[Any, np.ndarray]:
+    """A closed loop of the package, steps or a sine with a noisy sensor, and what its sensor read at each call."""
+    low, stroke = (-0.6, 0.9) if loop.system.load.reading[1] == "rad" else (0.0, 0.008)
+    time, key = clock(3.0, PERIOD), jax.random.key(number)
+    positions = [low + 0.5 * stroke, low + 0.9 * stroke, low + 0.2 * stroke]
+    wanted = sine(time, low + 0.5 * stroke, 0.3 * stroke, 0.4) if number % 2 else steps(time, positions, 1.0)
+    sensor = Sensor(noise_sigma=1e-4 * stroke)
+    between = {"estimator": loop.estimator, "sensor": sensor, "key": key, "delay": delay}
+    run = RUN(loop.system, loop.controller, wanted, PERIOD, **between)
+    noise = jax.random.normal(key, (len(time) - 1,))
+    return run, np.asarray(sensor.reading(jnp.asarray(run.run.reading[:-1]), noise))
+
+
+def commands(instance: Running, run: Any, readings: np.ndarray) -> np.ndarray:
+    """What the C commands where it reads what the package's controller read."""
+    wanted = run.wanted
+    series = np.stack(
+        [readings, *(np.asarray(one)[:-1] for one in (wanted.position, wanted.velocity, wanted.acceleration))]
+    )
+    names = ("reading", "set_point", "set_point_rate", "set_point_acceleration")
+    return np.asarray([instance.run(dict(zip(names, row, strict=True)))["command"] for row in series.T])
+
+
+SPRING = build("flexinol_table_3_2", "bias_spring", "flexinol_voltage")
+QUICK = [("pid", None, 0), ("vsc3", None, 2), ("sld", "printed", 0)]
+OTHERS = [
+    ("backstepping2", "model", 1),
+    *((name, None, 0) for name in ("vsc1", "vsc2")),
+    *((name, "model", 0) for name in ("pid", "nvsc", "sld", "backstepping1")),
+    *((name, "printed", 0) for name in ("nvsc", "backstepping1", "backstepping2")),
+]
+
+
+def hold_against_the_package(system: System, controller: str, estimator: str | None, delay: int, folder: Path) -> None:
+    """Commands equal to 1e-9 of the largest in double precision."""
+    loop = loop_around(system, controller, estimator=estimator, delay=delay)
+    make = compiled_c(source_of(loop, controller, delay), folder, DOUBLE, SANITIZED)
+    for number in range(2):
+        run, readings = loop_and_readings(loop, number, delay)
+        expected = np.asarray(run.voltage)[:-1]
+        assert np.ptp(expected) > 1.0
+        np.testing.assert_allclose(
+            commands(make(), run, readings), expected, rtol=0.0, atol=1e-9 * np.max(np.abs(expected))
+        )
+
+
+@needs_gcc
+@pytest.mark.parametrize(("controller", "estimator", "delay"), QUICK)
+def test_a_controller_in_c_commands_what_the_package_commands(controller, estimator, delay, tmp_path):
+    hold_against_the_package(ARM, controller, estimator, delay, tmp_path)
+
+
+@pytest.mark.slow
+@needs_gcc
+@pytest.mark.parametrize(("controller", "estimator", "delay"), OTHERS)
+def test_every_other_controller_does_too(controller, estimator, delay, tmp_path):
+    hold_against_the_package(ARM, controller, estimator, delay, tmp_path)
+
+
+# backstepping1 with noise multiplies roundings here: the commands of the package's two engines are 5.7 V apart.
+@pytest.mark.slow
+@needs_gcc
+@pytest.mark.parametrize("controller", ["pid", "vsc3", "nvsc", "backstepping2"])
+def test_on_another_load_too(controller, tmp_path):
+    estimator = None if controller in ("pid", "vsc3") else "model"
+    hold_against_the_package(SPRING, controller, estimator, 0, tmp_path)
+
+
+def test_a_controller_that_reads_states_needs_an_estimator():
+    with pytest.raises(
+        ExportError, match=r"`sld` cannot be exported without an estimator: it reads the velocity, stress"
+    ):
+        check_reads(source_of(loop_around(ARM, "sld"), "sld"), "`sld`", estimated=False)
+
+
+@needs_gcc
+@pytest.mark.parametrize("controller", ["pid", "vsc3"])
+def test_in_single_precision_commands_are_within_its_rounding(controller, tmp_path):
+    loop = loop_around(ARM, controller)
+    make = compiled_c(source_of(loop, controller), tmp_path, SINGLE, SANITIZED)
+    run, readings = loop_and_readings(loop, 1, 0)
+    expected = np.asarray(run.voltage)[:-1]
+    found = commands(make(), run, readings)
+    assert np.max(np.abs(found - expected)) < 1e-5 * np.max(np.abs(expected))
+
+
+@needs_gcc
+def test_a_command_that_is_no_number_is_zero_from_there_on(tmp_path):
+    instance = compiled_c(source_of(loop_around(ARM, "pid"), "pid"), tmp_path)()
+    assert instance.run({"reading": 0.0, "set_point": 0.3})["command"] > 0.0
+    assert instance.run({"reading": float("nan")})["command"] == 0.0
+    assert instance.run({"reading": 0.0})["command"] == 0.0
+    instance.call("init")
+    assert instance.run({"reading": 0.0})["command"] > 0.0
+
+
+BOARD = r"""
+#include <math.h>
+#include "bench.c"
+static double position = 0.0, volts = 0.0;
+static int left = 600;
+float read_position(void) { return (float)position; }
+void write_voltage(float value) { volts = value; }
+int wait_for_the_next_period(void)
+{
+    position += 0.01 * (0.001 * volts - position); /* something that follows */
+    return left-- > 0;
+}
+static void at_end(void) { if (!(fabs(position - 0.004) < 1e-4) || volts != 0.0) { _Exit(1); } }
+__attribute__((constructor)) static void ask(void) { atexit(at_end); }
+"""
+
+
+@needs_gcc
+@pytest.mark.parametrize("single", [0, 1])
+def test_the_bench_of_the_how_to_page_runs_in_twenty_lines(single, tmp_path):
+    page = (Path(__file__).parents[2] / "docs" / "how-to" / "to-a-microcontroller.md").read_text("utf-8")
+    bench = page.partition('```c title="bench.c"\n')[2].partition("```")[0]
+    assert len(bench.splitlines()) <= 20
+    pid = loop_around(SPRING, "pid").controller
+    source = c_source(lambda: controller_block(SPRING, pid, None, PERIOD, 0, "pid"), "pid", SHORT)
+    files = {
+        "bench.c": bench,
+        "board.c": f"#include <stdlib.h>\n{BOARD}",
+        "pid.h": source.header,
+        "pid.c": source.source,
+    }
+    for name, text in files.items():
+        (tmp_path / name).write_text(text)
+    sanitizers = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all", f"-DSMAJAX_SINGLE={single}"]
+    subprocess.run(["gcc", *STRICT, *sanitizers, "board.c", "pid.c", "-o", "bench", "-lm"], cwd=tmp_path, check=True)
+    subprocess.run(["./bench"], cwd=tmp_path, check=True, timeout=20)

@@ -1,0 +1,117 @@
+"""`smajax export` from files to files: whole or not at all, and errors that say which part and why."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from smajax.cli.main import app
+from smajax.control.gains_file import Gains, write_gains
+from smajax.control.loop_around import loop_around
+from smajax.data.model_file.of_presets import model_of_presets
+from smajax.export import fmu as units
+from smajax.export.errors import ExportError
+from smajax.export.fmu import platform_of
+from smajax.export.from_files import controller_source, plant_source
+from smajax.export.write import write_c
+from smajax.model.extended import extended
+from smajax.model.rigs import arm
+from tests.helpers.c_programs import needs_gcc
+
+
+def run(*words: object) -> tuple[int, str, str]:
+    done = CliRunner().invoke(app, ["export", *map(str, words)])
+    if done.exception and not isinstance(done.exception, SystemExit):
+        raise done.exception
+    return done.exit_code, done.stdout, done.stderr
+
+
+def gains_file(folder: Path, controller: str = "pid", **values: float) -> Path:
+    gains = Gains(controller, values)
+    return write_gains(folder / "gains.json", gains, gains.units(arm()), {})
+
+
+@needs_gcc
+def test_a_model_file_becomes_a_unit(tmp_path, monkeypatch):
+    monkeypatch.setattr(units, "FLAGS", tuple("-O0" if one == "-O2" else one for one in units.FLAGS))
+    model = model_of_presets("flexinol_table_3_2", "coupon", "none").save(tmp_path / "model.toml")
+    out = tmp_path / "units" / "actuator.fmu"
+    code, printed, _ = run(model, "--to", "fmu", "--fmi", "3.0", "--out", out, "--json")
+    assert code == 0
+    told = json.loads(printed)
+    assert told["inputs"] == ["stress", "temperature"]
+    assert told["files"] == [str(out)]
+    with zipfile.ZipFile(out) as archive:
+        folder, end = platform_of("3.0")
+        assert {"modelDescription.xml", f"binaries/{folder}/actuator{end}", "sources/buildDescription.xml"} <= set(
+            archive.namelist()
+        )
+    with pytest.raises(ExportError, match="is there already: give another --out, or --overwrite"):
+        run(model, "--to", "fmu", "--out", out)
+
+
+def test_gains_become_a_header_and_a_source(tmp_path):
+    gains = gains_file(tmp_path, proportional_gain=7.5)
+    code, printed, _ = run(gains, "--to", "c", "--out", tmp_path / "bench", "--period", "5ms")
+    assert code == 0
+    header = next((tmp_path / "bench").glob("*.h")).read_text()
+    assert "proportional_gain; /* V/rad, 0 to 1e+06, start 7.5: K_p */" in header
+    assert "_PERIOD 0.005 /* s" in header
+    assert "inputs: reading [rad], set_point [rad], set_point_rate [rad/s]" in printed
+    assert sorted(one.suffix for one in (tmp_path / "bench").iterdir()) == [".c", ".h"]
+
+
+def test_what_cannot_be_exported_is_named_and_nothing_is_written(tmp_path):
+    gains, out = gains_file(tmp_path, "sld"), tmp_path / "bench"
+    with pytest.raises(
+        ExportError, match=r"controller `sld` cannot be exported without an estimator: it reads the vel"
+    ):
+        run(gains, "--to", "c", "--out", out)
+    assert not out.exists()
+    late = extended(arm(), ["input_delay"])
+    with pytest.raises(ExportError, match=r"the effect input_delay cannot be exported: it needs the whole series"):
+        plant_source(late)
+    with pytest.raises(ExportError, match="the tolerance of a step is 1; expected 1e-9 to 1e-2"):
+        plant_source(arm(), tolerance=1.0)
+
+
+def test_a_write_that_fails_leaves_what_was_there(tmp_path, monkeypatch):
+    source = controller_source(arm(), gains_file(tmp_path))
+    write_c(source, tmp_path / "bench")
+    before = {path.name: path.read_text() for path in (tmp_path / "bench").iterdir()}
+
+    def full(handle: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.fsync", full)
+    with pytest.raises(OSError, match="No space"):
+        write_c(source, tmp_path / "bench", overwrite=True)
+    assert {path.name: path.read_text() for path in (tmp_path / "bench").iterdir()} == before
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--to", "matlab"], "`c` or `fmu`, not `matlab`"),
+        (["--to", "fmu", "--fmi", "1.0"], "`2.0` or `3.0`, not `1.0`"),
+        (["--to", "c", "--estimator", "perfect"], "no filter 'perfect'"),
+        (["--to", "c", "--period", "0"], "more than 0 s"),
+    ],
+)
+def test_options_that_make_no_sense_are_refused(tmp_path, words, said):
+    code, _, told = run(gains_file(tmp_path), *words, "--out", tmp_path / "out")
+    assert code == 2
+    assert said in " ".join(told.replace("│", " ").split())
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_loop_is_the_one_that_other_commands_run(tmp_path):
+    source = controller_source(arm(), gains_file(tmp_path, proportional_gain=7.5))
+    loop = loop_around(arm(), "pid", {"proportional_gain": 7.5})
+    starts = {one.name: one.start for one in source.parameters}
+    assert starts["proportional_gain"] == 7.5
+    assert starts["integral_gain"] == float(loop.controller.integral_gain)
