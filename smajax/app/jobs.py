@@ -23,6 +23,7 @@ from smajax.core.files import json_text, replace
 
 HIDDEN = ".smajax-app"
 RECORD, EVENTS, OUTPUT, LOCK, ENDED = "job.json", "events.jsonl", "output.json", "lock", "ended.json"
+PROGRAM = (sys.executable, "-m", "smajax")
 INTERRUPTED, NOT_MET = 130, 3  # exit codes of the command line, see `smajax --help`
 
 
@@ -112,7 +113,7 @@ def start(project: Path, command: str, words: Sequence[str], out: str, about: Ma
             fcntl.flock(lock, fcntl.LOCK_EX)
             with (folder / EVENTS).open("wb") as events, (folder / OUTPUT).open("wb") as output:
                 process = subprocess.Popen(
-                    [sys.executable, "-m", "smajax", command, *words, "--out", out, "--json"],
+                    [*PROGRAM, command, *words, "--out", out, "--json"],
                     cwd=project,
                     stdin=subprocess.DEVNULL,
                     stdout=output,

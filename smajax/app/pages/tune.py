@@ -30,7 +30,7 @@ def _able(at: tuple[str, int, int]) -> tuple[tuple[str, ...], str, str]:
         kept = load_model(Path(at[0]))
         system, _ = plant_of(kept, kept.system)
         unit = unit_of(system)
-        points = ",".join(f"{one:.3g}" for one in unit.of(default_set_points(system, 3)))
+        points = ",".join(f"{one:.3g}" for one in default_set_points(system, 3))
         return tuple(controllers_for(system)), f"{unit.shown}; default {points}", ""
     except (ExperimentError, KeyError, ValueError) as error:
         return (), "", str(error.args[0])
