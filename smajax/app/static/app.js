@@ -121,8 +121,8 @@ if (input) {
   const over = on => event => { event.preventDefault(); zone.classList.toggle("over", on); };
   zone.addEventListener("dragover", over(true));
   zone.addEventListener("dragleave", over(false));
-  zone.addEventListener("drop", event => { over(false)(event); input.files = event.dataTransfer.files; input.form.submit(); });
-  input.addEventListener("change", () => { say("Sending…"); input.form.submit(); });
+  zone.addEventListener("drop", event => { over(false)(event); input.files = event.dataTransfer.files; input.form.requestSubmit(); });
+  input.addEventListener("change", () => { say("Sending…"); input.form.requestSubmit(); });
 }
 
 // --- What matters most of the preset's values: takes some seconds.
@@ -136,6 +136,9 @@ if (influences) fetch(influences.dataset.src).then(answer => answer.json()).then
 }).catch(() => { influences.textContent = ""; });
 
 // --- What happens elsewhere: a command that runs, another tab, the command line, a server that is gone.
+// A form, or a link, on its way is not overtaken by a reload.
+window.addEventListener("beforeunload", () => { saving += 1; });
+document.addEventListener("submit", event => { if (!event.defaultPrevented) saving += 1; });
 const offline = document.getElementById("offline");
 const typing = () => { const at = document.activeElement; return at && /^(INPUT|SELECT)$/.test(at.tagName) && at.value !== at.defaultValue && /^(text|)$/.test(at.type); };
 async function watch() {
@@ -151,7 +154,7 @@ async function look() {
     if (answer.status === 403) { offline.textContent = "The server was started anew: open the address that it printed. What was running goes on."; offline.hidden = false; return; }
     offline.hidden = true;
     const { stamp } = await answer.json();
-    if (stamp !== document.body.dataset.stamp && !saving && !typing()) location.reload();
+    if (stamp !== document.body.dataset.stamp && !saving && !typing() && !("stay" in document.body.dataset)) location.reload();
   } catch {
     offline.textContent = "The server does not answer. Nothing is lost, and a fit that is running goes on: start smajax app again in this folder.";
     offline.hidden = false;
