@@ -67,15 +67,14 @@ def draft_file(
         raise MeasuredDataError("choose at least one log")
     columns: Requested = {} if afresh else columns_declared(project)
     model = ModelChoice(choice.get("load", ""), choice.get("wire", ""), choice.get("drive", ""))
-    title = project.folder.name
-    first = draft(list(logs), project.path, title, model, decimal, columns=columns)
+    first = draft(list(logs), project.path, "", model, decimal, columns=columns)
     old = None if afresh or not project.text else tomlkit.parse(project.text)
     if old is not None:
         named = tomlkit.parse(first.text)["model"]
         known = describe(named["wire"], named["load"], named["drive"]).parameters
         before = old.get("model", {}).get("parameters", {})
         bench = BenchFacts({name: str(value) for name, value in before.items() if name in known})
-        first = draft(list(logs), project.path, title, model, decimal, bench, columns)
+        first = draft(list(logs), project.path, "", model, decimal, bench, columns)
     document = tomlkit.parse(first.text)
     if old is not None:
         carried_over(old, document)

@@ -63,19 +63,10 @@ def _first_line(thing: Any) -> str:
 
 
 def shown(value: float, unit: str) -> str:
-    """As an experiment file has it: `0.15 mm`, with units that a person reads."""
-    from smajax.core.display_units import digits
+    """As a draft has it: `0.15 mm`."""
+    from smajax.data.experiment.draft_parameters import amount
 
-    if unit in ("-", "1", ""):
-        return digits(value, 5)
-    small = {
-        "m": ("mm", 1e3) if abs(value) < 1.0 else ("m", 1.0),
-        "kg": ("g", 1e3),
-        "Pa": ("MPa", 1e-6),
-        "Pa/K": ("MPa/K", 1e-6),
-    }
-    name, factor = small.get(unit, (unit, 1.0))
-    return f"{digits(value * factor, 5)} {name}"
+    return amount(value, unit, 5)
 
 
 @lru_cache(maxsize=16)

@@ -39,7 +39,7 @@ def test_the_draft_is_that_of_the_command_line(folder: Path, drafted: TestClient
     ours = (folder / EXPERIMENT).read_text(encoding="utf-8")
     logs = [str(folder / f"{name}.csv") for name in ("first", "second", "third")]
     theirs = folder / "theirs.toml"
-    ended = smajax_in("new-experiment", *logs, "--out", str(theirs), "--title", "bench", cwd=tmp_path)
+    ended = smajax_in("new-experiment", *logs, "--out", str(theirs), cwd=tmp_path)
     assert ended.code == 0, ended.said
     assert ours == theirs.read_text(encoding="utf-8")
 
