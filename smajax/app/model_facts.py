@@ -12,6 +12,10 @@ from smajax.app.ready import ready
 from smajax.data.experiment.schema import ExperimentFile
 
 
+# Where a preset's number comes from, in words.
+ORIGIN = {"printed": "from the source", "corrected": "from the source, corrected", "chosen": "an assumption"}
+
+
 @dataclass(frozen=True)
 class Card:
     """A preset to choose: its name, what it is, a drawing, and numbers in a few words."""
@@ -88,7 +92,7 @@ def rows(wire: str, load: str, drive: str) -> tuple[Row, ...]:
         if part not in named:
             continue  # of the whole, such as the state at the start, which a run or [nuisance] gives
         origin = origins_of(named[part], getattr(system, part)).get(name)
-        said = "" if origin is None else f"{origin.kind}: {origin.note}"
+        said = "" if origin is None else f"{ORIGIN[origin.kind]}: {origin.note}"
         found.append(
             Row(
                 name,

@@ -210,7 +210,8 @@ class Server:
 
     def influences(self, request: Request) -> Response:
         """Which preset values matter most."""
-        return JSONResponse(bench.influences(self.project(request)), headers=HEADERS)
+        found = bench.influences(self.project(request))
+        return JSONResponse({**found, "stamp": self.project(request).stamp}, headers=HEADERS)
 
     def file(self, request: Request) -> Response:
         """A file of the project: shown where it is a page of a command, else sent."""

@@ -20,7 +20,7 @@ from tests.helpers.command_line import DEMO
 from tests.helpers.in_browser import WIDTHS
 
 STEPS = ("folder", "logs", "columns", "bench", "runs", "fit", "result", "predict", "tune", "download")
-PATIENCE = 90_000  # ms, for a machine that does other things
+PATIENCE = 300_000  # ms, for a machine that does other things
 
 
 class App:

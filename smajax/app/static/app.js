@@ -52,8 +52,8 @@ async function fill(box) {
     if (box.plot && box.plot.series.length === (data.series || [0]).length + 1) { box.plot.setData([data.x, ...(data.series || [{ y: data.y }]).map(one => one.y)]); return; }
     if (!data.x || !data.x.length || (data.series && !data.series.length)) return;
     box.replaceChildren();
-    draw(box, data);
     box.closest("figure")?.removeAttribute("hidden");
+    draw(box, data);
   } catch { /* the server is away: the banner says so */ }
 }
 const seen = new IntersectionObserver(entries => entries.forEach(entry => {
@@ -127,13 +127,15 @@ if (input) {
 
 // --- What matters most of the preset's values: takes some seconds.
 const influences = document.getElementById("influences");
+if (influences) saving += 1;
 if (influences) fetch(influences.dataset.src).then(answer => answer.json()).then(found => {
   influences.textContent = found.sentence;
+  document.body.dataset.stamp = found.stamp; // it writes what it found into the file, as comments
   for (const [name, text] of Object.entries(found.remarks)) {
     const at = document.querySelector(`[data-influence="${CSS.escape(name)}"]`);
     if (at) at.textContent = text;
   }
-}).catch(() => { influences.textContent = ""; });
+}).catch(() => { influences.textContent = ""; }).finally(() => { saving -= 1; });
 
 // --- What happens elsewhere: a command that runs, another tab, the command line, a server that is gone.
 // A form, or a link, on its way is not overtaken by a reload.
