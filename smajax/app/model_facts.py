@@ -11,7 +11,6 @@ from smajax.app import drawings
 from smajax.app.ready import ready
 from smajax.data.experiment.schema import ExperimentFile
 
-
 # Where a preset's number comes from, in words.
 ORIGIN = {"printed": "from the source", "corrected": "from the source, corrected", "chosen": "an assumption"}
 
