@@ -20,7 +20,7 @@ from smajax.simulation.batch.store import Store
 
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-IMPORTED_AS = {"pillow": "PIL"}
+IMPORTED_AS = {"pillow": "PIL", "python-multipart": "python_multipart"}
 WITHIN = {"jaxlib": "jax", "markupsafe": "jinja2"}  # a part of another one, of the same authors
 
 
@@ -30,7 +30,7 @@ def names(requirements: list[str]) -> set[str]:
 
 RUNTIME = names(PROJECT["dependencies"])
 EXTRAS = {extra: names(lines) - {"smajax"} for extra, lines in PROJECT["optional-dependencies"].items()}
-OF_EXTRAS = set().union(*(EXTRAS[extra] for extra in ("bayes", "formats", "store", "tune")))
+OF_EXTRAS = set().union(*(EXTRAS[extra] for extra in ("app", "bayes", "formats", "store", "tune")))
 
 
 def imports(tree: ast.AST) -> Iterator[str]:
@@ -54,9 +54,21 @@ def test_what_is_imported_is_declared_and_what_is_declared_is_imported() -> None
 
 def test_a_package_of_an_extra_is_not_imported_before_it_is_used() -> None:
     for file in (ROOT / "smajax").rglob("*.py"):
+        own = (
+            EXTRAS["app"] if (ROOT / "smajax" / "app") in file.parents else set()
+        )  # only `smajax app` imports that room
         for node in ast.parse(file.read_text("utf-8")).body:
             if isinstance(node, ast.Import | ast.ImportFrom):
-                assert not set(imports(node)) & OF_EXTRAS, file
+                assert not set(imports(node)) & (OF_EXTRAS - own), file
+
+
+def test_the_room_of_the_app_is_imported_by_its_command_alone() -> None:
+    importers = {
+        file.relative_to(ROOT / "smajax").as_posix()
+        for file in (ROOT / "smajax").rglob("*.py")
+        if "from smajax.app" in file.read_text("utf-8") and (ROOT / "smajax" / "app") not in file.parents
+    }
+    assert importers == {"cli/commands/app.py"}
 
 
 def test_the_guide_lists_the_use_of_every_package() -> None:

@@ -9,7 +9,7 @@ from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 PACKAGE = Path(__file__).parents[1] / "smajax"
-ORDER = ["core", "engine", "model", "simulation", "data", "fit", "control", "attribution", "report", "export", "cli"]
+ORDER = ["core", "engine", "model", "simulation", "data", "fit", "control", "attribution", "report", "export", "app", "cli"]
 
 
 FILES = {".".join(p.relative_to(PACKAGE.parent).with_suffix("").parts): p for p in PACKAGE.rglob("*.py")}

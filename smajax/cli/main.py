@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from smajax.cli.commands.app import app as app_command
 from smajax.cli.commands.bench import bench
 from smajax.cli.commands.close_loop import close_loop_command
 from smajax.cli.commands.demo import demo
@@ -35,8 +36,8 @@ result does not meet a requirement (a limit of tune, a claim of figures); 130 in
 command resumes from cached results.
 
 A folder that holds another result is refused; --overwrite deletes that result and no other file. Progress is drawn in a
-terminal only; SMAJAX_PROGRESS=lines writes one line a stage to stderr elsewhere. SMAJAX_ENGINE=xla runs every program by
-XLA, not by smajax's own compiler.
+terminal only; SMAJAX_PROGRESS=lines writes one line a stage to stderr elsewhere, and SMAJAX_PROGRESS=json each event as a line
+of JSON, for a program. SMAJAX_ENGINE=xla runs every program by XLA, not by smajax's own compiler.
 """
 
 app = typer.Typer(
@@ -68,6 +69,7 @@ def _all(
 
 
 COMMANDS: dict[str, Callable[..., None]] = {
+    "app": app_command,
     "close-loop": close_loop_command,
     "identify": identify_command,
     "predict": predict_command,

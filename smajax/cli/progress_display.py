@@ -14,10 +14,11 @@ from rich.progress import Progress as Bars
 from rich.text import Text
 
 from smajax.core.compiling import compilations_reported
-from smajax.core.progress import Compiling, Event, Message, Progress, Stage, WarningMessage
+from smajax.core.files import json_line
+from smajax.core.progress import Compiling, Event, Message, Progress, Stage, WarningMessage, event_record
 
 # Where stderr is no terminal nothing is written, so that a program that calls us has a clean one; with `lines` a log of a
-# build has a line for each stage. A person who waits there for minutes is told so, unless the variable is set.
+# build has a line for each stage, and with `json` a program reads each event as a line. A person who waits there for minutes is told so, unless the variable is set.
 VARIABLE = "SMAJAX_PROGRESS"
 HOW = f"No terminal here, so progress is not drawn; {VARIABLE}=lines writes a line for each stage, and {VARIABLE}=none leaves this one out."
 COMPILING = "compiling, the first time only"
@@ -29,7 +30,10 @@ def displayed(console: Console, hint: bool = False) -> Iterator[Progress]:
 
     hint: where nothing is drawn, write once how to get progress; for long work whose result is read by a person.
     """
-    if sys.stderr.isatty():
+    if os.environ.get(VARIABLE) == "json":
+        with compilations_reported(_written):
+            yield _written
+    elif sys.stderr.isatty():
         with _bars(console) as progress:
             yield progress
     elif os.environ.get(VARIABLE) == "lines":
@@ -39,6 +43,15 @@ def displayed(console: Console, hint: bool = False) -> Iterator[Progress]:
         if hint and VARIABLE not in os.environ:
             console.print(HOW, markup=False, highlight=False, soft_wrap=True)
         yield _warnings(console)
+
+
+def _written(event: Event) -> None:
+    """The event as a line of JSON on stderr, for `smajax app` and other programs."""
+    record = event_record(event)
+    if record is not None:
+        record["at"] = round(clock.time(), 3)
+        sys.stderr.write(json_line(record) + "\n")  # in one piece: an event of a compilation comes from another thread
+        sys.stderr.flush()
 
 
 def _warnings(console: Console) -> Progress:

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import inspect
 import warnings
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import asdict, dataclass, field
 from typing import Any, TypeAlias
 
 
@@ -48,8 +48,27 @@ class Result:
     record: object
 
 
-Event: TypeAlias = Stage | Message | WarningMessage | Compiling | Result
+@dataclass(frozen=True)
+class BestFit:
+    """The best of the fits that a stage runs at once, as it is by now.
+
+    values: free parameters by name, in `units`. errors: root mean square misfit of each series of the problem (one output of one run,
+    those of the first run first), SI; nan of a run that this fit leaves out, empty where it is not known.
+    """
+
+    stage: str
+    values: Mapping[str, float]
+    units: Mapping[str, str] = field(default_factory=dict)
+    errors: tuple[float, ...] = ()
+
+
+Event: TypeAlias = Stage | Message | WarningMessage | Compiling | Result | BestFit
 Progress: TypeAlias = Callable[[Event], None]
+
+
+def event_record(event: Event) -> dict[str, Any] | None:
+    """An event as JSON values, with its kind as `event`; None of an intermediate result, which has no words here."""
+    return None if isinstance(event, Result) else {"event": type(event).__name__, **asdict(event)}
 
 
 def quiet(event: Event) -> None:

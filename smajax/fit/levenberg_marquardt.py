@@ -31,7 +31,8 @@ import numpy as np
 import optimistix as optx
 from jaxtyping import Array, Bool, Float, Int
 
-from smajax.core.progress import Progress, Stage, quiet
+from smajax.core.parameters import parameters
+from smajax.core.progress import BestFit, Progress, Stage, quiet
 from smajax.core.result_cache import ResultCache
 from smajax.fit.bounded_descent import BoundedDampedNewtonDescent, DescentState, GainRatioSearch, SearchState
 from smajax.fit.predicted import chunks, predicted_and_derivatives
@@ -101,8 +102,8 @@ NormalEquations = tuple[float, np.ndarray, np.ndarray]  # r^T r, J^T r, J^T J of
 
 def _normal_equations(
     problem: Problem, tasks: Sequence[FitTask], ys: Sequence[np.ndarray], outputs: np.ndarray | None
-) -> list[NormalEquations]:
-    """Of every task at its y. Directions of all tasks go side by side, whatever each of them frees."""
+) -> list[tuple[NormalEquations, np.ndarray]]:
+    """Of every task at its y, with its root mean square misfit on each series, SI. Directions of all tasks go side by side, whatever each of them frees."""
     points = np.stack([task.values_at(y) for task, y in zip(tasks, ys, strict=True)])
     most = max(1, *(len(task.slots) for task in tasks))
     tangents = np.zeros((len(tasks), most, points.shape[1]))
@@ -110,6 +111,7 @@ def _normal_equations(
         rows[np.arange(len(task.slots)), task.slots] = task.high - task.low
     predicted, derivatives = predicted_and_derivatives(problem, points, tangents)
     equations = []
+    samples = (np.asarray(problem.batch.mask) > 0.0).sum(axis=1)
     for k, (task, y) in enumerate(zip(tasks, ys, strict=True)):
         measured = problem.measured if outputs is None else outputs[k]
         weight = np.repeat(np.sqrt(task.weights), len(problem.batch.outputs))[:, None] / np.asarray(problem.noise)
@@ -120,8 +122,11 @@ def _normal_equations(
         prior = problem.priors.slopes(points[k])[:, task.slots] * (task.high - task.low)
         columns = jacobian.reshape(len(task.slots), residual.size), prior.T, np.diag(task.regularisation)
         rows = np.concatenate(columns, axis=1)
-        with np.errstate(over="ignore", invalid="ignore"):  # a step to where a load jumps: it will be rejected
-            equations.append((float(value @ value), rows @ value, rows @ rows.T))
+        with np.errstate(
+            over="ignore", invalid="ignore", divide="ignore"
+        ):  # a step to where a load jumps: it will be rejected
+            misfit = np.sqrt(np.sum((residual / weight) ** 2, axis=1) / samples)  # nan of a run without weight
+            equations.append(((float(value @ value), rows @ value, rows @ rows.T), misfit))
     return equations
 
 
@@ -224,6 +229,7 @@ def levenberg_marquardt(
     directions = max([len(task.slots) for task in tasks], default=1)
     size = -(-max(directions, 1) // PADDING) * PADDING
     states = [_initial_state(task, size) for task in tasks]
+    errors: dict[int, np.ndarray] = {}  # of the fits, at what they accepted last in this process
 
     def advance(indices: Sequence[int]) -> None:
         """Evaluate and advance these fits."""
@@ -232,8 +238,11 @@ def levenberg_marquardt(
             measured = None if outputs is None else outputs[np.asarray(part)]
             ys = [np.asarray(states[k].y_eval)[: len(tasks[k].slots)] for k in part]
             equations = _normal_equations(problem, [tasks[k] for k in part], ys, measured)
-            for k, at in zip(part, equations, strict=True):
+            for k, (at, misfit) in zip(part, equations, strict=True):
+                evaluated = states[k].y_eval
                 states[k] = _advanced(states[k], at, (settings.tolerance, 0.5 * settings.absolute_tolerance))
+                if np.array_equal(states[k].y, evaluated):
+                    errors[k] = misfit
 
     def running() -> list[int]:
         return [k for k, state in enumerate(states) if state.status == Status.RUNNING]
@@ -250,6 +259,8 @@ def levenberg_marquardt(
         cache.save(key, _packed(states, number), last=False)
         going = running()
         progress(Stage(settings.stage, max(1.0 - len(going) / max(len(tasks), 1), number / settings.max_steps)))
+        if tasks and progress is not quiet:
+            progress(_best(problem, tasks, states, errors, settings.stage))
         if not going:
             break
         advance(going)
@@ -257,6 +268,23 @@ def levenberg_marquardt(
     cache.save(key, _packed(states, settings.max_steps))
     progress(Stage(settings.stage, 1.0))
     return [_ended(task, state, settings) for task, state in zip(tasks, states, strict=True)]
+
+
+def _best(
+    problem: Problem,
+    tasks: Sequence[FitTask],
+    states: Sequence[LMState],
+    errors: Mapping[int, np.ndarray],
+    stage: str,
+) -> BestFit:
+    """The fit of the least cost, for whoever watches."""
+    k = int(np.argmin([float(state.f) for state in states]))
+    task, table = tasks[k], parameters(problem.system)
+    values = task.values_at(np.asarray(states[k].y)[: len(task.slots)])
+    names = [problem.names[slot] for slot in task.slots]
+    units = {name: table[own].unit for name in names if (own := name.split("[")[0]) in table}
+    found = {name: float(values[slot]) for name, slot in zip(names, task.slots, strict=True)}
+    return BestFit(stage, found, units, tuple(errors[k].tolist()) if k in errors else ())
 
 
 def _without_exceeding(states: Sequence[LMState], steps: int, allowed: Sequence[tuple[int, float]]) -> list[LMState]:

@@ -6,7 +6,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -14,7 +14,7 @@ from smajax.cli import completion
 from smajax.cli.options import UNMET, Decimal, Json, quantity, texts
 
 if TYPE_CHECKING:
-    from smajax.attribution.preset_ranking import PresetRanking
+    from smajax.report.draft_file import DraftFile
 
 KNOWN = "wire_length='0.5 m',wire_diameter='0.31 mm'"
 
@@ -81,18 +81,14 @@ def new_experiment(
     from smajax.core.runtime import prepare
 
     prepare()
-    from smajax.core.files import replace
     from smajax.data.experiment.bench_facts import BenchFacts
     from smajax.data.experiment.draft import draft
     from smajax.data.experiment.draft_model import ModelChoice
-    from smajax.report.preset_words import remarks
+    from smajax.report.draft_file import write_draft
 
     bench = BenchFacts(given, ohms, ohms_per_metre, masses, others)
     result = draft(files, out, title, ModelChoice(load, wire, drive, model), decimal, bench)
-    replace(out, result.text)
-    loaded = _loaded(out)
-    if loaded.ranking is not None:
-        replace(out, result.in_order(remarks(loaded.ranking)).text)
+    loaded = write_draft(result, out)
     if json_out:
         record = {
             "file": str(out),
@@ -107,14 +103,6 @@ def new_experiment(
         _print(result.messages, loaded, out)
     if loaded.reason:
         raise typer.Exit(UNMET)
-
-
-class _Loaded(NamedTuple):
-    """A draft as the other commands load it: warnings; why it cannot be loaded, or ""; what its runs depend on, None where that is not known."""
-
-    warnings: Sequence[str]
-    reason: str
-    ranking: PresetRanking | None
 
 
 def _check_options(out: Path, overwrite: bool, twice: bool) -> None:
@@ -143,20 +131,7 @@ def _masses(several: Sequence[str]) -> tuple[dict[str, str], str]:
     return result, result.pop("", "")
 
 
-def _loaded(path: Path) -> _Loaded:
-    from smajax.attribution.preset_ranking import rank_presets
-    from smajax.data.experiment.errors import ExperimentError
-    from smajax.data.experiment.load import load_experiment
-    from smajax.data.model_catalogue import CATALOGUE
-
-    try:
-        experiment = load_experiment(path, CATALOGUE)
-    except ExperimentError as error:
-        return _Loaded([], str(error), None)
-    return _Loaded(experiment.warnings, "", rank_presets(experiment))
-
-
-def _print(messages: Sequence[str], loaded: _Loaded, out: Path) -> None:
+def _print(messages: Sequence[str], loaded: DraftFile, out: Path) -> None:
     from smajax.report.preset_words import NO_NUMBER, NOT_LOADED, sentence
 
     for line in messages:

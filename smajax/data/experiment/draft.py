@@ -6,6 +6,7 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 
@@ -25,7 +26,7 @@ from smajax.data.experiment.draft_model import DraftModel, ModelChoice, choose_m
 from smajax.data.experiment.draft_parameters import PresetLine, kept_parameters, ordered, preset_parameters
 from smajax.data.experiment.first_force import first_force
 from smajax.data.experiment.grouping import RunFiles
-from smajax.data.experiment.logs import Logs, logs_of
+from smajax.data.experiment.logs import Logs, Requested, logs_of
 from smajax.data.experiment.toml_file import toml_value
 from smajax.data.model_file.read import load_model
 from smajax.data.readers.read import read_table
@@ -111,9 +112,11 @@ def draft(
     choice: ModelChoice | None = None,
     decimal: str = "",
     bench: BenchFacts | None = None,
+    columns: Requested = MappingProxyType({}),
 ) -> Draft:
     """The experiment file `target` for these logs. Raises MeasuredDataError for a file that cannot be read.
 
+    columns: column -> (quantity, unit) in the place of the guess, see `logs_of`.
     decimal: the decimal mark, "," or ".", where the files do not determine it. bench: what is known of it; ExperimentError where that
     cannot be, as of the file.
     A file is a run, with the columns of the first one; another file without one of them has its own for the same quantity, or
@@ -124,7 +127,7 @@ def draft(
     if kept is not None:
         choice = replace(choice, load=kept.load, wire=kept.wire, drive=kept.drive)
     tables = [read_table(file, decimal=decimal or None) for file in files]
-    logs = logs_of(files, tables)
+    logs = logs_of(files, tables, columns)
     by_quantity = {one.quantity: one for one, _ in logs.columns if one.quantity}
     kind_of = {one.quantity: kind for one, kind in logs.columns if one.quantity}
     model = choose_model(by_quantity, choice)

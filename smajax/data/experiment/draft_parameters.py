@@ -53,7 +53,8 @@ def ordered(text: str, presets: Sequence[PresetLine], remarks: Mapping[str, str]
     return text.replace("\n".join([HEAD, *before]), "\n".join([HEAD, *first, *rest]), 1)
 
 
-def _amount(value: float, unit: str, places: int, like: float | None = None) -> str:
+def amount(value: float, unit: str, places: int, like: float | None = None) -> str:
+    """A value (SI) rounded to so many digits, with its unit, as a draft has it; `like`: see `toml_file.quantity`."""
     rounded = float(f"{value:.{places}g}")
     text = quantity(rounded, unit, like)
     return text if isinstance(text, str) else f"{rounded:.{places}g}"
@@ -77,7 +78,7 @@ def _preset_lines(model: DraftModel, system: System, known: Known, unknown: Sequ
     parts = [name for name, one in table.items() if one.path[0] in ("load", "drive")]
     rest = [name for name, one in table.items() if one.path[0] == "wire" and name not in sizes]
     return tuple(
-        PresetLine(name, _amount(values[name], table[name].unit, 4), table[name].about, name not in rest)
+        PresetLine(name, amount(values[name], table[name].unit, 4), table[name].about, name not in rest)
         for name in (*sizes, *parts, *rest)
         if name not in out
     )
@@ -93,7 +94,7 @@ def _unknowns(model: DraftModel, system: System, known: Known) -> dict[str, str]
             continue
         value = values[name]
         box = (max(low * value, table[name].low), min(high * value, table[name].high), value)
-        shown = [_amount(one, table[name].unit, 3, value) for one in box]
+        shown = [amount(one, table[name].unit, 3, value) for one in box]
         lines[name] = f'{name} = {{ low = "{shown[0]}", high = "{shown[1]}", start = "{shown[2]}" }}'
     for name, width in KELVINS.items():
         value = values[name]
@@ -152,7 +153,7 @@ def kept_parameters(model: DraftModel, kept: ActuatorModel, known: Known) -> Par
     for name, one in fitted.items():
         unit = kept.table[name].unit
         shown = {"low": one.low, "high": one.high, "start": one.value}
-        box = ", ".join(f"{key} = {toml_value(_amount(value, unit, 10, one.value))}" for key, value in shown.items())
+        box = ", ".join(f"{key} = {toml_value(amount(value, unit, 10, one.value))}" for key, value in shown.items())
         why = "" if name in kept.errors else "  # the runs of before did not determine it"
         lines.append(f"{toml_key(name)} = {{ {box} }}{why}")
     offset = any(one.offset for one in kept.outputs) or not kept.outputs

@@ -5,10 +5,14 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
+from typing import TypeAlias
 
-from smajax.data.experiment.column_guess import COUPON, DRIVES, GUESS, TIME, Column, columns_of
+from smajax.data.experiment.column_guess import COUPON, DRIVES, GUESS, SURE, TIME, Column, columns_of
 from smajax.data.experiment.grouping import RunFiles, paired
 from smajax.data.readers.table import MeasuredDataError, NoColumnError, Table
+
+Requested: TypeAlias = Mapping[str | int, tuple[str, str]]
 
 
 @dataclass(frozen=True)
@@ -23,9 +27,26 @@ class Logs:
     ] = ()  # of each file: quantity -> its column, where the first file's is not in it
 
 
-def logs_of(files: Sequence[Path], tables: Sequence[Table]) -> Logs:
-    """One run a file where a file has an input and an output, else one file a sensor. Raises MeasuredDataError."""
-    seen = [columns_of(table) for table in tables]
+def _as_requested(seen: Sequence[Column], requested: Requested) -> list[Column]:
+    """The guesses with those columns as requested; a quantity that was guessed for another column is that one's no longer."""
+    wanted = {quantity for quantity, _ in requested.values() if quantity}
+    result = []
+    for one in seen:
+        if one.key in requested:
+            quantity, unit = requested[one.key]
+            one = replace(one, quantity=quantity, unit=unit, sure=SURE, why="as requested")
+        elif one.quantity in wanted:
+            one = replace(one, quantity="", why=f"another column is the {one.quantity}, as requested")
+        result.append(one)
+    return result
+
+
+def logs_of(files: Sequence[Path], tables: Sequence[Table], requested: Requested = MappingProxyType({})) -> Logs:
+    """One run a file where a file has an input and an output, else one file a sensor. Raises MeasuredDataError.
+
+    requested: column, as an experiment file names it -> its quantity ("" for none) and unit, in the place of the guess.
+    """
+    seen = [_as_requested(columns_of(table), requested) for table in tables]
     quantities = [frozenset(one.quantity for one in columns) - {"", TIME} for columns in seen]
     kinds = list(dict.fromkeys(quantities))
     if len(kinds) == 1 or any(_is_whole(held, frozenset().union(*quantities)) for held in quantities):
