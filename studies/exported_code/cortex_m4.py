@@ -108,14 +108,17 @@ def measured(source: CSource) -> dict[str, Any]:
     files = {"own.h": source.header, "own.c": source.source, "board.c": BOARD, "board.ld": LINKER}
     for name, text in files.items():
         (folder / name).write_text(text)
-    said = {"cwd": folder, "check": True, "capture_output": True, "text": True}
-    subprocess.run(["arm-none-eabi-gcc", *FLAGS, "-fstack-usage", "-c", "own.c", "-o", "own.o"], **said)
-    size = subprocess.run(["arm-none-eabi-size", "own.o"], **said).stdout.splitlines()[1].split()
+
+    def said(*command: str) -> str:
+        return subprocess.run(command, cwd=folder, check=True, capture_output=True, text=True).stdout
+
+    said("arm-none-eabi-gcc", *FLAGS, "-fstack-usage", "-c", "own.c", "-o", "own.o")
+    size = said("arm-none-eabi-size", "own.o").splitlines()[1].split()
     stacks = [int(line.split("\t")[1]) for line in (folder / "own.su").read_text().splitlines()]
     link = ["-nostartfiles", "--specs=nosys.specs", "-T", "board.ld", "-Wl,--gc-sections"]
     board = [one for one in FLAGS if one not in ("-std=c99",)] + ["-std=gnu99", f"-DCALLS={CALLS}"]
-    subprocess.run(["arm-none-eabi-gcc", *board, "board.c", "own.o", *link, "-o", "board.elf", "-lm"], **said)
-    linked = subprocess.run(["arm-none-eabi-size", "board.elf"], **said).stdout.splitlines()[1].split()
+    said("arm-none-eabi-gcc", *board, "board.c", "own.o", *link, "-o", "board.elf", "-lm")
+    linked = said("arm-none-eabi-size", "board.elf").splitlines()[1].split()
     machine = ["qemu-system-arm", "-M", "mps2-an386", "-cpu", "cortex-m4", "-nographic", "-icount", "shift=0"]
     told = subprocess.run(
         [*machine, "-semihosting-config", "enable=on,target=native", "-kernel", "board.elf"],
