@@ -7,7 +7,7 @@ from pathlib import Path
 
 import tomlkit
 
-from smajax.app.edit import carried_over
+from smajax.app.edit import carried_over, parsed
 from smajax.app.project import Project
 from smajax.app.ready import ready
 from smajax.core.files import replace
@@ -15,8 +15,6 @@ from smajax.data.experiment.column_guess import TIME
 from smajax.data.experiment.data_folder import data_folder
 from smajax.data.experiment.errors import ExperimentError
 from smajax.data.readers.table import MeasuredDataError
-
-Requested = Mapping[str | int, tuple[str, str]]
 
 
 def run_files(project: Project) -> dict[str, tuple[Path, ...]]:
@@ -50,12 +48,11 @@ def columns_declared(project: Project) -> dict[str | int, tuple[str, str]]:
     return found
 
 
-def draft_file(
-    project: Project, logs: Sequence[Path], choice: Mapping[str, str], decimal: str = "", afresh: bool = False
-) -> None:
+def draft_file(project: Project, logs: Sequence[Path], choice: Mapping[str, str], decimal: str = "") -> None:
     """Write `experiment.toml` for these logs and presets (`wire`, `load`, `drive`; "" for a guess), with what the file says already.
 
-    afresh: nothing of the old file is taken over. Raises MeasuredDataError and ExperimentError as `new-experiment` does; then the file is as before.
+    An experiment that begins from a model file still does. Raises MeasuredDataError and ExperimentError as `new-experiment` does; then the
+    file is as before.
     """
     ready()
     from smajax.data.experiment.bench_facts import BenchFacts
@@ -65,14 +62,17 @@ def draft_file(
 
     if not logs:
         raise MeasuredDataError("choose at least one log")
-    columns: Requested = {} if afresh else columns_declared(project)
+    old = parsed(project.path) if project.text else None
+    begun = project.file.model.file if project.file else None
     model = ModelChoice(choice.get("load", ""), choice.get("wire", ""), choice.get("drive", ""))
+    if begun is not None:
+        model = ModelChoice(model=project.folder / begun)
+    columns = columns_declared(project)
     first = draft(list(logs), project.path, "", model, decimal, columns=columns)
-    old = None if afresh or not project.text else tomlkit.parse(project.text)
-    if old is not None:
+    before = (old or {}).get("model", {}).get("parameters", {})
+    if before:
         named = tomlkit.parse(first.text)["model"]
-        known = describe(named["wire"], named["load"], named["drive"]).parameters
-        before = old.get("model", {}).get("parameters", {})
+        known = set(before) if begun else describe(named["wire"], named["load"], named["drive"]).parameters
         bench = BenchFacts({name: str(value) for name, value in before.items() if name in known})
         first = draft(list(logs), project.path, "", model, decimal, bench, columns)
     document = tomlkit.parse(first.text)

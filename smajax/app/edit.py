@@ -26,12 +26,17 @@ _WRITING = threading.Lock()
 def edited(path: Path, change: Callable[[tomlkit.TOMLDocument], None]) -> None:
     """Change the experiment file at `path`. Raises ExperimentError where it is not TOML."""
     with _WRITING:
-        try:
-            document = tomlkit.parse(path.read_text(encoding="utf-8-sig"))
-        except (TOMLKitError, UnicodeDecodeError) as error:
-            raise ExperimentError(path, "", f"is not TOML: {error}") from None
+        document = parsed(path)
         change(document)
         replace(path, tomlkit.dumps(document))
+
+
+def parsed(path: Path) -> tomlkit.TOMLDocument:
+    """The experiment file at `path`, with its comments. Raises ExperimentError where it is not TOML."""
+    try:
+        return tomlkit.parse(path.read_text(encoding="utf-8-sig"))
+    except (TOMLKitError, UnicodeDecodeError) as error:
+        raise ExperimentError(path, "", f"is not TOML: {error}") from None
 
 
 def put(table: Any, keys: tuple[str, ...], value: Any) -> None:
@@ -181,9 +186,11 @@ def carried_over(old: tomlkit.TOMLDocument, new: tomlkit.TOMLDocument) -> None:
             for what in ("unit", "noise", "reversed", "missing", "offset"):
                 if what in before:
                     after[what] = before[what]
-    for name in ("time", "sampling", "data"):
+    for name in ("time", "sampling"):
         if name in old and name in new and old[name] != new[name]:
             new[name] = old[name]
+    if "decimal" in old.get("data", {}):  # its folder is that of the logs now
+        new["data"]["decimal"] = old["data"]["decimal"]
     same_wire = old.get("model", {}).get("wire") == new.get("model", {}).get("wire")
     if same_wire and "unknown" in old:
         gone = set(old.get("model", {}).get("parameters", {}))

@@ -68,7 +68,7 @@ def stamp(path: Path) -> tuple[str, int, int]:
     return str(path), found.st_mtime_ns, found.st_size
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=16)
 def _table(at: tuple[str, int, int], decimal: str) -> Table:
     return read_table(at[0], decimal=decimal or None)
 

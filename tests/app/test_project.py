@@ -176,3 +176,20 @@ def test_a_file_that_was_broken_by_hand_is_shown_with_its_error(folder: Path, cl
         assert 'class="error box"' in answer.text
     answer = client.post("/runs", data={"runs.first.role": "fit"})
     assert answer.status_code in (200, 422)
+    client.post("/logs", data={"use": "first.csv", "do": "draft"})
+    after = (folder / EXPERIMENT).read_bytes()
+    assert after == text.encode("utf-8", "surrogateescape") or b"[[runs]]" in after
+
+
+def test_logs_of_another_folder_join_the_experiment(folder: Path, client: TestClient) -> None:
+    (folder / "logs").mkdir()
+    (folder / "first.csv").rename(folder / "logs" / "first.csv")
+    client.post("/logs", data={"use": "logs/first.csv", "do": "draft"})
+    client.post("/runs", data={"runs.first.end": "10 s"})
+    client.post("/logs", data={"use": ["logs/first.csv", "second.csv"], "do": "draft"})
+    file = read_schema(folder / EXPERIMENT)
+    assert [(run.name, run.file, run.end) for run in file.runs] == [
+        ("first", "logs/first.csv", "10 s"),
+        ("second", "second.csv", None),
+    ]
+    assert state(folder).examined.errors == {}
