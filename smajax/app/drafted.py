@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import tomlkit
 
@@ -69,7 +70,7 @@ def draft_file(project: Project, logs: Sequence[Path], choice: Mapping[str, str]
         model = ModelChoice(model=project.folder / begun)
     columns = columns_declared(project)
     first = draft(list(logs), project.path, "", model, decimal, columns=columns)
-    before = (old or {}).get("model", {}).get("parameters", {})
+    before: Mapping[str, Any] = {} if old is None else old.get("model", {}).get("parameters", {})
     if before:
         named = tomlkit.parse(first.text)["model"]
         known = set(before) if begun else describe(named["wire"], named["load"], named["drive"]).parameters

@@ -1,15 +1,13 @@
 """The work: one command of the command line at a time, in a process of its own, that a killed server does not take with it.
 
 A hidden folder in the project holds what was started, the events that the command writes (`SMAJAX_PROGRESS=json`) and its output. That a
-process still runs is known from a file lock that it holds until it ends in any way. POSIX only, as the folders of the commands are.
+process still runs is known from a file lock that it holds until it ends in any way. Linux and macOS only: on Windows a job says that it cannot be started.
 """
 
 from __future__ import annotations
 
-import fcntl
 import json
 import os
-import signal
 import subprocess
 import sys
 import threading
@@ -20,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from smajax.core.files import json_text, replace
+from smajax.core.operating_system import interrupt, is_held, started
 
 HIDDEN = ".smajax-app"
 RECORD, EVENTS, OUTPUT, LOCK, ENDED = "job.json", "events.jsonl", "output.json", "lock", "ended.json"
@@ -57,21 +56,6 @@ class Job:
         return "finished" if self.code in (0, NOT_MET) else "stopped" if self.code == INTERRUPTED else "failed"
 
 
-def _locked(folder: Path) -> bool:
-    """Whether a process that was started there still runs."""
-    try:
-        handle = os.open(folder / LOCK, os.O_RDONLY)
-    except OSError:
-        return False
-    try:
-        fcntl.flock(handle, fcntl.LOCK_SH | fcntl.LOCK_NB)  # shared: two that look at once do not see each other
-    except BlockingIOError:
-        return True
-    finally:
-        os.close(handle)
-    return False
-
-
 def _json(path: Path) -> Any:
     try:
         return json.loads(path.read_text(encoding="utf-8"))
@@ -85,7 +69,7 @@ def last_job(project: Path) -> Job | None:
     record = _json(folder / RECORD)
     if not isinstance(record, dict):
         return None
-    running = _locked(folder)
+    running = is_held(folder / LOCK)
     ended = None if running else _json(folder / ENDED)
     code = ended["code"] if isinstance(ended, dict) else None
     if code is None and not running and _json(folder / OUTPUT) is not None:
@@ -104,26 +88,23 @@ def start(project: Path, command: str, words: Sequence[str], out: str, about: Ma
     folder = project / HIDDEN
     with _STARTING:
         folder.mkdir(exist_ok=True)
-        if _locked(folder):
+        if is_held(folder / LOCK):
             raise JobError("something is running in this folder already: stop it, or wait until it has ended")
         for name in (ENDED, OUTPUT, EVENTS):
             (folder / name).unlink(missing_ok=True)
-        lock = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT, 0o600)
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX)
-            with (folder / EVENTS).open("wb") as events, (folder / OUTPUT).open("wb") as output:
-                process = subprocess.Popen(
+        with (folder / EVENTS).open("wb") as events, (folder / OUTPUT).open("wb") as output:
+            try:
+                process = started(
                     [*PROGRAM, command, *words, "--out", out, "--json"],
+                    folder / LOCK,
                     cwd=project,
                     stdin=subprocess.DEVNULL,
                     stdout=output,
                     stderr=events,
                     env={**os.environ, "SMAJAX_PROGRESS": "json"},
-                    pass_fds=(lock,),  # which keeps the lock as long as it lives
-                    start_new_session=True,  # neither Ctrl-C nor the end of the server reaches it
                 )
-        finally:
-            os.close(lock)
+            except OSError as error:
+                raise JobError(f"`smajax {command}` could not be started: {error}") from None
         record = {
             "command": command,
             "words": list(words),
@@ -152,11 +133,7 @@ def stop(project: Path) -> bool:
     job = last_job(project)
     if job is None or not job.running:
         return False
-    try:
-        os.killpg(job.process, signal.SIGINT)
-    except ProcessLookupError:
-        return False
-    return True
+    return interrupt(job.process)
 
 
 def output_of(project: Path) -> Any:

@@ -11,6 +11,7 @@ import errno
 import importlib
 import os
 import signal
+import subprocess
 import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
@@ -46,6 +47,44 @@ def locked(path: Path) -> Iterator[None]:
         yield
     finally:
         lock.release()
+
+
+def is_held(path: Path) -> bool:
+    """Whether a program that `started` began with this lock file still runs, or one that it began."""
+    if not path.exists() or WINDOWS:
+        return False
+    fcntl = importlib.import_module("fcntl")
+    with path.open("rb") as handle:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_SH | fcntl.LOCK_NB)  # shared: two that look at once do not see each other
+        except BlockingIOError:
+            return True
+    return False
+
+
+def started(words: Sequence[str], lock: Path, **more: Any) -> subprocess.Popen[bytes]:
+    """Start a program that outlives this one and its Ctrl-C, and holds the file `lock` as long as it lives.
+
+    more: of `subprocess.Popen`. Raises OSError on Windows, where a child cannot be given a lock.
+    """
+    if WINDOWS:
+        raise OSError(errno.ENOSYS, "a program that outlives this one can be started on Linux and macOS only")
+    fcntl = importlib.import_module("fcntl")
+    handle = os.open(lock, os.O_RDWR | os.O_CREAT, 0o600)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX)
+        return subprocess.Popen(words, pass_fds=(handle,), start_new_session=True, **more)
+    finally:
+        os.close(handle)
+
+
+def interrupt(process: int) -> bool:
+    """Ctrl-C to a program that `started` began, and to what that began; whether there was one."""
+    try:
+        os.killpg(process, signal.SIGINT)
+    except ProcessLookupError:
+        return False
+    return True
 
 
 Handler = Callable[[int, FrameType | None], Any]

@@ -6,15 +6,15 @@ import math
 from pathlib import Path
 
 from smajax.control.gains_file import read_gains
+from smajax.control.kept_plant import with_limit
 from smajax.control.loop_around import loop_around
+from smajax.control.loop_settings import LoopSettings, joined
 from smajax.control.presets import CONTROLLERS
 from smajax.export.controller import SHORT, check_reads, controller_block
 from smajax.export.errors import ExportError
 from smajax.export.plant import DEFAULT_TOLERANCE, check_plant, plant_block
 from smajax.export.source import CSource, c_source
 from smajax.model.system import System
-
-PERIOD = 0.01  # s, of a controller
 
 
 def plant_source(
@@ -32,25 +32,32 @@ def controller_source(
     gains: Path,
     name: str = "controller",
     *,
-    estimator: str = "",
-    period: float = PERIOD,
-    delay: int = 0,
+    estimator: str | None = None,
+    period: float | None = None,
+    delay: int | None = None,
+    own_limit: bool = False,
 ) -> CSource:
     """The C of the controller in a file of gains on `system`, the plant that it assumes.
 
-    estimator: the name of one, "" for the reading alone. period: s. delay: periods until a command arrives.
+    estimator: the name of one, "" for the reading alone. period: s. delay: periods until a command arrives. What is None is what the gains
+    were tuned with, where their file says it. own_limit: the limit of the command is that of `system`, whatever the file says.
     Raises GainsFileError as `read_gains`, ExportError for a controller that reads what nobody measures, KeyError for no estimator
     and ValueError as `loop_around`.
     """
-    if not 0.0 < period < math.inf or delay < 0:
-        raise ExportError(
-            f"the period is {period:g} s and the delay {delay} periods; expected more than 0 s, and 0 periods or more."
-        )
     found = read_gains(gains, system)
-    loop = loop_around(system, found.controller, found, estimator=estimator or None, delay=delay)
+    found = found.without_limit() if own_limit else found
+    used = joined({found.controller: found.loop}, LoopSettings(period=period, delay=delay, estimator=estimator))
+    if not 0.0 < used.period < math.inf or used.delay < 0:
+        raise ExportError(
+            f"the period is {used.period:g} s and the delay {used.delay} periods; expected more than 0 s, and 0 periods or more."
+        )
+    assumed = with_limit(system, used.command_limit)
+    loop = loop_around(assumed, found.controller, found, estimator=used.estimator or None, delay=used.delay)
     known = CONTROLLERS[found.controller].known
     source = c_source(
-        lambda: controller_block(loop.system, loop.controller, loop.estimator, period, delay, name, known), name, SHORT
+        lambda: controller_block(loop.system, loop.controller, loop.estimator, used.period, used.delay, name, known),
+        name,
+        SHORT,
     )
     check_reads(source, f"the controller `{found.controller}`", loop.estimator is not None)
     return source

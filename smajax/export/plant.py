@@ -10,11 +10,10 @@ from jax import lax
 
 from smajax.core.names import listed
 from smajax.core.parameters import check_bounds, parameter_values, parameters, set_parameters
-from smajax.data.model_file.of_experiment import LOGGED
 from smajax.export.block import Block, Quantity, Values
 from smajax.export.compiled import cast
 from smajax.export.errors import ExportError
-from smajax.model.channels import INPUT_UNITS
+from smajax.model.channels import INPUT_UNITS, REPLACED
 from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.system import System, initial_state
 from smajax.model.types import Scalar, State
@@ -66,7 +65,7 @@ def channels_of(system: System) -> list[str]:
 
 
 def _input(name: str, values: Mapping[str, float]) -> Quantity:
-    replaced = {channel: parameter for parameter, channel in LOGGED.items()}.get(name, "")
+    replaced = {channel: parameter for parameter, channel in REPLACED.items()}.get(name, "")
     start = values.get(replaced, values.get("ambient_temperature", 0.0) if name == "temperature" else 0.0)
     low, high = (0.0, 1.0) if name == "duty" else (0.0, jnp.inf) if name == "mass" else (-jnp.inf, jnp.inf)
     return Quantity(name, INPUT_UNITS.get(name, "1"), ABOUT.get(name, ""), start, low, high)

@@ -7,15 +7,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from smajax.cli.loop_options import Delay, Estimator
-from smajax.cli.options import Json, quantity, refused, within
+from smajax.cli.loop_options import Delay, Estimator, Period
+from smajax.cli.options import Json, refused, within
 from smajax.cli.plant_options import Changes, DriveName, LawName, LoadName, ModelFile, PlantOptions, WireName
 
 if TYPE_CHECKING:
     from smajax.export.source import CSource
     from smajax.model.system import System
-
-Sample = Annotated[float, quantity("of a controller: time between two calls", "s", above=0.0, like="10ms")]
 
 
 # More than 8 parameters: typer reads the options from them.
@@ -36,9 +34,9 @@ def export(
     law: LawName = "",
     values: Changes = None,
     model: ModelFile = None,
-    estimator: Estimator = "",
-    period: Sample = 0.01,
-    delay: Delay = 0,
+    estimator: Estimator = None,
+    period: Period = None,
+    delay: Delay = None,
     tolerance: Annotated[
         float,
         typer.Option(help="of a model: error of a step, a share of 1 C and of 1 % strain", callback=within(1e-9, 1e-2)),
@@ -86,23 +84,33 @@ def export(
 
 
 def _source(
-    file: Path, plant: PlantOptions, name: str, estimator: str, period: float, delay: int, tolerance: float
+    file: Path,
+    plant: PlantOptions,
+    name: str,
+    estimator: str | None,
+    period: float | None,
+    delay: int | None,
+    tolerance: float,
 ) -> CSource:
     """Raises typer.BadParameter for options of the other kind of file, ExportError for what cannot be exported."""
     from smajax.control.gains_file import GainsFileError
     from smajax.export.from_files import controller_source, plant_source
 
     if file.suffix == ".json":
+        if period is not None and period <= 0.0:
+            raise typer.BadParameter(f"more than 0 s, not {period:g} s.", param_hint="--period")
         system = plant.system()
         try:
-            return controller_source(system, file, name, estimator=estimator, period=period, delay=delay)
+            return controller_source(
+                system, file, name, estimator=estimator, period=period, delay=delay, own_limit=plant.gives_limit
+            )
         except GainsFileError as error:
             raise typer.BadParameter(str(error), param_hint="FILE") from None
         except KeyError as error:
             raise typer.BadParameter(str(error.args[0]), param_hint="--estimator") from None
-    if estimator or delay or plant.model or plant.wire or plant.load or plant.drive or plant.law:
+    if estimator or period or delay or plant.model or plant.wire or plant.load or plant.drive or plant.law:
         raise typer.BadParameter(
-            "--estimator, --delay, --model, --wire, --load, --drive and --law are for gains.json; a model file says all of a model but "
+            "--estimator, --period, --delay, --model, --wire, --load, --drive and --law are for gains.json; a model file says all of a model but "
             "what --set changes.",
             param_hint="FILE",
         )
