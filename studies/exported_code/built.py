@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import subprocess
 import tempfile
+import time
 from pathlib import Path
 
 import numpy as np
@@ -62,12 +63,15 @@ def commands(source: CSource, kind: str, readings: np.ndarray, points: np.ndarra
     return found
 
 
-def open_loop(source: CSource, inputs: dict[str, np.ndarray], seconds: float) -> dict[str, np.ndarray]:
-    """Of a model in double precision: its outputs by name, (samples,), for inputs held from sample to sample."""
+def open_loop(source: CSource, inputs: dict[str, np.ndarray], seconds: float) -> tuple[dict[str, np.ndarray], float]:
+    """Of a model in double precision, for inputs held from sample to sample: (outputs by name, (samples,); the time it took, s)."""
     samples = len(next(iter(inputs.values())))
     rows = np.stack([inputs.get(one.name, np.full(samples, one.start)) for one in source.inputs], axis=1)
     found = np.empty((samples, len(source.outputs)))
     given = [np.ascontiguousarray(rows, dtype=np.float64), found]
     pointers = [one.ctypes.data_as(ctypes.c_void_p) for one in given]
-    library(source, DOUBLE, MODEL).drive(ctypes.c_long(samples), *pointers, ctypes.c_double(seconds))
-    return {one.name: found[:, k] for k, one in enumerate(source.outputs)}
+    run = library(source, DOUBLE, MODEL).drive
+    begin = time.perf_counter()
+    run(ctypes.c_long(samples), *pointers, ctypes.c_double(seconds))
+    spent = time.perf_counter() - begin
+    return {one.name: found[:, k] for k, one in enumerate(source.outputs)}, spent
