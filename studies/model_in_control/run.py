@@ -12,7 +12,7 @@ import json
 import math
 import sys
 import time as clock
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from statistics import fmean
 from typing import Any
@@ -163,7 +163,7 @@ def write_bench(number: int, folder: Path) -> tuple[Path, ActuatorModel, str]:
     return path, truth, effect
 
 
-def bench(number: int, out: Path) -> dict[str, Any]:
+def bench(number: int, out: Path, controllers: Sequence[str] = CONTROLLERS) -> dict[str, Any]:
     """One bench: what was found, and settling times by the gains of each model on the true plant."""
     began = clock.monotonic()
     path, truth, effect = write_bench(number, out / f"bench_{number:02d}")
@@ -178,7 +178,7 @@ def bench(number: int, out: Path) -> dict[str, Any]:
         "found": list(findings.extended_model.effects),
     }
     if findings.added:
-        for controller in CONTROLLERS:
+        for controller in controllers:
             result[controller] = _figures(
                 tuned_on_models(models, ("true model", truth), controller, seed=number, effort=QUICK)
             )
@@ -240,6 +240,7 @@ def main(words: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--benches", type=int, default=50)
+    parser.add_argument("--controllers", default=",".join(CONTROLLERS))
     parser.add_argument("--part", default="1/1", help="k/n: every n-th bench from the k-th on, for several processes")
     options = parser.parse_args(words)
     prepare()
@@ -248,7 +249,7 @@ def main(words: list[str] | None = None) -> None:
     for number in range(part - 1, options.benches, parts):
         file = options.out / f"bench_{number:02d}.json"
         if not file.is_file():
-            replace(file, json_text(bench(number, options.out)))
+            replace(file, json_text(bench(number, options.out, options.controllers.split(","))))
         print(f"bench {number + 1} of {options.benches}: {file.read_text(encoding='utf-8')[:200]!r}", file=sys.stderr)
     files = sorted(options.out.glob("bench_*.json"))
     results = [json.loads(file.read_text(encoding="utf-8")) for file in files]
