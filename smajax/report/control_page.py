@@ -181,7 +181,7 @@ def page(result: ControlComparison, command: str = "") -> str:
         headline(worth(result) if len(result.tuned) > 1 else conclusions(result)[0]),
         str(picture(loops_picture(result), "loops over time", "panels", loops_picture(result, upright=True))),
         f"<p class=quiet>Each loop is a step from the start, cold and at rest, on the {html.escape(result.plant)}. Gains were tuned on each model and on plants drawn from its "
-        "posterior, with the same settings. The command stays within that of the fit runs.</p>",
+        "posterior, with the same settings; each model takes the best for its own plants of all gains that were found. The command stays within that of the fit runs.</p>",
         table(head(result), rows(result), (1, 2, 3, 4)),
         bullets(conclusions(result)[:-1] if len(result.tuned) > 1 else conclusions(result)[1:]),
         "<h2>Gains</h2>",

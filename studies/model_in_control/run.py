@@ -212,20 +212,39 @@ def gain(figures: dict[str, Any], over: Callable[[list[float]], Any] = max) -> f
     return float(base / extended)
 
 
+def settles(figures: dict[str, Any]) -> bool:
+    """Whether any loop does, by the gains of either model."""
+    return any(one is not None for model in ("base model", "extended model") for one in figures[model]["settling_time"])
+
+
+def same_gains(figures: dict[str, Any]) -> bool:
+    """Whether both models chose the same of the gains that were found."""
+    return bool(figures["base model"]["gains"] == figures["extended model"]["gains"])
+
+
 def summary(results: list[dict[str, Any]]) -> str:
-    """Markdown: a row a controller, and a row a bench."""
+    """Markdown: a row a controller and measure, and a row a bench. Benches where nothing settles say nothing and are counted apart."""
     lines = [
-        "| controller | settling time | benches | at least as good (within 2 %) | median gain | smallest | largest |",
-        "|---|---|---|---|---|---|---|",
+        "| controller | settling time | compared | nothing settles | same gains | no longer | at most 2 % longer | over 2 % shorter "
+        "| median gain | smallest | largest |",
+        "|---|---|---|---|---|---|---|---|---|---|---|",
     ]
     for controller in CONTROLLERS:
+        every = [one[controller] for one in results if controller in one]
+        told = [one for one in every if settles(one)]
         for what, over in MEASURES.items():
-            gains = np.asarray([gain(one[controller], over) for one in results if controller in one])
+            gains = np.asarray([gain(one, over) for one in told])
             if gains.size:
-                good = float(np.mean(gains >= NEAR))
-                lines.append(
-                    f"| {controller} | {what} | {gains.size} | {good:.0%} | {np.median(gains):.3f} | {gains.min():.3f} | {gains.max():.3f} |"
+                counts = (
+                    sum(map(same_gains, told)),
+                    *(int(np.sum(each)) for each in (gains >= 1.0, gains >= NEAR, gains > 1.0 / NEAR)),
                 )
+                lines.append(
+                    f"| {controller} | {what} | {gains.size} | {len(every) - gains.size} | {' | '.join(map(str, counts))} "
+                    f"| {np.median(gains):.3f} | {gains.min():.3f} | {gains.max():.3f} |"
+                )
+    without = sum(not any(name in one for name in CONTROLLERS) for one in results)
+    lines += ["", f"{len(results)} benches, of which on {without} nothing was found and nothing tuned."]
     lines += ["", "| bench | hidden | found | verdict | gain, pid | gain, sld |", "|---|---|---|---|---|---|"]
     for one in results:
         cells = [f"{gain(one[name]):.3f}" if name in one else "–" for name in CONTROLLERS]

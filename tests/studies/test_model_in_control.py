@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from pathlib import Path
+from statistics import fmean
+from typing import Any
 
 import pytest
 
@@ -31,18 +33,23 @@ def test_its_experiment_gives_what_is_known_and_not_what_is_hidden(tmp_path: Pat
     assert max(float(run.output.max()) for run in experiment.runs) > 5e-3
 
 
-def test_the_summary_counts_benches_at_least_as_good() -> None:
-    def figures(base: float | None, extended: float | None) -> dict[str, object]:
+def test_the_summary_counts_what_is_better_equal_and_no_answer() -> None:
+    def figures(base: float | None, extended: float | None, other: float | None = 4.0) -> dict[str, Any]:
         models = (("base model", base), ("extended model", extended))
-        return {"seconds": 20.0, **{name: {"settling_time": [time, 4.0]} for name, time in models}}
+        return {
+            "seconds": 20.0,
+            **{name: {"settling_time": [time, other], "gains": {"integral_gain": time}} for name, time in models},
+        }
 
-    assert gain(figures(6.0, 4.0)) == pytest.approx(1.25)
-    assert gain(figures(None, 4.0)) == pytest.approx(3.0)  # null: never settles, counts as the loop's length
+    assert gain(figures(6.0, 4.0)) == pytest.approx(1.5)
+    assert gain(figures(6.0, 4.0), fmean) == pytest.approx(1.25)
+    assert gain(figures(None, 4.0)) == pytest.approx(5.0)  # null: never settles, counts as the loop's length
     one = {"hidden": "creep", "found": ["creep"], "verdict": "explained"}
-    results = [
-        {"bench": k, **one, "pid": figures(*pair), "sld": figures(*pair)}
-        for k, pair in enumerate([(6.0, 4.0), (4.0, 4.0), (4.0, 6.0), (None, 4.0)])
-    ]
+    pairs = [(6.0, 4.0), (4.0, 4.0), (4.0, 6.0), (None, 4.0), (5.0, 5.05)]
+    results: list[dict[str, Any]] = [{"bench": k, **one, "pid": figures(*pair)} for k, pair in enumerate(pairs)]
+    results.append({"bench": 5, **one, "pid": figures(None, None, None)})
+    results.append({"bench": 6, **one, "found": []})
     text = summary(results)
-    assert "| pid | 4 | 75% |" in text
-    assert "| 2 | creep | creep | explained | 0.800 | 0.800 |" in text
+    assert "| pid | longest | 5 | 1 | 1 | 3 | 4 | 2 | 1.000 | 0.667 | 5.000 |" in text
+    assert "7 benches, of which on 1 nothing was found and nothing tuned." in text
+    assert "| 2 | creep | creep | explained | 0.667 | – |" in text
