@@ -9,11 +9,11 @@ from smajax.core.wording import counted
 
 def loop_rows(loop: LoopSettings) -> list[list[str]]:
     """A row a setting: limit of the command, period, delay, filter, noise."""
-    limit = "none" if loop.command_limit is None else f"up to {digits(loop.command_limit, 4)} {loop.command_unit}"
+    limit = "no limit" if loop.command_limit is None else f"up to {digits(loop.command_limit, 4)} {loop.command_unit}"
     return [
         ["limit of the command", limit],
         ["control period", "not known" if loop.period is None else f"{1e3 * loop.period:g} ms"],
-        ["delay of the command", counted(loop.delay, "control period") if loop.delay else "none"],
+        ["delay of the command", counted(loop.delay, "control period") if loop.delay else "no delay"],
         [
             "what the controller reads",
             f"the state from the filter {loop.estimator}" if loop.estimator else "the true state",

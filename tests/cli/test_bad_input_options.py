@@ -190,7 +190,7 @@ GAINS = {
     ),
     "a number that is none": (
         '{"controller": "pid", "gains": {"proportional_gain": NaN}}',
-        "`proportional_gain` = nan V/rad",
+        "proportional_gain must be a number, not nan",
     ),
     "text": ('{"controller": "pid", "gains": {"proportional_gain": "3"}}', "must be a number, not '3'"),
     "a misspelt gain": ('{"controller": "pid", "gains": {"proportional": 3}}', "did you mean 'proportional_gain'"),

@@ -187,5 +187,6 @@ def test_every_command_has_an_example_and_a_json_output(tmp_path: Path) -> None:
         said = run.invoke(app, [name, "--help"])
         assert said.exit_code == 0
         assert f"Example:  smajax {name}" in said.output.replace("\n", " ").replace("   ", "  "), name
-        assert "--json" in said.output, name
+        if name != "app":  # whose result is a page
+            assert "--json" in said.output, name
     assert "laws" in json.loads(run.invoke(app, ["presets", "--json"]).stdout)

@@ -116,7 +116,7 @@ def test_a_control_acts_once_a_period_and_holds(every: int) -> None:
 
 
 def test_only_integrate_marches_in_time() -> None:
-    """Scans of these rooms: `integrate`, the stages of one step, and the delay of input series."""
+    """Scans of these rooms: `integrate`, the stages of one step, the delay of input series, and a curve over temperature."""
     root = Path(smajax.__file__).parent
     scanning = {
         path.relative_to(root).as_posix()
@@ -124,4 +124,9 @@ def test_only_integrate_marches_in_time() -> None:
         for path in (root / room).rglob("*.py")
         if re.search(r"\b(checkpointed_scan|scan|fori_loop)\(", path.read_text())
     }
-    assert scanning == {"simulation/integrate.py", "simulation/step.py", "simulation/input_delay.py"}
+    assert scanning == {
+        "simulation/integrate.py",
+        "simulation/step.py",
+        "simulation/input_delay.py",
+        "control/controllers/quasi_static.py",
+    }
