@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 from smajax.cli.main import app
 from smajax.control.gains_file import Gains, write_gains
 from smajax.control.loop_around import loop_around
+from smajax.control.loop_settings import LoopSettings
 from smajax.data.model_file.of_presets import model_of_presets
 from smajax.export import fmu as units
 from smajax.export.errors import ExportError
@@ -99,7 +100,6 @@ def test_a_write_that_fails_leaves_what_was_there(tmp_path, monkeypatch):
         (["--to", "matlab"], "`c` or `fmu`, not `matlab`"),
         (["--to", "fmu", "--fmi", "1.0"], "`2.0` or `3.0`, not `1.0`"),
         (["--to", "c", "--estimator", "perfect"], "no filter 'perfect'"),
-        (["--to", "c", "--period", "0"], "more than 0 s"),
     ],
 )
 def test_options_that_make_no_sense_are_refused(tmp_path, words, said):
@@ -107,6 +107,20 @@ def test_options_that_make_no_sense_are_refused(tmp_path, words, said):
     assert code == 2
     assert said in " ".join(told.replace("│", " ").split())
     assert not (tmp_path / "out").exists()
+
+
+def test_period_delay_and_filter_are_those_that_the_gains_were_tuned_with(tmp_path):
+    tuned = Gains("pid", {}, loop=LoopSettings(period=0.02, delay=1, estimator="printed", position_unit="rad"))
+    file = write_gains(tmp_path / "tuned.json", tuned, tuned.units(arm()), {})
+    source = controller_source(arm(), file)
+    assert source.block.period == 0.02
+    assert "behind the estimator PrintedFilter" in source.block.title
+    assert "queue[1]" in source.header
+    alone = controller_source(arm(), file, estimator="", delay=0, period=0.005)
+    assert alone.block.period == 0.005
+    assert "queue" not in alone.header
+    with pytest.raises(ExportError, match="the period is 0 s and the delay 1 periods; expected more than 0 s"):
+        controller_source(arm(), file, period=0.0)
 
 
 def test_the_loop_is_the_one_that_other_commands_run(tmp_path):

@@ -108,7 +108,16 @@ def _source(
             raise typer.BadParameter(str(error), param_hint="FILE") from None
         except KeyError as error:
             raise typer.BadParameter(str(error.args[0]), param_hint="--estimator") from None
-    if estimator or period or delay or plant.model or plant.wire or plant.load or plant.drive or plant.law:
+    if (
+        estimator is not None
+        or delay is not None
+        or period is not None
+        or plant.model
+        or plant.wire
+        or plant.load
+        or plant.drive
+        or plant.law
+    ):
         raise typer.BadParameter(
             "--estimator, --period, --delay, --model, --wire, --load, --drive and --law are for gains.json; a model file says all of a model but "
             "what --set changes.",
