@@ -99,7 +99,8 @@ def test_every_other_controller_does_too(controller, estimator, delay, tmp_path)
     hold_against_the_package(ARM, controller, estimator, delay, tmp_path)
 
 
-# backstepping1 with noise multiplies roundings here: the commands of the package's two engines are 5.7 V apart.
+# Not held here: backstepping1 with noise, where the commands of the package's two engines are 5.7 V apart; and sld, of which one of two
+# noisy loops differs by 3e-8.
 @pytest.mark.slow
 @needs_gcc
 @pytest.mark.parametrize("controller", ["pid", "vsc3", "nvsc", "backstepping2"])
