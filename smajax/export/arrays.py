@@ -9,6 +9,8 @@ from typing import Any
 import jax
 import numpy as np
 
+from smajax.engine.array_operations import MOVES, REDUCTIONS
+from smajax.engine.values import Held, held
 from smajax.export.errors import NoTranslation
 from smajax.export.operations import ELEMENTWISE, select
 from smajax.export.statements import Number, Writer, literal
@@ -16,48 +18,7 @@ from smajax.export.statements import Number, Writer, literal
 MOST = 4096  # entries of an array; each is a name in the C
 
 
-class Held(np.ndarray):
-    """An array of `Number`s (object dtype), whatever its shape: a number is one of shape ()."""
-
-
 Value = np.ndarray | Held  # known before the program runs, or not
-
-# Operations that only move numbers about -> which of their arguments hold these, the others being places; None: all.
-MOVES: dict[str, tuple[int, ...] | None] = {
-    "broadcast_in_dim": None,
-    "concatenate": None,
-    "dynamic_slice": (0,),
-    "dynamic_update_slice": (0, 1),
-    "expand_dims": None,
-    "gather": (0,),
-    "pad": None,
-    "reshape": None,
-    "rev": None,
-    "scatter": (0, 2),
-    "slice": None,
-    "split": None,
-    "squeeze": None,
-    "stack": None,
-    "transpose": None,
-    "unstack": None,
-}
-REDUCTIONS = {
-    "reduce_sum": "add",
-    "reduce_prod": "mul",
-    "reduce_max": "max",
-    "reduce_min": "min",
-    "reduce_and": "and",
-    "reduce_or": "or",
-}
-
-
-def held(numbers: Any, shape: tuple[int, ...] = ()) -> Held:
-    """An array of `Number`s: numpy must not look into them."""
-    flat = numbers if isinstance(numbers, list) else [numbers]
-    result = np.empty(len(flat), dtype=object)
-    for k, one in enumerate(flat):
-        result[k] = one
-    return result.reshape(shape).view(Held)
 
 
 def is_known(value: Value) -> bool:

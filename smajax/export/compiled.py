@@ -14,7 +14,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from smajax.engine.jax_versions import kind_of
-from smajax.export.arrays import held, numbers_of
+from smajax.engine.values import held
+from smajax.export.arrays import numbers_of
 from smajax.export.block import Block, Quantity, identifier
 from smajax.export.counts import Cost, cost_of
 from smajax.export.printed import texts_of

@@ -100,9 +100,8 @@ def _settings(one: Quantity, causality: str) -> dict[str, object]:
     return result if causality == "output" else result | {"start": repr(float(one.start))}
 
 
-def _variables_2(variables: Variables) -> Iterator[str]:
-    shared = {"name": "time", "valueReference": 0, "causality": "independent", "variability": "continuous"}
-    yield f'    <ScalarVariable{_attributes(**shared)}><Real unit="s"/></ScalarVariable>'
+def _heads(variables: Variables) -> Iterator[tuple[str, str]]:
+    """Of each variable what both versions say of it: its attributes, and those of its value."""
     for number, (one, causality) in enumerate(variables.rows, start=1):
         head = _attributes(
             name=one.name,
@@ -112,21 +111,20 @@ def _variables_2(variables: Variables) -> Iterator[str]:
             variability=variables.variability(causality),
             initial={"parameter": "exact", "output": "calculated"}.get(causality),
         )
-        yield f"    <ScalarVariable{head}><Real{_attributes(**_settings(one, causality))}/></ScalarVariable>"
+        yield head, _attributes(**_settings(one, causality))
+
+
+def _variables_2(variables: Variables) -> Iterator[str]:
+    shared = {"name": "time", "valueReference": 0, "causality": "independent", "variability": "continuous"}
+    yield f'    <ScalarVariable{_attributes(**shared)}><Real unit="s"/></ScalarVariable>'
+    for head, settings in _heads(variables):
+        yield f"    <ScalarVariable{head}><Real{settings}/></ScalarVariable>"
 
 
 def _variables_3(variables: Variables) -> Iterator[str]:
     yield '    <Float64 name="time" valueReference="0" causality="independent" variability="continuous" unit="s"/>'
-    for number, (one, causality) in enumerate(variables.rows, start=1):
-        head = _attributes(
-            name=one.name,
-            valueReference=number,
-            description=one.about or None,
-            causality=causality,
-            variability=variables.variability(causality),
-            initial={"parameter": "exact", "output": "calculated"}.get(causality),
-        )
-        yield f"    <Float64{head}{_attributes(**_settings(one, causality))}/>"
+    for head, settings in _heads(variables):
+        yield f"    <Float64{head}{settings}/>"
 
 
 def _structure(variables: Variables, version: str) -> Iterator[str]:

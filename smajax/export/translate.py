@@ -16,24 +16,12 @@ import jax.extend as jex
 import jax.numpy as jnp
 import numpy as np
 
+from smajax.engine.array_operations import MOVES, REDUCTIONS
 from smajax.engine.expansions import EXPANSIONS
 from smajax.engine.jax_versions import TABLE, expanded, kind_of, opened, parameters_of, refuse_unread
 from smajax.engine.text import Unsupported
-from smajax.export.arrays import (
-    MOVES,
-    REDUCTIONS,
-    Held,
-    Value,
-    held,
-    is_known,
-    moved,
-    numbers_of,
-    part_at,
-    product,
-    reduced,
-    settled,
-    with_entry,
-)
+from smajax.engine.values import Held, held
+from smajax.export.arrays import Value, is_known, moved, numbers_of, part_at, product, reduced, settled, with_entry
 from smajax.export.errors import NoTranslation, part_of
 from smajax.export.operations import ELEMENTWISE
 from smajax.export.rounds import most_rounds
