@@ -35,7 +35,8 @@ def confounders(search: JointSearch, setting: Search, model: Model, runs: Sequen
     fitted = search.fitted[own]
     variance = search.error(fitted) ** 2
     here = fitted.log_evidence(variance)
-    traces = traces_at(search.joint, fitted, search.extent)
+    others = {other for effect in own for other, _ in _in_place_of(search, own, effect)}
+    traces = traces_at(search.joint, fitted, search.extent, tuple(others))
     found: list[Confounder] = []
     likely: list[tuple[int, FittedModel]] = []  # (place in `found`, model with a confounder that runs may separate)
     for effect in own:

@@ -13,16 +13,17 @@ only strong effects are added; the better the model, the finer the effects that 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from smajax.attribution.fit_programs import grouped
 from smajax.attribution.joint_parameters import JointParameters
 from smajax.attribution.laplace_evidence import FittedModel, decomposed, fitted_model, independent_error
 from smajax.attribution.subset_evidence import LinearModel, Subset, linear_model
 from smajax.attribution.traces import Traces, Variant, traces_at
-from smajax.core.progress import Stage
+from smajax.core.progress import Stage, part_of
 from smajax.fit.levenberg_marquardt import FitSettings, levenberg_marquardt
 from smajax.fit.starts import logarithmic_points, nearest
 from smajax.model.effects.candidate import Extent
@@ -44,7 +45,6 @@ LARGEST_STEP = 0.2  # of its range that an unknown moves to the start of a fit
 SETTLED = 0.05  # relative change of the error of a sample
 DETECTABLE = 1.0  # standard errors that an effect of one width has to change the runs by to be looked for
 CERTAIN = 100.0  # nats that the linear model loses without an effect, beyond which no refit makes up for it
-CARRIED = 40  # likeliest sets of the linear model whose effects the program of the fits carries
 REPLACED = 2  # other effects that are tried in the place of each at the end
 NEIGHBOURS = 12  # of these sets and those without an effect, the likeliest in the linear model
 SETTLED_ODDS = 1.0  # log odds: a model that is likelier by less is as likely, and the average has both
@@ -65,7 +65,7 @@ class JointSearch:
     )  # error of a sample at which a set was fitted last
     rounds: list[JointRound] = field(default_factory=list)
     detectable: tuple[str, ...] = ()
-    carried: tuple[str, ...] = ()  # effects of the program that fits run in, which grows with what is tried
+    programs: tuple[tuple[str, ...], ...] = ()  # effects that each program of the fits so far carries
     winner: tuple[str, ...] = ()  # effects of the likeliest model when the search had ended
     rounds_before: int = 0  # of an earlier search, from whose models this one begins
     thorough: bool = True  # ends only where no effect of the likeliest model can be removed or replaced
@@ -106,9 +106,9 @@ def search_jointly(search: JointSearch, starts: Mapping[tuple[str, ...], np.ndar
 
     Fills `search.fitted` and `search.rounds`.
     """
-    search.carried = search.joint.ordered([effect for effects in starts for effect in effects])
-    for effects, values in starts.items():
-        search.fitted[effects] = fitted_model(search.joint, effects, values, search.carried)
+    for carried, sets in _grouped(search, starts):
+        for effects in sets:
+            search.fitted[effects] = fitted_model(search.joint, effects, starts[effects], carried)
     error = min(search.error(model) for model in search.fitted.values())
     # All to their end, however far behind: the base model is what every result is held against.
     _fit_side_by_side(search, list(starts.items()), error, "fitting what the search begins with", ())
@@ -148,7 +148,7 @@ def _effects(search: JointSearch, subset: Subset) -> tuple[str, ...]:
 
 def _linear(search: JointSearch, present: FittedModel, error: float) -> tuple[LinearModel, Traces]:
     """The linear model at the present fit, searched from no effects and from the present ones."""
-    traces = traces_at(search.joint, present, search.extent)
+    traces = traces_at(search.joint, present, search.extent, search.detectable or None)
     if not search.detectable:
         search.detectable = detectable(search.joint, traces, search.noise)
     linear = linear_model(search.joint, traces, error**2, search.detectable)
@@ -226,21 +226,17 @@ def _fit(
 ) -> None:
     """Fit the sets, all side by side, from the present values and from where the linear model points to."""
     joint = search.joint
-    needed = {effect for one in sets for effect in _effects(search, one)}
-    if not needed <= set(search.carried):
-        # The program that fits run in also carries what the next sets are likely to have: compiling costs as much as a round.
-        likely = {effect for one in linear.ranked()[:CARRIED] for effect in _effects(search, one)}
-        search.carried = joint.ordered([*search.carried, *needed, *likely])
-    problem, index = joint.restricted(search.carried)
-    points = [starts(joint, subset, linear, traces) for subset in sets]
-    chosen = nearest(problem.with_noise(error), points, index)
     begun: list[tuple[tuple[str, ...], np.ndarray]] = []
-    for subset, start in zip(sets, chosen, strict=True):
-        effects = _effects(search, subset)
-        begun.append((effects, start))
-        if set(effects) - set(traces.present):
-            # And, where an effect is new, from its usual size: near zero the misfit may have a minimum of its own.
-            begun.append((effects, _at_usual_size(joint, subset, traces, start)))
+    for carried, members in _grouped(search, [_effects(search, subset) for subset in sets]):
+        problem, index = joint.restricted(carried)
+        here = [subset for subset in sets if _effects(search, subset) in members]
+        points = [starts(joint, subset, linear, traces) for subset in here]
+        for subset, start in zip(here, nearest(problem.with_noise(error), points, index), strict=True):
+            effects = _effects(search, subset)
+            begun.append((effects, start))
+            if set(effects) - set(traces.present):
+                # And, where an effect is new, from its usual size: near zero the misfit may have a minimum of its own.
+                begun.append((effects, _at_usual_size(joint, subset, traces, start)))
     _fit_side_by_side(
         search, begun, error, f"round {search.rounds_before + number + 1}: fitting the likeliest sets of effects"
     )
@@ -253,24 +249,40 @@ def _fit_side_by_side(
     stage: str,
     allowed_excess: tuple[tuple[int, float], ...] = ALLOWED_EXCESS,
 ) -> None:
-    """Fit sets of effects from values (P,), in the program of `search.carried`; the likelier of two fits of one set counts."""
+    """Fit sets of effects from values (P,), those of one program side by side; the likelier of two fits of one set counts."""
     joint = search.joint
-    problem, index = joint.restricted(search.carried)
-    problem = problem.with_noise(error)
-    tasks = [problem.task(joint.free(effects), joint.bounds, values[index]) for effects, values in begun]
     search.settings.progress(Stage(stage, 0.0))
     settings = dataclasses.replace(comparison_settings(search.settings, stage), allowed_excess=allowed_excess)
-    fits = levenberg_marquardt(problem, tasks, settings)
-    for (effects, start), fit in zip(begun, fits, strict=True):
-        search.trials[effects] = error
-        if np.isfinite(fit.cost):
-            values = np.array(start)
-            values[index] = fit.values
-            # Coefficients of other effects count for nothing in this model.
-            model = fitted_model(joint, effects, joint.without(values, effects), search.carried)
-            old = search.fitted.get(effects)
-            if old is None or model.log_evidence(error**2) > old.log_evidence(error**2):
-                search.fitted[effects] = model
+    groups, least = _grouped(search, [effects for effects, _ in begun]), np.inf
+    for place, (carried, members) in enumerate(groups):
+        problem, index = joint.restricted(carried)
+        problem = problem.with_noise(error)
+        here = [(effects, values) for effects, values in begun if effects in members]
+        tasks = [problem.task(joint.free(effects), joint.bounds, values[index]) for effects, values in here]
+        progress = part_of(search.settings.progress, place, len(groups))
+        settings = dataclasses.replace(settings, progress=progress, least_cost=least)
+        fits = levenberg_marquardt(problem, tasks, settings)
+        least = min([least, *(fit.cost for fit in fits)])
+        for (effects, start), fit in zip(here, fits, strict=True):
+            search.trials[effects] = error
+            if np.isfinite(fit.cost):
+                values = np.array(start)
+                values[index] = fit.values
+                # Coefficients of other effects count for nothing in this model.
+                model = fitted_model(joint, effects, joint.without(values, effects), carried)
+                old = search.fitted.get(effects)
+                if old is None or model.log_evidence(error**2) > old.log_evidence(error**2):
+                    search.fitted[effects] = model
+
+
+def _grouped(search: JointSearch, sets: Iterable[tuple[str, ...]]) -> list[tuple[tuple[str, ...], list[tuple[str, ...]]]]:
+    """(effects that a program carries, sets that are fitted in it), and remember the programs."""
+    found = []
+    for union, members in grouped(sets, search.programs):
+        carried = search.joint.ordered(tuple(union))
+        search.programs = tuple(dict.fromkeys([*search.programs, carried]))
+        found.append((carried, members))
+    return found
 
 
 def comparison_settings(settings: FitSettings, stage: str) -> FitSettings:

@@ -40,18 +40,22 @@ class Traces:
     places: Mapping[Variant, Mapping[str, float]]  # values there, by full name
 
 
-def traces_at(joint: JointParameters, model: FittedModel, extent: Extent) -> Traces:
+def traces_at(
+    joint: JointParameters, model: FittedModel, extent: Extent, candidates: Sequence[str] | None = None
+) -> Traces:
     """Residual of a fitted model and derivatives there; effects that are off are switched on by `NUDGE` for theirs.
 
-    Derivatives by one step of the integration a sample: they only say which sets of effects are worth a fit.
+    `candidates`: effects that are looked at beside those of the model; None: all. Derivatives by one step of the integration a
+    sample: they only say which sets of effects are worth a fit.
     """
     values, present = model.values, model.effects
-    absent = [effect for effect in joint.coefficients if effect not in present]
+    among = joint.coefficients if candidates is None else joint.ordered((*present, *candidates))
+    absent = [effect for effect in among if effect not in present]
     here = _nudged(joint, values, absent)
-    names = [*joint.unknowns, *(name for own in joint.coefficients.values() for name in own)]
+    names = [*joint.unknowns, *(name for effect in among for name in joint.coefficients[effect])]
     _, columns = residual_and_columns(with_integration(joint.problem, ONE_STEP), here, names)
     variants: dict[Variant, Mapping[str, np.ndarray]] = {
-        Variant(effect, -1): {name: columns[name] for name in own} for effect, own in joint.coefficients.items()
+        Variant(effect, -1): {name: columns[name] for name in joint.coefficients[effect]} for effect in among
     }
     places: dict[Variant, Mapping[str, float]] = {}
     for effect in absent:

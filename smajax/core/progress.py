@@ -8,7 +8,7 @@ from __future__ import annotations
 import inspect
 import warnings
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any, TypeAlias
 
 
@@ -73,6 +73,17 @@ def event_record(event: Event) -> dict[str, Any] | None:
 
 def quiet(event: Event) -> None:
     """Progress that is shown to no one."""
+
+
+def part_of(progress: Progress, place: int, parts: int) -> Progress:
+    """`progress` of a stage that is done in equal parts, from within the part `place`, 0..parts - 1."""
+    if progress is quiet:
+        return quiet
+
+    def scaled(event: Event) -> None:
+        progress(replace(event, share=(place + event.share) / parts) if isinstance(event, Stage) else event)
+
+    return scaled
 
 
 def report_checks(progress: Progress, warned: Iterable[str], identifiable: Iterable[str]) -> None:

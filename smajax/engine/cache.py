@@ -21,7 +21,7 @@ from smajax.core.files import writing
 from smajax.engine.kernel import COMPILE_OPTIONS, processor
 
 LARGEST = 2**30  # bytes in the folder: beyond, what was not used longest goes
-HEAD = b"smajax program 2\n"
+HEAD = b"smajax program 3\n"
 PACKAGES = ("smajax", "jax", "jaxlib", "llvmlite", "numpy")
 
 

@@ -62,13 +62,14 @@ class FitSettings:
 
     A fit ends where a step lowers its cost by less than `tolerance` of it, or by less than `absolute_tolerance`, and
     predicted no more. Of `allowed_excess`, (steps, cost) each: after so many steps a fit ends whose cost is above the least
-    of all by more than that.
+    of all by more than that; `least_cost` is that of fits that have ended elsewhere.
     """
 
     max_steps: int = MAX_STEPS
     tolerance: float = TOLERANCE
     absolute_tolerance: float = 0.0
     allowed_excess: tuple[tuple[int, float], ...] = ()
+    least_cost: float = float("inf")
     cache: ResultCache = field(default_factory=ResultCache)
     progress: Progress = quiet
     stage: str = "fitting"
@@ -247,7 +248,8 @@ def levenberg_marquardt(
     def running() -> list[int]:
         return [k for k, state in enumerate(states) if state.status == Status.RUNNING]
 
-    settled = settings.max_steps, settings.tolerance, settings.absolute_tolerance, settings.allowed_excess
+    limits = settings.allowed_excess, settings.least_cost
+    settled = settings.max_steps, settings.tolerance, settings.absolute_tolerance, *limits
     key = cache.key((problem, list(tasks)), "levenberg_marquardt", outputs if outputs is not None else "", *settled)
     cached = cache.load(key)
     if cached is not None:
@@ -264,7 +266,7 @@ def levenberg_marquardt(
         if not going:
             break
         advance(going)
-        states = _without_exceeding(states, number + 1, settings.allowed_excess)
+        states = _without_exceeding(states, number + 1, settings)
     cache.save(key, _packed(states, settings.max_steps))
     progress(Stage(settings.stage, 1.0))
     return [_ended(task, state, settings) for task, state in zip(tasks, states, strict=True)]
@@ -287,10 +289,11 @@ def _best(
     return BestFit(stage, found, units, tuple(errors[k].tolist()) if k in errors else ())
 
 
-def _without_exceeding(states: Sequence[LMState], steps: int, allowed: Sequence[tuple[int, float]]) -> list[LMState]:
+def _without_exceeding(states: Sequence[LMState], steps: int, settings: FitSettings) -> list[LMState]:
     """Fits end that after these steps are too far above the least cost."""
-    excess = min((0.5 * most for least, most in allowed if steps >= least), default=np.inf)
-    limit = min((float(state.f) for state in states), default=np.inf) + excess
+    excess = min((0.5 * most for least, most in settings.allowed_excess if steps >= least), default=np.inf)
+    limit = min((float(state.f) for state in states), default=np.inf)
+    limit = min(limit, 0.5 * settings.least_cost) + excess
     return [
         dataclasses.replace(state, status=np.asarray(int(Status.EXCEEDED)))
         if state.status == Status.RUNNING and float(state.f) > limit
