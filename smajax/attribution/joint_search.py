@@ -106,8 +106,8 @@ def search_jointly(search: JointSearch, starts: Mapping[tuple[str, ...], np.ndar
 
     Fills `search.fitted` and `search.rounds`.
     """
-    for carried, sets in _grouped(search, starts):
-        for effects in sets:
+    for carried, members in _grouped(search, starts):
+        for effects in members:
             search.fitted[effects] = fitted_model(search.joint, effects, starts[effects], carried)
     error = min(search.error(model) for model in search.fitted.values())
     # All to their end, however far behind: the base model is what every result is held against.
@@ -275,7 +275,9 @@ def _fit_side_by_side(
                     search.fitted[effects] = model
 
 
-def _grouped(search: JointSearch, sets: Iterable[tuple[str, ...]]) -> list[tuple[tuple[str, ...], list[tuple[str, ...]]]]:
+def _grouped(
+    search: JointSearch, sets: Iterable[tuple[str, ...]]
+) -> list[tuple[tuple[str, ...], list[tuple[str, ...]]]]:
     """(effects that a program carries, sets that are fitted in it), and remember the programs."""
     found = []
     for union, members in grouped(sets, search.programs):

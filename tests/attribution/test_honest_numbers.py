@@ -12,7 +12,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from smajax.attribution.close_loop import close_loop
@@ -132,6 +132,8 @@ def test_the_heat_balance_closes(rig: str, effects: bool, shares: list[float], l
     inputs = {channel: top * level * jnp.where(jnp.arange(count + 1) < 0.6 * count, 1.0, 0.3)}
     run, rest = RUN(system, inputs, dt), initial_state(system, {channel: inputs[channel][0]}).wire
     t, temperature, fraction = run.time, run.temperature, run.martensite_fraction
+    # One that would melt crosses its range within some steps, and the sum over them is no integral any more.
+    assume(float(jnp.max(temperature)) < HOTTEST)
 
     def flows(
         level: jax.Array, temperature: jax.Array, fraction: jax.Array, time: jax.Array

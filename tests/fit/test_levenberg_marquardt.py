@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any
 
 import jax
@@ -22,6 +23,7 @@ from smajax.fit.levenberg_marquardt import (
     MAX_DAMPING,
     MAX_STEPS,
     TOLERANCE,
+    FitSettings,
     LMState,
     NormalEquations,
     Status,
@@ -128,10 +130,13 @@ def test_fits_far_above_the_best_end_after_as_many_steps_as_allowed() -> None:
         _advanced(_initial_state(_task(np.full(1, 0.5)), 8), (cost, np.ones(1), np.eye(1)), TOLERANCES)
         for cost in (10.0, 200.0)
     )
-    allowed = ((3, 400.0), (6, 100.0))
+    allowed = FitSettings(allowed_excess=((3, 400.0), (6, 100.0)))
     for steps, expected in ((2, Status.RUNNING), (3, Status.RUNNING), (6, Status.EXCEEDED)):
         states = _without_exceeding([near, far], steps, allowed)
         assert [int(state.status) for state in states] == [Status.RUNNING, expected]
+    elsewhere = dataclasses.replace(allowed, least_cost=9.0)  # of fits in another program
+    states = _without_exceeding([far], 6, elsewhere)
+    assert [int(state.status) for state in states] == [Status.EXCEEDED]
 
 
 def test_a_step_to_a_jacobian_that_is_not_finite_is_rejected() -> None:
