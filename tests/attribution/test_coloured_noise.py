@@ -59,7 +59,7 @@ def _estimated(experiment: Experiment) -> Experiment:
     )
 
 
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow)])
 def test_autocorrelated_noise_leads_to_no_effect(seed: int, tmp_path: Path) -> None:
     findings = close_loop(_coupon(tmp_path, seed))
     assert not any(effect.added for effect in findings.effects)
@@ -96,7 +96,7 @@ def _thinned(experiment: Experiment, by: int) -> Experiment:
     return dataclasses.replace(experiment, step=by * experiment.step, runs=tuple(runs))
 
 
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", [pytest.param(0, marks=pytest.mark.slow), 1])
 def test_an_effect_that_a_short_log_confuses_with_slow_noise_is_still_tested(seed: int, tmp_path: Path) -> None:
     whole = _coupon(tmp_path, seed, memory=0.5, name=WEAK)
     # The wire's values are given: an effect this weak is no larger than what a preset leaves open.
@@ -124,6 +124,7 @@ def test_an_effect_that_the_held_out_runs_reject_is_not_named(tmp_path: Path) ->
     assert all(run.rmse_after == run.rmse_before for run in held_out)
 
 
+@pytest.mark.slow  # half a minute; the rejection alone is tested above
 def test_a_right_effect_is_kept_when_the_wrong_one_beside_it_is_rejected(tmp_path: Path) -> None:
     """The same drift beside an effect that is there: the held-out runs reject the drift alone."""
     findings = close_loop(_coupon(tmp_path, 0, trend=20.0, name=LACKING))

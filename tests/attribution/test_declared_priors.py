@@ -96,6 +96,7 @@ def test_values_of_presets_are_as_uncertain_as_the_file_says() -> None:
 
 
 @pytest.mark.usefixtures("blank_pictures")
+@pytest.mark.slow  # a whole loop, for words of the page
 def test_the_record_and_the_page_say_which_priors_the_file_gives(tmp_path: Path) -> None:
     priors = """[effects]
 only = ["latent_heat", "rising_convection"]

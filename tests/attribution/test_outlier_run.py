@@ -49,7 +49,10 @@ def _coupon(folder: Path, wrong: int) -> Experiment:
 TEMPTING = ("drifting_temperatures", "stress_dependent_width", "input_delay", "sensor_lag")
 
 
-@pytest.mark.parametrize(("wrong", "tried"), [(2, TEMPTING), pytest.param(0, None, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("wrong", "tried"),
+    [pytest.param(wrong, tried, marks=pytest.mark.slow) for wrong, tried in ((2, TEMPTING), (0, None))],
+)
 def test_a_run_of_another_wire_is_named(wrong: int, tried: tuple[str, ...] | None, tmp_path: Path) -> None:
     experiment = dataclasses.replace(_coupon(tmp_path, wrong), effects_only=tried)
     name = [run.name for run in experiment.runs if run.role == "fit"][wrong]

@@ -89,6 +89,7 @@ def test_a_gain_that_depends_on_the_step_is_lost_at_half_the_step(setting: Searc
     assert gain_kept_at_half_step(setting, lucky, base) < 0.1
 
 
+@pytest.mark.slow  # a whole loop at two steps
 def test_an_effect_that_needs_a_finer_integration_than_the_base_model_gets_it() -> None:
     """The demo logs at 100 ms; under Liang's conditions its branches end more sharply than those of the base model."""
     experiment = dataclasses.replace(open_experiment(DEMO), effects_only=("liang_conditions",))

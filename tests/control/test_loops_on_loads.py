@@ -41,7 +41,7 @@ def led(system: System, controller: str, millimetres: float, seconds: float, **m
 @pytest.mark.parametrize("controller", BY_READING)
 @pytest.mark.parametrize(
     ("system", "seconds"),
-    [(HANGING, 10.0), (SPRING, 60.0), (OWN, 15.0)],
+    [(HANGING, 10.0), (SPRING, 60.0), pytest.param(OWN, 15.0, marks=pytest.mark.slow)],
     ids=["dead weight", "bias spring", "own"],
 )
 def test_controllers_that_need_the_reading_alone_hold_a_set_point(
@@ -53,7 +53,7 @@ def test_controllers_that_need_the_reading_alone_hold_a_set_point(
     assert np.abs(position[-len(position) // 5 :] - 50.0 * band).max() < band
 
 
-@pytest.mark.parametrize("millimetres", [3.0, 10.0])
+@pytest.mark.parametrize("millimetres", [pytest.param(3.0, marks=pytest.mark.slow), 10.0])
 def test_pid_ends_on_its_set_point(millimetres: float) -> None:
     """Its integral leaves no error: a micrometre, on both loads."""
     assert led(HANGING, "pid", millimetres, 20.0)[-1] == pytest.approx(millimetres, abs=1e-3)
@@ -95,7 +95,9 @@ def test_the_temperature_controller_overshoots_by_less_than_the_vsc_that_is_in_i
     assert beyond[0] < 0.9 * beyond[1]
 
 
-@pytest.mark.parametrize("law", ["tanaka", "liang", "brinson", "enhanced"])
+@pytest.mark.parametrize(
+    "law", [*(pytest.param(law, marks=pytest.mark.slow) for law in ("tanaka", "liang", "brinson")), "enhanced"]
+)
 def test_any_wire_law_and_effects_are_a_plant(law: str) -> None:
     plant = sma.compose(
         "flexinol_table_3_2",
@@ -114,8 +116,18 @@ def test_a_duty_cycle_heats_as_the_voltage_does() -> None:
     np.testing.assert_allclose(led(switched, "pid", 6.0, 20.0), led(SPRING, "pid", 6.0, 20.0), atol=1e-6)
 
 
-@pytest.mark.parametrize("controller", ["pid", "vsc3", "sld", "backstepping2"])
-@pytest.mark.parametrize(("drive", "unit"), [("current", "A"), ("power", "W")])
+@pytest.mark.parametrize(
+    ("drive", "unit", "controller"),
+    [
+        ("current", "A", "vsc3"),
+        ("power", "W", "sld"),
+        *(
+            pytest.param(drive, unit, controller, marks=pytest.mark.slow)
+            for drive, unit, rest in (("current", "A", ("pid", "sld")), ("power", "W", ("pid", "vsc3")))
+            for controller in (*rest, "backstepping2")
+        ),
+    ],
+)
 def test_a_current_source_and_a_power_supply_are_commanded_in_their_own_unit(
     drive: str, unit: str, controller: str
 ) -> None:
