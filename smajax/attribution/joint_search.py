@@ -115,6 +115,7 @@ def search_jointly(search: JointSearch, starts: Mapping[tuple[str, ...], np.ndar
     present = search.best(error)
     error = search.error(present)
     checked: set[tuple[str, ...]] = set()  # models whose effects were removed and replaced one by one
+    left: set[tuple[str, ...]] = set()  # models that were the likeliest before
     for number in range(MOST_ROUNDS):
         search.joint = dataclasses.replace(search.joint, width_factors=present.width_factors)
         linear, traces = _linear(search, present, error)
@@ -123,6 +124,10 @@ def search_jointly(search: JointSearch, starts: Mapping[tuple[str, ...], np.ndar
         if sets:
             _fit(search, sets, linear, traces, error, number)
         best, before = search.best(error), present.log_evidence(error**2)
+        gain = best.log_evidence(error**2) - before
+        if best.effects in left - {present.effects} and gain < SETTLED_ODDS:
+            # Of two that are as likely each is the likelier one seen from the other: what a sample may be off by differs.
+            best = search.fitted[present.effects]
         gains = tuple(
             (effects, search.fitted[effects].log_evidence(error**2) - before, search.fitted[effects].rms)
             for effects in dict.fromkeys(_effects(search, one) for one in sets)
@@ -130,7 +135,9 @@ def search_jointly(search: JointSearch, starts: Mapping[tuple[str, ...], np.ndar
         done = JointRound(error, present.effects, gains, best.effects, best.log_evidence(error**2) - before)
         search.rounds.append(done)
         search.on_round(done)
-        moved, present = best.effects != present.effects, best
+        moved = best.effects != present.effects
+        left |= {present.effects} if moved else set()
+        present = best
         now = search.error(present)
         settled, error = abs(np.log(now / error)) < SETTLED, now
         alike = last and done.best_gain < SETTLED_ODDS

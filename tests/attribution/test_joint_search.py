@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
+from typing import Any
+
 import numpy as np
 import pytest
 
+from smajax.attribution import joint_search
 from smajax.attribution.joint_parameters import JointParameters
 from smajax.attribution.joint_search import PLACES, JointSearch, detectable, search_jointly, starts
 from smajax.attribution.laplace_evidence import fitted_model
@@ -167,3 +171,37 @@ def test_unknowns_of_which_the_runs_show_the_product_alone_end_no_search() -> No
     linear = linear_model(joint, traces, NOISE**2, found)
     assert "latent_heat" in {variant.effect for variant in linear.climb(frozenset())}
     assert all(error > 0.0 for error in base.standard_errors(NOISE**2).values())
+
+
+@dataclasses.dataclass(frozen=True)
+class _Alike:
+    """A model that is likelier than its like by `odds` where a sample may be off by what the other leaves."""
+
+    effects: tuple[str, ...]
+    rms: float
+    odds: float
+    width_factors: dict[str, float] = dataclasses.field(default_factory=dict)
+
+    def log_evidence(self, variance: float) -> float:
+        return self.odds if abs(variance - self.rms**2) > 1e-9 else 0.0
+
+
+@dataclasses.dataclass(frozen=True)
+class _Nothing:
+    width_factors: dict[str, float] = dataclasses.field(default_factory=dict)
+
+
+def test_two_models_that_are_as_likely_do_not_take_turns(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Seen from each the other is the likelier one, by less than a unit: the search ends instead of going from one to the other."""
+    one, other = _Alike(("creep",), 1.0, 0.2), _Alike(("slack",), 1.02, 0.2)
+    search: Any = JointSearch(*([_Nothing()] * 4))  # type: ignore[arg-type]
+    search.fitted = {one.effects: one, other.effects: other}
+    monkeypatch.setattr(joint_search, "independent_error", lambda model, *_: model.rms)
+    monkeypatch.setattr(joint_search, "_grouped", lambda *_: [])
+    monkeypatch.setattr(joint_search, "_fit_side_by_side", lambda *_: None)
+    monkeypatch.setattr(joint_search, "_linear", lambda *_: (None, None))
+    for name in ("_neighbours", "_promising"):
+        monkeypatch.setattr(joint_search, name, lambda *_: [])
+    joint_search.search_jointly(search, {})
+    assert len({done.best for done in search.rounds}) == 1
+    assert len(search.rounds) <= 4
