@@ -83,6 +83,15 @@ def test_where_every_record_is_right_none_is_named() -> None:
     assert record_error(setting, base, base, runs[:2]) is None  # of two that disagree either may be wrong
 
 
+def test_no_record_is_wrong_where_more_is_missing() -> None:
+    """A sensor whose zero drifts in all runs, which nothing that is looked at explains: the error of the record would take its part of it."""
+    setting, base, extended, runs = _searched({}, _early, 0)
+    assert record_error(setting, base, extended, runs) is not None
+    drift = 20.0 * float(setting.problem.noise_sigma) * np.sin(np.linspace(0.0, 9.0, SAMPLES))
+    problem = setting.problem.with_output(jnp.asarray(setting.problem.measured + drift))
+    assert record_error(dataclasses.replace(setting, problem=problem), base, extended, runs) is None
+
+
 def _demo(which: str) -> Experiment:
     with resources.as_file(resources.files("smajax") / "data" / "demo" / which) as folder:
         return load_experiment(folder / "experiment.toml", CATALOGUE)
