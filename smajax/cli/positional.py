@@ -9,6 +9,8 @@ from typing import Any
 
 from typer.core import TyperArgument, TyperCommand
 
+from smajax.cli.log_lines import announce
+
 ORDINALS = ("first", "second", "third")
 
 
@@ -29,7 +31,13 @@ def _argument(name: str, arguments: Sequence[TyperArgument], args: Sequence[str]
 
 
 class Command(TyperCommand):
-    """A command that knows its arguments by their names too, to say where they stand."""
+    """A command that knows its arguments by their names too, to say where they stand, and that begins its log of progress."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """As typer's. A command within a budget runs as a process of its own, which begins the log."""
+        if "out" in ctx.params and ctx.params.get("budget") is None:
+            announce(str(self.name))
+        return super().invoke(ctx)
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Raises what typer raises, with that added to "No such option"."""

@@ -13,13 +13,12 @@ from rich.progress import BarColumn, ProgressColumn, Task, TaskID, TextColumn, T
 from rich.progress import Progress as Bars
 from rich.text import Text
 
+from smajax.cli.log_lines import VARIABLE as VARIABLE
+from smajax.cli.log_lines import line
 from smajax.core.compiling import compilations_reported
 from smajax.core.files import json_line
 from smajax.core.progress import Compiling, Event, Message, Progress, Stage, WarningMessage, event_record
 
-# Where stderr is no terminal nothing is written, so that a program that calls us has a clean one; with `lines` a log of a
-# build has a line for each stage, and with `json` a program reads each event as a line. A person who waits there for minutes is told so, unless the variable is set.
-VARIABLE = "SMAJAX_PROGRESS"
 HOW = f"No terminal here, so progress is not drawn; {VARIABLE}=lines writes a line for each stage, and {VARIABLE}=none leaves this one out."
 COMPILING = "compiling, the first time only"
 
@@ -64,10 +63,10 @@ def _warnings(console: Console) -> Progress:
 
 @contextmanager
 def _lines(console: Console) -> Iterator[Progress]:
-    began, last, compiled = clock.monotonic(), "", "none"
+    last, compiled = "", "none"
 
     def write(text: str) -> None:
-        console.print(f"[{clock.monotonic() - began:6.1f} s] {text}", markup=False, highlight=False, soft_wrap=True)
+        console.print(line(text), markup=False, highlight=False, soft_wrap=True)
 
     def show(event: Event) -> None:
         nonlocal last, compiled

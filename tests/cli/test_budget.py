@@ -50,8 +50,24 @@ def test_a_time_that_is_over_before_the_base_fit_leaves_no_page_and_says_so(tmp_
     ended = smajax(*words)
     assert time.monotonic() - began < 30.0
     assert ended.code == 3
-    assert "before the base model was fitted" in ended.said
+    assert "before the base model was fitted: there is no page, and nothing was finished" in ended.said
+    assert "resumes" not in ended.said
     assert not (tmp_path / "report" / "report.html").exists()
+
+
+def test_a_time_that_is_over_says_that_fits_are_cached_only_where_they_are(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    report = tmp_path / "report"
+    (report / "fits").mkdir(parents=True)
+    (report / "fits" / f"{'0' * 32}.npz").write_bytes(b"")
+    monkeypatch.setattr("smajax.cli.budget.run_within", lambda seconds, words: None)
+    words = ["close-loop", "none.toml", "--out", str(report), "--budget", "1s"]
+    ended = smajax(*words)
+    assert ended.code == 3
+    assert "there is no page, and the same command resumes from the finished fits." in ended.said
+    (report / "report.json").write_text("{}", encoding="utf-8")
+    assert f"the page in {report} is of an earlier run" in " ".join(smajax(*words).said.split())
 
 
 def test_a_command_that_ends_in_time_is_as_without_a_budget() -> None:

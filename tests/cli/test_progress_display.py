@@ -17,6 +17,7 @@ from smajax.cli.main import app
 from smajax.cli.progress_display import VARIABLE, _TimeLeft, displayed
 from smajax.cli.terminal import console
 from smajax.core.progress import Compiling, Event, Message, Progress, Stage, WarningMessage, as_progress, quiet
+from smajax.data.experiment.errors import ExperimentError
 from smajax.engine import program
 
 
@@ -31,6 +32,19 @@ def test_progress_is_silent_without_a_terminal(
         said = capsys.readouterr().err
         assert told in said
         assert bool(said) is bool(told)
+
+
+def test_a_log_begins_with_the_command_before_its_libraries_are_loaded(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    words = ["predict", str(tmp_path / "none.toml"), str(tmp_path / "none.csv"), "--out", str(tmp_path / "out")]
+    for setting, count in (("lines", 1), ("", 0), ("json", 0)):
+        monkeypatch.setenv(VARIABLE, setting)
+        ended = CliRunner().invoke(app, words)
+        assert isinstance(ended.exception, ExperimentError)
+        assert ended.output.count("predict: loading") == count
+    monkeypatch.setenv(VARIABLE, "lines")
+    assert "loading" not in CliRunner().invoke(app, ["predict", "--help"]).output
 
 
 def test_the_hint_how_to_see_progress_is_given_once(
