@@ -1,4 +1,4 @@
-r"""Prediction by the average of the likely models, with a band in which nine of ten measured samples are expected.
+r"""Prediction by the average of the likely models, with a band in which nine of ten measured samples are expected, on average over runs like the fit's.
 
 Every run is predicted by each model whose posterior probability is at least `LEAST_PROBABILITY`, and the predictions are
 averaged with these probabilities (Hoeting et al. 1999). The half-width of the band is

@@ -40,7 +40,7 @@ class PredictedSeries:
     reading: np.ndarray  # of the average of the likely models, with the run's offset
     half_width: np.ndarray  # of the band
     noise: float  # sigma of a sample
-    offset: float  # of the run, that was added to the reading
+    offset: float  # of the run, that was added to the reading: the average of the likely models'
     rmse: float
     coverage: float  # share of the measured samples inside the band
 
@@ -128,13 +128,15 @@ def _prediction(model: ActuatorModel, experiment: Experiment) -> Prediction:
     ]
     readings, variances = (np.stack([getattr(one, name) for one in predicted]) for name in ("reading", "variance"))
     mean, half = averaged_band(readings, variances, weights, missed)
+    # That of the reading, which each model has its own offset in.
+    zero = np.tensordot(weights, np.stack([one.offset for one in predicted]), 1)
     states = states_by_run(simulate_batch(problems[0].system, problems[0].batch), experiment.runs, SHOWN)
     runs = []
     for number, run in enumerate(experiment.runs):
         n = len(run.time)
         rows = range(number * len(experiment.outputs), (number + 1) * len(experiment.outputs))
         series = tuple(
-            _series(output, run, (mean[row, :n], half[row, :n]), known.get(output.name), predicted[0].offset[row])
+            _series(output, run, (mean[row, :n], half[row, :n]), known.get(output.name), zero[row])
             for row, output in zip(rows, experiment.outputs, strict=True)
         )
         own = states[run.name]

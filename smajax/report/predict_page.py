@@ -31,7 +31,7 @@ from smajax.report.pictures import (
     tidy,
 )
 from smajax.report.plain_page import bullets, table, whole
-from smajax.report.predict_words import HEAD, conclusions, diagnostics, pooled, run_rows
+from smajax.report.predict_words import HEAD, band_sentence, conclusions, diagnostics, pooled, run_rows
 
 FILES = ("predict.html", "predict.json", RUNS)
 SHOWN = 6  # runs in the first picture
@@ -162,14 +162,6 @@ def _run(run: PredictedRun) -> dict[str, Any]:
             for one in run.extrapolation
         ],
     }
-
-
-def band_sentence(result: Prediction) -> str:
-    """What the band is made of."""
-    fitted = "Nothing is fitted to these runs, but for the zero of a sensor that has one in each run. "
-    if not any(one.names for one in result.model.likely):
-        return f"{fitted}Nothing in this model was fitted either: the band is the noise's alone, and no range is known beyond which it extrapolates."
-    return f"{fitted}The band is that of the parameters' posterior, of the likely models, and of the error on runs that the fit did not see."
 
 
 def page(result: Prediction, command: str = "") -> str:

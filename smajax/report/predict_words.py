@@ -90,6 +90,19 @@ def extrapolation_sentence(run: PredictedRun, one: Extrapolation) -> str:
     ).replace(" ;", ";")
 
 
+def band_sentence(result: Prediction) -> str:
+    """That nothing was fitted, what the band is made of, and on what its share holds."""
+    fitted = "Nothing was fitted to these runs"
+    if any(one.offset for one in result.model.outputs):
+        fitted += ", but for the zero of a sensor that has its own in each run"
+    if not any(one.names for one in result.model.likely):
+        return f"{fitted}. Nothing in this model was fitted either: the band is the noise's alone, and no range is known beyond which it extrapolates."
+    return (
+        f"{fitted}. The band is that of the parameters' posterior, of the likely models, and of the error on runs that the fit did not see: nine of "
+        "ten samples lie in it on average over runs like the fit's, and in a single run more or fewer."
+    )
+
+
 def run_rows(result: Prediction) -> list[tuple[str, ...]]:
     """A row a run and output, as `HEAD`."""
     rows: list[tuple[str, ...]] = []

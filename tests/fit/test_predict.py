@@ -99,6 +99,22 @@ def test_a_zero_of_the_sensor_is_each_runs_own_only_where_the_model_has_one(tmp_
     assert one.offset == pytest.approx(3e-3, rel=0.02)
 
 
+def test_the_offset_of_an_average_of_models_is_the_average_of_theirs(tmp_path: Path) -> None:
+    single = kept_model()
+    single = dataclasses.replace(single, outputs=(ModelOutput("position", "m", NOISE, True),))
+    first = single.likely[0]
+    other = dataclasses.replace(first, values={**VALUES, "convection_coefficient": 110.0}, probability=0.4)
+    path = log(tmp_path / "run.csv", reading(single) + 3e-3)
+
+    def offset(*likely: LikelyModel) -> float:
+        return sma.predict(dataclasses.replace(single, likely=likely), path).runs[0].series[0].offset
+
+    alone = [offset(dataclasses.replace(one, probability=1.0)) for one in (first, other)]
+    assert abs(alone[1] - alone[0]) > 2.0 * NOISE
+    both = offset(dataclasses.replace(first, probability=0.6), other)
+    assert both == pytest.approx(0.6 * alone[0] + 0.4 * alone[1], rel=1e-9)
+
+
 def test_the_average_of_likely_models_lies_between_them_with_their_difference_in_the_band() -> None:
     readings, variances = np.array([[[0.0, 0.0]], [[1.0, 2.0]]]), np.zeros((2, 1, 2))
     mean, half = averaged_band(readings, variances, np.array([0.75, 0.25]), 0.0)

@@ -41,7 +41,7 @@ def predict_command(
     """Predict measured runs with a fitted model, and show the error, the band and where the model extrapolates.
 
     Columns are those of the logs that the model was fitted to; where a log has others they are guessed, as by `new-experiment`.
-    Nothing is fitted, but for the zero of a sensor that has one in each run.
+    Nothing is fitted, but for the zero of a sensor that has one in each run; it is that of the average of the likely models.
 
     Example:  smajax predict report/model.toml logs/ramp.csv --out predicted
     """
@@ -84,9 +84,9 @@ def predict_command(
 def _print(result: Prediction) -> None:
     """The result for a terminal."""
     from smajax.core.wording import aligned
-    from smajax.report.predict_words import HEAD, conclusions, run_rows
+    from smajax.report.predict_words import HEAD, band_sentence, conclusions, run_rows
 
-    for sentence in conclusions(result):
+    for sentence in (*conclusions(result), band_sentence(result)):
         typer.echo(f"  {sentence}")
     for line in aligned([list(HEAD), *map(list, run_rows(result))]):
         typer.echo(f"  {line}")

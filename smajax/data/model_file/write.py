@@ -64,7 +64,7 @@ def model_text(model: ModelRecord, uncertainty: str = "", sha256: str = "") -> s
         if output.prediction_error is not None:
             error = _quantity(output.prediction_error, output.unit)
             lines.append(
-                f"prediction_error = {error}  # nine of ten samples of runs that the fit did not see stay within"
+                f"prediction_error = {error}  # on average nine of ten samples of runs that the fit did not see stay within"
             )
     for other in model.likely[1:]:
         lines += [
