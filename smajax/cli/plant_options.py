@@ -66,6 +66,16 @@ Changes = Annotated[
 EXAMPLE = "damping=+20%,wire_length='1 m'"
 
 
+def loaded(path: Path) -> ActuatorModel:
+    """The model of a file; stderr says what of it was changed by hand or is not finished. Raises ExperimentError."""
+    from smajax.data.model_file.read import load_model
+
+    model = load_model(path)
+    for sentence in model.warnings:
+        typer.echo(f"note: {sentence}.", err=True)
+    return model
+
+
 @dataclass(frozen=True)
 class PlantOptions:
     """As typed; the defaults are the arm of the source."""
@@ -80,15 +90,13 @@ class PlantOptions:
     @cached_property
     def kept(self) -> ActuatorModel | None:
         """The model of --model. Raises ExperimentError, and typer.BadParameter where presets are named beside it."""
-        from smajax.data.model_file.read import load_model
-
         if self.model is None:
             return None
         if self.wire or self.load or self.drive or self.law:
             raise typer.BadParameter(
                 "says wire, load, drive and law: leave --wire, --load, --drive and --law out.", param_hint="--model"
             )
-        return load_model(self.model)
+        return loaded(self.model)
 
     def draws(self, count: int | None, seed: int, others: bool, limit: float | None = None) -> System | None:
         """Plants from the posterior of the model, stacked; None for none. others: whether mismatches are asked for too. limit: as `system`'s.

@@ -29,6 +29,7 @@ from smajax.control.presets import CONTROLLERS, check_controller
 from smajax.control.reach import reach_of, reach_sentence
 from smajax.control.reference import resting
 from smajax.control.run_result import RunResult, mismatches
+from smajax.control.scales import is_arm
 from smajax.core.display_units import digits
 from smajax.core.names import close_matches
 from smajax.core.parameters import parameter_values
@@ -257,9 +258,20 @@ def _assumed(request: RunRequest, loop: LoopRequest) -> _Assumed:
         noise, source = _noise(request, loop, system)
     own = settings_of(system, merged, noise)
     said = [sentence, source]
-    if loop.gains is not None:
+    if loop.gains is None:
+        said.append(_of_preset(gains.controller, system))
+    else:
         said += sentences({gains.controller: (gains.loop, gains.fixed)}, loop.given, own)
     return _Assumed(system, gains, merged, noise, tuple(one for one in said if one))
+
+
+def _of_preset(controller: str, system: System) -> str:
+    """Whose gains a loop without a file of gains has."""
+    scaled = "" if is_arm(system) else ", scaled from the arm to this load's stroke, force and time"
+    return (
+        f"No gains file: the gains are those of the preset of {controller}{scaled}, and not tuned on this plant; `smajax tune {controller}` "
+        "tunes them, and --gains takes its gains.json."
+    )
 
 
 def _noise(request: RunRequest, loop: LoopRequest, system: System) -> tuple[float, str]:

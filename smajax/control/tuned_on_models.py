@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
@@ -11,7 +12,7 @@ import numpy as np
 from smajax.control.closed_loop import ClosedLoopSetup
 from smajax.control.compiled_loop import measured_loop
 from smajax.control.controllers.base import AbstractController
-from smajax.control.gains_file import Gains
+from smajax.control.gains_file import Gains, fixed_parameters
 from smajax.control.kept_plant import plant_of, within_limit
 from smajax.control.position_unit import PositionUnit, unit_of
 from smajax.control.presets import CONTROLLERS
@@ -91,8 +92,9 @@ def tuned_on_models(
     """`controller` tuned on each of the `models` and on plants from its posterior, and judged on the `plant`, each by its name.
 
     The first model's load has the unit of the set points, mm or deg; by default they are spread over what all the models reach. All
-    have the first model's limit of the command, and the same settings. Each model has the gains that cost least on its own plants, of
-    those that the searches on all the models found: what differs is then the model, and not where a search happened to end.
+    have the first model's limit of the command, its bounds of the gains and its controller's parameters that are not tuned (filter,
+    unwinding time), and the same settings. Each model has the gains that cost least on its own plants, of those that the searches on
+    all the models found. What differs is then what the models say, and neither where a search happened to end nor a time constant.
     Raises ValueError and KeyError as `tune`, and ValueError for set points out of a model's reach.
     """
     first = next(iter(models.values()))
@@ -104,14 +106,14 @@ def tuned_on_models(
         if sentence := reach_sentence(reach_of(assumed), assumed, targets):
             raise ValueError(f"{name}: {sentence}")
     truth = within_limit(first, plant[1].system)
+    shared = _shared(controller, next(iter(every.values())))
     searched: list[tuple[str, System, System | None, TuneSettings, TuningResult]] = []
     for name, model in models.items():
         assumed = every[name]
         drawn = model.plants(PLANTS, seed) if any(one.names for one in model.likely) else None
         plants = None if drawn is None else within_limit(first, drawn)
-        settings = settings_for(
-            assumed, controller, plants, set_points=targets, seconds=seconds, seed=seed, **{**EFFORT, **(effort or {})}
-        )
+        asked = {**EFFORT, **(effort or {}), **shared}
+        settings = settings_for(assumed, controller, plants, set_points=targets, seconds=seconds, seed=seed, **asked)
         searched.append((name, assumed, plants, settings, tune(assumed, settings, plants=plants, progress=progress)))
     pool = [found.after for *_, found in searched]
     tuned = []
@@ -121,6 +123,13 @@ def tuned_on_models(
         loops = tuple(judged(truth, own, float(target), seconds) for target in unit.to_own(np.asarray(targets)))
         tuned.append(TunedOnModel(name, gains, found.units, loops))
     return ControlComparison(controller, plant[0], unit, seconds, tuple(tuned), differing(first, plant[1]))
+
+
+def _shared(controller: str, system: System) -> dict[str, Mapping[str, Any]]:
+    """Fields of `TuneSettings` that this model's plant gives to all: scaled to each they would differ by some per cent."""
+    preset = CONTROLLERS[controller]
+    plant = preset.plant(system)
+    return {"fixed": fixed_parameters(controller, preset.make(plant)), "box": preset.box_on(plant)}
 
 
 def differing(model: ModelRecord, plant: ModelRecord) -> tuple[str, ...]:

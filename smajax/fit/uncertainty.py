@@ -9,6 +9,7 @@ from enum import StrEnum
 import numpy as np
 from scipy.sparse.csgraph import connected_components
 
+from smajax.core.correlation import correlation_of
 from smajax.core.whiteness import WHITE, bartlett_sum, correlation_time, split_runs, whiteness_p_value
 from smajax.core.wording import and_listed
 from smajax.fit.sensitivity import Sensitivity
@@ -142,13 +143,6 @@ def _extents(directions: np.ndarray, scale: np.ndarray, ranges: np.ndarray) -> n
     return np.asarray(extents / np.where(longest > 0.0, longest, 1.0))
 
 
-def _correlation(covariance: np.ndarray) -> np.ndarray:
-    """Correlation matrix; zero where an estimate has no spread."""
-    error = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    error = np.where(error > 0.0, error, 1.0)
-    return np.asarray(covariance / np.outer(error, error))
-
-
 def _clusters(covariance: np.ndarray) -> list[list[int]]:
     """Correlated estimates, directly or through another one: the indices of each group of two or more.
 
@@ -156,7 +150,7 @@ def _clusters(covariance: np.ndarray) -> list[list[int]]:
     """
     if not len(covariance):
         return []
-    count, of = connected_components(np.abs(_correlation(covariance)) > CORRELATED, directed=False)
+    count, of = connected_components(np.abs(correlation_of(covariance)) > CORRELATED, directed=False)
     clusters = [np.flatnonzero(of == cluster).tolist() for cluster in range(count)]
     return [cluster for cluster in clusters if len(cluster) > 1]
 
@@ -281,7 +275,7 @@ def identifiability(
     sentences += [
         f"{name}: the noise alone leaves more than a quarter of its range undetermined." for name in undetermined
     ]
-    correlation = np.abs(_correlation(covariance))
+    correlation = np.abs(correlation_of(covariance))
     for cluster in _clusters(covariance):
         pairs = correlation[np.ix_(cluster, cluster)][np.triu_indices(len(cluster), 1)]
         # Cut and not rounded: 0.9996 is not yet 1.

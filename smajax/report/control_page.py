@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from smajax.control.gains_file import write_gains
+from smajax.control.gains_file import LARGEST, write_gains
 from smajax.control.tuned_on_models import ControlComparison, TunedOnModel
 from smajax.core.display_units import digits, label
 from smajax.core.files import json_text, replace
@@ -160,7 +160,7 @@ def loops_picture(result: ControlComparison, upright: bool = False) -> bytes:
 
 def _settings(result: ControlComparison) -> list[list[str]]:
     """A row a setting of the loop and a parameter that was not tuned, a column a model."""
-    loops = [loop_rows(one.gains.loop) for one in result.tuned]
+    loops = [loop_rows(one.gains.loop, one.gains.fixed.get(LARGEST)) for one in result.tuned]
     rows = [[several[0][0], *(one[1] for one in several)] for several in zip(*loops, strict=True)]
     for name in result.tuned[0].gains.fixed:
         values = [f"{digits(one.gains.fixed[name], 4)} {one.units[name]}" for one in result.tuned]

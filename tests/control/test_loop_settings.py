@@ -15,6 +15,8 @@ from smajax.control.loop_settings import LoopSettings, joined
 from smajax.control.run_request import LoopRequest, RunRequest, run_closed
 from smajax.control.run_result import RunResult
 from smajax.data.model_file.of_presets import model_of_presets
+from smajax.report.loop_words import limit_words
+from smajax.report.simulate_page import settings_rows
 from tests.fit.test_predict import NOISE, kept_model
 from tests.helpers.small_bench import refused, smajax
 
@@ -146,6 +148,30 @@ def test_the_noise_is_that_of_the_model_file_unless_an_option_says_otherwise(gai
     other = run_closed(request, LoopRequest("", "5mm:0.4s", gains, noise="50 um"))
     assert other.loop is not None
     assert other.loop.noise == pytest.approx(5e-5)
+
+
+def test_of_two_limits_of_the_command_the_page_says_which_one_holds() -> None:
+    drive = LoopSettings(command_limit=1000.0, command_unit="V")
+    assert limit_words(drive) == "up to 1000 V"
+    assert limit_words(drive, 8.7) == "up to 8.7 V, the limit of the controller; that of the drive is 1000 V"
+    assert limit_words(drive, 2000.0) == "up to 1000 V, the limit of the drive; that of the controller is 2000 V"
+    assert limit_words(drive, 1000.0) == "up to 1000 V"
+    assert limit_words(LoopSettings(command_unit="A"), 2.0) == "up to 2 A"
+    assert limit_words(LoopSettings()) == "no limit"
+
+
+def test_a_loop_without_a_file_of_gains_says_that_they_are_the_presets(gains: Path) -> None:
+    request = RunRequest(model=kept_model(), dt=0.01, seconds=0.4)
+    own = run_closed(request, LoopRequest("pid", "5mm:0.4s", noise=0.0))
+    said = "the gains are those of the preset of pid, scaled from the arm to this load's stroke, force and time"
+    assert [said in one for one in own.settings] == [False, True]
+    (limit,) = [row[1] for row in settings_rows(own) if row[0] == "limit of the command"]
+    used = json.loads(own.data.attrs["gains"])["largest_voltage"]
+    assert limit.startswith(f"up to {min(used, 5.0):.4g} V")
+    assert not any("preset" in one for one in loop(gains).settings)
+    arm = run_closed(RunRequest(dt=0.01, seconds=0.1), LoopRequest("pid", "40deg:0.1s"))
+    assert "those of the preset of pid, and not tuned" in arm.settings[0]
+    assert settings_rows(arm)[0][1].startswith("up to 10 V, the limit of the controller; that of the drive is 5")
 
 
 def test_a_set_point_out_of_reach_is_told_apart_from_a_controller_that_fails(tmp_path: Path, gains: Path) -> None:

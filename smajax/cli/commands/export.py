@@ -9,7 +9,7 @@ import typer
 
 from smajax.cli.loop_options import Delay, Estimator, Period
 from smajax.cli.options import Json, refused, within
-from smajax.cli.plant_options import Changes, DriveName, LawName, LoadName, ModelFile, PlantOptions, WireName
+from smajax.cli.plant_options import Changes, DriveName, LawName, LoadName, ModelFile, PlantOptions, WireName, loaded
 
 if TYPE_CHECKING:
     from smajax.export.source import CSource
@@ -132,9 +132,8 @@ def _model(file: Path, values: list[str]) -> tuple[System, str]:
     from smajax.cli.options import texts
     from smajax.cli.plant_options import EXAMPLE
     from smajax.control.compose import with_values
-    from smajax.data.model_file.read import load_model
 
-    kept = load_model(file)
+    kept = loaded(file)
     with refused("--set"):
         return with_values(kept.system, texts("--set", values, EXAMPLE)), f"Model of an actuator: {kept.title}"
 

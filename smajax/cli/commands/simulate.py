@@ -12,6 +12,7 @@ import typer
 from smajax.cli import completion
 from smajax.cli.loop_options import Delay, Estimator, Noise, Period
 from smajax.cli.options import Finely, Json, Open, Overwrite, quantity, texts, tolerance_of
+from smajax.cli.plant_options import loaded
 from smajax.cli.terminal import browse, command_line, console, resumable
 
 if TYPE_CHECKING:
@@ -287,7 +288,6 @@ def simulate(
     from smajax.cli.result_folder import check_path, claimed
     from smajax.control.run_request import LoopRequest, RunRequest
     from smajax.core.files import json_text
-    from smajax.data.model_file.read import load_model
     from smajax.report.simulate_page import FILES, record, write_run
 
     check_path(out)
@@ -296,7 +296,7 @@ def simulate(
     options = _Options(step, series, gains, controller, set_point, perturbed, time, gif, plant)
     if model is not None and (wire, load, drive, law) != (WIRE, LOAD, DRIVE, ""):
         raise typer.BadParameter("says wire, load, drive and law: leave these out.", param_hint="--model")
-    kept, true = (None if path is None else load_model(path) for path in (model, plant))
+    kept, true = (None if path is None else loaded(path) for path in (model, plant))
     options.check(load if kept is None else kept.load)
     changed, finely = texts("--set", values, VALUES), tolerance_of(tolerance)
     compared = _inputs("--measured", measured)

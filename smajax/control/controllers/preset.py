@@ -10,7 +10,7 @@ import jax.numpy as jnp
 from smajax.control.controllers.base import AbstractController
 from smajax.control.load_equation import missing_for_equation, missing_for_stroke
 from smajax.control.scales import factors_for, is_arm, scaled
-from smajax.core.parameters import parameters
+from smajax.core.parameters import parameters, set_parameters
 from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.system import System
 from smajax.model.types import Scalar
@@ -47,6 +47,8 @@ class ControllerPreset:
     known: frozenset[str] = frozenset({"believed", "equation"})
     # Gain -> scale -> its power on another load (`control.scales`), in the place of what its unit says; of several the least.
     scales: Mapping[str, Sequence[Mapping[str, int]]] = field(default_factory=dict)
+    # Parameters that do not follow the plant's scales, SI: of a comparison in which several models share them.
+    fixed: Mapping[str, float] = field(default_factory=dict)
 
     def missing(self, system: System) -> str:
         """What it needs and this plant does not give, in words; "" where it can be made."""
@@ -67,11 +69,9 @@ class ControllerPreset:
         if lacking := self.missing(system):
             raise ValueError(f"no controller of a {type(system.load).__name__}: {lacking}.")
         controller = self.on_arm(system)
-        return (
-            controller
-            if is_arm(system)
-            else scaled(controller, factors_for(system, controller, self.scales), self.known)
-        )
+        if not is_arm(system):
+            controller = scaled(controller, factors_for(system, controller, self.scales), self.known)
+        return set_parameters(controller, self.fixed) if self.fixed else controller
 
     def plant(self, system: System) -> System:
         """The plant that runs: an arm as the controller's section has it, any other load as it is."""

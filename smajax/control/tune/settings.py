@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from smajax.control.gains_file import fixed_parameters
 from smajax.control.interface import between_in_words, check_interface, check_set_points
 from smajax.control.plants import Plants, PlantSet, plant_set
 from smajax.control.position_unit import (
@@ -24,6 +25,7 @@ from smajax.control.tune.multistart import Effort
 from smajax.control.tune.objective import REGULATION, Goal
 from smajax.control.tune.scenarios import HELD_OUT, beside, check_variation
 from smajax.control.tune.terms import terms_in
+from smajax.core.names import close_matches
 from smajax.model.system import System
 from smajax.simulation.integration_error import AUTO, Tolerance
 
@@ -55,6 +57,9 @@ class TuneSettings:
     unit: str = "deg"  # as `position_unit.unit_of` the plant
     command: str = "V"  # as the drive's: of chatter
     batch: int = 0  # plants of a batch in the place of the variation
+    # In the place of those that the preset has on this plant, SI: parameters that are not tuned, and bounds of every gain.
+    fixed: Mapping[str, float] = field(default_factory=dict)
+    box: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     @property
     def goal(self) -> Goal:
@@ -91,6 +96,15 @@ class TuneSettings:
         box = CONTROLLERS[self.controller].box
         if self.start and set(self.start) != set(box):
             raise ValueError(f"gains to begin from are {', '.join(box)}, all of them; not {', '.join(self.start)}.")
+        if self.box and set(self.box) != set(box):
+            raise ValueError(f"bounds are of {', '.join(box)}, all of them; not of {', '.join(self.box)}.")
+        preset = CONTROLLERS[self.controller]
+        own = fixed_parameters(self.controller, preset.make(preset.plant(system)))
+        for name in self.fixed:
+            if name not in own:
+                raise ValueError(
+                    f"{self.controller} has no fixed parameter {name!r}{close_matches(name, own, 'there are')}"
+                )
         if self.finish < 0:
             raise ValueError(f"generations without gradients are none or more, not {self.finish}.")
         if self.unseen < 1:
@@ -167,6 +181,8 @@ class TuneSettings:
             "start": dict(self.start),
             "tolerance": self.tolerance,
             **({"plants_of_the_batch": self.batch} if self.batch else {}),
+            **({"fixed": dict(self.fixed)} if self.fixed else {}),
+            **({"box": {name: list(ends) for name, ends in self.box.items()}} if self.box else {}),
         }
 
 

@@ -82,10 +82,13 @@ def problem_of(system: System, settings: TuneSettings, plants: PlantSet | None =
     plants = plant_set(system) if plants is None else plants
     preset = CONTROLLERS[settings.controller]
     plant = preset.plant(system)
+    if settings.fixed:
+        preset = dataclasses.replace(preset, fixed=settings.fixed)
     size = settings.starts * tuned_on(settings.set_points, settings.variation, settings.seed, plants).size
     return TuningProblem(
         preset,
         system,
+        box=settings.box or None,
         seconds=settings.seconds,
         interface=interface_of(plant, settings.estimator, settings.noise, settings.period, STEP, settings.delay),
         seed=settings.seed,

@@ -18,6 +18,7 @@ from smajax.data.experiment.toml_file import Quantity, read_toml, validated
 from smajax.data.experiment.unknowns import bounded
 from smajax.data.model_catalogue import CATALOGUE, check_together
 from smajax.data.model_file.actuator_model import ActuatorModel
+from smajax.data.model_file.edits import CLOSE, without_edits
 from smajax.data.model_file.record import (
     STATE_UNITS,
     FittedRun,
@@ -34,8 +35,6 @@ from smajax.model.presets import build
 from smajax.model.system import System
 from smajax.model.wire.order import disorder
 from smajax.simulation.sensors import sensors_of
-
-CLOSE = 1e-9  # of a value: nearer than that it is the fitted one
 
 
 def load_model(path: str | Path) -> ActuatorModel:
@@ -204,7 +203,8 @@ def _with_uncertainty(path: Path, file: ModelFile, model: ActuatorModel) -> Actu
         kept = read_uncertainty(content)
     except ValueError as error:
         raise ExperimentError(path, "uncertainty", f"{other} ({error}); {remedy}") from None
-    return _with_likely(path, model, _matched(path, file, model, kept))
+    said = _with_likely(path, model, _matched(path, file, model, kept.likely))
+    return without_edits(path, said, kept.written)
 
 
 def _matched(path: Path, file: ModelFile, model: ActuatorModel, kept: list[LikelyModel]) -> list[LikelyModel]:

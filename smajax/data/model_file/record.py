@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Literal
 import jax
 import numpy as np
 
+from smajax.core.correlation import correlation_of, deviations_of
 from smajax.core.parameters import Parameter, parameter_values, parameters, set_parameters
 from smajax.data.experiment.record import Prior
 from smajax.data.experiment.schema import LogFormat
@@ -68,13 +69,12 @@ class LikelyModel:
     @cached_property
     def deviations(self) -> np.ndarray:
         """Standard deviation of each of `names` by the covariance, (K,), SI; 0 where that has none."""
-        return np.asarray(np.sqrt(np.maximum(np.diag(self.covariance), 0.0)))
+        return deviations_of(self.covariance)
 
     @cached_property
     def correlation(self) -> np.ndarray:
         """The covariance over these deviations on either side, (K, K)."""
-        size = np.where(self.deviations > 0.0, self.deviations, 1.0)
-        return np.asarray(self.covariance / np.outer(size, size))
+        return correlation_of(self.covariance)
 
 
 @dataclass(frozen=True)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from io import BytesIO
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 
 from smajax.data.experiment.record import Prior
+from smajax.data.model_file.edits import as_written
 from smajax.data.model_file.record import LikelyModel, ModelRecord
 from smajax.data.model_file.schema import FORMAT
 
@@ -20,6 +22,7 @@ ERRORS = (
 def uncertainty_of(model: ModelRecord) -> xr.Dataset:
     """What is known of the fitted values of each likely model: `value_0`, `covariance_0`, ... along `parameter_0`."""
     result = xr.Dataset(attrs={"title": model.title, "format": FORMAT, "unit": "SI, degC, rad", "errors": ERRORS})
+    result.attrs["written"] = as_written(model)
     for number, one in enumerate(model.likely):
         result.attrs[f"effects_{number}"] = " ".join(one.effects)
         if one.values:
@@ -46,13 +49,20 @@ def _dataset(one: LikelyModel, number: str) -> xr.Dataset:
     return result
 
 
-def read_uncertainty(content: bytes) -> list[LikelyModel]:
-    """The likely models of a NetCDF file, without their probabilities. Raises ValueError for what `uncertainty_of` did not write."""
+class Uncertainty(NamedTuple):
+    """What a NetCDF file holds: the likely models, without their probabilities, and what the text said (`edits.as_written`)."""
+
+    likely: list[LikelyModel]
+    written: str
+
+
+def read_uncertainty(content: bytes) -> Uncertainty:
+    """Raises ValueError for what `uncertainty_of` did not write."""
     try:
         with xr.open_dataset(BytesIO(content), engine="scipy") as dataset:
             dataset.load()
         count = sum(str(name).startswith("effects_") for name in dataset.attrs)
-        return [_likely(dataset, number) for number in range(count)]
+        return Uncertainty([_likely(dataset, number) for number in range(count)], str(dataset.attrs.get("written", "")))
     except (KeyError, ValueError, TypeError, OSError, AssertionError) as error:
         raise ValueError(str(error)) from None
 
