@@ -1,18 +1,24 @@
-"""The plant of a command: options that name its parts, and the system that they mean."""
+"""The plant of a command: options that name its parts, and the system that they mean.
+
+A command takes them as one parameter, `plant: PlantOptions` or `plant: LoopPlants`, and is decorated by `with_plant_options`.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 
 from smajax.cli import completion
-from smajax.cli.options import texts
+from smajax.cli.options import refused, texts
 
 if TYPE_CHECKING:
+    from smajax.control.plants import Plants
     from smajax.control.position_unit import PositionUnit
     from smajax.data.model_file.actuator_model import ActuatorModel
     from smajax.model.system import System
@@ -27,6 +33,13 @@ Drawn = Annotated[
         "--plants",
         min=0,
         help="plants drawn from the posterior of --model, in the place of mismatches; default 16 with --model, 0 for none",
+    ),
+]
+OtherPlant = Annotated[
+    Path | None,
+    typer.Option(
+        "--plant",
+        help="closed loops on this other model file, whose controller knows --model (or wire, load and drive)",
     ),
 ]
 DRAWN = 16
@@ -80,12 +93,12 @@ def loaded(path: Path) -> ActuatorModel:
 class PlantOptions:
     """As typed; the defaults are the arm of the source."""
 
-    wire: str = ""
-    load: str = ""
-    drive: str = ""
-    law: str = ""
-    values: list[str] = field(default_factory=list)
-    model: Path | None = None
+    wire: WireName = ""
+    load: LoadName = ""
+    drive: DriveName = ""
+    law: LawName = ""
+    values: Changes = None
+    model: ModelFile = None
 
     @cached_property
     def kept(self) -> ActuatorModel | None:
@@ -98,49 +111,9 @@ class PlantOptions:
             )
         return loaded(self.model)
 
-    def draws(self, count: int | None, seed: int, others: bool, limit: float | None = None) -> System | None:
-        """Plants from the posterior of the model, stacked; None for none. others: whether mismatches are asked for too. limit: as `system`'s.
-
-        Raises typer.BadParameter for plants without a model, or of one of which nothing was fitted.
-        """
-        if self.kept is None:
-            if count:
-                raise typer.BadParameter("are drawn from a model's posterior: give --model.", param_hint="--plants")
-            return None
-        if others and count:
-            raise typer.BadParameter(
-                "plants are drawn, or differ by mismatches: give one of the two.", param_hint="--plants"
-            )
-        fitted = any(one.names for one in self.kept.likely)
-        if count and not fitted:
-            raise typer.BadParameter(
-                f"{self.model} has no covariance of fitted values, so that nothing can be drawn: leave it out.",
-                param_hint="--plants",
-            )
-        wanted = (0 if others or not fitted else DRAWN) if count is None else count
-        if not wanted:
-            return None
-        import numpy as np
-
-        from smajax.control.kept_plant import with_limit, within_limit
-        from smajax.core.parameters import parameter_values, parameters, set_parameters
-
-        plants = self.kept.plants(wanted, seed)
-        plants = within_limit(self.kept, plants) if limit is None else with_limit(plants, limit)
-        if not self._changed:
-            return plants
-        own, changed = self.kept.values, parameter_values(self.system(limit, said=False))
-        values = {name: value for name, value in changed.items() if value != own.get(name) or name in self._changed}
-        if new := sorted(values.keys() - parameters(plants).keys()):
-            raise typer.BadParameter(
-                f"{new[0]} is of an effect that the model has not: with --set of it give --plants 0.",
-                param_hint="--plants",
-            )
-        return set_parameters(plants, {name: np.full(wanted, value) for name, value in values.items()})
-
     @property
     def _changed(self) -> dict[str, str]:
-        return texts("--set", self.values, EXAMPLE)
+        return texts("--set", self.values or (), EXAMPLE)
 
     def bare(self) -> System:
         """The plant, whose command has the limit of its drive. Raises as `system`."""
@@ -199,6 +172,90 @@ class PlantOptions:
             return typed, ""
         own, sentence = noise_of_file(self.kept)
         return float(f"{float(unit.of(own)):.6g}"), sentence
+
+
+@dataclass(frozen=True)
+class LoopPlants(PlantOptions):
+    """The plant that controllers assume, and those that their closed loops run on."""
+
+    drawn: Drawn = None
+    plant: OtherPlant = None
+
+    def plants(self, seed: int, others: bool, limit: float | None = None) -> Plants | None:
+        """The plant of --plant, or plants from the posterior of the model; None for none. others: whether mismatches are asked for too.
+
+        limit: as `system`'s. Raises typer.BadParameter for plants without a model, or of one of which nothing was fitted, and for a plant
+        with another wire's law, load or drive.
+        """
+        if self.plant is None:
+            return self._draws(self.drawn, seed, others, limit)
+        if others or self.drawn:
+            raise typer.BadParameter(
+                "is one plant in the place of drawn ones and of mismatches: give one of these.", param_hint="--plant"
+            )
+        from smajax.control.kept_plant import one_plant
+
+        with refused("--plant"):
+            return one_plant(loaded(self.plant), self.system(limit, said=False))
+
+    def _draws(self, count: int | None, seed: int, others: bool, limit: float | None) -> System | None:
+        """As `plants`, stacked."""
+        if self.kept is None:
+            if count:
+                raise typer.BadParameter("are drawn from a model's posterior: give --model.", param_hint="--plants")
+            return None
+        if others and count:
+            raise typer.BadParameter(
+                "plants are drawn, or differ by mismatches: give one of the two.", param_hint="--plants"
+            )
+        fitted = any(one.names for one in self.kept.likely)
+        if count and not fitted:
+            raise typer.BadParameter(
+                f"{self.model} has no covariance of fitted values, so that nothing can be drawn: leave it out.",
+                param_hint="--plants",
+            )
+        wanted = (0 if others or not fitted else DRAWN) if count is None else count
+        if not wanted:
+            return None
+        import numpy as np
+
+        from smajax.control.kept_plant import with_limit, within_limit
+        from smajax.core.parameters import parameter_values, parameters, set_parameters
+
+        plants = self.kept.plants(wanted, seed)
+        plants = within_limit(self.kept, plants) if limit is None else with_limit(plants, limit)
+        if not self._changed:
+            return plants
+        own, changed = self.kept.values, parameter_values(self.system(limit, said=False))
+        values = {name: value for name, value in changed.items() if value != own.get(name) or name in self._changed}
+        if new := sorted(values.keys() - parameters(plants).keys()):
+            raise typer.BadParameter(
+                f"{new[0]} is of an effect that the model has not: with --set of it give --plants 0.",
+                param_hint="--plants",
+            )
+        return set_parameters(plants, {name: np.full(wanted, value) for name, value in values.items()})
+
+
+def with_plant_options(command: Callable[..., None]) -> Callable[..., None]:
+    """`command` for typer, with the options of its plant in the place of its parameter `plant`, whose annotation has them as fields."""
+    own = inspect.signature(command, eval_str=True)
+    group = own.parameters["plant"].annotation
+    types, names = get_type_hints(group, include_extras=True), [one.name for one in fields(group)]
+    options = [
+        inspect.Parameter(one.name, inspect.Parameter.KEYWORD_ONLY, default=one.default, annotation=types[one.name])
+        for one in fields(group)
+    ]
+
+    def run(**given: Any) -> None:
+        command(plant=group(**{name: given.pop(name) for name in names}), **given)
+
+    several: list[inspect.Parameter] = []
+    for name, one in own.parameters.items():
+        several += options if name == "plant" else [one.replace(kind=inspect.Parameter.KEYWORD_ONLY)]
+    run.__name__, run.__doc__, run.__module__ = command.__name__, command.__doc__, command.__module__
+    run.__signature__ = inspect.Signature(several)  # type: ignore[attr-defined]
+    run.__annotations__ = {one.name: one.annotation for one in several}
+    return run
 
 
 def set_points_of(plant: System, text: str | None, fast: bool) -> dict[str, tuple[float, ...]]:

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from typing import Any
+
+import jax
+import numpy as np
 
 from smajax.control.compose import with_values
 from smajax.control.loop_settings import LIMIT_PARAMETER
 from smajax.control.presets import CONTROLLERS
 from smajax.core.display_units import digits, display
-from smajax.core.parameters import get_parameters, parameters, set_parameters
+from smajax.core.parameters import get_parameters, parameter_values, parameters, set_parameters
 from smajax.data.model_file.record import ModelRecord
+from smajax.model.extended import with_effects
 from smajax.model.system import System
 
 
@@ -86,6 +91,11 @@ def true_plant(model: ModelRecord, changed: Mapping[str, str | float], assumed: 
 
     Raises ValueError for one with another load or drive than that system.
     """
+    return CONTROLLERS[controller].plant(_on_bench(model, changed, assumed))
+
+
+def _on_bench(model: ModelRecord, changed: Mapping[str, str | float], assumed: System) -> System:
+    """The model's system with the limit of the assumed one. Raises as `true_plant`."""
     plant = with_values(model.system, changed)
     for part in ("load", "drive"):
         own, other = (type(getattr(one, part)).__name__ for one in (assumed, plant))
@@ -95,4 +105,22 @@ def true_plant(model: ModelRecord, changed: Mapping[str, str | float], assumed: 
                 f"the same {part}, or a controller's model of {getattr(model, part)}."
             )
     limit = float(assumed.drive.largest_command())
-    return CONTROLLERS[controller].plant(plant if gives_limit(changed) else with_limit(plant, limit))
+    return plant if gives_limit(changed) else with_limit(plant, limit)
+
+
+def one_plant(model: ModelRecord, assumed: System) -> dict[str, np.ndarray]:
+    """The plant of a model file as a batch of one (`plants.Plants`): what it has otherwise than the assumed system, (1,) each, SI.
+
+    Raises ValueError as `true_plant`, and for a wire with another kinetics law.
+    """
+    names = [one.effect_name for one in (*assumed.effects, *model.system.effects)]
+    plant, assumed = (with_effects(one, names) for one in (_on_bench(model, {}, assumed), assumed))
+    kinds: list[Any] = [jax.tree.structure(one) for one in (plant, assumed)]
+    if kinds[0] != kinds[1]:
+        raise ValueError(
+            f"the wire of the plant ({model.wire}) has another kinetics law than that of the controller's model: loops of many plants run one "
+            "program; give a plant with the same law (--law), or use `smajax simulate --plant`."
+        )
+    own, values = parameter_values(assumed), parameter_values(plant)
+    differ = {name: value for name, value in values.items() if value != own[name]} or dict([next(iter(own.items()))])
+    return {name: np.asarray([value]) for name, value in differ.items()}

@@ -8,9 +8,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import smajax as sma
+from smajax.cli.plant_options import LoopPlants
 from smajax.control.kept_plant import plant_of
+from smajax.control.tune.scenarios import held_out, tuned_on
+from smajax.control.tune.settings import settings_for
+from smajax.data.model_file.actuator_model import ActuatorModel
+from smajax.data.model_file.of_presets import model_of_presets
+from smajax.data.model_file.record import ModelParameter
 from tests.fit.test_predict import NOISE, kept_model, log, reading
 from tests.helpers.small_bench import refused, smajax
 
@@ -80,7 +87,7 @@ def test_gains_are_tuned_and_compared_on_plants_from_the_posterior(tmp_path: Pat
     assert record["loop"] == written["loop"]
     assert record["fixed"] == written["fixed"]
     page = (tmp_path / "tuned" / "tune.html").read_text(encoding="utf-8")
-    assert "up to 5 V" in page
+    assert "the limit of the controller; that of the drive is 5 V" in page
     assert "0.1 mm of noise" in page
     ended = smajax("simulate", "--model", model, "--gains", gains, "--set-point", "5mm:4s", "--out", tmp_path / "loop")
     assert ended.code == 0, ended.said
@@ -120,3 +127,60 @@ def test_an_input_that_the_models_logs_had_and_a_run_has_not_is_said(tmp_path: P
     assert "fitted to runs with their own mass, 0.5 to 1 kg; here it is load_mass, 0.075. Give --input mass=..." in said
     assert "their own mass" not in smajax(*step, "--input", "mass=0.6kg", "--out", tmp_path / "with").said
     assert "their own mass" not in smajax(*step, "--set", "load_mass=0.6 kg", "--out", tmp_path / "set").said
+
+
+def hotter_model() -> ActuatorModel:
+    """`kept_model` with a stronger convection and with radiation, which the kept model lacks."""
+    kept = kept_model()
+    radiating = ModelParameter(0.8, "given", 0.0, 1.0)
+    cooled = dataclasses.replace(kept.parameters["convection_coefficient"], value=120.0, origin="given")
+    parameters = {**kept.parameters, "convection_coefficient": cooled, "radiation.emissivity": radiating}
+    return dataclasses.replace(kept, effects=("radiation",), parameters=parameters, likely=(), title="hotter")
+
+
+def test_loops_of_a_sweep_run_on_the_plant_of_another_file(tmp_path: Path, model: Path) -> None:
+    plant = hotter_model().save(tmp_path / "plant.toml")
+    loop: list[str | Path] = ["--model", model, "--plant", plant, "--noise", "0", "--seconds", "8"]
+    words = ["--controllers", "pid", "--set-point", "5mm", "--gain-ratios", "1", "--tolerance", "none"]
+    ended = smajax("sweep", *loop, *words, "--out", tmp_path / "swept")
+    assert ended.code == 0, ended.said
+    record = json.loads((tmp_path / "swept" / "sweep.json").read_text(encoding="utf-8"))
+    assert record["sweep"]["plants"] == {"convection_coefficient": [120.0], "radiation.emissivity": [0.8]}
+    with xr.open_dataset(tmp_path / "swept" / "sweep.nc") as data:
+        energy = float(np.ravel(data["energy"])[0])
+    one = ["--controller", "pid", "--set-point", "5mm:8s", "--dt", "10ms", "--tolerance", "none", "--json"]
+    ended = smajax("simulate", *loop[:-2], *one, "--out", tmp_path / "one")
+    assert ended.code == 0, ended.said
+    assert energy == pytest.approx(json.loads(ended.out)["merit"]["energy"]["value"], rel=1e-6)
+
+
+def test_gains_are_tuned_on_the_plant_of_another_file_too_and_checked_on_it(tmp_path: Path, model: Path) -> None:
+    options = LoopPlants(model=model, plant=hotter_model().save(tmp_path / "plant.toml"))
+    plants = options.plants(0, others=False)
+    settings = settings_for(options.system(said=False), "pid", plants, set_points=(5.0, 10.0))
+    found = settings.check(options.system(said=False), plants)
+    assert settings.plants_sentence() == "the plant as believed and another one; set points 5 mm, 10 mm"
+    assert settings.held_out_sentence() == "set points between those tuned, the other plant"
+    seen = tuned_on(settings.set_points, {}, 0, found)
+    convection = found.columns.index("convection_coefficient")
+    assert sorted(zip(seen.rows[:, convection], seen.targets, strict=True)) == [
+        (90.0, 0.005),
+        (90.0, 0.01),
+        (120.0, 0.005),
+        (120.0, 0.01),
+    ]
+    unseen = held_out(settings.set_points, {}, 4, 0, found)["inside"]
+    assert list(zip(unseen.rows[:, convection], unseen.targets, strict=True)) == [(120.0, 0.0075)]
+
+
+def test_one_other_plant_is_in_the_place_of_drawn_ones_and_of_mismatches(tmp_path: Path, model: Path) -> None:
+    plant = hotter_model().save(tmp_path / "plant.toml")
+    tune: list[str | Path] = ["tune", "pid", "--set-point", "5mm", "--out", tmp_path / "out", "--model", model]
+    assert "is one plant in the place of" in refused(*tune, "--plant", plant, "--plants", "4")
+    assert "is one plant in the place of" in refused(*tune, "--plant", plant, "--variation", "damping=20%")
+    arm = model_of_presets("niti_table_3_1", "arm", "amplified_voltage").save(tmp_path / "arm.toml")
+    assert "the plant has the load Arm" in refused(*tune, "--plant", arm)
+    law = model_of_presets("flexinol_table_3_2", "dead_weight", "flexinol_voltage", "tanaka")
+    said = refused(*tune, "--plant", law.save(tmp_path / "law.toml"))
+    assert "has another kinetics law than that of the controller's model" in said
+    assert not (tmp_path / "out").exists()

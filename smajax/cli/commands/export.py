@@ -9,7 +9,7 @@ import typer
 
 from smajax.cli.loop_options import Delay, Estimator, Period
 from smajax.cli.options import Json, refused, within
-from smajax.cli.plant_options import Changes, DriveName, LawName, LoadName, ModelFile, PlantOptions, WireName, loaded
+from smajax.cli.plant_options import PlantOptions, loaded, with_plant_options
 
 if TYPE_CHECKING:
     from smajax.export.source import CSource
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 
 # More than 8 parameters: typer reads the options from them.
+@with_plant_options
 def export(
     file: Annotated[
         Path,
@@ -28,12 +29,8 @@ def export(
         typer.Option(help="the .fmu file, or the folder of the C; default: named after FILE, here"),
     ] = None,
     fmi: Annotated[str, typer.Option(help="version of the interface of an FMU: 2.0 or 3.0")] = "2.0",
-    wire: WireName = "",
-    load: LoadName = "",
-    drive: DriveName = "",
-    law: LawName = "",
-    values: Changes = None,
-    model: ModelFile = None,
+    *,
+    plant: PlantOptions,
     estimator: Estimator = None,
     period: Period = None,
     delay: Delay = None,
@@ -71,7 +68,6 @@ def export(
     path = out or (Path(f"{stem}.fmu") if to == "fmu" else Path(f"{stem}_c"))
     name = identifier(path.stem if to == "fmu" else stem)
     check_free([path] if to == "fmu" else c_paths(path, name), overwrite)
-    plant = PlantOptions(wire, load, drive, law, values or [], model)
     source = _source(file, plant, name, estimator, period, delay, tolerance)
     if to == "fmu":
         written = [write_fmu(source, path, fmi, not source_only, overwrite)]
@@ -123,7 +119,7 @@ def _source(
             "what --set changes.",
             param_hint="FILE",
         )
-    system, title = _model(file, plant.values)
+    system, title = _model(file, plant.values or [])
     return plant_source(system, name, title, tolerance)
 
 

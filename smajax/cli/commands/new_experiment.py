@@ -72,7 +72,7 @@ def new_experiment(
     What is left to the presets is listed by how much it changes the outputs of the runs. With three logs or more the last one is held
     out. Exit code 3 when the file cannot be loaded yet, with what is missing.
 
-    Example:  smajax new-experiment logs/step1.csv logs/step2.csv logs/ramp.csv --out experiment.toml
+    Example:  smajax new-experiment logs/steps.csv logs/triangle.csv logs/pulses.csv logs/ramp.csv --out experiment.toml
 
     Example:  smajax new-experiment logs/*.csv --known wire_length='0.5 m',wire_diameter='0.31 mm' --ohms 4.2ohm --mass ramp='500 g'
     """

@@ -12,7 +12,7 @@ import typer
 from smajax.cli import completion
 from smajax.cli.loop_options import Delay, Estimator, Noise, Period
 from smajax.cli.options import Finely, Json, Open, Overwrite, quantity, texts, tolerance_of
-from smajax.cli.plant_options import loaded
+from smajax.cli.plant_options import OtherPlant, loaded
 from smajax.cli.terminal import browse, command_line, console, resumable
 
 if TYPE_CHECKING:
@@ -243,12 +243,7 @@ def simulate(
             autocompletion=completion.values,
         ),
     ] = None,
-    plant: Annotated[
-        Path | None,
-        typer.Option(
-            help="a closed loop on this other model file, whose controller knows --model (or wire, load and drive)"
-        ),
-    ] = None,
+    plant: OtherPlant = None,
     estimator: Estimator = None,
     noise: Noise = "",
     period: Period = None,

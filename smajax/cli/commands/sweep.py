@@ -23,17 +23,7 @@ from smajax.cli.options import (
     understood,
     within,
 )
-from smajax.cli.plant_options import (
-    Changes,
-    Drawn,
-    DriveName,
-    LawName,
-    LoadName,
-    ModelFile,
-    PlantOptions,
-    WireName,
-    set_points_of,
-)
+from smajax.cli.plant_options import LoopPlants, PlantOptions, set_points_of, with_plant_options
 from smajax.cli.terminal import browse, command_line, console, resumable
 
 if TYPE_CHECKING:
@@ -119,6 +109,7 @@ def _sentences(tuned: Sequence[Gains], given: LoopSettings, plant: System, setti
 
 
 # More than 8 parameters and 80 lines: typer reads the options from them.
+@with_plant_options
 def sweep(
     controllers: Annotated[
         str | None,
@@ -128,13 +119,8 @@ def sweep(
             autocompletion=completion.several_controllers,
         ),
     ] = None,
-    wire: WireName = "",
-    load: LoadName = "",
-    drive: DriveName = "",
-    law: LawName = "",
-    values: Changes = None,
-    model: ModelFile = None,
-    drawn: Drawn = None,
+    *,
+    plant: LoopPlants,
     over: Annotated[
         str | None,
         typer.Option(
@@ -185,7 +171,7 @@ def sweep(
 ) -> None:
     """Run controllers on perturbed plants, and compare them on every set point.
 
-    By default on the arm of the source; with --model on a fitted model, and on plants drawn from its posterior; with --wire, --load and --drive on any load that moves, where the gains are those of the
+    By default on the arm of the source; with --model on a fitted model, and on plants drawn from its posterior; with --plant on the one of that file; with --wire, --load and --drive on any load that moves, where the gains are those of the
     arm scaled to the load's stroke, force and time and to the drive's limit.
 
     After Ctrl-C the same command resumes with the controllers that are not finished.
@@ -215,23 +201,22 @@ def sweep(
     from smajax.report.sweep_folder import as_text, files_of, write_sweep
     from smajax.report.sweep_page import Remarks, answer
 
-    plant_options = PlantOptions(wire, load, drive, law, values or [], model)
-    tuned = _tuned(tuple(gains or ()), plant_options)
+    tuned = _tuned(tuple(gains or ()), plant)
     given = LoopSettings(period=period, delay=delay, estimator=estimator)
     with refused():
         loop = joined({one.controller: one.loop for one in tuned}, given)
-    plant = plant_options.system(loop.command_limit)
-    plants = plant_options.draws(drawn, SEED, others=over is not None, limit=loop.command_limit)
+    assumed = plant.system(loop.command_limit)
+    plants = plant.plants(SEED, others=over is not None, limit=loop.command_limit)
     with refused():
-        sigma, source = plant_options.noise(noise, unit_of(plant))
+        sigma, source = plant.noise(noise, unit_of(assumed))
     between: dict[str, Any] = {"period": loop.period, "delay": loop.delay, "estimator": loop.estimator, "noise": sigma}
     between |= {} if seconds is None else {"seconds": seconds}
     options = _Options(controllers, over, points, set_points, gain_ratios, fast)
-    settings = options.settings(plant, tuned, tolerance=tolerance_of(tolerance), **between)
+    settings = options.settings(assumed, tuned, tolerance=tolerance_of(tolerance), **between)
     with refused():
-        settings.check(plant, plants)
-    said = tuple(one for one in (source, *_sentences(tuned, given, plant, settings)) if one)
-    out_of_reach = tuple(one for one in [reach_sentence(reach_of(plant), plant, settings.set_points)] if one)
+        settings.check(assumed, plants)
+    said = tuple(one for one in (source, *_sentences(tuned, given, assumed, settings)) if one)
+    out_of_reach = tuple(one for one in [reach_sentence(reach_of(assumed), assumed, settings.set_points)] if one)
     for sentence in (
         understood("Set points", set_points, settings.set_points, settings.unit),
         understood("Ratios of the main gain", gain_ratios, settings.gain_ratios),
@@ -241,8 +226,8 @@ def sweep(
         if sentence and not json_out:
             typer.echo(sentence, err=True)
     request = settings.record()
-    if not is_arm(plant) or law or values or loop.command_limit is not None:
-        request["plant"] = digest(plant)[:16]
+    if not is_arm(assumed) or plant.law or plant.values or loop.command_limit is not None:
+        request["plant"] = digest(assumed)[:16]
     if plants is not None:
         request["plants"] = digest(plants)[:16]
     resume = "Finished controllers are cached: the same command resumes."
@@ -252,9 +237,9 @@ def sweep(
             claimed(out, "sweep", request, files_of(settings.controllers), overwrite, may_resume),
             displayed(console(), hint=not json_out) as progress,
         ):
-            sweeps = sweep_controllers(plant, settings, out, progress, plants)
+            sweeps = sweep_controllers(assumed, settings, out, progress, plants)
             results = write_sweep(
-                plant, settings, sweeps, out, progress, command_line(), plants, Remarks(out_of_reach, said)
+                assumed, settings, sweeps, out, progress, command_line(), plants, Remarks(out_of_reach, said)
             )
     except FolderTaken:
         raise

@@ -25,21 +25,12 @@ from smajax.cli.options import (
     understood,
     within,
 )
-from smajax.cli.plant_options import (
-    Changes,
-    Drawn,
-    DriveName,
-    LawName,
-    LoadName,
-    ModelFile,
-    PlantOptions,
-    WireName,
-    set_points_of,
-)
+from smajax.cli.plant_options import LoopPlants, set_points_of, with_plant_options
 from smajax.cli.terminal import browse, command_line, console, resumable
 
 if TYPE_CHECKING:
     from smajax.control.gains_file import Gains
+    from smajax.control.plants import Plants
     from smajax.control.tune.settings import TuneSettings
     from smajax.model.system import System
 
@@ -95,7 +86,7 @@ def _variation(several: Sequence[str] | None, plant: System) -> dict[str, float]
 
 
 def _run(
-    plant: System, settings: TuneSettings, plants: System | None, out: Path, overwrite: bool, json_out: bool
+    plant: System, settings: TuneSettings, plants: Plants | None, out: Path, overwrite: bool, json_out: bool
 ) -> Mapping[str, Any]:
     """The record of the tuning, from the folder where it is finished there. Raises typer.BadParameter."""
     from smajax.cli.progress_display import displayed
@@ -128,6 +119,7 @@ def _run(
 
 
 # More than 8 parameters and 80 lines: typer reads the options from them.
+@with_plant_options
 def tune(
     controller: Annotated[
         str,
@@ -136,13 +128,7 @@ def tune(
             autocompletion=completion.controllers,
         ),
     ],
-    wire: WireName = "",
-    load: LoadName = "",
-    drive: DriveName = "",
-    law: LawName = "",
-    values: Changes = None,
-    model: ModelFile = None,
-    drawn: Drawn = None,
+    plant: LoopPlants,
     set_points: Annotated[
         str | None,
         typer.Option(
@@ -211,7 +197,8 @@ def tune(
 ) -> None:
     """Tune the gains of a controller on many set points and plants at once: by gradient, then by CMA-ES.
 
-    By default on the arm of the source; with --model on a fitted model, and then on plants drawn from its posterior; with --wire, --load and --drive on any load that moves, where the gains and their bounds
+    By default on the arm of the source; with --model on a fitted model, and then on plants drawn from its posterior; with --plant on the plant that the
+    controller assumes and on the one of that file; with --wire, --load and --drive on any load that moves, where the gains and their bounds
     are those of the arm scaled to the load's stroke, force and time and to the drive's limit.
 
     Each closed loop is one step from the start, cold and at rest. Moves between the set points are simulated at the end. The
@@ -237,13 +224,12 @@ def tune(
     from smajax.control.tune.terms import terms_in
     from smajax.report.tune_page import gain_rows
 
-    options = PlantOptions(wire, load, drive, law, values or [], model)
-    plant, plants = options.system(), options.draws(drawn, seed, others=bool(variation))
+    assumed, plants = plant.system(), plant.plants(seed, others=bool(variation))
     with refused():
-        unit = unit_of(plant)
-    initial = _initial_gains(start, controller, plant)
+        unit = unit_of(assumed)
+    initial = _initial_gains(start, controller, assumed)
     units = {name: term.unit for name, term in terms_in(unit).items()}
-    sigma, source = options.noise(noise, unit)
+    sigma, source = plant.noise(noise, unit)
     given: dict[str, Any] = {
         "weights": pairs("--weights", weights, {}, "settling_time=1,overshoot=1") or None,
         "seconds": seconds,
@@ -254,17 +240,17 @@ def tune(
         **_Search(starts, rounds, finish, fast).effort(),
     }
     settings = settings_for(
-        plant,
+        assumed,
         controller,
         plants,
-        variation=_variation(variation, plant),
+        variation=_variation(variation, assumed),
         objective=objective,
         limits=pairs("--limits", limits, units, "settling_time=4,overshoot=2deg"),
         by=by,
         noise=sigma,
         seed=seed,
         tolerance=tolerance_of(tolerance),
-        **set_points_of(plant, set_points, fast),
+        **set_points_of(assumed, set_points, fast),
         **{name: one for name, one in given.items() if one is not None},
     )
     if source and not json_out:
@@ -272,7 +258,7 @@ def tune(
     sentence = understood("Set points", set_points, settings.set_points, unit.shown)
     if sentence and not json_out:
         typer.echo(sentence, err=True)
-    record = _run(plant, settings, plants, out, overwrite, json_out)
+    record = _run(assumed, settings, plants, out, overwrite, json_out)
     page = out / "tune.html"
     for sentence in record["price"]:
         typer.echo(sentence, err=True)

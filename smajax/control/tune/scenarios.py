@@ -124,12 +124,12 @@ def held_out(
     """What tuning never saw, by name: `inside`, set points that were not tuned, on plants drawn within the variation; and `beyond`.
 
     Beyond: at the set points tuned, each mismatch that was not varied wrong by 20 % alone. Of a batch of plants `inside` has the
-    plants that were held out, or where there are fewer than four the plant as believed, and there is no `beyond`.
+    plants that were held out, or where there are fewer than four all of them, and there is no `beyond`.
     """
     where = between(targets, plants.unit)
     if plants.batch is not None:
         unseen = _batch(plants, True)[:count]
-        return {"inside": _crossed(unseen if len(unseen) else plants.nominal[None], where, plants)}
+        return {"inside": _crossed(unseen if len(unseen) else plants.batch, where, plants)}
     others = [name for name in plants.columns if name not in variation]
     inside = _drawn(variation, count, seed + UNSEEN) if variation else [{}]
     result = {"inside": _crossed(_changed(inside, plants), where, plants)}

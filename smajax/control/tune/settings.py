@@ -127,7 +127,8 @@ class TuneSettings:
         wrong = [f"{name} ±{size}" for name, size in sizes.items()]
         plants = f"the plant as believed and with {', '.join(wrong)} at once" if wrong else "the plant as believed"
         if self.batch:
-            plants = f"the plant as believed and three of every four of a batch of {self.batch}"
+            several = f"three of every four of a batch of {self.batch}" if self.batch >= HELD_OUT else "the others"
+            plants = f"the plant as believed and {'another one' if self.batch == 1 else several}"
         return f"{plants}; set points {', '.join(f'{point:g}{self.shown.symbol}' for point in self.set_points)}"
 
     def held_out_sentence(self) -> str:
@@ -137,6 +138,8 @@ class TuneSettings:
             where = f"a set point {beside(self.set_points[0], self.shown):.3g}{self.shown.symbol} beside"
         if self.batch >= HELD_OUT:
             return f"every fourth plant of the batch, {where}"
+        if self.batch:
+            return f"{where}, {'the other plant' if self.batch == 1 else 'the other plants'}"
         return f"plants within the variation, {where}" if self.variation else f"{where}, the plant as believed"
 
     def goal_sentence(self) -> str:
