@@ -59,8 +59,8 @@ def test_logs_become_a_model_a_prediction_and_a_controller_on_the_true_plant(tmp
     ended = smajax("tune", "pid", "--model", report, "--set-point", "4mm,12mm", *effort, "--out", tuned)
     assert ended.code == 0, ended.said
 
-    loop = ["--model", report, "--plant", DEMO / "true_model.toml", "--gains", tuned / "gains.json"]
-    words = ["--set-point", "12mm:20s", "--json", "--out", tmp_path / "loop"]
+    loop: list[str | Path] = ["--model", report, "--plant", DEMO / "true_model.toml", "--gains", tuned / "gains.json"]
+    words: list[str | Path] = ["--set-point", "12mm:20s", "--json", "--out", tmp_path / "loop"]
     ended = smajax("simulate", *loop, *words)
     assert ended.code == 0, ended.said
     record = json.loads(ended.out)
