@@ -13,10 +13,12 @@ from smajax.cli.progress_display import displayed
 from smajax.core.runtime import prepare
 from smajax.data.experiment.load import load_experiment
 from smajax.data.model_catalogue import CATALOGUE
-from smajax.report.pictures import run_over_time
+from smajax.report.run_plots import over_time
+from smajax.report.series_picture import as_picture
 
 PICTURE = Path(__file__).parents[1] / "docs" / "loop.png"
 RUN = "mass_change"  # held out
+DPI = 150
 
 
 def main() -> None:
@@ -26,7 +28,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as kept, displayed(Console(stderr=True)) as progress:
         findings = close_loop(experiment, memory=Path(kept), progress=progress)
     run = next(one for one in findings.runs if one.name == RUN)
-    PICTURE.write_bytes(run_over_time(findings, run))
+    PICTURE.write_bytes(as_picture(over_time(findings, run), DPI))
 
 
 if __name__ == "__main__":

@@ -30,6 +30,7 @@ from smajax.app.ready import loaded
 from smajax.app.step import FieldError, Sent, Step
 from smajax.core.display_units import digits
 from smajax.data.readers.table import MeasuredDataError
+from smajax.report.frame import TEMPLATES
 
 HERE = Path(__file__).parent
 STEPS: tuple[Step, ...] = (
@@ -83,7 +84,11 @@ class Pages:
 
     def __init__(self) -> None:
         self.environment = jinja2.Environment(
-            loader=jinja2.FileSystemLoader(HERE / "templates"), autoescape=True, trim_blocks=True, lstrip_blocks=True
+            # The head of a page is that of the reports.
+            loader=jinja2.FileSystemLoader([HERE / "templates", TEMPLATES]),
+            autoescape=True,
+            trim_blocks=True,
+            lstrip_blocks=True,
         )
         self.environment.filters["digits"] = lambda value: digits(value, 4)
 
@@ -253,7 +258,8 @@ def make_app(root: Path, token: str) -> Starlette:
     return Starlette(
         routes=[
             Route("/", home),
-            Mount("/static", StaticFiles(directory=HERE / "static")),
+            # Colours and plots are those of the reports.
+            Mount("/static", StaticFiles(directory=HERE / "static", packages=[("smajax.report", "static")])),
             Route("/stamp", _guarded(server.stamp)),
             Route("/series", _guarded(server.series)),
             Route("/errors", _guarded(server.errors)),

@@ -14,13 +14,12 @@ from smajax.control.tuned_on_models import ControlComparison, TunedOnModel
 from smajax.core.display_units import digits, label
 from smajax.core.files import json_text, replace
 from smajax.core.provenance import made_with
-from smajax.report.drawing import UPRIGHT
-from smajax.report.html import picture
 from smajax.report.loop_words import loop_rows
-from smajax.report.pictures import AFTER, as_png, new_figure, tidy
 from smajax.report.plain_page import bullets, headline, table, whole
+from smajax.report.series_picture import COARSE, series
+from smajax.report.series_plot import Line, Panel, SeriesPlot
 
-COLOURS = ("#8a8f98", AFTER, "#c8553d")
+COLOURS = ("before", "after", "there")
 SAME = 0.02  # of a settling time: a smaller difference is none
 ROUNDING = 1e-6  # of a set point: a smaller error is none
 
@@ -127,35 +126,21 @@ def record(result: ControlComparison, command: str = "") -> dict[str, Any]:
     }
 
 
-def loops_picture(result: ControlComparison, upright: bool = False) -> bytes:
+def loop_plots(result: ControlComparison) -> list[SeriesPlot]:
     """The position over time at each set point, by the gains of each model."""
-    count = len(result.tuned[0].loops)
-    size = (4.6 if upright else 2.9 * count + 0.6, 2.2 * count + 0.6 if upright else 3.2)
-    figure = new_figure(size[1], UPRIGHT if upright else size[0])
-    panels = np.ravel(figure.subplots(*((count, 1) if upright else (1, count)), squeeze=False))
-    for number, axes in enumerate(panels):
-        for one, colour in zip(result.tuned, COLOURS, strict=False):
-            loop = one.loops[number]
-            axes.plot(
-                loop.time, result.unit.of(loop.position), color=colour, linewidth=1.4, label=f"tuned on the {one.model}"
-            )
-        axes.axhline(
-            float(result.unit.of(result.tuned[0].loops[number].set_point)),
-            color="#1d1d1f",
-            linewidth=0.7,
-            linestyle="--",
+    shown, plots = result.unit, []
+    for number, first in enumerate(result.tuned[0].loops):
+        lines = [
+            Line(f"tuned on the {one.model}", np.asarray(shown.of(one.loops[number].position)), colour, 1.5)
+            for one, colour in zip(result.tuned, COLOURS, strict=False)
+        ]
+        target = float(shown.of(first.set_point))
+        lines.append(Line("set point", np.full(len(first.time), target), "asked", 1.0, dash=True))
+        panel = Panel(f"position, set point {target:.3g}", shown.label, tuple(lines), height=210)
+        plots.append(
+            SeriesPlot(f"{result.controller} at the set point {target:.3g} {shown.label}", first.time, (panel,))
         )
-        axes.set_xlabel("time (s)", fontsize=9)
-        tidy(axes)
-    panels[0].set_ylabel(result.unit.axis, fontsize=9)
-    figure.legend(
-        *panels[0].get_legend_handles_labels(),
-        loc="outside upper center",
-        ncols=1 if upright else 3,
-        frameon=False,
-        fontsize=9,
-    )
-    return as_png(figure)
+    return plots
 
 
 def _settings(result: ControlComparison) -> list[list[str]]:
@@ -179,7 +164,7 @@ def page(result: ControlComparison, command: str = "") -> str:
     parts = [
         f"<h1>{html.escape(title)}</h1>",
         headline(worth(result) if len(result.tuned) > 1 else conclusions(result)[0]),
-        str(picture(loops_picture(result), "loops over time", "panels", loops_picture(result, upright=True))),
+        f'<div class="pair">{"".join(series(plot, dpi=COARSE) for plot in loop_plots(result))}</div>',
         f"<p class=quiet>Each loop is a step from the start, cold and at rest, on the {html.escape(result.plant)}. Gains were tuned on each model and on plants drawn from its "
         "posterior, with the same settings; each model takes the best for its own plants of all gains that were found. The command stays within that of the fit runs.</p>",
         table(head(result), rows(result), (1, 2, 3, 4)),

@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
-import base64
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 from smajax.attribution.findings import Findings, ParameterFinding, Role, Verdict, coverage, pooled_rmse
 from smajax.core.display_units import chance, correlation, digits, display, label, p_value, with_error
 from smajax.fit.uncertainty import RemarkKind
-from smajax.report import pictures
+from smajax.report import pictures, run_plots
+from smajax.report.embedded import picture
+from smajax.report.formulas import typeset
+from smajax.report.frame import environment, parts_of_frame
 from smajax.report.narrative import Narrative, narrate
 from smajax.report.narrative.rounds import chosen_text
 from smajax.report.narrative.unknown import units
 from smajax.report.narrative.values import far_text
-from smajax.report.plain_page import breakable
+from smajax.report.plain_page import MANY, breakable
+from smajax.report.series_picture import COARSE, DPI, series
+from smajax.report.series_plot import room
 from smajax.report.unknown_pictures import function_learnt
 
 VERDICTS = {
@@ -58,27 +60,6 @@ def estimate(value: float, error: float | None, unit: str, quantity: str = "") -
     """`value ± standard error` for a table cell; the value alone where the runs do not determine it."""
     seen = display(unit, quantity)
     return Shown(with_error(seen.of(value), None if error is None else seen.of(error)), value)
-
-
-def _data(image: bytes) -> str:
-    """An image, PNG or GIF, as an address that holds its bytes."""
-    form = "gif" if image.startswith(b"GIF8") else "png"
-    return f"data:image/{form};base64,{base64.b64encode(image).decode('ascii')}"
-
-
-def picture(image: bytes | None, alt: str, kind: str = "wide", upright: bytes | None = None) -> Markup:
-    """An image, PNG or GIF, that carries its own bytes; nothing for a picture that there is none of.
-
-    kind: `narrow` or `wide`, or `panels` for what is too wide for a telephone and moves sideways there; `upright` is shown
-    there instead, the same panels one below the other.
-    """
-    if image is None:
-        return Markup("")
-    element = Markup('<img class="{}" src="{}" alt="{}">').format(kind, _data(image), alt)
-    if upright is not None:
-        other = Markup('<source media="(max-width: 720px)" srcset="{}">').format(_data(upright))
-        element = Markup("<picture>{}{}</picture>").format(other, element)
-    return Markup('<div class="scroll">{}</div>').format(element)
 
 
 def _parameter_rows(findings: Findings) -> list[dict[str, Any]]:
@@ -177,7 +158,7 @@ def _correlations(findings: Findings) -> list[dict[str, Any]]:
 
 
 def _figures(findings: Findings, output: Callable[[float | None], Shown]) -> list[dict[str, str]]:
-    """The numbers of the first screen: the error before and after, times the noise, and how the band does."""
+    """The numbers of the first screen: the error before and after, times the noise, the verdict, and how the band does."""
     unit = display(findings.output_unit, findings.output_name).unit
     single = pictures.nothing_added(findings)
     figures = []
@@ -189,7 +170,8 @@ def _figures(findings: Findings, output: Callable[[float | None], Shown]) -> lis
             figures.append({"caption": f"error on the {role} runs", "text": f"{text} {unit}".strip()})
     if findings.noise_sigma > 0.0:
         ratio = pooled_rmse(findings.runs, "fit", "after") / findings.noise_sigma
-        figures.append({"caption": "error on the fit runs over the noise", "text": digits(ratio, 3)})
+        figures.append({"caption": "times the noise", "text": digits(ratio, 3)})
+    figures.append({"caption": "verdict", "text": str(findings.verdict), "kind": "verdict"})
     inside = coverage(findings)
     if inside is not None:
         figures.append({"caption": "held-out samples in the 90 % band", "text": f"{inside:.0%}"})
@@ -197,18 +179,44 @@ def _figures(findings: Findings, output: Callable[[float | None], Shown]) -> lis
 
 
 def _runs(findings: Findings) -> list[dict[str, Any]]:
-    """Every run with its numbers and its pictures."""
+    """Every run with its numbers, its plot and its picture over the temperature."""
+    plots = [run_plots.over_time(findings, run) for run in findings.runs]
+    samples = room(sum(len(plot.columns) for plot in plots))
+    many = len(plots) > MANY
     return [
         {
             "run": run,
             "noise_ratio": run.rmse_after / findings.noise_sigma if findings.noise_sigma > 0.0 else float("nan"),
-            "over_time": picture(pictures.run_over_time(findings, run), f"Run {run.name} over time"),
+            "over_time": series(plot, samples, DPI, number < MANY),
             "hysteresis": picture(
-                pictures.run_hysteresis(findings, run), f"Run {run.name} against the wire's temperature"
+                pictures.run_hysteresis(findings, run, COARSE if many else pictures.HYSTERESIS),
+                f"Run {run.name} against the wire's temperature",
             ),
         }
-        for run in findings.runs
+        for number, (run, plot) in enumerate(zip(findings.runs, plots, strict=True))
     ]
+
+
+def _contents(findings: Findings) -> list[tuple[str, str]]:
+    """(id, words) of the sections."""
+    entries = [
+        ("answer", "Answer"),
+        ("next", "What next" if findings.extended_model else ""),
+        ("runs", "Errors"),
+        ("pictures", "Runs"),
+        ("added", "What was added"),
+        ("confounders", "Mistaken for it" if findings.confounders else ""),
+        ("candidates", "Candidates"),
+        ("unknown", "Not in the library" if findings.unknown else ""),
+        ("parameters", "Parameters"),
+        ("residual", "What is left over"),
+        ("search", "Search"),
+        ("unexplained", "Unexplained"),
+        ("cannot-know", "What the runs do not determine"),
+        ("check", "Check"),
+        ("provenance", "Provenance"),
+    ]
+    return [(place, words) for place, words in entries if words]
 
 
 def _unknown(findings: Findings) -> list[dict[str, Any]]:
@@ -226,58 +234,62 @@ def _unknown(findings: Findings) -> list[dict[str, Any]]:
 def findings_to_html(findings: Findings, narrative: Narrative | None = None) -> str:
     """The whole page, as text. Names and sentences of the record are escaped; numbers are those of the record."""
     words = narrative or narrate(findings)
-    environment = Environment(
-        loader=FileSystemLoader(Path(__file__).parent),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
     title, tone = VERDICTS[findings.verdict]
 
     def output(value: float | None) -> Shown:
         return shown(value, findings.output_unit, findings.output_name, 3, zeros=True)
 
-    return environment.get_template("template.html").render(
-        f=findings,
-        words=words,
-        rounds=[(entry, chosen_text(entry), why) for entry, why in zip(findings.rounds, words.rounds, strict=True)],
-        verdict_title=title,
-        tone=tone,
-        unit=display(findings.output_unit, findings.output_name).unit,
-        output=output,
-        number=lambda value, count=3: Shown(digits(value, count, zeros=True), value),
-        estimate=estimate,
-        p_value=p_value,
-        unit_of=lambda unit, name="": display(unit, name).unit,
-        label=label,
-        breakable=lambda text: Markup(breakable(text)),
-        single=pictures.nothing_added(findings),
-        # Without offsets in the fit they are exactly zero.
-        offsets=any(run.offset_before or run.offset_after for run in findings.runs),
-        averaged=findings.averaged and all(run.average is not None for run in findings.runs),
-        held_out=any(run.role == "held-out" for run in findings.runs),
-        added=findings.added,
-        ranked=pictures.ranked(findings.effects),
-        evidence=_evidence(findings),
-        known=lambda value: value is not None and math.isfinite(value),
-        evidence_title=lambda name: EVIDENCE.get(name, label(name)),
-        evidence_unit=lambda name: _evidence_unit(findings, name),
-        evidence_cell=lambda name, value: _evidence_cell(findings, name, value),
-        parameters=_parameter_rows(findings),
-        runs=_runs(findings),
-        phases=_phase_rows(findings),
-        correlations=_correlations(findings),
-        unknown=_unknown(findings),
-        units=units,
-        figures=_figures(findings, output),
-        picture_held_out=picture(
-            pictures.held_out_bands(findings), "Held-out runs: measured, predicted, and the 90 % band", "narrow"
-        ),
-        picture_errors=picture(pictures.errors_by_run(findings), "Error of each run before and after", "narrow"),
-        picture_candidates=picture(
-            pictures.effect_probabilities(findings), "Candidates by posterior probability", "narrow"
-        ),
-        picture_phases=picture(pictures.residual_by_phase(findings), "Residual by phase of the wire"),
-        picture_correlation=picture(pictures.residual_correlation(findings), "Autocorrelation of the residual"),
+    first, correlation_of = run_plots.first_plot(findings), run_plots.residual_correlation(findings)
+    return (
+        environment()
+        .get_template("close_loop.html")
+        .render(
+            **parts_of_frame(True),
+            contents=_contents(findings),
+            typeset=typeset,
+            many=MANY,
+            f=findings,
+            words=words,
+            rounds=[(entry, chosen_text(entry), why) for entry, why in zip(findings.rounds, words.rounds, strict=True)],
+            verdict_title=title,
+            tone=tone,
+            unit=display(findings.output_unit, findings.output_name).unit,
+            output=output,
+            number=lambda value, count=3: Shown(digits(value, count, zeros=True), value),
+            estimate=estimate,
+            p_value=p_value,
+            unit_of=lambda unit, name="": display(unit, name).unit,
+            label=label,
+            breakable=lambda text: Markup(breakable(text)),
+            single=pictures.nothing_added(findings),
+            # Without offsets in the fit they are exactly zero.
+            offsets=any(run.offset_before or run.offset_after for run in findings.runs),
+            averaged=findings.averaged and all(run.average is not None for run in findings.runs),
+            held_out=any(run.role == "held-out" for run in findings.runs),
+            added=findings.added,
+            ranked=pictures.ranked(findings.effects),
+            evidence=_evidence(findings),
+            known=lambda value: value is not None and math.isfinite(value),
+            evidence_title=lambda name: EVIDENCE.get(name, label(name)),
+            evidence_unit=lambda name: _evidence_unit(findings, name),
+            evidence_cell=lambda name, value: _evidence_cell(findings, name, value),
+            parameters=_parameter_rows(findings),
+            runs=_runs(findings),
+            phases=_phase_rows(findings),
+            correlations=_correlations(findings),
+            unknown=_unknown(findings),
+            units=units,
+            figures=_figures(findings, output),
+            picture_first="" if first is None else series(first),
+            picture_errors=picture(pictures.errors_by_run(findings), "Error of each run before and after", "narrow"),
+            picture_candidates=picture(
+                pictures.effect_probabilities(findings), "Candidates by posterior probability", "narrow"
+            ),
+            picture_phases=picture(
+                pictures.residual_by_phase(findings),
+                "Residual by phase of the wire",
+                upright=pictures.residual_by_phase(findings, upright=True),
+            ),
+            picture_correlation="" if correlation_of is None else series(correlation_of),
+        )
     )

@@ -12,10 +12,12 @@ from smajax.core.files import json_text, replace
 from smajax.fit.identify_result import Identified, IdentifiedOutput
 from smajax.report import identify_pictures as draw
 from smajax.report.csv_files import PARAMETERS, RUNS, identified_parameters, identified_runs
-from smajax.report.html import picture
+from smajax.report.embedded import picture
 from smajax.report.identify_record import record
 from smajax.report.identify_words import conclusions, estimate_rows, posterior_rows, prior_shown
-from smajax.report.plain_page import breakable, bullets, table, whole
+from smajax.report.plain_page import MANY, breakable, bullets, folded, table, whole
+from smajax.report.series_picture import COARSE, DPI, series
+from smajax.report.series_plot import room
 
 KNOWN = "Every combination of the parameters is known to 5 % (temperatures: to 1 K) or better."
 KNOWN_OF_THE_REST = "Of the parameters that are neither at a bound nor without effect, every combination is known to 5 % (temperatures: to 1 K)."
@@ -74,6 +76,27 @@ def _colour(value: float) -> str:
     return f"rgb({'178 24 43' if value > 0.0 else '33 102 172'} / {0.7 * abs(value):.2f})"
 
 
+def _run_parts(result: Identified) -> list[str]:
+    """The plots of every run; those beyond ten are folded away."""
+    plots = {
+        run.name: [
+            draw.run_plot_of(result, run, k) for k in range(len(result.outputs)) if np.isfinite(run.series[k].rmse)
+        ]
+        for run in result.runs
+    }
+    samples = room(sum(len(plot.columns) for several in plots.values() for plot in several))
+    dpi = COARSE if sum(map(len, plots.values())) > MANY else DPI
+    drawn = {run.name for run in result.runs[:MANY]}
+    return folded(
+        [
+            f"<h3>{html.escape(run.name)} ({html.escape(run.role)})</h3>"
+            f"{''.join(series(plot, samples, dpi, run.name in drawn) for plot in plots[run.name])}"
+            for run in result.runs
+        ],
+        "runs",
+    )
+
+
 def page(result: Identified) -> str:
     """The whole page."""
     say = html.escape
@@ -129,7 +152,7 @@ def page(result: Identified) -> str:
             "<h2>What to measure next</h2><p class=quiet>Courses of the input within what was applied already, ranked by "
             "what one such run would determine (D-optimal, at the fit).</p>",
             table(["rank", "run", "information, nats", "standard errors become"], rows, (0, 2)),
-            picture(draw.suggested_inputs(result), "suggested inputs"),
+            *(series(plot, dpi=COARSE) for plot in draw.suggested_inputs(result)),
         ]
     parts += ["<h2>Runs</h2>", table(run_head, runs, range(2, len(run_head)))]
     if result.values_of_held_out_runs:
@@ -142,13 +165,7 @@ def page(result: Identified) -> str:
             f"<p class=quiet>What is each run's own was found for the held-out runs from themselves, all else held: "
             f"{say('; '.join(own))}.</p>"
         )
-    for run in result.runs:
-        pictures = [
-            picture(draw.run_with_band(result, run, k), f"{label(run.name)}, {label(one.name)}")
-            for k, one in enumerate(result.outputs)
-            if np.isfinite(run.series[k].rmse)
-        ]
-        parts.append(f"<h3>{say(run.name)} ({say(run.role)})</h3>{''.join(pictures)}")
+    parts += _run_parts(result)
     parts += [
         "<h2>Checks and provenance</h2>",
         bullets(result.check),

@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from types import MappingProxyType
-from typing import Any
-
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
@@ -13,37 +9,21 @@ from matplotlib.ticker import MaxNLocator
 from smajax.core.display_units import axis_label, digits, display, label
 from smajax.fit.identify_result import Identified, IdentifiedRun
 from smajax.model.channels import channel
-from smajax.report.pictures import (
-    AFTER,
-    NOISE,
-    QUIET,
-    as_png,
-    draw_band,
-    draw_predicted,
-    draw_residual,
-    new_figure,
-    panels_done,
-    run_panels,
-    tidy,
-)
-
-WHOLE: Mapping[str, Any] = MappingProxyType(
-    {"color": NOISE, "zorder": 0, "linewidth": None, "label": "95 %: noise and parameters"}
-)
+from smajax.report.pictures import AFTER, QUIET, as_png, new_figure, tidy
+from smajax.report.run_plots import measured_line, output_panel, residual_panel, run_plot
+from smajax.report.series_plot import Band, Line, Panel, SeriesPlot
 
 
-def run_with_band(result: Identified, run: IdentifiedRun, k: int = 0) -> bytes:
+def run_plot_of(result: Identified, run: IdentifiedRun, k: int = 0) -> SeriesPlot:
     """Of the k-th output: measured, simulated, residual with the noise's band and the parameters', varying inputs."""
     sensor, one = result.outputs[k], run.series[k]
     shown = display(sensor.unit, sensor.name)
-    figure, rows = run_panels(run.time, run.inputs, sensor.name, shown)
-    output, residual = rows[:2]
     measured, simulated = shown.of(one.measured), shown.of(one.simulated)
-    draw_predicted(output, run.time, measured, simulated, "simulated")
-    both = 1.96 * np.hypot(one.spread, sensor.noise_sigma)
-    draw_band(residual, run.time, 0.0, shown.of(both), WHOLE)
-    draw_residual(residual, run.time, measured, simulated)
-    return panels_done(figure, rows, 3)
+    both = shown.of(np.broadcast_to(1.96 * np.hypot(one.spread, sensor.noise_sigma), measured.shape))
+    output = output_panel(sensor.name, shown, [measured_line(measured), Line("simulated", simulated, "after")])
+    band = Band("95 %: noise and parameters", -both, both, "noise", 0.8)
+    residual = residual_panel(shown, [Line("residual", measured - simulated, "after", 1.0)], [band])
+    return run_plot(f"{label(run.name)}, {label(sensor.name)}", run.time, run.inputs, output, residual)
 
 
 def _panels(count: int, height: float, upright: bool) -> tuple[Figure, np.ndarray]:
@@ -109,19 +89,15 @@ def posterior_histograms(result: Identified, upright: bool = False) -> bytes | N
     return as_png(figure)
 
 
-def suggested_inputs(result: Identified) -> bytes | None:
+def suggested_inputs(result: Identified) -> list[SeriesPlot]:
     """The inputs of the suggested runs, best first."""
-    if not result.suggestions:
-        return None
-    figure = new_figure(1.25 * len(result.suggestions) + 0.4)
-    panels = figure.subplots(len(result.suggestions), 1, sharex=True, squeeze=False)[:, 0]
-    for number, (axes, one) in enumerate(zip(panels, result.suggestions, strict=True), start=1):
+    plots = []
+    for number, one in enumerate(result.suggestions, start=1):
         name = max(one.inputs, key=lambda channel_: float(np.ptp(one.inputs[channel_])))
-        unit = channel(name)
-        time = np.arange(len(one.inputs[name])) * result.step
-        axes.plot(time, unit.of(one.inputs[name]), color="#5b6470", linewidth=1.1)
-        axes.set_title(f"{number}. {digits(one.information, 3)} nats", fontsize=8, loc="left", pad=2)
-        axes.set_ylabel(f"{label(name)}" + (f"\n({unit.unit})" if unit.unit else ""), fontsize=7)
-        tidy(axes)
-    panels[-1].set_xlabel("time (s)" if result.clocked else "sample", fontsize=8)
-    return as_png(figure)
+        unit, values = channel(name), one.inputs[name]
+        line = Line(label(name), np.asarray(unit.of(values)), "input", silent=True)
+        panel = Panel(f"{number}. {label(name)}", unit.unit, (line,), height=110)
+        axis = ("time", "s") if result.clocked else ("sample", "")
+        about = f"suggested run {number}: {digits(one.information, 3)} nats"
+        plots.append(SeriesPlot(about, np.arange(len(values)) * float(result.step), (panel,), axis))
+    return plots

@@ -5,29 +5,10 @@ from __future__ import annotations
 import html
 import re
 from collections.abc import Sequence
-from pathlib import Path
 
-# What makes a page of one file answer clicks: tables that sort, pictures that open at full size.
-SCRIPT = (Path(__file__).parent / "interactive.js").read_text(encoding="utf-8")
-CLICKED = (Path(__file__).parent / "interactive.css").read_text(encoding="utf-8")
+from smajax.report.frame import framed
 
-STYLE = (
-    "body{font:15px/1.5 system-ui,sans-serif;max-width:1000px;margin:2em auto;padding:0 1em;color:#1d1d1f;background:#fff}"
-    "td,th{text-align:left;vertical-align:top;padding:.35em .7em;border-bottom:1px solid #e3e5e9}"
-    "table{border-collapse:collapse;font-size:14px;width:100%}td{overflow-wrap:break-word}.scroll{overflow-x:auto;margin:0 0 1em}"
-    "table:not(.sortable) td+td{overflow-wrap:anywhere}table:not(.sortable) td:first-child{min-width:7em}"
-    "td.n,th.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}"
-    "th.n{white-space:normal}img{max-width:100%;display:block;margin:0 auto}.quiet{color:#626973}h2{margin-top:1.6em}"
-    "p,ul,h1,h2,h3{overflow-wrap:anywhere}"
-    ".headline{font-size:1.2em;line-height:1.4;font-weight:600;border-left:4px solid #1f6fb2;padding:.1em 0 .1em .7em;margin:1em 0}"
-    # On a telephone names and numbers break where they may, so that the numbers are on the screen; sentences keep some width,
-    # and only a table that is too wide even so moves sideways.
-    "@media(max-width:720px){td.w{white-space:normal!important}td.t{min-width:9em}}"
-    "@media(min-width:721px){wbr{display:none}}"
-    "@media(max-width:520px){body{margin:1em auto;padding:0 .6em}h1{font-size:1.5em}.headline{font-size:1.05em}table{font-size:13px}td,th{padding:.3em .35em}}"
-)
-
-
+MANY = 10  # runs, or candidates, beyond which the others are folded away
 SENTENCE = 30  # characters from which on a cell is no name
 
 
@@ -75,10 +56,27 @@ def bullets(sentences: Sequence[str]) -> str:
     return f"<ul>{''.join(f'<li>{one}</li>' for one in items)}</ul>" if items else ""
 
 
+def folded(parts: Sequence[str], what: str) -> list[str]:
+    """The first ten, and the others in a box that opens."""
+    if len(parts) <= MANY:
+        return list(parts)
+    rest = f"<details><summary>{len(parts) - MANY} more {html.escape(what)}</summary>{''.join(parts[MANY:])}</details>"
+    return [*parts[:MANY], rest]
+
+
+def section_id(heading: str) -> str:
+    """The anchor of a section, of its heading's HTML."""
+    return re.sub(r"\W+", "-", html.unescape(re.sub(r"<[^>]+>", "", heading)).lower()).strip("-")
+
+
 def whole(title: str, parts: Sequence[str]) -> str:
-    """The page of parts that are HTML already."""
-    return (
-        '<!doctype html><html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width, '
-        f'initial-scale=1"><link rel="icon" href="data:,"><title>{html.escape(title)}</title>'
-        f"<style>{STYLE}{CLICKED}</style>{''.join(parts)}<script>{SCRIPT}</script></html>\n"
-    )
+    """The page of parts that are HTML already: what stands before the first `<h2>` is the answer, and each `<h2>` begins a section."""
+    first, *others = re.split(r"(?=<h2>)", "".join(parts))
+    contents, sections = [("answer", "Answer")], []
+    for number, other in enumerate(others, start=1):
+        found = re.match(r"<h2>(.*?)</h2>", other, re.DOTALL)
+        words = found[1] if found else ""
+        place = f"{section_id(words) or 'part'}-{number}"
+        contents.append((place, html.unescape(re.sub(r"<[^>]+>", "", words))))
+        sections.append(f'<section id="{place}">{other}</section>')
+    return framed(title, f'<header class="answer" id="answer">{first}</header>{"".join(sections)}', contents)

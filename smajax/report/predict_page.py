@@ -3,89 +3,56 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Mapping
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
-from matplotlib.axes import Axes
+import numpy as np
 
 from smajax.attribution.findings import ResidualDiagnostics
-from smajax.core.display_units import axis_label, digits, display, label
+from smajax.core.display_units import digits, display, label
 from smajax.core.files import json_text, replace
 from smajax.core.provenance import made_with
 from smajax.fit.predict import BAND, PredictedRun, Prediction
 from smajax.report.csv_files import RUNS, predicted_runs
-from smajax.report.drawing import UPRIGHT
-from smajax.report.html import picture
 from smajax.report.integration_words import integration_sentence
-from smajax.report.pictures import (
-    as_png,
-    draw_band,
-    draw_predicted,
-    draw_residual,
-    literal,
-    new_figure,
-    panels_done,
-    run_panels,
-    tidy,
-)
-from smajax.report.plain_page import bullets, table, whole
+from smajax.report.plain_page import MANY, bullets, folded, table, whole
 from smajax.report.predict_words import HEAD, band_sentence, conclusions, diagnostics, pooled, run_rows
+from smajax.report.run_plots import measured_line, output_panel, residual_panel, run_plot
+from smajax.report.series_picture import COARSE, DPI, series
+from smajax.report.series_plot import Band, Line, Panel, SeriesPlot, room
 
 FILES = ("predict.html", "predict.json", RUNS)
-SHOWN = 6  # runs in the first picture
-BAND_STYLE: Mapping[str, Any] = MappingProxyType({"color": "#9fc5b8", "alpha": 0.6, "label": "90 % band"})
+SHOWN = 4  # runs of the first plots
 
 
-def _tint(run: PredictedRun, *several: Axes) -> None:
-    """The ground where the run leaves what the model was fitted to."""
-    for start, end in (span for one in run.extrapolation for span in one.spans):
-        for axes in several:
-            axes.axvspan(start, end, color="#f1dcc0", alpha=0.35, zorder=0, linewidth=0)
+def _spans(run: PredictedRun) -> list[tuple[float, float]]:
+    """Where the run leaves what the model was fitted to."""
+    return [(float(start), float(end)) for one in run.extrapolation for start, end in one.spans]
 
 
-def run_picture(run: PredictedRun, k: int = 0) -> bytes:
+def run_plot_of(run: PredictedRun, k: int = 0) -> SeriesPlot:
     """Of the k-th output: measured, predicted with its band, residual with the same band, varying inputs."""
     one = run.series[k]
     shown = display(one.unit, one.output)
-    figure, rows = run_panels(run.time, run.inputs, one.output, shown)
-    output, residual = rows[:2]
-    measured, middle, half = shown.of(one.measured), shown.of(one.reading), shown.of(one.half_width)
-    draw_predicted(output, run.time, measured, middle)
-    draw_band(output, run.time, middle, half, {**BAND_STYLE, "alpha": 0.45})
-    draw_band(residual, run.time, 0.0, half, {"color": BAND_STYLE["color"], "alpha": 0.45})
-    draw_residual(residual, run.time, measured, middle)
-    _tint(run, output, residual)
-    return panels_done(figure, rows, 3)
+    measured, middle = shown.of(one.measured), shown.of(one.reading)
+    half = np.broadcast_to(shown.of(one.half_width), middle.shape)
+    lines = [measured_line(measured), Line("predicted", middle, "after")]
+    output = output_panel(one.output, shown, lines, [Band("90 % band", middle - half, middle + half, "predicted", 0.6)])
+    left = [Line("residual", measured - middle, "after", 1.0)]
+    residual = residual_panel(shown, left, [Band("the same band", -half, half, "predicted", 0.6, silent=True)])
+    return run_plot(f"{run.name}, {label(one.output)}", run.time, run.inputs, output, residual, _spans(run))
 
 
-def overview(result: Prediction, upright: bool = False) -> bytes:
+def overview(result: Prediction) -> list[SeriesPlot]:
     """The first output of the first runs, measured, predicted and its band; where a run extrapolates the ground is tinted."""
-    runs = result.runs[:SHOWN]
-    columns = 1 if upright or len(runs) == 1 else 2
-    rows = -(-len(runs) // columns)
-    figure = new_figure(0.9 + (2.0 if upright else 2.4) * rows, *([UPRIGHT] if upright else []))
-    panels = figure.subplots(rows, columns, squeeze=False).ravel()
-    shown = display(runs[0].series[0].unit, runs[0].series[0].output)
-    for axes, run in zip(panels, runs, strict=False):
-        one = run.series[0]
-        middle, half = shown.of(one.reading), shown.of(one.half_width)
-        draw_predicted(axes, run.time, shown.of(one.measured), middle)
-        draw_band(axes, run.time, middle, half, BAND_STYLE)
-        _tint(run, axes)
-        axes.set_title(literal(run.name) + " (extrapolation)" * bool(run.extrapolation), fontsize=9, loc="left")
-        axes.set_ylabel(axis_label(one.output, shown), fontsize=9)
-        axes.margins(x=0.01)
-        tidy(axes)
-    for axes in panels[len(runs) :]:
-        axes.set_visible(False)
-    for axes in panels[max(len(runs) - columns, 0) : len(runs)]:
-        axes.set_xlabel("time (s)", fontsize=9)
-    figure.legend(
-        *panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=3, frameon=False, fontsize=9
-    )
-    return as_png(figure)
+    plots = []
+    for run in result.runs[:SHOWN]:
+        whole = run_plot_of(run)
+        panel = whole.panels[0]
+        name = f"{panel.name} of {run.name}" + " (extrapolation)" * bool(run.extrapolation)
+        first = Panel(name, panel.unit, panel.lines, panel.bands, 200)
+        plots.append(SeriesPlot(f"{run.name}, measured and predicted", whole.at, (first,), spans=whole.spans))
+    return plots
 
 
 def record(result: Prediction, command: str = "") -> dict[str, Any]:
@@ -168,18 +135,24 @@ def page(result: Prediction, command: str = "") -> str:
     """The whole page: the answer, the picture that proves it, then the rest."""
     model = result.model
     title = f"Prediction by {model.title}" if model.title else "Prediction"
+    first, plots = overview(result), [[run_plot_of(run, k) for k in range(len(run.series))] for run in result.runs]
+    samples = room(sum(len(plot.columns) for several in (first, *plots) for plot in several))
+    dpi = COARSE if sum(map(len, plots)) > MANY else DPI
     parts = [
         f"<h1>{html.escape(title)}</h1>",
         bullets(conclusions(result)),
-        str(picture(overview(result), "measured and predicted runs", "panels", overview(result, upright=True))),
+        f'<div class="{"pair" if len(first) > 1 else ""}">{"".join(series(plot, samples, dpi=COARSE) for plot in first)}</div>',
         f"<p class=quiet>{html.escape(band_sentence(result))}</p>",
         "<h2>Runs</h2>",
         table(HEAD, run_rows(result), (2, 3, 4, 5)),
     ]
-    for run in result.runs:
-        parts.append(f"<h3>{html.escape(run.name)}</h3>")
-        for k, one in enumerate(run.series):
-            parts.append(str(picture(run_picture(run, k), f"{run.name}, {label(one.output)}")))
+    parts += folded(
+        [
+            f"<h3>{html.escape(run.name)}</h3>{''.join(series(plot, samples, dpi, number < MANY) for plot in several)}"
+            for number, (run, several) in enumerate(zip(result.runs, plots, strict=True))
+        ],
+        "runs",
+    )
     likely = [[" + ".join(one.effects) or "base model", f"{one.probability:.1%}"] for one in model.likely]
     values = [
         [name, digits(one.value, 6), digits(one.standard_error, 2), model.table[name].unit, one.origin]

@@ -18,17 +18,19 @@ from smajax.control.gains_file import LARGEST, fixed_parameters
 from smajax.control.presets import CONTROLLERS
 from smajax.control.run_result import RunResult
 from smajax.control.scales import unit_on
-from smajax.core.display_units import axis_label, digits, display
+from smajax.core.display_units import axis_label, digits, display, label
 from smajax.core.files import as_netcdf, csv_text, heading, json_text, replace
 from smajax.core.parameters import parameter_values, parameters
 from smajax.core.progress import Progress, Stage, quiet
-from smajax.report.animation import moving
-from smajax.report.drawing import BLUE, GREEN, GREY, RED, UPRIGHT, keyed, named, panels
-from smajax.report.html import picture
+from smajax.report import animation
+from smajax.report.drawing import BLUE, GREEN, GREY, RED, UPRIGHT, keyed, named, panels, styled
+from smajax.report.embedded import picture
 from smajax.report.integration_words import integration_sentence
 from smajax.report.loop_words import loop_rows
-from smajax.report.measured_log import draw_measured
+from smajax.report.measured_log import draw_measured, measured_of
+from smajax.report.pictures import NARROW, as_png
 from smajax.report.plain_page import bullets, headline, table, whole
+from smajax.report.series_plot import Band, Line, Panel, SeriesPlot, moving
 from smajax.report.simulate_words import (
     MISMATCH_HEAD,
     answer,
@@ -164,6 +166,47 @@ def picture_of(data: xr.Dataset, form: str = "png", upright: bool = False, band:
     return image.getvalue()
 
 
+def series_of(result: RunResult) -> SeriesPlot:
+    """Input, position with its set point, temperature, fraction and stress over time, each in its panel."""
+    data = result.data
+    inputs, path, band = _inputs(data), path_of(data), _band(result)
+    shown = [*inputs[:1], path, *PLAIN]
+    if "wanted" in data:
+        shown[:2] = shown[1::-1]
+    panels = []
+    for name in shown:
+        unit = display(data[name].attrs["units"], name)
+        lines = [
+            Line("measured", unit.of(logged), "asked", 2.6, 0.55)
+            for of, logged in measured_of(data).values()
+            if of == name or (of == "reading" and name == path)
+        ]
+        bands: tuple[Band, ...] = ()
+        lines.append(Line(label(name), unit.of(data[name].to_numpy()), "c1" if name in inputs else "c0", silent=True))
+        if name == "position" and "wanted" in data:
+            wanted = unit.of(data["wanted"].to_numpy())
+            near = unit.of(band)
+            lines.append(Line("set point", wanted, "asked", 1.0, dash=True))
+            bands = (Band("counts as there", wanted - near, wanted + near, "there", 0.25),)
+        panels.append(Panel(label(name), unit.unit, tuple(lines), bands, 150 if name in (path, "temperature") else 96))
+    return SeriesPlot("the run over time", data["time"].to_numpy(), tuple(panels))
+
+
+def hysteresis(data: xr.Dataset) -> bytes:
+    """The position, or what stands in its place, over the temperature."""
+    figure = Figure(figsize=(NARROW, 3.2), layout="constrained")
+    axes = figure.subplots()
+    path = path_of(data)
+    sides = []
+    for name in ("temperature", path):
+        unit = display(data[name].attrs["units"], name)
+        sides.append((unit.of(data[name].to_numpy()), axis_label(name, unit)))
+    (across, below), (up, beside) = sides
+    axes.plot(across, up, color=BLUE, linewidth=1.1)
+    named(styled(axes)[0], below, beside)
+    return as_png(figure)
+
+
 def settings_rows(result: RunResult) -> list[list[str]]:
     """What lies between plant and controller, and the controller's gains and other parameters."""
     loop, controller = result.loop, result.controller
@@ -183,14 +226,15 @@ def page(result: RunResult, image: bytes, title: str, command: str, animations: 
         [name, digits(value, 6), table_of[name].unit, table_of[name].about]
         for name, value in parameter_values(result.system).items()
     ]
-    animation, upright = animations or (None, None)
-    errors, tall = error_rows(result.data), picture_of(result.data, upright=True, band=_band(result))
+    film, upright = animations or (None, None)
+    errors = error_rows(result.data)
     parts = [
         f"<h1>{html.escape(title)}</h1>",
         headline(answer(result)),
         bullets(result.notes),
-        str(picture(image, "the run over time", "panels", tall)),
-        str(picture(animation, "the load moving, beside the wire's path through its phase diagram", "panels", upright)),
+        str(moving(series_of(result), picture(image, "the run over time", "panels"))),
+        str(picture(hysteresis(result.data), "hysteresis: over the wire's temperature", "narrow")),
+        str(picture(film, "the load moving, beside the wire's path through its phase diagram", "panels", upright)),
         *_merit_part(result),
         bullets(run_sentences(result)),
         *_settings_part(result),
@@ -259,7 +303,7 @@ def write_run(
     replace(folder / "simulate.svg", picture_of(result.data, "svg", band=band))
     progress(Stage("pictures", 1.0))
     animations = (
-        [moving(result.system, result.data, upright=each, progress=progress) for each in (False, True)]
+        [animation.moving(result.system, result.data, upright=each, progress=progress) for each in (False, True)]
         if animated
         else []
     )

@@ -26,6 +26,7 @@ from smajax.core.progress import Message, Progress, quiet
 from smajax.core.wording import aligned
 from smajax.model.system import System
 from smajax.report.drawing import UPRIGHT
+from smajax.report.series_plot import SeriesPlot
 from smajax.report.sweep_dataset import as_dataset
 from smajax.report.sweep_page import (
     NO_REMARKS,
@@ -37,7 +38,9 @@ from smajax.report.sweep_page import (
     perturbed_sentence,
     write_rows,
 )
-from smajax.report.sweep_pictures import draw_comparison, draw_curves, draw_lines, draw_maps
+from smajax.report.sweep_pictures import common_limits, draw_comparison, draw_curves, draw_lines, draw_maps, lines_plot
+
+MAPS = (10.0, 7.6)  # inches
 
 
 def files_of(controllers: Sequence[str]) -> list[str]:
@@ -66,6 +69,7 @@ def write_sweep(
     time = np.asarray(clock(settings.seconds, settings.dt))
     target = line_target(system, grid)
     upright: dict[str, bytes] = {}
+    plots: dict[str, SeriesPlot] = {}
     results: list[ControllerSweep] = []
 
     def write_picture(name: str, size: tuple[float, float], draw: Callable[[Figure], None]) -> None:
@@ -76,18 +80,23 @@ def write_sweep(
         results.append(one)
         write_rows(out / f"{one.name}.csv", grid, one)
         over_grid = draw_maps if grid.second else draw_curves
-        write_picture(f"{one.name}_maps.png", (10.0, 7.6), partial(over_grid, grid=grid, sweep=one))
+        write_picture(f"{one.name}_maps.png", MAPS, partial(over_grid, grid=grid, sweep=one))
         if one.lines:
+            plots[one.name] = lines_plot(time, LINES, one, target, found.unit)
             lines = partial(draw_lines, time=time, ratios=LINES, sweep=one, target=target, unit=found.unit)
             write_picture(f"{one.name}_lines.png", (11.0, 3.1 * -(-len(one.lines) // 3)), lines)
         progress(Message(f"{one.name}: {grid.size:,} closed loops; {failures(one)}. {perturbed_sentence(grid, one)}"))
+    if grid.second and len(results) > 1:  # all are known now, and so the scale of the colours
+        limits = common_limits(grid, results)
+        for one in results:
+            write_picture(f"{one.name}_maps.png", MAPS, partial(draw_maps, grid=grid, sweep=one, limits=limits))
     whole = SweepResults(settings, tuple(results), assumed_air(system), found)
     comparison = partial(draw_comparison, targets=grid.targets, merits=whole.nominal, position=found.unit)
     write_picture("comparison.png", (10.0, 11.0), comparison)
     replace(out / "sweep.json", as_json(whole, command, remarks))
     replace(out / "sweep.nc", as_netcdf(as_dataset(whole, command)))
     pictures = {name: ((out / name).read_bytes(), narrow) for name, narrow in upright.items()}
-    replace(out / "index.html", page(whole, pictures, command, remarks))
+    replace(out / "index.html", page(whole, pictures, command, remarks, plots))
     return whole
 
 

@@ -9,6 +9,7 @@ import io
 import json
 from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -20,9 +21,10 @@ from smajax.control.sweep.run_sweep import ControllerSweep, SweepResults
 from smajax.core.files import replace
 from smajax.core.provenance import made_with
 from smajax.core.wording import and_listed, counted
-from smajax.report.html import picture
+from smajax.report.embedded import picture
 from smajax.report.integration_words import integration_sentence
-from smajax.report.plain_page import bullets, headline, table, whole
+from smajax.report.plain_page import bullets, folded, headline, table, whole
+from smajax.report.series_plot import SeriesPlot, moving, room
 from smajax.report.sweep_pictures import ROUNDING, SHOWN, merit_values, nominal_gain, shown_in
 
 Pictures = Mapping[str, tuple[bytes, bytes]]  # file name -> the picture, and the one for a telephone
@@ -36,6 +38,7 @@ class Remarks(NamedTuple):
 
 
 NO_REMARKS = Remarks()
+NO_PLOTS: Mapping[str, SeriesPlot] = MappingProxyType({})
 NAMED = 3  # controllers of a headline
 
 
@@ -100,7 +103,9 @@ def _panels(pictures: Pictures, name: str, alt: str) -> str:
     return str(picture(wide, alt, "panels", narrow))
 
 
-def _controller_part(results: SweepResults, sweep: ControllerSweep, pictures: Pictures) -> str:
+def _controller_part(
+    results: SweepResults, sweep: ControllerSweep, pictures: Pictures, plot: SeriesPlot | None, samples: int
+) -> str:
     """The section of one controller: failures, what it reads, maps and lines."""
     say, settings = html.escape, results.settings
     return (
@@ -108,12 +113,19 @@ def _controller_part(results: SweepResults, sweep: ControllerSweep, pictures: Pi
         f"{say(description(sweep.name, results.unit))} {say(integration_sentence(sweep.integration_error))} "
         f'<a href="{sweep.name}.csv">every loop as CSV</a></p>'
         + _panels(pictures, f"{sweep.name}_maps.png", f"maps of {sweep.name}")
-        + (_panels(pictures, f"{sweep.name}_lines.png", f"lines of {sweep.name}") if sweep.lines else "")
+        + (moving(plot, picture(pictures[f"{sweep.name}_lines.png"][0], plot.about, "panels"), samples) if plot else "")
     )
 
 
-def page(results: SweepResults, pictures: Pictures, command: str = "", remarks: Remarks = NO_REMARKS) -> str:
-    """One page for a browser, with the pictures inside; the rows as CSV are beside it."""
+def page(
+    results: SweepResults,
+    pictures: Pictures,
+    command: str = "",
+    remarks: Remarks = NO_REMARKS,
+    plots: Mapping[str, SeriesPlot] = NO_PLOTS,
+) -> str:
+    """One page for a browser, with the pictures inside; the rows as CSV are beside it. plots: of each controller's lines over time."""
+    samples = room(sum(len(plot.columns) for plot in plots.values()))
     say, settings, grid, unit = html.escape, results.settings, results.grid, results.unit
     low, high = min(settings.set_points), max(settings.set_points)
     precision = ".0f" if unit.is_angle else ".3g"
@@ -136,7 +148,10 @@ def page(results: SweepResults, pictures: Pictures, command: str = "", remarks: 
         f"median / worst over the set points. {arrived} {say(settings.between)}</p>{bullets(remarks.settings)}",
         table(head, comparison_rows(results)),
         _what_differs(results, drawn_as),
-        *(_controller_part(results, one, pictures) for one in results.sweeps),
+        *folded(
+            [_controller_part(results, one, pictures, plots.get(one.name), samples) for one in results.sweeps],
+            "controllers",
+        ),
         "<h2>Provenance</h2>",
         table(["", ""], [["command", command], *map(list, made_with().items())]),
         "<p class=quiet>The same numbers: sweep.json, sweep.nc (every loop, with named axes and units), and a CSV file for each controller.</p>",

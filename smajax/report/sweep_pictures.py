@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FormatStrFormatter
@@ -14,6 +16,7 @@ from smajax.control.position_unit import DEGREES, PositionUnit
 from smajax.control.sweep.grid import Grid
 from smajax.control.sweep.run_sweep import ControllerSweep
 from smajax.report.drawing import named, panels
+from smajax.report.series_plot import Line, Panel, SeriesPlot
 
 # Figure of merit -> (label, unit shown, factor from SI); of an angle.
 SHOWN = {
@@ -96,8 +99,42 @@ def draw_curves(figure: Figure, grid: Grid, sweep: ControllerSweep) -> None:
             axes.set_yticks([])
 
 
-def draw_maps(figure: Figure, grid: Grid, sweep: ControllerSweep) -> None:
-    """Median over the set points, at the nominal gain, over the two mismatches.
+Limits = Mapping[str, tuple[float, float]]
+
+
+def common_limits(grid: Grid, sweeps: Sequence[ControllerSweep]) -> dict[str, tuple[float, float]]:
+    """Of each figure that is mapped the least and the largest median of all controllers, so that they have one scale of colours."""
+    limits = {}
+    for name in MAPPED:
+        values = np.concatenate([np.median(_over_set_points(grid, one, name)[0], axis=2).ravel() for one in sweeps])
+        values = values[np.isfinite(values)]
+        if values.size:
+            limits[name] = (float(values.min()), float(values.max()))
+    return limits
+
+
+NUMBERED = 9  # values of a mismatch up to which a map's cells have their numbers
+
+
+def _write_cells(axes: Axes, ratios: np.ndarray, values: np.ndarray, limits: tuple[float, float]) -> None:
+    """The number of each cell in it, dark on light cells and light on dark ones."""
+    low, high = limits
+    for across, row in zip(ratios, values, strict=True):
+        for up, value in zip(ratios, row, strict=True):
+            if np.isfinite(value):
+                light = value - low > 0.6 * (high - low)
+                text = f"{0.0 if abs(value) < ROUNDING else value:.2g}"
+                look: dict[str, Any] = {
+                    "ha": "center",
+                    "va": "center",
+                    "fontsize": 7,
+                    "color": "#1d1d1f" if light else "white",
+                }
+                axes.text(across, up, f"{float(text):g}", **look)
+
+
+def draw_maps(figure: Figure, grid: Grid, sweep: ControllerSweep, limits: Limits | None = None) -> None:
+    """Median over the set points, at the nominal gain, over the two mismatches. limits: of the colours, by figure of merit.
 
     Dashed: one mismatch alone, as in the source. Grey: at more than half of the set points the angle never arrives or settles.
     """
@@ -107,7 +144,12 @@ def draw_maps(figure: Figure, grid: Grid, sweep: ControllerSweep) -> None:
         several, why = _over_set_points(grid, sweep, name)
         values, never = np.median(several, axis=2), f"; grey: {why}" if why else ""
         axes.set_facecolor("#c9ccd1")
-        mesh = axes.pcolormesh(edges, edges, np.ma.masked_invalid(values).T, cmap="viridis")
+        finite = values[np.isfinite(values)]
+        own = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 1.0)
+        low, high = (limits or {}).get(name, own)
+        mesh = axes.pcolormesh(edges, edges, np.ma.masked_invalid(values).T, cmap="viridis", vmin=low, vmax=high)
+        if len(grid.ratios) <= NUMBERED:
+            _write_cells(axes, grid.ratios, values, (low, high))
         axes.set(xscale="log", yscale="log")
         for axis in (axes.xaxis, axes.yaxis):
             _ratio_axis(axis)
@@ -151,6 +193,21 @@ def draw_lines(
         handlelength=1.2,
         frameon=False,
     )
+
+
+def lines_plot(
+    time: np.ndarray, ratios: Sequence[float], sweep: ControllerSweep, target: float, unit: PositionUnit = DEGREES
+) -> SeriesPlot:
+    """The same as a plot that moves: a panel a mismatch."""
+    asked = Line("set point", np.full(len(time), float(unit.of(target))), "asked", 1.0, dash=True)
+    panels = []
+    for mismatch, angles in sweep.lines.items():
+        lines = [
+            Line(f"{ratio:g} times", unit.of(angle), f"c{k}", 1.4)
+            for k, (ratio, angle) in enumerate(zip(ratios, angles, strict=False))
+        ]
+        panels.append(Panel(f"{mismatch}, plant over controller", unit.label, (asked, *lines), height=150))
+    return SeriesPlot(f"{sweep.name}, one mismatch at a time", time, tuple(panels))
 
 
 def draw_comparison(

@@ -18,12 +18,13 @@ from smajax.core.display_units import digits
 from smajax.core.files import csv_text, heading
 from smajax.core.provenance import made_with
 from smajax.core.wording import and_listed, counted
-from smajax.report.html import picture
+from smajax.report.embedded import picture
 from smajax.report.integration_words import integration_sentence
 from smajax.report.loop_words import loop_rows
 from smajax.report.plain_page import bullets, headline, table, whole
+from smajax.report.series_picture import series
 from smajax.report.tune_answer import answer, set_point_rows
-from smajax.report.tune_pictures import before_after
+from smajax.report.tune_pictures import merits_picture, positions_plot
 
 SCALED = "The preset's gains and the box are those of the arm, scaled to this load's stroke, force and time and to the drive's limit."
 EDGE = 0.02  # of the box, by logarithm
@@ -256,14 +257,12 @@ def page(result: TuningResult, pictures: Mapping[str, bytes], command: str) -> s
     parts = [
         f"<h1>Gains of {say(settings.controller)}, tuned</h1>",
         headline(answer(result)),
+        series(positions_plot(result)),
         picture(
-            pictures["before_after.png"],
-            "positions and figures of merit before and after",
-            "panels",
-            before_after(result, upright=True),
+            merits_picture(result), "figures of merit before and after", "panels", merits_picture(result, upright=True)
         ),
-        "<p class=quiet>Above: thick, the plant as assumed; thin, plants never seen. Below: from the least to the largest "
-        "over the plants at each set point; squares were tuned on, circles never seen.</p>",
+        "<p class=quiet>From the least to the largest over the plants at each set point; squares were tuned on, circles never "
+        "seen.</p>",
         table(points, rows, range(len(points))),
         bullets(conclusions(result)),
         f"<p>Tuned on {say(settings.plants_sentence(result.air))}. {say(settings.goal_sentence())}.</p>",

@@ -9,27 +9,20 @@ from matplotlib.ticker import FuncFormatter
 from smajax.control.tune.objective import rank
 from smajax.control.tune.terms import TERMS, terms_in
 from smajax.control.tune.tuning import TuningResult
-from smajax.report.pictures import AFTER, BEFORE, MEASURED, QUIET, as_png, new_figure, tidy
+from smajax.report.pictures import AFTER, BEFORE, MEASURED, NARROW, QUIET, as_png, new_figure, tidy
+from smajax.report.series_plot import Line, Panel, SeriesPlot
 
 WIDE = 9.6  # inches
 COLUMNS = list(TERMS)
 
 
-def before_after(result: TuningResult, upright: bool = False) -> bytes:
-    """Positions over time with the preset's gains and with the tuned ones, and what was asked for over the set point.
-
-    upright: one below the other, for a telephone.
-    """
+def before_after(result: TuningResult) -> bytes:
+    """Positions over time with the preset's gains and with the tuned ones, and what was asked for over the set point."""
     terms = [name for name in ("settling_time", "overshoot", "steady_error") if name in TERMS]
-    if upright:
-        figure = new_figure(13.0, width=4.6)
-        left, right, *below = figure.subplots(2 + len(terms), 1)
-        right.sharey(left)
-    else:
-        figure = new_figure(7.4, width=WIDE)
-        top, bottom = np.asarray(figure.subfigures(2, 1, height_ratios=[1.15, 1.0]))
-        left, right = top.subplots(1, 2, sharey=True)
-        below = list(bottom.subplots(1, len(terms)))
+    figure = new_figure(7.4, width=WIDE)
+    top, bottom = np.asarray(figure.subfigures(2, 1, height_ratios=[1.15, 1.0]))
+    left, right = top.subplots(1, 2, sharey=True)
+    below = list(bottom.subplots(1, len(terms)))
     lines, unit = result.lines, result.settings.shown
     alone = len(np.unique(lines.targets))
     for axes, angles, colour, name in (
@@ -50,13 +43,52 @@ def before_after(result: TuningResult, upright: bool = False) -> bytes:
         axes.set_title(name, fontsize=9.5, loc="left")
         axes.set_xlabel("time (s)", fontsize=9)
         tidy(axes)
-    for axes in (left, right) if upright else (left,):
-        axes.set_ylabel(unit.axis, fontsize=9)
+    left.set_ylabel(unit.axis, fontsize=9)
     if len(lines.targets) > alone:
         right.plot([], [], color=MEASURED, linewidth=1.5, label="plant as believed")
         right.plot([], [], color=MEASURED, linewidth=0.5, label="plants never seen")
         right.legend(frameon=False, fontsize=8, loc="lower right")
     for axes, name in zip(below, terms, strict=True):
+        _over_set_points(axes, result, name)
+    return as_png(figure)
+
+
+def positions_plot(result: TuningResult) -> SeriesPlot:
+    """Positions over time with the preset's gains and with the tuned ones, those of plants never seen thin."""
+    lines, unit = result.lines, result.settings.shown
+    targets = np.unique(lines.targets)
+    panels = []
+    for angles, colour, name in (
+        (lines.angles[0], "before", "before: the preset's gains"),
+        (lines.angles[1], "after", "after: tuned"),
+    ):
+        asked = [
+            Line(
+                "set point",
+                np.full(len(lines.time), float(unit.of(target))),
+                "asked",
+                1.0,
+                dash=True,
+                silent=number > 0,
+            )
+            for number, target in enumerate(targets)
+        ]
+        drawn = []
+        for number, angle in enumerate(angles):
+            known = number < len(targets)
+            what = "plant as believed" if known else "plants never seen"
+            width, alpha = (1.6, 1.0) if known else (0.7, 0.45)
+            drawn.append(Line(what, unit.of(angle), colour, width, alpha, silent=number not in (0, len(targets))))
+        panels.append(Panel(name, unit.label, (*asked, *drawn), height=190))
+    return SeriesPlot("positions over time before and after", lines.time, tuple(panels))
+
+
+def merits_picture(result: TuningResult, upright: bool = False) -> bytes:
+    """Figures of merit over the set point, before and after; upright: one below the other, for a telephone."""
+    terms = [name for name in ("settling_time", "overshoot", "steady_error") if name in TERMS]
+    figure = new_figure(2.9 * len(terms), NARROW) if upright else new_figure(3.3, WIDE)
+    panels = figure.subplots(*((len(terms), 1) if upright else (1, len(terms))))
+    for axes, name in zip(panels, terms, strict=True):
         _over_set_points(axes, result, name)
     return as_png(figure)
 

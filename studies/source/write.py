@@ -16,7 +16,7 @@ from smajax.core.files import csv_text, replace, writing
 from smajax.core.progress import Message, Progress, Stage
 from smajax.core.provenance import made_with, source_mark
 from smajax.report.drawing import UPRIGHT
-from smajax.report.html import picture
+from smajax.report.embedded import picture
 from smajax.report.plain_page import table, whole
 
 from .catalogue import every_row

@@ -20,7 +20,7 @@ async hostile => {
   const text = [];
   while (walker.nextNode()) {
     const parent = walker.currentNode.parentElement;
-    if (["SCRIPT", "STYLE"].includes(parent.tagName) || !walker.currentNode.data.trim() || !shown(parent)) continue;
+    if (["SCRIPT", "STYLE", "NOSCRIPT"].includes(parent.tagName) || !walker.currentNode.data.trim() || !shown(parent)) continue;
     text.push(walker.currentNode.data);
     const size = parseFloat(getComputedStyle(parent).fontSize);
     if (size < 11) wrong.push(`text of ${size} px: ${named(parent)}`);
@@ -32,7 +32,7 @@ async hostile => {
     const [across, down] = [image.naturalWidth, image.naturalHeight];
     if (!across || !down) continue;
     if (!image.alt) wrong.push("a picture without a word for it");
-    if (image.getBoundingClientRect().width < Math.min(300, across)) wrong.push(`a picture ${image.getBoundingClientRect().width} px wide: ${image.alt}`);
+    if (shown(image) && image.getBoundingClientRect().width < Math.min(300, across)) wrong.push(`a picture ${image.getBoundingClientRect().width} px wide: ${image.alt}`);
     const canvas = Object.assign(document.createElement("canvas"), { width: across, height: down });
     const pen = canvas.getContext("2d");
     pen.drawImage(image, 0, 0);

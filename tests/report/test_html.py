@@ -25,7 +25,10 @@ NO_REMARK = Remark()
 def test_the_page_fetches_nothing(page):
     assert page.addresses
     assert [address for address in page.addresses if not address.startswith(("#", "data:"))] == []
-    assert not re.search(r"@import|url\(|https?://", page.source)
+    names = page.source.replace(
+        "http://www.w3.org/2000/svg", ""
+    )  # of the language of pictures that are saved, which is no address
+    assert not re.search(r"@import|url\((?!#)|https?://", names)
 
 
 def test_names_are_text_and_never_markup(page):
@@ -44,7 +47,7 @@ def test_the_verdict_comes_first(page, findings):
 
 def test_the_first_screen_has_the_errors_before_and_after_and_how_the_band_does(findings):
     source = findings_to_html(findings)
-    figures = re.findall(r"<dt>(.*?)</dt><dd>(.*?)</dd>", source[: source.index("<nav")])
+    figures = re.findall(r"<dt>(.*?)</dt><dd>(.*?)</dd>", source[: source.index("</header>")])
     shown = {caption: text for caption, text in figures}
     before, after = (1e3 * pooled_rmse(findings.runs, "held-out", which) for which in ("before", "after"))
     assert shown["error on the held-out runs"] == f"{before:.3g} → {after:.3g} mm"
@@ -64,9 +67,10 @@ def test_every_contents_entry_leads_somewhere(page):
 
 def test_no_picture_is_blank(page, findings):
     images = page.images()
-    assert len(images) == 2 * len(findings.runs) + 5
+    # Each run over time and over the temperature; before and after, candidates, errors, autocorrelation; phases twice, once for a telephone.
+    assert len(images) == 2 * len(findings.runs) + 6
     for image in images:
-        assert image.shape[1] > 500
+        assert image.shape[1] > 400
         assert image.std() > 10.0
 
 

@@ -49,12 +49,12 @@ def test_the_summary_of_an_effect_that_was_found() -> None:
     """A snapshot: the verdict, the errors, the noise, what the effect means."""
     assert narrate(made_findings()).summary == (
         "The base model lacks: latent heat of transformation. With it, what is left on the fit runs is measurement noise.",
-        "Mind: radiation to the surroundings leaves a trace in the score test (p = 4e-12 after 2 candidates) that would take 0.4% of the residual's square, but the model with it is no likelier.",
         "Error on the fit runs: 1.13 mm before, 0.0198 mm after.",
         "Error on the held-out runs: 1.18 mm before, 0.0202 mm after.",
         "On the held-out runs the average of the 2 likely models is off by 0.0202 mm, and 93% of the samples lie in its 90 % band.",
         "Measurement noise: 0.02 mm (estimated from the flat part of the runs).",
         "While it transforms the wire absorbs heat without getting warmer, and gives it back on cooling: both strokes are slower than the heat balance alone says, and the same at rest.",
+        "Mind: radiation to the surroundings leaves a trace in the score test (p = 4e-12 after 2 candidates) that would take 0.4% of the residual's square, but the model with it is no likelier.",
     )
 
 

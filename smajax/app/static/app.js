@@ -2,47 +2,16 @@
 // Plots, saving as one types, what changes elsewhere, and the progress of a command. The state is on the server: nothing is kept here.
 const query = new URLSearchParams(document.body.dataset.folder ? { folder: document.body.dataset.folder } : {});
 const address = path => path + (query.size ? "?" + query : "");
-const colour = name => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-const SERIES = ["--plot", "--wire", "--good", "--fair", "--poor", "--quiet"];
 
-// --- Plots: of one group share the cursor and the part that is shown.
-const groups = new Map();
-function shown(value) { return value == null ? "–" : String(Number(value.toPrecision(4))); }
-function axis(label, more) {
-  return { stroke: colour("--quiet"), grid: { stroke: colour("--line"), width: 1 }, ticks: { stroke: colour("--line"), width: 1 }, font: "12px system-ui", label, labelSize: label ? 18 : 0, labelFont: "12px system-ui", ...more };
-}
+// --- Plots.
+const SERIES = ["plot", "wire", "good", "fair", "poor", "quiet"];
 function draw(box, data) {
   const several = data.series || [{ name: data.name, y: data.y }];
-  const unit = data.unit ? " " + data.unit : "";
-  const group = box.dataset.group;
-  const height = Number(box.dataset.height) || 150;
-  let moving = false;
-  const options = {
-    width: Math.max(box.clientWidth, 120), height,
-    cursor: { sync: group ? { key: group, setSeries: false } : undefined, drag: { x: true, y: false } },
-    scales: { x: { time: false }, y: data.log ? { distr: 3 } : {} },
-    series: [{ label: data.x_name, value: (u, v) => v == null ? "–" : shown(v) + (data.x_unit ? " " + data.x_unit : "") },
-      ...several.map((one, k) => ({ label: one.name, stroke: colour(SERIES[k % SERIES.length]), width: 1.4, dash: k < 6 ? undefined : [6, 4], points: { show: several.length && (data.x || []).length < 3 }, value: (u, v) => shown(v) + (v == null ? "" : unit) }))],
-    axes: [axis(data.x_name + (data.x_unit ? " (" + data.x_unit + ")" : ""), { size: 26, labelSize: 16, labelGap: 0 }), axis(data.unit || "", { size: 56 })],
-    hooks: { setScale: [(u, key) => {
-      if (key !== "x" || !group || moving) return;
-      for (const other of groups.get(group) || []) if (other !== u && other.move) other.move(u.scales.x.min, u.scales.x.max);
-    }] },
-  };
-  const plot = new uPlot(options, [data.x, ...several.map(one => one.y)], box);
-  plot.move = (min, max) => { if (plot.scales.x.min === min && plot.scales.x.max === max) return; moving = true; plot.setScale("x", { min, max }); setTimeout(() => { moving = false; }); };
-  plot.data_range = () => [plot.data[0][0], plot.data[0][plot.data[0].length - 1]];
-  box.plot = plot;
-  if (group) groups.set(group, [...(groups.get(group) || []), plot]);
-  new ResizeObserver(() => { if (box.clientWidth > 100 && Math.abs(box.clientWidth - plot.width) > 2) plot.setSize({ width: box.clientWidth, height }); }).observe(box);
-  box.addEventListener("keydown", event => {
-    const { min, max } = plot.scales.x, wide = max - min, middle = (min + max) / 2;
-    const to = { ArrowLeft: [min - wide / 4, max - wide / 4], ArrowRight: [min + wide / 4, max + wide / 4], "+": [middle - wide / 4, middle + wide / 4], "=": [middle - wide / 4, middle + wide / 4], "-": [middle - wide, middle + wide], "0": plot.data_range() }[event.key];
-    if (!to) return;
-    event.preventDefault();
-    const [first, last] = plot.data_range();
-    plot.setScale("x", { min: Math.max(to[0], first), max: Math.min(to[1], last) });
-  });
+  const lines = several.map((one, k) => ({ ...one, colour: SERIES[k % SERIES.length], dash: k >= SERIES.length }));
+  const label = data.x_name + (data.x_unit ? " (" + data.x_unit + ")" : "");
+  const panel = { label: data.unit || "", unit: data.unit, height: (Number(box.dataset.height) || 150) - 52, lines, log: data.log };
+  box.plot = smajaxPlots.panel_in(box, panel, { y: data.x, name: data.x_name, unit: data.x_unit, label }, { group: box.dataset.group });
+  smajaxPlots.keys(box, () => box.plot);
 }
 async function fill(box) {
   try {
@@ -101,10 +70,10 @@ document.querySelectorAll("form[data-autosave]").forEach(form => {
   });
 });
 document.querySelectorAll("button[data-visible]").forEach(button => button.addEventListener("click", () => {
-  const plot = (groups.get(button.dataset.visible) || [])[0];
+  const plot = (smajaxPlots.groups.get(button.dataset.visible) || [])[0];
   if (!plot) return;
   const form = button.form, fields = [];
-  const [first, last] = plot.data_range();
+  const [first, last] = smajaxPlots.ends(plot);
   for (const [what, at, end] of [["start", plot.scales.x.min, first], ["end", plot.scales.x.max, last]]) {
     const name = button.dataset.prefix + "." + what;
     const value = Math.abs(at - end) < 1e-9 ? "" : Number(at.toPrecision(5)) + " s";

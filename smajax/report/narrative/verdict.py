@@ -16,18 +16,17 @@ from smajax.report.narrative.values import error_text
 
 
 def summary(findings: Findings) -> tuple[str, ...]:
-    """The answer first, then what is to be minded, the errors, and what each effect means."""
+    """The answer first, then what makes it doubtful, the errors, what each effect means, and what was not found."""
     outliers = [] if _in_one_run(findings) else caveats.of_an_outlier(findings)
     sentences = [
         _opening(findings),
         *of_wrong_records(findings),
         *outliers,
         *caveats.of_the_noise(findings),
-        *caveats.of_a_faint_trace(findings),
         *caveats.of_the_step(findings),
     ]
     if findings.rejected is not None:
-        sentences.insert(0, _rejected(findings))
+        sentences.insert(1 if findings.added else 0, _rejected(findings))  # after what was found
     sentences += _errors(findings)
     sentences += caveats.of_bounds(findings)
     sentences += caveats.of_priors_left(findings)
@@ -35,6 +34,7 @@ def summary(findings: Findings) -> tuple[str, ...]:
         meaning = caveats.of_the_preset(findings, effect) or LIBRARY[effect.name].candidate.sentence
         sentences += [meaning, *caveats.of_a_size(findings, effect)]
     sentences += caveats.held_out_warnings(findings)
+    sentences += caveats.of_a_faint_trace(findings)
     sentences += caveats.of_the_test(findings)
     sentences += caveats.of_effects_excluded(findings)
     first, *rest = sentences

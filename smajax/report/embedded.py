@@ -1,0 +1,47 @@
+"""Pictures that lie within a page as text."""
+
+from __future__ import annotations
+
+import base64
+import io
+
+import numpy as np
+from markupsafe import Markup
+from PIL import Image
+
+COLOURS = 64  # of a picture within a page: drawings have few, and take a third of the bytes
+
+
+def small(png: bytes) -> bytes:
+    """The same picture with few colours; as it was where that is smaller."""
+    with Image.open(io.BytesIO(png)) as image:
+        full = image.convert("RGB")
+    few = full.quantize(COLOURS, method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
+    # The ground stays as white as the page.
+    palette, ground = few.getpalette() or [], int(np.asarray(few)[0, 0])
+    palette[3 * ground : 3 * ground + 3] = np.asarray(full)[0, 0].tolist()
+    few.putpalette(palette)
+    stream = io.BytesIO()
+    few.save(stream, format="png", optimize=True)
+    return min(stream.getvalue(), png, key=len)
+
+
+def _data(image: bytes) -> str:
+    """An image, PNG or GIF, as an address that holds its bytes."""
+    form = "gif" if image.startswith(b"GIF8") else "png"
+    return f"data:image/{form};base64,{base64.b64encode(small(image) if form == 'png' else image).decode('ascii')}"
+
+
+def picture(image: bytes | None, alt: str, kind: str = "wide", upright: bytes | None = None) -> Markup:
+    """An image, PNG or GIF, that carries its own bytes; nothing for a picture that there is none of.
+
+    kind: `narrow` or `wide`, or `panels` for what is too wide for a telephone and moves sideways there; `upright` is shown
+    there instead, the same panels one below the other.
+    """
+    if image is None:
+        return Markup("")
+    element = Markup('<img class="{}" src="{}" alt="{}">').format(kind, _data(image), alt)
+    if upright is not None:
+        other = Markup('<source media="(max-width: 720px)" srcset="{}">').format(_data(upright))
+        element = Markup("<picture>{}{}</picture>").format(other, element)
+    return Markup('<div class="scroll">{}</div>').format(element)

@@ -1,0 +1,119 @@
+"""Plots of the runs of a loop: output, residual and inputs over time, and the residual's autocorrelation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from smajax.attribution.findings import Findings, RunFinding
+from smajax.core.display_units import Display, display, label
+from smajax.model.channels import channel
+from smajax.report.pictures import autocorrelation, nothing_added
+from smajax.report.series_plot import Band, Line, Panel, SeriesPlot
+
+STRIPS = 3  # input channels drawn under one run
+STRIP, RESIDUAL, OUTPUT = 56, 110, 200  # px
+FIRST = 230  # px: the plot of the first screen
+
+
+def measured_line(values: np.ndarray) -> Line:
+    """The measured curve, wide, under those of models."""
+    return Line("measured", values, "measured", 2.4, 0.55)
+
+
+def run_plot(
+    about: str,
+    time: np.ndarray,
+    inputs: Mapping[str, np.ndarray],
+    output: Panel,
+    residual: Panel,
+    spans: Sequence[tuple[float, float]] = (),
+) -> SeriesPlot:
+    """One run: output, residual, and the first inputs that vary."""
+    varying = [name for name, values in inputs.items() if np.ptp(values) > 0.0][:STRIPS]
+    strips = tuple(
+        Panel(
+            label(name),
+            channel(name).unit,
+            (Line(label(name), np.asarray(channel(name).of(inputs[name])), "input", 1.0, silent=True),),
+            height=STRIP,
+        )
+        for name in varying
+    )
+    return SeriesPlot(about, time, (output, residual, *strips), spans=tuple(spans))
+
+
+def output_panel(name: str, shown: Display, lines: Sequence[Line], bands: Sequence[Band] = ()) -> Panel:
+    """What is measured and what models say of it."""
+    return Panel(label(name), shown.unit, tuple(lines), tuple(bands), OUTPUT)
+
+
+def residual_panel(shown: Display, lines: Sequence[Line], bands: Sequence[Band]) -> Panel:
+    """What models leave over."""
+    return Panel("measured − model", shown.unit, tuple(lines), tuple(bands), RESIDUAL)
+
+
+def models_of(findings: Findings, run: RunFinding) -> list[tuple[str, np.ndarray, str]]:
+    """The models to draw for one run: name, values, colour. One only when nothing was added."""
+    if nothing_added(findings):
+        return [("base model", run.before, "after")]
+    return [("before: base model", run.before, "before"), ("after: extended model", run.after, "after")]
+
+
+def _output(findings: Findings, run: RunFinding) -> Panel:
+    shown = display(findings.output_unit, findings.output_name)
+    lines = [measured_line(shown.of(run.measured))]
+    lines += [Line(name, shown.of(values), colour) for name, values, colour in models_of(findings, run)]
+    bands = []
+    if run.role == "held-out" and run.average is not None:
+        middle, half = shown.of(run.average.reading), shown.of(run.average.half_width)
+        bands = [Band("90 % band", middle - half, middle + half, "band", 0.22)]
+    return output_panel(findings.output_name, shown, lines, bands)
+
+
+def over_time(findings: Findings, run: RunFinding) -> SeriesPlot:
+    """Output measured, before and after; the residuals with the noise band; the varying inputs on thin strips.
+
+    Of a held-out run also the band of the averaged prediction.
+    """
+    shown = display(findings.output_unit, findings.output_name)
+    noise = np.full(len(run.time), 2.0 * shown.of(findings.noise_sigma))
+    lines = [
+        Line(name.split(":")[0], shown.of(run.measured - values), colour, 1.0)
+        for name, values, colour in models_of(findings, run)
+    ]
+    residual = residual_panel(shown, lines, [Band("noise, ± 2 σ", -noise, noise, "noise", 0.8)])
+    return run_plot(f"Run {run.name} over time", run.time, run.inputs, _output(findings, run), residual)
+
+
+def first_plot(findings: Findings) -> SeriesPlot | None:
+    """Before and after, for the first screen: the held-out run that the base model gets most wrong, of fit runs where none is held out."""
+    held_out = [run for run in findings.runs if run.role == "held-out"]
+    runs = held_out or list(findings.runs)
+    if not runs:
+        return None
+    run = max(runs, key=lambda one: float(np.nan_to_num(one.rmse_before, nan=-1.0)))
+    panel = _output(findings, run)
+    name = f"{panel.name} of {run.name}" + (" (held out)" if held_out else "")
+    return SeriesPlot(
+        f"Run {run.name}, before and after", run.time, (Panel(name, panel.unit, panel.lines, panel.bands, FIRST),)
+    )
+
+
+def residual_correlation(findings: Findings) -> SeriesPlot | None:
+    """Autocorrelation of the fit runs' residuals before and after, with the 95 % band of white noise."""
+    runs = [run for run in findings.runs if run.role == "fit" and len(run.time) > 8]
+    if not runs:
+        return None
+    lags = min(200, min(len(run.time) for run in runs) // 4)
+    step = float(np.median(np.diff(runs[0].time)))
+    band = np.full(lags, 1.96 / np.sqrt(sum(len(run.time) for run in runs)))
+    lines = []
+    for index, (name, _, colour) in enumerate(models_of(findings, runs[0])):
+        models = [run.after if index or nothing_added(findings) else run.before for run in runs]
+        curve = autocorrelation([run.measured - model for run, model in zip(runs, models, strict=True)], lags)
+        lines.append(Line(name, curve[1:], colour, 1.4))
+    white = (Band("95 % of white noise", -band, band, "noise", 0.8),)
+    panel = Panel("autocorrelation of the residual", "", tuple(lines), white, 190)
+    return SeriesPlot("Autocorrelation of the residual", step * np.arange(1, lags + 1), (panel,), ("lag", "s"))
