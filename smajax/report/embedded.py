@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import base64
 import io
+from typing import Any
 
 import numpy as np
 from markupsafe import Markup
-from PIL import Image
+from PIL import Image, ImageSequence
 
 COLOURS = 64  # of a picture within a page: drawings have few, and take a third of the bytes
 
@@ -26,10 +27,21 @@ def small(png: bytes) -> bytes:
     return min(stream.getvalue(), png, key=len)
 
 
+def small_film(gif: bytes) -> bytes:
+    """The same film as a WebP without loss, which takes two thirds of the bytes."""
+    with Image.open(io.BytesIO(gif)) as film:
+        images = [one.convert("RGB") for one in ImageSequence.Iterator(film)]
+        each = film.info.get("duration", 100)
+    stream = io.BytesIO()
+    how: dict[str, Any] = {"lossless": True, "method": 2, "minimize_size": True}
+    images[0].save(stream, "webp", save_all=True, append_images=images[1:], duration=each, loop=0, **how)
+    return stream.getvalue()
+
+
 def _data(image: bytes) -> str:
     """An image, PNG or GIF, as an address that holds its bytes."""
-    form = "gif" if image.startswith(b"GIF8") else "png"
-    return f"data:image/{form};base64,{base64.b64encode(small(image) if form == 'png' else image).decode('ascii')}"
+    form, held = ("webp", small_film(image)) if image.startswith(b"GIF8") else ("png", small(image))
+    return f"data:image/{form};base64,{base64.b64encode(held).decode('ascii')}"
 
 
 def picture(image: bytes | None, alt: str, kind: str = "wide", upright: bytes | None = None) -> Markup:

@@ -14,10 +14,11 @@ from smajax.report import identify_pictures as draw
 from smajax.report.csv_files import PARAMETERS, RUNS, identified_parameters, identified_runs
 from smajax.report.embedded import picture
 from smajax.report.identify_record import record
-from smajax.report.identify_words import conclusions, estimate_rows, posterior_rows, prior_shown
-from smajax.report.plain_page import MANY, breakable, bullets, folded, table, whole
+from smajax.report.identify_words import answer, conclusions, estimate_rows, posterior_rows, prior_shown
+from smajax.report.plain_page import MANY, breakable, bullets, folded, headline, table, whole
+from smajax.report.run_plots import FIRST
 from smajax.report.series_picture import COARSE, DPI, series
-from smajax.report.series_plot import room
+from smajax.report.series_plot import Panel, SeriesPlot, room
 
 KNOWN = "Every combination of the parameters is known to 5 % (temperatures: to 1 K) or better."
 KNOWN_OF_THE_REST = "Of the parameters that are neither at a bound nor without effect, every combination is known to 5 % (temperatures: to 1 K)."
@@ -97,6 +98,24 @@ def _run_parts(result: Identified) -> list[str]:
     )
 
 
+def _first_plot(result: Identified) -> str:
+    """Measured and simulated of one run, held out where one is: that with the largest error over the noise."""
+    runs = [run for run in result.runs if run.role == "held-out"] or list(result.runs)
+    ratios = {
+        (run.name, k): float(np.nan_to_num(run.series[k].rmse / one.noise_sigma, nan=-1.0, posinf=-1.0))
+        for run in runs
+        for k, one in enumerate(result.outputs)
+    }
+    name, k = max(ratios, key=lambda key: ratios[key])
+    run = next(one for one in runs if one.name == name)
+    if not np.isfinite(run.series[k].rmse):
+        return ""
+    plot = draw.run_plot_of(result, run, k)
+    panel = plot.panels[0]
+    shown = Panel(f"{panel.name} of {name} ({run.role})", panel.unit, panel.lines, panel.bands, FIRST)
+    return str(series(SeriesPlot(f"{plot.about}, measured and simulated", plot.at, (shown,))))
+
+
 def page(result: Identified) -> str:
     """The whole page."""
     say = html.escape
@@ -109,6 +128,8 @@ def page(result: Identified) -> str:
         rows = [[*row[:-1], prior_shown(one), row[-1]] for row, one in zip(rows, result.estimates, strict=True)]
     parts = [
         f"<h1>{say(result.title or result.experiment)}: parameters</h1>",
+        headline(answer(result)),
+        _first_plot(result),
         bullets(conclusions(result)),
         "<h2>Parameters</h2>",
         table(head, rows, [k for k, title in enumerate(head) if title not in ("parameter", "unit", "remark")]),

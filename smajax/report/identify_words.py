@@ -9,13 +9,31 @@ import numpy as np
 
 from smajax.core.display_units import digits, display, label, p_value, with_error
 from smajax.core.whiteness import WHITE
-from smajax.core.wording import and_listed, times_noise
+from smajax.core.wording import and_listed, counted, times_noise
 from smajax.data.experiment.record import Prior
 from smajax.fit.identify_result import Estimate, Identified
 from smajax.fit.posterior import Posterior
 
 FAR = 2.0  # standard deviations of what was known before, from which on an estimate contradicts it
+NAMED = 3  # parameters of a headline
 OFF = 1.25  # ratio of residual to noise that is worth a sentence
+
+
+def answer(result: Identified) -> str:
+    """The parameters with their standard errors, as a headline; the first few where there are many."""
+    known = [one for one in result.estimates if one.standard_error is not None]
+    every = counted(len(result.estimates), "parameter")
+    if not known:
+        return f"Of {every} the runs determine none."
+    values = "; ".join(f"{label(one.name)} {_with_unit(one)}" for one in known[:NAMED])
+    more = f"; {len(known) - NAMED} more in the table" if len(known) > NAMED else ""
+    return f"{len(known)} of {every} determined: {values}{more}."
+
+
+def _with_unit(one: Estimate) -> str:
+    unit = display(one.unit, one.name)
+    error = None if one.standard_error is None else unit.of(one.standard_error)
+    return f"{with_error(unit.of(one.value), error)} {unit.unit}".strip()
 
 
 def conclusions(result: Identified) -> list[str]:

@@ -77,6 +77,7 @@ def whole(title: str, parts: Sequence[str]) -> str:
         found = re.match(r"<h2>(.*?)</h2>", other, re.DOTALL)
         words = found[1] if found else ""
         place = f"{section_id(words) or 'part'}-{number}"
-        contents.append((place, html.unescape(re.sub(r"<[^>]+>", "", words))))
+        plain = html.unescape(re.sub(r"<[^>]+>", "", words))
+        contents.append((place, re.sub(r" \(.*\)$", "", plain)))  # the contents need no units
         sections.append(f'<section id="{place}">{other}</section>')
     return framed(title, f'<header class="answer" id="answer">{first}</header>{"".join(sections)}', contents)

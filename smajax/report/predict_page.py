@@ -15,7 +15,7 @@ from smajax.core.provenance import made_with
 from smajax.fit.predict import BAND, PredictedRun, Prediction
 from smajax.report.csv_files import RUNS, predicted_runs
 from smajax.report.integration_words import integration_sentence
-from smajax.report.plain_page import MANY, bullets, folded, table, whole
+from smajax.report.plain_page import MANY, bullets, folded, headline, table, whole
 from smajax.report.predict_words import HEAD, band_sentence, conclusions, diagnostics, pooled, run_rows
 from smajax.report.run_plots import measured_line, output_panel, residual_panel, run_plot
 from smajax.report.series_picture import COARSE, DPI, series
@@ -135,13 +135,15 @@ def page(result: Prediction, command: str = "") -> str:
     """The whole page: the answer, the picture that proves it, then the rest."""
     model = result.model
     title = f"Prediction by {model.title}" if model.title else "Prediction"
+    said = conclusions(result)
     first, plots = overview(result), [[run_plot_of(run, k) for k in range(len(run.series))] for run in result.runs]
     samples = room(sum(len(plot.columns) for several in (first, *plots) for plot in several))
     dpi = COARSE if sum(map(len, plots)) > MANY else DPI
     parts = [
         f"<h1>{html.escape(title)}</h1>",
-        bullets(conclusions(result)),
+        headline(said[0]) if said else "",
         f'<div class="{"pair" if len(first) > 1 else ""}">{"".join(series(plot, samples, dpi=COARSE) for plot in first)}</div>',
+        bullets(said[1:]),
         f"<p class=quiet>{html.escape(band_sentence(result))}</p>",
         "<h2>Runs</h2>",
         table(HEAD, run_rows(result), (2, 3, 4, 5)),

@@ -58,7 +58,7 @@ def models_of(findings: Findings, run: RunFinding) -> list[tuple[str, np.ndarray
     """The models to draw for one run: name, values, colour. One only when nothing was added."""
     if nothing_added(findings):
         return [("base model", run.before, "after")]
-    return [("before: base model", run.before, "before"), ("after: extended model", run.after, "after")]
+    return [("before", run.before, "before"), ("after", run.after, "after")]
 
 
 def _output(findings: Findings, run: RunFinding) -> Panel:
@@ -80,8 +80,7 @@ def over_time(findings: Findings, run: RunFinding) -> SeriesPlot:
     shown = display(findings.output_unit, findings.output_name)
     noise = np.full(len(run.time), 2.0 * shown.of(findings.noise_sigma))
     lines = [
-        Line(name.split(":")[0], shown.of(run.measured - values), colour, 1.0)
-        for name, values, colour in models_of(findings, run)
+        Line(name, shown.of(run.measured - values), colour, 1.0) for name, values, colour in models_of(findings, run)
     ]
     residual = residual_panel(shown, lines, [Band("noise, ± 2 σ", -noise, noise, "noise", 0.8)])
     return run_plot(f"Run {run.name} over time", run.time, run.inputs, _output(findings, run), residual)

@@ -91,7 +91,7 @@ def room(plots: int) -> int:
 def kept_samples(columns: Sequence[np.ndarray], most: int = POINTS) -> np.ndarray:
     """Indices, rising, at most `most` and a few, of samples (n,) that hold every extreme of every column.
 
-    The samples are cut into buckets, of each of which the least and the largest of each column stay, and its first. A short series stays whole. A
+    The samples are cut into buckets, of each of which the least and the largest of each column stay, and its first; samples at equal distances fill the room that is left. A short series stays whole. A
     missing number is neither least nor largest; a bucket of none stays missing by its first.
     """
     count = len(columns[0])
@@ -109,7 +109,10 @@ def kept_samples(columns: Sequence[np.ndarray], most: int = POINTS) -> np.ndarra
             picked.append(rows + signed[:whole].reshape(-1, size).argmin(axis=1))
             if whole < count:
                 picked.append(np.asarray([whole + int(signed[whole:].argmin())]))
-    return np.unique(np.concatenate(picked))
+    extremes = np.unique(np.concatenate(picked))
+    # Smooth series have their extremes at the ends of the buckets: what room is left goes to samples in between.
+    between = np.linspace(0, count - 1, max(most - len(extremes), 0)).round().astype(int)
+    return np.union1d(extremes, between)
 
 
 def encoded(values: np.ndarray, bits: int = 16) -> dict[str, Any]:

@@ -48,6 +48,7 @@ from smajax.report.simulate_words import (
 )
 
 APART = ("parameters (SI)", "integration_error")  # attributes that a record and a page have in their own place
+FRAMES, FEW_FRAMES = 90, 54  # of the animation, and of that for a telephone, which the page holds too
 PLAIN = ("temperature", "martensite_fraction", "stress")
 
 
@@ -303,7 +304,10 @@ def write_run(
     replace(folder / "simulate.svg", picture_of(result.data, "svg", band=band))
     progress(Stage("pictures", 1.0))
     animations = (
-        [animation.moving(result.system, result.data, upright=each, progress=progress) for each in (False, True)]
+        [
+            animation.moving(result.system, result.data, upright=each, frames=frames, progress=progress)
+            for each, frames in ((False, FRAMES), (True, FEW_FRAMES))
+        ]
         if animated
         else []
     )

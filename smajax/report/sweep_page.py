@@ -108,12 +108,14 @@ def _controller_part(
 ) -> str:
     """The section of one controller: failures, what it reads, maps and lines."""
     say, settings = html.escape, results.settings
+    still = f"{sweep.name}_lines.png"
+    lines = "" if plot is None else str(moving(plot, picture(pictures[still][0], plot.about, "panels"), samples))
     return (
         f"<h3>{say(sweep.name)}</h3><p>{counted(results.grid.size, 'closed loop')} of {settings.seconds:g} s; {failures(sweep)}. "
         f"{say(description(sweep.name, results.unit))} {say(integration_sentence(sweep.integration_error))} "
         f'<a href="{sweep.name}.csv">every loop as CSV</a></p>'
         + _panels(pictures, f"{sweep.name}_maps.png", f"maps of {sweep.name}")
-        + (moving(plot, picture(pictures[f"{sweep.name}_lines.png"][0], plot.about, "panels"), samples) if plot else "")
+        + lines
     )
 
 

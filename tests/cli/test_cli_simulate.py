@@ -62,9 +62,11 @@ def test_the_files_hold_the_run_of_the_model(folder: Path) -> None:
     page = (folder / "simulate.html").read_text(encoding="utf-8")
     images = [
         page.count(f'{where}="data:image/{form};base64,')
-        for where, form in (("src", "png"), ("srcset", "png"), ("src", "gif"), ("srcset", "gif"))
+        for where, form in (("src", "png"), ("srcset", "png"), ("src", "webp"), ("srcset", "webp"))
     ]
-    assert images == [1, 1, 1, 1]  # the picture, the animation, the same for a telephone
+    assert images == [2, 0, 1, 1]  # the picture, the hysteresis, the animation, the same for a telephone
+    assert page.count('<figure class="series"') == 1
+    assert len(page.encode()) < 800_000
     assert f"lies between {float(expected.martensite_fraction.min()):.2f} and 1.00" in page
     assert (folder / "simulate.svg").read_text(encoding="utf-8").rstrip().endswith("</svg>")
     with Image.open(folder / "simulate.gif") as film:

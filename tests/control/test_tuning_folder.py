@@ -87,7 +87,8 @@ def test_the_folder_has_gains_page_tables_and_record(folder: Path) -> None:
     page = (folder / "tune.html").read_text(encoding="utf-8")
     assert "overshoot" in page
     assert "another parameter wrong by 20 % (the air by 4 K)" in page
-    assert page.count('src="data:image/png') == 2
+    assert page.count('src="data:image/png') == 3
+    assert page.count('<figure class="series"') == 1
     assert page.count('srcset="data:image/png') == 1  # the same for a telephone
     record = json.loads((folder / "tune.json").read_text(encoding="utf-8"))["checks"]
     with (folder / "loops.csv").open(encoding="utf-8") as file:

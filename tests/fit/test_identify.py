@@ -200,7 +200,9 @@ def test_the_page_and_the_record_agree(found: Identified, tmp_path: Path) -> Non
     text = written.read_text(encoding="utf-8")
     assert text == page(found)
     assert "Coupon &lt;of&gt; test" in text
-    assert text.count('src="data:image/png') == 3 + 1 + 1  # runs, profiles, suggestions
+    plots = 3 + 1 + len(found.suggestions)  # runs, that of the answer, suggestions
+    assert text.count('<figure class="series"') == plots
+    assert text.count('src="data:image/png') == plots + 1  # profiles
     assert not re.search(r">\s*nan\b", text.lower())
     assert "The residual is as large as the noise" in " ".join(conclusions(dataclasses.replace(found, ratio=1.004)))
     assert "The residual is 1.4 times the noise" in " ".join(conclusions(dataclasses.replace(found, ratio=1.4)))

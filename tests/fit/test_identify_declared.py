@@ -149,8 +149,8 @@ def test_a_second_sensor_narrows_the_errors_and_the_noise_of_each_is_found(tmp_p
     assert set(told["outputs"]) == set(NOISE)
     assert told["runs"]["c"]["outputs"]["resistance"]["rmse"] < 1.2 * NOISE["resistance"]
     assert told["outputs"]["strain"]["rmse"]["held-out"] < 1.2 * NOISE["strain"]
-    assert page(both).count("data:image/png") == 3 * 2  # runs by sensor
-    assert page(alone).count("data:image/png") == 3
+    assert page(both).count("data:image/png") == 3 * 2 + 1  # runs by sensor, and that of the answer
+    assert page(alone).count("data:image/png") == 3 + 1
 
 
 def test_a_sensor_counts_by_its_noise(tmp_path: Path) -> None:

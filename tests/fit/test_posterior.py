@@ -37,7 +37,7 @@ def test_the_posterior_is_the_gaussian_of_the_fit_where_that_is_valid(tmp_path: 
     np.testing.assert_allclose(np.corrcoef(drawn.flat.T), found.correlation, atol=0.12)
     assert "The chains of the posterior agree" in " ".join(conclusions(found))
     assert record(found)["posterior"]["converged"]
-    assert page(found).count('src="data:image/png') == 3 * 2 + 1 + 1
+    assert page(found).count('src="data:image/png') == 3 * 2 + 1 + 1 + 1
     # Chains that have not mixed are not to be used, and the page says so.
     apart = drawn.draws + drawn.draws.std() * np.arange(CHAINS)[:, None, None]
     poor = dataclasses.replace(found, posterior=dataclasses.replace(drawn, draws=apart, r_hat=np.asarray([1.3, 1.0])))
