@@ -52,7 +52,7 @@ document.querySelectorAll("img").forEach(image => {
 // Below a picture, and below a table: what it shows as a file.
 const below = (place, words, why, act) => {
   const button = Object.assign(document.createElement("button"), { type: "button", textContent: words, title: why });
-  button.setAttribute("aria-label", why);
+  button.setAttribute("aria-label", `${words}: ${why}`);
   button.addEventListener("click", act);
   let row = place.nextElementSibling;
   if (!row?.classList.contains("more-of")) { row = document.createElement("div"); row.className = "more-of"; place.after(row); }
@@ -72,6 +72,7 @@ document.querySelectorAll("table:has(thead)").forEach((table, k) => {
   if (beyond) {
     const all = below(box, `all ${table.tBodies[0].rows.length}`, `show the ${beyond} other rows`, () => {
       table.classList.toggle("all");
+      all.removeAttribute("aria-label");
       all.textContent = table.classList.contains("all") ? "fewer" : `all ${table.tBodies[0].rows.length}`;
     });
   }
