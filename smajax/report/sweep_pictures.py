@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
+from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FormatStrFormatter
 
@@ -116,9 +117,9 @@ def common_limits(grid: Grid, sweeps: Sequence[ControllerSweep]) -> dict[str, tu
 NUMBERED = 9  # values of a mismatch up to which a map's cells have their numbers
 
 
-def _write_cells(axes: Axes, ratios: np.ndarray, values: np.ndarray, limits: tuple[float, float]) -> None:
+def _write_cells(axes: Axes, ratios: np.ndarray, values: np.ndarray, mesh: QuadMesh) -> None:
     """The number of each cell in it, dark on light cells and light on dark ones."""
-    low, high = limits
+    low, high = mesh.get_clim()
     for across, row in zip(ratios, values, strict=True):
         for up, value in zip(ratios, row, strict=True):
             if np.isfinite(value):
@@ -139,6 +140,9 @@ def draw_maps(figure: Figure, grid: Grid, sweep: ControllerSweep, limits: Limits
     Dashed: one mismatch alone, as in the source. Grey: at more than half of the set points the angle never arrives or settles.
     """
     edges = _edges(grid.ratios)
+    numbered, middle = len(grid.ratios) <= NUMBERED, int(np.argmin(np.abs(np.log(grid.ratios))))
+    # Lines beside the numbers, where there are some: on them they would be minus signs.
+    alone = edges[middle : middle + 2] if numbered else [1.0]
     for axes, name in zip(panels(figure, 2, 2), MAPPED, strict=True):
         label, unit, _ = shown_in(grid.plants.unit)[name]
         several, why = _over_set_points(grid, sweep, name)
@@ -148,13 +152,14 @@ def draw_maps(figure: Figure, grid: Grid, sweep: ControllerSweep, limits: Limits
         own = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 1.0)
         low, high = (limits or {}).get(name, own)
         mesh = axes.pcolormesh(edges, edges, np.ma.masked_invalid(values).T, cmap="viridis", vmin=low, vmax=high)
-        if len(grid.ratios) <= NUMBERED:
-            _write_cells(axes, grid.ratios, values, (low, high))
+        if numbered:
+            _write_cells(axes, grid.ratios, values, mesh)
         axes.set(xscale="log", yscale="log")
         for axis in (axes.xaxis, axes.yaxis):
             _ratio_axis(axis)
-        axes.axhline(1.0, color="white", linewidth=1.0, linestyle="--")
-        axes.axvline(1.0, color="white", linewidth=1.0, linestyle="--")
+        for at in alone:
+            axes.axhline(at, color="white", linewidth=1.0, linestyle="--")
+            axes.axvline(at, color="white", linewidth=1.0, linestyle="--")
         named(axes, f"{grid.first}, plant / controller", f"{grid.second}, plant / controller", label)
         if np.isnan(values).all():  # no value: no scale
             axes.set_title(f"{label}{never}", fontsize=9.5, loc="left")
@@ -225,7 +230,7 @@ def draw_comparison(
             axes.plot(position.of(targets), values, "o-", color=colour, markersize=3, linewidth=1.2, label=controller)
         label, unit, _ = shown_in(position)[name]
         named(axes, f"set point ({position.label})", f"{label} ({unit})")
-    last = axes_of[-1]
-    last.axis("off")
+    axes_of[-1].axis("off")
     handles, labels = axes_of[0].get_legend_handles_labels()
-    last.legend(handles, labels, frameon=False, fontsize=9, loc="center", ncols=2)
+    # Above all panels: on the first screen.
+    figure.legend(handles, labels, frameon=False, fontsize=9, loc="outside upper center", ncols=min(len(labels), 4))
