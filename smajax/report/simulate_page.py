@@ -48,7 +48,7 @@ from smajax.report.simulate_words import (
 )
 
 APART = ("parameters (SI)", "integration_error")  # attributes that a record and a page have in their own place
-FRAMES, FEW_FRAMES = 90, 54  # of the animation, and of that for a telephone, which the page holds too
+FRAMES, FEW_FRAMES = 72, 45  # of the animation, and of that for a telephone, which the page holds too
 PLAIN = ("temperature", "martensite_fraction", "stress")
 
 
