@@ -40,6 +40,8 @@ EVIDENCE = {
 }
 # No column: the summary says the gain of a trace that is to be minded.
 RECORD_ONLY = {"score_gain_at_the_end"}
+FIRST_POINTS = 800  # samples in the plot of the first screen, whose run is below with more
+FOLDED = 60  # dots an inch of a picture that is folded away
 LEAST_SHOWN = 0.001  # of a probability: what is less depends on the few sets that were fitted
 
 
@@ -187,14 +189,19 @@ def _runs(findings: Findings) -> list[dict[str, Any]]:
         {
             "run": run,
             "noise_ratio": run.rmse_after / findings.noise_sigma if findings.noise_sigma > 0.0 else float("nan"),
-            "over_time": series(plot, samples, DPI, number < MANY),
+            "over_time": series(plot, samples, COARSE if many else DPI, number < MANY),
             "hysteresis": picture(
-                pictures.run_hysteresis(findings, run, COARSE if many else pictures.HYSTERESIS),
+                pictures.run_hysteresis(findings, run, _hysteresis_dpi(number, many)),
                 f"Run {run.name} against the wire's temperature",
             ),
         }
         for number, (run, plot) in enumerate(zip(findings.runs, plots, strict=True))
     ]
+
+
+def _hysteresis_dpi(number: int, many: bool) -> int:
+    """Dots an inch; those that are folded away have the fewest."""
+    return pictures.HYSTERESIS if not many else COARSE if number < MANY else FOLDED
 
 
 def _contents(findings: Findings) -> list[tuple[str, str]]:
@@ -280,7 +287,7 @@ def findings_to_html(findings: Findings, narrative: Narrative | None = None) -> 
             unknown=_unknown(findings),
             units=units,
             figures=_figures(findings, output),
-            picture_first="" if first is None else series(first),
+            picture_first="" if first is None else series(first, FIRST_POINTS),
             picture_errors=picture(pictures.errors_by_run(findings), "Error of each run before and after", "narrow"),
             picture_candidates=picture(
                 pictures.effect_probabilities(findings), "Candidates by posterior probability", "narrow"

@@ -13,8 +13,8 @@ import numpy as np
 from markupsafe import Markup
 
 POINTS = 1600  # samples of a plot: more than the pixels across
-LEAST_POINTS = 240
-NUMBERS = 72_000  # of all plots of a page; a number takes 2.7 bytes
+LEAST_POINTS = 160
+NUMBERS = 60_000  # of all plots of a page; a number takes 2.7 bytes
 TOOLS, KEY, AXIS = 30, 24, 52  # px: heights of what stands around the panels
 
 
