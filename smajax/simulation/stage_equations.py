@@ -20,7 +20,9 @@ class Unknowns(NamedTuple):
     """What a stage solves for, in the order of elimination."""
 
     temperature: Scalar
-    position: Scalar
+    # From the base of the stage: the velocity is the displacement over the step, of which a difference of two positions leaves
+    # single precision two digits.
+    displacement: Scalar
     stress: Scalar
     fraction: Scalar
 
@@ -48,26 +50,27 @@ def _heating(system: System, stage: Stage, inputs: Inputs, temperature: Scalar, 
     return heat_rate(wire, terms.heat, at, power)
 
 
-def motion_rates(stage: Stage, position: Scalar) -> tuple[Scalar, Scalar]:
-    """(v, a) at the end of a stage that ends at `position`."""
-    velocity = (position - stage.position) / stage.step
+def motion_rates(stage: Stage, displacement: Scalar) -> tuple[Scalar, Scalar]:
+    """(v, a) at the end of a stage that ends `displacement` from its base."""
+    velocity = displacement / stage.step
     return velocity, (velocity - stage.velocity) / stage.step
 
 
-def _free_position(system: System, stage: Stage, inputs: Inputs, z: Unknowns) -> Scalar:
-    """The position less what the equation of motion is off by, in units of position; `z.position` where it holds."""
+def _free_displacement(system: System, stage: Stage, inputs: Inputs, z: Unknowns) -> Scalar:
+    """The displacement less what the equation of motion is off by, in units of position; `z.displacement` where it holds."""
     load = system.load
     assert isinstance(load, AbstractMovingLoad)
-    velocity, acceleration = motion_rates(stage, z.position)
+    position = stage.position + z.displacement
+    velocity, acceleration = motion_rates(stage, z.displacement)
     inertia = load.inertia(inputs)
     before = stage.old.motion
     friction = sum(
-        one.limit * in_use(one, before, z.position)
+        one.limit * in_use(one, before, position)
         for one in rubbing(load, system.terms.friction, before, stage.velocity, inputs)
     )
     pull = load.lever() * cross_section(system.wire) * z.stress
-    resisting = load_resistance(system, stage.time, z.position, velocity, inputs) + friction
-    return z.position - (inertia * acceleration + resisting - pull) * stage.step**2 / inertia
+    resisting = load_resistance(system, stage.time, position, velocity, inputs) + friction
+    return z.displacement - (inertia * acceleration + resisting - pull) * stage.step**2 / inertia
 
 
 class Residuals(NamedTuple):
@@ -79,7 +82,7 @@ class Residuals(NamedTuple):
     heat: Scalar
     motion: Scalar
     stress: Scalar
-    free: Scalar  # not an equation: where the load would be without end stops
+    free: Scalar  # not an equation: the displacement without end stops
 
 
 def equations(system: System, stage: Stage, inputs: Inputs, z: Unknowns) -> Residuals:
@@ -92,10 +95,10 @@ def equations(system: System, stage: Stage, inputs: Inputs, z: Unknowns) -> Resi
     heat = heat / capacity
 
     # Projected on the range between the end stops: at a stop the equation reads "position = stop".
-    free = _free_position(system, stage, inputs, z)
-    lower, upper = load.limits()
-    motion = z.position - jnp.where(free < lower, lower, jnp.where(free > upper, upper, free))
+    free = _free_displacement(system, stage, inputs, z)
+    lower, upper = (limit - stage.position for limit in load.limits())
+    motion = z.displacement - jnp.where(free < lower, lower, jnp.where(free > upper, upper, free))
 
-    strain = -load.contraction(wire) * (z.position - load.start())
+    strain = -load.contraction(wire) * (stage.position + z.displacement - load.start())
     expected = stress_at(wire, terms.constitutive, old, strain, z.temperature, z.stress, z.fraction)
     return Residuals(heat, motion, z.stress - expected, free)

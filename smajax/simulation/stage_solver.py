@@ -58,7 +58,7 @@ class Solution(NamedTuple):
 
     z: Unknowns
     branch: Branch
-    free: Scalar  # position without end stops
+    free: Scalar  # displacement without end stops
     unsolved: Scalar  # 1 where `MOST_ITERATIONS` were not enough, else 0
 
 
@@ -202,10 +202,10 @@ def solve(system: System, stage: Stage, inputs: Inputs) -> Solution:
         new = Unknowns(*(value + change for value, change in zip(z, step, strict=True)))
         for one in slips:
             # Friction passes through sticking on its way from one slip to the other.
-            here, there = bent(one, before, z.position), bent(one, before, new.position)
+            here, there = (bent(one, before, stage.position + end.displacement) for end in (z, new))
             jumped = (one.limit > 0.0) & (jnp.abs(here) > 1.0) & (jnp.abs(there) > 1.0) & (here * there < 0.0)
-            new = new._replace(position=jnp.where(jumped, unbent(one, before), new.position))
-            step[1] = new.position - z.position
+            new = new._replace(displacement=jnp.where(jumped, unbent(one, before) - stage.position, new.displacement))
+            step[1] = new.displacement - z.displacement
         free = free + sum(entry * change for entry, change in zip(free_row, step, strict=True) if entry is not None)
         if number == 0:  # it solves the inner equation roughly only
             return _Iterate(new, branch, free, no, at.iterations + 1)
@@ -213,8 +213,8 @@ def solve(system: System, stage: Stage, inputs: Inputs) -> Solution:
         return _Iterate(new, branch, free, ~_moves(system, step, tolerance) & same, at.iterations + 1)
 
     no = jnp.zeros_like(xi, bool)
-    guess = Unknowns(old.temperature, stage.old.motion.position, old.stress, xi)
-    at = _Iterate(guess, Branch(no, no), guess.position, no, jnp.zeros_like(xi, int))
+    guess = Unknowns(old.temperature, stage.old.motion.position - stage.position, old.stress, xi)
+    at = _Iterate(guess, Branch(no, no), guess.displacement, no, jnp.zeros_like(xi, int))
     for number in range(len(INNER)):
         at = iterate(at, number)
     at = lax.while_loop(

@@ -132,13 +132,13 @@ def _differentiable(given: tuple[System, Stage, Inputs]) -> Solution:
 
 
 def _ended(system: System, stage: Stage, inputs: Inputs) -> tuple[WireState, Scalar, Scalar, Scalar]:
-    """Solve one stage: (the wire at its end, the position, the position without end stops, 1 where it did not converge)."""
+    """Solve one stage: (the wire at its end, the displacement, that without end stops, 1 where it did not converge)."""
     wire, terms, old = system.wire, system.terms, stage.old.wire
     z, branch, free, unsolved = _solved((system, stage, dict(inputs)))
     at = z.temperature, jnp.maximum(z.stress, 0.0)
     xi, parts = settled(wire.kinetics, terms.kinetics, old, branch, z.temperature, z.stress, z.fraction)
     new = reached(wire, terms.constitutive, old, *at, xi)
-    return with_amplitudes(wire.kinetics, terms.kinetics, old, branch, new, parts), z.position, free, unsolved
+    return with_amplitudes(wire.kinetics, terms.kinetics, old, branch, new, parts), z.displacement, free, unsolved
 
 
 def _stage(system: System, stage: Stage, inputs: Inputs) -> tuple[State, Scalar, Scalar, Scalar]:
@@ -147,12 +147,12 @@ def _stage(system: System, stage: Stage, inputs: Inputs) -> tuple[State, Scalar,
     assert isinstance(load, AbstractMovingLoad)
     terms, old = system.terms, over(stage.old.wire, stage.time - stage.old.time)
     stage = dataclasses.replace(stage, old=dataclasses.replace(stage.old, wire=old))
-    wire, position, free, unsolved = _ended(system, stage, inputs)
+    wire, displacement, free, unsolved = _ended(system, stage, inputs)
     wire = with_supply_history(system, inputs, old, wire)
     lower, upper = load.limits()
-    below, above = free < lower, free > upper
-    velocity, acceleration = motion_rates(stage, position)
-    position = jnp.where(below, lower, jnp.where(above, upper, position))
+    below, above = free < lower - stage.position, free > upper - stage.position
+    velocity, acceleration = motion_rates(stage, displacement)
+    position = jnp.where(below, lower, jnp.where(above, upper, stage.position + displacement))
     velocity = jnp.where(below | above, 0.0, velocity)  # inelastic
     acceleration = jnp.where(below | above, 0.0, acceleration)
     # What the heat equation says where it is solved, at the cost of a difference.
