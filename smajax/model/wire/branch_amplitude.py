@@ -15,9 +15,11 @@ FINISHED = 1e-9
 
 
 # A curve that lies beyond the present fraction by less does not: where the wire rests on its curve, the rounding of the
-# stress alone would count as a transformation, or as one missed, and renew an amplitude.
+# stress alone would count as a transformation, or as one missed, and renew an amplitude. In single precision a temperature of
+# 80 C is known to 8e-6 C, and a curve that falls by 0.1 a degree to 7 roundings of 1; a rest of many more takes the onset of
+# a transformation, which is as flat as a cosine, for none.
 REST = 1e-10
-ROUNDINGS = 64.0
+ROUNDINGS = 8.0
 
 
 def beyond(gap: Scalar) -> Bool[Array, ""]:
