@@ -208,7 +208,7 @@ def test_the_jacobians_of_the_printed_filter_agree_with_differences_and_with_its
     at, period, volts = jnp.asarray([0.3, 0.7, 120.0, 50.0, 0.29, 0.6]), jnp.asarray(PERIOD), jnp.asarray(8.0)
     memory, _ = PRINTED.start(jnp.asarray(0.3))
     transition = jax.jit(lambda vector: PRINTED.transition(vector, memory.coupon, volts, period))
-    whole, printed = (np.asarray(one.of(ARM, transition, at, period)) for one in (PastCarried(), PastDropped()))
+    whole, printed = (np.asarray(one.of(ARM, transition, at, period, 0.0)) for one in (PastCarried(), PastDropped()))
     for column, step in enumerate(1e-6 * np.eye(6)):
         difference = (transition(at + step) - transition(at - step)) / 2e-6
         np.testing.assert_allclose(whole[:, column], difference, rtol=1e-6, atol=1e-6)

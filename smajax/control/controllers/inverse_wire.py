@@ -82,8 +82,12 @@ def fraction_for(believed: System, position: Scalar, stress: Scalar, offset: Sca
 
 def bounded_arccos(value: Scalar, edge: Scalar) -> Scalar:
     r"""arccos with the slope held at that of $\pm(1 - \mathrm{edge})$ beyond it, $1/\sqrt{2\,\mathrm{edge}}$ about; flat beyond +-1."""
-    inside = limited(value, edge - 1.0, 1.0 - edge)
-    return jnp.arccos(inside) - (limited(value, -1.0, 1.0) - inside) / jnp.sqrt(1.0 - inside**2)
+    # By the distance to the nearer end: 1 - value^2 and arccos itself lose it, in single precision all but one digit at the edge.
+    negative = value < 0.0
+    distance = jnp.where(negative, 1.0 + value, 1.0 - value)
+    within, held = limited(distance, 0.0, 1.0), limited(distance, edge, 1.0)
+    from_end = 2.0 * jnp.arcsin(jnp.sqrt(0.5 * held)) - (held - within) / jnp.sqrt(held * (2.0 - held))
+    return jnp.where(negative, jnp.pi - from_end, from_end)
 
 
 def temperature_for(

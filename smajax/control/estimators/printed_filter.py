@@ -43,24 +43,30 @@ class AbstractJacobian(eqx.Module):
     """Derivative of the predictions."""
 
     @abc.abstractmethod
-    def of(self, system: System, transition: Callable[[Vector], Vector], at: Vector, period: Scalar) -> Matrix:
-        """6 x 6, the sample before the last in the last two rows and columns."""
+    def of(
+        self, system: System, transition: Callable[[Vector], Vector], at: Vector, period: Scalar, origin: Scalar | float
+    ) -> Matrix:
+        """6 x 6, the sample before the last in the last two rows and columns; the angles of `at` count from `origin`, rad."""
 
 
 class PastCarried(AbstractJacobian):
     """The whole derivative: an error of theta_{k-2} is remembered, and cancels in f_2 what theta_{k-1} shares with it."""
 
-    def of(self, system: System, transition: Callable[[Vector], Vector], at: Vector, period: Scalar) -> Matrix:
+    def of(
+        self, system: System, transition: Callable[[Vector], Vector], at: Vector, period: Scalar, origin: Scalar | float
+    ) -> Matrix:
         return jax.jacfwd(transition)(at)
 
 
 class PastDropped(AbstractJacobian):
     """Eq. 4.29 and 4.30 to the letter: theta_{k-2} as if it were exact, and A_32 without the acceleration."""
 
-    def of(self, system: System, transition: Callable[[Vector], Vector], at: Vector, period: Scalar) -> Matrix:
+    def of(
+        self, system: System, transition: Callable[[Vector], Vector], at: Vector, period: Scalar, origin: Scalar | float
+    ) -> Matrix:
         load = system.load
         torque_to_stress = load.lever() * cross_section(system.wire) * MEGA
-        angle, rate = at[0] + period * at[1], (at[0] - at[4]) / period
+        angle, rate = origin + at[0] + period * at[1], (at[0] - at[4]) / period
         along_angle, along_rate = jax.grad(load.resistance, (0, 1))(angle, rate, {})
         whole = jax.jacfwd(transition)(at)
         printed = jnp.zeros_like(whole).at[0, 0].set(1.0).at[0, 1].set(period).at[1, 0].set(1.0 / period)
@@ -72,6 +78,9 @@ class PrintedFilterMemory(eqx.Module):
     """Estimate after the last reading, and the wire that its stress and temperature lead along the kinetics."""
 
     belief: Belief  # rad, rad/s, MPa, C; then angle (rad) and rate (rad/s) one sample earlier
+    # rad, from which both angles count. The stress comes of their difference over the square of a period: as angles of
+    # 1 rad they would have lost four of single precision's seven digits of it.
+    reading: Scalar
     coupon: State
     innovation: Innovation
 
@@ -92,39 +101,43 @@ class PrintedFilter(AbstractEstimator):
     jacobian: AbstractJacobian = PastCarried()
 
     def start(self, reading: Scalar) -> tuple[PrintedFilterMemory, MeasuredState]:
-        angle, zero = self.system.load.start(), jnp.zeros_like(reading)
+        zero = jnp.zeros_like(reading)
+        angle = self.system.load.start() - reading
         guess = jnp.stack([angle, zero, self.start_stress / MEGA, self.start_temperature, angle, zero])
         inputs = {"temperature": self.start_temperature, "stress": self.start_stress}
         coupon = initial_state(self._coupon(), inputs)
         belief = Belief(guess, self.start_variance * jnp.eye(guess.size, dtype=guess.dtype))
-        belief, innovation = self._read(belief, reading)
+        belief, innovation = self._read(belief)
         # At rest before the first sample: the earlier angle is the angle.
         belief = Belief(belief.mean.at[4].set(belief.mean[0]), belief.covariance)
-        return self._told(belief, coupon, innovation)
+        return self._told(belief, reading, coupon, innovation)
 
     def step(
         self, memory: PrintedFilterMemory, reading: Scalar, voltage: Scalar, period: Scalar
     ) -> tuple[PrintedFilterMemory, MeasuredState]:
         def transition(vector: Vector) -> Vector:
-            return self.transition(vector, memory.coupon, voltage, period)
+            return self.transition(vector, memory.coupon, voltage, period, memory.reading)
 
         mean, covariance = memory.belief.mean, memory.belief.covariance
-        jacobian = self.jacobian.of(self.system, transition, mean, period)
+        jacobian = self.jacobian.of(self.system, transition, mean, period, memory.reading)
         noise = jnp.zeros_like(mean).at[:4].set(self.process_variance)
-        belief = Belief(transition(mean), propagated(covariance, jacobian, jnp.diag(noise)))
-        belief, innovation = self._read(belief, reading)
+        further = jnp.zeros_like(mean).at[jnp.asarray((0, 4))].set(reading - memory.reading)
+        belief = Belief(transition(mean) - further, propagated(covariance, jacobian, jnp.diag(noise)))
+        belief, innovation = self._read(belief)
         inputs = {"temperature": belief.mean[3], "stress": MEGA * belief.mean[2]}
-        return self._told(belief, step(self._coupon(), memory.coupon, inputs, period), innovation)
+        return self._told(belief, reading, step(self._coupon(), memory.coupon, inputs, period), innovation)
 
-    def transition(self, vector: Vector, coupon: State, voltage: Scalar, period: Scalar) -> Vector:
-        """f of eq. 4.24-4.28, and the sample that was the last."""
+    def transition(
+        self, vector: Vector, coupon: State, voltage: Scalar, period: Scalar, origin: Scalar | float = 0.0
+    ) -> Vector:
+        """f of eq. 4.24-4.28, and the sample that was the last. origin: from which the angles count, rad."""
         refuse_lag(self.system, "a filter")
         load, wire, terms = self.system.load, self.system.wire, self.system.terms
         assert isinstance(load, Arm)
         angle, rate, _, temperature, earlier_angle, earlier_rate = vector
         next_angle, next_rate = angle + period * rate, (angle - earlier_angle) / period
         acceleration = (rate - earlier_rate) / period
-        torque = load.inertia({}) * acceleration + load.resistance(next_angle, next_rate, {})
+        torque = load.inertia({}) * acceleration + load.resistance(origin + next_angle, next_rate, {})
         stress = torque / (load.lever() * cross_section(wire))
         fraction = coupon.wire.martensite_fraction
         ohms = resistance_per_metre(wire, terms.resistance, temperature, fraction)
@@ -139,14 +152,17 @@ class PrintedFilter(AbstractEstimator):
         """The believed wire under prescribed temperature and stress."""
         return dataclasses.replace(self.system, load=Coupon(), drive=NoDrive())
 
-    def _read(self, belief: Belief, reading: Scalar) -> tuple[Belief, Innovation]:
+    def _read(self, belief: Belief) -> tuple[Belief, Innovation]:
+        """Corrected by the reading from which its angles count."""
         angle = jnp.zeros_like(belief.mean).at[0].set(1.0)
-        return corrected(belief, reading, angle, self.reading_variance)
+        return corrected(belief, jnp.zeros_like(belief.mean[0]), angle, self.reading_variance)
 
-    def _told(self, belief: Belief, coupon: State, innovation: Innovation) -> tuple[PrintedFilterMemory, MeasuredState]:
+    def _told(
+        self, belief: Belief, reading: Scalar, coupon: State, innovation: Innovation
+    ) -> tuple[PrintedFilterMemory, MeasuredState]:
         angle, rate, stress, temperature = belief.mean[:4]
         wire = coupon.wire
         measured = MeasuredState(
-            angle, rate, MEGA * stress, temperature, wire.martensite_fraction, wire.xi_M, wire.xi_A
+            reading + angle, rate, MEGA * stress, temperature, wire.martensite_fraction, wire.xi_M, wire.xi_A
         )
-        return PrintedFilterMemory(belief, coupon, innovation), measured
+        return PrintedFilterMemory(belief, reading, coupon, innovation), measured
