@@ -117,13 +117,17 @@ def test_a_controller_that_reads_states_needs_an_estimator():
 
 
 @needs_gcc
-@pytest.mark.parametrize("controller", ["pid", "vsc3"])
-def test_in_single_precision_commands_are_within_its_rounding(controller, tmp_path):
-    loop = loop_around(ARM, controller)
-    make = compiled_c(source_of(loop, controller), tmp_path, SINGLE, SANITIZED)
+@pytest.mark.parametrize(("controller", "estimator"), [("pid", None), ("vsc3", None), ("sld", "printed")])
+def test_in_single_precision_commands_are_within_its_rounding(controller, estimator, tmp_path):
+    """Of the double's at readings that both can hold: `printed` makes more of a reading's rounding than of its own (the study)."""
+    loop = loop_around(ARM, controller, estimator=estimator)
+    source = source_of(loop, controller)
     run, readings = loop_and_readings(loop, 1, 0)
-    expected = np.asarray(run.voltage)[:-1]
-    found = commands(make(), run, readings)
+    readings = readings.astype(np.float32).astype(float)
+    expected, found = (
+        commands(compiled_c(source, tmp_path, kind, SANITIZED)(), run, readings) for kind in (DOUBLE, SINGLE)
+    )
+    assert np.ptp(expected) > 1.0
     assert np.max(np.abs(found - expected)) < 1e-5 * np.max(np.abs(expected))
 
 
