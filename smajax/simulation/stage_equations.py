@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
+from jaxtyping import Array, Bool
 
 from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.load.friction import in_use, rubbing
@@ -73,6 +74,17 @@ def _free_displacement(system: System, stage: Stage, inputs: Inputs, z: Unknowns
     return z.displacement - (inertia * acceleration + resisting - pull) * stage.step**2 / inertia
 
 
+def beyond_stops(system: System, stage: Stage, free: Scalar) -> tuple[Bool[Array, ""], Bool[Array, ""]]:
+    """Whether a displacement leads beyond the lower end stop, and beyond the upper one.
+
+    By the position, in which the rounding of a displacement is lost: a load that rests at its stop is not held by it.
+    """
+    assert isinstance(system.load, AbstractMovingLoad)
+    lower, upper = system.load.limits()
+    position = stage.position + free
+    return position < lower, position > upper
+
+
 class Residuals(NamedTuple):
     """Residuals of three equations of a stage, each in the unit of the unknown that it is solved for.
 
@@ -96,8 +108,10 @@ def equations(system: System, stage: Stage, inputs: Inputs, z: Unknowns) -> Resi
 
     # Projected on the range between the end stops: at a stop the equation reads "position = stop".
     free = _free_displacement(system, stage, inputs, z)
-    lower, upper = (limit - stage.position for limit in load.limits())
-    motion = z.displacement - jnp.where(free < lower, lower, jnp.where(free > upper, upper, free))
+    lower, upper = load.limits()
+    below, above = beyond_stops(system, stage, free)
+    ended = jnp.where(below, lower - stage.position, jnp.where(above, upper - stage.position, free))
+    motion = z.displacement - ended
 
     strain = -load.contraction(wire) * (stage.position + z.displacement - load.start())
     expected = stress_at(wire, terms.constitutive, old, strain, z.temperature, z.stress, z.fraction)

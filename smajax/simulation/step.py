@@ -39,7 +39,7 @@ from smajax.model.wire.heat import stored_heat
 from smajax.model.wire.history import over
 from smajax.model.wire.root import root
 from smajax.model.wire.two_populations import choose_branch, curve_on, open_branches, settled, with_amplitudes
-from smajax.simulation.stage_equations import Stage, Unknowns, equations, motion_rates
+from smajax.simulation.stage_equations import Stage, Unknowns, beyond_stops, equations, motion_rates
 from smajax.simulation.stage_solver import Solution, solve, solved_linear
 
 Tree = TypeVar("Tree")
@@ -150,7 +150,7 @@ def _stage(system: System, stage: Stage, inputs: Inputs) -> tuple[State, Scalar,
     wire, displacement, free, unsolved = _ended(system, stage, inputs)
     wire = with_supply_history(system, inputs, old, wire)
     lower, upper = load.limits()
-    below, above = free < lower - stage.position, free > upper - stage.position
+    below, above = beyond_stops(system, stage, free)
     velocity, acceleration = motion_rates(stage, displacement)
     position = jnp.where(below, lower, jnp.where(above, upper, stage.position + displacement))
     velocity = jnp.where(below | above, 0.0, velocity)  # inelastic
