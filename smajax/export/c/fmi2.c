@@ -1,4 +1,7 @@
 /* Functional mock-up interface 2.0 for co-simulation, of the standard's text: only what a slave has to have. */
+#ifdef FMI2_FUNCTION_PREFIX
+#define FUNCTION_PREFIX FMI2_FUNCTION_PREFIX
+#endif
 #include "unit.h"
 
 #include <stdarg.h>
@@ -24,25 +27,6 @@ typedef struct {
     void (*stepFinished)(fmi2ComponentEnvironment, fmi2Status);
     fmi2ComponentEnvironment componentEnvironment;
 } fmi2CallbackFunctions;
-
-#ifdef FMI2_FUNCTION_PREFIX
-#define PASTED(a, b) a##b
-#define PASTE(a, b) PASTED(a, b)
-#define API(name) PASTE(FMI2_FUNCTION_PREFIX, name)
-#define EXPORTED
-#else
-#define API(name) name
-#if defined _WIN32
-#define EXPORTED __declspec(dllexport)
-#elif defined __GNUC__
-#define EXPORTED __attribute__((visibility("default")))
-#else
-#define EXPORTED
-#endif
-#endif
-/* An exported function with its declaration before it, and of a call that changes nothing. */
-#define FUNCTION(result, name, arguments) EXPORTED result API(name) arguments; result API(name) arguments
-#define UNUSED(one) ((void)(one))
 
 typedef struct {
     unit *own;
@@ -149,24 +133,12 @@ FUNCTION(fmi2Status, fmi2Reset, (fmi2Component c))
 
 FUNCTION(fmi2Status, fmi2GetReal, (fmi2Component c, const fmi2ValueReference references[], size_t count, fmi2Real values[]))
 {
-    size_t k;
-    for (k = 0; k < count; k++) {
-        if (unit_get(own(c), references[k], &values[k]) != UNIT_OK) {
-            return fmi2Error;
-        }
-    }
-    return fmi2OK;
+    return status(unit_get(own(c), references, count, values));
 }
 
 FUNCTION(fmi2Status, fmi2SetReal, (fmi2Component c, const fmi2ValueReference references[], size_t count, const fmi2Real values[]))
 {
-    size_t k;
-    for (k = 0; k < count; k++) {
-        if (unit_set(own(c), references[k], values[k]) != UNIT_OK) {
-            return fmi2Error;
-        }
-    }
-    return fmi2OK;
+    return status(unit_set(own(c), references, count, values));
 }
 
 /* There are no variables of these types, and no derivatives: asked for none it is well, asked for one it is an error. */
@@ -186,32 +158,18 @@ NO_VARIABLES(fmi2SetString, const fmi2String)
 
 FUNCTION(fmi2Status, fmi2GetFMUstate, (fmi2Component c, fmi2FMUstate *state))
 {
-    if (*state == NULL) {
-        *state = malloc(sizeof(unit_data));
-    }
-    if (*state == NULL) {
-        return fmi2Error;
-    }
-    memcpy(*state, &own(c)->data, sizeof(unit_data));
-    return fmi2OK;
+    return status(unit_save(own(c), state));
 }
 
 FUNCTION(fmi2Status, fmi2SetFMUstate, (fmi2Component c, fmi2FMUstate state))
 {
-    if (state == NULL) {
-        return status(unit_failed(own(c), "there is no state to go back to", "fmi2SetFMUstate"));
-    }
-    memcpy(&own(c)->data, state, sizeof(unit_data));
-    return fmi2OK;
+    return status(unit_restore(own(c), state, "fmi2SetFMUstate"));
 }
 
 FUNCTION(fmi2Status, fmi2FreeFMUstate, (fmi2Component c, fmi2FMUstate *state))
 {
     UNUSED(c);
-    if (state != NULL) {
-        free(*state);
-        *state = NULL;
-    }
+    unit_forget(state);
     return fmi2OK;
 }
 
@@ -225,27 +183,12 @@ FUNCTION(fmi2Status, fmi2SerializedFMUstateSize, (fmi2Component c, fmi2FMUstate 
 
 FUNCTION(fmi2Status, fmi2SerializeFMUstate, (fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[], size_t size))
 {
-    if (state == NULL || size < unit_bytes()) {
-        return status(unit_failed(own(c), "the buffer is too small", "fmi2SerializeFMUstate"));
-    }
-    unit_write(state, (uint8_t *)bytes);
-    return fmi2OK;
+    return status(unit_write(own(c), state, (uint8_t *)bytes, size, "fmi2SerializeFMUstate"));
 }
 
 FUNCTION(fmi2Status, fmi2DeSerializeFMUstate, (fmi2Component c, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state))
 {
-    unit_data data;
-    if (unit_read(own(c), (const uint8_t *)bytes, size, &data) != UNIT_OK) {
-        return fmi2Error;
-    }
-    if (*state == NULL) {
-        *state = malloc(sizeof data);
-    }
-    if (*state == NULL) {
-        return fmi2Error;
-    }
-    memcpy(*state, &data, sizeof data);
-    return fmi2OK;
+    return status(unit_read(own(c), (const uint8_t *)bytes, size, state));
 }
 
 FUNCTION(fmi2Status, fmi2GetDirectionalDerivative,

@@ -1,5 +1,8 @@
 /* Functional mock-up interface 3.0 for co-simulation, of the standard's text: every function that it names, those of what this unit has not
  * as errors. */
+#ifdef FMI3_FUNCTION_PREFIX
+#define FUNCTION_PREFIX FMI3_FUNCTION_PREFIX
+#endif
 #include "unit.h"
 
 #include <stdlib.h>
@@ -24,24 +27,6 @@ typedef void (*fmi3IntermediateUpdateCallback)(fmi3InstanceEnvironment, fmi3Floa
                                                fmi3Boolean, fmi3Boolean *, fmi3Float64 *);
 typedef void (*fmi3LockPreemptionCallback)(void);
 typedef void (*fmi3ClockUpdateCallback)(fmi3InstanceEnvironment);
-
-#ifdef FMI3_FUNCTION_PREFIX
-#define PASTED(a, b) a##b
-#define PASTE(a, b) PASTED(a, b)
-#define API(name) PASTE(FMI3_FUNCTION_PREFIX, name)
-#define EXPORTED
-#else
-#define API(name) name
-#if defined _WIN32
-#define EXPORTED __declspec(dllexport)
-#elif defined __GNUC__
-#define EXPORTED __attribute__((visibility("default")))
-#else
-#define EXPORTED
-#endif
-#endif
-#define FUNCTION(result, name, arguments) EXPORTED result API(name) arguments; result API(name) arguments
-#define UNUSED(one) ((void)(one))
 
 typedef struct {
     unit *own;
@@ -193,31 +178,19 @@ FUNCTION(fmi3Status, fmi3Reset, (fmi3Instance i))
 FUNCTION(fmi3Status, fmi3GetFloat64,
          (fmi3Instance i, const fmi3ValueReference references[], size_t count, fmi3Float64 values[], size_t numbers))
 {
-    size_t k;
     if (count != numbers) {
         return status(unit_failed(own(i), "every variable is one number", "fmi3GetFloat64"));
     }
-    for (k = 0; k < count; k++) {
-        if (unit_get(own(i), references[k], &values[k]) != UNIT_OK) {
-            return fmi3Error;
-        }
-    }
-    return fmi3OK;
+    return status(unit_get(own(i), references, count, values));
 }
 
 FUNCTION(fmi3Status, fmi3SetFloat64,
          (fmi3Instance i, const fmi3ValueReference references[], size_t count, const fmi3Float64 values[], size_t numbers))
 {
-    size_t k;
     if (count != numbers) {
         return status(unit_failed(own(i), "every variable is one number", "fmi3SetFloat64"));
     }
-    for (k = 0; k < count; k++) {
-        if (unit_set(own(i), references[k], values[k]) != UNIT_OK) {
-            return fmi3Error;
-        }
-    }
-    return fmi3OK;
+    return status(unit_set(own(i), references, count, values));
 }
 
 /* There are no variables of these types: asked for none it is well, asked for one it is an error. */
@@ -309,32 +282,18 @@ FUNCTION(fmi3Status, fmi3GetVariableDependencies,
 
 FUNCTION(fmi3Status, fmi3GetFMUState, (fmi3Instance i, fmi3FMUState *state))
 {
-    if (*state == NULL) {
-        *state = malloc(sizeof(unit_data));
-    }
-    if (*state == NULL) {
-        return fmi3Error;
-    }
-    memcpy(*state, &own(i)->data, sizeof(unit_data));
-    return fmi3OK;
+    return status(unit_save(own(i), state));
 }
 
 FUNCTION(fmi3Status, fmi3SetFMUState, (fmi3Instance i, fmi3FMUState state))
 {
-    if (state == NULL) {
-        return status(unit_failed(own(i), "there is no state to go back to", "fmi3SetFMUState"));
-    }
-    memcpy(&own(i)->data, state, sizeof(unit_data));
-    return fmi3OK;
+    return status(unit_restore(own(i), state, "fmi3SetFMUState"));
 }
 
 FUNCTION(fmi3Status, fmi3FreeFMUState, (fmi3Instance i, fmi3FMUState *state))
 {
     UNUSED(i);
-    if (state != NULL) {
-        free(*state);
-        *state = NULL;
-    }
+    unit_forget(state);
     return fmi3OK;
 }
 
@@ -348,27 +307,12 @@ FUNCTION(fmi3Status, fmi3SerializedFMUStateSize, (fmi3Instance i, fmi3FMUState s
 
 FUNCTION(fmi3Status, fmi3SerializeFMUState, (fmi3Instance i, fmi3FMUState state, fmi3Byte bytes[], size_t size))
 {
-    if (state == NULL || size < unit_bytes()) {
-        return status(unit_failed(own(i), "the buffer is too small", "fmi3SerializeFMUState"));
-    }
-    unit_write(state, bytes);
-    return fmi3OK;
+    return status(unit_write(own(i), state, bytes, size, "fmi3SerializeFMUState"));
 }
 
 FUNCTION(fmi3Status, fmi3DeserializeFMUState, (fmi3Instance i, const fmi3Byte bytes[], size_t size, fmi3FMUState *state))
 {
-    unit_data data;
-    if (unit_read(own(i), bytes, size, &data) != UNIT_OK) {
-        return fmi3Error;
-    }
-    if (*state == NULL) {
-        *state = malloc(sizeof data);
-    }
-    if (*state == NULL) {
-        return fmi3Error;
-    }
-    memcpy(*state, &data, sizeof data);
-    return fmi3OK;
+    return status(unit_read(own(i), bytes, size, state));
 }
 
 #define NO_DERIVATIVE(name)                                                                                                  \

@@ -113,7 +113,7 @@ enum unit_result unit_initialised(unit *one)
     return UNIT_OK;
 }
 
-enum unit_result unit_get(unit *one, uint32_t reference, double *value)
+static enum unit_result get(unit *one, uint32_t reference, double *value)
 {
     if (reference >= UNIT_VARIABLES) {
         return unit_failed(one, "there is no variable of this value reference", "");
@@ -125,7 +125,18 @@ enum unit_result unit_get(unit *one, uint32_t reference, double *value)
     return UNIT_OK;
 }
 
-enum unit_result unit_set(unit *one, uint32_t reference, double value)
+enum unit_result unit_get(unit *one, const uint32_t references[], size_t count, double values[])
+{
+    size_t k;
+    for (k = 0; k < count; k++) {
+        if (get(one, references[k], &values[k]) != UNIT_OK) {
+            return UNIT_ERROR;
+        }
+    }
+    return UNIT_OK;
+}
+
+static enum unit_result set(unit *one, uint32_t reference, double value)
 {
     enum unit_kind kind;
     if (reference >= UNIT_VARIABLES) {
@@ -140,6 +151,17 @@ enum unit_result unit_set(unit *one, uint32_t reference, double value)
     }
     *place(&one->data, reference) = value;
     one->data.stale = 1;
+    return UNIT_OK;
+}
+
+enum unit_result unit_set(unit *one, const uint32_t references[], size_t count, const double values[])
+{
+    size_t k;
+    for (k = 0; k < count; k++) {
+        if (set(one, references[k], values[k]) != UNIT_OK) {
+            return UNIT_ERROR;
+        }
+    }
     return UNIT_OK;
 }
 
@@ -180,20 +202,59 @@ enum unit_result unit_step(unit *one, double time, double seconds)
     return UNIT_OK;
 }
 
+static enum unit_result saved(const unit_data *data, void **state)
+{
+    if (*state == NULL) {
+        *state = malloc(sizeof *data);
+    }
+    if (*state == NULL) {
+        return UNIT_ERROR;
+    }
+    memcpy(*state, data, sizeof *data);
+    return UNIT_OK;
+}
+
+enum unit_result unit_save(const unit *one, void **state)
+{
+    return saved(&one->data, state);
+}
+
+enum unit_result unit_restore(unit *one, const void *state, const char *function)
+{
+    if (state == NULL) {
+        return unit_failed(one, "there is no state to go back to", function);
+    }
+    memcpy(&one->data, state, sizeof one->data);
+    return UNIT_OK;
+}
+
+void unit_forget(void **state)
+{
+    if (state != NULL) {
+        free(*state);
+        *state = NULL;
+    }
+}
+
 size_t unit_bytes(void)
 {
     return sizeof(uint64_t) + sizeof(unit_data);
 }
 
-void unit_write(const unit_data *data, uint8_t *bytes)
+enum unit_result unit_write(unit *one, const void *state, uint8_t bytes[], size_t count, const char *function)
 {
     const uint64_t mark = UNIT_MARK;
+    if (state == NULL || count < unit_bytes()) {
+        return unit_failed(one, "the buffer is too small", function);
+    }
     memcpy(bytes, &mark, sizeof mark);
-    memcpy(bytes + sizeof mark, data, sizeof *data);
+    memcpy(bytes + sizeof mark, state, sizeof(unit_data));
+    return UNIT_OK;
 }
 
-enum unit_result unit_read(unit *one, const uint8_t *bytes, size_t count, unit_data *data)
+enum unit_result unit_read(unit *one, const uint8_t bytes[], size_t count, void **state)
 {
+    unit_data data;
     uint64_t mark = 0;
     if (count == unit_bytes()) {
         memcpy(&mark, bytes, sizeof mark);
@@ -201,6 +262,6 @@ enum unit_result unit_read(unit *one, const uint8_t *bytes, size_t count, unit_d
     if (mark != UNIT_MARK) {
         return unit_failed(one, "these bytes are not a state of this unit", "");
     }
-    memcpy(data, bytes + sizeof mark, sizeof *data);
-    return UNIT_OK;
+    memcpy(&data, bytes + sizeof mark, sizeof data);
+    return saved(&data, state);
 }
