@@ -6,6 +6,7 @@ import ctypes
 import subprocess
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -54,13 +55,18 @@ def library(source: CSource, kind: str, driver: str) -> ctypes.CDLL:
     return ctypes.CDLL(str(path))
 
 
-def commands(source: CSource, kind: str, readings: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Of a controller, (loops, samples)."""
-    given = [np.ascontiguousarray(one, dtype=np.float64) for one in (readings, points)]
-    found = np.empty_like(given[0])
-    pointers = [one.ctypes.data_as(ctypes.c_void_p) for one in (*given, found)]
-    library(source, kind, CONTROLLER).drive(ctypes.c_long(len(found)), ctypes.c_long(found.shape[1]), *pointers)
-    return found
+def commands(source: CSource, kind: str) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
+    """Of a controller compiled once: readings and set points -> commands, (loops, samples) each."""
+    drive = library(source, kind, CONTROLLER).drive
+
+    def of(readings: np.ndarray, points: np.ndarray) -> np.ndarray:
+        given = [np.ascontiguousarray(one, dtype=np.float64) for one in (readings, points)]
+        found = np.empty_like(given[0])
+        pointers = [one.ctypes.data_as(ctypes.c_void_p) for one in (*given, found)]
+        drive(ctypes.c_long(len(found)), ctypes.c_long(found.shape[1]), *pointers)
+        return found
+
+    return of
 
 
 def open_loop(source: CSource, inputs: dict[str, np.ndarray], seconds: float) -> tuple[dict[str, np.ndarray], float]:

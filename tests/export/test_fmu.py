@@ -27,6 +27,7 @@ from smajax.model.presets import build
 from smajax.model.rigs import arm
 from smajax.simulation.compiled import simulate_compiled
 from smajax.simulation.steppers import Integration
+from studies.exported_code.slave import Slave
 from tests.helpers.c_programs import STRICT, needs_gcc
 from tests.helpers.machine_code import by_machine_code
 
@@ -72,55 +73,6 @@ def files(
     return paths
 
 
-class Slave:
-    """A unit under FMPy, by the names of its variables."""
-
-    def __init__(self, fmpy: Any, path: Path, folder: Path) -> None:
-        from fmpy.fmi2 import FMU2Slave
-        from fmpy.fmi3 import FMU3Slave
-
-        description = fmpy.read_model_description(str(path))
-        self.three = description.fmiVersion == "3.0"
-        self.reference = {one.name: one.valueReference for one in description.modelVariables}
-        given = {"modelIdentifier": description.coSimulation.modelIdentifier, "instanceName": "one"}
-        unzipped = folder / path.stem
-        if not unzipped.exists():  # not again: a library that is in use would be written over
-            fmpy.extract(str(path), str(unzipped))
-        make = FMU3Slave if self.three else FMU2Slave
-        token = description.instantiationToken if self.three else description.guid
-        self.unit = make(guid=token, unzipDirectory=str(unzipped), **given)
-        self.unit.instantiate()
-
-    def begin(self, **values: float) -> Slave:
-        if not self.three:
-            self.unit.setupExperiment(startTime=0.0)
-        self.unit.enterInitializationMode()
-        self.set(**values)
-        self.unit.exitInitializationMode()
-        return self
-
-    def set(self, **values: float) -> None:
-        put = self.unit.setFloat64 if self.three else self.unit.setReal
-        put([self.reference[name] for name in values], list(values.values()))
-
-    def get(self, *names: str) -> list[float]:
-        read = self.unit.getFloat64 if self.three else self.unit.getReal
-        return list(read([self.reference[name] for name in names]))
-
-    def step(self, time: float, seconds: float) -> None:
-        self.unit.doStep(currentCommunicationPoint=time, communicationStepSize=seconds)
-
-    def state(self) -> Any:
-        return self.unit.getFMUState() if self.three else self.unit.getFMUstate()
-
-    def back_to(self, state: Any) -> None:
-        (self.unit.setFMUState if self.three else self.unit.setFMUstate)(state)
-
-    def close(self) -> None:
-        self.unit.terminate()
-        self.unit.freeInstance()
-
-
 def volts(time: np.ndarray) -> np.ndarray:
     return np.where(time < 0.9, 14.0, np.where(time < 1.4, 2.0, 12.0))
 
@@ -164,7 +116,7 @@ def test_an_open_loop_is_the_packages_whatever_the_communication_step(fmpy, file
     left = np.max(np.abs(run - exact), axis=0)
     assert left[0] < 3e-4 * np.ptp(exact[:, 0])
     for seconds in (0.001, 0.005, 0.05):
-        found = open_loop(Slave(fmpy, files["actuator"], tmp_path), seconds)
+        found = open_loop(Slave(files["actuator"], tmp_path), seconds)
         rows, places = np.asarray(list(found.values())), list(found)
         assert len(places) == {0.001: 401, 0.005: 401, 0.05: 41}[seconds]
         assert np.all(np.max(np.abs(rows - exact[places]), axis=0) <= 2.0 * left)
@@ -173,7 +125,7 @@ def test_an_open_loop_is_the_packages_whatever_the_communication_step(fmpy, file
 
 
 def test_parameters_inputs_and_a_state_that_is_gone_back_to(fmpy, files, tmp_path):
-    slave = Slave(fmpy, files["actuator"], tmp_path).begin(voltage=14.0, payload_mass=0.08, ambient_temperature=30.0)
+    slave = Slave(files["actuator"], tmp_path).begin(voltage=14.0, payload_mass=0.08, ambient_temperature=30.0)
     assert slave.get("temperature")[0] == 30.0
     slave.step(0.0, 0.6)
     saved, before = slave.state(), slave.get("reading", "temperature", "time")
@@ -185,7 +137,7 @@ def test_parameters_inputs_and_a_state_that_is_gone_back_to(fmpy, files, tmp_pat
     slave.step(0.6, 0.4)
     assert slave.get("reading", "temperature") == there
     data = slave.unit.serializeFMUState(saved) if slave.three else slave.unit.serializeFMUstate(saved)
-    other = Slave(fmpy, files["actuator"], tmp_path).begin()
+    other = Slave(files["actuator"], tmp_path).begin()
     other.back_to(other.unit.deserializeFMUState(data) if slave.three else other.unit.deSerializeFMUstate(data))
     other.step(0.6, 0.4)
     assert other.get("reading", "temperature") == there
@@ -193,7 +145,7 @@ def test_parameters_inputs_and_a_state_that_is_gone_back_to(fmpy, files, tmp_pat
     with pytest.raises(Exception, match="Set"):
         slave.set(payload_mass=0.1)
     with pytest.raises(Exception, match="ExitInitializationMode"):
-        Slave(fmpy, files["actuator"], tmp_path).begin(wire_length=-1.0)
+        Slave(files["actuator"], tmp_path).begin(wire_length=-1.0)
 
 
 def test_a_closed_loop_of_two_units_is_the_packages(fmpy, files, tmp_path):
@@ -203,7 +155,7 @@ def test_a_closed_loop_of_two_units_is_the_packages(fmpy, files, tmp_path):
     run = by_machine_code(simulate_closed_loop)(
         loop.system, loop.controller, wanted, 0.5 * PERIOD, 2, integration=integration
     )
-    plant, pid = (Slave(fmpy, files[name], tmp_path) for name in ("actuator", "pid"))
+    plant, pid = (Slave(files[name], tmp_path) for name in ("actuator", "pid"))
     plant.begin()
     pid.begin()
     readings, commands = plant.get("reading"), []
@@ -334,7 +286,7 @@ def test_a_coupon_is_a_unit_too(fmpy, tmp_path):
     warmth, pull = 20.0 + 80.0 * np.sin(0.3 * time) ** 2, np.full(101, 1e8)
     inputs = {"temperature": jnp.asarray(warmth), "stress": jnp.asarray(pull)}
     run = simulate_compiled(system, inputs, 0.1)
-    slave = Slave(fmpy, path, tmp_path).begin(temperature=warmth[0], stress=pull[0])
+    slave = Slave(path, tmp_path).begin(temperature=warmth[0], stress=pull[0])
     readings = slave.get("reading")
     for k in range(100):
         slave.set(temperature=warmth[k + 1], stress=pull[k + 1])

@@ -1,0 +1,218 @@
+"""Exported units run by FMPy, a client that is not ours: `python -m studies.exported_code.in_fmpy`, into fmpy.json beside it.
+
+Needs a C compiler and FMPy (`pip install fmpy`). Prints the tables of the README.
+"""
+
+from __future__ import annotations
+
+import gc
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+
+from smajax.core.runtime import prepare
+
+prepare()
+
+from smajax.control.closed_loop import simulate_closed_loop  # noqa: E402
+from smajax.control.loop_around import loop_around  # noqa: E402
+from smajax.control.reference import clock, steps  # noqa: E402
+from smajax.core.files import json_text, replace  # noqa: E402
+from smajax.core.operating_system import peak_memory  # noqa: E402
+from smajax.engine import program  # noqa: E402
+from smajax.export.fmu import VERSIONS, fmu  # noqa: E402
+from smajax.export.from_files import plant_source  # noqa: E402
+from smajax.export.source import CSource  # noqa: E402
+from smajax.model.rigs import arm, dead_weight  # noqa: E402
+from smajax.model.system import System  # noqa: E402
+from smajax.simulation.compiled import simulate_compiled  # noqa: E402
+from smajax.simulation.steppers import Integration  # noqa: E402
+from studies.exported_code.run import PERIOD, source_of  # noqa: E402
+from studies.exported_code.slave import Slave  # noqa: E402
+from studies.source.unloading import INITIAL_MASS, VOLTS  # noqa: E402
+
+RESULTS = Path(__file__).with_name("fmpy.json")
+TOLERANCE, CLOCK, MANY = 1e-5, 0.005, 10_000
+
+
+def written(source: CSource, version: str, folder: Path) -> Path:
+    path = Path(tempfile.mkdtemp(dir=folder)) / f"{source.name}.fmu"
+    path.write_bytes(fmu(source, version))
+    return path
+
+
+def figures() -> dict[str, tuple[System, float, dict[str, list[tuple[float, float]]]]]:
+    """Name -> (system, length in s, inputs as corners (s, value) between which FMPy goes along straight lines)."""
+    left = INITIAL_MASS - 0.096
+    mass = [
+        (0.0, INITIAL_MASS),
+        (40.0, INITIAL_MASS),
+        (40.0, left),
+        (60.0, left),
+        (60.0, INITIAL_MASS),
+        (80.0, INITIAL_MASS),
+    ]
+    return {
+        "M2": (arm(), 10.0, {"voltage": [(0.0, 7.2), (10.0, 7.2)]}),
+        "M3": (arm(), 10.0, {"voltage": [(0.0, 7.3), (10.0, 7.3)]}),
+        "M13": (dead_weight(), 80.0, {"voltage": [(time, VOLTS) for time, _ in mass], "mass": mass}),
+    }
+
+
+def series_of(corners: list[tuple[float, float]], length: float) -> np.ndarray:
+    """Held from sample to sample of the package's clock; at a jump the value behind it."""
+    times, values = np.asarray(corners).T
+    at = np.arange(round(length / CLOCK) + 1) * CLOCK
+    return values[np.minimum(np.searchsorted(times, at + 1e-9), len(values) - 1)]
+
+
+def off(ours: Any, theirs: Any) -> float:
+    return float(np.max(np.abs(np.asarray(ours) - np.asarray(theirs))))
+
+
+def open_loops(folder: Path) -> list[dict[str, Any]]:
+    """FMPy's own master over each figure, at communication steps of 1, 5 and 50 ms."""
+    from fmpy import simulate_fmu
+
+    rows = []
+    for name, (system, length, inputs) in figures().items():
+        source = plant_source(system, name.lower(), tolerance=TOLERANCE)
+        given = {key: jnp.asarray(series_of(corners, length)) for key, corners in inputs.items()}
+        run, exact = (
+            np.asarray(simulate_compiled(system, given, CLOCK, tolerance=size).reading) for size in (TOLERANCE, 1e-8)
+        )
+        corners = list(inputs.values())
+        signals = np.array(
+            [(corners[0][k][0], *(one[k][1] for one in corners)) for k in range(len(corners[0]))],
+            dtype=[("time", np.float64), *((key, np.float64) for key in inputs)],
+        )
+        for version in VERSIONS:
+            path = written(source, version, folder)
+            row: dict[str, Any] = {
+                "figure": name,
+                "fmi": version,
+                "range": float(np.ptp(exact)),
+                "package": off(run, exact),
+            }
+            for seconds in (0.001, 0.005, 0.05):
+                found = simulate_fmu(
+                    str(path), stop_time=length, output_interval=seconds, input=signals, output=["reading"],
+                    start_values={key: float(values[0]) for key, values in given.items()}, validate=False,
+                )  # fmt: skip
+                places = np.round(found["time"] / CLOCK).astype(int)
+                shared = np.abs(found["time"] - places * CLOCK) < 1e-9
+                places, reading = places[shared], found["reading"][shared]
+                row[f"{1e3 * seconds:g}_ms"] = off(reading, exact[places])
+                row[f"{1e3 * seconds:g}_ms_from_package"] = off(reading, run[places])
+            rows.append(row)
+            print(row, flush=True)
+    return rows
+
+
+def closed_loops(folder: Path) -> list[dict[str, Any]]:
+    """A controller's unit with the plant's, against the package's closed loop with the same tolerance."""
+    rows = []
+    wanted = steps(clock(4.0, 0.5 * PERIOD), [0.2, -0.4], 2.0)
+    for name, estimator in (("pid", ""), ("sld", "printed")):
+        loop = loop_around(arm(), name, estimator=estimator or None)
+
+        def one(loop: Any, own: dict[str, Any]) -> Any:
+            integration = Integration(jnp.asarray(own["tolerance"]))
+            found = simulate_closed_loop(
+                loop.system, loop.controller, wanted, 0.5 * PERIOD, 2, estimator=loop.estimator, integration=integration
+            )
+            return found.run.reading, found.voltage
+
+        (run, exact), (volts, _) = map(
+            np.asarray, program(one, loop, ("tolerance",))(loop, {"tolerance": np.asarray([TOLERANCE, 1e-8])})
+        )
+        for version in VERSIONS:
+            plant, controller = (
+                Slave(path, path.parent).begin()
+                for path in (
+                    written(source, version, folder)
+                    for source in (plant_source(arm(), tolerance=TOLERANCE), source_of(loop, name))
+                )
+            )
+            readings, commands = plant.get("reading"), []
+            for k in range(400):
+                controller.set(reading=readings[-1], set_point=float(wanted.position[2 * k]))
+                controller.step(k * PERIOD, PERIOD)
+                commands += controller.get("command")
+                plant.set(voltage=commands[-1])
+                plant.step(k * PERIOD, PERIOD)
+                readings += plant.get("reading")
+            plant.close()
+            controller.close()
+            rows.append(
+                {
+                    "controller": name,
+                    "estimator": estimator,
+                    "fmi": version,
+                    "range": float(np.ptp(readings)),
+                    "package": off(run, exact),
+                    "reading_from_package": off(readings, run[::2]),
+                    "command_from_package": off(commands, volts[:-1:2]),
+                }
+            )
+            print(rows[-1], flush=True)
+    return rows
+
+
+def checked(folder: Path) -> list[dict[str, Any]]:
+    """What FMPy's checker finds, and a state that is gone back to."""
+    from fmpy.validation import validate_fmu
+
+    rows = []
+    for version in VERSIONS:
+        plant = written(plant_source(arm()), version, folder)
+        units = [plant, written(source_of(loop_around(arm(), "pid"), "pid"), version, folder)]
+        one = Slave(plant, plant.parent).begin(voltage=7.3)
+        one.step(0.0, 1.5)
+        saved = one.state()
+        ends = []
+        for _ in range(2):
+            one.step(1.5, 0.5)
+            ends.append(one.get("reading", "temperature", "stress"))
+            one.back_to(saved)
+        one.free(saved)
+        one.close()
+        problems = [problem for path in units for problem in validate_fmu(str(path))]
+        rows.append({"fmi": version, "problems": problems, "rolled_back": off(*ends)})
+        print(rows[-1], flush=True)
+    return rows
+
+
+def memory(folder: Path) -> list[dict[str, Any]]:
+    """Largest memory of this process after a tenth of `MANY` instances made, stepped, saved, restored and freed, and after all."""
+    rows = []
+    for version in VERSIONS:
+        path, held = written(plant_source(arm()), version, folder), []
+        for k in range(MANY):
+            one = Slave(path, path.parent).begin(voltage=7.3)
+            one.step(0.0, 0.02)
+            saved = one.state()
+            one.back_to(saved)
+            one.free(saved)
+            one.close()
+            if k + 1 in (MANY // 10, MANY):
+                gc.collect()
+                held.append(peak_memory())
+        rows.append({"fmi": version, "instances": MANY, "bytes_after_a_tenth": held[0], "bytes_after_all": held[1]})
+        print(rows[-1], flush=True)
+    return rows
+
+
+def main() -> None:
+    with tempfile.TemporaryDirectory() as name:
+        folder, result = Path(name), {}
+        for what in (checked, closed_loops, open_loops, memory):
+            result[what.__name__] = what(folder)
+            replace(RESULTS, json_text(result))
+
+
+if __name__ == "__main__":
+    main()
