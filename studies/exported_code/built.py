@@ -69,15 +69,19 @@ def commands(source: CSource, kind: str) -> Callable[[np.ndarray, np.ndarray], n
     return of
 
 
-def open_loop(source: CSource, inputs: dict[str, np.ndarray], seconds: float) -> tuple[dict[str, np.ndarray], float]:
-    """Of a model in double precision, for inputs held from sample to sample: (outputs by name, (samples,); the time it took, s)."""
+def open_loop(
+    source: CSource, inputs: dict[str, np.ndarray], seconds: float, times: int = 1
+) -> tuple[dict[str, np.ndarray], list[float]]:
+    """Of a model in double precision, for inputs held from sample to sample: (outputs by name, (samples,); processor time of each run, s)."""
     samples = len(next(iter(inputs.values())))
     rows = np.stack([inputs.get(one.name, np.full(samples, one.start)) for one in source.inputs], axis=1)
     found = np.empty((samples, len(source.outputs)))
     given = [np.ascontiguousarray(rows, dtype=np.float64), found]
     pointers = [one.ctypes.data_as(ctypes.c_void_p) for one in given]
     run = library(source, DOUBLE, MODEL).drive
-    begin = time.perf_counter()
-    run(ctypes.c_long(samples), *pointers, ctypes.c_double(seconds))
-    spent = time.perf_counter() - begin
+    spent = []
+    for _ in range(times):
+        begin = time.process_time()
+        run(ctypes.c_long(samples), *pointers, ctypes.c_double(seconds))
+        spent.append(time.process_time() - begin)
     return {one.name: found[:, k] for k, one in enumerate(source.outputs)}, spent

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import subprocess
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +25,6 @@ from smajax.export.errors import ExportError
 from smajax.export.source import CSource, c_source
 from smajax.model.presets import build
 from smajax.model.rigs import arm
-from smajax.model.system import System
 from tests.helpers.c_programs import STRICT, Running, compiled_c, needs_gcc
 from tests.helpers.machine_code import by_machine_code
 
@@ -73,10 +74,29 @@ OTHERS = [
 ]
 
 
-def hold_against_the_package(system: System, controller: str, estimator: str | None, delay: int, folder: Path) -> None:
+Made = tuple[Loop, Callable[[], Running]]
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Made]:
+    """(the loop, its controller in C) of a load, each translated and compiled once."""
+
+    @cache
+    def source(load: str, controller: str, estimator: str | None, delay: int) -> tuple[Loop, CSource]:
+        loop = loop_around({"arm": ARM, "spring": SPRING}[load], controller, estimator=estimator, delay=delay)
+        return loop, source_of(loop, controller, delay)
+
+    @cache
+    def of(controller: str, estimator: str | None, delay: int = 0, load: str = "arm", kind: str = DOUBLE) -> Made:
+        loop, text = source(load, controller, estimator, delay)
+        return loop, compiled_c(text, tmp_path_factory.mktemp("c"), kind, SANITIZED)
+
+    return of
+
+
+def hold_against_the_package(case: Made, delay: int = 0) -> None:
     """Commands equal to 1e-9 of the largest in double precision."""
-    loop = loop_around(system, controller, estimator=estimator, delay=delay)
-    make = compiled_c(source_of(loop, controller, delay), folder, DOUBLE, SANITIZED)
+    loop, make = case
     for number in range(2):
         run, readings = loop_and_readings(loop, number, delay)
         expected = np.asarray(run.voltage)[:-1]
@@ -88,35 +108,33 @@ def hold_against_the_package(system: System, controller: str, estimator: str | N
 
 @needs_gcc
 @pytest.mark.parametrize(("controller", "estimator", "delay"), QUICK)
-def test_a_controller_in_c_commands_what_the_package_commands(controller, estimator, delay, tmp_path):
-    hold_against_the_package(ARM, controller, estimator, delay, tmp_path)
+def test_a_controller_in_c_commands_what_the_package_commands(controller, estimator, delay, made):
+    hold_against_the_package(made(controller, estimator, delay), delay)
 
 
 @pytest.mark.slow
 @needs_gcc
 @pytest.mark.parametrize(("controller", "estimator", "delay"), OTHERS)
-def test_every_other_controller_does_too(controller, estimator, delay, tmp_path):
-    hold_against_the_package(ARM, controller, estimator, delay, tmp_path)
+def test_every_other_controller_does_too(controller, estimator, delay, made):
+    hold_against_the_package(made(controller, estimator, delay), delay)
 
 
 @pytest.mark.slow
 @needs_gcc
 @pytest.mark.parametrize("controller", ["pid", "vsc3", "nvsc", "sld", "backstepping2"])
-def test_on_another_load_too(controller, tmp_path):
-    estimator = None if controller in ("pid", "vsc3") else "model"
-    hold_against_the_package(SPRING, controller, estimator, 0, tmp_path)
+def test_on_another_load_too(controller, made):
+    hold_against_the_package(made(controller, None if controller in ("pid", "vsc3") else "model", load="spring"))
 
 
 @pytest.mark.slow
 @needs_gcc
-def test_a_loop_that_makes_volts_of_a_rounding_is_equal_until_it_has(tmp_path):
+def test_a_loop_that_makes_volts_of_a_rounding_is_equal_until_it_has(made):
     """Backstepping I on the spring: it differences the estimated stress, and the filter believes the command that follows.
 
     With a noisy sensor a change of a reading by its last bit doubles with every call, to volts after 40. So these commands have no
     value that could be held to 1e-9, whoever computes them; those of the calls before have, and all of a loop without noise.
     """
-    loop = loop_around(SPRING, "backstepping1", estimator="model")
-    make = compiled_c(source_of(loop, "backstepping1"), tmp_path, DOUBLE, SANITIZED)
+    loop, make = made("backstepping1", "model", load="spring")
     for number, noise in ((0, 0.0), (0, 1e-4), (1, 1e-4)):
         run, readings = loop_and_readings(loop, number, 0, noise)
         found, expected = commands(make(), run, readings), np.asarray(run.voltage)[:-1]
@@ -137,16 +155,13 @@ def test_a_controller_that_reads_states_needs_an_estimator():
 
 
 @needs_gcc
-@pytest.mark.parametrize(("controller", "estimator"), [("pid", None), ("vsc3", None), ("sld", "printed")])
-def test_in_single_precision_commands_are_within_its_rounding(controller, estimator, tmp_path):
+@pytest.mark.parametrize(("controller", "estimator", "delay"), QUICK)
+def test_in_single_precision_commands_are_within_its_rounding(controller, estimator, delay, made):
     """Of the double's at readings that both can hold: `printed` makes more of a reading's rounding than of its own (the study)."""
-    loop = loop_around(ARM, controller, estimator=estimator)
-    source = source_of(loop, controller)
-    run, readings = loop_and_readings(loop, 1, 0)
+    (loop, double), (_, single) = (made(controller, estimator, delay, kind=kind) for kind in (DOUBLE, SINGLE))
+    run, readings = loop_and_readings(loop, 1, delay)
     readings = readings.astype(np.float32).astype(float)
-    expected, found = (
-        commands(compiled_c(source, tmp_path, kind, SANITIZED)(), run, readings) for kind in (DOUBLE, SINGLE)
-    )
+    expected, found = (commands(make(), run, readings) for make in (double, single))
     assert np.ptp(expected) > 1.0
     assert np.max(np.abs(found - expected)) < 1e-5 * np.max(np.abs(expected))
 
