@@ -1,4 +1,4 @@
-"""Exported units run by FMPy, a client that is not ours: `python -m studies.exported_code.in_fmpy`, into fmpy.json beside it.
+"""Exported units run by FMPy, a client that is not ours: `python -m studies.exported_code.in_fmpy [PART ...]`, into fmpy.json beside it.
 
 Needs a C compiler and FMPy (`pip install fmpy`). Prints the tables of the README.
 """
@@ -6,6 +6,8 @@ Needs a C compiler and FMPy (`pip install fmpy`). Prints the tables of the READM
 from __future__ import annotations
 
 import gc
+import json
+import sys
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -208,8 +210,11 @@ def memory(folder: Path) -> list[dict[str, Any]]:
 
 def main() -> None:
     with tempfile.TemporaryDirectory() as name:
-        folder, result = Path(name), {}
+        folder, result = Path(name), json.loads(RESULTS.read_text("utf-8")) if RESULTS.exists() else {}
+        chosen = sys.argv[1:]
         for what in (checked, closed_loops, open_loops, memory):
+            if chosen and what.__name__ not in chosen:
+                continue
             result[what.__name__] = what(folder)
             replace(RESULTS, json_text(result))
 

@@ -92,20 +92,20 @@ def closed_loops(name: str, estimator: str, count: int) -> dict[str, Any]:
 def _spread(off: np.ndarray, largest: float, enough: float) -> dict[str, float]:
     """Largest difference of each loop as a share of the largest command, over all loops.
 
-    A loop that switches is one whose difference grows tenfold within one call, beyond `enough`: a limit, a branch or a layer decided the
-    other way. `largest_without_switch`: of the other loops.
+    A loop that jumps is one whose difference grows tenfold within one call, beyond `enough`: a limit, a branch or a layer decided the
+    other way. `largest_without_jump`: of the other loops.
     """
     share = np.abs(off) / largest
     before = np.maximum.accumulate(share, axis=1)
-    switched = np.any((share[:, 1:] > enough) & (share[:, 1:] > 10.0 * before[:, :-1]), axis=1)
+    jumped = np.any((share[:, 1:] > enough) & (share[:, 1:] > 10.0 * before[:, :-1]), axis=1)
     most = before[:, -1]
     return {
         "median": float(np.median(most)),
         "quantile_99": float(np.quantile(most, 0.99)),
         "largest": float(np.max(most)),
         "loops_within": float(np.mean(most < enough)),
-        "loops_that_switch": float(np.mean(switched)),
-        "largest_without_switch": float(np.max(most[~switched], initial=0.0)),
+        "loops_that_jump": float(np.mean(jumped)),
+        "largest_without_jump": float(np.max(most[~jumped], initial=0.0)),
     }
 
 

@@ -2,8 +2,17 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 from typing import Any
+
+
+@cache
+def described(path: Path) -> Any:
+    """The description of a unit, read and checked once."""
+    import fmpy
+
+    return fmpy.read_model_description(str(path))
 
 
 class Slave:
@@ -15,7 +24,7 @@ class Slave:
         from fmpy.fmi2 import FMU2Slave
         from fmpy.fmi3 import FMU3Slave
 
-        description = fmpy.read_model_description(str(path))
+        description = described(path)
         self.three = description.fmiVersion == "3.0"
         self.reference = {one.name: one.valueReference for one in description.modelVariables}
         given = {"modelIdentifier": description.coSimulation.modelIdentifier, "instanceName": "one"}
