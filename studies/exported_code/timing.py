@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -49,7 +50,7 @@ def models() -> list[dict[str, Any]]:
     for name, system, volts in (("arm of M3", arm(), 7.3), ("dead weight of M13", dead_weight(), VOLTS)):
         inputs = {"voltage": np.full(SAMPLES, volts)}
         given = {"voltage": jnp.asarray(inputs["voltage"])}
-        package = spent(lambda system=system, given=given: simulate_compiled(system, given, CLOCK, tolerance=TOLERANCE).reading)  # fmt: skip
+        package = spent(partial(simulate_compiled, system, given, CLOCK, tolerance=TOLERANCE))
         source = plant_source(system, tolerance=TOLERANCE)
         _, own = open_loop(source, inputs, CLOCK, TIMES)
         rows.append(
@@ -72,7 +73,7 @@ def controllers() -> list[dict[str, Any]]:
         row: dict[str, Any] = {"controller": name, "estimator": estimator}
         for kind in (DOUBLE, SINGLE):
             run = commands(source, kind)
-            row[f"{kind}_seconds_a_call"] = spent(lambda run=run: run(readings, np.full_like(readings, 0.2))) / readings.size  # fmt: skip
+            row[f"{kind}_seconds_a_call"] = spent(partial(run, readings, np.full_like(readings, 0.2))) / readings.size
         rows.append(row)
         print(row, flush=True)
     return rows
