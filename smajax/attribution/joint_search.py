@@ -21,13 +21,13 @@ import numpy as np
 from smajax.attribution.fit_programs import grouped
 from smajax.attribution.joint_parameters import JointParameters
 from smajax.attribution.laplace_evidence import FittedModel, decomposed, fitted_model, independent_error
+from smajax.attribution.set_starts import at_usual_size, starts
 from smajax.attribution.subset_evidence import LinearModel, Subset, linear_model
 from smajax.attribution.traces import Traces, Variant, traces_at
 from smajax.core.progress import Stage, part_of
 from smajax.fit.levenberg_marquardt import FitSettings, levenberg_marquardt
-from smajax.fit.starts import logarithmic_points, nearest
+from smajax.fit.starts import nearest
 from smajax.model.effects.candidate import Extent
-from smajax.model.effects.library import LIBRARY
 
 MOST_ROUNDS = 20  # the evidence rises in every one of them, so this only ends what should have ended
 FITTED = 4  # sets a round
@@ -39,9 +39,6 @@ ALLOWED_EXCESS = (
     (8, 200.0),
     (14, 100.0),
 )  # after so many steps fits end whose cost is so far above the least
-LEAST_START, MOST_START = 0.02, 2.0  # widths from the base where a fit of a new coefficient begins
-PLACES = 16  # a power of two, for Sobol's points: of an effect with several local minima, simulated and the best fitted
-LARGEST_STEP = 0.2  # of its range that an unknown moves to the start of a fit
 SETTLED = 0.05  # relative change of the error of a sample
 DETECTABLE = 1.0  # standard errors that an effect of one width has to change the runs by to be looked for
 CERTAIN = 100.0  # nats that the linear model loses without an effect, beyond which no refit makes up for it
@@ -243,7 +240,7 @@ def _fit(
             begun.append((effects, start))
             if set(effects) - set(traces.present):
                 # And, where an effect is new, from its usual size: near zero the misfit may have a minimum of its own.
-                begun.append((effects, _at_usual_size(joint, subset, traces, start)))
+                begun.append((effects, at_usual_size(joint, subset, traces, start)))
     _fit_side_by_side(
         search, begun, error, f"round {search.rounds_before + number + 1}: fitting the likeliest sets of effects"
     )
@@ -320,84 +317,3 @@ def refined(search: JointSearch, model: FittedModel, error: float) -> FittedMode
         return model
     search.fitted[model.effects] = best
     return best
-
-
-def starts(joint: JointParameters, subset: Subset, linear: LinearModel, traces: Traces) -> list[np.ndarray]:
-    """Where a fit of a set may begin, (P,) each: new coefficients at their linear estimate, unknowns where they are and there too.
-
-    An effect with several local minima gives ranges of its coefficients (`Candidate.start_ranges`): it is tried all over them.
-    """
-    slots, estimate = joint.slots, linear.estimate(subset)
-    values = joint.without(traces.values, [variant.effect for variant in subset])
-    new = [variant for variant in subset if variant.effect not in traces.present]
-    for variant in new:
-        for name, value in _begin(joint, variant, traces, estimate.coefficients).items():
-            values[slots[name]] = value
-    moved = np.array(values)
-    for name, step in estimate.unknowns.items():
-        low, high = joint.bounds[name]
-        most = LARGEST_STEP * (high - low)
-        moved[slots[name]] = np.clip(values[slots[name]] + np.clip(step, -most, most), low, high)
-    points = [values, moved]
-    for variant in new:
-        points += _all_over(joint, variant.effect, moved)
-    return [_off_bounds(joint, one) for one in points]
-
-
-def _at_usual_size(joint: JointParameters, subset: Subset, traces: Traces, start: np.ndarray) -> np.ndarray:
-    """`start` (P,) with the switches of new effects at their initial guess, on the side where they are."""
-    changed = np.array(start)
-    for variant in subset:
-        if variant.effect in traces.present:
-            continue
-        guesses = LIBRARY[variant.effect].candidate.initial_guess
-        for name in joint.switches(variant.effect):
-            k, (low, high) = joint.slots[name], joint.bounds[name]
-            base, guess = joint.priors[name].base, guesses.get(name.split(".", 1)[1], joint.priors[name].sigma)
-            changed[k] = np.clip(base + np.copysign(abs(guess - base), changed[k] - base), low, 0.5 * (base + high))
-    return changed
-
-
-def _begin(
-    joint: JointParameters, variant: Variant, traces: Traces, estimated: Mapping[str, float]
-) -> dict[str, float]:
-    """Values of a new effect's coefficients, by full name."""
-    switches = joint.switches(variant.effect)
-    guesses = LIBRARY[variant.effect].candidate.initial_guess
-    values = {}
-    for name in joint.coefficients[variant.effect]:
-        prior, bounds = joint.priors[name], joint.bounds[name]
-        value = traces.places.get(variant, {}).get(name, guesses.get(name.split(".", 1)[1], prior.base))
-        if name in switches:
-            size = float(np.clip(estimated[name] / prior.sigma, -MOST_START, MOST_START))
-            if abs(size) < LEAST_START:
-                size = float(np.copysign(LEAST_START, size)) if bounds[0] < prior.base else LEAST_START
-            value = prior.base + size * prior.sigma
-        values[name] = float(np.clip(value, *bounds))
-    return values
-
-
-def _all_over(joint: JointParameters, effect: str, values: np.ndarray) -> list[np.ndarray]:
-    """`values` with the coefficients of an effect at Sobol points of the ranges in which fits of it begin, by logarithm."""
-    sizes = {name.split(".", 1)[1]: abs(float(values[joint.slots[name]])) for name in joint.switches(effect)}
-    ranges = LIBRARY[effect].candidate.start_ranges(sizes)
-    if not ranges:
-        return []
-    points = []
-    for drawn in logarithmic_points(ranges, PLACES):
-        point = np.array(values)
-        for name, value in drawn.items():
-            full = f"{effect}.{name}"
-            point[joint.slots[full]] = np.clip(value, *joint.bounds[full])
-        points.append(point)
-    return points
-
-
-def _off_bounds(joint: JointParameters, values: np.ndarray) -> np.ndarray:
-    """A parameter that begins on its bound stays there."""
-    changed = np.array(values)
-    for name in joint.unknowns:
-        low, high = joint.bounds[name]
-        room = 1e-3 * (high - low)
-        changed[joint.slots[name]] = np.clip(changed[joint.slots[name]], low + room, high - room)
-    return changed

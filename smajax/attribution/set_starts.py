@@ -1,0 +1,98 @@
+"""Where the fit of a set of effects may begin: at the linear model's estimate, at an effect's usual size, all over its ranges."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from smajax.attribution.joint_parameters import JointParameters
+from smajax.attribution.subset_evidence import LinearModel, Subset
+from smajax.attribution.traces import Traces, Variant
+from smajax.fit.starts import logarithmic_points
+from smajax.model.effects.library import LIBRARY
+
+LEAST_START, MOST_START = 0.02, 2.0  # widths from the base where a fit of a new coefficient begins
+PLACES = 16  # a power of two, for Sobol's points: of an effect with several local minima, simulated and the best fitted
+LARGEST_STEP = 0.2  # of its range that an unknown moves to the start of a fit
+
+
+def starts(joint: JointParameters, subset: Subset, linear: LinearModel, traces: Traces) -> list[np.ndarray]:
+    """Where a fit of a set may begin, (P,) each: new coefficients at their linear estimate, unknowns where they are and there too.
+
+    An effect with several local minima gives ranges of its coefficients (`Candidate.start_ranges`): it is tried all over them.
+    """
+    slots, estimate = joint.slots, linear.estimate(subset)
+    values = joint.without(traces.values, [variant.effect for variant in subset])
+    new = [variant for variant in subset if variant.effect not in traces.present]
+    for variant in new:
+        for name, value in _begin(joint, variant, traces, estimate.coefficients).items():
+            values[slots[name]] = value
+    moved = np.array(values)
+    for name, step in estimate.unknowns.items():
+        low, high = joint.bounds[name]
+        most = LARGEST_STEP * (high - low)
+        moved[slots[name]] = np.clip(values[slots[name]] + np.clip(step, -most, most), low, high)
+    points = [values, moved]
+    for variant in new:
+        points += _all_over(joint, variant.effect, moved)
+    return [_off_bounds(joint, one) for one in points]
+
+
+def at_usual_size(joint: JointParameters, subset: Subset, traces: Traces, start: np.ndarray) -> np.ndarray:
+    """`start` (P,) with the switches of new effects at their initial guess, on the side where they are."""
+    changed = np.array(start)
+    for variant in subset:
+        if variant.effect in traces.present:
+            continue
+        guesses = LIBRARY[variant.effect].candidate.initial_guess
+        for name in joint.switches(variant.effect):
+            k, (low, high) = joint.slots[name], joint.bounds[name]
+            base, guess = joint.priors[name].base, guesses.get(name.split(".", 1)[1], joint.priors[name].sigma)
+            changed[k] = np.clip(base + np.copysign(abs(guess - base), changed[k] - base), low, 0.5 * (base + high))
+    return changed
+
+
+def _begin(
+    joint: JointParameters, variant: Variant, traces: Traces, estimated: Mapping[str, float]
+) -> dict[str, float]:
+    """Values of a new effect's coefficients, by full name."""
+    switches = joint.switches(variant.effect)
+    guesses = LIBRARY[variant.effect].candidate.initial_guess
+    values = {}
+    for name in joint.coefficients[variant.effect]:
+        prior, bounds = joint.priors[name], joint.bounds[name]
+        value = traces.places.get(variant, {}).get(name, guesses.get(name.split(".", 1)[1], prior.base))
+        if name in switches:
+            size = float(np.clip(estimated[name] / prior.sigma, -MOST_START, MOST_START))
+            if abs(size) < LEAST_START:
+                size = float(np.copysign(LEAST_START, size)) if bounds[0] < prior.base else LEAST_START
+            value = prior.base + size * prior.sigma
+        values[name] = float(np.clip(value, *bounds))
+    return values
+
+
+def _all_over(joint: JointParameters, effect: str, values: np.ndarray) -> list[np.ndarray]:
+    """`values` with the coefficients of an effect at Sobol points of the ranges in which fits of it begin, by logarithm."""
+    sizes = {name.split(".", 1)[1]: abs(float(values[joint.slots[name]])) for name in joint.switches(effect)}
+    ranges = LIBRARY[effect].candidate.start_ranges(sizes)
+    if not ranges:
+        return []
+    points = []
+    for drawn in logarithmic_points(ranges, PLACES):
+        point = np.array(values)
+        for name, value in drawn.items():
+            full = f"{effect}.{name}"
+            point[joint.slots[full]] = np.clip(value, *joint.bounds[full])
+        points.append(point)
+    return points
+
+
+def _off_bounds(joint: JointParameters, values: np.ndarray) -> np.ndarray:
+    """A parameter that begins on its bound stays there."""
+    changed = np.array(values)
+    for name in joint.unknowns:
+        low, high = joint.bounds[name]
+        room = 1e-3 * (high - low)
+        changed[joint.slots[name]] = np.clip(changed[joint.slots[name]], low + room, high - room)
+    return changed
