@@ -62,8 +62,14 @@ def is_held(path: Path) -> bool:
     return False
 
 
+# What a shell starts in the background ignores Ctrl-C, and so does what that starts: a program that is to answer has to be given it back.
+_ANSWERING = (
+    "import os, signal, sys; signal.signal(signal.SIGINT, signal.SIG_DFL); os.execvp(sys.argv[1], sys.argv[1:])"
+)
+
+
 def started(words: Sequence[str], lock: Path, **more: Any) -> subprocess.Popen[bytes]:
-    """Start a program that outlives this one and its Ctrl-C, and holds the file `lock` as long as it lives.
+    """Start a program that outlives this one and its Ctrl-C, answers its own, and holds the file `lock` as long as it lives.
 
     more: of `subprocess.Popen`. Raises OSError on Windows, where a child cannot be given a lock.
     """
@@ -73,7 +79,8 @@ def started(words: Sequence[str], lock: Path, **more: Any) -> subprocess.Popen[b
     handle = os.open(lock, os.O_RDWR | os.O_CREAT, 0o600)
     try:
         fcntl.flock(handle, fcntl.LOCK_EX)
-        return subprocess.Popen(words, pass_fds=(handle,), start_new_session=True, **more)
+        answering = [sys.executable, "-I", "-S", "-c", _ANSWERING, *words]
+        return subprocess.Popen(answering, pass_fds=(handle,), start_new_session=True, **more)
     finally:
         os.close(handle)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import signal
 import sys
 import time as clock
 from collections.abc import Callable
@@ -45,7 +46,7 @@ def small(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def until(what: Callable[[], object]) -> None:
-    end = clock.monotonic() + 120.0  # of a machine that does other things
+    end = clock.monotonic() + 60.0  # of a machine that does other things
     while not what():
         assert clock.monotonic() < end
         clock.sleep(0.01)
@@ -82,6 +83,18 @@ def test_stop_is_ctrl_c_and_the_same_command_resumes(small: Path) -> None:
     (small / "end").touch()
     until(lambda: last(small).state == "finished")
     assert (small / "count").read_text(encoding="utf-8") == "2"
+
+
+def test_what_a_server_in_the_background_starts_is_stopped_too(small: Path) -> None:
+    """A shell that starts the server in the background has it ignore Ctrl-C, which a program inherits from what starts it."""
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        jobs.start(small, "close-loop", ["experiment.toml"], "report", {})
+    finally:
+        signal.signal(signal.SIGINT, before)
+    until((small / "count").exists)
+    assert jobs.stop(small)
+    until(lambda: last(small).state == "stopped")
 
 
 def test_an_error_of_the_command_is_shown_as_it_says_it(small: Path) -> None:
