@@ -17,7 +17,7 @@ from smajax.core.provenance import made_with
 from smajax.report.loop_words import loop_rows
 from smajax.report.plain_page import bullets, headline, table, whole
 from smajax.report.series_picture import COARSE, series
-from smajax.report.series_plot import Line, Panel, SeriesPlot
+from smajax.report.series_plot import Line, Panel, SeriesPlot, set_point_line
 
 COLOURS = ("before", "after", "there")
 SAME = 0.02  # of a settling time: a smaller difference is none
@@ -135,7 +135,7 @@ def loop_plots(result: ControlComparison) -> list[SeriesPlot]:
             for one, colour in zip(result.tuned, COLOURS, strict=False)
         ]
         target = float(shown.of(first.set_point))
-        lines.append(Line("set point", np.full(len(first.time), target), "asked", 1.0, dash=True))
+        lines.append(set_point_line(np.full(len(first.time), target)))
         panel = Panel(f"position, set point {target:.3g}", shown.label, tuple(lines), height=210)
         plots.append(
             SeriesPlot(f"{result.controller} at the set point {target:.3g} {shown.label}", first.time, (panel,))

@@ -21,8 +21,7 @@ from smajax.report.narrative.rounds import chosen_text
 from smajax.report.narrative.unknown import units
 from smajax.report.narrative.values import far_text
 from smajax.report.plain_page import MANY, breakable
-from smajax.report.series_picture import COARSE, DPI, series
-from smajax.report.series_plot import room
+from smajax.report.series_picture import COARSE, series, series_of_runs
 from smajax.report.unknown_pictures import function_learnt
 
 VERDICTS = {
@@ -182,14 +181,13 @@ def _figures(findings: Findings, output: Callable[[float | None], Shown]) -> lis
 
 def _runs(findings: Findings) -> list[dict[str, Any]]:
     """Every run with its numbers, its plot and its picture over the temperature."""
-    plots = [run_plots.over_time(findings, run) for run in findings.runs]
-    samples = room(sum(len(plot.columns) for plot in plots))
+    plots = series_of_runs([[run_plots.over_time(findings, run)] for run in findings.runs])
     many = len(plots) > MANY
     return [
         {
             "run": run,
             "noise_ratio": run.rmse_after / findings.noise_sigma if findings.noise_sigma > 0.0 else float("nan"),
-            "over_time": series(plot, samples, COARSE if many else DPI, number < MANY),
+            "over_time": plot,
             "hysteresis": picture(
                 pictures.run_hysteresis(findings, run, _hysteresis_dpi(number, many)),
                 f"Run {run.name} against the wire's temperature",

@@ -15,10 +15,9 @@ from smajax.report.csv_files import PARAMETERS, RUNS, identified_parameters, ide
 from smajax.report.embedded import picture
 from smajax.report.identify_record import record
 from smajax.report.identify_words import answer, conclusions, estimate_rows, posterior_rows, prior_shown
-from smajax.report.plain_page import MANY, breakable, bullets, folded, headline, table, whole
-from smajax.report.run_plots import FIRST
-from smajax.report.series_picture import COARSE, DPI, series
-from smajax.report.series_plot import Panel, SeriesPlot, room
+from smajax.report.plain_page import breakable, bullets, folded, headline, table, whole
+from smajax.report.run_plots import output_alone
+from smajax.report.series_picture import COARSE, series, series_of_runs
 
 KNOWN = "Every combination of the parameters is known to 5 % (temperatures: to 1 K) or better."
 KNOWN_OF_THE_REST = "Of the parameters that are neither at a bound nor without effect, every combination is known to 5 % (temperatures: to 1 K)."
@@ -79,20 +78,14 @@ def _colour(value: float) -> str:
 
 def _run_parts(result: Identified) -> list[str]:
     """The plots of every run; those beyond ten are folded away."""
-    plots = {
-        run.name: [
-            draw.run_plot_of(result, run, k) for k in range(len(result.outputs)) if np.isfinite(run.series[k].rmse)
-        ]
+    plots = [
+        [draw.run_plot_of(result, run, k) for k in range(len(result.outputs)) if np.isfinite(run.series[k].rmse)]
         for run in result.runs
-    }
-    samples = room(sum(len(plot.columns) for several in plots.values() for plot in several))
-    dpi = COARSE if sum(map(len, plots.values())) > MANY else DPI
-    drawn = {run.name for run in result.runs[:MANY]}
+    ]
     return folded(
         [
-            f"<h3>{html.escape(run.name)} ({html.escape(run.role)})</h3>"
-            f"{''.join(series(plot, samples, dpi, run.name in drawn) for plot in plots[run.name])}"
-            for run in result.runs
+            f"<h3>{html.escape(run.name)} ({html.escape(run.role)})</h3>{shown}"
+            for run, shown in zip(result.runs, series_of_runs(plots), strict=True)
         ],
         "runs",
     )
@@ -111,9 +104,7 @@ def _first_plot(result: Identified) -> str:
     if not np.isfinite(run.series[k].rmse):
         return ""
     plot = draw.run_plot_of(result, run, k)
-    panel = plot.panels[0]
-    shown = Panel(f"{panel.name} of {name} ({run.role})", panel.unit, panel.lines, panel.bands, FIRST)
-    return str(series(SeriesPlot(f"{plot.about}, measured and simulated", plot.at, (shown,))))
+    return str(series(output_alone(plot, f"{plot.about}, measured and simulated", f"{name} ({run.role})")))
 
 
 def page(result: Identified) -> str:

@@ -15,14 +15,15 @@ from smajax.core.provenance import made_with
 from smajax.fit.predict import BAND, PredictedRun, Prediction
 from smajax.report.csv_files import RUNS, predicted_runs
 from smajax.report.integration_words import integration_sentence
-from smajax.report.plain_page import MANY, bullets, folded, headline, table, whole
+from smajax.report.plain_page import bullets, folded, headline, table, whole
 from smajax.report.predict_words import HEAD, band_sentence, conclusions, diagnostics, pooled, run_rows
-from smajax.report.run_plots import measured_line, output_panel, residual_panel, run_plot
-from smajax.report.series_picture import COARSE, DPI, series
-from smajax.report.series_plot import Band, Line, Panel, SeriesPlot, room
+from smajax.report.run_plots import measured_line, output_alone, output_panel, residual_panel, run_plot
+from smajax.report.series_picture import COARSE, series, series_of_runs
+from smajax.report.series_plot import Band, Line, SeriesPlot, samples_of
 
 FILES = ("predict.html", "predict.json", RUNS)
 SHOWN = 4  # runs of the first plots
+OVERVIEW = 200  # px: their height
 
 
 def _spans(run: PredictedRun) -> list[tuple[float, float]]:
@@ -45,14 +46,15 @@ def run_plot_of(run: PredictedRun, k: int = 0) -> SeriesPlot:
 
 def overview(result: Prediction) -> list[SeriesPlot]:
     """The first output of the first runs, measured, predicted and its band; where a run extrapolates the ground is tinted."""
-    plots = []
-    for run in result.runs[:SHOWN]:
-        whole = run_plot_of(run)
-        panel = whole.panels[0]
-        name = f"{panel.name} of {run.name}" + " (extrapolation)" * bool(run.extrapolation)
-        first = Panel(name, panel.unit, panel.lines, panel.bands, 200)
-        plots.append(SeriesPlot(f"{run.name}, measured and predicted", whole.at, (first,), spans=whole.spans))
-    return plots
+    return [
+        output_alone(
+            run_plot_of(run),
+            f"{run.name}, measured and predicted",
+            run.name + " (extrapolation)" * bool(run.extrapolation),
+            OVERVIEW,
+        )
+        for run in result.runs[:SHOWN]
+    ]
 
 
 def record(result: Prediction, command: str = "") -> dict[str, Any]:
@@ -137,8 +139,7 @@ def page(result: Prediction, command: str = "") -> str:
     title = f"Prediction by {model.title}" if model.title else "Prediction"
     said = conclusions(result)
     first, plots = overview(result), [[run_plot_of(run, k) for k in range(len(run.series))] for run in result.runs]
-    samples = room(sum(len(plot.columns) for several in (first, *plots) for plot in several))
-    dpi = COARSE if sum(map(len, plots)) > MANY else DPI
+    samples = samples_of([*first, *(plot for several in plots for plot in several)])
     parts = [
         f"<h1>{html.escape(title)}</h1>",
         headline(said[0]) if said else "",
@@ -150,8 +151,8 @@ def page(result: Prediction, command: str = "") -> str:
     ]
     parts += folded(
         [
-            f"<h3>{html.escape(run.name)}</h3>{''.join(series(plot, samples, dpi, number < MANY) for plot in several)}"
-            for number, (run, several) in enumerate(zip(result.runs, plots, strict=True))
+            f"<h3>{html.escape(run.name)}</h3>{shown}"
+            for run, shown in zip(result.runs, series_of_runs(plots, samples), strict=True)
         ],
         "runs",
     )

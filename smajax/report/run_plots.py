@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -54,6 +55,13 @@ def residual_panel(shown: Display, lines: Sequence[Line], bands: Sequence[Band])
     return Panel("measured − model", shown.unit, tuple(lines), tuple(bands), RESIDUAL)
 
 
+def output_alone(plot: SeriesPlot, about: str, of: str, height: int = FIRST) -> SeriesPlot:
+    """The output of a run's plot without what stands below it. of: whose it is, after the output's name; height: px."""
+    panel = plot.panels[0]
+    alone = replace(panel, name=f"{panel.name} of {of}", height=height)
+    return SeriesPlot(about, plot.at, (alone,), plot.axis, plot.spans)
+
+
 def models_of(findings: Findings, run: RunFinding) -> list[tuple[str, np.ndarray, str]]:
     """The models to draw for one run: name, values, colour. One only when nothing was added."""
     if nothing_added(findings):
@@ -93,11 +101,8 @@ def first_plot(findings: Findings) -> SeriesPlot | None:
     if not runs:
         return None
     run = max(runs, key=lambda one: float(np.nan_to_num(one.rmse_before, nan=-1.0)))
-    panel = _output(findings, run)
-    name = f"{panel.name} of {run.name}" + (" (held out)" if held_out else "")
-    return SeriesPlot(
-        f"Run {run.name}, before and after", run.time, (Panel(name, panel.unit, panel.lines, panel.bands, FIRST),)
-    )
+    named = run.name + (" (held out)" if held_out else "")
+    return output_alone(over_time(findings, run), f"Run {run.name}, before and after", named)
 
 
 def residual_correlation(findings: Findings) -> SeriesPlot | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -11,19 +12,30 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from smajax.report.embedded import picture
-from smajax.report.pictures import as_png, extremes, literal, new_figure, tidy
-from smajax.report.series_plot import POINTS, Band, Line, SeriesPlot, moving
+from smajax.report.pictures import (
+    AFTER,
+    BEFORE,
+    MEASURED,
+    QUIET,
+    as_png,
+    extremes,
+    literal,
+    new_figure,
+    tidy,
+)
+from smajax.report.plain_page import MANY
+from smajax.report.series_plot import POINTS, Band, Line, SeriesPlot, moving, samples_of
 
 # As look.css has them, for light pages: the picture is for paper.
 COLOURS = {
-    "measured": "#1d1d1f",
-    "before": "#c8553d",
-    "after": "#1f6fb2",
+    "measured": MEASURED,
+    "before": BEFORE,
+    "after": AFTER,
     "noise": "#c9cdd4",
-    "band": "#1f6fb2",
+    "band": AFTER,
     "predicted": "#9fc5b8",
     "input": "#5b6470",
-    "asked": "#9aa0a8",
+    "asked": QUIET,
     "there": "#3f8f5b",
     "fraction": "#6a4c93",
     "tint": "#f1dcc0",
@@ -97,3 +109,16 @@ def series(plot: SeriesPlot, most: int = POINTS, dpi: int = DPI, drawn: bool = T
     if not drawn:
         return moving(plot, Markup('<p class="quiet">{}: this plot needs scripts.</p>').format(plot.about), most)
     return moving(plot, picture(as_picture(plot, dpi), plot.about), most)
+
+
+def series_of_runs(plots: Sequence[Sequence[SeriesPlot]], most: int | None = None) -> list[Markup]:
+    """The plots of each run for a page: those that are folded away (`plain_page.folded`) without pictures, coarse ones where there are many.
+
+    most: samples of each series; by default what a page has room for that holds no others.
+    """
+    every = [plot for several in plots for plot in several]
+    samples, dpi = samples_of(every) if most is None else most, COARSE if len(every) > MANY else DPI
+    return [
+        Markup("").join(series(plot, samples, dpi, number < MANY) for plot in several)
+        for number, several in enumerate(plots)
+    ]

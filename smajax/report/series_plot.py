@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import json
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -29,6 +29,11 @@ class Line:
     alpha: float = 1.0
     dash: bool = False
     silent: bool = False  # not in the key
+
+
+def set_point_line(values: np.ndarray, silent: bool = False) -> Line:
+    """Where the load is to be, dashed. silent: as of `Line`."""
+    return Line("set point", values, "asked", 1.0, dash=True, silent=silent)
 
 
 @dataclass(frozen=True)
@@ -83,9 +88,14 @@ class SeriesPlot:
         return f"{self.axis[0]} ({self.axis[1]})" if self.axis[1] else self.axis[0]
 
 
-def room(plots: int) -> int:
+def room(columns: int) -> int:
     """Samples that each of so many series on a page may have."""
-    return int(np.clip(NUMBERS // max(plots, 1), LEAST_POINTS, POINTS))
+    return int(np.clip(NUMBERS // max(columns, 1), LEAST_POINTS, POINTS))
+
+
+def samples_of(plots: Iterable[SeriesPlot]) -> int:
+    """Samples that each series of the plots of a page may have."""
+    return room(sum(len(plot.columns) for plot in plots))
 
 
 def kept_samples(columns: Sequence[np.ndarray], most: int = POINTS) -> np.ndarray:

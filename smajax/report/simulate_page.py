@@ -30,7 +30,7 @@ from smajax.report.loop_words import loop_rows
 from smajax.report.measured_log import draw_measured, measured_of
 from smajax.report.pictures import NARROW, as_png
 from smajax.report.plain_page import bullets, headline, table, whole
-from smajax.report.series_plot import Band, Line, Panel, SeriesPlot, moving
+from smajax.report.series_plot import Band, Line, Panel, SeriesPlot, moving, set_point_line
 from smajax.report.simulate_words import (
     MISMATCH_HEAD,
     answer,
@@ -187,7 +187,7 @@ def series_of(result: RunResult) -> SeriesPlot:
         if name == "position" and "wanted" in data:
             wanted = unit.of(data["wanted"].to_numpy())
             near = unit.of(band)
-            lines.append(Line("set point", wanted, "asked", 1.0, dash=True))
+            lines.append(set_point_line(wanted))
             bands = (Band("counts as there", wanted - near, wanted + near, "there", 0.25),)
         panels.append(Panel(label(name), unit.unit, tuple(lines), bands, 150 if name in (path, "temperature") else 96))
     return SeriesPlot("the run over time", data["time"].to_numpy(), tuple(panels))

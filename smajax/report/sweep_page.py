@@ -24,7 +24,7 @@ from smajax.core.wording import and_listed, counted
 from smajax.report.embedded import picture
 from smajax.report.integration_words import integration_sentence
 from smajax.report.plain_page import bullets, folded, headline, table, whole
-from smajax.report.series_plot import SeriesPlot, moving, room
+from smajax.report.series_plot import SeriesPlot, moving, samples_of
 from smajax.report.sweep_pictures import ROUNDING, SHOWN, merit_values, nominal_gain, shown_in
 
 Pictures = Mapping[str, tuple[bytes, bytes]]  # file name -> the picture, and the one for a telephone
@@ -127,7 +127,7 @@ def page(
     plots: Mapping[str, SeriesPlot] = NO_PLOTS,
 ) -> str:
     """One page for a browser, with the pictures inside; the rows as CSV are beside it. plots: of each controller's lines over time."""
-    samples = room(sum(len(plot.columns) for plot in plots.values()))
+    samples = samples_of(plots.values())
     say, settings, grid, unit = html.escape, results.settings, results.grid, results.unit
     low, high = min(settings.set_points), max(settings.set_points)
     precision = ".0f" if unit.is_angle else ".3g"

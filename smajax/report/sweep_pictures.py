@@ -17,7 +17,7 @@ from smajax.control.position_unit import DEGREES, PositionUnit
 from smajax.control.sweep.grid import Grid
 from smajax.control.sweep.run_sweep import ControllerSweep
 from smajax.report.drawing import named, panels
-from smajax.report.series_plot import Line, Panel, SeriesPlot
+from smajax.report.series_plot import Line, Panel, SeriesPlot, set_point_line
 
 # Figure of merit -> (label, unit shown, factor from SI); of an angle.
 SHOWN = {
@@ -204,7 +204,7 @@ def lines_plot(
     time: np.ndarray, ratios: Sequence[float], sweep: ControllerSweep, target: float, unit: PositionUnit = DEGREES
 ) -> SeriesPlot:
     """The same as a plot that moves: a panel a mismatch."""
-    asked = Line("set point", np.full(len(time), float(unit.of(target))), "asked", 1.0, dash=True)
+    asked = set_point_line(np.full(len(time), float(unit.of(target))))
     panels = []
     for mismatch, angles in sweep.lines.items():
         lines = [

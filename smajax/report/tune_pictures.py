@@ -10,7 +10,7 @@ from smajax.control.tune.objective import rank
 from smajax.control.tune.terms import TERMS, terms_in
 from smajax.control.tune.tuning import TuningResult
 from smajax.report.pictures import AFTER, BEFORE, MEASURED, NARROW, QUIET, as_png, new_figure, tidy
-from smajax.report.series_plot import Line, Panel, SeriesPlot
+from smajax.report.series_plot import Line, Panel, SeriesPlot, set_point_line
 
 WIDE = 9.6  # inches
 COLUMNS = list(TERMS)
@@ -63,14 +63,7 @@ def positions_plot(result: TuningResult) -> SeriesPlot:
         (lines.angles[1], "after", "after: tuned"),
     ):
         asked = [
-            Line(
-                "set point",
-                np.full(len(lines.time), float(unit.of(target))),
-                "asked",
-                1.0,
-                dash=True,
-                silent=number > 0,
-            )
+            set_point_line(np.full(len(lines.time), float(unit.of(target))), silent=number > 0)
             for number, target in enumerate(targets)
         ]
         drawn = []
