@@ -35,12 +35,12 @@ def confounders(search: JointSearch, setting: Search, model: Model, runs: Sequen
     fitted = search.fitted[own]
     variance = search.error(fitted) ** 2
     here = fitted.log_evidence(variance)
-    others = {other for effect in own for other, _ in _in_place_of(search, own, effect)}
+    in_place = {effect: list(_in_place_of(search, own, effect)) for effect in own}
+    others = {other for likened in in_place.values() for other, _ in likened}
     traces = traces_at(search.joint, fitted, search.extent, tuple(others))
     found: list[Confounder] = []
     likely: list[tuple[int, FittedModel]] = []  # (place in `found`, model with a confounder that runs may separate)
-    for effect in own:
-        likened = list(_in_place_of(search, own, effect))
+    for effect, likened in in_place.items():
         odds = np.exp([min(one.log_evidence(variance) - here, 500.0) for _, one in likened])
         for (other, one), share in zip(likened, odds / (1.0 + odds.sum()), strict=True):
             alike = _alike(search, traces, fitted, effect, other)

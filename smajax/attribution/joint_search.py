@@ -125,11 +125,12 @@ def search_jointly(search: JointSearch, starts: Mapping[tuple[str, ...], np.ndar
         if best.effects in left - {present.effects} and gain < SETTLED_ODDS:
             # Of two that are as likely each is the likelier one seen from the other: what a sample may be off by differs.
             best = search.fitted[present.effects]
+            gain = best.log_evidence(error**2) - before
         gains = tuple(
             (effects, search.fitted[effects].log_evidence(error**2) - before, search.fitted[effects].rms)
             for effects in dict.fromkeys(_effects(search, one) for one in sets)
         )
-        done = JointRound(error, present.effects, gains, best.effects, best.log_evidence(error**2) - before)
+        done = JointRound(error, present.effects, gains, best.effects, gain)
         search.rounds.append(done)
         search.on_round(done)
         moved = best.effects != present.effects

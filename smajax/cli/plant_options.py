@@ -100,12 +100,17 @@ class PlantOptions:
     values: Changes = None
     model: ModelFile = None
 
+    @property
+    def by_parts(self) -> bool:
+        """Whether presets are named."""
+        return bool(self.wire or self.load or self.drive or self.law)
+
     @cached_property
     def kept(self) -> ActuatorModel | None:
         """The model of --model. Raises ExperimentError, and typer.BadParameter where presets are named beside it."""
         if self.model is None:
             return None
-        if self.wire or self.load or self.drive or self.law:
+        if self.by_parts:
             raise typer.BadParameter(
                 "says wire, load, drive and law: leave --wire, --load, --drive and --law out.", param_hint="--model"
             )

@@ -176,11 +176,11 @@ def _collector_paused() -> Iterator[None]:
             gc.enable()
 
 
+@_collector_paused()
 def _made(function: Function, model: Any, names: tuple[str, ...], alone: bool, engine: Engine) -> Program:
     if engine == "xla":
         return Program(function, model, names, alone, None)
-    with _collector_paused():
-        traced = Traced(function, model, names)  # what goes wrong in here goes wrong by XLA too
+    traced = Traced(function, model, names)  # what goes wrong in here goes wrong by XLA too
     if engine == "auto" and WINDOWS:
         _say(UNTRIED)
         return Program(function, model, names, alone, None)
@@ -188,8 +188,7 @@ def _made(function: Function, model: Any, names: tuple[str, ...], alone: bool, e
         # Imported here: the translator reads names of JAX that a release may move, and then XLA has to run all the same.
         from smajax.engine.native import NativeProgram
 
-        with _collector_paused():
-            native = NativeProgram(traced, alone)
+        native = NativeProgram(traced, alone)
     except Exception as error:
         if engine == "native":
             raise

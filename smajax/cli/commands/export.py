@@ -104,16 +104,7 @@ def _source(
             raise typer.BadParameter(str(error), param_hint="FILE") from None
         except KeyError as error:
             raise typer.BadParameter(str(error.args[0]), param_hint="--estimator") from None
-    if (
-        estimator is not None
-        or delay is not None
-        or period is not None
-        or plant.model
-        or plant.wire
-        or plant.load
-        or plant.drive
-        or plant.law
-    ):
+    if plant.model or plant.by_parts or any(one is not None for one in (estimator, delay, period)):
         raise typer.BadParameter(
             "--estimator, --period, --delay, --model, --wire, --load, --drive and --law are for gains.json; a model file says all of a model but "
             "what --set changes.",

@@ -48,12 +48,12 @@ def without_edits(path: Path, model: Record, written: str) -> Record:
     others = {
         name: value
         for name, (value, _) in known.items()
-        if name not in fitted and not _same(value, model.parameters[name].value)
+        if name not in fitted and not same(value, model.parameters[name].value)
     }
     errors = {
         name: error
         for name, (value, error) in known.items()
-        if _same(value, model.parameters[name].value) and not _same(error, model.parameters[name].standard_error)
+        if same(value, model.parameters[name].value) and not same(error, model.parameters[name].standard_error)
     }
     kept = {name: replace(model.parameters[name], standard_error=error) for name, error in errors.items()}
     warnings = (*model.warnings, *(f"{path}: {one}" for one in _sentences(model, before, others, errors)))
@@ -93,7 +93,8 @@ def _change(model: ModelRecord, name: str, before: float) -> str:
     return f"{name} ({digits(before, 4)}, now {digits(model.values[name], 4)} {model.table[name].unit})"
 
 
-def _same(one: float | None, other: float | None) -> bool:
+def same(one: float | None, other: float | None) -> bool:
+    """Whether two values of a file are one but for the rounding of text; of none each is none."""
     if one is None or other is None:
         return one is other
     return math.isclose(one, other, rel_tol=CLOSE)

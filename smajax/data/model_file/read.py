@@ -18,7 +18,7 @@ from smajax.data.experiment.toml_file import Quantity, read_toml, validated
 from smajax.data.experiment.unknowns import bounded
 from smajax.data.model_catalogue import CATALOGUE, check_together
 from smajax.data.model_file.actuator_model import ActuatorModel
-from smajax.data.model_file.edits import CLOSE, without_edits
+from smajax.data.model_file.edits import same, without_edits
 from smajax.data.model_file.record import (
     STATE_UNITS,
     FittedRun,
@@ -265,7 +265,7 @@ def _changed(fitted: LikelyModel, model: ActuatorModel) -> list[str]:
     return [
         name
         for name, value in fitted.values.items()
-        if name not in model.parameters or abs(model.parameters[name].value - value) > CLOSE * abs(value)
+        if name not in model.parameters or not same(model.parameters[name].value, value)
     ]
 
 
