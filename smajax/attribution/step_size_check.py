@@ -50,7 +50,11 @@ def gain_kept_at_half_step(setting: Search, new: Model, old: Model) -> float:
 def _finer(batch: RunBatch) -> RunBatch:
     """At half the step; error-controlled steps, which half a step alone changes little, at a far smaller tolerance too."""
     fine, tolerance = halved(batch), batch.integration.tolerance
-    return fine if tolerance is None else dataclasses.replace(fine, integration=Integration(tolerance / MUCH_FINER))
+    if tolerance is None:
+        return fine
+    return dataclasses.replace(
+        fine, integration=dataclasses.replace(fine.integration, tolerance=tolerance / MUCH_FINER)
+    )
 
 
 def integration_error_of(setting: Search, final: Model) -> IntegrationError:

@@ -54,22 +54,30 @@ def _outside(state: State) -> Scalar:
     return not_finite | runaway
 
 
-def advance(
-    system: System, state: State, inputs: Inputs, dt: Scalar, tried: Scalar, tolerance: Scalar, once: bool = False
+def advance(  # of one sample, each once
+    system: System,
+    state: State,
+    inputs: Inputs,
+    dt: Scalar,
+    tried: Scalar,
+    tolerance: Scalar,
+    once: bool = False,
+    most: Scalar | None = None,
 ) -> tuple[State, Scalar, Scalar]:
     """(state after `dt` seconds with `inputs` held, the step to begin with next time, how many were taken).
 
-    `tried` (s) is the step to begin with. `once`: as in `step.step`. A part that is not resolved, because a state in it cannot be or the tries
+    `tried` (s) is the step to begin with. `once`: as in `step.step`. `most`: tries, `MOST_STEPS` where that is less. A part that is not resolved, because a state in it cannot be or the tries
     ran out (`MOST_STEPS`), counts in the state's `unsolved`.
     """
     shortest = SHORTEST * lax.stop_gradient(dt)
+    allowed = MOST_STEPS if most is None else jnp.minimum(most, MOST_STEPS)
 
     def unfinished(at: _At) -> Scalar:
         return at.left > 0.0
 
     def body(at: _At) -> _At:
         # A state that is not finite, or of a wire that has molten or is colder than can be, goes to the end at once: no shorter step mends it.
-        outside, exhausted = _outside(at.state), at.taken >= MOST_STEPS
+        outside, exhausted = _outside(at.state), at.taken >= allowed
         lost = outside | exhausted
         last = (at.tried >= at.left * (1.0 - 1e-6)) | lost
         # Two equal ones in the place of a long and a short one.

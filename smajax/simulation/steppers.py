@@ -28,10 +28,12 @@ class Integration(eqx.Module):
 
     tolerance: of a moving load, the error of a step, as a share of 1 C and of 1 % strain; None: one step, whatever its error.
     substeps: equal steps, where there is no tolerance; a coupon's temperature and stress (or strain) follow straight lines between two samples.
+    most_tries: steps that a run under a tolerance may try, on average a sample; None: as many as it takes.
     """
 
     tolerance: Scalar | None = None
     substeps: int = eqx.field(static=True, default=1)
+    most_tries: Scalar | None = None
 
 
 ONE_STEP = Integration()
@@ -74,22 +76,34 @@ class EqualSteps(eqx.Module):
 
 
 class ErrorControlledSteps(eqx.Module):
-    """As many steps of order 3 in `dt` (s) as the `tolerance` asks for (`adaptive_steps`), of a moving load."""
+    """As many steps of order 3 in `dt` (s) as the `tolerance` asks for (`adaptive_steps`), of a moving load.
+
+    With `most_tries` those that a sample does not need are left for the later ones; when they are used up a sample has one.
+    """
 
     system: System
     dt: Scalar
     tolerance: Scalar
     once: bool = eqx.field(static=True, default=False)
+    most_tries: Scalar | None = None
 
     def start(self, state: State, inputs: Inputs) -> Carry:
         """What a run from `state` begins with: the first step that is tried lasts `dt`."""
-        return Carry(state, lax.stop_gradient(self.dt))
+        first = lax.stop_gradient(self.dt)
+        return Carry(state, first if self.most_tries is None else (first, lax.stop_gradient(self.most_tries)))
 
     def __call__(self, carry: Carry, inputs: Inputs) -> Carry:
-        state, following, _ = advance(
-            self.system, carry.state, inputs, self.dt, carry.memory, self.tolerance, self.once
-        )
-        return Carry(state, following)
+        if self.most_tries is None:
+            state, following, _ = self._advanced(carry, inputs, carry.memory)
+            return Carry(state, following)
+        tried, most = carry.memory
+        state, following, taken = self._advanced(carry, inputs, tried, most)
+        return Carry(state, (following, lax.stop_gradient(jnp.maximum(most - taken, 0.0) + self.most_tries)))
+
+    def _advanced(
+        self, carry: Carry, inputs: Inputs, tried: Scalar, most: Scalar | None = None
+    ) -> tuple[State, Scalar, Scalar]:
+        return advance(self.system, carry.state, inputs, self.dt, tried, self.tolerance, self.once, most)
 
 
 class CouponSubsteps(eqx.Module):
@@ -177,7 +191,9 @@ def stepper_of(system: System, dt: Scalar | float, integration: Integration = ON
         if integration.substeps > 1:
             whole = EqualSteps(system, dt, integration.substeps, once)
         if integration.tolerance is not None:
-            whole = ErrorControlledSteps(system, jnp.asarray(dt, dtype=float), integration.tolerance, once)
+            whole = ErrorControlledSteps(
+                system, jnp.asarray(dt, dtype=float), integration.tolerance, once, integration.most_tries
+            )
         return SwitchedSteps(whole) if system.terms.input_lag and system.drive.inputs_required else whole
     return (
         FixedStep(system, dt, once) if integration.substeps == 1 else CouponSubsteps(system, dt, integration.substeps)

@@ -98,3 +98,21 @@ def test_a_refit_of_exact_data_leaves_a_tenth_of_the_noise(rigs: dict[str, study
     for one in free:
         k = problem.names.index(one)
         assert fit.values[k] == pytest.approx(truth[k], rel=1e-3)
+
+
+def test_a_run_that_takes_a_thousand_steps_a_sample_ends_early_in_a_fit(rigs: dict[str, study.Rig]) -> None:
+    """At 1e-12 every sample does. The tries left over by some samples are there for others: at 1e-4 nothing changes."""
+    problem = study._problem(rigs["dead weight"], 0.1)
+    fits = choose_integration(problem, problem.system)
+    assert fits.most_tries is not None
+    values = problem.start_values()[None]
+
+    def predicted(tolerance: float, most: float) -> np.ndarray:
+        limited = Integration(jnp.asarray(tolerance), most_tries=jnp.asarray(most))
+        return predicted_at(with_integration(problem, limited), values)[0]
+
+    unlimited = predicted(1e-4, np.inf)
+    np.testing.assert_array_equal(predicted(1e-4, float(fits.most_tries)), unlimited)
+    np.testing.assert_array_equal(predicted(1e-4, 40.0), unlimited)  # 4.5 a sample on average, 31 in one
+    assert not np.allclose(predicted(1e-4, 2.0), unlimited, atol=1e-7)
+    assert np.isfinite(predicted(1e-12, 2.0)).all()
