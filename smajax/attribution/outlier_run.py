@@ -30,7 +30,8 @@ def outlier_runs(setting: Search, model: Model, names: Sequence[str]) -> tuple[O
     if runs < config.outlier_least_runs:
         return ()
     mask = np.asarray(problem.batch.mask)
-    (whole,) = misfits(problem, [model.values])
+    own, index = setting.restricted(model.effects)
+    (whole,) = misfits(own, [model.values[index]])
     worst = np.argsort(-(whole**2).sum(axis=1), kind="stable")[: config.outlier_most_runs]
     everyone = np.arange(runs)
     places = [setting.inside(model)]
