@@ -24,11 +24,11 @@ from smajax.attribution.findings import (
     Verdict,
 )
 from smajax.attribution.found import effects_found, parameters_found, priors_found
-from smajax.attribution.held_out import Compared, compare, every_run, validated
+from smajax.attribution.held_out import Compared, compare, every_run, held_out_error, validated
 from smajax.attribution.input_of_run import corrected, record_error
 from smajax.attribution.job import Job, effects_excluded, job_of
 from smajax.attribution.joint_search import JointSearch
-from smajax.attribution.joint_stage import base_alone, search_by_evidence
+from smajax.attribution.joint_stage import base_alone, search_by_evidence, search_without
 from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.neutral import check_neutral
 from smajax.attribution.outlier_run import outlier_runs
@@ -49,6 +49,7 @@ from smajax.fit.uncertainty import identifiability
 from smajax.simulation.steppers import Integration
 
 SEED = 2004
+MOST_SEARCHES = 2  # the first, and again without what the held-out runs rejected
 MOST_RECORD_ERRORS = 2  # of single runs that are corrected: with more of them nothing is left that says which is right
 SEARCH_TO_COME = "the search for effects, and the checks of what it finds"
 CHECKS_TO_COME = "the checks against an unknown function, an outlier run and the held-out runs"
@@ -130,10 +131,11 @@ def close_loop(  # keywords, which a caller names one by one
         context, outcome = searched_finely(context)
     if interim is not None and not context.setting.is_noise(outcome.final):
         interim(known_so_far(context, (outcome.search, outcome.base, outcome.final), CHECKS_TO_COME))
+    outcome, rejected = against_the_held_out_runs(context, outcome)
     outcome = against_an_unknown_term(context, outcome)
     outcome = against_an_outlier_run(context, outcome)
-    final, compared, rejected = validated(context.job, context.setting, outcome.search, outcome.base, outcome.final)
-    found = findings_of(context, replace(outcome, final=final), compared, rejected)
+    compared = compare(context.job, context.setting, outcome.base, outcome.final)
+    found = findings_of(context, outcome, compared, rejected)
     provenance = _provenance(experiment, cache, command, seed, clock.monotonic() - began)
     return replace(found, record_errors=tuple(errors), provenance=provenance)
 
@@ -197,6 +199,27 @@ def wrong_record(context: Context, outcome: Outcome) -> RecordError | None:
     if not final.effects and setting.is_noise(final):
         return None
     return record_error(setting, base, final, context.job.fit_runs)
+
+
+def against_the_held_out_runs(context: Context, outcome: Outcome) -> tuple[Outcome, Rejected | None]:
+    """The model that the held-out runs validate; where they reject effects, the search goes on without these.
+
+    They say what is not named, and nothing else: what takes its place is chosen by the fit runs alone, and has to be validated as well.
+    """
+    job, setting, all_rejected = context.job, context.setting, None
+    for searches_left in reversed(range(MOST_SEARCHES)):
+        final, compared, rejected = validated(job, setting, outcome.search, outcome.base, outcome.final)
+        if all_rejected is not None:
+            now = rejected.effects if rejected is not None else ()
+            all_rejected = Rejected((*all_rejected.effects, *now), held_out_error(compared), all_rejected.rmse_with)
+        else:
+            all_rejected = rejected
+        outcome = replace(outcome, final=final)
+        if rejected is None:
+            break
+        if searches_left and all_rejected is not None:
+            outcome = Outcome(*search_without(setting, outcome.search, all_rejected.effects))
+    return outcome, all_rejected
 
 
 def against_an_unknown_term(context: Context, outcome: Outcome) -> Outcome:

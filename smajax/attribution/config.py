@@ -50,9 +50,9 @@ class AttributionConfig:
     outlier_most_runs: int = 12  # looked at, those of the largest residual first: each costs a refit
 
     # Held-out runs
-    held_out_tolerance: float = (
-        0.02  # by which their error may be larger with an effect beside others than without it, by chance
-    )
+    held_out_tolerance: float = 0.02  # by which two models' errors there differ without a meaning
+    held_out_errors: float = 2.0  # standard errors of the difference of their squares, which chance may make
+    held_out_factor: float = 1.2  # by which the errors differ by no chance, whatever that standard error
 
     # Confounders
     overlap_listed: float = 0.7  # of an effect's trace: a candidate that overlaps less hardly takes its place
@@ -73,7 +73,6 @@ class AttributionConfig:
     noise_may_be_wrong: float = 2.0  # residual over noise up to which the noise itself may be what is wrong
     held_out_ratio: float = 1.3  # error of a held-out run over that of the fit runs, and more where it has few samples:
     held_out_chance: float = 5.0  # by this over the root of twice their number
-    worse_than_base: float = 1.02  # error of a held-out run over the base model's
     faint_p_value: float = 0.01  # corrected for the candidates: a trace below the noise is reported
     integration_error_of_error: float = (
         0.5  # of the model's error on the fit runs: what was fitted may be the integration's

@@ -8,11 +8,13 @@ from typing import Literal
 import jax.numpy as jnp
 import numpy as np
 
+from smajax.attribution import paired_errors
 from smajax.attribution.findings import HeldOutWorse, Rejected, ResidualDiagnostics, RunFinding, pooled_rmse
 from smajax.attribution.job import Job
 from smajax.attribution.joint_search import JointSearch
 from smajax.attribution.joint_stage import without_last
 from smajax.attribution.model_fits import Model, Search
+from smajax.attribution.paired_errors import Comparison
 from smajax.attribution.residual_diagnostics import diagnosed
 from smajax.core.parameters import parameter_values
 from smajax.data.experiment.record import Run
@@ -23,36 +25,46 @@ from smajax.model.types import Trajectory
 Compared = tuple[tuple[RunFinding, ...], ResidualDiagnostics, ResidualDiagnostics]
 
 
+def held_out_error(compared: Compared, which: Literal["before", "after"] = "after") -> float:
+    """Root mean square error of all held-out runs together, SI."""
+    return pooled_rmse(compared[0], "held-out", which)
+
+
 def validated(
     job: Job, setting: Search, search: JointSearch, first: Model, final: Model
 ) -> tuple[Model, Compared, Rejected | None]:
     """What the held-out runs leave of `final`: (model, every run by it, what they rejected).
 
-    No fit sees them and nothing is added for them. They reject the effect that came last first, as long as with it their
-    error is larger than without it, or no smaller than the base model's. It may be larger by `held_out_tolerance` where others are left.
+    No fit sees them and nothing is added for them. They reject the effect that the evidence needs least first, as long as they are predicted worse
+    with it than without it, or worse than by the base model, beyond chance (`paired_errors`).
     """
-
-    def held_out(compared: Compared, which: Literal["before", "after"] = "after") -> float:
-        return pooled_rmse(compared[0], "held-out", which)
-
     error = search.error_of(final.effects)
     compared = whole = compare(job, setting, first, final)
     left = final
     while left.effects:
         rest = without_last(search, setting, left, error) if len(left.effects) > 1 else first
         without = compare(job, setting, first, rest)
-        now = held_out(compared)
-        if not (
-            now >= held_out(compared, "before") or now > (1.0 + setting.config.held_out_tolerance) * held_out(without)
-        ):
+        if "worse" not in (_beside(compared, without, setting), _beside(compared, compared, setting, "before")):
             break
         left, compared = rest, without
     gone = tuple(name for name in final.effects if name not in left.effects)
     if not gone:
         return left, compared, None
-    without_them, with_them = held_out(compared), held_out(whole)
+    without_them, with_them = held_out_error(compared), held_out_error(whole)
     setting.set_aside(final, HeldOutWorse(without_them, with_them), gone)
     return left, compared, Rejected(gone, without_them, with_them)
+
+
+def _beside(new: Compared, old: Compared, setting: Search, which: Literal["before", "after"] = "after") -> Comparison:
+    """How the held-out runs are predicted by the extended model of `new` beside that, or the base model, of `old`."""
+    pairs = [pair for pair in zip(new[0], old[0], strict=True) if pair[0].role == "held-out"]
+    if not pairs:
+        return "alike"
+    return paired_errors.compared(
+        [run.measured - run.after for run, _ in pairs],
+        [run.measured - (run.before if which == "before" else run.after) for _, run in pairs],
+        setting.config,
+    )
 
 
 def _simulated(setting: Search, model: Model, batch: RunBatch) -> Trajectory:

@@ -6,7 +6,7 @@ Effects whose gain is gone at half the step of the integration are excluded and 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -57,15 +57,21 @@ class _Stage:
         """
         search = self.joint_search({})
         found = search_jointly(search, {(): base})
-        presets = self.setting.presets
-        if not presets:
-            return search, found
-        error = search.error(found)
-        likeliest = sorted(search.fitted.values(), key=lambda model: -model.log_evidence(error**2))[:LIKELIEST]
-        alone = [search.fitted[one,] for one in found.effects if (one,) in search.fitted]
-        starts = {model.effects: model.values for model in (search.fitted[()], *alone, *likeliest)}
-        freed = self.joint_search(presets)
-        return freed, search_jointly(freed, starts)
+        return self.resumed(search, found) if self.setting.presets else (search, found)
+
+    def resumed(self, search: JointSearch, found: FittedModel | None = None) -> tuple[JointSearch, FittedModel]:
+        """(search, likeliest model) from the likeliest sets that `search` has fitted, with the values of presets free.
+
+        `found`: its likeliest. None: sets that have an excluded effect do not count, and the likeliest of the others is that.
+        """
+        fitted = {effects: model for effects, model in search.fitted.items() if not self.excluded & set(effects)}
+        error = search.error(found) if found is not None else min(map(search.error, fitted.values()))
+        likeliest = sorted(fitted.values(), key=lambda model: -model.log_evidence(error**2))[:LIKELIEST]
+        found = found or likeliest[0]
+        alone = [fitted[one,] for one in found.effects if (one,) in fitted]
+        starts = {model.effects: model.values for model in (fitted[()], *alone, *likeliest)}
+        again = self.joint_search(self.setting.presets)
+        return again, search_jointly(again, starts)
 
     def exclude(self, effects: Sequence[str], kept: float) -> None:
         """Effects that keep only that share of their gain at half the step."""
@@ -86,8 +92,7 @@ class _Stage:
 
 def base_alone(setting: Search, base: Fit) -> tuple[JointSearch, Model, Model]:
     """(a search of nothing, base model, the same) before anything is searched, as `search_by_evidence` gives it."""
-    settings = FitSettings(tolerance=setting.config.final_convergence, cache=setting.cache, progress=setting.progress)
-    search = _Stage(setting, settings).joint_search({})
+    search = _Stage(setting, _settings(setting)).joint_search({})
     search.fitted[()] = fitted_model(search.joint, (), base.values, ())
     model = as_model(search, search.fitted[()], search.error_of(()))
     return search, model, model
@@ -95,10 +100,31 @@ def base_alone(setting: Search, base: Fit) -> tuple[JointSearch, Model, Model]:
 
 def search_by_evidence(setting: Search, base: Fit) -> tuple[JointSearch, Model, Model]:
     """(the search, base model, likeliest model). Fills `setting.evidence` and `setting.rounds` on the way."""
-    settings = FitSettings(tolerance=setting.config.final_convergence, cache=setting.cache, progress=setting.progress)
-    stage = _Stage(setting, settings)
+    stage = _Stage(setting, _settings(setting))
+    return _kept_at_half_step(stage, lambda: stage.searched(base.values))
+
+
+def search_without(setting: Search, search: JointSearch, effects: Sequence[str]) -> tuple[JointSearch, Model, Model]:
+    """As `search_by_evidence`, from the likeliest models that `search` has fitted without any of `effects`.
+
+    What is left of the likeliest set when one effect is taken out is rarely the likeliest without it: the others were chosen beside it.
+    """
+    excluded = {*effects, *(name for name in setting.candidates if name not in search.joint.coefficients)}
+    stage = _Stage(setting, _settings(setting), excluded)
+    return _kept_at_half_step(stage, lambda: stage.resumed(search))
+
+
+def _settings(setting: Search) -> FitSettings:
+    return FitSettings(tolerance=setting.config.final_convergence, cache=setting.cache, progress=setting.progress)
+
+
+def _kept_at_half_step(
+    stage: _Stage, searched: Callable[[], tuple[JointSearch, FittedModel]]
+) -> tuple[JointSearch, Model, Model]:
+    """(the search, base model, likeliest model), searched again without effects whose gain half the step does not keep."""
+    setting = stage.setting
     while True:
-        search, found = stage.searched(base.values)
+        search, found = searched()
         error = search.error(found)
         base_model = refined(search, search.fitted[()], search.error_of(()))
         first = as_model(search, base_model, error)

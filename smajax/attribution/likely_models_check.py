@@ -15,7 +15,9 @@ from smajax.attribution.findings import DroppedModel, HeldOutWorse, StepDependen
 from smajax.attribution.joint_search import JointSearch
 from smajax.attribution.laplace_evidence import FittedModel
 from smajax.attribution.model_fits import Model, Search
+from smajax.attribution.paired_errors import compared
 from smajax.attribution.step_size_check import gain_kept_at_half_step
+from smajax.core.whiteness import split_runs
 from smajax.fit.predicted import misfits
 from smajax.fit.problem import Problem
 from smajax.model.effects.library import LIBRARY
@@ -51,21 +53,21 @@ def checked(
 def _on_held_out(
     setting: Search, search: JointSearch, base: Model, models: Sequence[FittedModel]
 ) -> dict[tuple[str, ...], HeldOutWorse]:
-    """Those of `models` that predict the held-out runs no better than the base model, or worse than without one of their effects."""
+    """Those of `models` that predict the held-out runs worse than the base model, or than without one of their effects, beyond chance."""
     if not models:
         return {}
     simpler = [_without_one(search, one) for one in models]
     values = [base.values, *(one.values for one in models), *(one.values for one in simpler if one is not None)]
     carried = [effect for one in models for effect in one.effects]
-    error, *others = _held_out_errors(setting, carried, values)
+    basic, *others = _held_out_residuals(setting, carried, values)
     own, nested = others[: len(models)], iter(others[len(models) :])
     found = {}
-    for one, rest, now in zip(models, simpler, own, strict=True):
-        without = error if rest is None else next(nested)
-        if now >= error:
-            found[one.effects] = HeldOutWorse(error, now)
-        elif now > (1.0 + setting.config.held_out_tolerance) * without:
-            found[one.effects] = HeldOutWorse(without, now)
+    for one, rest, mine in zip(models, simpler, own, strict=True):
+        without = basic if rest is None else next(nested)
+        for other in (basic, without):
+            if compared(mine, other, setting.config) == "worse":
+                found[one.effects] = HeldOutWorse(_rms(other), _rms(mine))
+                break
     return found
 
 
@@ -80,14 +82,20 @@ def _without_one(search: JointSearch, model: FittedModel) -> FittedModel | None:
     return max(nested, key=lambda one: one.log_evidence(error**2), default=None)
 
 
-def _held_out_errors(setting: Search, effects: Sequence[str], values: Sequence[np.ndarray]) -> list[float]:
-    """Rms error on the held-out runs, SI, of parameters (P,) of models with some of `effects`."""
+def _held_out_residuals(
+    setting: Search, effects: Sequence[str], values: Sequence[np.ndarray]
+) -> list[list[np.ndarray]]:
+    """Residuals of each held-out run (n,), SI, of parameters (P,) of models with some of `effects`."""
     batch = setting.held_out
     assert batch is not None
     problem, index = setting.restricted(effects)
     there = Problem.build(problem.system, batch, problem.noise_sigma, problem.offset)
-    found = misfits(there, [one[index] for one in values])
-    return [float(np.sqrt((misfit**2).sum() / np.asarray(batch.mask).sum())) for misfit in found]
+    mask = np.asarray(batch.mask)
+    return [split_runs(misfit, mask) for misfit in misfits(there, [one[index] for one in values])]
+
+
+def _rms(residuals: Sequence[np.ndarray]) -> float:
+    return float(np.sqrt(np.mean(np.concatenate(residuals) ** 2)))
 
 
 def _as_model(search: JointSearch, fitted: FittedModel) -> Model:

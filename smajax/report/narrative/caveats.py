@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from smajax.attribution.findings import EffectFinding, Findings, RunFinding, Verdict, pooled_rmse
+from smajax.attribution.paired_errors import Comparison, compared
 from smajax.attribution.record_error import OutlierRun
 from smajax.core.display_units import digits
 from smajax.core.wording import and_listed
@@ -179,15 +180,21 @@ def held_out_warnings(findings: Findings) -> list[str]:
     ]
 
 
+def held_out_comparison(findings: Findings) -> Comparison:
+    """How the extended model predicts the held-out runs beside the base model."""
+    return _comparison(findings, [run for run in findings.runs if run.role == "held-out"])
+
+
+def _comparison(findings: Findings, runs: Sequence[RunFinding]) -> Comparison:
+    after, before = ([run.measured - getattr(run, which) for run in runs] for which in ("after", "before"))
+    return compared(after, before, findings.config)
+
+
 def of_the_test(findings: Findings) -> Iterator[str]:
     """How far what was found has been tested, and whether the noise was declared rightly."""
     if findings.fit_runs < 2:
         yield "There is one fit run only: effects were assessed on the fit itself, no run could be left out."
-    worse = [
-        run.name
-        for run in findings.runs
-        if run.role == "held-out" and run.rmse_after > findings.config.worse_than_base * run.rmse_before
-    ]
+    worse = [run.name for run in findings.runs if run.role == "held-out" and _comparison(findings, [run]) == "worse"]
     if worse:
         yield f"Mind: on {', '.join(worse)}, which the fit never saw, the extended model does worse than the base model."
     if not any(run.role == "held-out" for run in findings.runs):

@@ -175,9 +175,11 @@ def _errors(findings: Findings) -> list[str]:
         before, after = (pooled_rmse(findings.runs, role, which) for which in ("before", "after"))
         if np.isfinite(before):
             decided = role != "fit" and findings.rejected is not None
+            alike = role != "fit" and findings.added and caveats.held_out_comparison(findings) == "alike"
             sentences.append(
                 f"Error on the {role} runs: {error_text(findings, before)}"
                 + (f" before, {error_text(findings, after)} after" if findings.added else "")
+                + (", a difference that may be chance" if alike else "")
                 + (" (no fit saw them, but they decided what is not named)." if decided else ".")
             )
     sentences += _of_the_band(findings)
