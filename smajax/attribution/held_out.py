@@ -12,7 +12,8 @@ from smajax.attribution import paired_errors
 from smajax.attribution.findings import HeldOutWorse, Rejected, ResidualDiagnostics, RunFinding, pooled_rmse
 from smajax.attribution.job import Job
 from smajax.attribution.joint_search import JointSearch
-from smajax.attribution.joint_stage import without_last
+from smajax.attribution.joint_stage import final_model, without_last
+from smajax.attribution.laplace_evidence import FittedModel
 from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.paired_errors import Comparison
 from smajax.attribution.residual_diagnostics import diagnosed
@@ -42,11 +43,12 @@ def validated(
     compared = whole = compare(job, setting, first, final)
     left = final
     while left.effects:
-        rest = without_last(search, setting, left, error) if len(left.effects) > 1 else first
+        rest = without_last(search, left, error) if len(left.effects) > 1 else first
         without = compare(job, setting, first, rest)
         if "worse" not in (_beside(compared, without, setting), _beside(compared, compared, setting, "before")):
             break
-        left, compared = rest, without
+        left = first if rest is first else final_model(search, setting, search.fitted[rest.effects], error)
+        compared = compare(job, setting, first, left)
     gone = tuple(name for name in final.effects if name not in left.effects)
     if not gone:
         return left, compared, None
@@ -67,7 +69,7 @@ def _beside(new: Compared, old: Compared, setting: Search, which: Literal["befor
     )
 
 
-def _simulated(setting: Search, model: Model, batch: RunBatch) -> Trajectory:
+def _simulated(setting: Search, model: Model | FittedModel, batch: RunBatch) -> Trajectory:
     problem, index = setting.restricted(model.effects)
     return simulate_batch(problem.system_at(jnp.asarray(model.values[index])), batch)
 
@@ -78,7 +80,7 @@ def every_run(job: Job) -> RunBatch:
     return pack(experiment.runs, experiment.step, parameter_values(job.problem.system), integration)
 
 
-def compare(job: Job, setting: Search, first: Model, final: Model) -> Compared:
+def compare(job: Job, setting: Search, first: Model, final: Model | FittedModel) -> Compared:
     """Every run, held-out ones included, by both models; and the diagnostics of the fit runs' residuals."""
     experiment, batch = job.experiment, every_run(job)
     before = _simulated(setting, first, batch)

@@ -41,6 +41,7 @@ MOST_RUNS = 2  # looked at, those of the largest residual first: each costs a fi
 LEAST_ODDS = 3.0  # in log odds: twenty to one that the record is wrong, before a run is corrected by it
 CLOSER = 3.0  # by which a fit is expected to come nearer: what its error is counted in while it runs
 MOST_LEFT = 2.0  # noises that the model with the error leaves: of one that leaves more no record is said to be wrong
+MOST_SHARES = ((10, 0.25), (20, 0.1))  # after so many steps a fit ends that leaves more than this share of the squares
 LEAST_RUNS = 3  # of two runs that disagree either may be the wrong one
 
 
@@ -146,7 +147,12 @@ def _fits(setting: Search, host: Model, runs: Sequence[str]) -> list[tuple[_Even
         for name, begun in zip(events, nearest(joint_problem, groups), strict=True)
     ]
     settings = FitSettings(cache=setting.cache, progress=setting.progress)
-    fits = levenberg_marquardt(joint_problem, tasks, comparison_settings(settings, "inputs of single runs"))
+    settings = comparison_settings(settings, "inputs of single runs")
+    # Of a wrong record there is noise left when it is right; what comes nowhere near that in a few steps is none.
+    squares = float((left**2).sum()) / error**2
+    excess = tuple((steps, share * squares) for steps, share in MOST_SHARES)
+    settings = replace(settings, allowed_excess=excess, least_cost=0.0)
+    fits = levenberg_marquardt(joint_problem, tasks, settings)
     return [
         (
             _Event(kind.coefficient, run, float(fit.values[joint.slots[name]])),

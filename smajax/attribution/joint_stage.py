@@ -155,15 +155,13 @@ def final_model(search: JointSearch, setting: Search, found: FittedModel, error:
     return as_model(search, fitted_model(search.joint, best.effects, fit.values, best.effects), error)
 
 
-def without_last(search: JointSearch, setting: Search, model: Model, error: float) -> Model:
-    """`model` without the effect that the evidence needs least."""
+def without_last(search: JointSearch, model: Model, error: float) -> FittedModel:
+    """`model` without the effect that the evidence needs least, as the search has fitted it; else fitted now."""
     rest = search.joint.ordered(model.effects[:-1])
-    if rest in search.fitted:
-        fitted = search.fitted[rest]
-    else:
+    if rest not in search.fitted:
         values = search.joint.without(model.values, rest)
-        fitted = fitted_model(search.joint, rest, values, model.effects)
-    return final_model(search, setting, fitted, error)
+        search.fitted[rest] = refined(search, fitted_model(search.joint, rest, values, model.effects), error)
+    return search.fitted[rest]
 
 
 def effect_probabilities(search: JointSearch, error: float) -> dict[str, float]:

@@ -17,6 +17,7 @@ from smajax.attribution.record_error import OutlierRun
 from smajax.fit.predicted import misfits
 
 SETTLED = 0.02  # of what one sample adds to the cost
+FIRST = 1e-3  # relative decrease at which the first fits end: they only tell which come near noise or halve an error, and those go on
 
 
 def outlier_runs(setting: Search, model: Model, names: Sequence[str]) -> tuple[OutlierRun, ...]:
@@ -40,7 +41,7 @@ def outlier_runs(setting: Search, model: Model, names: Sequence[str]) -> tuple[O
     starts = [Start(model.effects, place, (everyone != run).astype(float)) for run in worst for place in places]
     stage = "leaving out each run for good"
     settled = SETTLED * float((whole**2).sum() / mask.sum()) / float(problem.noise_sigma) ** 2
-    fits, found = setting.fit(starts, stage, settled=settled, presets=True)
+    fits, found = setting.fit(starts, stage, enough=FIRST, settled=settled, presets=True)
     near = [k for k, start in enumerate(starts) if _near(setting, found[k], start, whole)]
     if near:
         again, misfit = setting.fit([starts[k] for k in near], stage, hops=True, presets=True)
