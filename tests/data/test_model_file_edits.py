@@ -86,3 +86,25 @@ def test_effects_that_are_changed_by_hand_leave_no_errors_and_no_alternatives(tm
     assert [one.effects for one in model.likely] == [("latent_heat", "creep")]
     assert model.likely[0].names == ()
     assert "effects were changed by hand" in model.warnings[0]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("specific_heat = {.*", 'specific_heat = "600 J/kg/K"', "changed by hand since the fit: specific_heat"),
+        ('wire_diameter = "0.31 mm"', 'wire_diameter = "0.25 mm"', "since the fit: wire_diameter (0.00031, now 0.00025 m)"),
+        (r'effects = \["latent_heat"\]', 'effects = ["latent_heat", "creep"]', "effects were changed by hand"),
+    ],
+)  # fmt: skip
+def test_a_file_that_was_changed_by_hand_and_saved_again_still_says_so(
+    tmp_path: Path, old: str, new: str, said: str
+) -> None:
+    path = fitted_model().save(tmp_path / "model.toml")
+    text, count = re.subn(old, new, path.read_text(encoding="utf-8"), count=1)
+    assert count
+    path.write_text(text, encoding="utf-8")
+    again = load_model(path).save(tmp_path / "again.toml")
+    for _ in range(2):
+        (warning,) = load_model(again).warnings
+        assert said in warning
+        again = load_model(again).save(tmp_path / "third.toml")

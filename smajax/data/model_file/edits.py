@@ -57,7 +57,7 @@ def without_edits(path: Path, model: Record, written: str) -> Record:
     }
     kept = {name: replace(model.parameters[name], standard_error=error) for name, error in errors.items()}
     warnings = (*model.warnings, *(f"{path}: {one}" for one in _sentences(model, before, others, errors)))
-    return replace(model, parameters={**model.parameters, **kept}, warnings=warnings)
+    return replace(model, parameters={**model.parameters, **kept}, warnings=warnings, as_fitted=written)
 
 
 def _sentences(

@@ -123,6 +123,7 @@ class ModelRecord:
     made_with: Mapping[str, str] = field(default_factory=dict)
     unfinished: str = ""  # what was still to come when it was written
     warnings: tuple[str, ...] = ()  # of the file that it was read from
+    as_fitted: str = ""  # what the text of the file said after the fit (`edits.as_written`), of a model that was read
 
     @property
     def values(self) -> dict[str, float]:

@@ -22,7 +22,8 @@ ERRORS = (
 def uncertainty_of(model: ModelRecord) -> xr.Dataset:
     """What is known of the fitted values of each likely model: `value_0`, `covariance_0`, ... along `parameter_0`."""
     result = xr.Dataset(attrs={"title": model.title, "format": FORMAT, "unit": "SI, degC, rad", "errors": ERRORS})
-    result.attrs["written"] = as_written(model)
+    # Of a model that was read and is saved again: what was changed by hand in between stays said.
+    result.attrs["written"] = model.as_fitted or as_written(model)
     for number, one in enumerate(model.likely):
         result.attrs[f"effects_{number}"] = " ".join(one.effects)
         if one.values:
