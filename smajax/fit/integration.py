@@ -22,7 +22,7 @@ from smajax.simulation.steppers import ONE_STEP, Integration
 LARGEST = 0.1  # of an output's noise: the error, rms over a run, that integration may leave in it
 # Steps that a run of a fit may try, on average a sample, at a tolerance of 1e-4; of a smaller one as many more as steps of order 3 need. The
 # rigs of `studies.integration` take 15 at most, on a clock of 250 ms, and 185 at 1e-8. A trial point at which a force grows with speed, so
-# that the load shakes, took a thousand in every sample: half a minute of one fit's ten.
+# that the load shakes, took a thousand in every sample: half a minute of one fit's ten. It has no numbers then, and no fit goes there.
 MOST_TRIES, AT_TOLERANCE = 100.0, 1e-4
 MARGIN = 0.5  # of that, at the start: by the end of a fit its values have moved
 

@@ -78,7 +78,7 @@ class EqualSteps(eqx.Module):
 class ErrorControlledSteps(eqx.Module):
     """As many steps of order 3 in `dt` (s) as the `tolerance` asks for (`adaptive_steps`), of a moving load.
 
-    With `most_tries` those that a sample does not need are left for the later ones; when they are used up a sample has one.
+    With `most_tries` those that a sample does not need are left for the later ones; when they are used up the run has no numbers any more.
     """
 
     system: System
@@ -98,7 +98,10 @@ class ErrorControlledSteps(eqx.Module):
             return Carry(state, following)
         tried, most = carry.memory
         state, following, taken = self._advanced(carry, inputs, tried, most)
-        return Carry(state, (following, lax.stop_gradient(jnp.maximum(most - taken, 0.0) + self.most_tries)))
+        left = lax.stop_gradient(most - taken)
+        # What follows is then quick: a state that is not finite goes to the end of every sample at once.
+        state = where_tree(left >= 0.0, state, jax.tree.map(lambda one: jnp.full_like(one, jnp.nan), state))
+        return Carry(state, (following, left + self.most_tries))
 
     def _advanced(
         self, carry: Carry, inputs: Inputs, tried: Scalar, most: Scalar | None = None
