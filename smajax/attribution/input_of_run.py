@@ -41,7 +41,11 @@ MOST_RUNS = 2  # looked at, those of the largest residual first: each costs a fi
 LEAST_ODDS = 3.0  # in log odds: twenty to one that the record is wrong, before a run is corrected by it
 CLOSER = 3.0  # by which a fit is expected to come nearer: what its error is counted in while it runs
 MOST_LEFT = 2.0  # noises that the model with the error leaves: of one that leaves more no record is said to be wrong
-MOST_SHARES = ((10, 0.25), (20, 0.1))  # after so many steps a fit ends that leaves more than this share of the squares
+MOST_SHARES = (
+    (4, 0.6),
+    (8, 0.3),
+    (16, 0.1),
+)  # after so many steps a fit ends that leaves more than this share of the squares
 LEAST_RUNS = 3  # of two runs that disagree either may be the wrong one
 
 
