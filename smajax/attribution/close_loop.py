@@ -24,7 +24,7 @@ from smajax.attribution.findings import (
     Verdict,
 )
 from smajax.attribution.found import effects_found, parameters_found, priors_found
-from smajax.attribution.held_out import Compared, compare, every_run, held_out_error, validated
+from smajax.attribution.held_out import Compared, compare, every_run, validated
 from smajax.attribution.input_of_run import corrected, record_error
 from smajax.attribution.job import Job, effects_excluded, job_of
 from smajax.attribution.joint_search import JointSearch
@@ -201,25 +201,23 @@ def wrong_record(context: Context, outcome: Outcome) -> RecordError | None:
     return record_error(setting, base, final, context.job.fit_runs)
 
 
-def against_the_held_out_runs(context: Context, outcome: Outcome) -> tuple[Outcome, Rejected | None]:
+def against_the_held_out_runs(context: Context, outcome: Outcome) -> tuple[Outcome, tuple[Rejected, ...]]:
     """The model that the held-out runs validate; where they reject effects, the search goes on without these.
 
     They say what is not named, and nothing else: what takes its place is chosen by the fit runs alone, and has to be validated as well.
     """
-    job, setting, all_rejected = context.job, context.setting, None
+    job, setting = context.job, context.setting
+    rejected: list[Rejected] = []
     for searches_left in reversed(range(MOST_SEARCHES)):
-        final, compared, rejected = validated(job, setting, outcome.search, outcome.base, outcome.final)
-        if all_rejected is not None:
-            now = rejected.effects if rejected is not None else ()
-            all_rejected = Rejected((*all_rejected.effects, *now), held_out_error(compared), all_rejected.rmse_with)
-        else:
-            all_rejected = rejected
+        final, _, now = validated(job, setting, outcome.search, outcome.base, outcome.final)
         outcome = replace(outcome, final=final)
-        if rejected is None:
+        if now is None:
             break
-        if searches_left and all_rejected is not None:
-            outcome = Outcome(*search_without(setting, outcome.search, all_rejected.effects))
-    return outcome, all_rejected
+        rejected.append(now)
+        if searches_left:
+            gone = [effect for one in rejected for effect in one.effects]
+            outcome = Outcome(*search_without(setting, outcome.search, gone))
+    return outcome, tuple(rejected)
 
 
 def against_an_unknown_term(context: Context, outcome: Outcome) -> Outcome:
@@ -267,7 +265,7 @@ def known_so_far(context: Context, models: tuple[JointSearch, Model, Model], rem
     """What a loop that goes on knows by then, as findings without a verdict. `models`: the search, base model, likeliest model."""
     search, base, final = models
     compared = compare(context.job, context.setting, base, final)
-    found = findings_of(context, Outcome(search, base, final, Lacking()), compared, None, brief=True)
+    found = findings_of(context, Outcome(search, base, final, Lacking()), compared, brief=True)
     base_model, extended_model = (
         None if one is None else replace(one, unfinished=remaining) for one in (found.base_model, found.extended_model)
     )
@@ -281,7 +279,7 @@ def known_so_far(context: Context, models: tuple[JointSearch, Model, Model], rem
 
 
 def findings_of(
-    context: Context, outcome: Outcome, compared: Compared, rejected: Rejected | None, brief: bool = False
+    context: Context, outcome: Outcome, compared: Compared, rejected: tuple[Rejected, ...] = (), brief: bool = False
 ) -> Findings:
     """The record of all stages. `brief`: without what takes long, the scores of effects that were not added and the averages."""
     job, setting, experiment = context.job, context.setting, context.job.experiment

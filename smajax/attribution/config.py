@@ -51,8 +51,7 @@ class AttributionConfig:
 
     # Held-out runs
     held_out_tolerance: float = 0.02  # by which two models' errors there differ without a meaning
-    held_out_errors: float = 2.0  # standard errors of the difference of their squares, which chance may make
-    held_out_factor: float = 1.2  # by which the errors differ by no chance, whatever that standard error
+    held_out_errors: float = 2.0  # standard errors, which chance may make: two models as good as each other are told apart in 1 to 7 of 100 cases
 
     # Confounders
     overlap_listed: float = 0.7  # of an effect's trace: a candidate that overlaps less hardly takes its place

@@ -335,7 +335,7 @@ class Findings:
     correlated: tuple[tuple[str, ...], ...] = ()  # clusters of parameters whose estimates are correlated
     confounders: tuple[Confounder, ...] = ()
     superseded: tuple[str, ...] = ()  # effects that one unknown term supersedes
-    rejected: Rejected | None = None
+    rejected: tuple[Rejected, ...] = ()  # by the held-out runs, one for each search
     unknown: tuple[UnknownTerm, ...] = ()  # terms sought for what the library does not hold, best first
     outlier_runs: tuple[OutlierRun, ...] = ()
     record_errors: tuple[RecordError, ...] = ()  # inputs of single runs, which were corrected

@@ -12,13 +12,14 @@ from smajax.attribution import paired_errors
 from smajax.attribution.findings import HeldOutWorse, Rejected, ResidualDiagnostics, RunFinding, pooled_rmse
 from smajax.attribution.job import Job
 from smajax.attribution.joint_search import JointSearch
-from smajax.attribution.joint_stage import final_model, without_last
+from smajax.attribution.joint_stage import final_model, without
 from smajax.attribution.laplace_evidence import FittedModel
 from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.paired_errors import Comparison
 from smajax.attribution.residual_diagnostics import diagnosed
 from smajax.core.parameters import parameter_values
 from smajax.data.experiment.record import Run
+from smajax.fit.integration import unlimited
 from smajax.fit.packed_runs import RunBatch, pack, simulate_batch, states_by_run
 from smajax.model.channels import SHOWN
 from smajax.model.types import Trajectory
@@ -36,16 +37,24 @@ def validated(
 ) -> tuple[Model, Compared, Rejected | None]:
     """What the held-out runs leave of `final`: (model, every run by it, what they rejected).
 
-    No fit sees them and nothing is added for them. They reject the effect that the evidence needs least first, as long as they are predicted worse
-    with it than without it, or worse than by the base model, beyond chance (`paired_errors`).
+    No fit sees them and nothing is added for them. They reject effects one after the other, beginning with the one that the evidence needs
+    least, as long as they are predicted worse with it than without it beyond chance (`paired_errors`), or worse than by the base
+    model. In that case an effect stays whose removal makes it worse still, and another goes; all do where each would.
     """
     error = search.error_of(final.effects)
     compared = whole = compare(job, setting, first, final)
     left = final
     while left.effects:
-        rest = without_last(search, left, error) if len(left.effects) > 1 else first
-        without = compare(job, setting, first, rest)
-        if "worse" not in (_beside(compared, without, setting), _beside(compared, compared, setting, "before")):
+        worse_than_base = _beside(compared, compared, setting, "before") == "worse"
+        for effect in reversed(left.effects):
+            rest = without(search, left, effect, error) if len(left.effects) > 1 else first
+            simpler = compare(job, setting, first, rest)
+            rejected = _beside(compared, simpler, setting) == "worse"
+            if rejected or not worse_than_base or _beside(simpler, compared, setting) != "worse":
+                break
+        else:
+            rest, rejected = first, True
+        if not (rejected or worse_than_base):
             break
         left = first if rest is first else final_model(search, setting, search.fitted[rest.effects], error)
         compared = compare(job, setting, first, left)
@@ -76,7 +85,7 @@ def _simulated(setting: Search, model: Model | FittedModel, batch: RunBatch) -> 
 
 def every_run(job: Job) -> RunBatch:
     """All runs, held-out ones included, integrated as finely as in the fits."""
-    experiment, integration = job.experiment, job.problem.batch.integration
+    experiment, integration = job.experiment, unlimited(job.problem.batch.integration)
     return pack(experiment.runs, experiment.step, parameter_values(job.problem.system), integration)
 
 

@@ -154,7 +154,8 @@ def _fits(setting: Search, host: Model, runs: Sequence[str]) -> list[tuple[_Even
     settings = comparison_settings(settings, "inputs of single runs")
     # Of a wrong record there is noise left when it is right; what comes nowhere near that in a few steps is none.
     squares = float((left**2).sum()) / error**2
-    excess = tuple((steps, share * squares) for steps, share in MOST_SHARES)
+    allowed = (MOST_LEFT * float(own.noise_sigma) / error) ** 2 * float(np.asarray(own.batch.mask).sum())
+    excess = tuple((steps, max(share * squares, allowed)) for steps, share in MOST_SHARES)
     settings = replace(settings, allowed_excess=excess, least_cost=0.0)
     fits = levenberg_marquardt(joint_problem, tasks, settings)
     return [

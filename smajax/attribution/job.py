@@ -10,7 +10,7 @@ from smajax.core.parameters import parameter_values, parameters
 from smajax.data.experiment.record import Experiment, Run
 from smajax.data.model_catalogue import candidates
 from smajax.fit.base_model import base_model
-from smajax.fit.integration import choose_integration, with_integration
+from smajax.fit.integration import choose_integration, unlimited, with_integration
 from smajax.fit.packed_runs import RunBatch, pack
 from smajax.fit.problem import Problem
 from smajax.model.effects.library import LIBRARY
@@ -60,7 +60,7 @@ def job_of(experiment: Experiment, integration: Integration | None = None) -> Jo
     bounds |= {f"{name}.{own}": one for name in names for own, one in LIBRARY[name].candidate.bounds(extent).items()}
     bounds |= {unknown.name: (unknown.low, unknown.high) for unknown in experiment.unknowns}
     others = tuple(run for run in experiment.runs if run.role != "fit")
-    held_out = pack(others, experiment.step, parameter_values(full), integration) if others else None
+    held_out = pack(others, experiment.step, parameter_values(full), unlimited(integration)) if others else None
     unknowns = tuple(unknown.name for unknown in experiment.unknowns)
     of_runs = {name for run in experiment.runs for name in run.parameters}
     given = frozenset({*experiment.parameters, *unknowns, *of_runs})

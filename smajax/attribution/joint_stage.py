@@ -155,13 +155,14 @@ def final_model(search: JointSearch, setting: Search, found: FittedModel, error:
     return as_model(search, fitted_model(search.joint, best.effects, fit.values, best.effects), error)
 
 
-def without_last(search: JointSearch, model: Model, error: float) -> FittedModel:
-    """`model` without the effect that the evidence needs least, as the search has fitted it; else fitted now."""
-    rest = search.joint.ordered(model.effects[:-1])
-    if rest not in search.fitted:
-        values = search.joint.without(model.values, rest)
-        search.fitted[rest] = refined(search, fitted_model(search.joint, rest, values, model.effects), error)
-    return search.fitted[rest]
+def without(search: JointSearch, model: Model, effect: str, error: float) -> FittedModel:
+    """`model` without one of its effects, at the optimum."""
+    rest = search.joint.ordered([one for one in model.effects if one != effect])
+    fitted = search.fitted.get(rest)
+    if fitted is None:
+        fitted = fitted_model(search.joint, rest, search.joint.without(model.values, rest), model.effects)
+        search.fitted[rest] = fitted
+    return refined(search, fitted, error)  # in the search it may have ended early
 
 
 def effect_probabilities(search: JointSearch, error: float) -> dict[str, float]:

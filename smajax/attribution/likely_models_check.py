@@ -15,7 +15,7 @@ from smajax.attribution.findings import DroppedModel, HeldOutWorse, StepDependen
 from smajax.attribution.joint_search import JointSearch
 from smajax.attribution.laplace_evidence import FittedModel
 from smajax.attribution.model_fits import Model, Search
-from smajax.attribution.paired_errors import compared
+from smajax.attribution.paired_errors import compared, pooled_rms
 from smajax.attribution.step_size_check import gain_kept_at_half_step
 from smajax.core.whiteness import split_runs
 from smajax.fit.predicted import misfits
@@ -66,7 +66,7 @@ def _on_held_out(
         without = basic if rest is None else next(nested)
         for other in (basic, without):
             if compared(mine, other, setting.config) == "worse":
-                found[one.effects] = HeldOutWorse(_rms(other), _rms(mine))
+                found[one.effects] = HeldOutWorse(pooled_rms(other), pooled_rms(mine))
                 break
     return found
 
@@ -92,10 +92,6 @@ def _held_out_residuals(
     there = Problem.build(problem.system, batch, problem.noise_sigma, problem.offset)
     mask = np.asarray(batch.mask)
     return [split_runs(misfit, mask) for misfit in misfits(there, [one[index] for one in values])]
-
-
-def _rms(residuals: Sequence[np.ndarray]) -> float:
-    return float(np.sqrt(np.mean(np.concatenate(residuals) ** 2)))
 
 
 def _as_model(search: JointSearch, fitted: FittedModel) -> Model:

@@ -1,8 +1,14 @@
-r"""Whether one model predicts runs better than another, beyond chance: their squared errors sample by sample.
+r"""Whether one model predicts runs better than another, beyond chance: how much of the change of the prediction would better be taken back.
 
-$d_i = r_i^2 - r_{0,i}^2$ of the residuals $r$ and $r_0$ of both at the same sample; what is common to both, the noise and what neither has,
-falls out of most of it. Neighbouring samples are off together, so that the mean of $n$ of them has the standard error of $n / \tau$
-independent ones, $\tau$ the correlation time of $d$ (Diebold & Mariano 1995).
+Residuals $r$ of the new model and $r_0$ of the old one differ by the change of the prediction, $c = r - r_0$. Of
+$r = \lambda c + e$ the share $\lambda$ is 0 where the new model is right and 1 where the old one is; beyond one half the old
+one is nearer (a test of forecast encompassing; Harvey, Leybourne & Newbold 1998). Its standard error is that of the
+scores $e c$: neighbouring samples go together, so that $n$ of them count as $n / \tau$, $\tau$ their correlation time; of
+several runs it is no smaller than what the runs' sums scatter by. Student's t, of so many independent samples or runs, says what
+chance may make. One run speaks for itself alone: how much runs differ from one another it cannot say.
+
+Where the residual is a drift that the change makes or takes away, the difference of the squares drifts too and has no correlation
+time; what is left, $e$, does not.
 """
 
 from __future__ import annotations
@@ -11,33 +17,54 @@ from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
+from scipy import stats
 
 from smajax.attribution.config import AttributionConfig
 from smajax.core.whiteness import correlation_time
 
 Comparison = Literal["better", "worse", "alike"]
+LEAST_FREEDOM = 2.0  # degrees of freedom of two runs: with one, Student's t asks for 14 standard errors
 
 
 def compared(new: Sequence[np.ndarray], old: Sequence[np.ndarray], config: AttributionConfig) -> Comparison:
     """How `new` predicts beside `old`; both are residuals of each run (n,), of the same samples.
 
-    "alike" where the difference is `held_out_errors` standard errors or less, or the root mean squares differ by no more than
-    `held_out_tolerance`. A factor of `held_out_factor` counts whatever the standard error: of runs that drift apart no
-    correlation time can be told.
+    "alike" where the difference may be chance (`held_out_errors` standard errors of a normal distribution), or the root mean squares differ by
+    no more than `held_out_tolerance`. A model without a number is worse than one with.
     """
-    squares = [mine**2 - theirs**2 for mine, theirs in zip(new, old, strict=True)]
-    every = np.concatenate([np.zeros(0), *squares])
-    if not every.any():
+    if not (new and old):
         return "alike"
-    mean = float(every.mean())
-    ratio = float(np.sqrt(sum(map(_sum_of_squares, new)) / sum(map(_sum_of_squares, old))))
-    difference = max(ratio, 1.0 / ratio)
-    error = float(every.std()) * np.sqrt(correlation_time([one - mean for one in squares]) / every.size)
-    told = abs(mean) > config.held_out_errors * error or difference > config.held_out_factor
-    if not told or difference <= 1.0 + config.held_out_tolerance:
+    finite, finite_before = (all(bool(np.isfinite(one).all()) for one in runs) for runs in (new, old))
+    if not (finite and finite_before):
+        return "alike" if finite == finite_before else ("better" if finite else "worse")
+    changes = [mine - theirs for mine, theirs in zip(new, old, strict=True)]
+    total = _squares(changes)
+    more, less = (np.sqrt(_squares(runs)) for runs in (new, old))
+    if total == 0.0 or abs(more - less) <= config.held_out_tolerance * min(more, less):
         return "alike"
-    return "worse" if mean > 0.0 else "better"
+    share = sum(float(mine @ change) for mine, change in zip(new, changes, strict=True)) / total
+    scores = [(mine - share * change) * change for mine, change in zip(new, changes, strict=True)]
+    if abs(share - 0.5) <= _by_chance(scores, config.held_out_errors) / total:
+        return "alike"
+    return "worse" if share > 0.5 else "better"
 
 
-def _sum_of_squares(residual: np.ndarray) -> float:
-    return float(np.sum(residual**2))
+def pooled_rms(runs: Sequence[np.ndarray]) -> float:
+    """Root mean square of the residuals of runs (n,), of all samples alike."""
+    return float(np.sqrt(np.mean(np.concatenate(list(runs)) ** 2)))
+
+
+def _by_chance(scores: Sequence[np.ndarray], errors: float) -> float:
+    """What the sum of the scores (n,) of runs may be off by: so many standard errors, were it normal."""
+    quantile = stats.norm.cdf(errors)
+    count, time = sum(map(len, scores)), correlation_time(scores)
+    within = np.sqrt(_squares(scores) * time) * stats.t.ppf(quantile, max(count / time - 1.0, 1.0))
+    if len(scores) == 1:
+        return float(within)
+    sums = np.asarray([float(score.sum()) for score in scores])
+    between = np.sqrt(len(sums) / (len(sums) - 1) * float(sums @ sums))
+    return float(max(within, between * stats.t.ppf(quantile, max(len(sums) - 1.0, LEAST_FREEDOM))))
+
+
+def _squares(runs: Sequence[np.ndarray]) -> float:
+    return sum(float(one @ one) for one in runs)

@@ -23,6 +23,7 @@ from smajax.attribution.joint_search import comparison_settings
 from smajax.attribution.laplace_evidence import FittedModel, fitted_model, independent_error
 from smajax.attribution.leave_one_run_out import predicting
 from smajax.attribution.model_fits import Model, Search
+from smajax.attribution.paired_errors import compared, pooled_rms
 from smajax.attribution.score_test import Score, ranked
 from smajax.attribution.unknown.ranges import Sought, sought
 from smajax.attribution.unknown.spline import design
@@ -164,8 +165,11 @@ def learnt(setting: Search, fits: TermFits) -> Lacking:
     # One run fits too well to name anything: there is none to predict.
     several = len(present.left_out) > 1
     enough = log_odds[0] > 0.0 and several and models[0].left_out_rmse < present.left_out_rmse
-    held_out = _on_held_out(search, present, models[0]) if enough and search.held_out is not None else None
-    enough = enough and (held_out is None or not held_out[1] >= held_out[0])
+    held_out = None
+    if enough and search.held_out is not None:
+        without, with_it = _on_held_out(search, present, models[0])
+        held_out = pooled_rms(without), pooled_rms(with_it)
+        enough = compared(with_it, without, setting.config) != "worse"
     alike = [
         model.effects[-1]
         for model, odds in zip(models[1:], log_odds[1:], strict=True)
@@ -208,13 +212,13 @@ def least_error(setting: Search, models: Sequence[FittedModel]) -> float:
     return independent_error(best, float(setting.problem.noise_sigma), setting.noise_given)
 
 
-def _on_held_out(search: Search, *models: Model) -> list[float]:
-    """Rms error of each model on the held-out runs, SI."""
+def _on_held_out(search: Search, *models: Model) -> list[list[np.ndarray]]:
+    """Residuals of each held-out run (n,) by each model, SI."""
     problem, batch = search.problem, search.held_out
     assert batch is not None
     there = Problem.build(problem.system, batch, problem.noise_sigma, problem.offset)
-    found = misfits(there, [model.values for model in models])
-    return [float(np.sqrt((misfit**2).sum() / np.asarray(batch.mask).sum())) for misfit in found]
+    mask = np.asarray(batch.mask)
+    return [split_runs(misfit, mask) for misfit in misfits(there, [model.values for model in models])]
 
 
 def in_place_of(setting: Search, first: Model, final: Model) -> Lacking | None:

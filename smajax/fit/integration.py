@@ -20,10 +20,11 @@ from smajax.simulation.integration_error import described as described
 from smajax.simulation.steppers import ONE_STEP, Integration
 
 LARGEST = 0.1  # of an output's noise: the error, rms over a run, that integration may leave in it
-# Steps that a run of a fit may try, on average a sample, at a tolerance of 1e-4; of a smaller one as many more as steps of order 3 need. The
-# rigs of `studies.integration` take 15 at most, on a clock of 250 ms, and 185 at 1e-8. A trial point at which a force grows with speed, so
-# that the load shakes, took a thousand in every sample: half a minute of one fit's ten. It has no numbers then, and no fit goes there.
-MOST_TRIES, AT_TOLERANCE = 100.0, 1e-4
+# Steps that a run of a fit may try, on average, at a tolerance of 1e-4, of a smaller one as many more as steps of order 3 need: so many a
+# second, and a sample. The rigs of `studies.integration` take 15 a sample at most, on a clock of 250 ms, and 185 at 1e-8; a load that swings
+# without damping some 600 a second. A trial point at which a force grows with speed, so that the load shakes, takes 10,000 a second: half a minute
+# of one fit's ten. It has no numbers then, and no fit goes there.
+TRIES_A_SECOND, TRIES_A_SAMPLE, AT_TOLERANCE = 2000.0, 100.0, 1e-4
 MARGIN = 0.5  # of that, at the start: by the end of a fit its values have moved
 
 
@@ -62,17 +63,25 @@ def integration_error(problem: Problem, system: System, per_run: np.ndarray | No
     """What the integration of `problem` leaves in the outputs of `system`, with each run's own values `per_run`."""
     own = np.asarray(problem.per_run.start if per_run is None else per_run)
     chosen = problem.batch.integration
-    exact = _predicted(problem, system, _limited(finest(system), np.inf), own)
+    exact = _predicted(problem, system, unlimited(_limited(problem, finest(system))), own)
     return _error(problem, _predicted(problem, system, chosen, own) - exact, chosen)
 
 
-def _limited(integration: Integration, share: float = 1.0) -> Integration:
-    """With so many times the usual tries under a tolerance; one program serves all of them."""
+def _limited(problem: Problem, integration: Integration) -> Integration:
+    """With the tries of a fit, where there is a tolerance."""
     tolerance = integration.tolerance
     if tolerance is None:
         return integration
-    most = share * MOST_TRIES * jnp.maximum(1.0, AT_TOLERANCE / tolerance) ** (1.0 / 3.0)
+    dt = float(np.asarray(problem.batch.dt))
+    most = max(TRIES_A_SAMPLE, TRIES_A_SECOND * dt) * jnp.maximum(1.0, AT_TOLERANCE / tolerance) ** (1.0 / 3.0)
     return dataclasses.replace(integration, most_tries=most)
+
+
+def unlimited(integration: Integration) -> Integration:
+    """The same for a run that is no trial point of a fit: as many tries as it takes, by the same program."""
+    if integration.most_tries is None:
+        return integration
+    return dataclasses.replace(integration, most_tries=jnp.asarray(jnp.inf))
 
 
 def choose_integration(
@@ -84,9 +93,9 @@ def choose_integration(
     where friction lets a load jump, no step length settles which sample it jumps at.
     """
     own = np.asarray(problem.per_run.start if per_run is None else per_run)
-    exact = _predicted(problem, system, _limited(finest(system), np.inf), own)
+    exact = _predicted(problem, system, unlimited(_limited(problem, finest(system))), own)
     best, least = ONE_STEP, np.inf
-    for choice in map(_limited, coarse_to_fine(system)):
+    for choice in (_limited(problem, one) for one in coarse_to_fine(system)):
         error = _error(problem, _predicted(problem, system, choice, own) - exact, choice).share
         if error <= largest:
             return choice

@@ -19,7 +19,13 @@ from smajax.data.model_file.read_logs import read_logs
 from smajax.data.model_file.record import LikelyModel, ModelOutput, range_unit
 from smajax.data.model_file.runs_of_model import runs_of_model
 from smajax.data.open_experiment import open_experiment
-from smajax.fit.integration import IntegrationError, choose_integration, integration_error, with_integration
+from smajax.fit.integration import (
+    IntegrationError,
+    choose_integration,
+    integration_error,
+    unlimited,
+    with_integration,
+)
 from smajax.fit.packed_runs import pack, simulate_batch, states_by_run
 from smajax.fit.prediction_band import BAND as BAND
 from smajax.fit.prediction_band import NORMAL, averaged_band, reading_of
@@ -120,7 +126,7 @@ def _prediction(model: ActuatorModel, experiment: Experiment) -> Prediction:
     likely, weights = model.weighted
     noise, offset, missed = _of_outputs(model, experiment)
     problems = [_problem(model, one, experiment, noise, offset) for one in likely]
-    integration = choose_integration(problems[0], problems[0].system)
+    integration = unlimited(choose_integration(problems[0], problems[0].system))
     problems = [with_integration(one, integration) for one in problems]
     predicted = [
         reading_of(problem, problem.start_values(), one.names, one.deviations, one.correlation)
@@ -148,12 +154,16 @@ def _prediction(model: ActuatorModel, experiment: Experiment) -> Prediction:
 
 
 def extrapolations(model: ActuatorModel, run: Run, states: Mapping[str, np.ndarray]) -> tuple[Extrapolation, ...]:
-    """Inputs, temperature, its rate and stress of a run that leave what the model was fitted to, and when."""
+    """Inputs, temperature, its rate, stress and own parameters of a run that leave what the model was fitted to, and when."""
     found = []
-    for name, series in quantities(run.time, run.inputs, states).items():
-        if name not in model.fitted_range:
+    constant = {name: np.full(len(run.time), value) for name, value in run.parameters.items()}
+    for name, series in {**constant, **quantities(run.time, run.inputs, states)}.items():
+        fitted = model.fitted_range.get(name)
+        if fitted is None and name in constant and name in model.values and model.runs:
+            fitted = (model.values[name],) * 2  # the same in all runs of the fit
+        if fitted is None:
             continue
-        low, high = model.fitted_range[name]
+        low, high = fitted
         slack = BEYOND * (high - low) + 1e-5 * max(abs(low), abs(high))
         outside = (series < low - slack) | (series > high + slack)
         if outside.mean() > FEW:

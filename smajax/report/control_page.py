@@ -74,6 +74,11 @@ def conclusions(result: ControlComparison) -> list[str]:
         sentences.append(
             f"Mind: the {result.plant} differs from the models in what was taken as known: {', '.join(result.differs)}."
         )
+    if len(result.tuned) > 1 and result.plant == result.tuned[-1].model:
+        sentences.append(
+            f"Mind: the {result.plant} is the plant as well, and the gains tuned on it are judged on the model that they were tuned on. This is what they are "
+            "worth if that model is true."
+        )
     return [*sentences, worth(result)] if len(result.tuned) > 1 else sentences
 
 

@@ -40,6 +40,7 @@ ONE_STEP = Integration()
 # Shortest part of a step on either side of a switch of the command. Rounding in a derivative by the length of a step grows as its
 # inverse square: at 1e-6 it is 2e-4 of the derivative.
 SHORTEST_PART = 3e-6
+FIRST_SAMPLES = 10.0  # whose tries the first sample may use
 SAYS_NOTHING = 0.01  # of a step: the next one would grow from there by four at a time
 
 
@@ -90,7 +91,9 @@ class ErrorControlledSteps(eqx.Module):
     def start(self, state: State, inputs: Inputs) -> Carry:
         """What a run from `state` begins with: the first step that is tried lasts `dt`."""
         first = lax.stop_gradient(self.dt)
-        return Carry(state, first if self.most_tries is None else (first, lax.stop_gradient(self.most_tries)))
+        if self.most_tries is None:
+            return Carry(state, first)
+        return Carry(state, (first, lax.stop_gradient(FIRST_SAMPLES * self.most_tries)))
 
     def __call__(self, carry: Carry, inputs: Inputs) -> Carry:
         if self.most_tries is None:

@@ -134,6 +134,22 @@ def test_a_run_beyond_the_fitted_range_is_said_to_be_extrapolation_with_where(tm
     assert "Extrapolation in run: voltage goes up to 5 V; the model was fitted to 0 to 4.2 V" in text
 
 
+def test_a_value_of_these_runs_that_no_run_of_the_fit_had_is_extrapolation(tmp_path: Path) -> None:
+    model = kept_model()
+    path = log(tmp_path / "run.csv", reading(model))
+    model = dataclasses.replace(model, runs=(FittedRun("steps", "fit", ""),))
+    assert (
+        not sma.predict(model, path, parameters={"damping": f"{model.values['damping']} N s/m"}).runs[0].extrapolation
+    )
+    result = sma.predict(model, path, parameters={"damping": f"{2.0 * model.values['damping']} N s/m"})
+    (beyond,) = result.runs[0].extrapolation
+    assert (beyond.quantity, beyond.share) == ("damping", 1.0)
+    assert beyond.fitted == (model.values["damping"],) * 2
+    ranged = dataclasses.replace(model, fitted_range={**model.fitted_range, "damping": (50.0, 1000.0)})
+    assert not sma.predict(ranged, path, parameters={"damping": "900 N s/m"}).runs[0].extrapolation
+    assert any("Extrapolation in run: damping" in one for one in conclusions(result))
+
+
 def test_a_run_that_the_model_was_fitted_to_is_said_to_be_one(tmp_path: Path) -> None:
     model = kept_model()
     path = log(tmp_path / "run.csv", reading(model))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 from pathlib import Path
@@ -47,6 +48,12 @@ def compared(*settling: tuple[float, float], differs: tuple[str, ...] = ()) -> C
 )
 def test_what_the_found_model_is_worth_is_said(settling: tuple[tuple[float, float], ...], said: str) -> None:
     assert worth(compared(*settling)) == f"Tuning on the extended model in the place of the base model {said}"
+
+
+def test_gains_that_are_judged_on_the_model_that_they_were_tuned_on_are_said_to_be() -> None:
+    result = dataclasses.replace(compared((4.0, 6.0), (3.0, 5.0)), plant="extended model")
+    assert any("judged on the model that they were tuned on" in one for one in conclusions(result))
+    assert not any("judged on the model" in one for one in conclusions(compared((4.0, 6.0), (3.0, 5.0))))
 
 
 def test_a_loop_that_never_settles_and_a_rounding_error_are_said_as_such() -> None:

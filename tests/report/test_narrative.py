@@ -78,7 +78,7 @@ def test_effects_that_depend_on_the_step_or_hide_in_the_noise_are_reported_at_th
     assert "leaves a trace" not in said(adequate, 0.5, 0.0) + said(missing, 1e-9, 0.0)
     assert "square, but the model with it is no likelier" in said(adequate, 1e-9, 0.0)
     rejected = Rejected(("creep",), 1e-3, 2e-3)
-    assert "square, but the held-out runs reject it" in said(adequate, 1e-9, 0.0, rejected=rejected)
+    assert "square, but the held-out runs reject it" in said(adequate, 1e-9, 0.0, rejected=(rejected,))
     assert "autocorrelated, looks the same" in said(missing, 0.5, 0.0, 1.3)
     assert "looks the same" not in said(missing, 0.5, 0.0, 3.0) + said(adequate, 0.5, 0.0)
 
@@ -235,7 +235,7 @@ def _nothing_added() -> Findings:
         ({"effects": ()}, "no candidate effect was to be tried"),
         ({"explained_variance": 0.1}, "(explained variance 10% in runs left out)"),
         ({"superseded": ("radiation",)}, "radiation to the surroundings comes nearest, and one unknown function"),
-        ({"rejected": Rejected(("radiation",), 1e-3, 2e-3)}, "Radiation to the surroundings would lower the error"),
+        ({"rejected": (Rejected(("radiation",), 1e-3, 2e-3),)}, "Radiation to the surroundings would lower the error"),
         ({"outlier_runs": (OutlierRun("step 6 V", (), True, 1e-3, 2e-5, 3e-3),)}, "in one run alone: without step 6 V"),
     ],
 )

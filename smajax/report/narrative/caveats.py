@@ -68,7 +68,7 @@ def of_a_faint_trace(findings: Findings) -> list[str]:
     chance = min(1.0, len(left) * first.evidence["score_p_value_at_the_end"])
     if chance > findings.config.faint_p_value:
         return []
-    rejected = findings.rejected is not None and first.name in findings.rejected.effects
+    rejected = any(first.name in one.effects for one in findings.rejected)
     return [
         f"Mind: {first.title} leaves a trace in the score test (p = {digits(chance, 2)} after {len(left)} candidates) that would take "
         f"{first.evidence['score_gain_at_the_end']:.1%} of the residual's square"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from smajax.attribution.findings import Findings, Role, Verdict, coverage, pooled_rmse
+from smajax.attribution.findings import Findings, Rejected, Role, Verdict, coverage, pooled_rmse
 from smajax.attribution.record_error import OutlierRun
 from smajax.core.wording import and_listed
 from smajax.model.effects.library import LIBRARY
@@ -25,8 +25,9 @@ def summary(findings: Findings) -> tuple[str, ...]:
         *caveats.of_the_noise(findings),
         *caveats.of_the_step(findings),
     ]
-    if findings.rejected is not None:
-        sentences.insert(1 if findings.added else 0, _rejected(findings))  # after what was found
+    # After what was found.
+    place = 1 if findings.added else 0
+    sentences[place:place] = [*_unconfirmed(findings), *(_rejected(findings, one) for one in findings.rejected)]
     sentences += _errors(findings)
     sentences += caveats.of_bounds(findings)
     sentences += caveats.of_priors_left(findings)
@@ -72,7 +73,7 @@ def _not_in_library(findings: Findings) -> str:
         return "Something is missing, and no candidate effect was to be tried: the experiment file leaves none."
     if alone:
         return _of_one_run(findings, alone)
-    if findings.rejected is not None:
+    if findings.rejected:
         return (
             f"Something is missing: none of the {tried} candidate effects that were tried accounts for it in the fit runs and "
             "is validated on those that were held out."
@@ -134,12 +135,20 @@ def _explained(findings: Findings) -> str:
     )
 
 
-def _rejected(findings: Findings) -> str:
-    assert findings.rejected is not None
-    named = and_listed([effect.title for effect in findings.effects if effect.name in findings.rejected.effects])
-    without, with_it = (
-        error_text(findings, one) for one in (findings.rejected.rmse_without, findings.rejected.rmse_with)
-    )
+def _unconfirmed(findings: Findings) -> list[str]:
+    """That the held-out runs do not tell the extended model from the base model."""
+    held_out = any(run.role == "held-out" for run in findings.runs)
+    if not (findings.added and held_out) or caveats.held_out_comparison(findings) != "alike":
+        return []
+    return [
+        "The held-out runs neither confirm nor refute it: how far the base model and the extended model differ there may be chance."
+    ]
+
+
+def _rejected(findings: Findings, rejected: Rejected) -> str:
+    """Of one search."""
+    named = and_listed([effect.title for effect in findings.effects if effect.name in rejected.effects])
+    without, with_it = (error_text(findings, one) for one in (rejected.rmse_without, rejected.rmse_with))
     text = (
         f"{named} would lower the error on the fit runs, but not on the runs that were held out ({without} without, "
         f"{with_it} with): it is not confirmed, and not named."
@@ -174,12 +183,10 @@ def _errors(findings: Findings) -> list[str]:
     for role in roles:
         before, after = (pooled_rmse(findings.runs, role, which) for which in ("before", "after"))
         if np.isfinite(before):
-            decided = role != "fit" and findings.rejected is not None
-            alike = role != "fit" and findings.added and caveats.held_out_comparison(findings) == "alike"
+            decided = role != "fit" and bool(findings.rejected)
             sentences.append(
                 f"Error on the {role} runs: {error_text(findings, before)}"
                 + (f" before, {error_text(findings, after)} after" if findings.added else "")
-                + (", a difference that may be chance" if alike else "")
                 + (" (no fit saw them, but they decided what is not named)." if decided else ".")
             )
     sentences += _of_the_band(findings)
