@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from smajax.control.position_unit import PositionUnit
     from smajax.data.model_file.actuator_model import ActuatorModel
     from smajax.model.system import System
+    from smajax.report.next_steps import PlantWords
 
 ModelFile = Annotated[
     Path | None,
@@ -105,6 +106,13 @@ class PlantOptions:
         """Whether presets are named."""
         return bool(self.wire or self.load or self.drive or self.law)
 
+    def words(self) -> PlantWords:
+        """As a command names it."""
+        from smajax.report.next_steps import PlantWords
+
+        parts = (self.wire, self.load, self.drive) if self.wire else None
+        return PlantWords(parts, self.law, str(self.model or ""), tuple(self.values or ()))
+
     @cached_property
     def kept(self) -> ActuatorModel | None:
         """The model of --model. Raises ExperimentError, and typer.BadParameter where presets are named beside it."""
@@ -185,6 +193,9 @@ class LoopPlants(PlantOptions):
 
     drawn: Drawn = None
     plant: OtherPlant = None
+
+    def words(self) -> PlantWords:
+        return replace(super().words(), other=str(self.plant or ""))
 
     def plants(self, seed: int, others: bool, limit: float | None = None) -> Plants | None:
         """The plant of --plant, or plants from the posterior of the model; None for none. others: whether mismatches are asked for too.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from smajax.core.display_units import digits, label
 from smajax.core.files import json_text, replace
 from smajax.core.provenance import made_with
 from smajax.report.loop_words import loop_rows
+from smajax.report.next_steps import MODEL, PlantWords, Step, after_tune, section
 from smajax.report.plain_page import bullets, headline, table, whole
 from smajax.report.series_picture import COARSE, series
 from smajax.report.series_plot import Line, Panel, SeriesPlot, set_point_line
@@ -158,8 +160,8 @@ def _settings(result: ControlComparison) -> list[list[str]]:
     return rows
 
 
-def page(result: ControlComparison, command: str = "") -> str:
-    """The whole page."""
+def page(result: ControlComparison, command: str = "", steps: Sequence[Step] = ()) -> str:
+    """The whole page. steps: what a reader may do next."""
     title = f"{result.controller}: what the model is worth in control"
     names = list(result.tuned[0].gains.values)
     gains = [
@@ -174,6 +176,7 @@ def page(result: ControlComparison, command: str = "") -> str:
         "posterior, with the same settings; each model takes the best for its own plants of all gains that were found. The command stays within that of the fit runs.</p>",
         table(head(result), rows(result), (1, 2, 3, 4)),
         bullets(conclusions(result)[:-1] if len(result.tuned) > 1 else conclusions(result)[1:]),
+        section(steps),
         "<h2>Gains</h2>",
         table(["gain", *(one.model for one in result.tuned), "unit"], gains, range(1, 1 + len(result.tuned))),
         "<h2>What the gains were tuned with</h2>",
@@ -192,4 +195,12 @@ def write_comparison(result: ControlComparison, folder: Path, command: str = "")
     best: TunedOnModel = result.tuned[-1]
     write_gains(folder / gains, best.gains, best.units, {"tuned on": best.model, "command": command, **made_with()})
     replace(folder / numbers, json_text(record(result, command)))
-    return replace(folder / shown, page(result, command))
+    return replace(folder / shown, page(result, command, _steps(result, folder, gains)))
+
+
+def _steps(result: ControlComparison, folder: Path, gains: str) -> list[Step]:
+    """With the gains of the last model, whose file is in the same folder."""
+    loops = result.tuned[-1].loops
+    points = [float(f"{float(result.unit.of(one.set_point)):.3g}") for one in loops]
+    seconds = math.ceil(float(loops[0].time[-1]))
+    return after_tune(folder, PlantWords(model=str(folder / MODEL)), gains, points, result.unit.shown, seconds)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,6 +20,7 @@ from smajax.report.narrative import Narrative, narrate
 from smajax.report.narrative.rounds import chosen_text
 from smajax.report.narrative.unknown import units
 from smajax.report.narrative.values import far_text
+from smajax.report.next_steps import Step, section
 from smajax.report.plain_page import MANY, breakable
 from smajax.report.series_picture import COARSE, series, series_of_runs
 from smajax.report.unknown_pictures import function_learnt
@@ -202,11 +203,11 @@ def _hysteresis_dpi(number: int, many: bool) -> int:
     return pictures.HYSTERESIS if not many else COARSE if number < MANY else FOLDED
 
 
-def _contents(findings: Findings) -> list[tuple[str, str]]:
+def _contents(findings: Findings, steps: Sequence[Step]) -> list[tuple[str, str]]:
     """(id, words) of the sections."""
     entries = [
         ("answer", "Answer"),
-        ("next", "What next" if findings.extended_model else ""),
+        ("next", "What next" if steps else ""),
         ("runs", "Errors"),
         ("pictures", "Runs"),
         ("added", "What was added"),
@@ -236,8 +237,8 @@ def _unknown(findings: Findings) -> list[dict[str, Any]]:
     ]
 
 
-def findings_to_html(findings: Findings, narrative: Narrative | None = None) -> str:
-    """The whole page, as text. Names and sentences of the record are escaped; numbers are those of the record."""
+def findings_to_html(findings: Findings, narrative: Narrative | None = None, steps: Sequence[Step] = ()) -> str:
+    """The whole page, as text. Names and sentences of the record are escaped; numbers are those of the record. steps: what a reader may do next."""
     words = narrative or narrate(findings)
     title, tone = VERDICTS[findings.verdict]
 
@@ -250,7 +251,8 @@ def findings_to_html(findings: Findings, narrative: Narrative | None = None) -> 
         .get_template("close_loop.html")
         .render(
             **parts_of_frame(True),
-            contents=_contents(findings),
+            contents=_contents(findings, steps),
+            following=Markup(section(steps)),
             typeset=typeset,
             many=MANY,
             f=findings,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from smajax.report.csv_files import PARAMETERS, RUNS, identified_parameters, ide
 from smajax.report.embedded import picture
 from smajax.report.identify_record import record
 from smajax.report.identify_words import answer, conclusions, estimate_rows, posterior_rows, prior_shown
+from smajax.report.next_steps import Step, after_identify, section
 from smajax.report.plain_page import breakable, bullets, folded, headline, table, whole
 from smajax.report.run_plots import output_alone
 from smajax.report.series_picture import COARSE, series, series_of_runs
@@ -107,7 +109,7 @@ def _first_plot(result: Identified) -> str:
     return str(series(output_alone(plot, f"{plot.about}, measured and simulated", f"{name} ({run.role})")))
 
 
-def page(result: Identified) -> str:
+def page(result: Identified, steps: Sequence[Step] = ()) -> str:
     """The whole page."""
     say = html.escape
     run_head, runs = _run_rows(result)
@@ -122,6 +124,7 @@ def page(result: Identified) -> str:
         headline(answer(result)),
         _first_plot(result),
         bullets(conclusions(result)),
+        section(steps),
         "<h2>Parameters</h2>",
         table(head, rows, [k for k, title in enumerate(head) if title not in ("parameter", "unit", "remark")]),
         "<h2>Which combinations are identifiable</h2>",
@@ -187,12 +190,17 @@ def page(result: Identified) -> str:
     return whole(f"{result.title or result.experiment}", parts)
 
 
-def write_identified(result: Identified, folder: Path) -> Path:
-    """`identify.html`, `identify.json` and its tables in `folder`, each whole or not at all; the path of the page."""
+def write_identified(result: Identified, folder: Path, experiment: Path | None = None) -> Path:
+    """`identify.html`, `identify.json` and its tables in `folder`, each whole or not at all; the path of the page.
+
+    experiment: the experiment file, for the commands that the page suggests.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     replace(folder / "identify.json", json_text(record(result)))
     if result.model is not None:
         result.model.save(folder / "model.toml")
     replace(folder / PARAMETERS, identified_parameters(result))
     replace(folder / RUNS, identified_runs(result))
-    return replace(folder / "identify.html", page(result))
+    return replace(
+        folder / "identify.html", page(result, after_identify(result, folder, str(experiment or result.source)))
+    )

@@ -17,6 +17,7 @@ from urllib.parse import quote
 from smajax.core.display_units import digits, display, label
 from smajax.core.files import replace
 from smajax.report.json_file import with_current_keys
+from smajax.report.next_steps import MODEL, Step, after_reports, section
 from smajax.report.plain_page import bullets, table, whole
 
 RECORD, PAGE, INDEX = "report.json", "report.html", "reports.html"
@@ -123,8 +124,8 @@ def cells(row: ReportRow) -> list[str]:
     ]
 
 
-def index_page(rows: Sequence[ReportRow], messages: Sequence[str] = ()) -> str:
-    """The page; its links are relative to the folder that was searched."""
+def index_page(rows: Sequence[ReportRow], messages: Sequence[str] = (), steps: Sequence[Step] = ()) -> str:
+    """The page; its links are relative to the folder that was searched. steps: what a reader may do next."""
     counts: dict[str, int] = {}
     for row in rows:
         counts[row.verdict] = counts.get(row.verdict, 0) + 1
@@ -137,6 +138,7 @@ def index_page(rows: Sequence[ReportRow], messages: Sequence[str] = ()) -> str:
         table(HEAD, [cells(row) for row in rows], NUMBERS, links),
         "<p class=quiet>Errors are root mean squares over all samples of the runs, of the base model and of the model with the effects added. "
         "Times the noise: the error after of held-out runs, of fit runs where none is held out. A click on a heading sorts.</p>",
+        section(steps),
     ]
     if messages:
         parts += ["<h2>Not read</h2>", bullets(messages)]
@@ -155,7 +157,14 @@ def write_index(folder: Path) -> tuple[Path, list[ReportRow], list[str]]:
     if not rows:
         why = f": {'; '.join(messages)}" if messages else ""
         raise ValueError(f"no {RECORD} in {folder} or below it{why}; expected folders that `smajax close-loop` wrote")
-    return replace(page, index_page(rows, messages)), rows, messages
+    steps = after_reports(folder, _with_model(folder, rows))
+    return replace(page, index_page(rows, messages, steps)), rows, messages
+
+
+def _with_model(folder: Path, rows: Sequence[ReportRow]) -> list[str]:
+    """Folders of the reports that have a model, that with the least error over the noise first."""
+    held = [row for row in rows if (folder / row.folder / MODEL).is_file()]
+    return [row.folder for row in sorted(held, key=lambda row: math.inf if row.noises is None else row.noises)]
 
 
 def as_record(row: ReportRow) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from smajax.core.provenance import made_with
 from smajax.fit.predict import BAND, PredictedRun, Prediction
 from smajax.report.csv_files import RUNS, predicted_runs
 from smajax.report.integration_words import integration_sentence
+from smajax.report.next_steps import Step, section
 from smajax.report.plain_page import bullets, folded, headline, table, whole
 from smajax.report.predict_words import HEAD, band_sentence, conclusions, diagnostics, pooled, run_rows
 from smajax.report.run_plots import measured_line, output_alone, output_panel, residual_panel, run_plot
@@ -133,7 +135,7 @@ def _run(run: PredictedRun) -> dict[str, Any]:
     }
 
 
-def page(result: Prediction, command: str = "") -> str:
+def page(result: Prediction, command: str = "", steps: Sequence[Step] = ()) -> str:
     """The whole page: the answer, the picture that proves it, then the rest."""
     model = result.model
     title = f"Prediction by {model.title}" if model.title else "Prediction"
@@ -146,6 +148,7 @@ def page(result: Prediction, command: str = "") -> str:
         f'<div class="{"pair" if len(first) > 1 else ""}">{"".join(series(plot, samples, dpi=COARSE) for plot in first)}</div>',
         bullets(said[1:]),
         f"<p class=quiet>{html.escape(band_sentence(result))}</p>",
+        section(steps),
         "<h2>Runs</h2>",
         table(HEAD, run_rows(result), (2, 3, 4, 5)),
     ]
@@ -173,9 +176,9 @@ def page(result: Prediction, command: str = "") -> str:
     return whole(title, parts)
 
 
-def write_prediction(result: Prediction, folder: Path, command: str = "") -> Path:
-    """`predict.html`, `predict.json` and `runs.csv` in `folder`, each whole or not at all; the path of the page."""
+def write_prediction(result: Prediction, folder: Path, command: str = "", steps: Sequence[Step] = ()) -> Path:
+    """`predict.html`, `predict.json` and `runs.csv` in `folder`, each whole or not at all; the path of the page. steps: what a reader may do next."""
     folder.mkdir(parents=True, exist_ok=True)
     replace(folder / "predict.json", json_text(record(result, command)))
     replace(folder / RUNS, predicted_runs(result))
-    return replace(folder / "predict.html", page(result, command))
+    return replace(folder / "predict.html", page(result, command, steps))

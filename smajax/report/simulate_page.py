@@ -28,6 +28,7 @@ from smajax.report.embedded import picture
 from smajax.report.integration_words import integration_sentence
 from smajax.report.loop_words import loop_rows
 from smajax.report.measured_log import draw_measured, measured_of
+from smajax.report.next_steps import Step, section
 from smajax.report.pictures import NARROW, as_png
 from smajax.report.plain_page import bullets, headline, table, whole
 from smajax.report.series_plot import Band, Line, Panel, SeriesPlot, moving, set_point_line
@@ -220,8 +221,18 @@ def settings_rows(result: RunResult) -> list[list[str]]:
     return [*loop_rows(loop, values.get(LARGEST)), *gains]
 
 
-def page(result: RunResult, image: bytes, title: str, command: str, animations: Sequence[bytes] = ()) -> str:
-    """The whole page, pictures inside. animations: the animation as wide and as upright as a window, if there is one."""
+def page(
+    result: RunResult,
+    image: bytes,
+    title: str,
+    command: str,
+    animations: Sequence[bytes] = (),
+    steps: Sequence[Step] = (),
+) -> str:
+    """The whole page, pictures inside. animations: the animation as wide and as upright as a window, if there is one.
+
+    steps: what a reader may do next.
+    """
     table_of = parameters(result.system)
     values = [
         [name, digits(value, 6), table_of[name].unit, table_of[name].about]
@@ -238,6 +249,7 @@ def page(result: RunResult, image: bytes, title: str, command: str, animations: 
         str(picture(film, "the load moving, beside the wire's path through its phase diagram", "panels", upright)),
         *_merit_part(result),
         bullets(run_sentences(result)),
+        section(steps),
         *_settings_part(result),
         "<h2>The run</h2>",
         table(
@@ -291,9 +303,15 @@ FILES: Sequence[str] = tuple(f"simulate.{kind}" for kind in ("csv", "nc", "json"
 
 
 def write_run(
-    result: RunResult, folder: Path, title: str, command: str, animated: bool = False, progress: Progress = quiet
+    result: RunResult,
+    folder: Path,
+    title: str,
+    command: str,
+    animated: bool = False,
+    progress: Progress = quiet,
+    steps: Sequence[Step] = (),
 ) -> Path:
-    """All files of a run into `folder`, each in one step; the path of the page. animated: an animation too (no coupon)."""
+    """All files of a run into `folder`, each in one step; the path of the page. animated: an animation too (no coupon). steps: what a reader may do next."""
     progress(Stage("pictures", 0.0))
     band = _band(result)
     image = picture_of(result.data, band=band)
@@ -313,4 +331,4 @@ def write_run(
     )
     if animations:
         replace(folder / "simulate.gif", animations[0])
-    return replace(folder / "simulate.html", page(result, image, title, command, animations))
+    return replace(folder / "simulate.html", page(result, image, title, command, animations, steps))

@@ -26,6 +26,7 @@ from smajax.core.progress import Message, Progress, quiet
 from smajax.core.wording import aligned
 from smajax.model.system import System
 from smajax.report.drawing import UPRIGHT
+from smajax.report.next_steps import after_sweep
 from smajax.report.series_plot import SeriesPlot
 from smajax.report.sweep_dataset import as_dataset
 from smajax.report.sweep_page import (
@@ -36,6 +37,7 @@ from smajax.report.sweep_page import (
     failures,
     page,
     perturbed_sentence,
+    ranked,
     write_rows,
 )
 from smajax.report.sweep_pictures import common_limits, draw_comparison, draw_curves, draw_lines, draw_maps, lines_plot
@@ -61,7 +63,7 @@ def write_sweep(
 ) -> SweepResults:
     """Write the files of each controller as it comes, then those of all; `sweeps` are of `sweep_controllers`, as are the others.
 
-    remarks: sentences on set points out of reach, and on where the settings come from.
+    remarks: sentences on set points out of reach, and on where the settings come from, and how commands name the plant.
     """
     out.mkdir(parents=True, exist_ok=True)
     found = plant_set(system, plants)
@@ -96,7 +98,9 @@ def write_sweep(
     replace(out / "sweep.json", as_json(whole, command, remarks))
     replace(out / "sweep.nc", as_netcdf(as_dataset(whole, command)))
     pictures = {name: ((out / name).read_bytes(), narrow) for name, narrow in upright.items()}
-    replace(out / "index.html", page(whole, pictures, command, remarks, plots))
+    best = ranked(whole)[0][2]
+    steps = after_sweep(out, remarks.plant, best, settings.set_points, found.unit.shown, remarks.gains.get(best, ""))
+    replace(out / "index.html", page(whole, pictures, command, remarks, plots, steps))
     return whole
 
 

@@ -7,7 +7,7 @@ import dataclasses
 import html
 import io
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
@@ -23,6 +23,7 @@ from smajax.core.provenance import made_with
 from smajax.core.wording import and_listed, counted
 from smajax.report.embedded import picture
 from smajax.report.integration_words import integration_sentence
+from smajax.report.next_steps import ARM, PlantWords, Step, section
 from smajax.report.plain_page import bullets, folded, headline, table, whole
 from smajax.report.series_plot import SeriesPlot, moving, samples_of
 from smajax.report.sweep_pictures import ROUNDING, SHOWN, merit_values, nominal_gain, shown_in
@@ -31,10 +32,15 @@ Pictures = Mapping[str, tuple[bytes, bytes]]  # file name -> the picture, and th
 
 
 class Remarks(NamedTuple):
-    """Sentences beside the results. notes: what a reader has to know first; settings: where these come from."""
+    """Sentences beside the results. notes: what a reader has to know first; settings: where these come from.
+
+    plant, and gains (controller: file): as the commands that the page suggests name them.
+    """
 
     notes: tuple[str, ...] = ()
     settings: tuple[str, ...] = ()
+    plant: PlantWords = ARM
+    gains: Mapping[str, str] = MappingProxyType({})
 
 
 NO_REMARKS = Remarks()
@@ -125,8 +131,12 @@ def page(
     command: str = "",
     remarks: Remarks = NO_REMARKS,
     plots: Mapping[str, SeriesPlot] = NO_PLOTS,
+    steps: Sequence[Step] = (),
 ) -> str:
-    """One page for a browser, with the pictures inside; the rows as CSV are beside it. plots: of each controller's lines over time."""
+    """One page for a browser, with the pictures inside; the rows as CSV are beside it.
+
+    plots: of each controller's lines over time. steps: what a reader may do next.
+    """
     samples = samples_of(plots.values())
     say, settings, grid, unit = html.escape, results.settings, results.grid, results.unit
     low, high = min(settings.set_points), max(settings.set_points)
@@ -149,6 +159,7 @@ def page(
         f"{len(settings.set_points)} set points from {low:{precision}}{unit.symbol} to {high:{precision}}{unit.symbol}; "
         f"median / worst over the set points. {arrived} {say(settings.between)}</p>{bullets(remarks.settings)}",
         table(head, comparison_rows(results)),
+        section(steps),
         _what_differs(results, drawn_as),
         *folded(
             [_controller_part(results, one, pictures, plots.get(one.name), samples) for one in results.sweeps],
@@ -195,8 +206,8 @@ def conclusions(results: SweepResults) -> list[str]:
     return sentences
 
 
-def answer(results: SweepResults) -> str:
-    """The controllers by the share of the runs on perturbed plants in which they settle; then the quicker ones first."""
+def ranked(results: SweepResults) -> list[tuple[float, float, str, float]]:
+    """(minus the share of the runs on perturbed plants in which it settles, median settling time, name, largest overshoot), the best controller first."""
     at, unit = nominal_gain(results.grid), results.unit
     rows = []
     for one in results.sweeps:
@@ -205,6 +216,12 @@ def answer(results: SweepResults) -> str:
         overshoot = float(np.nanmax(merit_values(one.merits, "overshoot", unit)[..., at]))
         median = float(np.median(times[settled])) if settled.any() else np.inf
         rows.append((-float(settled.mean()), median, one.name, overshoot))
+    return sorted(rows)
+
+
+def answer(results: SweepResults) -> str:
+    """The controllers by the share of the runs on perturbed plants in which they settle; then the quicker ones first."""
+    unit = results.unit
     each = [
         f"{name} settles in {-100 * share:.0f} %"
         + (
@@ -212,7 +229,7 @@ def answer(results: SweepResults) -> str:
             if np.isfinite(median)
             else ""
         )
-        for share, median, name, overshoot in sorted(rows)
+        for share, median, name, overshoot in ranked(results)
     ]
     rest = f"; then {counted(len(each) - NAMED, 'other')}" if len(each) > NAMED else ""
     plants = "plants drawn from the batch" if results.grid.numbered else "perturbed plants"

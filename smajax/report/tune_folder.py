@@ -14,6 +14,7 @@ from smajax.control.tune.tuning_folder import GAINS, RECORD, RESULTS, check_fold
 from smajax.core.files import json_text, replace
 from smajax.core.provenance import made_with
 from smajax.model.system import System
+from smajax.report.next_steps import ARM, PlantWords, after_tune
 from smajax.report.tune_page import loops, page, record
 from smajax.report.tune_pictures import before_after, costs_over_loops
 
@@ -36,8 +37,8 @@ def finished(system: System, settings: TuneSettings, out: Path, plants: Plants |
     return known if same else None
 
 
-def write_tuning(tuned: TuningResult, out: Path, command: str = "") -> dict[str, Any]:
-    """Write the results into the folder, each file in one step; the record of `tune.json`."""
+def write_tuning(tuned: TuningResult, out: Path, command: str = "", plant: PlantWords = ARM) -> dict[str, Any]:
+    """Write the results into the folder, each file in one step; the record of `tune.json`. plant: as the commands that the page suggests name it."""
     origin = {"tuned": tuned.settings.record(), "command": command, **made_with()}
     write_gains(out / GAINS, tuned.after, tuned.units, origin)
     pictures = {"before_after.png": before_after(tuned), "descent.png": costs_over_loops(tuned)}
@@ -46,5 +47,7 @@ def write_tuning(tuned: TuningResult, out: Path, command: str = "") -> dict[str,
     whole = record(tuned, command)
     replace(out / RECORD, json_text(whole))
     replace(out / "loops.csv", loops(tuned))
-    replace(out / "tune.html", page(tuned, pictures, command))
+    settings = tuned.settings
+    steps = after_tune(out, plant, GAINS, settings.set_points, settings.shown.shown, settings.seconds)
+    replace(out / "tune.html", page(tuned, pictures, command, steps))
     return whole

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import html
 import itertools
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,7 @@ from smajax.core.wording import and_listed, counted
 from smajax.report.embedded import picture
 from smajax.report.integration_words import integration_sentence
 from smajax.report.loop_words import loop_rows
+from smajax.report.next_steps import Step, section
 from smajax.report.plain_page import bullets, headline, table, whole
 from smajax.report.series_picture import series
 from smajax.report.tune_answer import answer, set_point_rows
@@ -248,8 +249,8 @@ def settings_rows(result: TuningResult) -> list[list[str]]:
     return [*loop_rows(result.after.loop, result.after.fixed.get(LARGEST)), *fixed]
 
 
-def page(result: TuningResult, pictures: Mapping[str, bytes], command: str) -> str:
-    """The whole page, pictures inside."""
+def page(result: TuningResult, pictures: Mapping[str, bytes], command: str, steps: Sequence[Step] = ()) -> str:
+    """The whole page, pictures inside. steps: what a reader may do next."""
     say, settings = html.escape, result.settings
     head = ["figure", "median before", "worst before", "median after", "worst after"]
     head += ["limit"] if settings.limits else []
@@ -266,6 +267,7 @@ def page(result: TuningResult, pictures: Mapping[str, bytes], command: str) -> s
         table(points, rows, range(len(points))),
         bullets(conclusions(result)),
         f"<p>Tuned on {say(settings.plants_sentence(result.air))}. {say(settings.goal_sentence())}.</p>",
+        section(steps),
         "<h2>Gains</h2>",
         "" if settings.shown.is_angle else f"<p class=quiet>{SCALED}</p>",
         table(["gain", "before", "after", "unit", "box", "remark"], gain_rows(gains_of(result)), (1, 2)),

@@ -11,14 +11,15 @@ from smajax.report.csv_files import PARAMETERS, RUNS, findings_parameters, findi
 from smajax.report.html import findings_to_html
 from smajax.report.json_file import findings_to_json
 from smajax.report.narrative import narrate
+from smajax.report.next_steps import MODEL, after_close_loop
 
-MODEL, BASE_MODEL = "model.toml", "base_model.toml"
+BASE_MODEL = "base_model.toml"
 
 
-def write_report(findings: Findings, folder: Path) -> Path:
+def write_report(findings: Findings, folder: Path, experiment: Path | None = None) -> Path:
     """Writes the files into `folder`, creating it, and returns the path of report.html.
 
-    A reader never sees half a file: each is written beside its place and then put there in one step.
+    experiment: the experiment file, for the commands that the page suggests. A reader never sees half a file: each is written beside its place and then put there in one step.
     Raises NotADirectoryError when `folder` or one of its parents is a file.
     """
     try:
@@ -29,7 +30,8 @@ def write_report(findings: Findings, folder: Path) -> Path:
             "existing or new; give another one"
         ) from error
     narrative = narrate(findings)
-    page = findings_to_html(findings, narrative)
+    steps = after_close_loop(findings, folder, str(experiment or findings.source))
+    page = findings_to_html(findings, narrative, steps)
     record = json.dumps(findings_to_json(findings, narrative), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
     # The record goes first: where the page is, its numbers are too.
     replace(folder / "report.json", record)

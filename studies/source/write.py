@@ -17,6 +17,7 @@ from smajax.core.progress import Message, Progress, Stage
 from smajax.core.provenance import made_with, source_mark
 from smajax.report.drawing import UPRIGHT
 from smajax.report.embedded import picture
+from smajax.report.next_steps import after_figures, section
 from smajax.report.plain_page import table, whole
 
 from .catalogue import every_row
@@ -193,7 +194,7 @@ def as_page(drawn: Sequence[Drawn], folder: Path) -> str:
         table(["", ""], list(map(list, made_with().items()))),
         "<p class=quiet>The same numbers: figures.csv, and a JSON file for each figure.</p>",
     ]
-    return whole("Figures of the source", [head, *parts, *foot])
+    return whole("Figures of the source", [head, section(after_figures()), *parts, *foot])
 
 
 def _picture(one: Drawn, folder: Path) -> str:

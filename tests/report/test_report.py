@@ -19,7 +19,7 @@ def test_the_files_are_written_whole_and_nothing_else(folder, page):
 
 
 def test_a_missing_folder_is_made(findings, tmp_path, monkeypatch):
-    monkeypatch.setattr("smajax.report.write.findings_to_html", lambda findings, narrative: "page")
+    monkeypatch.setattr("smajax.report.write.findings_to_html", lambda findings, narrative, steps: "page")
     assert write_report(findings, tmp_path / "a" / "b").read_text() == "page"
 
 

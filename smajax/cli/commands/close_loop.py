@@ -59,9 +59,9 @@ def run_close_loop(
             memory=out / "fits",
             progress=in_words,
             command=command,
-            interim=lambda known: write_report(known, out),
+            interim=lambda known: write_report(known, out, loaded.path),
         )
-        return findings, write_report(findings, out)
+        return findings, write_report(findings, out, loaded.path)
 
 
 def print_findings(findings: Findings, page: Path) -> None:

@@ -102,7 +102,7 @@ def identify_command(
                 progress=progress,
                 command=command,
             )
-            page = write_identified(identified, out)
+            page = write_identified(identified, out, loaded.path)
     except (FolderTaken, ExperimentError):
         raise
     except ValueError as error:

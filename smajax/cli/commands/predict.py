@@ -54,6 +54,7 @@ def predict_command(
     from smajax.core.progress import Stage
     from smajax.data.model_file.read import load_model
     from smajax.fit.predict import predict
+    from smajax.report.next_steps import after_predict
     from smajax.report.predict_page import FILES, record, write_prediction
 
     check_path(out)
@@ -71,7 +72,7 @@ def predict_command(
         progress(Stage("predicting the runs", 0.0))
         result = predict(loaded, logs, inputs=constants, parameters=changed, decimal=decimal)
         progress(Stage("predicting the runs", 1.0))
-        page = write_prediction(result, out, command)
+        page = write_prediction(result, out, command, after_predict(loaded, str(model), [str(one) for one in logs]))
     if json_out:
         typer.echo(json_text(record(result, command)), nl=False)
     else:

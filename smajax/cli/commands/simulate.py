@@ -283,6 +283,7 @@ def simulate(
     from smajax.cli.result_folder import check_path, claimed
     from smajax.control.run_request import LoopRequest, RunRequest
     from smajax.core.files import json_text
+    from smajax.report.next_steps import PlantWords, after_simulate
     from smajax.report.simulate_page import FILES, record, write_run
 
     check_path(out)
@@ -304,6 +305,8 @@ def simulate(
     what = f"{wire}, {load}, {drive}" if model is None else model.name
     title = what + (f", {result.data.attrs['controller']}" if options.closed else "")
     title += "" if plant is None else f", on {plant.name}"
+    presets = None if model is not None or (wire, load, drive) == (WIRE, LOAD, DRIVE) else (wire, load, drive)
+    named = PlantWords(presets, law, str(model or ""), tuple(values or ()), str(plant or ""))
     settings = {
         **vars(request),
         **(vars(loop) if options.closed else {}),
@@ -312,7 +315,7 @@ def simulate(
         "plant": None if plant is None else str(plant),
     }
     with resumable(), claimed(out, "simulate", settings, FILES, overwrite), displayed(console()) as progress:
-        page = write_run(result, out, title, command, gif, progress)
+        page = write_run(result, out, title, command, gif, progress, after_simulate(result, named, str(gains or "")))
     for note in result.notes:
         console().print(note, soft_wrap=True, markup=False, highlight=False)
     if json_out:

@@ -225,6 +225,12 @@ def sweep(
     ):
         if sentence and not json_out:
             typer.echo(sentence, err=True)
+    remarks = Remarks(
+        out_of_reach,
+        said,
+        plant.words(),
+        {one.controller: str(path) for one, path in zip(tuned, gains or (), strict=True)},
+    )
     request = settings.record()
     if not is_arm(assumed) or plant.law or plant.values or loop.command_limit is not None:
         request["plant"] = digest(assumed)[:16]
@@ -238,9 +244,7 @@ def sweep(
             displayed(console(), hint=not json_out) as progress,
         ):
             sweeps = sweep_controllers(assumed, settings, out, progress, plants)
-            results = write_sweep(
-                assumed, settings, sweeps, out, progress, command_line(), plants, Remarks(out_of_reach, said)
-            )
+            results = write_sweep(assumed, settings, sweeps, out, progress, command_line(), plants, remarks)
     except FolderTaken:
         raise
     except ValueError as error:

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from smajax.control.plants import Plants
     from smajax.control.tune.settings import TuneSettings
     from smajax.model.system import System
+    from smajax.report.next_steps import PlantWords
 
 
 @dataclass(frozen=True)
@@ -86,7 +87,13 @@ def _variation(several: Sequence[str] | None, plant: System) -> dict[str, float]
 
 
 def _run(
-    plant: System, settings: TuneSettings, plants: Plants | None, out: Path, overwrite: bool, json_out: bool
+    plant: System,
+    settings: TuneSettings,
+    plants: Plants | None,
+    out: Path,
+    overwrite: bool,
+    json_out: bool,
+    words: PlantWords,
 ) -> Mapping[str, Any]:
     """The record of the tuning, from the folder where it is finished there. Raises typer.BadParameter."""
     from smajax.cli.progress_display import displayed
@@ -110,7 +117,9 @@ def _run(
         ):
             record = finished(plant, settings, out, plants)
             if record is None:
-                record = write_tuning(tune_in_folder(plant, settings, out, progress, plants), out, command_line())
+                record = write_tuning(
+                    tune_in_folder(plant, settings, out, progress, plants), out, command_line(), words
+                )
     except FolderTaken:
         raise
     except ValueError as error:
@@ -258,7 +267,7 @@ def tune(
     sentence = understood("Set points", set_points, settings.set_points, unit.shown)
     if sentence and not json_out:
         typer.echo(sentence, err=True)
-    record = _run(assumed, settings, plants, out, overwrite, json_out)
+    record = _run(assumed, settings, plants, out, overwrite, json_out, plant.words())
     page = out / "tune.html"
     for sentence in record["price"]:
         typer.echo(sentence, err=True)

@@ -85,6 +85,18 @@ document.querySelectorAll("table:has(thead)").forEach((table, k) => {
     setTimeout(() => URL.revokeObjectURL(part), 1000);
   });
 });
+// A line of a command can be copied; where a browser does not let a page do that, it is marked.
+document.querySelectorAll("code.line").forEach(line => {
+  const text = line.textContent, words = line.firstChild;
+  const button = Object.assign(document.createElement("button"), { type: "button", textContent: "copy" });
+  button.setAttribute("aria-label", `copy: ${text}`);
+  button.addEventListener("click", async () => {
+    try { await navigator.clipboard.writeText(text); button.textContent = "copied"; }
+    catch { const range = document.createRange(); range.selectNodeContents(words); getSelection().removeAllRanges(); getSelection().addRange(range); }
+    setTimeout(() => { button.textContent = "copy"; }, 1500);
+  });
+  line.prepend(button);
+});
 // A link into what is folded away unfolds it; the contents say where the reader is.
 const unfold = () => { const at = document.getElementById(decodeURIComponent(location.hash.slice(1))), box = at?.closest("details:not([open])"); if (box) { box.open = true; at.scrollIntoView(); } };
 addEventListener("hashchange", unfold);

@@ -1,0 +1,114 @@
+"""What a page suggests: each command is one that smajax reads, with the files that the page's own command wrote."""
+
+from __future__ import annotations
+
+import dataclasses
+import html
+import re
+import shlex
+from collections.abc import Sequence
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+import typer
+
+from smajax.cli.main import app
+from smajax.control.run_request import RunRequest, run_open
+from smajax.data.model_file.of_presets import model_of_presets
+from smajax.report import next_steps
+from smajax.report.next_steps import ARM, PlantWords, Step
+from smajax.report.write import write_report
+from tests.helpers.made_findings import made_findings
+
+FOLDER = Path("my bench/report")
+SPRING = PlantWords(("flexinol_ht_500um", "bias_spring", "voltage"), values=("wire_length='1 m'",))
+FITTED = PlantWords(model="report/model.toml", other="other/model.toml")
+
+
+def read(steps: Sequence[Step]) -> list[dict[str, Any]]:
+    """The options of every command, as the command line reads them; a line that it does not read is an error."""
+    group = typer.main.get_command(app)
+    found = []
+    for line in (one.command for one in steps if one.command):
+        program, name, *words = shlex.split(line)
+        assert program == "smajax"
+        command = group.commands[name]  # type: ignore[attr-defined]
+        with command.make_context(name, words) as context:
+            found.append({"command": name, **context.params})
+    return found
+
+
+def test_the_commands_of_a_fitted_model_are_read_and_name_its_files() -> None:
+    model = model_of_presets("flexinol_table_3_2", "dead_weight", "voltage")
+    findings = dataclasses.replace(made_findings(), base_model=model, extended_model=model)
+    found = {
+        one["command"]: one for one in read(next_steps.after_close_loop(findings, FOLDER, "my bench/experiment.toml"))
+    }
+    assert (
+        found["predict"]["model"] == found["tune"]["model"] == found["new-experiment"]["model"] == FOLDER / "model.toml"
+    )
+    assert found["export"]["file"] == FOLDER / "model.toml"
+    assert found["identify"]["experiment"] == Path("my bench/experiment.toml")
+    assert found["identify"]["design"] is True
+
+
+def test_an_identification_suggests_a_design_unless_it_has_one() -> None:
+    model = model_of_presets("flexinol_table_3_2", "dead_weight", "voltage")
+    for suggestions, expected in (((), True), (("a run",), False)):
+        result: Any = SimpleNamespace(model=model, suggestions=suggestions)
+        found = read(next_steps.after_identify(result, FOLDER, "experiment.toml"))
+        assert ("identify" in [one["command"] for one in found]) == expected
+
+
+def test_no_controller_is_suggested_for_what_does_not_move() -> None:
+    blocked = model_of_presets("flexinol_table_3_2", "blocked_wire", "voltage")
+    found = read(next_steps.after_predict(blocked, "report/model.toml", ["logs/a b.csv", "logs/c.csv"]))
+    assert [one["command"] for one in found] == ["new-experiment", "export"]
+    assert found[0]["files"] == [Path("logs/a b.csv"), Path("logs/c.csv")]
+
+
+@pytest.mark.parametrize("plant", [ARM, SPRING, FITTED])
+def test_the_commands_of_gains_and_sweeps_are_read_and_name_the_plant(plant: PlantWords) -> None:
+    steps = next_steps.after_tune(FOLDER, plant, "gains.json", (4.0, 12.0), "mm", 30.0)
+    steps += next_steps.after_sweep(FOLDER, plant, "sld", (4.0, 12.0), "mm", "my gains.json")
+    steps += next_steps.after_sweep(FOLDER, plant, "sld", (4.0, 12.0), "mm")
+    found = read(steps)
+    assert [one["command"] for one in found] == [
+        "sweep",
+        "simulate",
+        "export",
+        "simulate",
+        "export",
+        "simulate",
+        "tune",
+    ]
+    assert found[1]["set_point"] == "12mm:30s,4mm:30s"
+    for one in found:
+        assert str(one["model"] or "") == plant.model
+        assert tuple(one["values"] or ()) == plant.values
+        assert not plant.parts or (one["wire"], one["load"], one["drive"]) == plant.parts
+        assert one["command"] == "export" or str(one["plant"] or "") == plant.other
+
+
+def test_a_run_suggests_a_set_point_that_it_reached() -> None:
+    ran = run_open(RunRequest(inputs={"voltage": "7:2s"}, dt=0.01))
+    loop, tune, fit = read(next_steps.after_simulate(ran, ARM))
+    low, high = (float(ran.data["position"].min()), float(ran.data["position"].max()))
+    degrees = float(loop["set_point"].partition("deg")[0])
+    assert low < degrees * np.pi / 180.0 < high
+    assert (loop["controller"], tune["controller"], fit["command"]) == ("pid", "pid", "new-experiment")
+
+
+def test_the_page_has_the_lines_as_they_are_typed(tmp_path: Path, blank_pictures: None) -> None:
+    model = model_of_presets("flexinol_table_3_2", "dead_weight", "voltage")
+    folder = tmp_path / "a 'quoted' & folder"
+    page = write_report(dataclasses.replace(made_findings(), base_model=model, extended_model=model), folder)
+    lines = [
+        html.unescape(one) for one in re.findall(r"<code class=line>(.*?)</code>", page.read_text(encoding="utf-8"))
+    ]
+    assert [Path(words[2]) for line in lines if (words := shlex.split(line))[:2] == ["smajax", "predict"]] == [
+        folder / "model.toml"
+    ]
