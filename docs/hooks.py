@@ -3,14 +3,19 @@
 A page links a file of the repository by its path, so that the link also works in the repository (`../tests/x.py`).
 Pages and pictures of `studies/` become part of the site, and so do the notebooks with their stored outputs; any other text file
 that a page links becomes a page that shows it. A broken link ends the build.
+
+A page of the reference names modules (`::: smajax.control.compose`). Each of them gets a page of its own, and the page that names it a table
+that leads there. The options of each command are a page too, as `--help` prints them.
 """
 
 from __future__ import annotations
 
+import ast
 import html
 import os
 import posixpath
 import re
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +23,9 @@ from latex2mathml.converter import convert
 from mkdocs.exceptions import PluginError
 from mkdocs.structure.files import File, Files
 from nbconvert import MarkdownExporter
+from typer.testing import CliRunner
+
+from smajax.cli.main import app
 
 ROOT = Path(__file__).parents[1]
 TAKEN = (
@@ -32,6 +40,19 @@ PICTURES = ("studies/*.png", "studies/*/*.png", "docs/*.png", "docs/*.svg")
 LINK = re.compile(r"(\]\()([^)#\s]+)((?:#[^)\s]*)?\))")
 LABELLED = re.compile(r"\[([^\[\]]*)\]\(([^)#\s]+)\)")
 FENCED = re.compile(r"^(```|~~~).*?^\1[ \t]*$", re.MULTILINE | re.DOTALL)
+NAMED = re.compile(r"(?:^::: \S+\n+)+", re.MULTILINE)  # modules in a row
+ANCHOR = re.compile(r"(\]\()#(smajax\.[^)\s]+)\)")
+MODULES, HELP = "reference/modules", "reference/commands"
+# How a search ranks a page whose words fit as well: what a reader looks for first, and what stands behind it.
+BOOSTS = (
+    ("how-to/", 4.0),
+    ("start/", 4.0),
+    ("tutorial", 4.0),
+    ("notebooks/", 1.5),
+    (f"{MODULES}/", 0.01),
+    ("studies/", 0.4),
+    ("C", 0.3),
+)
 MATHS = re.compile(r'<(span|div) class="arithmatex">(.*?)</\1>', re.DOTALL)
 # Where the reference shows a module that no page names: on the page of its folder, the longest that fits.
 PAGE_OF = {
@@ -102,7 +123,7 @@ def notebook_files(config: Any, path: Path) -> list[File]:
 
 
 def on_files(files: Files, config: Any) -> Files:
-    """Add what the pages of the site and of the studies link."""
+    """Add what the pages of the site and of the studies link, a page for each module and one for each command."""
     taken = [path.relative_to(ROOT).as_posix() for one in TAKEN for path in sorted(ROOT.glob(one))]
     taken += [path.relative_to(ROOT).as_posix() for one in PICTURES for path in sorted(ROOT.glob(one))]
     pages = [f"docs/{file.src_uri}" for file in files.documentation_pages()]
@@ -121,12 +142,56 @@ def on_files(files: Files, config: Any) -> Files:
             files.append(File.generated(config, place(path), content=shown))
         else:
             files.append(File.generated(config, place(path), abs_src_path=str(source)))
+    for path in [file for file in files.documentation_pages() if file.src_uri.startswith("reference/")]:
+        title = path.content_string.partition("# ")[2].partition("\n")[0]
+        names = [*re.findall(r"^::: (\S+)$", path.content_string, re.MULTILINE), *unlisted(path.src_uri, files)]
+        back = os.path.relpath(path.src_uri, MODULES)
+        for name in names:
+            text = f"---\ntitle: {name}\n---\n[{title}]({back}) (advanced reference)\n\n::: {name}\n    options:\n      heading_level: 1\n"
+            files.append(File.generated(config, f"{MODULES}/{name}.md", content=text))
+    for name, text in helps().items():
+        files.append(File.generated(config, f"{HELP}/{name}.md", content=text))
     return files
+
+
+@cache
+def helps() -> dict[str, str]:
+    """Of each command a page with what its `--help` prints."""
+    pages = {}
+    for command in app.registered_commands:
+        name = str(command.name)
+        text = CliRunner().invoke(app, [name, "--help"]).output.replace("Usage: root ", "Usage: smajax ").strip()
+        pages[name] = f"# smajax {name}\n\n[All commands](../commands.md)\n\n```text\n{text}\n```\n"
+    return pages
+
+
+@cache
+def modules() -> dict[str, str]:
+    """The first sentence of every module's docstring."""
+    found = {}
+    for path in sorted((ROOT / "smajax").rglob("*.py")):
+        parts = path.relative_to(ROOT).with_suffix("").parts
+        name = ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+        said = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or ""
+        found[name] = " ".join(said.split("\n\n")[0].split()).replace("|", "\\|")
+    return found
+
+
+def module_table(names: list[str]) -> str:
+    """What stands on a page in the place of modules that it names."""
+    rows = [f"| [`{name}`](modules/{name}.md) | {modules().get(name, '')} |" for name in names]
+    return "\n".join(["", "| module | |", "|---|---|", *rows, ""])
+
+
+def page_of_anchor(anchor: str) -> str:
+    """The page that has `smajax.control.compose.compose`, which is that of its module."""
+    parts = anchor.split(".")
+    return next(name for k in range(len(parts), 0, -1) if (name := ".".join(parts[:k])) in modules())
 
 
 def unlisted(source: str, files: Files) -> list[str]:
     """Modules that belong to this page of the reference and that no page names, so that a new one is never left out."""
-    pages = [file for file in files.documentation_pages() if file.src_uri.startswith("reference/")]
+    pages = [file for file in files.documentation_pages() if posixpath.dirname(file.src_uri) == "reference"]
     text = "\n".join(file.content_string for file in pages)
     listed = set(re.findall(r"^::: (\S+)$", text, re.MULTILINE))
     paths = [path.relative_to(ROOT).with_suffix("") for path in sorted((ROOT / "smajax").rglob("*.py"))]
@@ -150,8 +215,18 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str
     here = page.file.src_uri
     if here.startswith("repository/"):
         return markdown
-    if here.startswith("reference/"):
-        markdown += "".join(f"\n::: {name}\n" for name in unlisted(here, files))
+    page.meta.setdefault("search", {"boost": next((boost for begin, boost in BOOSTS if here.startswith(begin)), 1.0)})
+    if posixpath.dirname(here) in (MODULES, HELP):
+        return markdown
+    if posixpath.dirname(here) == "reference":
+        markdown += "\n" + "".join(f"::: {name}\n\n" for name in unlisted(here, files))
+        markdown = NAMED.sub(lambda run: module_table(re.findall(r"\S+\.\S+|smajax", run[0])), markdown)
+        if here == "reference/commands.md":
+            markdown += (
+                "\n## Options of each command\n\n"
+                + ", ".join(f"[`{name}`](commands/{name}.md)" for name in helps())
+                + "\n"
+            )
     mine = origin(here)
 
     def path_of(target: str) -> str:
@@ -164,10 +239,17 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str
         before, target, after = match.groups()
         if "://" in target or target.startswith("mailto:"):
             return match[0]
+        if after.startswith("#smajax."):
+            return f"{before}{module_link(after[1:-1])})"
         return f"{before}{os.path.relpath(place(path_of(target)), posixpath.dirname(here) or '.')}{after}"
 
+    def module_link(anchor: str) -> str:
+        page = f"{MODULES}/{page_of_anchor(anchor)}.md"
+        return f"{os.path.relpath(page, posixpath.dirname(here) or '.')}#{anchor}"
+
     def changed(text: str) -> str:
-        return LINK.sub(led, LABELLED.sub(unlinked, text))
+        here_or_there = ANCHOR.sub(lambda match: f"{match[1]}{module_link(match[2])})", text)
+        return LINK.sub(led, LABELLED.sub(unlinked, here_or_there))
 
     fences = list(FENCED.finditer(markdown))
     parts, at = [], 0

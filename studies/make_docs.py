@@ -1,4 +1,4 @@
-"""Write studies/parameters.md from the presets themselves: `python -m studies.make_docs`."""
+"""Write studies/parameters.md and parameters_of_controllers.md from the presets themselves: `python -m studies.make_docs`."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from smajax.model.wire.laws import LAWS, detwinning
 
 BELIEVED = ("equation", "believed", "system")  # fields that hold a plant
 PAGE = Path(__file__).parent / "parameters.md"
+OTHER = Path(__file__).parent / "parameters_of_controllers.md"
 
 
 def page() -> str:
@@ -25,6 +26,7 @@ def page() -> str:
         "Made from the presets by `python -m studies.make_docs`; do not edit. SI, temperatures in degrees Celsius, angles in",
         "radians. *printed*: as the source (Elahinia 2004) has it; *corrected*: the source's number in other units or",
         "mended; *chosen*: the source is silent, and this is what smajax takes.",
+        "[Controllers, filters and kinetics laws](parameters_of_controllers.md).",
     ]
     for kind, presets in (("Wires", WIRES), ("Loads", LOADS), ("Drives", DRIVES)):
         lines += ["", f"## {kind}"]
@@ -43,12 +45,21 @@ def page() -> str:
                     f"| `{entry.name}` | {digits(float(value), 5)} | {entry.unit} | {digits(entry.low)} to "
                     f"{digits(entry.high)} | {origin.kind}: {origin.note} | {entry.about} |"
                 )
-    lines += [
+    return "\n".join(lines) + "\n"
+
+
+def page_of_controllers() -> str:
+    """The Markdown text."""
+    lines = [
+        "# Parameters of controllers, filters and kinetics laws",
+        "",
+        "Made from the presets by `python -m studies.make_docs`; do not edit. SI, temperatures in degrees Celsius, angles in radians.",
+        "[Wires, loads and drives](parameters.md).",
         "",
         "## Controllers and filters",
         "",
         "Of the arm (`control/presets.py`). The source prints 10 V and 4 V, P_0, Q and the filter's first guess; gains come",
-        "from the searches in `studies/gains`. What a controller believes of its plant is the plant's own table above.",
+        "from the searches in `studies/gains`. What a controller believes of its plant is the plant's own table.",
     ]
     system = arm()
     shown = {name: preset.on_arm for name, preset in CONTROLLERS.items()}
@@ -78,3 +89,4 @@ def page() -> str:
 if __name__ == "__main__":
     prepare()
     PAGE.write_text(page(), encoding="utf-8")
+    OTHER.write_text(page_of_controllers(), encoding="utf-8")

@@ -5,13 +5,11 @@ from __future__ import annotations
 import html
 import inspect
 import re
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import smajax
 from smajax.core.parameters import parameters
-from smajax.model.effects.base import AbstractEffect
 from smajax.model.effects.candidate import EQUATIONS, PRIOR_ODDS
 from smajax.model.effects.library import LIBRARY, of_others
 from smajax.model.effects.prior_width import stated_width
@@ -165,22 +163,23 @@ def effects() -> str:
     modules = dict.fromkeys(
         effect.__module__ for equation in EQUATIONS for effect in own.values() if effect.candidate.equation == equation
     )
-    lines += _priors(own)
-    lines += ["", "## Their classes"]
+    lines += ["", "What is known of each coefficient before the runs: [priors](priors.md).", "", "## Their classes"]
     first = [f"smajax.model.effects.{name}" for name in ("base", "candidate", "prior_width", "grouping", "library")]
     for module in (*first, "smajax.model.extended", *modules):
         lines += ["", f"::: {module}"]
     return "\n".join(lines) + "\n"
 
 
-def _priors(own: Mapping[str, type[AbstractEffect]]) -> list[str]:
-    """The section of the prior of every coefficient."""
+def priors() -> str:
+    """The page of the prior of every coefficient."""
+    own = {name: effect for name, effect in LIBRARY.items() if name not in of_others()}
     lines = [
+        "# Priors of the effects",
         "",
-        "## Priors",
+        MADE,
         "",
         "What is known of a coefficient before the runs, where the wire or the bench has the effect: its base value and the standard",
-        "deviation about it, in its own unit or of what the runs show (`Width` of [candidate](#smajax.model.effects.candidate)). The odds",
+        "deviation about it, in its own unit or of what the runs show (`Width` of [candidate](effects.md#smajax.model.effects.candidate)). The odds",
         "are those that the runs of an experiment need the effect:",
         f"{', '.join(f'{odds:g} for the class {name}' for name, odds in PRIOR_ODDS.items())}.",
         "",
@@ -191,10 +190,10 @@ def _priors(own: Mapping[str, type[AbstractEffect]]) -> list[str]:
         for name, entry in parameters(effect.base()).items():
             width = stated_width(effect, name.split(".", 1)[1])
             lines.append(f"| `{name}` | {width_in_words(entry.unit, width)} | {width.source} |")
-    return lines
+    return "\n".join(lines) + "\n"
 
 
-PAGES = {"effects.md": effects, NAMES: names}
+PAGES = {"effects.md": effects, "priors.md": priors, NAMES: names}
 
 
 if __name__ == "__main__":

@@ -180,7 +180,7 @@ def page(result: ControlComparison, command: str = "", steps: Sequence[Step] = (
         "<h2>Gains</h2>",
         table(["gain", *(one.model for one in result.tuned), "unit"], gains, range(1, 1 + len(result.tuned))),
         "<h2>What the gains were tuned with</h2>",
-        table(["", *(one.model for one in result.tuned)], _settings(result)),
+        table(["setting", *(one.model for one in result.tuned)], _settings(result)),
         "<h2>Provenance</h2>",
         table(["", ""], [["command", command], *map(list, made_with().items())]),
         f"<p class=quiet>The same numbers: {files_of(result.controller)[1]}; the gains tuned on the {result.tuned[-1].model}: {files_of(result.controller)[0]}.</p>",

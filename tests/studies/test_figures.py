@@ -89,9 +89,10 @@ def test_an_unknown_figure_is_answered_with_the_list() -> None:
 
 def test_the_page_of_parameters_is_that_of_the_presets() -> None:
     """Every number with its origin; `python -m studies.make_docs` writes it anew."""
-    from studies.make_docs import PAGE, page
+    from studies.make_docs import OTHER, PAGE, page, page_of_controllers
 
     assert PAGE.read_text(encoding="utf-8") == page()
+    assert OTHER.read_text(encoding="utf-8") == page_of_controllers()
 
 
 def test_geometry_and_convergence_studies_hold_in_their_fast_setting() -> None:

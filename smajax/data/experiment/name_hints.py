@@ -38,5 +38,5 @@ def mass_hint(runs: Sequence[str], wire_diameter: float) -> str:
     how = f"; MPa times the cross-section of a wire of {1e3 * wire_diameter:.4g} mm" if stresses else ""
     return (
         f"mass: names of runs have one, and nothing is taken from them: all runs get load_mass. If they say the hanging mass{how}, "
-        f"draft again with {' '.join(options)}"
+        f"draft again with {' '.join(options)} --overwrite"
     )
