@@ -142,10 +142,10 @@ def on_files(files: Files, config: Any) -> Files:
             files.append(File.generated(config, place(path), content=shown))
         else:
             files.append(File.generated(config, place(path), abs_src_path=str(source)))
-    for path in [file for file in files.documentation_pages() if file.src_uri.startswith("reference/")]:
-        title = path.content_string.partition("# ")[2].partition("\n")[0]
-        names = [*re.findall(r"^::: (\S+)$", path.content_string, re.MULTILINE), *unlisted(path.src_uri, files)]
-        back = os.path.relpath(path.src_uri, MODULES)
+    for room in [file for file in files.documentation_pages() if file.src_uri.startswith("reference/")]:
+        title = room.content_string.partition("# ")[2].partition("\n")[0]
+        names = [*re.findall(r"^::: (\S+)$", room.content_string, re.MULTILINE), *unlisted(room.src_uri, files)]
+        back = os.path.relpath(room.src_uri, MODULES)
         for name in names:
             text = f"---\ntitle: {name}\n---\n[{title}]({back}) (advanced reference)\n\n::: {name}\n    options:\n      heading_level: 1\n"
             files.append(File.generated(config, f"{MODULES}/{name}.md", content=text))

@@ -26,7 +26,8 @@ def visited(browser: Any, page: Path) -> tuple[float, float]:
         shown = context.new_page()
         shown.goto(page.resolve().as_uri())
         shown.wait_for_function("() => performance.getEntriesByName('first-contentful-paint').length")
-        return tuple(shown.evaluate(TIMES))
+        paint, loaded = shown.evaluate(TIMES)
+        return paint, loaded
     finally:
         context.close()
 
