@@ -29,7 +29,7 @@ from smajax.attribution.unknown.ranges import Sought, sought
 from smajax.attribution.unknown.spline import design
 from smajax.attribution.unknown.terms import UNKNOWN
 from smajax.core.parameters import parameters
-from smajax.core.progress import Stage
+from smajax.core.progress import Stage, part_of
 from smajax.core.whiteness import correlation_time, split_runs
 from smajax.data.experiment.record import Prior
 from smajax.fit.levenberg_marquardt import FitSettings, levenberg_marquardt
@@ -43,6 +43,7 @@ from smajax.model.effects.prior_width import CoefficientPrior
 
 INDISTINGUISHABLE = 3.0  # in log odds: twenty to one
 PASSES = 2  # the error of a sample is first that of the model without a term, then that of the best with one
+MUCH = 7e4  # samples times directions of the derivative, of one fit
 REACH = 10.0  # in log odds behind the likeliest, within which a term is fitted again with the smaller error
 
 
@@ -159,8 +160,11 @@ def learnt(setting: Search, fits: TermFits) -> Lacking:
     """What the fitted terms say, and whether the likeliest is named."""
     search, fitted = fits.search, fits.fitted
     error = least_error(setting, [fits.none, *fitted])
-    noise, carried = float(search.problem.noise_sigma), tuple(fits.joint.coefficients)
-    present, *models = (predicting(fits.joint, model, error, noise, carried) for model in (fits.none, *fitted))
+    noise = float(search.problem.noise_sigma)
+    effects = fits.none.effects
+    carried = {term: own for own, terms in _programs(fits.joint, effects, _terms(fitted)) for term in terms}
+    present = predicting(fits.joint, fits.none, error, noise, next(iter(carried.values())))
+    models = [predicting(fits.joint, model, error, noise, carried[model.effects[-1]]) for model in fitted]
     log_odds = [fits.log_odds(one, error) for one in fitted]
     # One run fits too well to name anything: there is none to predict.
     several = len(present.left_out) > 1
@@ -189,6 +193,10 @@ def learnt(setting: Search, fits: TermFits) -> Lacking:
             )
         terms.append(term)
     return Lacking(tuple(terms), fitted[0] if enough else None)
+
+
+def _terms(fitted: Sequence[FittedModel]) -> list[str]:
+    return [model.effects[-1] for model in fitted]
 
 
 def joint_with_terms(setting: Search, search: Search, final: Model) -> JointParameters:
@@ -270,14 +278,39 @@ def fitted_terms(
     error: float,
 ) -> list[FittedModel]:
     """Every term fitted together with the parameters of the model with `effects`, from the best of its places."""
-    problem, _ = joint.restricted(tuple(joint.coefficients))
-    problem = problem.with_noise(error)
-    begun = dict(zip(places, nearest(problem, list(places.values())), strict=True))
-    tasks = [problem.task(joint.free((*effects, term)), joint.bounds, at) for term, at in begun.items()]
     settings = comparison_settings(FitSettings(cache=search.cache, progress=search.progress), "fitting unknown terms")
-    fits = dict(zip(begun, levenberg_marquardt(problem, tasks, settings), strict=True))
-    carried = tuple(joint.coefficients)
-    return [fitted_model(joint, (*effects, term), fit.values, carried) for term, fit in fits.items()]
+    found: dict[str, FittedModel] = {}
+    programs = _programs(joint, effects, list(places))
+    for number, (carried, terms) in enumerate(programs):
+        problem, index = joint.restricted(carried)
+        problem = problem.with_noise(error)
+        begun = nearest(problem, [places[term] for term in terms], index)
+        tasks = [
+            problem.task(joint.free((*effects, term)), joint.bounds, at[index])
+            for term, at in zip(terms, begun, strict=True)
+        ]
+        settings = dataclasses.replace(settings, progress=part_of(search.progress, number, len(programs)))
+        fits = levenberg_marquardt(problem, tasks, settings)
+        settings = dataclasses.replace(settings, least_cost=min([settings.least_cost, *(fit.cost for fit in fits)]))
+        for term, at, fit in zip(terms, begun, fits, strict=True):
+            values = np.array(at)
+            values[index] = fit.values
+            found[term] = fitted_model(joint, (*effects, term), values, carried)
+    return list(found.values())
+
+
+def _programs(
+    joint: JointParameters, effects: tuple[str, ...], terms: Sequence[str]
+) -> list[tuple[tuple[str, ...], list[str]]]:
+    """(effects and terms that a program carries, terms that are fitted in it).
+
+    The program of all terms is there, from the screening. A run of it computes all of them; where there is much to compute, one
+    for each term is soon worth its three seconds.
+    """
+    directions = max(len(joint.free((*effects, term))) for term in terms)
+    if directions * float(np.asarray(joint.problem.batch.mask).sum()) < MUCH:
+        return [(tuple(joint.coefficients), list(terms))]
+    return [((*effects, term), [term]) for term in terms]
 
 
 def _learnt(
