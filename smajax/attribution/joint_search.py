@@ -61,6 +61,7 @@ class JointSearch:
         default_factory=dict
     )  # error of a sample at which a set was fitted last
     rounds: list[JointRound] = field(default_factory=list)
+    excluded: frozenset[str] = frozenset()  # candidates that no set may have
     detectable: tuple[str, ...] = ()
     programs: tuple[tuple[str, ...], ...] = ()  # effects that each program of the fits so far carries
     winner: tuple[str, ...] = ()  # effects of the likeliest model when the search had ended
@@ -155,7 +156,8 @@ def _linear(search: JointSearch, present: FittedModel, error: float) -> tuple[Li
     """The linear model at the present fit, searched from no effects and from the present ones."""
     traces = traces_at(search.joint, present, search.extent, search.detectable or None)
     if not search.detectable:
-        search.detectable = detectable(search.joint, traces, search.noise)
+        found = detectable(search.joint, traces, search.noise)
+        search.detectable = tuple(effect for effect in found if effect not in search.excluded)
     linear = linear_model(search.joint, traces, error**2, search.detectable)
     here: Subset = frozenset(Variant(effect, -1) for effect in present.effects)
     for start in {frozenset(), here}:
