@@ -1,4 +1,4 @@
-"""Operations that are written in others: random numbers (Threefry, Salmon et al. 2011) and the inverse error function.
+"""Operations that are written in others: random numbers (Threefry, Salmon et al. 2011), the inverse error function, and small triangles.
 
 Each is a function of plain arrays, of which JAX makes the program that the translator takes in the operation's place. A random
 key is its two 32-bit words throughout.
@@ -14,6 +14,7 @@ import jax.numpy as jnp
 from jax import lax
 from jax.extend.random import threefry_prng_impl as threefry
 
+from smajax.engine.text import Unsupported
 from smajax.engine.values import SMALL
 
 ROTATIONS = ((13, 15, 26, 6), (17, 29, 16, 24))
@@ -171,8 +172,22 @@ def _inverse_error(x: jax.Array) -> jax.Array:
 
 
 # Operation -> (its parameters) -> the function of plain arrays that it is.
+def small_cholesky(matrix: jax.Array) -> jax.Array:
+    """The lower triangle whose square is a small matrix (n, n); NaN of one that is not positive, as JAX has it. Raises Unsupported for a batch."""
+    if matrix.ndim != 2:
+        raise Unsupported("the operation `cholesky` of a batch")
+    size = matrix.shape[0]
+    rows: list[list[Any]] = [[jnp.zeros((), matrix.dtype)] * size for _ in range(size)]
+    for j in range(size):
+        for i in range(j, size):
+            left = matrix[i, j] - sum((rows[i][k] * rows[j][k] for k in range(j)), jnp.zeros((), matrix.dtype))
+            rows[i][j] = jnp.sqrt(left) if i == j else left / rows[j][j]
+    return jnp.stack([jnp.stack(row) for row in rows])
+
+
 EXPANSIONS: dict[str, Callable[[Any], Callable[..., Any]]] = {
     "threefry2x32": lambda params: lambda *words: _one_by_one(_block, *words),
+    "cholesky": lambda params: small_cholesky,
     "erf_inv": lambda params: lambda x: _one_by_one(_inverse_error, x),
     "random_bits": lambda params: lambda key: threefry.random_bits(key, params["bit_width"], tuple(params["shape"])),
     "random_fold_in": lambda params: lambda key, number: threefry.fold_in(key, number),

@@ -96,8 +96,6 @@ class Translation:
             return [found] if found is not None else moved(equation.primitive, equation.params, given)
         if name in ("cumsum", "cumprod", "cummax", "cummin"):
             return [self.cumulative(name, equation.params, given[0], dtype)]
-        if name == "cholesky":
-            return self.closed(jax.make_jaxpr(_cholesky)(_like(equation.invars[0])), given)
         program = expanded(equation)
         if program is None:
             raise NoTranslation(f"the operation `{name}`")
@@ -277,21 +275,3 @@ def _place(row: str, size: int, k: int) -> str:
     if size == 1:
         return row
     return f"{size} * {row} + {k}" if k else f"{size} * {row}"
-
-
-def _like(variable: Any) -> jax.ShapeDtypeStruct:
-    shape, dtype = kind_of(variable.aval)
-    return jax.ShapeDtypeStruct(shape, dtype)
-
-
-def _cholesky(matrix: jax.Array) -> jax.Array:
-    """The lower triangle whose square is a small matrix; NaN of one that is not positive, as JAX has it."""
-    if matrix.ndim != 2:
-        raise NoTranslation("the operation `cholesky` of a batch")
-    size = matrix.shape[0]
-    rows: list[list[Any]] = [[jnp.zeros((), matrix.dtype)] * size for _ in range(size)]
-    for j in range(size):
-        for i in range(j, size):
-            left = matrix[i, j] - sum((rows[i][k] * rows[j][k] for k in range(j)), jnp.zeros((), matrix.dtype))
-            rows[i][j] = jnp.sqrt(left) if i == j else left / rows[j][j]
-    return jnp.stack([jnp.stack(row) for row in rows])

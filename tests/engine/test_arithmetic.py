@@ -115,3 +115,16 @@ def test_random_numbers_equal_those_of_jax(count):
 
     numbers = np.arange(21.0)
     np.testing.assert_allclose(by_machine_code(drawn, numbers), by_xla(drawn, numbers), rtol=0.0, atol=1e-14)
+
+
+def test_the_triangle_of_a_small_matrix_equals_that_of_jax_and_is_no_number_where_there_is_none() -> None:
+    """As in the unscented filter, of a covariance of four states."""
+
+    def triangle(share: jax.Array) -> jax.Array:
+        return jnp.linalg.cholesky((1.0 - share) * jnp.eye(4) + share * jnp.ones((4, 4)))
+
+    shares = np.array([-0.2, 0.0, 0.5, 0.99, 1.5])
+    found, wanted = by_machine_code(triangle, shares), by_xla(triangle, shares)
+    np.testing.assert_allclose(found[:4], wanted[:4], rtol=1e-13, atol=1e-15)
+    assert np.isnan(found[4]).any()
+    assert np.isnan(wanted[4]).any()
