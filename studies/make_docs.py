@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from smajax.control.presets import CONTROLLERS, model_filter, printed_filter
+from smajax.control.presets import CONTROLLERS, adaptive_filter, model_filter, printed_filter
 from smajax.core.display_units import digits
 from smajax.core.parameters import get_parameters, parameters
 from smajax.core.runtime import prepare
@@ -63,12 +63,13 @@ def page_of_controllers() -> str:
     ]
     system = arm()
     shown = {name: preset.on_arm for name, preset in CONTROLLERS.items()}
-    for name, make in {**shown, "printed filter": printed_filter, "model filter": model_filter}.items():
+    filters = {"printed filter": printed_filter, "model filter": model_filter, "adaptive filter": adaptive_filter}
+    for name, make in {**shown, **filters}.items():
         one = make(system)
         about = (make.__doc__ or "").strip().split("\n\n")[0]
         lines += ["", f"### `{name}`", "", " ".join(about.split()), ""]
         lines += ["| gain | value | unit | bounds | meaning |", "|---|---|---|---|---|"]
-        own = {key: entry for key, entry in parameters(one).items() if entry.path[0] not in BELIEVED}
+        own = {key: entry for key, entry in parameters(one).items() if not {*entry.path} & {*BELIEVED}}
         for value, entry in zip(get_parameters(one, list(own)), own.values(), strict=True):
             bounds = f"{digits(entry.low)} to {digits(entry.high)}"
             lines.append(f"| `{entry.name}` | {digits(float(value), 3)} | {entry.unit} | {bounds} | {entry.about} |")

@@ -70,6 +70,7 @@ OTHERS = [
     ("backstepping2", "model", 1),
     *((name, None, 0) for name in ("vsc1", "vsc2")),
     *((name, "model", 0) for name in ("pid", "nvsc", "sld", "backstepping1")),
+    ("sld", "adaptive", 1),
     *((name, "printed", 0) for name in ("nvsc", "backstepping1", "backstepping2")),
 ]
 

@@ -18,6 +18,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
+from smajax.control.controllers.approach import approach_speed, braking_parameter
 from smajax.control.controllers.base import AbstractController
 from smajax.control.controllers.inverse_wire import (
     power_for,
@@ -88,6 +89,7 @@ class BacksteppingOne(AbstractController):
         "1/T_z: weight of the integral of the stress error beside that error; 0 as printed",
         default=0.0,
     )
+    braking: Scalar = braking_parameter()
 
     # The wire read backwards from the measured state (`inverse_wire.strain_offset`), for laws other than eq. 4.51.
     anchored: bool = eqx.field(static=True, default=False)
@@ -163,6 +165,9 @@ class BacksteppingOne(AbstractController):
         return equation_of(self.believed).inertia()
 
     def _pull(self, position: Scalar, velocity: Scalar, wanted: Reference) -> Scalar:
-        """w = K_0 x_1 + K x_2, rad/s^2, which the integral sums up."""
+        """w = K (x_2 + f(x_1)), rad/s^2, which the integral sums up: K_0 x_1 + K x_2 as printed where f is a line (`approach`)."""
         off, off_rate = position - wanted.position, velocity - wanted.velocity
-        return self.position_gain * off + self.damping_gain * off_rate
+        damped = self.damping_gain > 0.0
+        gain = jnp.where(damped, self.damping_gain, 1.0)
+        towards = gain * approach_speed(off, self.position_gain / gain, self.braking)
+        return jnp.where(damped, towards, self.position_gain * off) + self.damping_gain * off_rate

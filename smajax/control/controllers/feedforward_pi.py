@@ -2,10 +2,10 @@ r"""Feedforward through the plant's own hysteresis along a path that the wire ca
 
 The set point theta_d is approached on a path theta_r, and the command is what the model says for the path, corrected by the error from it:
 
-    theta_r' = (theta_d - theta_r)/t_r held in [-v_r, v_r],      e = theta_r - theta
+    theta_r' = f(theta_d - theta_r) held in [-v_r, v_r],      e = theta_r - theta
     u        = u_0(theta_r, theta_r') + K_p e + I + K_d (theta_r' - v),      dI/dt = K_i e
 
-u_0 holds the branch temperature T of the hysteresis at theta_r (`quasi_static`) and warms the wire along it: the command whose heat is that of
+f is (theta_d - theta_r)/t_r, with `braking` a parabola further away (`approach`). u_0 holds the branch temperature T of the hysteresis at theta_r (`quasi_static`) and warms the wire along it: the command whose heat is that of
 T + tau T'. It is of the model that the controller is given, a found one with its effects. What the model has wrong, I makes up for. While the command is at its
 limit, path and I wait where they would push it further: so the path begins once the wire is hot enough to follow, and nothing winds up.
 The position alone is read; v is its filtered difference. With K_d = 0 it is a plain PI controller.
@@ -16,6 +16,7 @@ from __future__ import annotations
 import equinox as eqx
 import jax.numpy as jnp
 
+from smajax.control.controllers.approach import approach_speed, braking_parameter
 from smajax.control.controllers.base import AbstractController
 from smajax.control.controllers.preset import ANGLE, EQUATION, Box, ControllerPreset
 from smajax.control.controllers.quasi_static import Hysteresis, Turns, hysteresis_of, leading_command, no_turns, turned
@@ -49,6 +50,7 @@ class FeedforwardPi(AbstractController):
     largest_voltage: Scalar = parameter("V", 0.0, 1e4, "upper limit of the command")
     derivative_gain: Scalar = parameter("V s/rad", 0.0, 1e6, "K_d; 0: a PI controller", default=0.0)
     rate_filter: Scalar = parameter("s", 0.0, 10.0, "time constant of the velocity's filter", default=0.02)
+    braking: Scalar = braking_parameter()
 
     def start(self, measured: MeasuredState, wanted: Reference) -> FeedforwardPiMemory:
         zero, here = jnp.zeros_like(measured.position), measured.position
@@ -58,7 +60,8 @@ class FeedforwardPi(AbstractController):
         self, memory: FeedforwardPiMemory, measured: MeasuredState, wanted: Reference, period: Scalar
     ) -> tuple[FeedforwardPiMemory, Scalar]:
         left = wanted.position - memory.path
-        speed = limited(left / (self.path_time + period), -self.path_speed, self.path_speed)
+        towards = approach_speed(left, 1.0 / (self.path_time + period), self.braking)
+        speed = limited(towards, -self.path_speed, self.path_speed)
         speed = jnp.where(memory.push * speed > 0.0, 0.0, speed)
         path = memory.path + period * speed
         turns = turned(self.hysteresis, memory.turns, path)

@@ -6,13 +6,16 @@ the derivative for this one in eq. 4.44) and the load's equation of motion (eq. 
     tau_w = h(theta, theta') + I theta_d'' - I lambda e' - K sat(s / phi),      sigma_d = tau_w / (lever A_w)    (eq. 4.44, 4.45)
 
 with the resistance h, the inertia I and the lever of whatever load it is (of the arm tau_g + tau_s + c theta' and 2 r), and a PID controller on the stress sets the voltage.
+With `braking` the surface is s = e' + f(e), a parabola far from the set point (`approach`); the source's is the line f = lambda e.
 """
 
 from __future__ import annotations
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 
+from smajax.control.controllers.approach import approach_speed, braking_parameter
 from smajax.control.controllers.base import AbstractController
 from smajax.control.load_equation import LoadEquation
 from smajax.control.measured_state import MeasuredState
@@ -44,6 +47,7 @@ class StressSliding(AbstractController):
     stress_integral_gain: Scalar = parameter("V/(Pa s)", 0.0, 1.0, "integral gain")
     stress_derivative_gain: Scalar = parameter("V s/Pa", 0.0, 1.0, "derivative gain")
     largest_voltage: Scalar = parameter("V", 0.0, 1e4, "largest command; the smallest is zero")
+    braking: Scalar = braking_parameter()
 
     def start(self, measured: MeasuredState, wanted: Reference) -> StressSlidingMemory:
         zero = jnp.zeros_like(measured.stress)
@@ -52,10 +56,11 @@ class StressSliding(AbstractController):
     def stress_wanted(self, measured: MeasuredState, wanted: Reference) -> Scalar:
         """sigma_d, Pa (eq. 4.44, 4.45); never negative: a wire cannot push."""
         error, rate = measured.position - wanted.position, measured.velocity - wanted.velocity
-        surface = limited((rate + self.surface_slope * error) / self.boundary, -1.0, 1.0)
+        towards, change = jax.jvp(lambda off: approach_speed(off, self.surface_slope, self.braking), (error,), (rate,))
+        surface = limited((rate + towards) / self.boundary, -1.0, 1.0)
         inertia = self.equation.inertia()
         torque = self.equation.resistance(measured.position, measured.velocity) + inertia * wanted.acceleration
-        torque = torque - inertia * self.surface_slope * rate - self.gain * surface
+        torque = torque - inertia * change - self.gain * surface
         stress = torque / (self.equation.lever() * self.cross_section)
         return jnp.where(stress < 0.0, 0.0, stress)  # so that nan stays nan
 

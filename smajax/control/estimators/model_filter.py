@@ -57,12 +57,20 @@ class ModelFilter(AbstractEstimator):
     prediction: AbstractPrediction = Linearised()
     substeps: int = eqx.field(static=True, default=1)
 
-    def start(self, reading: Scalar) -> tuple[ModelFilterMemory, MeasuredState]:
+    def belief_at_rest(self, reading: Scalar) -> tuple[State, Belief]:
+        """(state, belief) before the first reading."""
         rest = initial_state(self.system, self.system.drive.from_command(jnp.zeros_like(reading)))
         # Strain and stress count from the rest at ambient temperature also where the wire is believed to be warm.
         believed = vector_of(rest).at[2].set(self.start_temperature)
         errors = [self.start_position_error, self.start_velocity_error, self.start_temperature_error]
-        belief = Belief(believed, jnp.diag(jnp.stack([*errors, self.start_fraction_error]) ** 2))
+        return rest, Belief(believed, jnp.diag(jnp.stack([*errors, self.start_fraction_error]) ** 2))
+
+    def walks(self) -> Vector:
+        """Random walks of position, velocity, temperature and martensite fraction, per root of a second."""
+        return jnp.stack([self.position_walk, self.velocity_walk, self.temperature_walk, self.fraction_walk])
+
+    def start(self, reading: Scalar) -> tuple[ModelFilterMemory, MeasuredState]:
+        rest, belief = self.belief_at_rest(reading)
         return self._read(rest, belief, jnp.zeros_like(reading, bool), reading)
 
     def step(
@@ -74,9 +82,8 @@ class ModelFilter(AbstractEstimator):
             )
             return vector_of(after), after
 
-        walks = jnp.stack([self.position_walk, self.velocity_walk, self.temperature_walk, self.fraction_walk])
         before = Belief(vector_of(memory.state), memory.covariance)
-        belief, after = self.prediction.predicted(transition, before, jnp.diag(walks**2) * period)
+        belief, after = self.prediction.predicted(transition, before, jnp.diag(self.walks() ** 2) * period)
         # Rounding alone does not transform.
         transforming = beyond(jnp.abs(after.wire.martensite_fraction - memory.state.wire.martensite_fraction))
         return self._read(after, belief, transforming, reading)

@@ -1,0 +1,134 @@
+"""The filter that estimates parameters too: they come to the plant's, it has derivatives, and it is the filter below where nothing is to be estimated."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from smajax.control.estimators.adaptive_filter import LARGEST, AdaptiveFilter
+from smajax.control.estimators.run import estimate
+from smajax.control.presets import FILTERS, adaptive_filter
+from smajax.core.parameters import get_parameters, set_parameters
+from smajax.model.presets import build
+from smajax.model.rigs import arm
+from smajax.simulation.compiled import simulate_compiled
+from tests.helpers.machine_code import by_machine_code
+
+PERIOD, COUNT, NOISE = 0.01, 400, 1.7e-3  # s, -, rad
+ARM = arm()
+# Up to the middle of the way, held and back: 10 V would be through in 0.4 s.
+VOLTS = jnp.where(jnp.arange(COUNT) * PERIOD < 1.6, 8.0, jnp.where(jnp.arange(COUNT) * PERIOD < 2.6, 6.2, 3.0))
+FILTER = adaptive_filter(ARM)
+WRONG = {"convection_coefficient": 0.8, "damping": 1.2, "inertia_ratio": 0.8}
+
+followed = by_machine_code(lambda estimator, readings, volts: estimate(estimator, readings, volts, PERIOD))
+
+
+def _plant(ratios: dict[str, float]):
+    names = list(ratios)
+    return set_parameters(
+        ARM, dict(zip(names, get_parameters(ARM, names) * np.asarray(list(ratios.values())), strict=True))
+    )
+
+
+def _readings(ratios: dict[str, float]):
+    truth = simulate_compiled(_plant(ratios), {"voltage": VOLTS}, PERIOD)
+    return truth, truth.position + NOISE * jax.random.normal(jax.random.key(2), (COUNT,))
+
+
+@pytest.fixture(scope="module")
+def wrong_convection():
+    truth, readings = _readings({"convection_coefficient": 0.8})
+    return truth, readings, *followed(FILTER, readings, VOLTS)
+
+
+def test_the_convection_comes_to_the_plants(wrong_convection) -> None:
+    _, _, memory, _ = wrong_convection
+    ratio = np.exp(np.asarray(memory.logarithms)[:, FILTER.estimated.index("convection_coefficient")])
+    assert ratio[0] == 1.0
+    assert np.abs(ratio[-50:] - 0.8).max() < 0.04
+    spread = np.sqrt(np.asarray(memory.covariance)[-1, 4, 4])
+    assert np.abs(np.log(ratio[-1] / 0.8)) < 4.0 * spread
+    assert spread < 0.25 * 0.12
+
+
+def test_the_temperature_is_nearer_than_that_of_the_filter_that_believes_the_nominal_convection(
+    wrong_convection,
+) -> None:
+    truth, readings, _, told = wrong_convection
+    _, nominal = followed(FILTERS["model"](ARM), readings, VOLTS)
+    here = slice(200, None)  # the arm has moved
+    rms = lambda one, other: float(jnp.sqrt(jnp.mean((one - other)[here] ** 2)))  # noqa: E731
+    assert rms(told.temperature, truth.temperature) < 0.4 * rms(nominal.temperature, truth.temperature)
+    assert abs(float(jnp.mean((told.position - truth.position)[here]))) < np.radians(0.1)
+
+
+def test_with_three_parameters_wrong_nothing_is_nan_and_the_covariance_stays_positive() -> None:
+    truth, readings = _readings(WRONG)
+    memory, told = followed(FILTER, readings, VOLTS)
+    assert all(np.isfinite(leaf).all() for leaf in jax.tree.leaves((memory, told)))
+    assert np.linalg.eigvalsh(np.asarray(memory.covariance)).min() > 0.0
+    # At rest damping and inertia move nothing: their variance does not grow beyond sigma's.
+    assert np.sqrt(np.asarray(memory.covariance)[:, 5:, 5:].diagonal(axis1=1, axis2=2)).max() < 1.01 * 0.12
+    assert np.abs(told.temperature - truth.temperature)[-50:].max() < 1.0
+
+
+def test_without_an_error_to_estimate_it_is_the_filter_below() -> None:
+    _, readings = _readings({"convection_coefficient": 0.9})
+    certain = set_parameters(FILTER, {"ratio_error": 0.0})
+    memory, told = followed(certain, readings, VOLTS)
+    _, below = followed(FILTER.filter, readings, VOLTS)
+    assert np.abs(memory.logarithms).max() == 0.0
+    for one, other in zip(jax.tree.leaves(told), jax.tree.leaves(below), strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-9)
+
+
+def test_a_parameter_stays_within_a_factor_of_e_whatever_is_read() -> None:
+    wild = jnp.where(jnp.arange(COUNT) % 2 == 0, 1.5, -0.7)
+    sure = set_parameters(FILTER, {"reading_noise": 1e-6, "ratio_error": 1.0})
+    memory, _ = followed(sure, wild, VOLTS)
+    logarithms = np.asarray(memory.logarithms)
+    assert np.isfinite(logarithms).all()
+    assert np.abs(logarithms).max() <= LARGEST
+
+
+def test_a_step_has_a_derivative_in_reading_voltage_and_settings(wrong_convection) -> None:
+    _, readings, memory, _ = wrong_convection
+    moving = jax.tree.map(lambda leaf: leaf[110], memory)
+
+    def temperature(reading, voltage, sigma):
+        estimator = set_parameters(FILTER, {"ratio_error": sigma})
+        return estimator.step(moving, reading, voltage, jnp.asarray(PERIOD))[1].temperature
+
+    at = (readings[111], VOLTS[110], jnp.asarray(0.12))
+    slopes = [float(one) for one in jax.jit(jax.jacfwd(temperature, (0, 1, 2)))(*at)]
+    assert np.isfinite(slopes).all()
+    width, value = 1e-3, jax.jit(temperature)
+    by_difference = (value(at[0], at[1] + width, at[2]) - value(at[0], at[1] - width, at[2])) / (2 * width)
+    assert slopes[1] == pytest.approx(float(by_difference), rel=1e-3)
+    assert slopes[0] != 0.0
+
+
+@pytest.mark.slow
+def test_in_single_precision_the_convection_comes_out_the_same(wrong_convection) -> None:
+    _, readings, memory, _ = wrong_convection
+    single = lambda tree: jax.tree.map(lambda leaf: jnp.asarray(leaf, jnp.float32), tree)  # noqa: E731
+    with jax.enable_x64(False):
+        narrow, told = jax.jit(lambda one, y, u: estimate(one, y, u, PERIOD))(
+            single(FILTER), single(readings), single(VOLTS)
+        )
+    assert told.temperature.dtype == jnp.float32
+    assert all(np.isfinite(leaf).all() for leaf in jax.tree.leaves((narrow, told)))
+    np.testing.assert_allclose(narrow.logarithms[-1, 0], memory.logarithms[-1, 0], atol=0.01)
+
+
+def test_its_parameters_are_those_that_the_load_has() -> None:
+    spring = FILTERS["adaptive"](build("flexinol_table_3_2", "bias_spring", "flexinol_voltage"))
+    assert isinstance(spring, AdaptiveFilter)
+    assert spring.estimated[0] == "convection_coefficient"
+    assert set(FILTER.estimated) == set(WRONG)
+    assert dataclasses.replace(FILTER, estimated=("convection_coefficient",)).believed(jnp.zeros(1)).load == ARM.load
