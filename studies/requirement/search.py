@@ -49,7 +49,9 @@ def searched_on() -> Scenarios:
 
 def least_times(rows: np.ndarray) -> np.ndarray:
     """Seconds in which the largest command is first within the band of each row's set point on its plant."""
-    return np.asarray(closed_loops(LoopSetup(arm(), Largest(FULL), "largest_voltage", 3.0, STEP), rows).merits.reach_time)
+    return np.asarray(
+        closed_loops(LoopSetup(arm(), Largest(FULL), "largest_voltage", 3.0, STEP), rows).merits.reach_time
+    )
 
 
 def costs(exact: np.ndarray, least: np.ndarray | None = None, quick: float = 0.0) -> np.ndarray:

@@ -8,8 +8,18 @@ import numpy as np
 
 from smajax.control.presets import CONTROLLERS
 from smajax.control.tune.terms import TERMS
-from studies.requirement.run import GAINS, HERE, MARK, gains_of, judged_on, table
-from studies.requirement.search import LIMITS, MARGIN, SET_POINTS, costs
+from studies.requirement.run import (
+    FRONTIER,
+    FRONTIER_MARK,
+    GAINS,
+    HERE,
+    MARK,
+    frontier_table,
+    gains_of,
+    judged_on,
+    table,
+)
+from studies.requirement.search import ALSO, LIMITS, MARGIN, SET_POINTS, box_of, costs, searched_on
 
 
 def test_loops_that_judge_are_none_of_those_that_gains_were_searched_on() -> None:
@@ -18,6 +28,9 @@ def test_loops_that_judge_are_none_of_those_that_gains_were_searched_on() -> Non
     corner = (np.abs(np.abs(rows[:, :3] - 1.0) - 0.2) < 1e-9).all(axis=1)
     assert nearest[corner].min() > 0.1
     assert (np.abs(rows[:, :3] - 1.0) <= 0.2 + 1e-9).all()
+    searched = searched_on().rows
+    apart = np.abs(rows[:, None, [0, 1, 2, 6]] - searched[None, :, [0, 1, 2, 6]]).max(axis=2)
+    assert apart.min() > 1e-3
 
 
 def test_the_cost_counts_loops_beyond_the_limits_and_then_how_far() -> None:
@@ -32,12 +45,29 @@ def test_the_cost_counts_loops_beyond_the_limits_and_then_how_far() -> None:
     assert costs(one)[0] < costs(far)[0]
 
 
+def test_a_weight_makes_the_quicker_of_two_cheaper_and_no_limit_looser() -> None:
+    terms, least = np.zeros((3, 4, len(TERMS))), np.full(4, 1.2)
+    at = [list(TERMS).index(name) for name in ("settling_time", "overshoot")]
+    terms[:, :, at[0]] = np.asarray([1.5, 2.5, 1.5])[:, None]
+    terms[2, 0, at[1]] = 2.0 * LIMITS["overshoot"]
+    quick, slow, beyond = costs(terms, least, 0.5)
+    assert quick < slow < beyond
+
+
+def test_the_limit_of_the_command_is_searched_up_to_the_drives() -> None:
+    assert box_of("sld")["largest_voltage"] == ALSO["largest_voltage"]
+    assert "braking" not in box_of("pid")
+
+
 def test_the_stored_results_are_of_every_controller_and_in_the_table() -> None:
-    results = json.loads((HERE / "results.json").read_text(encoding="utf-8"))
+    whole = json.loads((HERE / "results.json").read_text(encoding="utf-8"))
+    results, page = whole["controllers"], (HERE / "README.md").read_text(encoding="utf-8")
     assert set(results) == set(CONTROLLERS)
-    assert {name for name, one in results.items() if one["gains"] == "searched on the filter"} == {
+    assert {name for name, one in results.items() if one["gains"] != "preset"} == {
         path.stem for path in GAINS.glob("*.json")
     }
     assert all(one["filter"]["loops"] == len(judged_on()) for one in results.values())
-    assert (HERE / "README.md").read_text(encoding="utf-8").split(MARK)[1].strip() == table(results)
-    assert gains_of("pid")[1] == "searched on the filter"
+    assert page.split(MARK)[1].strip() == table(results)
+    assert page.split(FRONTIER_MARK)[1].strip() == frontier_table(whole["frontier"])
+    assert set(whole["frontier"]) == {path.stem.replace("_", " ") for path in FRONTIER.glob("*.json")}
+    assert all(one["gains"] == gains_of(name)[1] for name, one in results.items())

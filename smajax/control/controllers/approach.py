@@ -27,7 +27,7 @@ def braking_parameter() -> Scalar:
     )
 
 
-def approach_speed(off: Scalar, rate: Scalar, braking: Scalar) -> Scalar:
+def approach_speed(off: Scalar, rate: Scalar | float, braking: Scalar | float) -> Scalar:
     """f of a position that is `off` (rad), rad/s; rate: k, 1/s; braking: a, rad/s^2."""
     way, linear = jnp.abs(off), braking / jnp.where(rate > SLOWEST, rate, SLOWEST) ** 2
     far = way > linear

@@ -78,7 +78,10 @@ class FeedforwardPi(AbstractController):
 
 
 def feedforward_pi(system: System) -> FeedforwardPi:
-    """Gains of the arm, found on the filter with noise and delay: studies/requirement/gains/feedforward_pi.json."""
+    """Gains of the arm, searched on the filter `model` with noise and delay.
+
+    Those of studies/requirement/gains/feedforward_pi.json, with `braking`, are slower and meet its limits in every loop.
+    """
     return FeedforwardPi(
         hysteresis=hysteresis_of(system),
         proportional_gain=53.5,
