@@ -41,6 +41,7 @@ GAINS = HERE / "gains"
 QUICKEST = "backstepping1_integral"
 FRONTIER = GAINS / "frontier"  # its other gains
 DRAWN, SEED = 256, 20261125
+FRESH = 1024
 APART = 10.0  # degrees
 STEP = 0.01  # s
 SECONDS = 10.0
@@ -177,6 +178,9 @@ def main(arguments: list[str]) -> None:
         quick = float(arguments[arguments.index("--quick") + 1]) if "--quick" in arguments else 0.0
         _search_again([one for one in arguments if one in CONTROLLERS], quick)
     named = [name for name in arguments if name in CONTROLLERS]
+    if "--fresh" in arguments:
+        _judge_afresh(named, int(arguments[arguments.index("--fresh") + 1]))
+        return
     rows, system = judged_on(), arm()
     least = least_times(rows)
     between, nominal = (interface_of(system, one, NOISE, PERIOD, STEP, DELAY) for one in (FILTER, NOMINAL))
@@ -199,6 +203,14 @@ def main(arguments: list[str]) -> None:
                 results["frontier"][path.stem.replace("_", " ")] = other
                 print(path.stem, json.dumps(other), flush=True)
         _write(results)
+
+
+def _judge_afresh(names: list[str], seed: int) -> None:
+    """Print what the gains do on `FRESH` other plants, drawn with `seed`; nothing is written."""
+    rows, between = drawn(FRESH, seed), interface_of(arm(), FILTER, NOISE, PERIOD, STEP, DELAY)
+    for name in names or CONTROLLERS:
+        one = judged(name, between, rows, gains_of(name)[0], np.ones(len(rows)))
+        print(f"{name}: {_met(one)} of {one['loops']} loops, beyond the limits {one['beyond']}", flush=True)
 
 
 def _write(results: dict[str, Any]) -> None:
