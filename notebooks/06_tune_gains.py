@@ -7,7 +7,7 @@
 #     smajax tune vsc3 --set-points 0,30 --variation damping=20% --limits overshoot=0.1 --out tuned
 
 # %% tags=["skip-execution"]
-# %pip install -q 'smajax[tune]'
+# %pip install -q smajax
 
 # %%
 import tempfile

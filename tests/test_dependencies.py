@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import jax.numpy as jnp
+import numpy as np
 import pytest
 
 from smajax.cli.main import main
@@ -81,7 +82,6 @@ def test_the_guide_lists_the_use_of_every_package() -> None:
 @pytest.mark.parametrize(
     ("package", "use", "words"),
     [
-        ("cmaes", cma_es.package, r"\(CMA-ES\) needs cmaes: pip install 'smajax\[tune\]', or .*--finish 0"),
         ("optax", adam.rule, r"--by adam` needs optax: pip install 'smajax\[tune\]', or .*trust-region"),
         ("zarr", lambda: Store.opened(Path("nowhere")), r"on disk needs zarr: pip install 'smajax\[store\]'"),
     ],
@@ -109,19 +109,30 @@ def test_a_broken_package_is_not_reported_as_missing(monkeypatch: pytest.MonkeyP
     assert not isinstance(caught.value, MissingExtraError)
 
 
-@pytest.mark.parametrize(("package", "options"), [("cmaes", []), ("optax", ["--by", "adam", "--finish", "0"])])
+def test_what_the_readme_runs_after_a_plain_install_needs_no_extra() -> None:
+    """`smajax tune` with its defaults imports CMA-ES, and a plain install brings it."""
+    imported = set(imports(ast.parse((ROOT / "smajax/control/tune/cma_es.py").read_text("utf-8"))))
+    assert imported & (RUNTIME | OF_EXTRAS) <= RUNTIME
+    assert "cmaes" in imported
+
+
+def test_no_generations_of_cma_es_do_without_its_package(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "cmaes", None)
+    found = cma_es.evolve(None, np.full(3, 0.5), generations=0)  # type: ignore[arg-type]
+    assert found.generations == 0
+    assert found.best.tolist() == [0.5, 0.5, 0.5]
+
+
 def test_tune_without_its_extra_ends_before_the_work_and_leaves_no_folder(
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    tmp_path: Path,
-    package: str,
-    options: list[str],
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     adam.rule.cache_clear()
-    monkeypatch.setitem(sys.modules, package, None)
+    monkeypatch.setitem(sys.modules, "optax", None)
     # The oldest JAX refuses a count of devices once a test has computed something.
     monkeypatch.setattr("smajax.core.runtime.prepare", lambda cores=False: None)
-    monkeypatch.setattr(sys, "argv", ["smajax", "tune", "pid", "--fast", *options, "--out", str(tmp_path / "out")])
+    monkeypatch.setattr(
+        sys, "argv", ["smajax", "tune", "pid", "--fast", "--by", "adam", "--out", str(tmp_path / "out")]
+    )
     with pytest.raises(SystemExit) as ended:
         main()
     assert ended.value.code == 2

@@ -11,7 +11,6 @@ import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from types import ModuleType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,7 +18,6 @@ import numpy as np
 from smajax.control.tune.evaluate import TuningProblem
 from smajax.control.tune.objective import Goal, rank
 from smajax.control.tune.scenarios import Scenarios
-from smajax.core.extras import optional_package
 from smajax.core.files import writing
 from smajax.core.progress import Progress, Stage, quiet
 from smajax.core.result_cache import arrays
@@ -90,22 +88,16 @@ def load(path: Path) -> CmaEsState | None:
     return result if (result.costs.shape, result.excesses.shape, result.ran.shape) == shapes else None
 
 
-def package() -> ModuleType:
-    """cmaes. MissingExtraError says how to install it."""
-    return optional_package(
-        "cmaes", "tune", "the search without gradients (CMA-ES)", "or leave it out with `--finish 0`"
-    )
-
-
 def _search(mean: np.ndarray, seed: int, number: int) -> CMA:
-    search: CMA = package().CMA(
+    from cmaes import CMA  # imported when a search begins: `--finish 0` and `--help` do without
+
+    return CMA(
         mean=np.array(mean),
         sigma=RESTART_SIGMA if number else SIGMA,
         bounds=np.tile([0.0, 1.0], (len(mean), 1)),
         seed=int(np.random.default_rng([seed, number]).integers(2**31)),
         population_size=POPULATION,
     )
-    return search
 
 
 @dataclass(frozen=True)
@@ -141,6 +133,8 @@ def evolve(
     state = CmaEsState.none(start)
     if known is not None and np.array_equal(known.start, start) and known.points.shape[1:] == state.points.shape[1:]:
         state = known
+    if generations == 0:
+        return state.upto(0)
     number, search, centre, converged = 0, _search(start, seed, 0), start, False
     for k in range(generations):
         progress(Stage(what, k / generations))

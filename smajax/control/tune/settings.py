@@ -19,7 +19,7 @@ from smajax.control.position_unit import (
 )
 from smajax.control.presets import CONTROLLERS, check_controller
 from smajax.control.scales import is_arm, seconds_for
-from smajax.control.tune import adam, cma_es
+from smajax.control.tune import adam
 from smajax.control.tune.evaluate import STEP
 from smajax.control.tune.multistart import Effort
 from smajax.control.tune.objective import REGULATION, Goal
@@ -116,8 +116,6 @@ class TuneSettings:
         """MissingExtraError without a package that these settings need, before the work."""
         if self.by == "adam":
             adam.rule()
-        if self.finish:
-            cma_es.package()
 
     def plants_sentence(self, air: float = 20.0) -> str:
         """On which plants gains are tuned. `air`: degC as believed, of which a share is told in kelvins."""
