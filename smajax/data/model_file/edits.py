@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -34,11 +34,20 @@ def _parts(model: ModelRecord) -> dict[str, str]:
     return {"wire": model.wire, "load": model.load, "drive": model.drive, "law": model.law}
 
 
-def without_edits(path: Path, model: Record, written: str) -> Record:
+def missing(named: Sequence[str]) -> str:
+    """Of parameters that the text had after the fit and has no more, each as it is to be named."""
+    are = "is" if len(named) == 1 else "are"
+    return (
+        f"missing in [parameters], where the fit wrote a line of each: {and_listed(named)}; what the preset has {are} taken. Put the lines back, or copy the "
+        "file again: it may have been cut off"
+    )
+
+
+def without_edits(path: Path, model: Record, written: str, there: Container[str]) -> Record:
     """The model with a warning for each kind of change by hand, and with the standard errors that its covariance has.
 
     path: of the file, for the warnings. model: as its text says, with its likely models. written: of `as_written`; "" of a file from before version 0.2, of which nothing is known. Fitted values
-    that were changed are for the reader of the covariance (`read`).
+    that were changed are for the reader of the covariance (`read`). there: the parameters that the text has.
     """
     if not written:
         return model
@@ -56,19 +65,25 @@ def without_edits(path: Path, model: Record, written: str) -> Record:
         if same(value, model.parameters[name].value) and not same(error, model.parameters[name].standard_error)
     }
     kept = {name: replace(model.parameters[name], standard_error=error) for name, error in errors.items()}
-    warnings = (*model.warnings, *(f"{path}: {one}" for one in _sentences(model, before, others, errors)))
+    warnings = (*model.warnings, *(f"{path}: {one}" for one in _sentences(model, before, others, errors, there)))
     return replace(model, parameters={**model.parameters, **kept}, warnings=warnings, as_fitted=written)
 
 
 def _sentences(
-    model: ModelRecord, before: Mapping[str, Any], others: Mapping[str, float], errors: Mapping[str, float | None]
+    model: ModelRecord,
+    before: Mapping[str, Any],
+    others: Mapping[str, float],
+    errors: Mapping[str, float | None],
+    there: Container[str],
 ) -> Iterator[str]:
     parts = {kind: name for kind, name in before["parts"].items() if name != _parts(model)[kind]}
     if parts:
         named = and_listed([f"{kind} ({name or 'of the wire'})" for kind, name in parts.items()])
         yield f"changed by hand since the fit: {named}; the fitted values and their covariance are those of a fit with the former"
-    if others:
-        named = and_listed([_change(model, name, value) for name, value in others.items()])
+    if gone := [change(model, name, value) for name, value in others.items() if name not in there]:
+        yield missing(gone)
+    if by_hand := [change(model, name, value) for name, value in others.items() if name in there]:
+        named = and_listed(by_hand)
         yield (
             f"changed by hand since the fit: {named}; the fitted values and their covariance are those of a fit with the former. Fit again "
             "for another bench; what differs in some runs alone is for --set"
@@ -88,7 +103,7 @@ def _sentences(
             yield f"[{key}] was changed by hand: {what}"
 
 
-def _change(model: ModelRecord, name: str, before: float) -> str:
+def change(model: ModelRecord, name: str, before: float) -> str:
     """`load_mass (0.8, now 1.2 kg)`."""
     return f"{name} ({digits(before, 4)}, now {digits(model.values[name], 4)} {model.table[name].unit})"
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,7 @@ from smajax.data.experiment.toml_file import Quantity, read_toml, validated
 from smajax.data.experiment.unknowns import bounded
 from smajax.data.model_catalogue import CATALOGUE, check_together
 from smajax.data.model_file.actuator_model import ActuatorModel
-from smajax.data.model_file.edits import same, without_edits
+from smajax.data.model_file.edits import change, missing, same, without_edits
 from smajax.data.model_file.record import (
     STATE_UNITS,
     FittedRun,
@@ -27,7 +27,7 @@ from smajax.data.model_file.record import (
     ModelParameter,
     range_unit,
 )
-from smajax.data.model_file.schema import FORMAT, PLACES, ModelFile, ParameterSection
+from smajax.data.model_file.schema import FIRST_LINE, FORMAT, LAST_SECTION, PLACES, ModelFile, ParameterSection
 from smajax.data.model_file.uncertainty import read_uncertainty
 from smajax.model.channels import INPUT_UNITS
 from smajax.model.extended import extended
@@ -49,6 +49,7 @@ def load_model(path: str | Path) -> ActuatorModel:
     hint = "; `smajax close-loop` and `smajax identify` write model files" if path.suffix != ".toml" else ""
     content = read_toml(path, "a model file", ", or the folder of a model.toml", hint)
     _check_kind(path, content)
+    _check_whole(path, content)
     file = validated(path, content, ModelFile, PLACES)
     model = _model(path, file)
     if file.unfinished:
@@ -68,7 +69,19 @@ def _check_kind(path: Path, content: Mapping[str, Any]) -> None:
     number = content.get("format", FORMAT)
     if isinstance(number, int) and not isinstance(number, bool) and not 1 <= number <= FORMAT:
         later = "; it is from a later version of smajax: install that one" if number > FORMAT else ""
-        raise ExperimentError(path, "format", f"got {number}, expected 1 to {FORMAT}{later}")
+        known = f"1 to {FORMAT}" if FORMAT > 1 else f"{FORMAT}"
+        raise ExperimentError(path, "format", f"got {number}, expected {known}{later}")
+
+
+def _check_whole(path: Path, content: Mapping[str, Any]) -> None:
+    """Raises ExperimentError for a file that the program wrote and that was cut off: what it lost would be the presets' values."""
+    if LAST_SECTION not in content and path.read_text(encoding="utf-8-sig").startswith(FIRST_LINE):
+        raise ExperimentError(
+            path,
+            "",
+            f"its last section, [{LAST_SECTION}], is missing: the file was cut off. Copy it again, with the .nc file beside it, or write it "
+            "again; if you removed that section yourself, remove the comment in the first lines too",
+        )
 
 
 def _model(path: Path, file: ModelFile) -> ActuatorModel:
@@ -191,20 +204,31 @@ def _with_uncertainty(path: Path, file: ModelFile, model: ActuatorModel) -> Actu
     beside = path.parent / name
     if Path(name).name != name:
         raise ExperimentError(path, "uncertainty", f"got {name!r}, expected the name of a file in the same folder")
-    remedy = "put it beside this file, or remove the key, and predict without the parameters' uncertainty"
+    without = "or remove the key `uncertainty`, and predict without the parameters' uncertainty"
+    remedy = f"copy the two files again from where they were written, {without}"
     try:
         content = beside.read_bytes()
+    except FileNotFoundError:
+        raise ExperimentError(
+            path,
+            "uncertainty",
+            f"there is no file {beside}, which was written with this one; put it beside this file, {without}",
+        ) from None
     except (OSError, ValueError) as error:
-        raise ExperimentError(path, "uncertainty", f"{beside} cannot be read ({error}); {remedy}") from None
-    other = f"{beside} is not what was written with this file"
+        raise ExperimentError(path, "uncertainty", f"{beside} cannot be read ({error}); {without}") from None
+    other = f"{beside} is there, and is not what was written with this file"
     if file.uncertainty_sha256 not in (None, hashlib.sha256(content).hexdigest()):
-        raise ExperimentError(path, "uncertainty", f"{other} (its digest is another); {remedy}")
+        raise ExperimentError(
+            path,
+            "uncertainty",
+            f"{other} (its digest is another: it was cut off, changed, or is of another fit); {remedy}",
+        )
     try:
         kept = read_uncertainty(content)
     except ValueError as error:
         raise ExperimentError(path, "uncertainty", f"{other} ({error}); {remedy}") from None
-    said = _with_likely(path, model, _matched(path, file, model, kept.likely))
-    return without_edits(path, said, kept.written)
+    said = _with_likely(path, model, _matched(path, file, model, kept.likely), file.parameters)
+    return without_edits(path, said, kept.written, file.parameters)
 
 
 def _matched(path: Path, file: ModelFile, model: ActuatorModel, kept: list[LikelyModel]) -> list[LikelyModel]:
@@ -231,8 +255,11 @@ def _matched(path: Path, file: ModelFile, model: ActuatorModel, kept: list[Likel
     return result
 
 
-def _with_likely(path: Path, model: ActuatorModel, likely: list[LikelyModel]) -> ActuatorModel:
-    """The model with its likely models. Values that were changed by hand are given ones, without an error."""
+def _with_likely(path: Path, model: ActuatorModel, likely: list[LikelyModel], there: Container[str]) -> ActuatorModel:
+    """The model with its likely models. Values that were changed by hand are given ones, without an error.
+
+    there: the parameters that the text has. A fitted one that it lacks is the preset's, as `edits` says.
+    """
     if not likely:
         return model
     warnings = []
@@ -241,10 +268,13 @@ def _with_likely(path: Path, model: ActuatorModel, likely: list[LikelyModel]) ->
             f"{path}: its effects were changed by hand, so that nothing is known of the fitted values' errors"
         )
     changed = _changed(likely[0], model)
-    if changed:
+    by_hand = [name for name in changed if name in there or name not in model.parameters]
+    if by_hand:
         warnings.append(
-            f"{path}: changed by hand and taken as known: {', '.join(changed)}; the other fitted values keep their covariance"
+            f"{path}: changed by hand and taken as known: {', '.join(by_hand)}; the other fitted values keep their covariance"
         )
+    if gone := [change(model, name, likely[0].values[name]) for name in changed if name not in by_hand]:
+        warnings.append(f"{path}: {missing(gone)}")
     kept = tuple(_without(one, changed) for one in likely)
     exact = {
         name: replace(model.parameters[name], value=value)  # every digit of what the text has rounded
@@ -253,7 +283,7 @@ def _with_likely(path: Path, model: ActuatorModel, likely: list[LikelyModel]) ->
     }
     given = {
         name: replace(model.parameters[name], origin="given", standard_error=None)
-        for name in changed
+        for name in by_hand
         if name in model.parameters
     }
     values = {**model.parameters, **exact, **given}

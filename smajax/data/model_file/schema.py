@@ -10,6 +10,10 @@ from smajax.data.experiment.schema import ChannelSection, LogFormat, SamplingSec
 from smajax.data.experiment.toml_file import Places, Quantity, Section
 
 FORMAT = 1  # of the file; one with a higher number is from a later version
+# How a file that the program wrote begins, and its last section: one that begins so and lacks that section was cut off. A file written by
+# hand need not have either.
+FIRST_LINE = "# A model of an SMA wire actuator, for "
+LAST_SECTION = "made_with"
 
 
 class PartsSection(Section):

@@ -11,11 +11,11 @@ from smajax.core.files import as_netcdf, replace
 from smajax.data.experiment.errors import ExperimentError
 from smajax.data.experiment.toml_file import Section, quantity, toml_key, toml_value
 from smajax.data.model_file.record import ModelParameter, ModelRecord, range_unit
-from smajax.data.model_file.schema import FORMAT
+from smajax.data.model_file.schema import FIRST_LINE, FORMAT, LAST_SECTION
 from smajax.data.model_file.uncertainty import uncertainty_of
 
-HEAD = """\
-# A model of an SMA wire actuator, for `smajax predict`, `simulate`, `sweep`, `tune`, and `[model] file = "..."` of an experiment file.
+HEAD = f"""\
+{FIRST_LINE}`smajax predict`, `simulate`, `sweep`, `tune`, and `[model] file = "..."` of an experiment file.
 # A value may be changed by hand: its line becomes name = "number unit", which is taken as known."""
 
 
@@ -84,7 +84,7 @@ def model_text(model: ModelRecord, uncertainty: str = "", sha256: str = "") -> s
         lines += ["", "[[fitted_to]]", f"run = {toml_value(run.name)}", f"role = {toml_value(run.role)}"]
         lines.append(f"sha256 = {toml_value(run.sha256)}")
     made = {"smajax": metadata.version("smajax"), **model.made_with}
-    lines += ["", "[made_with]", *(f"{toml_key(name)} = {toml_value(value)}" for name, value in made.items())]
+    lines += ["", f"[{LAST_SECTION}]", *(f"{toml_key(name)} = {toml_value(value)}" for name, value in made.items())]
     return "\n".join(lines) + "\n"
 
 
