@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import signal
 import subprocess
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
+
+from smajax.cli.terminal import interrupts_answered
 
 GRACE = 2.0  # s between Ctrl-C and the end of a process that does not answer: a compilation cannot be interrupted
 
@@ -26,8 +30,11 @@ def run_within(seconds: float, words: Sequence[str]) -> int | None:
             process.wait()
         return None
     except KeyboardInterrupt:
-        # The process got it too, and says what there is to say.
-        return process.wait()
+        # It says what there is to say. From a terminal it got Ctrl-C too; from `kill` this process alone did.
+        with interrupts_answered():
+            with suppress(ValueError, OSError):  # Windows cannot send it
+                process.send_signal(signal.SIGINT)
+            return process.wait()
 
 
 def without(words: Sequence[str], option: str) -> list[str]:

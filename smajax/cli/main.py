@@ -27,7 +27,7 @@ from smajax.cli.commands.sweep import sweep
 from smajax.cli.commands.tune import tune
 from smajax.cli.positional import Command
 from smajax.cli.renamed import with_new_names
-from smajax.cli.terminal import answer_interrupts, console
+from smajax.cli.terminal import answer_interrupts, console, last_words
 from smajax.core.operating_system import no_room
 
 EXIT_CODES = """\
@@ -109,7 +109,7 @@ def main() -> None:
     for message in messages:
         sys.stderr.write(f"deprecated: {message}\n")
     try:
-        with answer_interrupts():  # from here on, since imports of a command call back too
+        with answer_interrupts(), last_words():  # from here on, since imports of a command call back too
             app(words)
     except Exception as error:
         if _no_memory(error):

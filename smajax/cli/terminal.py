@@ -7,7 +7,8 @@ import signal
 import sys
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING
@@ -21,6 +22,18 @@ INTERRUPTED = 130
 REPEAT = 1.0  # s after which an unanswered Ctrl-C is repeated
 RETRY = 0.02  # s, where it came at a moment at which no exception can be raised
 CALLBACKS = ("_xla_gc_callback",)  # an exception in them is lost
+STOPPING = b"\nStopping: what runs at this moment ends first, such as a compilation.\n"
+
+
+@dataclass
+class _Interrupts:
+    """Of this process: whether Ctrl-C came, and whether it is answered, so that none is repeated while the last words are written."""
+
+    came: bool = False
+    answered: bool = False
+
+
+_INTERRUPTS = _Interrupts()
 
 
 def console() -> Console:
@@ -44,20 +57,54 @@ def command_line() -> str:
 
 @contextmanager
 def answer_interrupts() -> Iterator[None]:
-    """Repeat Ctrl-C until it ends the command: an exception in a callback of XLA during garbage collection is printed and dropped."""
+    """Say at once that Ctrl-C came, and repeat it until it ends the command.
+
+    An exception in a callback of XLA during garbage collection is printed and dropped.
+    """
     own = threading.current_thread() is threading.main_thread()
     if not own or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
         yield
         return
 
     def interrupt(number: int, frame: FrameType | None) -> None:
+        if _INTERRUPTS.answered:
+            return
+        if not _INTERRUPTS.came:
+            _INTERRUPTS.came = True
+            with suppress(OSError):
+                os.write(2, STOPPING)  # no buffer of Python's, which may be in use at this moment
         called_back = frame is not None and frame.f_code.co_name in CALLBACKS
         repeat(RETRY if called_back else REPEAT)
         if not called_back:
             raise KeyboardInterrupt
 
+    _INTERRUPTS.came = _INTERRUPTS.answered = False
     with repeated_interrupts(interrupt) as repeat:
         yield
+
+
+@contextmanager
+def interrupts_answered() -> Iterator[None]:
+    """A block that Ctrl-C does not end: it came already, and is answered there."""
+    before, _INTERRUPTS.answered = _INTERRUPTS.answered, True
+    try:
+        yield
+    finally:
+        _INTERRUPTS.answered = before
+
+
+@contextmanager
+def last_words() -> Iterator[None]:
+    """Say what Ctrl-C ended where it came outside of `resumable`, such as while a file is read; typer ends the command without a word."""
+    try:
+        yield
+    except SystemExit as ended:
+        if _INTERRUPTS.came and not _INTERRUPTS.answered and ended.code == INTERRUPTED:
+            _INTERRUPTS.answered = True
+            sys.stderr.write(
+                "Interrupted. The same command goes on from what was finished before, or starts from the beginning.\n"
+            )
+        raise
 
 
 @contextmanager
@@ -82,6 +129,7 @@ def resumable(hint: str = "", out: Path | None = None, finished: str = "") -> It
         with answer_interrupts():
             yield
     except KeyboardInterrupt:
+        _INTERRUPTS.answered = True
         there = out is not None and any(out.glob(finished))
         message = hint if there else "Nothing was finished: the same command starts from the beginning."
         console().print(f"\nInterrupted. {message}", soft_wrap=True)

@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.helpers.small_bench import bench
+
 
 def test_ctrl_c_ends_a_command_with_130(tmp_path: Path) -> None:
     command = [
@@ -37,7 +39,35 @@ def test_ctrl_c_ends_a_command_with_130(tmp_path: Path) -> None:
         run.send_signal(signal.SIGINT)
         said = run.stderr.read()
     assert run.returncode == 130, said
+    assert said.index("Stopping: ") < said.index("Interrupted. ")
     assert "Interrupted. Nothing was finished: the same command starts from the beginning." in said
+
+
+ANSWERING = (
+    "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); from smajax.cli.main import main; main()"
+)
+
+
+@pytest.mark.parametrize("budget", [[], ["--budget", "60s"]], ids=["plain", "budget"])
+def test_ctrl_c_while_the_runs_are_read_is_answered_in_words(tmp_path: Path, budget: list[str]) -> None:
+    """No fit has begun. With --budget the work is that of a second process, and the first one alone gets the signal."""
+    command = [sys.executable, "-c", ANSWERING, "close-loop", str(bench(tmp_path)), "--out", "out", *budget]
+    with subprocess.Popen(
+        command,
+        cwd=tmp_path,
+        stderr=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        text=True,
+        env={**os.environ, "SMAJAX_PROGRESS": "lines"},
+    ) as run:
+        assert run.stderr is not None
+        assert "loading" in run.stderr.readline()  # with --budget of the second process
+        run.send_signal(signal.SIGINT)
+        said = run.stderr.read()
+    assert run.returncode == 130, said
+    assert "Stopping: " in said
+    assert "Interrupted. The same command " in said
+    assert "Traceback" not in said
 
 
 @pytest.mark.parametrize("finished", [True, False])
