@@ -50,16 +50,16 @@ def check_set_points(system: System, set_points: Sequence[float]) -> None:
     odd = [point for point in set_points if not low <= point <= high]
     if not odd and set_points:
         return
-    unit, load = unit_of(system), moving_load(system)
+    unit = unit_of(system)
     if is_arm(system):
-        where = "set points are angles between the arm's stops"
-    elif all(np.isfinite([float(end) for end in load.limits()])):
-        where = f"set points are between the stops of the load {type(load).__name__}"
+        where = "set points are angles between the arm's stops, {}"
+    elif all(np.isfinite([float(end) for end in moving_load(system).limits()])):
+        where = "set points are between the load's stops, {}"
     else:
-        where = f"set points are within the stroke of the wire on the load {type(load).__name__} and a fifth more"
+        where = "set points are from {}: the stroke of the wire under this load, and a fifth of it more at each end"
+    between = where.format(f"{low:g} to {high:g} {'degrees' if unit.is_angle else unit.shown}")
     raise ValueError(
-        f"{where}, {low:g} to {high:g} {'degrees' if unit.is_angle else unit.shown}, at least one; not "
-        f"{', '.join(f'{point:g}' for point in odd) or 'none'}."
+        f"{between}; not {', '.join(f'{point:g}' for point in odd)}." if odd else f"at least one set point; {between}."
     )
 
 

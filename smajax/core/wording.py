@@ -16,6 +16,15 @@ def times_noise(ratio: float, whose: str = "the noise") -> str:
     return f"as large as {whose}" if count == "1" else f"{count} times {whose}"
 
 
+def per_cent(share: float) -> str:
+    """`94%`; "100%" only of all and "0%" only of none: 599 of 600 are 99.8%."""
+    for places in range(4):
+        text = f"{share:.{places}%}"
+        if (share == 1.0 or float(text[:-1]) != 100.0) and (share == 0.0 or float(text[:-1]) != 0.0):
+            return text
+    return ">99.999%" if share > 0.5 else "<0.001%"
+
+
 def and_listed(names: Sequence[str]) -> str:
     """`a, b and c`, with semicolons where a name holds a comma itself; `nothing` for no names."""
     if len(names) < 2:

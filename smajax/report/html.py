@@ -11,6 +11,7 @@ from markupsafe import Markup
 
 from smajax.attribution.findings import Findings, ParameterFinding, Role, Verdict, coverage, pooled_rmse
 from smajax.core.display_units import chance, correlation, digits, display, label, p_value, with_error
+from smajax.core.wording import per_cent
 from smajax.fit.uncertainty import RemarkKind
 from smajax.report import pictures, run_plots
 from smajax.report.embedded import picture
@@ -176,7 +177,7 @@ def _figures(findings: Findings, output: Callable[[float | None], Shown]) -> lis
     figures.append({"caption": "verdict", "text": str(findings.verdict), "kind": "verdict"})
     inside = coverage(findings)
     if inside is not None:
-        figures.append({"caption": "held-out samples in the 90 % band", "text": f"{inside:.0%}"})
+        figures.append({"caption": "held-out samples in the 90 % band", "text": per_cent(inside)})
     return figures
 
 

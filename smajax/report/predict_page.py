@@ -150,7 +150,7 @@ def page(result: Prediction, command: str = "", steps: Sequence[Step] = ()) -> s
         f"<p class=quiet>{html.escape(band_sentence(result))}</p>",
         section(steps),
         "<h2>Runs</h2>",
-        table(HEAD, run_rows(result), (2, 3, 4, 5)),
+        table(HEAD, run_rows(result), (2, 3, 4, 5, 6)),
     ]
     parts += folded(
         [

@@ -7,12 +7,23 @@ import numpy as np
 from smajax.attribution.findings import ResidualDiagnostics
 from smajax.attribution.residual_diagnostics import diagnosed
 from smajax.core.display_units import digits, display, label
-from smajax.core.wording import and_listed, times_noise
+from smajax.core.wording import and_listed, per_cent, times_noise
 from smajax.fit.predict import Extrapolation, PredictedRun, Prediction
 from smajax.report.narrative.residual import residual_sentences
 
 LISTED = 3  # spans of time in a sentence
-HEAD = ("run", "output", "error (rms)", "noise", "error over noise", "in the 90 % band", "unit", "remark")
+LARGE_ZERO = 10.0  # noises: from here on a fitted zero is said in a sentence
+HEAD = (
+    "run",
+    "output",
+    "error (rms)",
+    "noise",
+    "error over noise",
+    "zero, fitted",
+    "in the 90 % band",
+    "unit",
+    "remark",
+)
 
 
 def measured_runs(result: Prediction, output: int = 0) -> list[PredictedRun]:
@@ -61,16 +72,38 @@ def conclusions(result: Prediction) -> list[str]:
         count = len(measured_runs(result, k))
         sentences.append(
             f"The {label(one.output)} of {count} run{'s' if count > 1 else ''} is predicted with an error (rms) of {size}, "
-            f"{times_noise(error / one.noise, f'the noise of {noise}')}; {share:.0%} of the samples lie in the 90 % band."
+            f"{times_noise(error / one.noise, f'the noise of {noise}')}; {per_cent(share)} of the samples lie in the 90 % band."
         )
         found = diagnostics(result, k)
         if found is not None:
             # The first of its sentences, the size, has been said.
             sentences += ["The residual is white."] if found.white else residual_sentences(found)[1:]
+        sentences += zero_sentences(result, k)
     if fitted := [run.name for run in result.runs if run.fitted]:
         sentences.append(f"The model was fitted to {and_listed(fitted)}: the error there says little of other runs.")
     sentences += [extrapolation_sentence(run, one) for run in result.runs for one in run.extrapolation]
     return sentences
+
+
+def zero_sentences(result: Prediction, output: int) -> list[str]:
+    """That a run's own zero, which is fitted to the run, is many noises, with the largest; nothing of smaller ones."""
+    large = [run for run in measured_runs(result, output) if _zero_ratio(run, output) >= LARGE_ZERO]
+    if not large:
+        return []
+    worst = max(large, key=lambda run: _zero_ratio(run, output))
+    one = worst.series[output]
+    unit = display(one.unit, one.output)
+    size = f"{digits(unit.of(one.offset), 3)} {unit.unit}".strip()
+    count = "" if len(large) == 1 else f"{len(large)} of them are large, "
+    return [
+        f"The zero of the {label(one.output)} is fitted to each run: {count}{worst.name} has {size}, "
+        f"{times_noise(_zero_ratio(worst, output))}. Where the sensor's zero did not move by that much, the model is off by it, and the error above "
+        "leaves it out."
+    ]
+
+
+def _zero_ratio(run: PredictedRun, output: int) -> float:
+    return abs(run.series[output].offset) / run.series[output].noise
 
 
 def extrapolation_sentence(run: PredictedRun, one: Extrapolation) -> str:
@@ -86,7 +119,7 @@ def extrapolation_sentence(run: PredictedRun, one: Extrapolation) -> str:
         spans = [f"{one.spans[0][0]:.4g} s to {one.spans[-1][1]:.4g} s, with gaps"]
     return (
         f"Extrapolation in {run.name}: {label(one.quantity)} goes {reached} {unit.unit}; the model was fitted to {of(one.fitted[0])} to "
-        f"{of(one.fitted[1])} {unit.unit}. {one.share:.0%} of the samples, from {and_listed(spans)}."
+        f"{of(one.fitted[1])} {unit.unit}. {per_cent(one.share)} of the samples, from {and_listed(spans)}."
     ).replace(" ;", ";")
 
 
@@ -118,7 +151,8 @@ def run_rows(result: Prediction) -> list[tuple[str, ...]]:
                     digits(unit.of(one.rmse), 3) if known else "not measured",
                     digits(unit.of(one.noise), 3),
                     digits(one.rmse / one.noise, 3) if known else "",
-                    f"{one.coverage:.0%}" if known else "",
+                    digits(unit.of(one.offset), 3) if known and one.offset else "",
+                    per_cent(one.coverage) if known else "",
                     unit.unit,
                     ", ".join(remarks),
                 )

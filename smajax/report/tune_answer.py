@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 import numpy as np
 
 from smajax.control.tune.terms import TERMS, terms_in
 from smajax.control.tune.tuning import Check, TuningResult
 from smajax.core.display_units import digits
-from smajax.core.wording import and_listed
+from smajax.core.wording import and_listed, counted
 
 COLUMNS = list(TERMS)
 TUNED = 1  # of two candidates: the tuned gains
@@ -41,36 +41,50 @@ def answer(result: TuningResult) -> str:
     settings, check = result.settings, result.checks["tuned on"]
     good, times = met(result, check), _column(result, check, "settling_time")
     symbol, targets = settings.shown.symbol, np.unique(check.scenarios.targets)
-    worst = {float(settings.shown.of(one)): float(times[check.scenarios.targets == one].max()) for one in targets}
+    places = {float(settings.shown.of(one)): times[check.scenarios.targets == one] for one in targets}
+    worst = {point: float(here.max()) for point, here in places.items()}
+    nowhere = {point for point, here in places.items() if not np.isfinite(here).any()}
     what = "settle and keep every limit" if settings.limits else "settle"
     many = (
         "the loop"
-        if good.size == 1
+        if good.size == 1 and good.all()
         else f"all {good.size} loops"
         if good.all()
-        else f"{int(good.sum())} of {good.size} loops"
+        else f"{int(good.sum()) or 'none'} of {counted(good.size, 'loop')}"
     )
-    sentence = f"The tuned gains of {settings.controller} {what} in {many}{_when(worst, symbol)}"
+    sentence = f"The tuned gains of {settings.controller} {what} in {many}{_when(worst, nowhere, symbol)}"
     unit = terms_in(settings.shown)["overshoot"].unit
     errors = [_shown(float(_column(result, check, name).max()), unit, 2) for name in ("overshoot", "steady_error")]
     sentence += f"; the overshoot is at most {errors[0]}, the steady error at most {errors[1]}."
     unseen = met(result, result.checks["inside"])
-    return f"{sentence} On plants and set points never seen they do in {int(unseen.sum())} of {unseen.size}."
+    return f"{sentence} On plants and set points never seen they do in {int(unseen.sum()) or 'none'} of {unseen.size}."
 
 
-def _when(worst: Mapping[float, float], symbol: str) -> str:
-    """`, at 5 mm after 2.1 s and at 10 mm after 3 s at the latest`, or from the soonest to the latest of many."""
+def _when(worst: Mapping[float, float], nowhere: Collection[float], symbol: str) -> str:
+    """`, at 5 mm after 2.1 s and at 10 mm after 3 s at the latest`, or from the soonest to the latest of many.
+
+    worst: the latest time of each set point, s; infinite where a plant never settles. nowhere: the set points where none does.
+    """
     if len(worst) > SEVERAL:
         settled = {point: late for point, late in worst.items() if np.isfinite(late)}
-        never = [f"{point:.4g}{symbol}" for point in worst if point not in settled]
+        never = [f"{point:.4g}{symbol}" for point in worst if point in nowhere]
+        partly = [f"{point:.4g}{symbol}" for point in worst if point not in settled and point not in nowhere]
         if not settled:
             return ""
         last = max(settled, key=lambda point: settled[point])
         return f", after {digits(settled[last], 3)} s at the latest (at {last:.4g}{symbol})" + (
-            f"; not on every plant at {and_listed(never)}" if never else ""
+            (f"; not on every plant at {and_listed(partly)}" if partly else "")
+            + (f"; on no plant at {and_listed(never)}" if never else "")
         )
     each = [
-        f"at {point:.4g}{symbol} " + (f"after {digits(late, 3)} s" if np.isfinite(late) else "not on every plant")
+        f"at {point:.4g}{symbol} "
+        + (
+            f"after {digits(late, 3)} s"
+            if np.isfinite(late)
+            else "on no plant"
+            if point in nowhere
+            else "not on every plant"
+        )
         for point, late in worst.items()
     ]
     return f", {and_listed(each)} at the latest" if all(np.isfinite(list(worst.values()))) else f", {and_listed(each)}"

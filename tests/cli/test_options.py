@@ -15,6 +15,7 @@ from smajax.cli.main import app
 from smajax.cli.options import numbers, pairs, texts, understood
 from smajax.control.compose import compose, with_values
 from smajax.control.mismatch import MISMATCHES, variation_of
+from smajax.control.presets import CONTROLLERS
 from smajax.control.tune.terms import TERMS
 from smajax.core.parameters import parameter_values
 from tests.helpers.command_line import DEMO
@@ -29,6 +30,17 @@ def test_every_option_that_takes_a_quantity_says_its_unit(command: str) -> None:
     assert re.findall(r"--([\w-]+) (?:<float>|FLOAT)", told) == []
     timed = {"simulate": 3, "sweep": 2, "tune": 2, "close-loop": 1}.get(command, 0)
     assert len(re.findall(r"<s> (?:(?!--).)*without a unit in s", told.replace("--dt;", "dt;"))) == timed
+
+
+@pytest.mark.parametrize("command", ["tune", "sweep"])
+def test_the_help_points_to_the_one_list_of_controllers(command: str) -> None:
+    """A list in the help would be a second one, which a new controller does not enter."""
+    told = " ".join(CliRunner().invoke(app, [command, "--help"]).output.split())
+    described = told[told.index("such as pid") :].partition("default")[0].partition("--")[0]
+    assert "`smajax presets` lists them" in described
+    assert len([name for name in CONTROLLERS if re.search(rf"\b{name}\b", described)]) <= 2
+    listed = CliRunner().invoke(app, ["presets"]).output
+    assert f"controllers: {', '.join(CONTROLLERS)}\n" in listed
 
 
 @pytest.mark.parametrize(

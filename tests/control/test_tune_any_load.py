@@ -228,8 +228,9 @@ def test_wrong_settings_of_a_load_are_errors() -> None:
         ({"unit": "deg"}, "give them in mm and unit='mm'"),
         (
             {"set_points": (60.0,)},
-            "within the stroke of the wire on the load DeadWeight and a fifth more, -4.95 to 29.7 mm",
+            "set points are from -4.95 to 29.7 mm: the stroke of the wire under this load, and a fifth of it more at each end; not 60.",
         ),
+        ({"set_points": ()}, "at least one set point; set points are from -4.95 to 29.7 mm: the stroke"),
         ({"variation": {"inertia": 0.2}}, "no variation `inertia`"),
         ({"batch": 3}, "use `settings_for`"),
     ):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 import tomllib
 from pathlib import Path
 
@@ -17,7 +18,8 @@ from smajax.data.model_file.of_presets import model_of_presets
 from smajax.data.model_file.record import FittedRun, LikelyModel, ModelOutput
 from smajax.fit.predict import Prediction
 from smajax.fit.prediction_band import averaged_band
-from smajax.report.predict_words import conclusions
+from smajax.report.predict_page import page
+from smajax.report.predict_words import HEAD, conclusions, run_rows
 from tests.helpers.small_bench import bench, smajax, table
 
 VALUES = {"convection_coefficient": 90.0, "specific_heat": 500.0}
@@ -94,9 +96,20 @@ def test_a_zero_of_the_sensor_is_each_runs_own_only_where_the_model_has_one(tmp_
     path = log(tmp_path / "run.csv", reading(model) + 3e-3)
     assert sma.predict(model, path).runs[0].series[0].rmse == pytest.approx(3e-3, rel=0.05)
     own = dataclasses.replace(model, outputs=(ModelOutput("position", "m", NOISE, True),))
-    one = sma.predict(own, path).runs[0].series[0]
+    result = sma.predict(own, path)
+    one = result.runs[0].series[0]
     assert one.rmse == pytest.approx(NOISE, rel=0.15)
     assert one.offset == pytest.approx(3e-3, rel=0.02)
+    shown = f"{1e3 * one.offset:.3g}"
+    assert dict(zip(HEAD, run_rows(result)[0], strict=True))["zero, fitted"] == shown
+    assert f"<td>{shown}</td>" in re.sub("<td [^>]*>", "<td>", page(result))
+    (said,) = [one for one in conclusions(result) if one.startswith("The zero of the position is fitted to each run")]
+    assert f"run has {shown} mm, 29.9 times the noise. Where" in said
+    # One of a noise or two is in the table alone, and where the model has none there is no number.
+    near = sma.predict(own, log(tmp_path / "near.csv", reading(model) + 2.0 * NOISE))
+    assert float(run_rows(near)[0][HEAD.index("zero, fitted")]) == pytest.approx(0.2, abs=0.02)
+    assert not any("zero" in sentence for sentence in conclusions(near))
+    assert run_rows(sma.predict(model, path))[0][HEAD.index("zero, fitted")] == ""
 
 
 def test_the_offset_of_an_average_of_models_is_the_average_of_theirs(tmp_path: Path) -> None:

@@ -22,7 +22,7 @@ SECONDS = 10.0
 
 def tuned(settling: list[list[float]], limits: dict[str, float], unseen: list[float]) -> Any:
     """Loops at 5 and 10 mm, on as many plants as each has times; 2 mm/100 of overshoot a second of settling."""
-    targets = np.repeat([0.005, 0.01], [len(one) for one in settling])
+    targets = np.repeat([0.005, 0.01][: len(settling)], [len(one) for one in settling])
 
     def check(times: np.ndarray, at: np.ndarray) -> Any:
         exact = np.zeros((2, times.size, len(COLUMNS)))
@@ -55,6 +55,11 @@ def test_a_tuning_that_does_not_says_where_and_on_which_share_of_the_plants() ->
     said = tune_answer.answer(result)
     assert "settle in 3 of 4 loops, at 5 mm after 2 s and at 10 mm not on every plant;" in said
     assert said.endswith("never seen they do in 1 of 2.")
+    none = tune_answer.answer(tuned([[np.inf, np.inf], [3.0, np.inf]], {}, [np.inf]))
+    assert "settle in 1 of 4 loops, at 5 mm on no plant and at 10 mm not on every plant;" in none
+    assert none.endswith("never seen they do in none of 1.")
+    alone = tune_answer.answer(tuned([[np.inf]], {}, [2.0]))
+    assert alone.startswith("The tuned gains of pid settle in none of 1 loop, at 5 mm on no plant;")
     limited = tuned([[1.0, 2.0], [3.0, 2.0]], {"settling_time": 2.5}, [2.0])
     assert "settle and keep every limit in 3 of 4 loops" in tune_answer.answer(limited)
     head, rows = tune_answer.set_point_rows(limited)

@@ -87,7 +87,7 @@ def _within(seconds: float, out: Path, json_out: bool) -> None:
         page = f"the page in {out} is of an earlier run" if shown.is_file() else "there is no page"
         if not any(out.glob(FITS)):
             resumes = "nothing was finished, so that the same command starts from the beginning: give it more time"
-        typer.echo(f"The time was over before the base model was fitted: {page}, and {resumes}.", err=True)
+        typer.echo(f"The time was over before this run had a result to show: {page}, and {resumes}.", err=True)
         raise typer.Exit(UNMET)
     known = json.loads(shown.read_text(encoding="utf-8"))
     if json_out:

@@ -114,8 +114,7 @@ def sweep(
     controllers: Annotated[
         str | None,
         typer.Option(
-            help="pid, vsc1, vsc2, vsc3, nvsc, sld, backstepping1, backstepping2 (with commas), or `all`; default all, "
-            "or those of the gains files",
+            help="such as pid,sld, or `all`; `smajax presets` lists them; default all, or those of the gains files",
             autocompletion=completion.several_controllers,
         ),
     ] = None,

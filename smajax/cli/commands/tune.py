@@ -133,7 +133,7 @@ def tune(
     controller: Annotated[
         str,
         typer.Argument(
-            help="pid, vsc1, vsc2, vsc3, nvsc, sld, backstepping1 or backstepping2",
+            help="a controller, such as pid; `smajax presets` lists them",
             autocompletion=completion.controllers,
         ),
     ],

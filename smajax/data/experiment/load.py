@@ -187,12 +187,20 @@ def _output(path: Path, file: ExperimentFile, name: str, unit: str, runs: Sequen
     return Output(name, unit, sigma, how, False, offset), float(np.median(sensors))
 
 
-def _fitted_before(kept: FromModelFile, runs: Sequence[Run]) -> list[str]:
-    """That a fit run is one that the model file was fitted to: its values would count it twice."""
+def _fitted_before(kept: FromModelFile, file: ExperimentFile, runs: Sequence[Run]) -> list[str]:
+    """That fit runs are some that the model file was fitted to: values with its errors as priors would count them twice.
+
+    A value that the experiment file gives, or has among its unknowns, is without that prior.
+    """
+    names = [name for name in kept.errors if name not in {*file.model.parameters, *file.unknown}]
+    again = [run.name for run in runs if run.role == "fit" and run.sha256 in kept.fitted_to]
+    if not names or not again:
+        return []
+    one = len(again) == 1
+    who = f"run {again[0]!r} is one" if one else f"runs {and_listed([repr(name) for name in again])} are some"
     return [
-        f"run {run.name!r} is one that the model file was fitted to: with the errors of its values as priors it counts twice"
-        for run in runs
-        if run.role == "fit" and run.sha256 in kept.fitted_to
+        f"{who} that the model file was fitted to: in `close-loop`, whose priors are its values' errors, {'it counts' if one else 'they count'} twice "
+        f"for {and_listed(names)}; under [unknown] a value is free, without that prior"
     ]
 
 
@@ -340,7 +348,7 @@ def experiment_of(path: Path, file: ExperimentFile, catalogue: Catalogue) -> Exp
         if kept is None
         else [
             *kept.warnings,
-            *_fitted_before(kept, [read.run for read in runs]),
+            *_fitted_before(kept, file, [read.run for read in runs]),
             *_undetermined(kept, file),
         ]
     )

@@ -6,7 +6,7 @@ import numpy as np
 
 from smajax.attribution.findings import Findings, Rejected, Role, Verdict, coverage, pooled_rmse
 from smajax.attribution.record_error import OutlierRun
-from smajax.core.wording import and_listed
+from smajax.core.wording import and_listed, per_cent
 from smajax.model.effects.library import LIBRARY
 from smajax.report.narrative import caveats
 from smajax.report.narrative.record_errors import of_wrong_records
@@ -167,7 +167,7 @@ def _of_the_band(findings: Findings) -> list[str]:
     count = len(findings.averaged)
     who = f"the average of the {count} likely models" if count > 1 else "the model"
     return [
-        f"On the held-out runs {who} is off by {error_text(findings, error)}, and {inside:.0%} of the samples lie in its 90 % band.",
+        f"On the held-out runs {who} is off by {error_text(findings, error)}, and {per_cent(inside)} of the samples lie in its 90 % band.",
         *(
             f"{' + '.join(one.effects)}, of probability {one.weight:.2f}, is not averaged with: "
             f"{reason_text(one.reason, findings.output_unit, findings.output_name)}."
