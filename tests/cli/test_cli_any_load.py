@@ -76,7 +76,7 @@ WRONG = {
     "tune pid --wire flexinol_isobaric --load coupon --drive none": "a Coupon moves nothing that a controller could lead",
     "tune sld --wire flexinol_table_3_2 --load dead_weight --drive none": "every other load is heated and takes one of",
     "tune pid --wire flexinol_table_3_2 --load dead_weight --drive voltage --set-point 30deg": "not `30deg`",
-    "tune pid --wire flexinol_table_3_2 --load dead_weight --drive voltage --set-point 80mm": "the stroke of the wire on the load",
+    "tune pid --wire flexinol_table_3_2 --load dead_weight --drive voltage --set-point 80mm": "the stroke of the wire under this load",
     "tune pid --wire flexinol_table_3_2 --load dead_weight --drive voltage --noise 1deg": "'--noise'",
     "tune pid --wire flexinol_table_3_2 --load dead_weight --drive voltage --variation inertia=20%": "no variation `inertia`",
     "sweep --wire flexinol_table_3_2 --load dead_weight --drive voltage --over spring": "no mismatch `spring`",

@@ -249,7 +249,7 @@ def test_a_request_by_names_is_in_the_load_s_unit() -> None:
     assert "the position with 0.01 mm of noise" in result.data.attrs["between"]
     assert [one.name for one in result.mismatches] == ["load_mass"]
     beyond = run_closed(request, LoopRequest("pid", "40mm:2s"))
-    assert any("within the stroke of the wire on the load DeadWeight" in note for note in beyond.notes)
+    assert any("the stroke of the wire under this load" in note for note in beyond.notes)
 
 
 def test_set_points_by_default_lie_in_the_stroke() -> None:

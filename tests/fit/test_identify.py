@@ -28,6 +28,7 @@ from smajax.model.presets import build
 from smajax.report.identify_page import page, write_identified
 from smajax.report.identify_record import record
 from smajax.report.identify_words import conclusions
+from smajax.report.next_steps import after_identify
 from smajax.simulation.compiled import simulate_compiled
 from tests.helpers.in_browser import HOSTILE, faults
 from tests.helpers.small_bench import refused
@@ -198,7 +199,7 @@ def test_the_suggested_run_adds_information(experiment: Experiment, found: Ident
 def test_the_page_and_the_record_agree(found: Identified, tmp_path: Path) -> None:
     written = write_identified(found, tmp_path)
     text = written.read_text(encoding="utf-8")
-    assert text == page(found)
+    assert text == page(found, after_identify(found, tmp_path, found.source))
     assert "Coupon &lt;of&gt; test" in text
     plots = 3 + 1 + len(found.suggestions)  # runs, that of the answer, suggestions
     assert text.count('<figure class="series"') == plots
