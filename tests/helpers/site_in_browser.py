@@ -19,6 +19,7 @@ from urllib.parse import unquote, urldefrag, urljoin, urlparse
 
 from tests.helpers.in_browser import FLAGS, NONE, WIDTHS, chromium
 
+MODULES, EVERY = "reference/modules/", 12
 HREF = re.compile(r'<(?:a|link|img|script)\b[^>]*?\b(?:href|src)="([^"]+)"')
 # Tables and code move sideways within their boxes; the page itself must not.
 CHECKS = """async () => {
@@ -122,7 +123,7 @@ def unsearched(browser: Any, site: Path) -> list[str]:
 
 
 def looked_at(site: Path) -> list[str]:
-    """Every page but the sources of the repository, opened."""
+    """Every page but the sources of the repository, opened; of the pages of modules, which one template makes, every `EVERY`-th."""
     from playwright.sync_api import sync_playwright
 
     found = chromium()
@@ -131,6 +132,8 @@ def looked_at(site: Path) -> list[str]:
         return []
     pages = [page.relative_to(site).as_posix() for page in sorted(site.rglob("*.html"))]
     pages = [page for page in pages if not page.startswith("repository/") and page != "404.html"]
+    modules = [page for page in pages if page.startswith(MODULES)]
+    pages = [page for page in pages if not page.startswith(MODULES)] + modules[::EVERY]
     server = _Server(("127.0.0.1", 0), functools.partial(_Pages, directory=site))
     threading.Thread(target=server.serve_forever, daemon=True).start()
     try:
