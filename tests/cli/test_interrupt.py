@@ -12,59 +12,41 @@ import pytest
 
 from tests.helpers.small_bench import bench
 
-
-def test_ctrl_c_ends_a_command_with_130(tmp_path: Path) -> None:
-    command = [
-        sys.executable,
-        "-c",
-        "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); from smajax.cli.main import main; main()",
-        "demo",
-        "--only",
-        "complete",
-        "--out",
-        "out",
-    ]
-    # A shell that runs its tests in the background has them ignore Ctrl-C, and what they start as well.
-    with subprocess.Popen(
-        command,
-        cwd=tmp_path,
-        stderr=subprocess.PIPE,
-        stdout=subprocess.DEVNULL,
-        text=True,
-        env={**os.environ, "SMAJAX_PROGRESS": "lines"},
-    ) as run:
-        assert run.stderr is not None
-        lines = iter(run.stderr.readline, "")
-        assert any("points of the box" in line for line in lines)  # the base fit has begun
-        run.send_signal(signal.SIGINT)
-        said = run.stderr.read()
-    assert run.returncode == 130, said
-    assert said.index("Stopping: ") < said.index("Interrupted. ")
-    assert "Interrupted. Nothing was finished: the same command starts from the beginning." in said
-
-
+# A shell that runs its tests in the background has them ignore Ctrl-C, and what they start as well.
 ANSWERING = (
     "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); from smajax.cli.main import main; main()"
 )
 
 
-@pytest.mark.parametrize("budget", [[], ["--budget", "60s"]], ids=["plain", "budget"])
-def test_ctrl_c_while_the_runs_are_read_is_answered_in_words(tmp_path: Path, budget: list[str]) -> None:
-    """No fit has begun. With --budget the work is that of a second process, and the first one alone gets the signal."""
-    command = [sys.executable, "-c", ANSWERING, "close-loop", str(bench(tmp_path)), "--out", "out", *budget]
+def _interrupted(folder: Path, words: list[str], begun: str) -> str:
+    """What a command in `folder` says after Ctrl-C, which comes when it has said `begun`."""
     with subprocess.Popen(
-        command,
-        cwd=tmp_path,
+        [sys.executable, "-c", ANSWERING, *words],
+        cwd=folder,
         stderr=subprocess.PIPE,
         stdout=subprocess.DEVNULL,
         text=True,
         env={**os.environ, "SMAJAX_PROGRESS": "lines"},
     ) as run:
         assert run.stderr is not None
-        assert "loading" in run.stderr.readline()  # with --budget of the second process
+        assert any(begun in line for line in iter(run.stderr.readline, ""))
         run.send_signal(signal.SIGINT)
         said = run.stderr.read()
     assert run.returncode == 130, said
+    return said
+
+
+def test_ctrl_c_ends_a_command_with_130(tmp_path: Path) -> None:
+    """The base fit has begun."""
+    said = _interrupted(tmp_path, ["demo", "--only", "complete", "--out", "out"], "points of the box")
+    assert said.index("Stopping: ") < said.index("Interrupted. ")
+    assert "Interrupted. Nothing was finished: the same command starts from the beginning." in said
+
+
+@pytest.mark.parametrize("budget", [[], ["--budget", "60s"]], ids=["plain", "budget"])
+def test_ctrl_c_while_the_runs_are_read_is_answered_in_words(tmp_path: Path, budget: list[str]) -> None:
+    """No fit has begun. With --budget the work is that of a second process, and the first one alone gets the signal."""
+    said = _interrupted(tmp_path, ["close-loop", str(bench(tmp_path)), "--out", "out", *budget], "loading")
     assert "Stopping: " in said
     assert "Interrupted. The same command " in said
     assert "Traceback" not in said
