@@ -8,14 +8,13 @@ from typing import Literal
 import jax.numpy as jnp
 import numpy as np
 
-from smajax.attribution import paired_errors
 from smajax.attribution.findings import HeldOutWorse, Rejected, ResidualDiagnostics, RunFinding, pooled_rmse
 from smajax.attribution.job import Job
 from smajax.attribution.joint_search import JointSearch
 from smajax.attribution.joint_stage import final_model, without
 from smajax.attribution.laplace_evidence import FittedModel
 from smajax.attribution.model_fits import Model, Search
-from smajax.attribution.paired_errors import Comparison
+from smajax.attribution.paired_errors import Comparison, runs_compared
 from smajax.attribution.residual_diagnostics import diagnosed
 from smajax.core.parameters import parameter_values
 from smajax.data.experiment.record import Run
@@ -25,11 +24,6 @@ from smajax.model.channels import SHOWN
 from smajax.model.types import Trajectory
 
 Compared = tuple[tuple[RunFinding, ...], ResidualDiagnostics, ResidualDiagnostics]
-
-
-def held_out_error(compared: Compared, which: Literal["before", "after"] = "after") -> float:
-    """Root mean square error of all held-out runs together, SI."""
-    return pooled_rmse(compared[0], "held-out", which)
 
 
 def validated(
@@ -44,38 +38,38 @@ def validated(
     error = search.error_of(final.effects)
     compared = whole = compare(job, setting, first, final)
     left = final
-    while left.effects:
-        worse_than_base = _beside(compared, compared, setting, "before") == "worse"
-        for effect in reversed(left.effects):
-            rest = without(search, left, effect, error) if len(left.effects) > 1 else first
-            simpler = compare(job, setting, first, rest)
-            rejected = _beside(compared, simpler, setting) == "worse"
-            if rejected or not worse_than_base or _beside(simpler, compared, setting) != "worse":
-                break
-        else:
-            rest, rejected = first, True
-        if not (rejected or worse_than_base):
-            break
+    while left.effects and (rest := _with_one_fewer(job, setting, search, first, left, compared, error)) is not None:
         left = first if rest is first else final_model(search, setting, search.fitted[rest.effects], error)
         compared = compare(job, setting, first, left)
     gone = tuple(name for name in final.effects if name not in left.effects)
     if not gone:
         return left, compared, None
-    without_them, with_them = held_out_error(compared), held_out_error(whole)
+    without_them, with_them = (pooled_rmse(one[0], "held-out", "after") for one in (compared, whole))
     setting.set_aside(final, HeldOutWorse(without_them, with_them), gone)
     return left, compared, Rejected(gone, without_them, with_them)
 
 
+def _with_one_fewer(  # what `validated` has at hand
+    job: Job, setting: Search, search: JointSearch, first: Model, left: Model, compared: Compared, error: float
+) -> Model | FittedModel | None:
+    """`left` without the effect that the held-out runs reject; `first` where all go, and None where none does."""
+    worse_than_base = _beside(compared, compared, setting, "before") == "worse"
+    for effect in reversed(left.effects):
+        rest = without(search, left, effect, error) if len(left.effects) > 1 else first
+        simpler = compare(job, setting, first, rest)
+        if _beside(compared, simpler, setting) == "worse":
+            return rest
+        if not worse_than_base:
+            return None
+        if _beside(simpler, compared, setting) != "worse":
+            return rest
+    return first
+
+
 def _beside(new: Compared, old: Compared, setting: Search, which: Literal["before", "after"] = "after") -> Comparison:
     """How the held-out runs are predicted by the extended model of `new` beside that, or the base model, of `old`."""
-    pairs = [pair for pair in zip(new[0], old[0], strict=True) if pair[0].role == "held-out"]
-    if not pairs:
-        return "alike"
-    return paired_errors.compared(
-        [run.measured - run.after for run, _ in pairs],
-        [run.measured - (run.before if which == "before" else run.after) for _, run in pairs],
-        setting.config,
-    )
+    mine, theirs = ([run for run in one[0] if run.role == "held-out"] for one in (new, old))
+    return runs_compared(mine, theirs, which, setting.config)
 
 
 def _simulated(setting: Search, model: Model | FittedModel, batch: RunBatch) -> Trajectory:

@@ -13,8 +13,9 @@ only strong effects are added; the better the model, the finer the effects that 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -260,26 +261,51 @@ def _fit_side_by_side(
     joint = search.joint
     search.settings.progress(Stage(stage, 0.0))
     settings = dataclasses.replace(comparison_settings(search.settings, stage), allowed_excess=allowed_excess)
-    groups, least = _grouped(search, [effects for effects, _ in begun]), np.inf
-    for place, (carried, members) in enumerate(groups):
+    groups = [
+        (carried, [one for one in begun if one[0] in members])
+        for carried, members in _grouped(search, [effects for effects, _ in begun])
+    ]
+    for effects, carried, values, cost in fits_by_program(joint, groups, error, settings):
+        search.trials[effects] = error
+        if np.isfinite(cost):
+            # Coefficients of other effects count for nothing in this model.
+            model = fitted_model(joint, effects, joint.without(values, effects), carried)
+            old = search.fitted.get(effects)
+            if old is None or model.log_evidence(error**2) > old.log_evidence(error**2):
+                search.fitted[effects] = model
+
+
+class EndedFit(NamedTuple):
+    """Of a set of effects, in the program that carries some."""
+
+    effects: tuple[str, ...]
+    carried: tuple[str, ...]
+    values: np.ndarray  # (P,)
+    cost: float
+
+
+def fits_by_program(
+    joint: JointParameters,
+    groups: Sequence[tuple[tuple[str, ...], Sequence[tuple[tuple[str, ...], np.ndarray]]]],
+    error: float,
+    settings: FitSettings,
+) -> Iterator[EndedFit]:
+    """Fits of sets of effects, by program: `groups` of (effects that it carries, (set, values (P,) that its fit begins with) each).
+
+    Those of one program go side by side; the least cost so far ends what is far behind it in the next.
+    """
+    progress, least = settings.progress, settings.least_cost
+    for place, (carried, begun) in enumerate(groups):
         problem, index = joint.restricted(carried)
         problem = problem.with_noise(error)
-        here = [(effects, values) for effects, values in begun if effects in members]
-        tasks = [problem.task(joint.free(effects), joint.bounds, values[index]) for effects, values in here]
-        progress = part_of(search.settings.progress, place, len(groups))
-        settings = dataclasses.replace(settings, progress=progress, least_cost=least)
-        fits = levenberg_marquardt(problem, tasks, settings)
+        tasks = [problem.task(joint.free(effects), joint.bounds, values[index]) for effects, values in begun]
+        own = dataclasses.replace(settings, progress=part_of(progress, place, len(groups)), least_cost=least)
+        fits = levenberg_marquardt(problem, tasks, own)
         least = min([least, *(fit.cost for fit in fits)])
-        for (effects, start), fit in zip(here, fits, strict=True):
-            search.trials[effects] = error
-            if np.isfinite(fit.cost):
-                values = np.array(start)
-                values[index] = fit.values
-                # Coefficients of other effects count for nothing in this model.
-                model = fitted_model(joint, effects, joint.without(values, effects), carried)
-                old = search.fitted.get(effects)
-                if old is None or model.log_evidence(error**2) > old.log_evidence(error**2):
-                    search.fitted[effects] = model
+        for (effects, start), fit in zip(begun, fits, strict=True):
+            values = np.array(start)
+            values[index] = fit.values
+            yield EndedFit(effects, carried, values, fit.cost)
 
 
 def _grouped(

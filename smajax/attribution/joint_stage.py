@@ -17,6 +17,7 @@ from smajax.attribution.laplace_evidence import FittedModel, fitted_model
 from smajax.attribution.leave_one_run_out import predicting
 from smajax.attribution.model_fits import Evidence, Model, Search, Start
 from smajax.attribution.step_size_check import gain_kept_at_half_step
+from smajax.core.whiteness import on_samples
 from smajax.fit.levenberg_marquardt import Fit, FitSettings
 from smajax.model.effects.library import LIBRARY
 from smajax.model.effects.prior_width import CoefficientPrior
@@ -81,9 +82,7 @@ class _Stage:
 
     def _leaves_noise(self, model: FittedModel) -> bool:
         mask = np.asarray(self.setting.problem.batch.mask)
-        left = np.zeros(mask.shape)
-        left[mask > 0] = model.residual
-        return self.setting.all_noise(left, mask)
+        return self.setting.all_noise(on_samples(model.residual, mask), mask)
 
     def resumed(self, search: JointSearch, found: FittedModel | None = None) -> tuple[JointSearch, FittedModel]:
         """(search, likeliest model) from the likeliest sets that `search` has fitted, with the values of presets free.

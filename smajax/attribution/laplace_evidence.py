@@ -20,7 +20,7 @@ import numpy as np
 from scipy import stats
 
 from smajax.attribution.joint_parameters import JointParameters, residual_and_columns
-from smajax.core.whiteness import correlation_time, split_runs
+from smajax.core.whiteness import correlation_time, on_samples, split_runs
 
 ROUNDING = 1e-14  # of an eigenvalue of a matrix whose diagonal is one
 LONGEST = 50.0  # samples: beyond it the correlation of a residual is its own shape, and no property of a noise
@@ -101,9 +101,7 @@ def fitted_model(
     log_prior = sum(joint.log_odds[effect] - 2.0 * math.log(factors[effect]) for effect in effects)
     log_prior -= 0.5 * float(np.sum(deviations**2 * precision))
     mask = np.asarray(joint.problem.batch.mask)
-    whole = np.zeros(mask.shape)
-    whole[mask > 0] = residual
-    correlation = min(correlation_time(split_runs(whole, mask)), LONGEST)
+    correlation = min(correlation_time(split_runs(on_samples(residual, mask), mask)), LONGEST)
     return FittedModel(
         effects,
         np.asarray(values),

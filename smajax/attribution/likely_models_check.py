@@ -17,9 +17,6 @@ from smajax.attribution.laplace_evidence import FittedModel
 from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.paired_errors import compared, pooled_rms
 from smajax.attribution.step_size_check import gain_kept_at_half_step
-from smajax.core.whiteness import split_runs
-from smajax.fit.predicted import misfits
-from smajax.fit.problem import Problem
 from smajax.model.effects.library import LIBRARY
 
 CHECKED = 0.05  # weight above which a model is looked at
@@ -59,7 +56,7 @@ def _on_held_out(
     simpler = [_without_one(search, one) for one in models]
     values = [base.values, *(one.values for one in models), *(one.values for one in simpler if one is not None)]
     carried = [effect for one in models for effect in one.effects]
-    basic, *others = _held_out_residuals(setting, carried, values)
+    basic, *others = setting.held_out_residuals(carried, values)
     own, nested = others[: len(models)], iter(others[len(models) :])
     found = {}
     for one, rest, mine in zip(models, simpler, own, strict=True):
@@ -80,18 +77,6 @@ def _without_one(search: JointSearch, model: FittedModel) -> FittedModel | None:
         if effects and len(effects) == len(model.effects) - 1 and set(effects) < set(model.effects)
     ]
     return max(nested, key=lambda one: one.log_evidence(error**2), default=None)
-
-
-def _held_out_residuals(
-    setting: Search, effects: Sequence[str], values: Sequence[np.ndarray]
-) -> list[list[np.ndarray]]:
-    """Residuals of each held-out run (n,), SI, of parameters (P,) of models with some of `effects`."""
-    batch = setting.held_out
-    assert batch is not None
-    problem, index = setting.restricted(effects)
-    there = Problem.build(problem.system, batch, problem.noise_sigma, problem.offset)
-    mask = np.asarray(batch.mask)
-    return [split_runs(misfit, mask) for misfit in misfits(there, [one[index] for one in values])]
 
 
 def _as_model(search: JointSearch, fitted: FittedModel) -> Model:

@@ -211,6 +211,15 @@ class Search:
         """Whether a misfit (SI) is measurement noise, as far as `mask` goes, both (R, N)."""
         return all_noise(split_runs(misfit, mask), float(self.problem.noise_sigma), self.noise_given, self.config)
 
+    def held_out_residuals(self, effects: Sequence[str], values: Sequence[np.ndarray]) -> list[list[np.ndarray]]:
+        """Residuals of each held-out run (n,), SI, of parameters (P,) of models with some of `effects`."""
+        batch = self.held_out
+        assert batch is not None
+        problem, index = self.restricted(effects)
+        there = Problem.build(problem.system, batch, problem.noise_sigma, problem.offset)
+        mask = np.asarray(batch.mask)
+        return [split_runs(misfit, mask) for misfit in misfits(there, [one[index] for one in values])]
+
     def rmse(self, misfit: np.ndarray) -> float:
         return float(np.sqrt((misfit**2).sum() / np.asarray(self.problem.batch.mask).sum()))
 

@@ -20,6 +20,7 @@ import numpy as np
 from scipy import stats
 
 from smajax.attribution.config import AttributionConfig
+from smajax.attribution.findings import RunFinding
 from smajax.core.whiteness import correlation_time
 
 Comparison = Literal["better", "worse", "alike"]
@@ -47,6 +48,15 @@ def compared(new: Sequence[np.ndarray], old: Sequence[np.ndarray], config: Attri
     if abs(share - 0.5) <= _by_chance(scores, config.held_out_errors) / total:
         return "alike"
     return "worse" if share > 0.5 else "better"
+
+
+def runs_compared(
+    new: Sequence[RunFinding], old: Sequence[RunFinding], which: Literal["before", "after"], config: AttributionConfig
+) -> Comparison:
+    """How the extended model of `new` predicts these runs beside the model `which` of `old`, the same runs."""
+    return compared(
+        [run.measured - run.after for run in new], [run.measured - getattr(run, which) for run in old], config
+    )
 
 
 def pooled_rms(runs: Sequence[np.ndarray]) -> float:

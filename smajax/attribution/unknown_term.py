@@ -19,7 +19,7 @@ import numpy as np
 from smajax.attribution.findings import UnknownTerm, UnknownTermLikelier
 from smajax.attribution.formulas import formulas
 from smajax.attribution.joint_parameters import JointParameters
-from smajax.attribution.joint_search import comparison_settings
+from smajax.attribution.joint_search import comparison_settings, fits_by_program
 from smajax.attribution.laplace_evidence import FittedModel, fitted_model, independent_error
 from smajax.attribution.leave_one_run_out import predicting
 from smajax.attribution.model_fits import Model, Search
@@ -29,10 +29,10 @@ from smajax.attribution.unknown.ranges import Sought, sought
 from smajax.attribution.unknown.spline import design
 from smajax.attribution.unknown.terms import UNKNOWN
 from smajax.core.parameters import parameters
-from smajax.core.progress import Stage, part_of
+from smajax.core.progress import Stage
 from smajax.core.whiteness import correlation_time, split_runs
 from smajax.data.experiment.record import Prior
-from smajax.fit.levenberg_marquardt import FitSettings, levenberg_marquardt
+from smajax.fit.levenberg_marquardt import FitSettings
 from smajax.fit.predicted import misfits
 from smajax.fit.problem import Problem
 from smajax.fit.sensitivity import sensitivity
@@ -161,8 +161,8 @@ def learnt(setting: Search, fits: TermFits) -> Lacking:
     search, fitted = fits.search, fits.fitted
     error = least_error(setting, [fits.none, *fitted])
     noise = float(search.problem.noise_sigma)
-    effects = fits.none.effects
-    carried = {term: own for own, terms in _programs(fits.joint, effects, _terms(fitted)) for term in terms}
+    programs = _programs(fits.joint, fits.none.effects, [model.effects[-1] for model in fitted])
+    carried = {term: own for own, terms in programs for term in terms}
     present = predicting(fits.joint, fits.none, error, noise, next(iter(carried.values())))
     models = [predicting(fits.joint, model, error, noise, carried[model.effects[-1]]) for model in fitted]
     log_odds = [fits.log_odds(one, error) for one in fitted]
@@ -171,7 +171,7 @@ def learnt(setting: Search, fits: TermFits) -> Lacking:
     enough = log_odds[0] > 0.0 and several and models[0].left_out_rmse < present.left_out_rmse
     held_out = None
     if enough and search.held_out is not None:
-        without, with_it = _on_held_out(search, present, models[0])
+        without, with_it = search.held_out_residuals(search.candidates, [present.values, models[0].values])
         held_out = pooled_rms(without), pooled_rms(with_it)
         enough = compared(with_it, without, setting.config) != "worse"
     alike = [
@@ -195,10 +195,6 @@ def learnt(setting: Search, fits: TermFits) -> Lacking:
     return Lacking(tuple(terms), fitted[0] if enough else None)
 
 
-def _terms(fitted: Sequence[FittedModel]) -> list[str]:
-    return [model.effects[-1] for model in fitted]
-
-
 def joint_with_terms(setting: Search, search: Search, final: Model) -> JointParameters:
     """Parameters of models with the effects of `final` and one of the terms of `search`, with their priors."""
     plain = setting.joint(final.effects)
@@ -218,15 +214,6 @@ def least_error(setting: Search, models: Sequence[FittedModel]) -> float:
     """What an independent sample may be off by, SI, given what the best of `models` leaves: all are compared with that."""
     best = min(models, key=lambda model: model.rms)
     return independent_error(best, float(setting.problem.noise_sigma), setting.noise_given)
-
-
-def _on_held_out(search: Search, *models: Model) -> list[list[np.ndarray]]:
-    """Residuals of each held-out run (n,) by each model, SI."""
-    problem, batch = search.problem, search.held_out
-    assert batch is not None
-    there = Problem.build(problem.system, batch, problem.noise_sigma, problem.offset)
-    mask = np.asarray(batch.mask)
-    return [split_runs(misfit, mask) for misfit in misfits(there, [model.values for model in models])]
 
 
 def in_place_of(setting: Search, first: Model, final: Model) -> Lacking | None:
@@ -279,24 +266,13 @@ def fitted_terms(
 ) -> list[FittedModel]:
     """Every term fitted together with the parameters of the model with `effects`, from the best of its places."""
     settings = comparison_settings(FitSettings(cache=search.cache, progress=search.progress), "fitting unknown terms")
-    found: dict[str, FittedModel] = {}
-    programs = _programs(joint, effects, list(places))
-    for number, (carried, terms) in enumerate(programs):
+    groups = []
+    for carried, terms in _programs(joint, effects, list(places)):
         problem, index = joint.restricted(carried)
-        problem = problem.with_noise(error)
-        begun = nearest(problem, [places[term] for term in terms], index)
-        tasks = [
-            problem.task(joint.free((*effects, term)), joint.bounds, at[index])
-            for term, at in zip(terms, begun, strict=True)
-        ]
-        settings = dataclasses.replace(settings, progress=part_of(search.progress, number, len(programs)))
-        fits = levenberg_marquardt(problem, tasks, settings)
-        settings = dataclasses.replace(settings, least_cost=min([settings.least_cost, *(fit.cost for fit in fits)]))
-        for term, at, fit in zip(terms, begun, fits, strict=True):
-            values = np.array(at)
-            values[index] = fit.values
-            found[term] = fitted_model(joint, (*effects, term), values, carried)
-    return list(found.values())
+        begun = nearest(problem.with_noise(error), [places[term] for term in terms], index)
+        groups.append((carried, [((*effects, term), at) for term, at in zip(terms, begun, strict=True)]))
+    fits = fits_by_program(joint, groups, error, settings)
+    return [fitted_model(joint, own, values, carried) for own, carried, values, _ in fits]
 
 
 def _programs(

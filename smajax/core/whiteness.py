@@ -107,6 +107,13 @@ def bartlett_sum(scores: np.ndarray, lags: int) -> np.ndarray:
     return np.asarray(total)
 
 
+def on_samples(residual: np.ndarray, mask: np.ndarray) -> np.ndarray:
+    """A residual of the measured samples (n,) where they are, zero elsewhere: (series, N), as the mask."""
+    found = np.zeros(mask.shape)
+    found[mask > 0] = residual
+    return found
+
+
 def split_runs(misfit: np.ndarray, mask: np.ndarray) -> list[np.ndarray]:
     """Misfit and mask, (series, N) -> one array of measured samples per series that has any."""
     return [row[valid > 0] for row, valid in zip(misfit, mask, strict=True) if valid.any()]

@@ -38,6 +38,11 @@ def _predicted(problem: Problem, system: System, integration: Integration, per_r
     return predict_compiled(system, batch, problem.per_run.names, per_run)
 
 
+def _exact(problem: Problem, system: System, per_run: np.ndarray) -> np.ndarray:
+    """What integrations are measured against, by the program of a fit."""
+    return _predicted(problem, system, unlimited(_limited(problem, finest(system))), per_run)
+
+
 def _scale(problem: Problem, mask: np.ndarray) -> np.ndarray:
     """Noise of every series; where it has none a tenth of its stroke, so that a hundredth of the stroke may be left."""
     noise, measured = np.asarray(problem.noise)[:, 0], np.asarray(problem.batch.output)
@@ -63,7 +68,7 @@ def integration_error(problem: Problem, system: System, per_run: np.ndarray | No
     """What the integration of `problem` leaves in the outputs of `system`, with each run's own values `per_run`."""
     own = np.asarray(problem.per_run.start if per_run is None else per_run)
     chosen = problem.batch.integration
-    exact = _predicted(problem, system, unlimited(_limited(problem, finest(system))), own)
+    exact = _exact(problem, system, own)
     return _error(problem, _predicted(problem, system, chosen, own) - exact, chosen)
 
 
@@ -93,7 +98,7 @@ def choose_integration(
     where friction lets a load jump, no step length settles which sample it jumps at.
     """
     own = np.asarray(problem.per_run.start if per_run is None else per_run)
-    exact = _predicted(problem, system, unlimited(_limited(problem, finest(system))), own)
+    exact = _exact(problem, system, own)
     best, least = ONE_STEP, np.inf
     for choice in (_limited(problem, one) for one in coarse_to_fine(system)):
         error = _error(problem, _predicted(problem, system, choice, own) - exact, choice).share

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 import numpy as np
 
 from smajax.attribution.findings import EffectFinding, Findings, RunFinding, Verdict, pooled_rmse
-from smajax.attribution.paired_errors import Comparison, compared
+from smajax.attribution.paired_errors import Comparison, runs_compared
 from smajax.attribution.record_error import OutlierRun
 from smajax.core.display_units import digits
 from smajax.core.wording import and_listed
@@ -182,19 +182,19 @@ def held_out_warnings(findings: Findings) -> list[str]:
 
 def held_out_comparison(findings: Findings) -> Comparison:
     """How the extended model predicts the held-out runs beside the base model."""
-    return _comparison(findings, [run for run in findings.runs if run.role == "held-out"])
-
-
-def _comparison(findings: Findings, runs: Sequence[RunFinding]) -> Comparison:
-    after, before = ([run.measured - getattr(run, which) for run in runs] for which in ("after", "before"))
-    return compared(after, before, findings.config)
+    held_out = [run for run in findings.runs if run.role == "held-out"]
+    return runs_compared(held_out, held_out, "before", findings.config)
 
 
 def of_the_test(findings: Findings) -> Iterator[str]:
     """How far what was found has been tested, and whether the noise was declared rightly."""
     if findings.fit_runs < 2:
         yield "There is one fit run only: effects were assessed on the fit itself, no run could be left out."
-    worse = [run.name for run in findings.runs if run.role == "held-out" and _comparison(findings, [run]) == "worse"]
+    worse = [
+        run.name
+        for run in findings.runs
+        if run.role == "held-out" and runs_compared([run], [run], "before", findings.config) == "worse"
+    ]
     if worse:
         yield f"Mind: on {', '.join(worse)}, which the fit never saw, the extended model does worse than the base model."
     if not any(run.role == "held-out" for run in findings.runs):
