@@ -68,23 +68,24 @@ def _all(
     pass
 
 
+# In the order in which they are listed: the way from logs to a controller first.
 COMMANDS: dict[str, Callable[..., None]] = {
     "app": app_command,
-    "close-loop": close_loop_command,
+    "new-experiment": new_experiment,
     "identify": identify_command,
+    "close-loop": close_loop_command,
     "predict": predict_command,
+    "tune": tune,
+    "simulate": simulate,
+    "sweep": sweep,
+    "export": export,
     "reports": reports,
-    "effects": effects,
     "presets": presets,
+    "effects": effects,
     "demo": demo,
     "figures": figures,
-    "tune": tune,
-    "sweep": sweep,
-    "simulate": simulate,
-    "export": export,
     "doctor": doctor,
     "bench": bench,
-    "new-experiment": new_experiment,
 }
 for _name, _function in COMMANDS.items():
     app.command(_name, cls=Command)(_function)

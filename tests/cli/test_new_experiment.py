@@ -43,6 +43,21 @@ def test_a_template_loads_as_it_is(tmp_path: Path) -> None:
     assert run.invoke(app, ["new-experiment", *logs, "--out", str(tmp_path / "e.toml")]).exit_code == 2
 
 
+def test_three_logs_are_two_fit_runs_and_a_held_out_one_without_a_warning_of_that(tmp_path: Path) -> None:
+    """What the draft itself decides is said in its list of guesses, and is nothing to warn of."""
+    logs = [str(DEMO / name) for name in ("steps.csv", "triangle.csv", "pulses.csv")]
+    said = smajax("new-experiment", *logs, "--out", tmp_path / "e.toml").out
+    assert "held out: the last run, pulses, to validate the fit of the other 2; a fourth log would be a third" in said
+    assert [
+        one
+        for one in load_experiment(tmp_path / "e.toml", CATALOGUE).warnings
+        if " fit run" in one or "held out" in one
+    ] == []
+    two = smajax("new-experiment", *logs[:2], "--out", tmp_path / "two.toml").out
+    assert "warning: only 2 fit runs: " in two
+    assert "warning: no run is held out: " in two
+
+
 @pytest.mark.parametrize(
     ("heading", "asked"),
     [("displacement [mm]", "damping"), ("angle [deg]", "pulley_radius"), ("mass [g]", "wire_length")],
@@ -55,6 +70,7 @@ def test_a_template_lists_the_sizes_that_a_bench_should_give(tmp_path: Path, hea
     (tmp_path / "log.csv").write_text(log)
     guessed = draft([tmp_path / "log.csv"], tmp_path / "e.toml")
     assert any("the bench: the preset's wire_length" in line for line in guessed.messages)
+    assert any("`--known wire_length=VALUE,... --overwrite`" in line for line in guessed.messages)
     head, _, rest = guessed.text.partition("[model.parameters]")
     known, _, tail = rest.partition("[unknown]")
     said = head + "[model.parameters]" + known.replace("\n# ", "\n")

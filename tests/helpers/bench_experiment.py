@@ -75,7 +75,7 @@ ambient_temperature = "297.15 K"
 """
 
 
-ONE_FIT = "only 1 fit run: runs left out in turn tell little; give at least three of different kinds"
+ONE_FIT = "only 1 fit run: how far the fitted values differ from run to run cannot be seen; give at least three of different kinds"
 
 
 def write_run(path: Path, count: int = 500, seed: int = 0, header: str = "time,duty,pos") -> None:

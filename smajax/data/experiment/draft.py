@@ -390,5 +390,7 @@ def _runs(inputs: _Inputs, target: Path) -> _Section:
     messages = [f"pretension: what the force of each run begins with ({GUESS})"] if forces else []
     if held_out is None:
         return _Section(lines, messages)
-    role = f"held out: the last run, {held_out.name}; choose another one by its `role` in [[runs]]"
+    few = len(runs) == HELD_OUT_FROM
+    others = f"the other {len(runs) - 1}; " + ("a fourth log would be a third fit run; " if few else "")
+    role = f"held out: the last run, {held_out.name}, to validate the fit of {others}choose another one by its `role` in [[runs]]"
     return _Section(lines, [*messages, role], of_bench=[role])

@@ -127,8 +127,8 @@ def preset_parameters(model: DraftModel, known: Known) -> ParameterSections:
         return ParameterSections(lines, known.messages, presets)
     some = ", ".join(f"{one.name} {one.value}" for one in listed[:4])
     message = (
-        f"the bench: the preset's {some}{' and others' if len(listed) > 4 else ''} until [model.parameters] has yours; a "
-        "wrong one leads to a wrong fitted value"
+        f"the bench: the preset's {some}{' and others' if len(listed) > 4 else ''} until [model.parameters] has yours, from the same "
+        f"command with `--known {listed[0].name}=VALUE,... --overwrite` or by hand; a wrong one leads to a wrong fitted value"
     )
     return ParameterSections(lines, [*known.messages, message], presets)
 

@@ -21,7 +21,8 @@ UNEVEN, UNEVEN_SHARE = 0.2, 0.1
 TWO_RATES = 0.02
 # Seconds: longer than most runs of a wire; a run of eleven seconds lasts that long when its ms are taken for s.
 LONGEST_RUN = 3.0 * 3600.0
-FEWEST_FIT_RUNS = 3
+# Beside a held-out run two fit runs are what three logs give; without one, two that disagree leave open which of them is wrong.
+FEWEST_FIT_RUNS, FEWEST_BESIDE_HELD_OUT = 3, 2
 # Times the width of what nearly all samples lie in from which on one is far off, and the share of a run that may be.
 FAR_OFF, FEW_FAR = 10.0, 0.01
 
@@ -193,9 +194,9 @@ def role_warnings(runs: Sequence[RunSection] | Sequence[Run]) -> list[str]:
     """What cannot be told from so few runs."""
     result: list[str] = []
     fit = sum(run.role == "fit" for run in runs)
-    if fit < FEWEST_FIT_RUNS:
+    if fit < (FEWEST_FIT_RUNS if fit == len(runs) else FEWEST_BESIDE_HELD_OUT):
         result.append(
-            f"only {fit} fit {'run' if fit == 1 else 'runs'}: runs left out in turn tell little; "
+            f"only {fit} fit {'run' if fit == 1 else 'runs'}: how far the fitted values differ from run to run cannot be seen; "
             "give at least three of different kinds"
         )
     if fit == len(runs):
