@@ -53,6 +53,13 @@ BOOSTS = (
     ("studies/", 0.4),
     ("C", 0.3),
 )
+# Pages of many parts of which a reader looks for one: each is folded away. Where a part begins; its title is the group `title`.
+FOLDED = {
+    "studies/chapter3/README.md": re.compile(r"^## (?P<title>M\d+)\n", re.MULTILINE),
+    "studies/chapter4/README.md": re.compile(r"^## (?P<title>C\d+)\n", re.MULTILINE),
+    "CHANGELOG.md": re.compile(r"^(?P<title>[A-Z][^\n]*):\n(?=\n- )", re.MULTILINE),
+}
+ENDS = re.compile(r"^#{2,3} ", re.MULTILINE)  # of a folded part, beside the begin of the next one
 MATHS = re.compile(r'<(span|div) class="arithmatex">(.*?)</\1>', re.DOTALL)
 # Where the reference shows a module that no page names: on the page of its folder, the longest that fits.
 PAGE_OF = {
@@ -210,6 +217,24 @@ def origin(source: str) -> str:
     return source if any(Path(source).match(one) for one in TAKEN) else f"docs/{source}"
 
 
+def folded(text: str, begins: re.Pattern[str]) -> str:
+    """`text` with each part in a box that opens at a click. Its heading is in the box: a link that leads to it opens the box."""
+    found = list(begins.finditer(text))
+    if not found:
+        raise PluginError(f"nothing to fold: no {begins.pattern} in a page that is listed in FOLDED")
+    pieces = [text[: found[0].start()]]
+    for one, after in zip(found, [*(one.start() for one in found[1:]), len(text)], strict=True):
+        end = ENDS.search(text, one.end(), after)
+        stop = end.start() if end else after
+        body = text[one.end() : stop].strip()
+        said = one["title"] if one[0].endswith(":\n") else f"{one['title']}: {body.partition('. ')[0]}"
+        head = "" if one[0].endswith(":\n") else one[0]
+        pieces.append(
+            f'<details markdown="1"><summary>{html.escape(said)}</summary>\n\n{head}\n{body}\n\n</details>\n\n{text[stop:after]}'
+        )
+    return "".join(pieces)
+
+
 def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str:
     """Links of the repository as links of the site, a folder's as plain text; a page of the reference with all its modules."""
     here = page.file.src_uri
@@ -227,6 +252,8 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str
                 + ", ".join(f"[`{name}`](commands/{name}.md)" for name in helps())
                 + "\n"
             )
+    if here in FOLDED:
+        markdown = folded(markdown, FOLDED[here])
     mine = origin(here)
 
     def path_of(target: str) -> str:

@@ -28,7 +28,7 @@ def _able(at: tuple[str, int, int]) -> tuple[tuple[str, ...], str, str]:
 
     try:
         kept = load_model(Path(at[0]))
-        system, _ = plant_of(kept, kept.system)
+        system, _ = plant_of(kept)
         unit = unit_of(system)
         points = ",".join(f"{one:.3g}" for one in default_set_points(system, 3))
         return tuple(controllers_for(system)), f"{unit.shown}; default {points}", ""
