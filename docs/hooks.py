@@ -59,6 +59,7 @@ FOLDED = {
     "studies/chapter4/README.md": re.compile(r"^## (?P<title>C\d+)\n", re.MULTILINE),
     "CHANGELOG.md": re.compile(r"^(?P<title>[A-Z][^\n]*):\n(?=\n- )", re.MULTILINE),
 }
+SOURCED = re.compile(r" \((?:Fig|sec|eq|Table)\b|\n")  # what stands before it says what the part is of
 ENDS = re.compile(r"^#{2,3} ", re.MULTILINE)  # of a folded part, beside the begin of the next one
 MATHS = re.compile(r'<(span|div) class="arithmatex">(.*?)</\1>', re.DOTALL)
 # Where the reference shows a module that no page names: on the page of its folder, the longest that fits.
@@ -227,7 +228,7 @@ def folded(text: str, begins: re.Pattern[str]) -> str:
         end = ENDS.search(text, one.end(), after)
         stop = end.start() if end else after
         body = text[one.end() : stop].strip()
-        said = one["title"] if one[0].endswith(":\n") else f"{one['title']}: {body.partition('. ')[0]}"
+        said = one["title"] if one[0].endswith(":\n") else f"{one['title']}: {SOURCED.split(body, maxsplit=1)[0]}"
         head = "" if one[0].endswith(":\n") else one[0]
         pieces.append(
             f'<details markdown="1"><summary>{html.escape(said)}</summary>\n\n{head}\n{body}\n\n</details>\n\n{text[stop:after]}'

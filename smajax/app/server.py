@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import html
+import re
 import secrets
 import socket
 import threading
@@ -79,6 +81,11 @@ def _marks(project: Project, current: Step, examined: Examined) -> list[Mark]:
     return found
 
 
+def with_code(text: str) -> str:
+    """A sentence as HTML: what stands in backticks as code, and nothing else of it as markup."""
+    return re.sub(r"`([^`]+)`", r"<code>\1</code>", html.escape(text))
+
+
 class Pages:
     """Templates, and what every one of them can call."""
 
@@ -91,6 +98,7 @@ class Pages:
             lstrip_blocks=True,
         )
         self.environment.filters["digits"] = lambda value: digits(value, 4)
+        self.environment.filters["with_code"] = with_code
 
     def html(
         self, template: str, project: Project, step: Step, wrong: Mapping[str, str], sent: Sent | None = None

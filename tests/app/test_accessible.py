@@ -33,6 +33,7 @@ def served(folder: Path, drafted: TestClient) -> Iterator[str]:
     fitted_model().save(report / "model.toml")
     tuned.mkdir()
     (tuned / "tune.html").write_text("<!doctype html>", encoding="utf-8")
+    (tuned / "state.npz").write_bytes(b"")
     (tuned / "tune.json").write_text(json.dumps({"controller": "pid", "gains": {}}), encoding="utf-8")
     listening = bound(0)
     server = uvicorn.Server(
@@ -67,6 +68,12 @@ def test_no_view_has_a_serious_finding(browser: Any, served: str) -> None:
                 page.get_by_role("heading", level=1).wait_for()
                 wrong += serious(axe, page, f"{step}, {scheme}, {width} px")
                 assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), step
+        assert page.goto(f"{served}/download").ok
+        listed = page.locator("main").inner_text()
+        assert "`" not in listed
+        assert "tune.html" in listed
+        assert "state.npz" not in listed  # which the command keeps for itself
+        assert page.goto(f"{served}/tune").ok
         assert "pid" in page.locator("select[name=controller]").inner_text()
         assert wrong == []
         page.set_content("<p style='color: #aaa; background: #fff'>pale</p>")

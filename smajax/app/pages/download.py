@@ -24,13 +24,17 @@ MEANING = {
     "tune.html": "the tuning, one file",
     "gains.json": "the gains, for `sweep --gains`",
 }
+# What a command keeps for itself, to resume from.
+KEPT = ("asked.json", "state.npz", "finish.npz")
 
 
 def page(project: Project) -> Mapping[str, Any]:
     found = []
     for result in project.results:
         files = sorted(
-            one for one in (project.folder / result.folder).iterdir() if one.is_file() and not one.name.startswith(".")
+            one
+            for one in (project.folder / result.folder).iterdir()
+            if one.is_file() and not one.name.startswith(".") and one.name not in KEPT
         )
         found.append(
             {
