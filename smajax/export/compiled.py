@@ -19,10 +19,12 @@ from smajax.export.arrays import numbers_of
 from smajax.export.block import Block, Quantity, identifier
 from smajax.export.counts import Cost, cost_of
 from smajax.export.printed import texts_of
+from smajax.export.single_precision import DOUBLE
 from smajax.export.statements import NAMES, Item, Number, Writer, needed
 from smajax.export.translate import Translation
 
-DOUBLE, SINGLE = "double", "float"
+# Inputs may be of less precision than the arithmetic: two of them are not multiplied before they are converted.
+PARAMETER, INPUT = "p->", "(real)u->"
 
 
 @dataclass(frozen=True)
@@ -87,8 +89,8 @@ def cast(tree: Any) -> Any:
     return jax.tree.map(one, tree)
 
 
-def _named(quantities: Sequence[Quantity], pointer: str) -> list[str]:
-    return [f"{pointer}->{one.c_name}" for one in quantities]
+def _named(quantities: Sequence[Quantity], at: str) -> list[str]:
+    return [f"{at}{one.c_name}" for one in quantities]
 
 
 class _Function:
@@ -155,7 +157,7 @@ def compiled(build: Callable[[], Block], kind: str) -> Compiled:
         # Dictionaries are flattened in the order of their sorted keys.
         given = [
             _named(sorted(many, key=lambda one: one.name), at)
-            for many, at in ((block.parameters, "p"), (block.inputs, "u"))
+            for many, at in ((block.parameters, PARAMETER), (block.inputs, INPUT))
         ]
         of_parameters, of_inputs = ([[text] for text in texts] for texts in given)
 
@@ -201,8 +203,8 @@ def compiled(build: Callable[[], Block], kind: str) -> Compiled:
         first,
         body,
         tuple(entry for k, entry in enumerate(entries) if k in alive),
-        frozenset(one.name for one in block.parameters if f"p->{one.c_name}" in read),
-        frozenset(one.name for one in block.inputs if f"u->{one.c_name}" in read),
+        frozenset(one.name for one in block.parameters if f"{PARAMETER}{one.c_name}" in read),
+        frozenset(one.name for one in block.inputs if f"{INPUT}{one.c_name}" in read),
     )
 
 

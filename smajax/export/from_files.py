@@ -13,18 +13,24 @@ from smajax.control.presets import CONTROLLERS
 from smajax.export.controller import SHORT, check_reads, controller_block
 from smajax.export.errors import ExportError
 from smajax.export.plant import DEFAULT_TOLERANCE, check_plant, plant_block
+from smajax.export.single_precision import DOUBLE, SingleBuild, single_build
 from smajax.export.source import CSource, c_source
 from smajax.model.system import System
 
 
 def plant_source(
-    system: System, name: str = "actuator", title: str = "", tolerance: float = DEFAULT_TOLERANCE
+    system: System,
+    name: str = "actuator",
+    title: str = "",
+    tolerance: float = DEFAULT_TOLERANCE,
+    arithmetic: str = DOUBLE,
 ) -> CSource:
-    """The C of a model. Raises ExportError for what cannot be exported, with the part and the reason; ValueError as `check_bounds`."""
+    """The C of a model. arithmetic: of a build with single-precision inputs and outputs, "double" or "float". Raises ExportError for what cannot be exported, with the part and the reason; ValueError as `check_bounds`."""
     if not 1e-9 <= tolerance <= 1e-2:
         raise ExportError(f"the tolerance of a step is {tolerance:g}; expected 1e-9 to 1e-2.")
     check_plant(system)
-    return c_source(lambda: plant_block(system, name, title, tolerance), name)
+    single = SingleBuild(arithmetic)
+    return c_source(lambda: plant_block(system, name, title, tolerance), name, single=single)
 
 
 def controller_source(
@@ -36,11 +42,13 @@ def controller_source(
     period: float | None = None,
     delay: int | None = None,
     own_limit: bool = False,
+    arithmetic: str | None = None,
 ) -> CSource:
     """The C of the controller in a file of gains on `system`, the plant that it assumes.
 
     estimator: the name of one, "" for the reading alone. period: s. delay: periods until a command arrives. What is None is what the gains
     were tuned with, where their file says it. own_limit: the limit of the command is that of `system`, whatever the file says.
+    arithmetic: of a build with single-precision inputs and outputs, "double" or "float"; None: "float" where that was measured to be enough.
     Raises GainsFileError as `read_gains`, ExportError for a controller that reads what nobody measures, KeyError for no estimator
     and ValueError as `loop_around`.
     """
@@ -58,6 +66,7 @@ def controller_source(
         lambda: controller_block(loop.system, loop.controller, loop.estimator, used.period, used.delay, name, known),
         name,
         SHORT,
+        single_build(found.controller, used.estimator, used.period, arithmetic),
     )
     check_reads(source, f"the controller `{found.controller}`", loop.estimator is not None)
     return source

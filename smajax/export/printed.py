@@ -150,7 +150,7 @@ def merged(double: Sequence[str], single: Sequence[str]) -> list[str]:
         lines = [_both(ours, theirs) for ours, theirs in zip(double, single, strict=True)]
         if all(one is not None for one in lines):
             return [one for one in lines if one is not None]
-    return ["#if SMAJAX_SINGLE", *single, "#else", *double, "#endif"]
+    return ["#if SINGLE", *single, "#else", *double, "#endif"]
 
 
 def _both(ours: str, theirs: str) -> str | None:

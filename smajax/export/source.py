@@ -1,6 +1,7 @@
 """A block as C99: a header that says what it takes and costs, and its source. Both compile to double and, by a macro, to single precision.
 
-No allocation, no other library than math.h; what a block remembers is one structure that the caller owns.
+No allocation, no other library than math.h; what a block remembers is one structure that the caller owns. Inputs and outputs are `NAME_real`;
+state, parameters and arithmetic are `NAME_number`, which another macro leaves double where single inputs and outputs are asked for.
 """
 
 from __future__ import annotations
@@ -13,9 +14,11 @@ from typing import Any
 import numpy as np
 
 from smajax.export.block import Block, Quantity
-from smajax.export.compiled import DOUBLE, SINGLE, Body, Compiled, Entry, compiled
+from smajax.export.compiled import Body, Compiled, Entry, compiled
 from smajax.export.operations import type_of
 from smajax.export.printed import helpers_of, merged, printed
+from smajax.export.single_precision import DOUBLE, SINGLE, UNKNOWN, SingleBuild
+from smajax.export.statements import NAMES
 
 MACRO = "SMAJAX_SINGLE"
 
@@ -30,7 +33,10 @@ class ShortCall:
 
 @dataclass(frozen=True)
 class CSource:
-    """C of a block. parameters, inputs, outputs: those that it has, for whoever calls it; state_bytes by precision."""
+    """C of a block. parameters, inputs, outputs: those that it has, for whoever calls it; state_bytes by the precision of the arithmetic.
+
+    single_build: what it computes in where it is compiled with single inputs and outputs.
+    """
 
     name: str
     block: Block
@@ -41,6 +47,7 @@ class CSource:
     outputs: tuple[Quantity, ...]
     state_bytes: dict[str, int]
     operations: dict[str, int]
+    single_build: SingleBuild
 
 
 class _Both:
@@ -62,8 +69,14 @@ class _Both:
         for one in (self.double, self.single):
             body = of(one)
             lines = printed(body.items, [what for _, what in body.written])
-            texts.append([*lines, *(f"    {where} = {what};" for where, what in body.written)])
+            texts.append([*lines, *(f"    {where} = {self.leaving(where, what)};" for where, what in body.written)])
         return merged(*texts)
+
+    def leaving(self, where: str, what: str) -> str:
+        """An output in the precision of the interface; a member of the state as it is."""
+        if not where.startswith("y->"):
+            return what
+        return f"({self.name}_real){what}" if NAMES.fullmatch(what) else f"({self.name}_real)({what})"
 
 
 def number(value: float) -> str:
@@ -90,13 +103,13 @@ def _structure(name: str, members: Sequence[str]) -> list[str]:
     return ["typedef struct {", *(f"    {one}" for one in members), f"}} {name};", ""] if members else []
 
 
-def _members(quantities: Iterable[Quantity], name: str) -> list[str]:
-    return [f"{name}_real {one.c_name}; /* {_meaning(one)} */" for one in quantities]
+def _members(quantities: Iterable[Quantity], kind: str) -> list[str]:
+    return [f"{kind} {one.c_name}; /* {_meaning(one)} */" for one in quantities]
 
 
 def _member(double: Entry, single: Entry, name: str) -> str:
     """Of the state."""
-    kinds = [type_of(one.dtype).replace("real", f"{name}_real") for one in (double, single)]
+    kinds = [type_of(one.dtype).replace("real", f"{name}_number") for one in (double, single)]
     kind = kinds[0] if kinds[0] == kinds[1] else f"{name}_count"
     return f"{kind} {double.name}{f'[{double.size}]' if double.shape else ''};"
 
@@ -141,7 +154,38 @@ def _short_head(name: str, short: ShortCall) -> str:
     return f"{name}_real {name}_step({name}_state *state{given})"
 
 
-def _header(both: _Both, short: ShortCall | None, state_bytes: dict[str, int]) -> str:
+def arithmetic_macro(name: str) -> str:
+    """What says of a block that arithmetic is single where inputs and outputs are; each has its own, for several may be in one program."""
+    return f"{name.upper()}_SINGLE_ARITHMETIC"
+
+
+def _precision(name: str, single: SingleBuild) -> list[str]:
+    """The types by the macros."""
+    macro = arithmetic_macro(name)
+    return [
+        f"#ifndef {MACRO}",
+        f"#define {MACRO} 0",
+        "#endif",
+        f"#ifndef {macro}",
+        f"#define {macro} {int(single.arithmetic == SINGLE)}",
+        "#endif",
+        f"#if {MACRO}",
+        f"typedef float {name}_real; /* inputs and outputs */",
+        "#else",
+        f"typedef double {name}_real;",
+        "#endif",
+        f"#if {MACRO} && {macro}",
+        f"typedef float {name}_number; /* state, parameters and arithmetic */",
+        f"typedef int32_t {name}_count;",
+        "#else",
+        f"typedef double {name}_number;",
+        f"typedef int64_t {name}_count;",
+        "#endif",
+        "",
+    ]
+
+
+def _header(both: _Both, short: ShortCall | None, state_bytes: dict[str, int], single: SingleBuild) -> str:
     name, block = both.name, both.block
     state = _structure(
         f"{name}_state",
@@ -157,10 +201,12 @@ def _header(both: _Both, short: ShortCall | None, state_bytes: dict[str, int]) -
         f"/* {block.title}",
         " *",
         " * Written by smajax: change the model and write it again, not this file. SI units, temperatures in degrees Celsius,",
-        " * angles in radians. Double precision; with -DSMAJAX_SINGLE=1 single precision.",
+        " * angles in radians.",
         " *",
-        f" * State: {state_bytes[DOUBLE]} bytes in double and {state_bytes[SINGLE]} in single precision, one structure that the caller owns;",
-        " * nothing is allocated, and of the libraries math.h alone is used.",
+        *(f" * {line}" for line in single.header(arithmetic_macro(name))),
+        " *",
+        f" * State: {state_bytes[DOUBLE]} bytes where arithmetic is double and {state_bytes[SINGLE]} where it is single, one structure that the",
+        " * caller owns; nothing is allocated, and of the libraries math.h alone is used.",
         f" * Operations of a step at worst{bounded}: {step.total}",
         f" * ({step.words()}); of the first one {start.total}.",
         " */",
@@ -170,24 +216,14 @@ def _header(both: _Both, short: ShortCall | None, state_bytes: dict[str, int]) -
         "#include <stdbool.h>",
         "#include <stdint.h>",
         "",
-        f"#ifndef {MACRO}",
-        f"#define {MACRO} 0",
-        "#endif",
-        f"#if {MACRO}",
-        f"typedef float {name}_real;",
-        f"typedef int32_t {name}_count;",
-        "#else",
-        f"typedef double {name}_real;",
-        f"typedef int64_t {name}_count;",
-        "#endif",
-        "",
+        *_precision(name, single),
         *(
             [f"#define {name.upper()}_PERIOD {number(block.period)} /* s, between two calls */", ""]
             if block.period
             else []
         ),
-        *_structure(f"{name}_parameters", _members(both.parameters, name)),
-        *_structure(f"{name}_inputs", _members(both.inputs, name)),
+        *_structure(f"{name}_parameters", _members(both.parameters, f"{name}_number")),
+        *_structure(f"{name}_inputs", _members(both.inputs, f"{name}_real")),
         *_structure(
             f"{name}_outputs", [f"{name}_real {one.c_name}; /* {one.unit}: {one.about} */" for one in block.outputs]
         ),
@@ -259,7 +295,9 @@ def _public(name: str, both: _Both, short: ShortCall | None) -> list[str]:
     if short is not None:
         lines += [_short_head(name, short), "{"]
         if both.inputs:
-            values = [one.c_name if one.name in short.inputs else f"R({number(one.start)})" for one in both.inputs]
+            values = [
+                one.c_name if one.name in short.inputs else f"({name}_real){number(one.start)}" for one in both.inputs
+            ]
             lines += [f"    const {name}_inputs inputs = {{{', '.join(values)}}};"]
         used = {one.name for one in both.inputs}
         lines += [f"    (void){one};" for one in short.inputs if one not in used]
@@ -274,8 +312,13 @@ def _public(name: str, both: _Both, short: ShortCall | None) -> list[str]:
     return lines
 
 
-def c_source(build: Callable[[], Block], name: str, short: ShortCall | None = None) -> CSource:
-    """The C of the block that `build` makes, in whichever precision JAX computes at the time. Raises NoTranslation."""
+def c_source(
+    build: Callable[[], Block], name: str, short: ShortCall | None = None, single: SingleBuild = UNKNOWN
+) -> CSource:
+    """The C of the block that `build` makes, in whichever precision JAX computes at the time. single: of a build with single inputs and outputs.
+
+    Raises NoTranslation.
+    """
     both = _Both(build, name)
     start, step = both.body(lambda one: one.start), both.body(lambda one: one.step)
     entries = {DOUBLE: [one for one, _ in both.state], SINGLE: [one for _, one in both.state]}
@@ -286,10 +329,11 @@ def c_source(build: Callable[[], Block], name: str, short: ShortCall | None = No
         "",
         "#include <math.h>",
         "",
-        f"typedef {name}_real real;",
+        f"typedef {name}_number real;",
         f"typedef {name}_count count;",
         "#define R(value) ((real)(value))",
-        f"#if {MACRO}",
+        f"#define SINGLE ({MACRO} && {arithmetic_macro(name)})",
+        "#if SINGLE",
         "#define R2(of_double, of_single) R(of_single)",
         "#define F(name) name##f",
         "#else",
@@ -306,13 +350,14 @@ def c_source(build: Callable[[], Block], name: str, short: ShortCall | None = No
     return CSource(
         name,
         both.block,
-        _header(both, short, sizes),
+        _header(both, short, sizes, single),
         "\n".join(source),
         tuple(both.parameters),
         tuple(both.inputs),
         both.block.outputs,
         sizes,
         {"start": both.double.start.cost.total, "step": both.double.step.cost.total},
+        single,
     )
 
 
@@ -323,6 +368,7 @@ def record(source: CSource) -> dict[str, Any]:
         "title": source.block.title,
         "period": source.block.period,
         "state_bytes": dict(source.state_bytes),
+        "single_build": source.single_build.record(),
         "operations": dict(source.operations),
         "parameters": [one.name for one in source.parameters],
         "inputs": [one.name for one in source.inputs],

@@ -18,7 +18,8 @@ prepare()
 
 from smajax.control.loop_around import loop_around  # noqa: E402
 from smajax.core.files import json_text, replace  # noqa: E402
-from smajax.export.source import CSource  # noqa: E402
+from smajax.export.single_precision import DOUBLE, SINGLE  # noqa: E402
+from smajax.export.source import CSource, arithmetic_macro  # noqa: E402
 from smajax.model.rigs import arm  # noqa: E402
 from studies.exported_code.run import source_of  # noqa: E402
 
@@ -26,12 +27,14 @@ CASES = [
     ("pid", ""),
     ("vsc3", ""),
     ("sld", "printed"),
+    ("backstepping1", "printed"),
     ("backstepping2", "printed"),
     ("pid", "model"),
     ("sld", "model"),
 ]
 TARGET = ["-mcpu=cortex-m4", "-mthumb", "-mfpu=fpv4-sp-d16", "-mfloat-abi=hard"]
 FLAGS = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-O2", "-DSMAJAX_SINGLE=1", "-ffunction-sections", *TARGET]
+CLOCK = 168e6  # Hz
 CALLS = 200
 
 LINKER = """
@@ -102,8 +105,8 @@ void reset(void)
 """
 
 
-def measured(source: CSource) -> dict[str, Any]:
-    """Bytes of code, state and stack, and instructions a call, of single precision."""
+def measured(source: CSource, arithmetic: str) -> dict[str, Any]:
+    """Bytes of code, state and stack, and instructions a call, of single inputs and outputs."""
     folder = Path(tempfile.mkdtemp())
     files = {"own.h": source.header, "own.c": source.source, "board.c": BOARD, "board.ld": LINKER}
     for name, text in files.items():
@@ -112,11 +115,12 @@ def measured(source: CSource) -> dict[str, Any]:
     def said(*command: str) -> str:
         return subprocess.run(command, cwd=folder, check=True, capture_output=True, text=True).stdout
 
-    said("arm-none-eabi-gcc", *FLAGS, "-fstack-usage", "-c", "own.c", "-o", "own.o")
+    flags = [*FLAGS, f"-D{arithmetic_macro(source.name)}={int(arithmetic == SINGLE)}"]
+    said("arm-none-eabi-gcc", *flags, "-fstack-usage", "-c", "own.c", "-o", "own.o")
     size = said("arm-none-eabi-size", "own.o").splitlines()[1].split()
     stacks = [int(line.split("\t")[1]) for line in (folder / "own.su").read_text().splitlines()]
     link = ["-nostartfiles", "--specs=nosys.specs", "-T", "board.ld", "-Wl,--gc-sections"]
-    board = [one for one in FLAGS if one not in ("-std=c99",)] + ["-std=gnu99", f"-DCALLS={CALLS}"]
+    board = [one for one in flags if one not in ("-std=c99",)] + ["-std=gnu99", f"-DCALLS={CALLS}"]
     said("arm-none-eabi-gcc", *board, "board.c", "own.o", *link, "-o", "board.elf", "-lm")
     linked = said("arm-none-eabi-size", "board.elf").splitlines()[1].split()
     machine = ["qemu-system-arm", "-M", "mps2-an386", "-cpu", "cortex-m4", "-nographic", "-icount", "shift=0"]
@@ -129,13 +133,16 @@ def measured(source: CSource) -> dict[str, Any]:
         check=False,
     )
     ticks = [int(one) for one in re.findall(r"^\d+$", told.stdout + told.stderr, re.MULTILINE)]
+    mean, most = (40 * ticks[0] / CALLS, 40 * ticks[1]) if len(ticks) == 2 else (None, None)
     return {
+        "arithmetic": arithmetic,
         "code_bytes": int(size[0]),
         "code_bytes_with_math": int(linked[0]),
-        "state_bytes": source.state_bytes["float"],
+        "state_bytes": source.state_bytes[arithmetic],
         "largest_stack_frame_bytes": max(stacks),
-        "instructions_mean": 40 * ticks[0] / CALLS if len(ticks) == 2 else None,
-        "instructions_most": 40 * ticks[1] if len(ticks) == 2 else None,
+        "instructions_mean": mean,
+        "instructions_most": most,
+        "milliseconds_most": None if most is None else 1e3 * most / CLOCK,
     }
 
 
@@ -143,8 +150,9 @@ def main() -> None:
     rows = []
     for name, estimator in CASES:
         source = source_of(loop_around(arm(), name, estimator=estimator or None), name)
-        rows.append({"controller": name, "estimator": estimator, **measured(source)})
-        print(rows[-1], flush=True)
+        for arithmetic in (SINGLE, DOUBLE):
+            rows.append({"controller": name, "estimator": estimator, **measured(source, arithmetic)})
+            print(rows[-1], flush=True)
         replace(Path(__file__).with_name("cortex_m4.json"), json_text({"compiler": _compiler(), "rows": rows}))
 
 

@@ -22,8 +22,8 @@ prepare()
 from smajax.control.loop_around import loop_around  # noqa: E402
 from smajax.core.files import json_text, replace  # noqa: E402
 from smajax.core.operating_system import processor_name  # noqa: E402
-from smajax.export.compiled import DOUBLE, SINGLE  # noqa: E402
 from smajax.export.from_files import plant_source  # noqa: E402
+from smajax.export.single_precision import DOUBLE, SINGLE  # noqa: E402
 from smajax.model.rigs import arm, dead_weight  # noqa: E402
 from smajax.simulation.compiled import simulate_compiled  # noqa: E402
 from studies.exported_code.built import commands, open_loop  # noqa: E402

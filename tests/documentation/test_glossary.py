@@ -107,6 +107,7 @@ PLAIN = set(
         "doctor",
         "drive",
         "dropped",
+        "arithmetic",
         "export",
         "fmi",
         "to",

@@ -8,6 +8,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -19,9 +20,9 @@ from smajax.control.loop_dataset import Loop
 from smajax.control.measured_state import Sensor
 from smajax.control.presets import CONTROLLERS
 from smajax.control.reference import clock, sine, steps
-from smajax.export.compiled import DOUBLE, SINGLE
 from smajax.export.controller import SHORT, check_reads, controller_block
 from smajax.export.errors import ExportError
+from smajax.export.single_precision import DOUBLE, ENOUGH, SINGLE, measured, single_build
 from smajax.export.source import CSource, c_source
 from smajax.model.presets import build
 from smajax.model.rigs import arm
@@ -39,6 +40,11 @@ def source_of(loop: Loop, controller: str, delay: int = 0) -> CSource:
     return c_source(
         lambda: controller_block(loop.system, loop.controller, loop.estimator, PERIOD, delay, NAME, known), NAME, SHORT
     )
+
+
+def rounded(readings: np.ndarray) -> np.ndarray:
+    """What single-precision numbers hold of them."""
+    return readings.astype(np.float32).astype(float)
 
 
 def loop_and_readings(loop: Loop, number: int, delay: int, noise: float = 1e-4) -> tuple[Any, np.ndarray]:
@@ -88,9 +94,16 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Made]:
         return loop, source_of(loop, controller, delay)
 
     @cache
-    def of(controller: str, estimator: str | None, delay: int = 0, load: str = "arm", kind: str = DOUBLE) -> Made:
+    def of(
+        controller: str,
+        estimator: str | None,
+        delay: int = 0,
+        load: str = "arm",
+        kind: str = DOUBLE,
+        arithmetic: str = "",
+    ) -> Made:
         loop, text = source(load, controller, estimator, delay)
-        return loop, compiled_c(text, tmp_path_factory.mktemp("c"), kind, SANITIZED)
+        return loop, compiled_c(text, tmp_path_factory.mktemp("c"), kind, SANITIZED, arithmetic)
 
     return of
 
@@ -167,16 +180,58 @@ def test_a_controller_that_reads_states_needs_an_estimator():
         check_reads(source_of(loop_around(ARM, "sld"), "sld"), "`sld`", estimated=False)
 
 
-@needs_gcc
-@pytest.mark.parametrize(("controller", "estimator", "delay"), QUICK)
-def test_in_single_precision_commands_are_within_its_rounding(controller, estimator, delay, made):
-    """Of the double's at readings that both can hold: `printed` makes more of a reading's rounding than of its own (the study)."""
-    (loop, double), (_, single) = (made(controller, estimator, delay, kind=kind) for kind in (DOUBLE, SINGLE))
+def hold_single_against_double(
+    of: Callable[..., Made], case: tuple[Any, ...], arithmetic: str, load: str = "arm"
+) -> None:
+    """At readings that single precision holds: to 1e-5 of the largest; where the arithmetic is double, rounded commands and no more."""
+    controller, estimator, delay = case
+    loop, double = of(controller, estimator, delay, load)
+    _, single = of(controller, estimator, delay, load, SINGLE, arithmetic)
     run, readings = loop_and_readings(loop, 1, delay)
-    readings = readings.astype(np.float32).astype(float)
-    expected, found = (commands(make(), run, readings) for make in (double, single))
+    expected, found = (commands(make(), as_single(run), rounded(readings)) for make in (double, single))
     assert np.ptp(expected) > 1.0
     assert np.max(np.abs(found - expected)) < 1e-5 * np.max(np.abs(expected))
+    if arithmetic == DOUBLE:
+        np.testing.assert_array_equal(found, rounded(expected))
+
+
+def as_single(run: Any) -> Any:
+    """The run with the set points that single precision holds."""
+    return eqx.tree_at(lambda one: one.wanted, run, jax.tree.map(lambda one: rounded(np.asarray(one)), run.wanted))
+
+
+@needs_gcc
+@pytest.mark.parametrize("case", QUICK)
+def test_with_single_inputs_and_outputs_commands_are_the_doubles_rounded(case, made):
+    hold_single_against_double(made, case, DOUBLE)
+
+
+@pytest.mark.slow
+@needs_gcc
+@pytest.mark.parametrize("case", OTHERS)
+def test_so_they_are_of_every_other_pair(case, made):
+    hold_single_against_double(made, case, DOUBLE)
+
+
+@needs_gcc
+@pytest.mark.parametrize("case", [("vsc2", None, 0), *QUICK])
+def test_in_single_arithmetic_these_commands_are_within_its_rounding(case, made):
+    """`printed` makes more of a reading's rounding than of its own (the study)."""
+    hold_single_against_double(made, case, SINGLE)
+
+
+def test_single_arithmetic_is_what_was_measured_to_be_enough_for_every_loop():
+    assert single_build("vsc2", "", 0.01).arithmetic == SINGLE
+    assert single_build("vsc2", "", 0.001).arithmetic == DOUBLE  # a shorter period than was measured
+    for known, found in measured().items():
+        assert single_build(*known, 0.01).arithmetic == (SINGLE if found.largest < ENOUGH else DOUBLE)
+    asked, unknown = single_build("sld", "model", 0.01, SINGLE), single_build("of my own", "", 0.01)
+    assert asked.arithmetic == SINGLE
+    assert asked.measured is not None
+    assert asked.measured.within < 1.0
+    assert f"in {100 * asked.measured.within:.4g} % of 10,000 closed loops" in asked.accuracy()
+    assert unknown.arithmetic == DOUBLE
+    assert unknown.accuracy() == "How far results of single-precision arithmetic are off was not measured."
 
 
 @needs_gcc

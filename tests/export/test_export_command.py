@@ -66,6 +66,28 @@ def test_gains_become_a_header_and_a_source(tmp_path):
     assert sorted(one.suffix for one in (tmp_path / "bench").iterdir()) == [".c", ".h"]
 
 
+def test_the_arithmetic_of_a_single_build_is_said_with_what_was_measured(tmp_path):
+    gains = gains_file(tmp_path)
+    for words, macro, said in (
+        (
+            (),
+            0,
+            "inputs and outputs single, arithmetic double. With single-precision arithmetic commands were within 1e-05",
+        ),
+        (
+            ("--arithmetic", "single"),
+            1,
+            "all of it single. With single-precision arithmetic commands were within 1e-05",
+        ),
+    ):
+        code, printed, _ = run(gains, "--to", "c", "--out", tmp_path / f"bench{macro}", *words)
+        assert code == 0
+        header = next((tmp_path / f"bench{macro}").glob("*.h")).read_text()
+        assert f"_SINGLE_ARITHMETIC {macro}\n" in header
+        assert "30,000 closed loops with a period of 10 ms" in " ".join(header.replace("\n *", " ").split())
+        assert f"with -DSMAJAX_SINGLE=1: {said}" in printed
+
+
 def test_what_cannot_be_exported_is_named_and_nothing_is_written(tmp_path):
     gains, out = gains_file(tmp_path, "sld"), tmp_path / "bench"
     with pytest.raises(
@@ -100,6 +122,8 @@ def test_a_write_that_fails_leaves_what_was_there(tmp_path, monkeypatch):
         (["--to", "matlab"], "`c` or `fmu`, not `matlab`"),
         (["--to", "fmu", "--fmi", "1.0"], "`2.0` or `3.0`, not `1.0`"),
         (["--to", "c", "--estimator", "perfect"], "no filter 'perfect'"),
+        (["--to", "c", "--arithmetic", "half"], "`single` or `double`, not `half`"),
+        (["--to", "fmu", "--arithmetic", "single"], "an FMU computes in double precision"),
     ],
 )
 def test_options_that_make_no_sense_are_refused(tmp_path, words, said):

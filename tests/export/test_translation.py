@@ -15,8 +15,9 @@ from hypothesis import HealthCheck, given, settings
 from jax import lax
 
 from smajax.export.block import Block, Quantity
-from smajax.export.compiled import DOUBLE, SINGLE, compiled
+from smajax.export.compiled import compiled
 from smajax.export.errors import NoTranslation
+from smajax.export.single_precision import DOUBLE, SINGLE
 from tests.helpers.c_programs import compiled_c, needs_gcc, source_of
 
 NAMES = ("a", "b", "c")
@@ -44,7 +45,7 @@ def agree(function: Callable[..., Any], folder: Path, kind: str = DOUBLE, rows: 
     """Over rows of random numbers, the state carried on."""
     outputs = int(np.prod(jax.eval_shape(function, *[jnp.zeros(())] * 3, jnp.zeros(64)).shape))
     source = source_of(lambda: block_of(function, outputs))
-    instance = compiled_c(source, folder, kind)()
+    instance = compiled_c(source, folder, kind, arithmetic=kind)()
     instance.run({})
     x, function = jnp.zeros(outputs), jax.jit(function)
     tolerance = 1e-12 if kind == DOUBLE else 2e-5

@@ -16,6 +16,9 @@ if TYPE_CHECKING:
     from smajax.model.system import System
 
 
+ARITHMETIC = {"single": "float", "double": "double"}  # option -> C's type
+
+
 # More than 8 parameters: typer reads the options from them.
 @with_plant_options
 def export(
@@ -41,6 +44,13 @@ def export(
     source_only: Annotated[
         bool, typer.Option("--source-only", help="an FMU without a binary, for the importing tool to compile")
     ] = False,
+    arithmetic: Annotated[
+        str | None,
+        typer.Option(
+            help="of C that is compiled with single-precision inputs and outputs: `single` or `double`; default: single where that was measured to "
+            "change no command by 1e-5 of the largest"
+        ),
+    ] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="replace files of the same name")] = False,
     json_out: Json = False,
 ) -> None:
@@ -64,11 +74,15 @@ def export(
         raise typer.BadParameter(f"`c` or `fmu`, not `{to}`.", param_hint="--to")
     if fmi not in ("2.0", "3.0"):
         raise typer.BadParameter(f"`2.0` or `3.0`, not `{fmi}`.", param_hint="--fmi")
+    if arithmetic not in (None, *ARITHMETIC):
+        raise typer.BadParameter(f"`single` or `double`, not `{arithmetic}`.", param_hint="--arithmetic")
+    if arithmetic is not None and to == "fmu":
+        raise typer.BadParameter("of `--to c`; an FMU computes in double precision.", param_hint="--arithmetic")
     stem = file.parent.resolve().name if file.stem in ("model", "gains") and file.parent.name else file.stem
     path = out or (Path(f"{stem}.fmu") if to == "fmu" else Path(f"{stem}_c"))
     name = identifier(path.stem if to == "fmu" else stem)
     check_free([path] if to == "fmu" else c_paths(path, name), overwrite)
-    source = _source(file, plant, name, estimator, period, delay, tolerance)
+    source = _source(file, plant, name, estimator, period, delay, tolerance, arithmetic)
     if to == "fmu":
         written = [write_fmu(source, path, fmi, not source_only, overwrite)]
     else:
@@ -76,9 +90,10 @@ def export(
     if json_out:
         typer.echo(json_text({**record(source), "files": [str(one) for one in written]}), nl=False)
         return
-    _print(source, written)
+    _print(source, written, to)
 
 
+# More than 8 parameters: the command's options, handed on.
 def _source(
     file: Path,
     plant: PlantOptions,
@@ -87,18 +102,27 @@ def _source(
     period: float | None,
     delay: int | None,
     tolerance: float,
+    arithmetic: str | None,
 ) -> CSource:
     """Raises typer.BadParameter for options of the other kind of file, ExportError for what cannot be exported."""
     from smajax.control.gains_file import GainsFileError
     from smajax.export.from_files import controller_source, plant_source
 
+    kind = None if arithmetic is None else ARITHMETIC[arithmetic]
     if file.suffix == ".json":
         if period is not None and period <= 0.0:
             raise typer.BadParameter(f"more than 0 s, not {period:g} s.", param_hint="--period")
         system = plant.system()
         try:
             return controller_source(
-                system, file, name, estimator=estimator, period=period, delay=delay, own_limit=plant.gives_limit
+                system,
+                file,
+                name,
+                estimator=estimator,
+                period=period,
+                delay=delay,
+                own_limit=plant.gives_limit,
+                arithmetic=kind,
             )
         except GainsFileError as error:
             raise typer.BadParameter(str(error), param_hint="FILE") from None
@@ -111,7 +135,7 @@ def _source(
             param_hint="FILE",
         )
     system, title = _model(file, plant.values or [])
-    return plant_source(system, name, title, tolerance)
+    return plant_source(system, name, title, tolerance, kind or "double")
 
 
 def _model(file: Path, values: list[str]) -> tuple[System, str]:
@@ -125,9 +149,9 @@ def _model(file: Path, values: list[str]) -> tuple[System, str]:
         return with_values(kept.system, texts("--set", values, EXAMPLE)), f"Model of an actuator: {kept.title}"
 
 
-def _print(source: CSource, written: list[Path]) -> None:
+def _print(source: CSource, written: list[Path], to: str) -> None:
     """What was written, for a terminal."""
-    from smajax.export.compiled import DOUBLE, SINGLE
+    from smajax.export.single_precision import DOUBLE, SINGLE
 
     block, sizes = source.block, source.state_bytes
     every = "" if block.period is None else f", called every {1e3 * block.period:g} ms"
@@ -136,5 +160,9 @@ def _print(source: CSource, written: list[Path]) -> None:
         typer.echo(f"  {label}: {', '.join(f'{one.name} [{one.unit}]' for one in many)}")
     typer.echo(f"  parameters: {len(source.parameters)}")
     typer.echo(f"  state: {sizes[DOUBLE]} bytes in double precision, {sizes[SINGLE]} in single")
+    if to == "c":
+        single = source.single_build
+        kept = "all of it single" if single.arithmetic == SINGLE else "inputs and outputs single, arithmetic double"
+        typer.echo(f"  with -DSMAJAX_SINGLE=1: {kept}. {single.accuracy()}")
     for path in written:
         typer.echo(f"Written: {path.resolve()}")
