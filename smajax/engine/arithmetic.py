@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from smajax.engine.composed import composed
 from smajax.engine.text import Lane, Text, Unsupported, scalar_type
 
 Operation = Callable[..., Lane]
@@ -149,40 +150,6 @@ def _estimated(text: Text, one: Lane, kind: str) -> Lane:
     return text.lane(f"call {of} @{name}({of} {one.name}, {of} zeroinitializer, {mask} -1)", one.dtype)
 
 
-def _whole_power(text: Text, out: str, one: Lane, *, power: int, **_: Any) -> Lane:
-    result: Lane | None = None
-    square, left = reciprocal(text, one) if power < 0 else one, abs(power)
-    while left:
-        if left & 1:
-            result = square if result is None else _times(text, result, square)
-        left >>= 1
-        square = _times(text, square, square) if left else square
-    return result or text.constant(1, out)
-
-
-def _polynomial(text: Text, out: str, one: Lane, *coefficients: Lane, **_: Any) -> Lane:
-    """c_0 + c_1 x + ... (an operation since JAX 0.12)."""
-    result = coefficients[-1]
-    for coefficient in reversed(coefficients[:-1]):
-        result = _binary("fadd", "add")(text, out, _times(text, result, one), coefficient)
-    return result
-
-
-def _square(text: Text, out: str, one: Lane, **_: Any) -> Lane:
-    return _times(text, one, one)
-
-
-def _one_less_square(text: Text, out: str, one: Lane, **_: Any) -> Lane:
-    """1 - x^2 as (1 + x)(1 - x), exact where x is near 1 (an operation since JAX 0.12)."""
-    unit = text.constant(1, out)
-    above, below = _binary("fadd", "add")(text, out, unit, one), _binary("fsub", "sub")(text, out, unit, one)
-    return _times(text, above, below)
-
-
-def _inverse_root(text: Text, out: str, one: Lane, **_: Any) -> Lane:
-    return reciprocal(text, text.call("llvm.sqrt", out, one.name))
-
-
 def _grown_less_one(text: Text, out: str, one: Lane, **_: Any) -> Lane:
     """exp(x) - 1 = 2 sinh(x/2) exp(x/2): exact where x is small; -1 where the product would be nothing times infinity."""
     half = _times(text, one, text.constant(0.5, out))
@@ -228,12 +195,6 @@ def _same_bits(text: Text, out: str, one: Lane, **_: Any) -> Lane:
     if scalar_type(out) == scalar_type(one.dtype):
         return Lane(one.name, out)
     return text.lane(f"bitcast {text.vector(one.dtype)} {one.name} to {text.vector(out)}", out)
-
-
-def _sigmoid(text: Text, out: str, one: Lane, **_: Any) -> Lane:
-    grown = text.call("llvm.exp", out, _negative(text, out, one).name)
-    below = _binary("fadd", None)(text, out, text.constant(1, out), grown)
-    return reciprocal(text, below)
 
 
 def _rounded(text: Text, out: str, one: Lane, *, rounding_method: Any, **_: Any) -> Lane:
@@ -306,23 +267,7 @@ def select(text: Text, out: str, which: Lane, *cases: Lane, **_: Any) -> Lane:
     return result
 
 
-def _clamped(text: Text, out: str, low: Lane, one: Lane, high: Lane, **_: Any) -> Lane:
-    return _extreme(False)(text, out, _extreme(True)(text, out, one, low), high)
-
-
-def _same(text: Text, out: str, one: Lane, **_: Any) -> Lane:
-    return one
-
-
-def _as_precise(text: Text, out: str, one: Lane, exponent_bits: int, mantissa_bits: int, **_: Any) -> Lane:
-    """What a derivative says of numbers that it computes again: no more digits than they had."""
-    whole = np.finfo(out)
-    if exponent_bits < whole.nexp or mantissa_bits < whole.nmant:
-        raise Unsupported(f"numbers of {exponent_bits} and {mantissa_bits} bits")
-    return one
-
-
-ELEMENTWISE: Mapping[str, Operation] = {
+BASIC: Mapping[str, Operation] = {
     "add": _binary("fadd", "add"),
     "add_any": _binary("fadd", "add"),
     "sub": _binary("fsub", "sub"),
@@ -338,7 +283,6 @@ ELEMENTWISE: Mapping[str, Operation] = {
     "ceil": _function("ceil"),
     "round": _rounded,
     "sqrt": _function("sqrt"),
-    "rsqrt": _inverse_root,
     "exp": _function("exp"),
     "exp2": _function("exp2"),
     "expm1": _grown_less_one,
@@ -355,11 +299,6 @@ ELEMENTWISE: Mapping[str, Operation] = {
     "tanh": _function("tanh"),
     "pow": _function("pow"),
     "atan2": _function("atan2"),
-    "logistic": _sigmoid,
-    "integer_pow": _whole_power,
-    "polynomial": _polynomial,
-    "square": _square,
-    "one_minus_square": _one_less_square,
     "is_finite": _finite,
     "eq": _compare("oeq", "eq"),
     "ne": _compare("une", "ne"),
@@ -376,10 +315,6 @@ ELEMENTWISE: Mapping[str, Operation] = {
     "shift_right_arithmetic": _shifted("ashr"),
     "bitcast_convert_type": _same_bits,
     "select_n": select,
-    "clamp": _clamped,
     "convert_element_type": _converted,
-    "reduce_precision": _as_precise,
-    "stop_gradient": _same,
-    "copy": _same,
-    "copy_p": _same,
 }
+ELEMENTWISE: Mapping[str, Operation] = {**BASIC, **composed(BASIC, Text.constant)}

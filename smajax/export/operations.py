@@ -1,7 +1,8 @@
 """Arithmetic on single numbers: one operation of a traced program -> the C of it.
 
 NaN goes through `max`, `min` and comparisons as JAX has it. Functions of math.h are written `F(name)`, which is the float's in single
-precision.
+precision. The native engine has the same operations as machine code (`engine.arithmetic`): there a number is a vector of lanes and what it lacks of
+JAX is another list. What is made of several operations stands once, in `engine.composed`.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from smajax.engine.composed import composed
 from smajax.export.errors import NoTranslation
 from smajax.export.statements import Number, Writer, literal
 
@@ -163,39 +165,6 @@ def select(writer: Writer, out: str, which: Number, *cases: Number, **_: Any) ->
     return result
 
 
-def _whole_power(writer: Writer, out: str, one: Number, *, power: int, **_: Any) -> Number:
-    result: Number | None = None
-    square, left = one, abs(power)
-    while left:
-        if left & 1:
-            result = square if result is None else times(writer, out, result, square)
-        left >>= 1
-        square = times(writer, out, square, square) if left else square
-    result = result or literal(1, out)
-    return divided(writer, out, literal(1, out), result) if power < 0 else result
-
-
-def _polynomial(writer: Writer, out: str, one: Number, *coefficients: Number, **_: Any) -> Number:
-    result = coefficients[-1]
-    for coefficient in reversed(coefficients[:-1]):
-        result = _add(writer, out, times(writer, out, result, one), coefficient)
-    return result
-
-
-def _one_less_square(writer: Writer, out: str, one: Number, **_: Any) -> Number:
-    unit = literal(1, out)
-    return times(writer, out, _add(writer, out, unit, one), _subtract(writer, out, unit, one))
-
-
-def _sigmoid(writer: Writer, out: str, one: Number, **_: Any) -> Number:
-    grown = writer.assign(f"F(exp)({negative(writer, out, one).text})", out, "call")
-    return divided(writer, out, literal(1, out), _add(writer, out, literal(1, out), grown))
-
-
-def _inverse_root(writer: Writer, out: str, one: Number, **_: Any) -> Number:
-    return divided(writer, out, literal(1, out), writer.assign(f"F(sqrt)({one.text})", out, "call"))
-
-
 def _rounded(writer: Writer, out: str, one: Number, *, rounding_method: Any, **_: Any) -> Number:
     return writer.assign(f"F({'rint' if int(rounding_method) == 1 else 'round'})({one.text})", out, "call")
 
@@ -215,27 +184,11 @@ def _converted(writer: Writer, out: str, one: Number, **_: Any) -> Number:
     return writer.assign(f"({type_of(out)}){one.text}", out)
 
 
-def _as_precise(writer: Writer, out: str, one: Number, exponent_bits: int, mantissa_bits: int, **_: Any) -> Number:
-    whole = np.finfo(out)
-    if exponent_bits < whole.nexp or mantissa_bits < whole.nmant:
-        raise NoTranslation(f"numbers of {exponent_bits} and {mantissa_bits} bits")
-    return one
-
-
 def _finite(writer: Writer, out: str, one: Number, **_: Any) -> Number:
     return writer.assign(f"(isfinite({one.text}) != 0)", "bool", "compare")
 
 
-def _clamped(writer: Writer, out: str, low: Number, one: Number, high: Number, **_: Any) -> Number:
-    above = ELEMENTWISE["max"](writer, out, one, low)
-    return ELEMENTWISE["min"](writer, out, above, high)
-
-
-def _same(writer: Writer, out: str, one: Number, **_: Any) -> Number:
-    return one
-
-
-ELEMENTWISE: Mapping[str, Operation] = {
+BASIC: Mapping[str, Operation] = {
     "add": _add,
     "add_any": _add,
     "sub": _subtract,
@@ -252,7 +205,6 @@ ELEMENTWISE: Mapping[str, Operation] = {
     "round": _rounded,
     "sqrt": _called("sqrt"),
     "cbrt": _called("cbrt"),
-    "rsqrt": _inverse_root,
     "exp": _called("exp"),
     "exp2": _called("exp2"),
     "expm1": _called("expm1"),
@@ -276,11 +228,6 @@ ELEMENTWISE: Mapping[str, Operation] = {
     "pow": _called("pow"),
     "atan2": _called("atan2"),
     "nextafter": _called("nextafter"),
-    "logistic": _sigmoid,
-    "integer_pow": _whole_power,
-    "polynomial": _polynomial,
-    "square": lambda writer, out, one, **_: times(writer, out, one, one),
-    "one_minus_square": _one_less_square,
     "is_finite": _finite,
     "eq": _compared("=="),
     "ne": _compared("!="),
@@ -293,10 +240,6 @@ ELEMENTWISE: Mapping[str, Operation] = {
     "xor": _logical("!=", "^"),
     "not": _not,
     "select_n": select,
-    "clamp": _clamped,
     "convert_element_type": _converted,
-    "reduce_precision": _as_precise,
-    "stop_gradient": _same,
-    "copy": _same,
-    "copy_p": _same,
 }
+ELEMENTWISE: Mapping[str, Operation] = {**BASIC, **composed(BASIC, lambda _, value, dtype: literal(value, dtype))}

@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import gc
 import json
+import os
 import sys
 import tempfile
+import time
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +25,6 @@ from smajax.control.closed_loop import simulate_closed_loop  # noqa: E402
 from smajax.control.loop_around import loop_around  # noqa: E402
 from smajax.control.reference import clock, steps  # noqa: E402
 from smajax.core.files import json_text, replace  # noqa: E402
-from smajax.core.operating_system import peak_memory  # noqa: E402
 from smajax.engine import program  # noqa: E402
 from smajax.export.fmu import VERSIONS, fmu  # noqa: E402
 from smajax.export.from_files import plant_source  # noqa: E402
@@ -37,7 +38,7 @@ from studies.exported_code.slave import Slave  # noqa: E402
 from studies.source.unloading import INITIAL_MASS, VOLTS  # noqa: E402
 
 RESULTS = Path(__file__).with_name("fmpy.json")
-TOLERANCE, CLOCK, MANY = 1e-5, 0.005, 10_000
+TOLERANCE, CLOCK, MANY, ROUNDS = 1e-5, 0.005, 10_000, 3
 
 
 def written(source: CSource, version: str, folder: Path) -> Path:
@@ -188,23 +189,53 @@ def checked(folder: Path) -> list[dict[str, Any]]:
     return rows
 
 
+def resident() -> int:
+    """Bytes of this process in memory now (Linux)."""
+    gc.collect()
+    pages = int(Path("/proc/self/statm").read_text("ascii").split()[1])
+    return pages * os.sysconf("SC_PAGE_SIZE")
+
+
 def memory(folder: Path) -> list[dict[str, Any]]:
-    """Largest memory of this process after a tenth of `MANY` instances made, stepped, saved, restored and freed, and after all."""
+    """`MANY` instances that exist at once, each made, initialised, stepped, saved, restored, stepped again, terminated and freed; all of it `ROUNDS` times.
+
+    Their states are compared, so that instances that shared anything would show.
+    """
     rows = []
     for version in VERSIONS:
-        path, held = written(plant_source(arm()), version, folder), []
-        for k in range(MANY):
-            one = Slave(path, path.parent).begin(voltage=7.3)
-            one.step(0.0, 0.02)
-            saved = one.state()
-            one.back_to(saved)
-            one.free(saved)
-            one.close()
-            if k + 1 in (MANY // 10, MANY):
-                gc.collect()
-                held.append(peak_memory())
-        rows.append({"fmi": version, "instances": MANY, "bytes_after_a_tenth": held[0], "bytes_after_all": held[1]})
-        print(rows[-1], flush=True)
+        path = written(plant_source(arm()), version, folder)
+        Slave(path, path.parent).begin(voltage=7.3).close()  # what is loaded once
+        row: dict[str, Any] = {
+            "fmi": version,
+            "instances": MANY,
+            "before": resident(),
+            "all_alive": [],
+            "all_freed": [],
+        }
+        volts = np.linspace(5.0, 9.0, MANY)
+        begin = time.perf_counter()
+        for _ in range(ROUNDS):
+            alive = [Slave(path, path.parent).begin(voltage=float(volt)) for volt in volts]
+            for one in alive:
+                one.step(0.0, 0.02)
+            for one in alive:
+                saved = one.state()
+                one.step(0.02, 0.02)
+                ended = one.get("temperature")
+                one.back_to(saved)
+                one.step(0.02, 0.02)
+                assert one.get("temperature") == ended
+                one.free(saved)
+            warmth = [one.get("temperature")[0] for one in alive]
+            row["all_alive"].append(resident())
+            for one in alive:
+                one.close()
+            del alive, one
+            row["all_freed"].append(resident())
+        row["seconds"] = time.perf_counter() - begin
+        row["warmer_with_more_volts"] = bool(np.all(np.diff(warmth) > 0.0))
+        rows.append(row)
+        print(row, flush=True)
     return rows
 
 
