@@ -242,4 +242,13 @@ BASIC: Mapping[str, Operation] = {
     "select_n": select,
     "convert_element_type": _converted,
 }
-ELEMENTWISE: Mapping[str, Operation] = {**BASIC, **composed(BASIC, lambda _, value, dtype: literal(value, dtype))}
+MADE = composed(BASIC, lambda _, value, dtype: literal(value, dtype))
+
+
+def _whole_power(writer: Writer, out: str, one: Number, *, power: int, **_: Any) -> Number:
+    """Divides last, which rounds once less; machine code takes powers of 1/x, as its division is an estimate of that."""
+    result: Number = MADE["integer_pow"](writer, out, one, power=abs(power))
+    return divided(writer, out, literal(1, out), result) if power < 0 else result
+
+
+ELEMENTWISE: Mapping[str, Operation] = {**BASIC, **MADE, "integer_pow": _whole_power}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import subprocess
 from collections.abc import Callable
 from functools import cache
@@ -280,3 +281,24 @@ def test_the_bench_of_the_how_to_page_runs_in_twenty_lines(single, tmp_path):
     sanitizers = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all", f"-DSMAJAX_SINGLE={single}"]
     subprocess.run(["gcc", *STRICT, *sanitizers, "board.c", "pid.c", "-o", "bench", "-lm"], cwd=tmp_path, check=True)
     subprocess.run(["./bench"], cwd=tmp_path, check=True, timeout=20)
+
+
+@needs_gcc
+def test_the_files_around_a_controller_of_the_simulink_page_call_it(tmp_path):
+    page = (Path(__file__).parents[2] / "docs" / "how-to" / "to-simulink.md").read_text("utf-8")
+    pid = loop_around(SPRING, "pid").controller
+    source = c_source(lambda: controller_block(SPRING, pid, None, PERIOD, 0, "pid"), "pid", SHORT)
+    files = {name: page.partition(f'```c title="{name}"\n')[2].partition("```")[0] for name in ("loop.h", "loop.c")}
+    for name, text in {**files, "pid.h": source.header, "pid.c": source.source}.items():
+        (tmp_path / name).write_text(text)
+    subprocess.run(
+        ["gcc", *STRICT, "-fPIC", "-shared", "loop.c", "pid.c", "-o", "loop.so", "-lm"], cwd=tmp_path, check=True
+    )
+    library = ctypes.CDLL(str(tmp_path / "loop.so"))
+    library.loop_call.restype = ctypes.c_double
+    library.loop_start()
+    direct = compiled_c(source, tmp_path)()
+    found = [library.loop_call(ctypes.c_double(reading), ctypes.c_double(0.004)) for reading in (0.0, 1e-4, 3e-4)]
+    expected = [direct.run({"reading": reading, "set_point": 0.004})["command"] for reading in (0.0, 1e-4, 3e-4)]
+    assert found == expected
+    assert min(found) > 0.0
