@@ -10,7 +10,6 @@ import json
 import os
 import sys
 import tempfile
-import time
 from pathlib import Path
 from typing import Any
 
@@ -213,7 +212,6 @@ def memory(folder: Path) -> list[dict[str, Any]]:
             "all_freed": [],
         }
         volts = np.linspace(5.0, 9.0, MANY)
-        begin = time.perf_counter()
         for _ in range(ROUNDS):
             alive = [Slave(path, path.parent).begin(voltage=float(volt)) for volt in volts]
             for one in alive:
@@ -232,7 +230,6 @@ def memory(folder: Path) -> list[dict[str, Any]]:
                 one.close()
             del alive, one
             row["all_freed"].append(resident())
-        row["seconds"] = time.perf_counter() - begin
         row["warmer_with_more_volts"] = bool(np.all(np.diff(warmth) > 0.0))
         rows.append(row)
         print(row, flush=True)
