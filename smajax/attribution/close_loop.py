@@ -256,7 +256,8 @@ def unknown_terms_of(context: Context, outcome: Outcome, verdict: Verdict) -> tu
     if lacking is None:
         missing = verdict in (Verdict.PARTLY_EXPLAINED, Verdict.NOT_IN_LIBRARY) and not outcome.one_outlier
         lacking = unknown_terms(setting, outcome.final) if missing else Lacking()
-    if lacking.terms and not setting.predicts(lacking.terms[0].left_out_after):
+    left_out = lacking.terms[0].left_out_after if lacking.terms else None
+    if left_out is not None and not setting.predicts(left_out):
         return Lacking(), ()
     return lacking, outcome.superseded
 

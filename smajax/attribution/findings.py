@@ -276,7 +276,7 @@ class UnknownTerm:
     log_odds: float  # of the model with it over the one without
     score_gain: float
     left_out_before: float
-    left_out_after: float
+    left_out_after: float | None  # None of a term that is less likely than others by far
     held_out_before: float | None  # on the held-out runs, where the term was asked for that
     held_out_after: float | None
     at: np.ndarray  # states, (points,)

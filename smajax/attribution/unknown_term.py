@@ -35,7 +35,7 @@ from smajax.data.experiment.record import Prior
 from smajax.fit.levenberg_marquardt import FitSettings
 from smajax.fit.predicted import misfits
 from smajax.fit.problem import Problem
-from smajax.fit.sensitivity import sensitivity
+from smajax.fit.sensitivity import Sensitivity, sensitivity
 from smajax.fit.starts import nearest
 from smajax.fit.uncertainty import covariance_of, uncertainty
 from smajax.model.effects.candidate import PRIOR_ODDS
@@ -164,24 +164,31 @@ def learnt(setting: Search, fits: TermFits) -> Lacking:
     programs = _programs(fits.joint, fits.none.effects, [model.effects[-1] for model in fitted])
     carried = {term: own for own, terms in programs for term in terms}
     present = predicting(fits.joint, fits.none, error, noise, next(iter(carried.values())))
-    models = [predicting(fits.joint, model, error, noise, carried[model.effects[-1]]) for model in fitted]
     log_odds = [fits.log_odds(one, error) for one in fitted]
-    # One run fits too well to name anything: there is none to predict.
-    several = len(present.left_out) > 1
-    enough = log_odds[0] > 0.0 and several and models[0].left_out_rmse < present.left_out_rmse
-    held_out = None
-    if enough and search.held_out is not None:
-        without, with_it = search.held_out_residuals(search.candidates, [present.values, models[0].values])
-        held_out = pooled_rms(without), pooled_rms(with_it)
-        enough = compared(with_it, without, setting.config) != "worse"
+    likeliest = fitted[0]
     alike = [
         model.effects[-1]
-        for model, odds in zip(models[1:], log_odds[1:], strict=True)
+        for model, odds in zip(fitted[1:], log_odds[1:], strict=True)
         if odds > max(0.0, log_odds[0] - INDISTINGUISHABLE)
     ]
+    # The runs are left out of what is named, or may be in its place: refits take as long as the fits.
+    predict = {
+        model.effects[-1]: predicting(fits.joint, model, error, noise, carried[model.effects[-1]]).left_out_rmse
+        for model in fitted
+        if model is likeliest or model.effects[-1] in alike
+    }
+    # One run fits too well to name anything: there is none to predict.
+    several = len(present.left_out) > 1
+    enough = log_odds[0] > 0.0 and several and predict[likeliest.effects[-1]] < present.left_out_rmse
+    held_out = None
+    if enough and search.held_out is not None:
+        without, with_it = search.held_out_residuals(search.candidates, [present.values, likeliest.values])
+        held_out = pooled_rms(without), pooled_rms(with_it)
+        enough = compared(with_it, without, setting.config) != "worse"
     terms: list[UnknownTerm] = []
-    for model, odds in zip(models, log_odds, strict=True):
-        term = _learnt(search, fits.sought, model, present, fits.gains[model.effects[-1]], odds)
+    for model, odds in zip(fitted, log_odds, strict=True):
+        left_out = present.left_out_rmse, predict.get(model.effects[-1])
+        term = _learnt(search, fits.sought, model, left_out, fits.gains[model.effects[-1]], odds)
         if not terms:
             before, after = held_out if held_out is not None else (None, None)
             term = dataclasses.replace(
@@ -192,7 +199,7 @@ def learnt(setting: Search, fits: TermFits) -> Lacking:
                 held_out_after=after,
             )
         terms.append(term)
-    return Lacking(tuple(terms), fitted[0] if enough else None)
+    return Lacking(tuple(terms), likeliest if enough else None)
 
 
 def joint_with_terms(setting: Search, search: Search, final: Model) -> JointParameters:
@@ -292,8 +299,8 @@ def _programs(
 def _learnt(
     search: Search,
     found: Sought,
-    model: Model,
-    present: Model,
+    model: FittedModel,
+    left_out: tuple[float, float | None],
     gain: float,
     log_odds: float,
 ) -> UnknownTerm:
@@ -308,7 +315,10 @@ def _learnt(
     centre = design(share).mean(axis=0) if term.only_changes else np.zeros(len(own))
     grid = np.linspace(0.0, 1.0, search.config.term_points)
     basis = design(grid) - centre
-    covariance, held_ones = (_covariance(search, model, own, names) * scale**2 for names in ((*others, *own), own))
+    sensitive = sensitivity(search.problem, model.values, [*others, *own])
+    covariance, held_ones = (
+        _covariance(search, sensitive, model.values, own, names) * scale**2 for names in ((*others, *own), own)
+    )
     error, error_held = (
         np.sqrt(np.maximum(np.einsum("ni,ij,nj->n", basis, one, basis), 0.0)) for one in (covariance, held_ones)
     )
@@ -330,8 +340,8 @@ def _learnt(
         indistinguishable=(),
         log_odds=log_odds,
         score_gain=gain,
-        left_out_before=present.left_out_rmse,
-        left_out_after=model.left_out_rmse,
+        left_out_before=left_out[0],
+        left_out_after=left_out[1],
         held_out_before=None,
         held_out_after=None,
         at=low + width * grid,
@@ -352,14 +362,15 @@ def _mean(curve: np.ndarray, share: np.ndarray) -> float:
     return float(np.interp(share, np.linspace(0.0, 1.0, len(curve)), curve).mean())
 
 
-def _covariance(search: Search, model: Model, own: Sequence[str], names: Sequence[str]) -> np.ndarray:
+def _covariance(
+    search: Search, at: Sensitivity, values: np.ndarray, own: Sequence[str], names: Sequence[str]
+) -> np.ndarray:
     """Of the coefficients `own`, (K, K), in shares of the largest, where all of `names` are free.
 
     A coefficient at a bound is as open as before the runs.
     """
-    at = sensitivity(search.problem, model.values, names)
-    values = {name: float(model.values[search.problem.names.index(name)]) for name in names}
-    known = uncertainty(at, names, values, search.bounds)
+    fitted = {name: float(values[search.problem.names.index(name)]) for name in names}
+    known = uncertainty(at, names, fitted, search.bounds)
     determined, covariance = covariance_of(at, names, known)
     whole = search.config.term_prior_sigma**2 * np.eye(len(own))
     here = [(row, determined.index(name)) for row, name in enumerate(own) if name in determined]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import cast
 
 from smajax.attribution.findings import Findings, UnknownTerm
 from smajax.core.display_units import label
@@ -11,10 +12,12 @@ from smajax.report.narrative.values import error_text
 
 def comparison_sentence(findings: Findings, term: UnknownTerm) -> str:
     """How a term compares with none."""
-    text = (
-        f"{'likelier' if term.log_odds > 0.0 else 'less likely'} than none by {abs(term.log_odds):.1f} in log odds; error on runs "
-        f"left out {error_text(findings, term.left_out_before)} -> {error_text(findings, term.left_out_after)}"
-    )
+    text = f"{'likelier' if term.log_odds > 0.0 else 'less likely'} than none by {abs(term.log_odds):.1f} in log odds"
+    if term.left_out_after is not None:
+        text += (
+            f"; error on runs left out {error_text(findings, term.left_out_before)} -> "
+            f"{error_text(findings, term.left_out_after)}"
+        )
     before, after = term.held_out_before, term.held_out_after
     if before is not None and after is not None and after >= before:
         text += f"; but on the held-out runs {error_text(findings, before)} -> {error_text(findings, after)}"
@@ -30,7 +33,7 @@ def unknown_sentences(findings: Findings) -> tuple[str, ...]:
         return (_none_named(findings, best),)
     brought = (
         f"error on runs left out {error_text(findings, best.left_out_before)} before, "
-        f"{error_text(findings, best.left_out_after)} with it"
+        f"{error_text(findings, cast(float, best.left_out_after))} with it"
     )
     if best.held_out_before is not None and best.held_out_after is not None:
         held_out = (error_text(findings, one) for one in (best.held_out_before, best.held_out_after))
