@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from smajax.fit.base_model import base_model as base_model
     from smajax.fit.identify import identify as identify
     from smajax.fit.predict import predict as predict
+    from smajax.fit.uncertain_presets import with_uncertain_presets as with_uncertain_presets
     from smajax.model import contracts as contracts
     from smajax.model import effects as effects
     from smajax.model import presets as presets
@@ -132,6 +133,7 @@ NAMES = {
     "status_summary": ("smajax.simulation.batch.run_batch", "status_summary"),
     "tune_in_folder": ("smajax.control.tune.tuning_folder", "tune_in_folder"),
     "under_law": ("smajax.model.wire.laws", "under_law"),
+    "with_uncertain_presets": ("smajax.fit.uncertain_presets", "with_uncertain_presets"),
     "write_identified": ("smajax.report.identify_page", "write_identified"),
     "write_prediction": ("smajax.report.predict_page", "write_prediction"),
     "write_report": ("smajax.report.write", "write_report"),

@@ -32,7 +32,6 @@ from smajax.attribution.joint_stage import base_alone, search_by_evidence, searc
 from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.neutral import check_neutral
 from smajax.attribution.outlier_run import outlier_runs
-from smajax.attribution.preset_priors import visible
 from smajax.attribution.record_error import OutlierRun, RecordError
 from smajax.attribution.refusal import refuse_keys_of_identify
 from smajax.attribution.saved_model import fit_run_states, saved_model
@@ -44,6 +43,7 @@ from smajax.core.provenance import made_with
 from smajax.core.result_cache import ResultCache
 from smajax.data.experiment.record import Experiment
 from smajax.fit.levenberg_marquardt import Fit
+from smajax.fit.preset_priors import visible
 from smajax.fit.sensitivity import sensitivity
 from smajax.fit.uncertainty import identifiability
 from smajax.simulation.steppers import Integration

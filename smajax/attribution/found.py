@@ -13,11 +13,11 @@ from smajax.attribution.joint_parameters import JointParameters
 from smajax.attribution.leave_one_run_out import jackknife_error
 from smajax.attribution.model_fits import Evidence, Model, Search
 from smajax.attribution.nuisance_grid import scores_at
-from smajax.attribution.preset_priors import fitted_priors, preset_priors
 from smajax.attribution.prior_finding import PriorFinding
 from smajax.core.parameters import parameter_values, parameters
 from smajax.data.experiment.record import DeclaredPriors, Prior
 from smajax.fit.base_model import base_model
+from smajax.fit.preset_priors import fitted_priors, preset_priors
 from smajax.fit.problem import Problem
 from smajax.fit.sensitivity import Sensitivity, sensitivity
 from smajax.fit.uncertainty import Uncertainty, uncertainty

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from smajax.attribution.preset_priors import fitted_priors, preset_bounds, preset_priors
 from smajax.attribution.run_extent import extent_of
 from smajax.core.parameters import parameter_values, parameters
 from smajax.data.experiment.record import Experiment, Run
@@ -13,6 +12,7 @@ from smajax.fit.base_model import base_model
 from smajax.fit.integration import choose_integration, unlimited, with_integration
 from smajax.fit.packed_runs import RunBatch, pack
 from smajax.fit.problem import Problem
+from smajax.fit.uncertain_presets import values_not_given
 from smajax.model.effects.library import LIBRARY
 from smajax.model.effects.prior_width import CoefficientPrior
 from smajax.model.extended import extended
@@ -62,15 +62,8 @@ def job_of(experiment: Experiment, integration: Integration | None = None) -> Jo
     others = tuple(run for run in experiment.runs if run.role != "fit")
     held_out = pack(others, experiment.step, parameter_values(full), unlimited(integration)) if others else None
     unknowns = tuple(unknown.name for unknown in experiment.unknowns)
-    of_runs = {name for run in experiment.runs for name in run.parameters}
-    given = frozenset({*experiment.parameters, *unknowns, *of_runs})
-    presets = preset_priors(parameters(base), parameter_values(base), given, experiment.priors.presets)
-    bounds |= preset_bounds(presets, bounds)
-    if experiment.model_file is not None:
-        # What this experiment file says of them goes before what a fit left.
-        stated = experiment.priors.presets.keys()
-        presets |= fitted_priors(experiment.model_file, given | stated)
-        bounds |= {name: one for name, one in experiment.model_file.bounds.items() if name in presets.keys() - stated}
+    presets, of_presets = values_not_given(experiment, base, bounds)
+    bounds |= of_presets
     return Job(experiment, runs, problem, held_out, unknowns, bounds, names, presets)
 
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from smajax.attribution.preset_priors import RELATIVE
 from smajax.core.parameters import Parameter, parameters
 from smajax.data.experiment.record import Experiment
 from smajax.fit.experiment_problem import declared_problem
+from smajax.fit.preset_priors import RELATIVE
 from smajax.fit.problem import Problem
 from smajax.fit.sensitivity import Sensitivity, sensitivity
 

@@ -11,10 +11,12 @@ import jax.numpy as jnp
 import numpy as np
 
 from smajax.core.names import listed
+from smajax.core.parameters import parameters
 from smajax.core.progress import Progress, Stage, report_checks
 from smajax.core.result_cache import ResultCache
 from smajax.core.whiteness import LAGS, WHITE, correlation_time, split_runs, whiteness_p_value
 from smajax.data.experiment.record import Experiment, Run, Unknown
+from smajax.fit.base_model import base_model
 from smajax.fit.experiment_problem import declared_problem, free_by_name
 from smajax.fit.integration import IntegrationError, choose_integration, described, integration_error, with_integration
 from smajax.fit.levenberg_marquardt import Fit, FitSettings, levenberg_marquardt
@@ -24,13 +26,14 @@ from smajax.fit.problem import Problem
 from smajax.fit.robust import NORMAL, clipped, robust_fit, robust_variance, unweighted_misfit
 from smajax.fit.sensitivity import Sensitivity, sensitivity
 from smajax.fit.starts import multistart
+from smajax.fit.uncertain_presets import values_not_given
 from smajax.fit.uncertainty import Uncertainty, covariance_of, identifiability, uncertainty
 from smajax.model.system import System
 from smajax.simulation.steppers import Integration
 
 UNUSED_PRIORS = (
-    "[priors] changes nothing here: they are of candidate effects and of the presets' values, which `smajax close-loop` fits; a prior of an "
-    "unknown stands in its own section, as prior = { mean = ..., sigma = ... }"
+    "[priors] changes nothing here: they are of candidate effects and of the presets' values, which `smajax close-loop` fits (`--presets fitted` "
+    "the latter here too); a prior of an unknown stands in its own section, as prior = { mean = ..., sigma = ... }"
 )
 EDGE = 1e-6  # of the range: a fit within bounds comes to a bound itself
 
@@ -137,9 +140,25 @@ def check_identifiability(setup: Setup, options: Options) -> tuple[str, ...]:
     values = _full_values(setup.every_run, setup.problem, setup.problem.start_values())
     at = _of_fit_runs(sensitivity(setup.every_run, values, setup.names), setup)
     sentences = [line for line in identifiability(at, setup.names, setup.bounds) if "are correlated" not in line]
-    warnings = (*setup.experiment.warnings, *((UNUSED_PRIORS,) if setup.experiment.priors else ()))
-    report_checks(options.progress, warnings, sentences)
-    return (*warnings, *sentences)
+    held = _held(setup)
+    unused = setup.experiment.priors and (held or setup.experiment.priors.odds or setup.experiment.priors.coefficients)
+    warnings = (*setup.experiment.warnings, *((UNUSED_PRIORS,) if unused else ()))
+    report_checks(options.progress, warnings, [*sentences, *held])
+    return (*warnings, *sentences, *held)
+
+
+def _held(setup: Setup) -> tuple[str, ...]:
+    """Which values are the presets' and held, in a sentence."""
+    table = parameters(setup.problem.system)
+    names, _ = values_not_given(
+        setup.experiment, base_model(setup.experiment), {name: (one.low, one.high) for name, one in table.items()}
+    )
+    if not names:
+        return ()
+    return (
+        f"The file does not give {listed(tuple(names))}: held at the values of the presets. `--presets fitted` fits them too, "
+        "within what data sheets leave open, as close-loop does.",
+    )
 
 
 def fit_within_tolerance(setup: Setup, options: Options) -> tuple[Setup, Fitted, IntegrationError]:

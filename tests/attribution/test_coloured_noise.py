@@ -12,13 +12,13 @@ from scipy.signal import lfilter
 
 from smajax.attribution.close_loop import close_loop
 from smajax.attribution.findings import HeldOutWorse
-from smajax.attribution.preset_priors import RELATIVE
 from smajax.core.parameters import parameter_values
 from smajax.data.experiment.load import load_experiment
 from smajax.data.experiment.record import Experiment
 from smajax.data.model_catalogue import CATALOGUE
 from smajax.data.readers.noise import estimate_noise
 from smajax.fit.base_model import base_model
+from smajax.fit.preset_priors import RELATIVE
 from smajax.report.narrative import narrate
 from studies.attribution_benchmark.cases import cases
 from studies.attribution_benchmark.rigs import show

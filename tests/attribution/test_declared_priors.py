@@ -12,10 +12,10 @@ import pytest
 from smajax.attribution.declared_priors import overridden
 from smajax.attribution.joint_parameters import JointParameters
 from smajax.attribution.joint_search import JointSearch, search_jointly
-from smajax.attribution.preset_priors import RELATIVE, preset_bounds, preset_priors
 from smajax.core.parameters import parameter_values, parameters
 from smajax.core.result_cache import ResultCache
 from smajax.data.experiment.record import DeclaredPriors, PriorSpread
+from smajax.fit.preset_priors import RELATIVE, preset_bounds, preset_priors
 from smajax.model.effects.prior_width import CoefficientPrior
 from smajax.model.presets import build
 from tests.helpers.hot_weight import CANDIDATES, UNKNOWNS, hot_weight

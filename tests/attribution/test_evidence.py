@@ -11,10 +11,10 @@ from scipy import integrate
 
 from smajax.attribution.joint_parameters import JointParameters
 from smajax.attribution.laplace_evidence import FittedModel, fitted_model
-from smajax.attribution.preset_priors import RELATIVE, preset_bounds, preset_priors
 from smajax.attribution.subset_evidence import LinearModel
 from smajax.attribution.traces import Variant
 from smajax.core.parameters import parameter_values, parameters
+from smajax.fit.preset_priors import RELATIVE, preset_bounds, preset_priors
 from smajax.model.presets import LOADS, WIRES, build
 from tests.helpers.hot_weight import NOISE, hot_weight
 

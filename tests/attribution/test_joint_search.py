@@ -13,13 +13,13 @@ from smajax.attribution.joint_parameters import JointParameters
 from smajax.attribution.joint_search import JointSearch, detectable, search_jointly
 from smajax.attribution.laplace_evidence import fitted_model
 from smajax.attribution.leave_one_run_out import left_out
-from smajax.attribution.preset_priors import preset_priors
 from smajax.attribution.set_starts import PLACES, starts
 from smajax.attribution.subset_evidence import linear_model
 from smajax.attribution.traces import Variant, traces_at
 from smajax.core.parameters import parameter_values, parameters
 from smajax.fit.levenberg_marquardt import FitSettings, levenberg_marquardt
 from smajax.fit.predicted import misfits
+from smajax.fit.preset_priors import preset_priors
 from smajax.fit.starts import logarithmic_points
 from smajax.model.effects.library import LIBRARY
 from tests.helpers.hot_weight import CANDIDATES, NOISE, UNKNOWNS, hot_weight

@@ -12,12 +12,12 @@ import pytest
 from smajax.attribution.close_loop import close_loop
 from smajax.attribution.model_fits import Model, Search, Start
 from smajax.attribution.outlier_run import outlier_runs
-from smajax.attribution.preset_priors import preset_bounds, preset_priors
 from smajax.core.parameters import parameter_values, parameters
 from smajax.core.result_cache import ResultCache
 from smajax.data.experiment.load import load_experiment
 from smajax.data.experiment.record import Experiment
 from smajax.data.model_catalogue import CATALOGUE
+from smajax.fit.preset_priors import preset_bounds, preset_priors
 from smajax.fit.problem import Problem
 from smajax.report.narrative import narrate
 from studies.attribution_benchmark.cases import cases

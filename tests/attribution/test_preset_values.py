@@ -10,13 +10,13 @@ import pytest
 
 from smajax.attribution.close_loop import close_loop
 from smajax.attribution.findings import Findings, Verdict
-from smajax.attribution.preset_priors import RELATIVE
 from smajax.core.parameters import get_parameters, parameter_values, set_parameters
 from smajax.data.experiment.load import load_experiment
 from smajax.data.experiment.record import Experiment
 from smajax.data.model_catalogue import CATALOGUE
 from smajax.fit.base_model import base_model
 from smajax.fit.packed_runs import pack, simulate_batch
+from smajax.fit.preset_priors import RELATIVE
 from smajax.simulation.steppers import Integration
 
 NOISE = 1e-4  # m

@@ -13,7 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from smajax.core.parameters import set_parameters
+from smajax.core.parameters import parameter_values, set_parameters
 from smajax.data.experiment.load import load_experiment
 from smajax.data.experiment.record import Experiment
 from smajax.data.model_catalogue import CATALOGUE
@@ -31,7 +31,7 @@ from smajax.report.identify_words import conclusions
 from smajax.report.next_steps import after_identify
 from smajax.simulation.compiled import simulate_compiled
 from tests.helpers.in_browser import HOSTILE, faults
-from tests.helpers.small_bench import refused
+from tests.helpers.small_bench import refused, smajax
 
 pytestmark = pytest.mark.usefixtures("blank_pictures")
 
@@ -303,3 +303,25 @@ def test_the_command_reports_what_is_wrong(tmp_path: Path) -> None:
     assert "austenite_start" in wrong
     path.write_text("\n".join(line for line in path.read_text().splitlines() if "low =" not in line))
     assert "unknown" in refused("identify", path, "--out", tmp_path / "out")
+
+
+def test_a_value_that_the_file_does_not_give_may_be_fitted_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A slope that is 12 % off the preset's: held, the fit leaves more than noise and says what it holds; fitted, it is found."""
+    preset = parameter_values(build("flexinol_table_3_2", "coupon", "none"))["stress_slope_austenite"]
+    monkeypatch.setitem(TRUTH, "stress_slope_austenite", 0.88 * preset)
+    file = coupon_file(tmp_path, NOISE)
+    records = {
+        how: json.loads(
+            smajax("identify", file, "--starts", 0, "--presets", how, "--out", tmp_path / how, "--json").out
+        )
+        for how in ("held", "fitted")
+    }
+    held, fitted = records["held"], records["fitted"]
+    assert held["residual"]["rms_over_noise"] > 1.3
+    assert any("stress_slope_austenite" in line and "--presets fitted" in line for line in held["check"])
+    assert fitted["residual"]["rms_over_noise"] == pytest.approx(1.0, abs=0.1)
+    assert not any("--presets" in line for line in fitted["check"])
+    slope = fitted["parameters"]["stress_slope_austenite"]
+    assert abs(slope["value"] - 0.88 * preset) < 4.0 * slope["standard_error"]
+    assert slope["standard_error"] < 0.05 * preset
+    assert refused("identify", file, "--starts", 0, "--presets", "fitted", "--out", tmp_path / "held")

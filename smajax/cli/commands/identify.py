@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Mapping
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -15,6 +16,14 @@ from smajax.cli.terminal import browse, console, resumable
 
 if TYPE_CHECKING:
     from smajax.fit.identify_result import Identified
+
+
+class Presets(StrEnum):
+    """What is done with values that the experiment file does not give."""
+
+    HELD = "held"
+    FITTED = "fitted"
+
 
 OWN = ("identify.html", "identify.json", "parameters.csv", "runs.csv", "model.toml", "model.nc", FITS)
 
@@ -41,6 +50,12 @@ def identify_command(
             autocompletion=completion.unknowns_declared,
         ),
     ] = "",
+    presets: Annotated[
+        Presets,
+        typer.Option(
+            help="values that the file does not give: held at the preset's, or fitted within what data sheets leave open"
+        ),
+    ] = Presets.HELD,
     robust: Annotated[bool, typer.Option("--robust", help="Huber's loss: outliers have less weight")] = False,
     design: Annotated[bool, typer.Option("--design", help="suggest the next run")] = False,
     posterior: Annotated[
@@ -71,18 +86,23 @@ def identify_command(
     from smajax.data.model_catalogue import CATALOGUE
     from smajax.fit.experiment_problem import free_by_name
     from smajax.fit.identify import identify
+    from smajax.fit.uncertain_presets import with_uncertain_presets
     from smajax.report.identify_page import write_identified
     from smajax.report.identify_record import record
 
     check_path(out)
     loaded = load_experiment(experiment, CATALOGUE)
+    # The page and the record are of the file, whose bytes say the same of both.
+    told = fingerprint(loaded)
+    if presets is Presets.FITTED:
+        loaded = with_uncertain_presets(loaded)
     unknowns = list(free_by_name(loaded, [run for run in loaded.runs if run.role == "fit"]))
     profiled = unknowns if profile == "all" else [part.strip() for part in profile.split(",") if part.strip()]
     command = f"smajax identify {shlex.quote(str(experiment))} --out {shlex.quote(str(out))} --starts {starts}"
     command += f" --profile {','.join(profiled)}" * bool(profiled) + " --robust" * robust + " --design" * design
-    command += f" --posterior {posterior}" * bool(posterior)
+    command += f" --posterior {posterior}" * bool(posterior) + " --presets fitted" * (presets is Presets.FITTED)
     # A profile and a design add to the same result, and so does a posterior where there was none: the cached fits are used.
-    settings = {**fingerprint(loaded), "--starts": starts, "--robust": robust, "--posterior": posterior}
+    settings = {**told, "--starts": starts, "--robust": robust, "--posterior": posterior, "--presets": presets.value}
     try:
         with (
             resumable("Fits are cached: the same command resumes.", out, FITS),
