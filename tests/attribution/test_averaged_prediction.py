@@ -40,6 +40,7 @@ def _fresh_runs() -> RunBatch:
     return hot_weight(TRUTH, seed=77).joint.problem.batch
 
 
+@pytest.mark.slow
 def test_nine_of_ten_samples_of_fresh_runs_lie_in_the_band(fitted: tuple[Search, JointSearch, Model]) -> None:
     setting, search, final = fitted
     found = averaged(setting, search, final, _fresh_runs())
@@ -49,6 +50,7 @@ def test_nine_of_ten_samples_of_fresh_runs_lie_in_the_band(fitted: tuple[Search,
     assert sum(one.weight for one in found.models) == pytest.approx(1.0)
 
 
+@pytest.mark.slow
 def test_the_band_is_wider_where_the_parameters_are_less_certain(fitted: tuple[Search, JointSearch, Model]) -> None:
     setting, search, final = fitted
     narrow = averaged(setting, search, final, _fresh_runs())

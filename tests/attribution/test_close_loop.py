@@ -84,6 +84,7 @@ def test_sizes_of_the_bench_that_the_file_does_not_give_are_listed() -> None:
     assert sizes(wire_diameter=1e-3, wire_length=1e-3) == []
 
 
+@pytest.mark.slow
 def test_a_parameter_at_its_bound_is_reported_at_the_top(tmp_path: Path) -> None:
     """The stroke of the log asks for more strain than the box has; the noise hides the rest, so that no search follows."""
     before, _, rest = small_bench.BENCH.partition("[unknown]")

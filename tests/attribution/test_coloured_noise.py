@@ -59,7 +59,7 @@ def _estimated(experiment: Experiment) -> Experiment:
     )
 
 
-@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("seed", [pytest.param(seed, marks=pytest.mark.slow) for seed in (0, 1)])
 def test_autocorrelated_noise_leads_to_no_effect(seed: int, tmp_path: Path) -> None:
     findings = close_loop(_coupon(tmp_path, seed))
     assert not any(effect.added for effect in findings.effects)
@@ -96,7 +96,8 @@ def _thinned(experiment: Experiment, by: int) -> Experiment:
     return dataclasses.replace(experiment, step=by * experiment.step, runs=tuple(runs))
 
 
-@pytest.mark.parametrize("seed", [pytest.param(0, marks=pytest.mark.slow), 1])
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [0, 1])
 def test_an_effect_that_a_short_log_confuses_with_slow_noise_is_still_tested(seed: int, tmp_path: Path) -> None:
     whole = _coupon(tmp_path, seed, memory=0.5, name=WEAK)
     # The wire's values are given: an effect this weak is no larger than what a preset leaves open.
@@ -111,6 +112,7 @@ def test_an_effect_that_a_short_log_confuses_with_slow_noise_is_still_tested(see
     assert [effect.name for effect in findings.effects if effect.added] == ["thermal_expansion"]
 
 
+@pytest.mark.slow
 def test_an_effect_that_the_held_out_runs_reject_is_not_named(tmp_path: Path) -> None:
     """All fit runs drift upwards and the held-out ones downwards: a drift that is found is no property of the bench."""
     findings = close_loop(_coupon(tmp_path, 0, trend=12.0))

@@ -61,7 +61,14 @@ def _early(volts: jax.Array) -> jax.Array:
     ("truth", "wrong", "run", "coefficient", "value"),
     [
         ({}, _early, 0, "input_delay.delay", 0.6),
-        ({"latent_heat.enthalpy": 1.2e4}, lambda volts: volts / 0.9, 2, "input_level.gain", -0.1),
+        pytest.param(
+            {"latent_heat.enthalpy": 1.2e4},
+            lambda volts: volts / 0.9,
+            2,
+            "input_level.gain",
+            -0.1,
+            marks=pytest.mark.slow,
+        ),
     ],
     ids=["recorded early", "noted too high beside a latent heat"],
 )
@@ -83,6 +90,7 @@ def test_where_every_record_is_right_none_is_named() -> None:
     assert record_error(setting, base, base, runs[:2]) is None  # of two that disagree either may be wrong
 
 
+@pytest.mark.slow
 def test_no_record_is_wrong_where_more_is_missing() -> None:
     """A sensor whose zero drifts in all runs, which nothing that is looked at explains: the error of the record would take its part of it."""
     setting, base, extended, runs = _searched({}, _early, 0)

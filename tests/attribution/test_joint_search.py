@@ -47,6 +47,7 @@ def test_an_effect_that_is_there_is_found_with_its_size() -> None:
     assert sum(value for effects, value in probabilities.items() if "latent_heat" in effects) > 0.99
 
 
+@pytest.mark.slow
 def test_two_effects_are_found_together() -> None:
     _, values, errors = _found(
         {"latent_heat.enthalpy": 1.2e4, "sensor_gain.error": 0.05, "phase_resistance.contrast": -0.2}
@@ -57,7 +58,10 @@ def test_two_effects_are_found_together() -> None:
     assert "rising_convection.slope" not in values
 
 
-@pytest.mark.parametrize(("side", "limit"), [("upper", 0.016), ("lower", 0.003)])
+@pytest.mark.parametrize(
+    ("side", "limit"),
+    [pytest.param("upper", 0.016, marks=pytest.mark.slow), pytest.param("lower", 0.003, marks=pytest.mark.slow)],
+)
 def test_a_sensor_that_ends_before_the_motion_is_found_with_its_limit(side: str, limit: float) -> None:
     """Of a stroke of 25 mm; the other end, which no reading comes near, stays unused."""
     truth = {f"sensor_limit.{side}_cut": 1.0, f"sensor_limit.{side}": limit}
@@ -70,6 +74,7 @@ def test_a_sensor_that_ends_before_the_motion_is_found_with_its_limit(side: str,
     assert search.rounds[-1].present == ("sensor_limit",)
 
 
+@pytest.mark.slow
 def test_a_sensor_that_shows_the_whole_motion_is_given_no_limit() -> None:
     """The wire rests at both ends of its transformation, where readings pile up as at a limit."""
     search, values, _ = _found({}, LIMITED)

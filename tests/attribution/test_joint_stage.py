@@ -36,6 +36,7 @@ def latent() -> Findings:
     return close_loop(_demo(FEW))
 
 
+@pytest.mark.slow
 def test_an_effect_that_is_there_is_added_and_all_others_are_unlikely(latent: Findings) -> None:
     assert [effect.name for effect in latent.added] == ["latent_heat"]
     likely = {effect.name: effect.evidence["posterior_probability"] for effect in latent.effects}
@@ -44,6 +45,7 @@ def test_an_effect_that_is_there_is_added_and_all_others_are_unlikely(latent: Fi
     assert latent.added[0].evidence["alone_rmse_fit"] == pytest.approx(latent.residual_after.rmse, rel=0.05)
 
 
+@pytest.mark.slow
 def test_the_page_and_the_record_list_the_sets_that_were_compared(latent: Findings) -> None:
     first = latent.rounds[0]
     assert first.chosen == "latent_heat"
@@ -60,6 +62,7 @@ def test_the_page_and_the_record_list_the_sets_that_were_compared(latent: Findin
     assert record["effects"][0]["evidence"]["posterior_probability"] > 0.99
 
 
+@pytest.mark.slow
 def test_an_effect_that_gains_nothing_at_half_the_step_is_excluded(monkeypatch: pytest.MonkeyPatch) -> None:
     """The latent heat passes for one with which the load jumps; the search is made again without it, and says so."""
     kept = iter((0.1, 1.0))

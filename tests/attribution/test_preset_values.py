@@ -51,12 +51,14 @@ def found() -> tuple[Findings, float]:
     return close_loop(experiment), true
 
 
+@pytest.mark.slow
 def test_no_effect_is_named_for_a_preset_that_is_wrong(found: tuple[Findings, float]) -> None:
     findings, _ = found
     assert findings.added == ()
     assert findings.verdict is Verdict.ADEQUATE
 
 
+@pytest.mark.slow
 def test_the_value_that_was_not_given_comes_out_with_its_standard_error(found: tuple[Findings, float]) -> None:
     findings, true = found
     (modulus,) = [one for one in findings.after if one.name == NAME]
@@ -68,6 +70,7 @@ def test_the_value_that_was_not_given_comes_out_with_its_standard_error(found: t
     assert modulus.prior_deviation == pytest.approx(np.log(modulus.value / modulus.start) / RELATIVE[NAME][0])
 
 
+@pytest.mark.slow
 def test_the_saved_model_has_the_models_that_predictions_are_averaged_over(found: tuple[Findings, float]) -> None:
     findings, _ = found
     assert findings.extended_model is not None

@@ -173,7 +173,14 @@ def _found(equation: str) -> tuple[UnknownTerm, ...]:
     return unknown_terms(*_setting(HIDDEN[equation].base())).terms
 
 
-@pytest.mark.parametrize(("equation", "level"), [("heat", 2.0), ("constitutive", 1.1), ("sensor", 1.1)])
+@pytest.mark.parametrize(
+    ("equation", "level"),
+    [
+        ("heat", 2.0),
+        pytest.param("constitutive", 1.1, marks=pytest.mark.slow),
+        pytest.param("sensor", 1.1, marks=pytest.mark.slow),
+    ],
+)
 def test_the_equation_of_a_hidden_term_is_ranked_first(equation: str, level: float) -> None:
     """Down to so many times the noise on runs left out, from at least 1.2 times it, and no other equation as well."""
     terms = _found(equation)
@@ -219,6 +226,7 @@ def test_an_unknown_function_replaces_effects_that_are_less_likely(hidden: str) 
         assert setting.rounds[-1].reason.log_odds > 10.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("there", [True, False], ids=["there too", "another bench"])
 def test_held_out_runs_validate_a_term_or_reject_it(there: bool) -> None:
     """Of a bent scale: a held-out run that was read on it, and one that was not."""

@@ -27,6 +27,7 @@ def tuned(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
+@pytest.mark.slow
 def test_gains_are_tuned_on_a_dead_weight_in_millimetres(tuned: Path) -> None:
     record = json.loads((tuned / "tune.json").read_text(encoding="utf-8"))
     assert record["settings"]["set_points_mm"] == [5.0, 12.0]
@@ -35,6 +36,7 @@ def test_gains_are_tuned_on_a_dead_weight_in_millimetres(tuned: Path) -> None:
     assert record["cost"]["after"] <= record["cost"]["before"]
 
 
+@pytest.mark.slow
 def test_the_tuned_gains_go_into_a_sweep_and_a_run_of_the_same_plant(tuned: Path, tmp_path: Path) -> None:
     gains = ["--gains", str(tuned / "gains.json")]
     words = [

@@ -79,6 +79,7 @@ def test_a_command_reports_a_full_disk_and_resumes_when_there_is_room(tmp_path: 
     assert smajax("simulate", *WIRE, "--out", out).code == 0
 
 
+@pytest.mark.slow
 def test_a_full_disk_is_reported(tmp_path: Path, small_disk: list[str]) -> None:
     code = "import sys; sys.argv = ['smajax', 'simulate', *sys.argv[1:]]; from smajax.cli.main import main; main()"
     inside = 'mount -t tmpfs -o size=16k none "$0" || exit 99; "$@"; code=$?; ls -A "$0/out"; exit $code'
@@ -175,6 +176,7 @@ def test_damaged_cached_work_is_computed_again(tmp_path: Path) -> None:
     assert ResultCache(tmp_path).load("a" * 32) is None  # pickled: never opened
 
 
+@pytest.mark.slow
 def test_a_cap_on_memory_makes_chunks_smaller(tmp_path: Path) -> None:
     """The same sweep with all the memory there is and with little: more chunks, the same numbers."""
     code = """

@@ -20,7 +20,10 @@ def programs_of_their_own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[
 
 @pytest.mark.parametrize(
     ("name", "kills"),
-    [("identify", FAST), *(pytest.param(name, SLOW, marks=pytest.mark.slow) for name in COMMANDS)],
+    [
+        pytest.param(name, kills, marks=pytest.mark.slow)
+        for name, kills in [("identify", FAST), *((name, SLOW) for name in COMMANDS)]
+    ],
 )
 def test_a_killed_and_resumed_command_gives_the_undisturbed_result(tmp_path: Path, name: str, kills: int) -> None:
     kill_and_resume(tmp_path, name, kills)

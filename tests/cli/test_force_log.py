@@ -144,6 +144,7 @@ def test_identify_finds_the_wire_behind_a_force_and_predict_another_run(folder: 
     assert float(error) == pytest.approx(NOISE, rel=0.15)
 
 
+@pytest.mark.slow
 def test_close_loop_takes_the_force_as_its_output(folder: Path) -> None:
     ended = smajax("close-loop", folder, "--out", folder / "loop")
     assert ended.code == 0, ended.said

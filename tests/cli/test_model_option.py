@@ -68,6 +68,7 @@ def test_a_closed_loop_stays_within_the_commands_of_the_fit_runs() -> None:
     assert plant_of(own)[1] == ""
 
 
+@pytest.mark.slow
 def test_gains_are_tuned_and_compared_on_plants_from_the_posterior(tmp_path: Path, model: Path) -> None:
     effort = ["--set-point", "5mm,10mm", "--fast", "--rounds", "1", "--finish", "0", "--seconds", "8", "--starts", "1"]
     ended = smajax("tune", "pid", "--model", model, "--plants", "4", *effort, "--out", tmp_path / "tuned")

@@ -6,6 +6,7 @@ import json
 import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -40,11 +41,13 @@ for command in json.loads(sys.argv[1]):
 print(json.dumps(ended))
 """
 )
-COMMANDS = (
+QUICK = (
     "presets",
     "effects",
     "simulate flexinol_table_3_2 dead_weight flexinol_voltage --step 5V:1s --out {out}/run",
     "new-experiment {out}/log.csv --out {out}/begun.toml",
+)
+LONG = (
     "identify {bench} --starts 0 --out {out}/identified",
     "figures M9 --fast --no-open --out {out}/figures",
 )
@@ -63,26 +66,22 @@ def without_network() -> list[str]:
     return words
 
 
-@pytest.fixture(scope="module")
-def commands(without_network: list[str], tmp_path_factory: pytest.TempPathFactory) -> list[tuple[int, str, list[str]]]:
-    """Of each of `COMMANDS`: its exit code, what it printed, and what it asked of the network."""
-    out = tmp_path_factory.mktemp("offline")
-    experiment = bench(out / "bench")
-    log(out / "log.csv")
-    words = [command.format(bench=experiment, out=out) for command in COMMANDS]
+@pytest.mark.parametrize("commands", [QUICK, pytest.param(LONG, marks=pytest.mark.slow)], ids=["quick", "long"])
+def test_commands_need_no_network_and_ask_for_none(
+    commands: tuple[str, ...], without_network: list[str], tmp_path: Path
+) -> None:
+    """Of each command: its exit code, what it printed, and what it asked of the network."""
+    experiment = bench(tmp_path / "bench")
+    log(tmp_path / "log.csv")
+    words = [command.format(bench=experiment, out=tmp_path) for command in commands]
     asked = [*without_network, sys.executable, "-c", ALL, json.dumps(words)]
     ended = subprocess.run(asked, capture_output=True, text=True, timeout=300)
     assert ended.returncode == 0, ended.stderr
     told = json.loads(ended.stdout)
-    return [tuple(told[word]) for word in words]
-
-
-@pytest.mark.parametrize("number", range(len(COMMANDS)), ids=[command.split()[0] for command in COMMANDS])
-def test_a_command_needs_no_network_and_asks_for_none(number: int, commands: list[tuple[int, str, list[str]]]) -> None:
-    code, printed, asked = commands[number]
-    assert code == 0, printed
-    assert printed
-    assert asked == []
+    assert {word: (code, told_of) for word, (code, _, told_of) in told.items()} == {word: (0, []) for word in words}, (
+        told
+    )
+    assert all(printed for _, printed, _ in told.values())
 
 
 def test_a_namespace_without_network_has_none(without_network: list[str]) -> None:

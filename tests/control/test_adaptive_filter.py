@@ -96,6 +96,7 @@ def test_a_parameter_stays_within_a_factor_of_e_whatever_is_read() -> None:
     assert np.abs(logarithms).max() <= LARGEST
 
 
+@pytest.mark.slow
 def test_a_step_has_a_derivative_in_reading_voltage_and_settings(wrong_convection) -> None:
     _, readings, memory, _ = wrong_convection
     moving = jax.tree.map(lambda leaf: leaf[110], memory)

@@ -70,6 +70,7 @@ def _errors_two(controllers: BacksteppingTwo, measured: MeasuredState, wanted: R
 STEPS = [4e-3, 2e-3, 1e-3]
 
 
+@pytest.mark.slow
 def test_the_temperature_error_dies_out_at_its_gain_in_the_limit_of_a_small_step() -> None:
     """z' = -K_1 z (eq. 4.79) with the true acceleration; with the wanted one of eq. 4.76 it is faster."""
     gain = 20.0

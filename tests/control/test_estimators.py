@@ -118,6 +118,7 @@ def _experiments(model, believed_noise, keys):
     return jax.vmap(one)(keys)
 
 
+@pytest.mark.slow
 def test_innovations_and_errors_are_as_large_as_the_model_filter_believes() -> None:
     """32 runs up and down: each run's sum of squared innovations in its 95 % band, and so each moment's."""
     keys, noise = jax.random.split(jax.random.key(0), 32), CLEAR.reading_noise

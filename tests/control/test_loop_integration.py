@@ -40,6 +40,7 @@ def test_loops_of_a_coarse_clock_take_finer_steps_until_the_error_is_small() -> 
     assert worst(setup) > SMALL * whole_transformation(plant)["position"]
 
 
+@pytest.mark.slow
 def test_a_sweep_says_what_its_integration_leaves(tmp_path: Path) -> None:
     settings = SweepSettings(("pid",), "payload", "", 3, (30.0,), (1.0,), seconds=SECONDS)
     write_sweep(arm(), settings, sweep_controllers(arm(), settings, tmp_path, quiet), tmp_path)

@@ -97,6 +97,7 @@ def test_the_data_set_holds_every_row(folder: Path) -> None:
         assert [field.name for field in dataclasses.fields(Merit)] == list(MERIT_UNITS)
 
 
+@pytest.mark.slow
 def test_one_mismatch_alone_is_swept_as_a_curve(tmp_path: Path, folder: Path, browser: Any) -> None:
     """Its loops are those of the map where the other mismatch is 1."""
     alone = dataclasses.replace(SETTINGS, second="", points=3)

@@ -133,6 +133,7 @@ def test_identify_reports_that_nothing_is_unknown_and_what_cannot_be_profiled(tm
     )
 
 
+@pytest.mark.slow
 def test_few_samples_give_no_warning_of_their_distribution(tmp_path: Path) -> None:
     experiment = bench(tmp_path / "bench")
     log(experiment.parent / "a.csv", seconds=0.5)

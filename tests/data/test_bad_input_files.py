@@ -215,6 +215,7 @@ def test_a_long_log_is_read_in_little_memory(tmp_path: Path) -> None:
     assert grown < 4 * kept + 60e6, f"{grown / 1e6:.0f} MB for a file of {size / 1e6:.0f} MB"
 
 
+@pytest.mark.slow
 def test_too_little_memory_is_reported(tmp_path: Path) -> None:
     """A cap on memory while the log is read: one message, no traceback."""
     experiment, small = bench(tmp_path / "bench"), bench(tmp_path / "small")

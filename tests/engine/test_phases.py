@@ -90,7 +90,15 @@ def _small(a: jax.Array) -> jax.Array:
     return x + sum(one.astype(float) for one in small)
 
 
-@pytest.mark.parametrize(("vectors", "mask"), [(1, "i1"), (3, "i1"), (8, "i1"), (8, "i64")])
+@pytest.mark.parametrize(
+    ("vectors", "mask"),
+    [
+        pytest.param(1, "i1", marks=pytest.mark.slow),
+        (3, "i1"),
+        (8, "i1"),
+        pytest.param(8, "i64", marks=pytest.mark.slow),
+    ],
+)
 @pytest.mark.parametrize(
     "function", [_busy, _crosswise, _late, _uneven, _begun_again, _small], ids=lambda one: one.__name__
 )

@@ -248,6 +248,7 @@ def test_the_page_has_no_fault_in_a_browser(found: Identified, browser: Any, tmp
     assert faults(browser, write_identified(dataclasses.replace(found, title=HOSTILE, runs=runs), tmp_path)) == []
 
 
+@pytest.mark.slow
 def test_correlations_of_many_parameters_scroll_sideways_in_a_narrow_window(
     found: Identified, browser: Any, tmp_path: Path
 ) -> None:

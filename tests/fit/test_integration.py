@@ -64,7 +64,7 @@ def test_less_noise_asks_for_a_finer_integration(rigs: dict[str, study.Rig]) -> 
     assert integration_error(with_integration(quiet, fine), quiet.system).small
 
 
-@pytest.mark.parametrize("name", ["arm", "dead weight"])
+@pytest.mark.parametrize("name", [pytest.param("arm", marks=pytest.mark.slow), "dead weight"])
 def test_derivatives_of_error_controlled_steps_agree_with_differences(rigs: dict[str, study.Rig], name: str) -> None:
     """Those of differences of the same integration, and of fine equal steps, through every change of branch of the run."""
     problem = with_integration(study._problem(rigs[name], 0.05), Integration(jnp.asarray(1e-5)))

@@ -62,7 +62,7 @@ def test_only_a_coupon_under_given_stress_by_the_rate_form_has_the_candidate() -
         assert "elastic_mismatch" not in candidates(build("flexinol_isobaric", load, drive), None, ())
 
 
-@pytest.mark.parametrize("hidden", [True, False])
+@pytest.mark.parametrize("hidden", [pytest.param(True, marks=pytest.mark.slow), False])
 def test_it_is_found_in_an_independent_coupon_that_has_it_and_in_none_that_has_not(
     hidden: bool, tmp_path: Path
 ) -> None:

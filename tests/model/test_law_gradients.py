@@ -99,6 +99,7 @@ def test_derivatives_in_every_parameter_of_a_coupon_agree_with_differences(law: 
     compare(system, features, {"start_fraction"} if law in ("tanaka", "brinson") else ())
 
 
+@pytest.mark.slow
 def test_closed_loop_has_the_derivatives_of_its_gains() -> None:
     arm = build("niti_table_3_1", "arm", "amplified_voltage")
     target = jnp.full(301, 0.3)
@@ -144,7 +145,9 @@ def _finite(system: System, inputs: dict[str, jax.Array], dt: float = DT) -> Non
     np.testing.assert_allclose(backward, forward, rtol=1e-6, atol=1e-9 * np.abs(forward).max())
 
 
-@pytest.mark.parametrize("law", NAMES)
+@pytest.mark.parametrize(
+    "law", ["enhanced", *(pytest.param(law, marks=pytest.mark.slow) for law in NAMES if law != "enhanced")]
+)
 def test_derivatives_are_finite_at_the_start_of_a_range(law: str) -> None:
     """The wire sits exactly on A_s' with all martensite, then on M_s' with none: the slopes there are 0/0 forms."""
     system = _under(law, "flexinol_table_3_2", "coupon", "none")
@@ -154,6 +157,7 @@ def test_derivatives_are_finite_at_the_start_of_a_range(law: str) -> None:
     _finite(system, {"temperature": jnp.array([23.0, 78.0]), "stress": jnp.full(2, stress)}, 1.0)
 
 
+@pytest.mark.slow
 def test_derivatives_are_finite_at_end_stops_and_when_slack() -> None:
     arm = set_parameters(build("niti_table_3_1", "arm", "amplified_voltage"), {"upper_stop": 0.5})
     _finite(arm, {"voltage": jnp.concatenate([jnp.full(300, 8.0), jnp.zeros(100)])})
@@ -243,6 +247,7 @@ def test_a_second_derivative_along_a_line_agrees_with_differences() -> None:
     np.testing.assert_allclose(second, (first(step) - first(-step)) / (2 * step), rtol=1e-5, atol=1e-7)
 
 
+@pytest.mark.slow
 def test_a_second_derivative_by_reverse_mode_agrees_with_differences() -> None:
     """Forward over reverse: where JAX computes what is known beforehand it goes through the solution, not by its rule."""
     system = _under("liang", "flexinol_table_3_2", "dead_weight", "voltage")

@@ -234,7 +234,7 @@ def test_a_strained_wire_that_goes_slack_comes_back_on_its_law(
     np.testing.assert_allclose(offset, offset[0], rtol=0.0, atol=1e-9)
 
 
-@pytest.mark.parametrize("rig", ["arm", "dead_weight"])
+@pytest.mark.parametrize("rig", [pytest.param("arm", marks=pytest.mark.slow), "dead_weight"])
 def test_a_run_in_a_batch_is_the_run_alone(rig: str) -> None:
     """Voltage, a parameter of each part and the start differ from lane to lane; the other lanes must not be felt."""
     wire = "niti_table_3_1" if rig == "arm" else "flexinol_table_3_2"

@@ -242,6 +242,7 @@ def test_the_doctor_reports_faulty_plug_ins_and_nothing_else(points: str, told: 
     assert f"{len(told)} remark{'s' * (len(told) > 1)}." in ended.stdout
 
 
+@pytest.mark.slow
 def test_the_loop_refuses_an_effect_that_is_not_neutral_and_says_by_how_much(tmp_path: Path) -> None:
     demo = Path(__file__).parents[2] / "smajax" / "data" / "demo" / "latent" / "experiment.toml"
     code = f"import sys; sys.argv = ['smajax', 'close-loop', {str(demo)!r}]; from smajax.cli.main import main; main()"

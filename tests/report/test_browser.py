@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from PIL import Image
 
 from smajax.control.run_request import LoopRequest, RunRequest, run_closed
@@ -28,6 +29,7 @@ def test_the_report_has_no_fault_in_a_browser(browser: Any, tmp_path: Path) -> N
     assert faults(browser, write_report(dataclasses.replace(found, title=HOSTILE, runs=runs), tmp_path)) == []
 
 
+@pytest.mark.slow
 def test_the_page_of_a_run_has_no_fault_in_a_browser(browser: Any, tmp_path: Path) -> None:
     several = LoopRequest("pid", "30deg:3s,10deg:3s", mismatch={"convection_coefficient": "120"})
     ran = run_closed(RunRequest(dt=0.01), several)
@@ -86,6 +88,7 @@ FAULTS = {
 }
 
 
+@pytest.mark.slow
 def test_each_fault_of_a_page_is_detected(browser: Any, tmp_path: Path) -> None:
     # The last two columns are numbers, as which they are not marked.
     rows = [["b", "2", "9 ± 1", "never"], ["a", "10", "10 ± 1", "1e-5"], ["c", "", "–", "3 … 4"]]

@@ -109,6 +109,7 @@ def test_the_memory_of_a_gradient_grows_as_the_root_of_the_steps() -> None:
     assert room(6400) < 4.4 * room(400)
 
 
+@pytest.mark.slow
 def test_a_cost_of_a_batch_is_differentiated_in_reverse() -> None:
     """By every parameter at once: along any direction it is the forward derivative."""
     names = tuple(parameters(ARM))
@@ -287,6 +288,7 @@ np.save(sys.argv[2], _batch(grid(voltage=np.linspace(5.0, 9.0, 13)))["position"]
 """
 
 
+@pytest.mark.slow
 def test_the_number_of_devices_changes_no_number(tmp_path: Path) -> None:
     folder = Path(__file__).parents[2]
     for count in (1, 4):

@@ -56,7 +56,9 @@ def _same(system: System, inputs: dict[str, jax.Array]) -> None:
         np.testing.assert_allclose(one, other, rtol=0.0, atol=1e-9 * float(np.abs(other).max()), err_msg=name)
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize(
+    "law", [law if law == "enhanced" else pytest.param(law, marks=pytest.mark.slow) for law in LAWS]
+)
 def test_every_law_equals_xla(law):
     system, channel, top = RIGS["arm"]
     _same(dataclasses.replace(system, wire=under_law(system.wire, law)), _inputs(channel, top))
@@ -84,7 +86,10 @@ EFFECTS = {
 @pytest.mark.parametrize(
     ("rig", "names"),
     [
-        *(pytest.param(*part, id=name) for name, part in EFFECTS.items()),
+        *(
+            pytest.param(*part, id=name, marks=() if name == "circuit, input and sensor" else pytest.mark.slow)
+            for name, part in EFFECTS.items()
+        ),
         pytest.param("dead_weight", set(LIBRARY), id="dead_weight, all", marks=pytest.mark.slow),
         pytest.param("bias_spring", set(LIBRARY), id="bias_spring, all", marks=pytest.mark.slow),
     ],

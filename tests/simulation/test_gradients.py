@@ -52,6 +52,7 @@ def test_derivatives_in_every_base_parameter_agree_with_differences(case: str) -
     compare(CASES[case][0], open_loop(CASES[case][1], DT), engine=ENGINES.get(case, "native"))
 
 
+@pytest.mark.slow
 def test_reverse_mode_agrees_with_forward_mode() -> None:
     system, inputs = CASES["dead_weight"]
 

@@ -68,6 +68,7 @@ def _together(out: Path, processes: int) -> None:
         assert "finished" in told
 
 
+@pytest.mark.slow
 def test_two_processes_give_what_one_gives(tmp_path: Path) -> None:
     _together(tmp_path / "two", 2)
     _together(tmp_path / "one", 1)

@@ -97,6 +97,7 @@ def test_a_batch_takes_one_step_a_sample_where_that_is_enough() -> None:
     assert coarse["last_position"].attrs["integration_error"] == _reached(coarse)["last_position"]["rms"]
 
 
+@pytest.mark.slow
 def test_slopes_of_a_coarse_clock_are_found_through_equal_steps() -> None:
     clock, wanted = 5.0 * CLOCK, jnp.linspace(-0.7, 0.5, 41)
     settings: dict[str, Any] = {
@@ -130,6 +131,7 @@ def test_a_batch_on_disk_keeps_the_integration_that_it_was_begun_with(tmp_path: 
     np.testing.assert_array_equal(again["position"], first["position"])
 
 
+@pytest.mark.slow
 def test_equal_steps_are_those_of_a_finer_clock_and_go_backwards() -> None:
     fine = jnp.append(jnp.repeat(jnp.asarray(ON_AND_OFF[:-1]), 4), ON_AND_OFF[-1])
     expected = simulate(arm(), {"voltage": fine}, CLOCK / 4.0)
@@ -144,6 +146,7 @@ def test_equal_steps_are_those_of_a_finer_clock_and_go_backwards() -> None:
     assert float(backwards) == pytest.approx(float(forwards), rel=1e-9)
 
 
+@pytest.mark.slow
 def test_derivatives_of_a_closed_loop_with_error_controlled_steps() -> None:
     """By a gain, against differences of the same integration and against fine equal steps; the controller's period stays."""
     plant, preset = arm(), CONTROLLERS["pid"]
