@@ -53,21 +53,29 @@ def serious(axe: Any, page: Any, what: str) -> list[str]:
     return [f"{what}: {one['help']}: {node['html'][:120]}" for one in found for node in one["nodes"][:3]]
 
 
-def test_no_view_has_a_serious_finding(browser: Any, served: str) -> None:
+@pytest.mark.parametrize(
+    ("scheme", "width", "steps"),
+    [
+        pytest.param("dark", WIDTHS[0], STEPS, marks=pytest.mark.slow, id="dark, on a telephone"),
+        pytest.param("light", WIDTHS[1], ("runs", "result", "tune"), id="light, at a desk"),
+    ],
+)
+def test_no_view_has_a_serious_finding(
+    browser: Any, served: str, scheme: Any, width: int, steps: tuple[str, ...]
+) -> None:
     axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe()
     context = browser.new_context(bypass_csp=True)
     wrong = []
     try:
         page = context.new_page()
         assert page.goto(f"{served}/?token={TOKEN}").ok
-        for scheme, width, steps in (("dark", WIDTHS[0], STEPS), ("light", WIDTHS[1], ("runs", "result", "tune"))):
-            page.emulate_media(color_scheme=scheme, reduced_motion="reduce")
-            page.set_viewport_size({"width": width, "height": 900})
-            for step in steps:
-                assert page.goto(f"{served}/{step}").ok, step
-                page.get_by_role("heading", level=1).wait_for()
-                wrong += serious(axe, page, f"{step}, {scheme}, {width} px")
-                assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), step
+        page.emulate_media(color_scheme=scheme, reduced_motion="reduce")
+        page.set_viewport_size({"width": width, "height": 900})
+        for step in steps:
+            assert page.goto(f"{served}/{step}").ok, step
+            page.get_by_role("heading", level=1).wait_for()
+            wrong += serious(axe, page, f"{step}, {scheme}, {width} px")
+            assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), step
         assert page.goto(f"{served}/download").ok
         listed = page.locator("main").inner_text()
         assert "`" not in listed
