@@ -38,6 +38,8 @@ def validated(
     error = search.error_of(final.effects)
     compared = whole = compare(job, setting, first, final)
     left = final
+    if all(run.role == "fit" for run in compared[0]):
+        return left, compared, None
     while left.effects and (rest := _with_one_fewer(job, setting, search, first, left, compared, error)) is not None:
         left = first if rest is first else final_model(search, setting, search.fitted[rest.effects], error)
         compared = compare(job, setting, first, left)
