@@ -15,7 +15,7 @@ from smajax.report.series_plot import Band, Line, Panel, SeriesPlot
 
 STRIPS = 3  # input channels drawn under one run
 STRIP, RESIDUAL, OUTPUT = 56, 110, 200  # px
-FIRST = 230  # px: the plot of the first screen
+FIRST, FIRST_OF_TWO = 230, 170  # px: the plot of the first screen, alone and above the residual
 
 
 def measured_line(values: np.ndarray) -> Line:
@@ -102,7 +102,12 @@ def first_plot(findings: Findings) -> SeriesPlot | None:
         return None
     run = max(runs, key=lambda one: float(np.nan_to_num(one.rmse_before, nan=-1.0)))
     named = run.name + (" (held out)" if held_out else "")
-    return output_alone(over_time(findings, run), f"Run {run.name}, before and after", named)
+    plot = over_time(findings, run)
+    alone = output_alone(plot, f"Run {run.name}, before and after", named, FIRST_OF_TWO)
+    # Where two models differ by a few noises, their curves lie on one another; what they leave does not.
+    residual = plot.panels[1]
+    lines = tuple(replace(line, silent=True) for line in residual.lines)
+    return replace(alone, panels=(*alone.panels, replace(residual, lines=lines)))
 
 
 def residual_correlation(findings: Findings) -> SeriesPlot | None:
