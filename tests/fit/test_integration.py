@@ -83,11 +83,21 @@ def test_derivatives_of_error_controlled_steps_agree_with_differences(rigs: dict
         assert np.sqrt(((difference - slope[0]) ** 2).mean()) < 0.02 * size
 
 
-@pytest.mark.parametrize("name", ["dead weight", "arm"])
-def test_a_refit_of_exact_data_leaves_a_tenth_of_the_noise(rigs: dict[str, study.Rig], name: str) -> None:
-    """Three parameters from 5 % off; data of the scipy integration, without noise, logged every 100 ms."""
-    problem = _chosen(study._problem(rigs[name], 0.1))
-    free = ("convection_coefficient", "specific_heat", "recoverable_strain")
+HEATED = ("convection_coefficient", "specific_heat", "recoverable_strain")
+FREE = {"coupon": ("austenite_start", "martensite_start", "recoverable_strain")}
+OFTEN = {("dead weight", 0.1), ("arm", 0.1)}
+GRID = [
+    pytest.param(name, clock, marks=() if (name, clock) in OFTEN else pytest.mark.slow)
+    for name in study.RIGS
+    for clock in study.CLOCKS
+]
+
+
+@pytest.mark.parametrize(("name", "clock"), GRID)
+def test_a_refit_of_exact_data_leaves_a_tenth_of_the_noise(rigs: dict[str, study.Rig], name: str, clock: float) -> None:
+    """Three parameters from 5 % off; data of the scipy integration, without noise, logged every `clock` s."""
+    problem = _chosen(study._problem(rigs[name], clock))
+    free = FREE.get(name, HEATED)
     truth = problem.start_values()
     begin = np.array(truth)
     for one in free:
