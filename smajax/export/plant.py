@@ -25,8 +25,8 @@ from smajax.simulation.steppers import CouponSubsteps
 
 TOLERANCE = "integration_tolerance"
 DEFAULT_TOLERANCE = 1e-5  # shares of 1 C and of 1 % strain a step: a tenth of what one run by itself begins with
-# s: error-controlled steps go through no more at a time. Where a load hits a stop they become as short as a thousandth of that and no shorter,
-# so that a communication step ten times as long would leave ten times the error there.
+# s: error-controlled steps go through no more at a time. Where a load hits a stop they become as short as a share of that and no shorter,
+# so that a longer communication step would leave more of an error there.
 LONGEST = DEFAULT_STEP
 COUPON_STEPS = 32  # between two communication points, along a straight line
 ABOUT = {
