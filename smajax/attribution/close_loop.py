@@ -28,7 +28,8 @@ from smajax.attribution.held_out import Compared, compare, every_run, validated
 from smajax.attribution.input_of_run import corrected, record_error
 from smajax.attribution.job import Job, effects_excluded, job_of
 from smajax.attribution.joint_search import JointSearch
-from smajax.attribution.joint_stage import base_alone, search_by_evidence, search_without
+from smajax.attribution.joint_stage import base_alone, likeliest_so_far, search_by_evidence, search_without
+from smajax.attribution.laplace_evidence import FittedModel
 from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.neutral import check_neutral
 from smajax.attribution.outlier_run import outlier_runs
@@ -51,9 +52,14 @@ from smajax.simulation.steppers import Integration
 SEED = 2004
 MOST_SEARCHES = 2  # the first, and again without what the held-out runs rejected
 MOST_RECORD_ERRORS = 2  # of single runs that are corrected: with more of them nothing is left that says which is right
+EVERY, RARELY = 60.0, 8.0  # s before the first page of a search that goes on; times what the last took before the next
+REST_OF_THE_SEARCH = "the rest of the search, and the checks of what it finds"
 SEARCH_TO_COME = "the search for effects, and the checks of what it finds"
 CHECKS_TO_COME = "the checks against an unknown function, an outlier run and the held-out runs"
 CHECKING, WRITING = "checking what these runs determine", "standard errors and pictures"
+
+
+Interim = Callable[[Findings], object]  # gets what is known of a loop that goes on
 
 
 @dataclass(frozen=True)
@@ -66,6 +72,7 @@ class Context:
     base: Fit  # the base model
     seed: int
     check: tuple[str, ...]
+    interim: Interim | None
 
 
 @dataclass(frozen=True)
@@ -95,15 +102,15 @@ def close_loop(  # keywords, which a caller names one by one
     compile_per_model: bool | None = None,
     config: AttributionConfig | None = None,
     apart: bool | None = None,
-    interim: Callable[[Findings], object] | None = None,
+    interim: Interim | None = None,
 ) -> Findings:
     """Fit the base model, look at what it leaves, find what it lacks, and validate on runs the fit never saw.
 
     `memory` is a folder for finished fits: a loop that was interrupted resumes from there.
     Held-out runs are simulated when the search is over: they reject what they do not validate, and nothing is added
     for them. The caller chooses precision; anything but float64 is refused with a ValueError, because the
-    differences that decide here are far below float32's rounding over a run. `interim` gets what is known after the base fit, and again
-    after the search where other stages follow: findings without a verdict, which say what is still to come. Raises PluginError for an effect of another
+    differences that decide here are far below float32's rounding over a run. `interim` gets what is known after the base fit, in a long search
+    now and then, and after it where other stages follow: findings without a verdict, which say what is still to come. Raises PluginError for an effect of another
     package that changes the model at its base value: every verdict would be wrong.
     """
     if jnp.zeros(()).dtype != jnp.float64:
@@ -119,7 +126,7 @@ def close_loop(  # keywords, which a caller names one by one
     check_neutral()
     cache = ResultCache(memory)
     settings = config or AttributionConfig()
-    context = prepared(experiment, cache, as_progress(progress), seed, settings)
+    context = prepared(experiment, cache, as_progress(progress), seed, settings, interim)
     if interim is not None:
         interim(known_so_far(context, base_alone(context.setting, context.base), SEARCH_TO_COME))
     context, outcome = searched_finely(context)
@@ -127,7 +134,8 @@ def close_loop(  # keywords, which a caller names one by one
     while len(errors) < MOST_RECORD_ERRORS and (wrong := wrong_record(context, outcome)) is not None:
         # All else is asked of the runs as they should have been recorded.
         errors.append(wrong)
-        context = prepared(corrected(context.job.experiment, wrong), cache, context.setting.progress, seed, settings)
+        right = corrected(context.job.experiment, wrong)
+        context = prepared(right, cache, context.setting.progress, seed, settings, interim)
         context, outcome = searched_finely(context)
     if interim is not None and not context.setting.is_noise(outcome.final):
         interim(known_so_far(context, (outcome.search, outcome.base, outcome.final), CHECKS_TO_COME))
@@ -146,6 +154,7 @@ def prepared(  # the stage's inputs, each once
     progress: Progress,
     seed: int,
     config: AttributionConfig,
+    interim: Interim | None = None,
     integration: Integration | None = None,
 ) -> Context:
     """The experiment as a problem, its base model fitted, and what its runs determine, from the Jacobian there."""
@@ -173,7 +182,24 @@ def prepared(  # the stage's inputs, each once
     identifiable = identifiability(at_fit, job.unknowns, job.bounds, "at the base model's fit")
     progress(Stage(CHECKING, 1.0))
     report_checks(progress, (), identifiable)
-    return Context(job, setting, start, base, seed, (*experiment.warnings, *identifiable))
+    context = Context(job, setting, start, base, seed, (*experiment.warnings, *identifiable), interim)
+    setting.after_round = None if interim is None else _now_and_then(context, interim)
+    return context
+
+
+def _now_and_then(context: Context, interim: Interim) -> Callable[[JointSearch, FittedModel], None]:
+    """What gives `interim` the likeliest model after a round, so seldom that it takes a small part of the time."""
+    began, cost = clock.monotonic(), EVERY / RARELY
+
+    def after_round(search: JointSearch, best: FittedModel) -> None:
+        nonlocal began, cost
+        now = clock.monotonic()
+        if best.effects and now - began > RARELY * cost:
+            interim(known_so_far(context, likeliest_so_far(search, best), REST_OF_THE_SEARCH))
+            began = clock.monotonic()
+            cost = began - now
+
+    return after_round
 
 
 def searched(context: Context) -> Outcome:
@@ -189,7 +215,7 @@ def searched_finely(context: Context) -> tuple[Context, Outcome]:
         return context, outcome
     # Models are compared as one integration gives them.
     experiment, seed = context.job.experiment, context.seed
-    context = prepared(experiment, setting.cache, setting.progress, seed, setting.config, finer)
+    context = prepared(experiment, setting.cache, setting.progress, seed, setting.config, context.interim, finer)
     return context, searched(context)
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
@@ -38,7 +39,7 @@ class _Stage:
         joint = setting.joint(setting.candidates, presets)
         noise = float(setting.problem.noise_sigma)
         before = len(setting.rounds)
-        return JointSearch(
+        search = JointSearch(
             joint,
             setting.extent,
             self.settings,
@@ -47,8 +48,9 @@ class _Stage:
             excluded=frozenset(self.excluded),
             rounds_before=before,
             thorough=bool(presets) or not setting.presets,  # the last search
-            on_round=self.note,
         )
+        search.on_round = partial(self.note, search)
+        return search
 
     def searched(self, base: np.ndarray) -> tuple[JointSearch, FittedModel]:
         """(the search, likeliest model), from the base model fitted at `base` (P,).
@@ -106,16 +108,25 @@ class _Stage:
         self.excluded |= set(effects)
         self._note("", StepDependent(_joined(effects), kept))
 
-    def note(self, done: JointRound) -> None:
+    def note(self, search: JointSearch, done: JointRound) -> None:
         """A round of the joint search, among those of the findings."""
         compared = tuple((_joined(effects), gain, rms) for effects, gain, rms in done.gains)
         if done.best == done.present:
             self._note("", NoLikelierModel(compared))
         else:
             self._note(_joined(done.best), LikelierModel(_joined(done.present), done.best_gain, compared))
+        if self.setting.after_round is not None:
+            self.setting.after_round(search, search.fitted[done.best])
 
     def _note(self, chosen: str, reason: Reason) -> None:
         self.setting.note(Round(len(self.setting.rounds) + 1, (), chosen, reason))
+
+
+def likeliest_so_far(search: JointSearch, best: FittedModel) -> tuple[JointSearch, Model, Model]:
+    """(the search, base model, likeliest model) as a search that goes on has fitted them, as `search_by_evidence` gives them."""
+    error = search.error(best)
+    first = as_model(search, search.fitted[()], error)
+    return search, first, as_model(search, best, error) if best.effects else first
 
 
 def base_alone(setting: Search, base: Fit) -> tuple[JointSearch, Model, Model]:

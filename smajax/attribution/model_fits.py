@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
+from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -83,6 +84,8 @@ class Search:
     rounds: list[Round] = field(default_factory=list)
     presets: Mapping[str, CoefficientPrior] = field(default_factory=dict)  # values that the user did not give
     declared: DeclaredPriors = NONE_DECLARED  # priors by the experiment file
+    # Gets a joint search and its likeliest model (`FittedModel`) after each of its rounds.
+    after_round: Callable[[Any, Any], object] | None = None
 
     def note(self, done: Round) -> None:
         """Record a round and report it."""

@@ -21,6 +21,12 @@ from smajax.export.single_precision import DOUBLE, SINGLE, UNKNOWN, SingleBuild
 from smajax.export.statements import NAMES
 
 MACRO = "SMAJAX_SINGLE"
+# Then a reading that is no number would pass every test for one, and the command be the largest.
+FINITE_ALONE = (
+    "#if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__)",
+    '#error "compile this without -ffast-math (-ffinite-math-only): numbers that are not finite have to be recognised"',
+    "#endif",
+)
 
 
 @dataclass(frozen=True)
@@ -328,6 +334,8 @@ def c_source(
         f'#include "{name}.h"',
         "",
         "#include <math.h>",
+        "",
+        *FINITE_ALONE,
         "",
         f"typedef {name}_number real;",
         f"typedef {name}_count count;",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
+from smajax.core.names import listed
 from smajax.core.parameters import parameter_values, parameters
 from smajax.data.experiment.record import Experiment, Prior, Unknown
 from smajax.fit.base_model import base_model
@@ -50,4 +51,7 @@ def with_uncertain_presets(experiment: Experiment) -> Experiment:
         )
         for name, one in priors.items()
     )
-    return replace(experiment, unknowns=(*experiment.unknowns, *added))
+    if not added:
+        return experiment
+    said = f"the file does not give {listed(tuple(priors))}: fitted too, within what data sheets leave open."
+    return replace(experiment, unknowns=(*experiment.unknowns, *added), warnings=(*experiment.warnings, said))

@@ -118,7 +118,9 @@ def after_close_loop(findings: Findings, folder: Path, experiment: str) -> list[
         return []
     model = folder / MODEL
     base = () if extended is findings.base_model else ("base_model.toml",)
+    resumed = command("close-loop", experiment, "--out", folder)
     return [
+        *([Step("Go on with this loop, from the fits that are finished", resumed)] if findings.remaining else []),
         Step(
             f"Download the model of this page{', and the base model' if base else ''}", files=(MODEL, "model.nc", *base)
         ),
@@ -147,7 +149,8 @@ def after_identify(result: Identified, folder: Path, experiment: str) -> list[St
     if result.model is not None:
         steps.append(Step(TO_PREDICT, command("predict", model, RUN, "--out", "predicted")))
     if not result.suggestions:
-        design = command("identify", experiment, "--design", "--out", folder)
+        presets = ("--presets", "fitted") if "--presets fitted" in result.provenance.get("command", "") else ()
+        design = command("identify", experiment, *presets, "--design", "--out", folder)
         steps.append(Step("Design the run that would determine most", design))
     if result.model is not None:
         steps += [*_tuning(model, result.model.system), _in_python(model)]

@@ -2,22 +2,68 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 
 import smajax as sma
+from smajax.attribution import close_loop as stages
+from smajax.attribution.close_loop import Interim
 from smajax.attribution.findings import Findings, Verdict
 from smajax.cli.budget import run_within, without
+from smajax.cli.commands.close_loop import run_close_loop
 from smajax.report.write import write_report
+from tests.helpers.made_findings import made_findings
 from tests.helpers.small_bench import bench, smajax
 
 
 class EndedError(Exception):
     """Raised in the place of the end of a process."""
+
+
+@pytest.mark.parametrize("rounds", [1, 2])
+def test_a_loop_that_resumes_leaves_a_page_that_knows_more_until_it_knows_as_much(
+    rounds: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found, experiment, out = made_findings(), sma.load_experiment(bench(tmp_path)), tmp_path / "report"
+    assert len(found.rounds) == 2
+
+    def ended_after(known: int, title: str) -> bytes:
+        def stopped(*_: object, interim: Interim, **__: object) -> None:
+            interim(dataclasses.replace(found, title=title, rounds=found.rounds[:known]))
+            raise EndedError
+
+        monkeypatch.setattr("smajax.attribution.close_loop.close_loop", stopped)
+        with pytest.raises(EndedError):
+            run_close_loop(experiment, out, "", overwrite=False, show_hint=False)
+        return (out / "report.json").read_bytes()
+
+    before = ended_after(2, "before")
+    assert (ended_after(rounds, "resumed") == before) == (rounds < 2)
+
+
+def test_a_long_search_gives_what_it_has_found_so_far(monkeypatch: pytest.MonkeyPatch) -> None:
+    """After its first round already where it may, and then only when much more time has passed than that took."""
+    given, now = [], [0.0]
+    monkeypatch.setattr(stages, "known_so_far", lambda context, models, rest: models[1])
+    monkeypatch.setattr(stages, "likeliest_so_far", lambda search, best: (search, best.effects, None))
+    monkeypatch.setattr(stages.clock, "monotonic", lambda: now[0])
+
+    def shown(effects: Any) -> None:
+        given.append((now[0], effects))
+        now[0] += 5.0
+
+    after_round = stages._now_and_then(cast(Any, None), shown)
+    for later, effects in ((50.0, ("a",)), (20.0, ()), (5.0, ("a", "b")), (20.0, ("a", "c")), (30.0, ("a", "c"))):
+        now[0] += later
+        after_round(cast(Any, None), cast(Any, SimpleNamespace(effects=effects)))
+    assert given == [(75.0, ("a", "b")), (130.0, ("a", "c"))]
 
 
 def test_the_page_is_there_after_the_base_fit_and_says_what_is_to_come(tmp_path: Path) -> None:

@@ -280,6 +280,11 @@ def test_the_bench_of_the_how_to_page_runs_in_twenty_lines(single, tmp_path):
         (tmp_path / name).write_text(text)
     sanitizers = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all", f"-DSMAJAX_SINGLE={single}"]
     subprocess.run(["gcc", *STRICT, *sanitizers, "board.c", "pid.c", "-o", "bench", "-lm"], cwd=tmp_path, check=True)
+    refused = subprocess.run(
+        ["gcc", "-ffast-math", "-c", "pid.c", "-o", "fast.o"], cwd=tmp_path, capture_output=True, text=True
+    )
+    assert refused.returncode != 0
+    assert "without -ffast-math" in refused.stderr
     subprocess.run(["./bench"], cwd=tmp_path, check=True, timeout=20)
 
 

@@ -53,14 +53,25 @@ def test_the_commands_of_a_fitted_model_are_read_and_name_its_files() -> None:
     assert found["export"]["file"] == FOLDER / "model.toml"
     assert found["identify"]["experiment"] == Path("my bench/experiment.toml")
     assert found["identify"]["design"] is True
+    assert "close-loop" not in found
+    stopped = dataclasses.replace(findings, remaining="the checks")
+    first = read(next_steps.after_close_loop(stopped, FOLDER, "my bench/experiment.toml"))[0]
+    assert (first["command"], first["experiment"], first["out"]) == (
+        "close-loop",
+        Path("my bench/experiment.toml"),
+        FOLDER,
+    )
 
 
 def test_an_identification_suggests_a_design_unless_it_has_one() -> None:
     model = model_of_presets("flexinol_table_3_2", "dead_weight", "voltage")
     for suggestions, expected in (((), True), (("a run",), False)):
-        result: Any = SimpleNamespace(model=model, suggestions=suggestions)
-        found = read(next_steps.after_identify(result, FOLDER, "experiment.toml"))
-        assert ("identify" in [one["command"] for one in found]) == expected
+        for given in ("", "smajax identify experiment.toml --presets fitted"):
+            result: Any = SimpleNamespace(model=model, suggestions=suggestions, provenance={"command": given})
+            found = read(next_steps.after_identify(result, FOLDER, "experiment.toml"))
+            designs = [one for one in found if one["command"] == "identify"]
+            assert bool(designs) == expected
+            assert [str(one["presets"]) for one in designs] == ["fitted" if given else "held"] * len(designs)
 
 
 def test_no_controller_is_suggested_for_what_does_not_move() -> None:

@@ -54,14 +54,29 @@ def run_close_loop(
         displayed(console(), show_hint) as progress,
     ):
         in_words = narrated(progress, loaded.output_unit, loaded.output_name)
+        shown = _rounds_shown(out)
+
+        def interim(known: Findings) -> None:
+            # A loop that resumes knows less at first than the page of the one that was stopped.
+            if len(known.rounds) >= shown:
+                write_report(known, out, loaded.path)
+
         findings = close_loop(
             loaded,
             memory=out / "fits",
             progress=in_words,
             command=command,
-            interim=lambda known: write_report(known, out, loaded.path),
+            interim=interim,
         )
         return findings, write_report(findings, out, loaded.path)
+
+
+def _rounds_shown(out: Path) -> int:
+    """Rounds of the search on the page that is in the folder."""
+    try:
+        return len(json.loads((out / RECORD).read_text(encoding="utf-8"))["rounds"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return 0
 
 
 def print_findings(findings: Findings, page: Path) -> None:
