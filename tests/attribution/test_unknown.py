@@ -188,6 +188,7 @@ def test_the_equation_of_a_hidden_term_is_ranked_first(equation: str, level: flo
     assert best.named, best.log_odds
     assert best.equation == equation
     assert {term.equation for term in terms if term.name in best.indistinguishable} <= {equation}
+    assert best.left_out_after is not None
     assert best.left_out_after < level * NOISE
     assert best.left_out_before > 1.2 * NOISE
     assert best.log_odds > 10.0
@@ -219,7 +220,9 @@ def test_an_unknown_function_replaces_effects_that_are_less_likely(hidden: str) 
     assert (found is not None) == (hidden == "sensor")
     if found is not None:
         assert found.terms[0].equation == "sensor"
-        assert found.terms[0].left_out_after < 1.1 * NOISE
+        left_out = found.terms[0].left_out_after
+        assert left_out is not None
+        assert left_out < 1.1 * NOISE
         assert found.likeliest is not None
         assert found.likeliest.rms < 1.1 * NOISE
         assert isinstance(setting.rounds[-1].reason, UnknownTermLikelier)

@@ -53,7 +53,7 @@ def test_a_long_search_gives_what_it_has_found_so_far(monkeypatch: pytest.Monkey
     given, now = [], [0.0]
     monkeypatch.setattr(stages, "known_so_far", lambda context, models, rest: models[1])
     monkeypatch.setattr(stages, "likeliest_so_far", lambda search, best: (search, best.effects, None))
-    monkeypatch.setattr(stages.clock, "monotonic", lambda: now[0])
+    monkeypatch.setattr("smajax.attribution.close_loop.clock.monotonic", lambda: now[0])
 
     def shown(effects: Any) -> None:
         given.append((now[0], effects))

@@ -313,7 +313,7 @@ def test_a_value_that_the_file_does_not_give_may_be_fitted_too(tmp_path: Path, m
     file = coupon_file(tmp_path, NOISE)
     records = {
         how: json.loads(
-            smajax("identify", file, "--starts", 0, "--presets", how, "--out", tmp_path / how, "--json").out
+            smajax("identify", file, "--starts", "0", "--presets", how, "--out", tmp_path / how, "--json").out
         )
         for how in ("held", "fitted")
     }
@@ -325,4 +325,4 @@ def test_a_value_that_the_file_does_not_give_may_be_fitted_too(tmp_path: Path, m
     slope = fitted["parameters"]["stress_slope_austenite"]
     assert abs(slope["value"] - 0.88 * preset) < 4.0 * slope["standard_error"]
     assert slope["standard_error"] < 0.05 * preset
-    assert refused("identify", file, "--starts", 0, "--presets", "fitted", "--out", tmp_path / "held")
+    assert refused("identify", file, "--starts", "0", "--presets", "fitted", "--out", tmp_path / "held")
