@@ -11,12 +11,10 @@ import jax.numpy as jnp
 import numpy as np
 
 from smajax.core.names import listed
-from smajax.core.parameters import parameters
 from smajax.core.progress import Progress, Stage, report_checks
 from smajax.core.result_cache import ResultCache
 from smajax.core.whiteness import LAGS, WHITE, correlation_time, split_runs, whiteness_p_value
 from smajax.data.experiment.record import Experiment, Run, Unknown
-from smajax.fit.base_model import base_model
 from smajax.fit.experiment_problem import declared_problem, free_by_name
 from smajax.fit.integration import IntegrationError, choose_integration, described, integration_error, with_integration
 from smajax.fit.levenberg_marquardt import Fit, FitSettings, levenberg_marquardt
@@ -149,10 +147,7 @@ def check_identifiability(setup: Setup, options: Options) -> tuple[str, ...]:
 
 def _held(setup: Setup) -> tuple[str, ...]:
     """Which values are the presets' and held, in a sentence."""
-    table = parameters(setup.problem.system)
-    names, _ = values_not_given(
-        setup.experiment, base_model(setup.experiment), {name: (one.low, one.high) for name, one in table.items()}
-    )
+    names, _ = values_not_given(setup.experiment, setup.problem.system)
     if not names:
         return ()
     return (

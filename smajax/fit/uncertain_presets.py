@@ -17,17 +17,17 @@ Bounds = Mapping[str, tuple[float, float]]
 
 
 def values_not_given(
-    experiment: Experiment, base: System, bounds: Bounds
+    experiment: Experiment, base: System, bounds: Bounds | None = None
 ) -> tuple[dict[str, CoefficientPrior], Bounds]:
     """Priors of the values that `base` has from its presets, or from an earlier fit, alone, and within what they may move; SI.
 
-    `bounds` of all parameters. What the file, its runs or its unknowns give is not among them.
+    `bounds` of all parameters, by default those declared. What the file, its runs or its unknowns give is not among them.
     """
     of_runs = {name for run in experiment.runs for name in run.parameters}
     given = frozenset({*experiment.parameters, *(unknown.name for unknown in experiment.unknowns), *of_runs})
-    stated = experiment.priors.presets
-    priors = preset_priors(parameters(base), parameter_values(base), given, stated)
-    own = preset_bounds(priors, bounds)
+    stated, table = experiment.priors.presets, parameters(base)
+    priors = preset_priors(table, parameter_values(base), given, stated)
+    own = preset_bounds(priors, bounds or {name: (one.low, one.high) for name, one in table.items()})
     if experiment.model_file is not None:
         # What this experiment file says of them goes before what a fit left.
         priors |= fitted_priors(experiment.model_file, given | stated.keys())
@@ -38,9 +38,8 @@ def values_not_given(
 def with_uncertain_presets(experiment: Experiment) -> Experiment:
     """The same experiment, in which each of these values is an unknown with its prior."""
     base = base_model(experiment)
-    table = parameters(base)
-    priors, bounds = values_not_given(experiment, base, {name: (one.low, one.high) for name, one in table.items()})
-    values = parameter_values(base)
+    table, values = parameters(base), parameter_values(base)
+    priors, bounds = values_not_given(experiment, base)
     added = tuple(
         Unknown(
             name,
