@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import html
-import re
 import secrets
 import socket
 import threading
@@ -33,6 +31,7 @@ from smajax.app.step import FieldError, Sent, Step
 from smajax.core.display_units import digits
 from smajax.data.readers.table import MeasuredDataError
 from smajax.report.frame import TEMPLATES
+from smajax.report.plain_page import with_code
 
 HERE = Path(__file__).parent
 STEPS: tuple[Step, ...] = (
@@ -79,11 +78,6 @@ def _marks(project: Project, current: Step, examined: Examined) -> list[Mark]:
         done = (of_file and not wrong and (loads or bool(errors))) if step.needs == "experiment" else step.done(project)
         found.append(Mark(step, number, step is current, done, wrong, there[step.needs]))
     return found
-
-
-def with_code(text: str) -> str:
-    """A sentence as HTML: what stands in backticks as code, and nothing else of it as markup."""
-    return re.sub(r"`([^`]+)`", r"<code>\1</code>", html.escape(text))
 
 
 class Pages:

@@ -50,10 +50,14 @@ def headline(sentence: str) -> str:
     return f"<p class=headline>{html.escape(sentence)}</p>" if sentence else ""
 
 
+def with_code(text: str) -> str:
+    """A sentence as HTML: what stands in backticks as code, and nothing else of it as markup."""
+    return re.sub(r"`([^`]+)`", r"<code>\1</code>", html.escape(text))
+
+
 def bullets(sentences: Sequence[str]) -> str:
     """A list, with what stands between backticks as code; nothing for none."""
-    items = [re.sub(r"`([^`]+)`", r"<code>\1</code>", html.escape(one)) for one in sentences]
-    return f"<ul>{''.join(f'<li>{one}</li>' for one in items)}</ul>" if items else ""
+    return f"<ul>{''.join(f'<li>{with_code(one)}</li>' for one in sentences)}</ul>" if sentences else ""
 
 
 def folded(parts: Sequence[str], what: str) -> list[str]:
