@@ -8,7 +8,7 @@ import sys
 from collections.abc import Sequence
 from contextlib import suppress
 
-from smajax.cli.terminal import interrupts_answered
+from smajax.cli.terminal import INTERRUPTED, interrupts_answered
 
 GRACE = 2.0  # s between Ctrl-C and the end of a process that does not answer: a compilation cannot be interrupted
 
@@ -34,7 +34,8 @@ def run_within(seconds: float, words: Sequence[str]) -> int | None:
         with interrupts_answered():
             with suppress(ValueError, OSError):  # Windows cannot send it
                 process.send_signal(signal.SIGINT)
-            return process.wait()
+            code = process.wait()
+        return INTERRUPTED if code < 0 else code  # ended before it could answer: its code is that of the signal
 
 
 def without(words: Sequence[str], option: str) -> list[str]:

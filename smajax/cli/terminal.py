@@ -22,6 +22,7 @@ INTERRUPTED = 130
 REPEAT = 1.0  # s after which an unanswered Ctrl-C is repeated
 RETRY = 0.02  # s, where it came at a moment at which no exception can be raised
 CALLBACKS = ("_xla_gc_callback",)  # an exception in them is lost
+IMPORTING = ("<frozen importlib._bootstrap>", "_find_and_load")  # file and function that an import statement runs
 STOPPING = b"\nStopping: what runs at this moment ends first, such as a compilation.\n"
 
 
@@ -55,11 +56,21 @@ def command_line() -> str:
     return "smajax " + as_typed(sys.argv[1:])
 
 
+def _imports(frame: FrameType | None) -> bool:
+    """Whether what runs at this moment is part of an import."""
+    while frame is not None:
+        if (frame.f_code.co_filename, frame.f_code.co_name) == IMPORTING:
+            return True
+        frame = frame.f_back
+    return False
+
+
 @contextmanager
 def answer_interrupts() -> Iterator[None]:
     """Say at once that Ctrl-C came, and repeat it until it ends the command.
 
-    An exception in a callback of XLA during garbage collection is printed and dropped.
+    An exception in a callback of XLA during garbage collection is printed and dropped; one in an import aborts the process where
+    compiled code began it. Both are waited for.
     """
     own = threading.current_thread() is threading.main_thread()
     if not own or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
@@ -73,9 +84,9 @@ def answer_interrupts() -> Iterator[None]:
             _INTERRUPTS.came = True
             with suppress(OSError):
                 os.write(2, STOPPING)  # no buffer of Python's, which may be in use at this moment
-        called_back = frame is not None and frame.f_code.co_name in CALLBACKS
-        repeat(RETRY if called_back else REPEAT)
-        if not called_back:
+        waits = (frame is not None and frame.f_code.co_name in CALLBACKS) or _imports(frame)
+        repeat(RETRY if waits else REPEAT)
+        if not waits:
             raise KeyboardInterrupt
 
     _INTERRUPTS.came = _INTERRUPTS.answered = False

@@ -81,3 +81,25 @@ def test_ctrl_c_while_garbage_is_collected_ends_the_command() -> None:
     assert told.stdout == "went on\n"
     assert told.returncode == 130
     assert "Interrupted." in told.stderr
+
+
+def test_ctrl_c_waits_for_the_end_of_an_import(tmp_path: Path) -> None:
+    """Compiled code that imports, and is told of an exception, aborts the process."""
+    (tmp_path / "compiled.py").write_text(
+        "import os, signal, time\ntry:\n    os.kill(os.getpid(), signal.SIGINT)\n    time.sleep(0.2)\n"
+        "except KeyboardInterrupt:\n    os.abort()\n"
+    )
+    code = (
+        "import signal, time\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        "from smajax.cli.terminal import resumable\nwith resumable():\n    import compiled\n"
+        "    print('imported', flush=True)\n    time.sleep(20)"
+    )
+    told = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])},
+    )
+    assert told.returncode == 130, told.stderr
+    assert "Interrupted." in told.stderr
