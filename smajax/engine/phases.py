@@ -11,6 +11,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from heapq import heappop, heappush
 
 import numpy as np
 
@@ -239,18 +240,19 @@ def _places(spans: Mapping[str, tuple[int, int]], sizes: Mapping[str, int], vect
     sizes: bytes a vector. Only one of the same makes room: a vector's turn must not write where another's is still to be read.
     """
     free: dict[int, list[int]] = {}
-    living: list[str] = []
+    living: list[tuple[int, int, str]] = []  # a heap: (its end, the order in which they came, what)
     result: dict[str, int] = {}
     total = 0
-    for name in sorted(spans, key=lambda one: spans[one][0]):
-        for over in [one for one in living if spans[one][1] <= spans[name][0]]:
+    for number, name in enumerate(sorted(spans, key=lambda one: spans[one][0])):
+        first, last = spans[name]
+        while living and living[0][0] <= first:
+            *_, over = heappop(living)
             free.setdefault(sizes[over], []).append(result[over])
-            living.remove(over)
         if free.get(sizes[name]):
             result[name] = free[sizes[name]].pop()
         else:
             result[name], total = total, total - (-sizes[name] * vectors // LINE) * LINE
-        living.append(name)
+        heappush(living, (last, number, name))
     return result, total
 
 

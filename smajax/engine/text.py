@@ -34,9 +34,11 @@ class Unsupported(ValueError):
         return f"machine code has no translation for {self.args[0]}"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(
+    slots=True, unsafe_hash=True
+)  # not frozen, which takes three times as long to make: there are 100,000 of them
 class Lane:
-    """One number a lane: its name in the text (or a constant, the same in every lane)."""
+    """One number a lane: its name in the text (or a constant, the same in every lane). Nothing changes it."""
 
     name: str
     dtype: str  # numpy's
@@ -85,6 +87,8 @@ class Text:
         self.either: dict[str, tuple[str, float, float]] = {}  # (mask, yes, no) of what is one of two constants
         self.names = Names({}, {})
         self.levels: list[_Level] = [_Level(sure=True)]
+        self.least_depth = 0  # of the innermost loop that may not run: nothing is done before it
+        self._layouts: dict[str, Layout] = {}
         self.depth: dict[str, int] = {}  # how many loops lie about what has a name
         self.globals: list[str] = []
         self.declared: dict[str, str] = {}
@@ -108,34 +112,40 @@ class Text:
 
         `dtype`: the kind of number of a vector.
         """
-        names = NAMES.findall(right)
-        sure = max(k for k, level in enumerate(self.levels) if k == 0 or not level.sure)
-        depth = max([sure, *(self.depth.get(one, 0) for one in names)])
+        names, depth = NAMES.findall(right), self.least_depth
+        for one in names:
+            depth = max(depth, self.depth.get(one, 0))
         level = self.levels[depth]
-        if right in level.known:
-            return level.known[right]
+        if (given := level.known.get(right)) is not None:
+            return given
         name = level.known[right] = self.fresh()
         self.depth[name] = depth
-        if any(one in self.names.layouts for one in names):
+        if reads := self._reads(names):
             assert dtype is not None, f"of an unknown kind: {right}"
-            self._differs(name, dtype)
-            level.items.append(Work(name, [f"{name} = {right}"], self._reads(names)))
+            self.names.layouts[name] = self.layout(dtype)
+            level.items.append(Work(name, [f"{name} = {right}"], reads))
         else:
             level.items.append(f"  {name} = {right}")
         return name
 
-    def _differs(self, name: str, dtype: str) -> None:
+    def layout(self, dtype: str) -> Layout:
+        """Of what differs from vector to vector."""
+        found = self._layouts.get(dtype)
+        if found is None:
+            found = self._layouts[dtype] = self._layout(dtype)
+        return found
+
+    def _layout(self, dtype: str) -> Layout:
         kind = self.vector(dtype)
         if dtype != "bool":
-            self.names.layouts[name] = Layout(kind, self.lanes * self.bytes(dtype))
-        elif self.mask == "i1":
-            self.names.layouts[name] = Layout(kind, -(-self.lanes // 8))
-        else:
-            whole = f"<{self.lanes} x {self.mask}>"
-            self.names.layouts[name] = Layout(whole, self.lanes * int(self.mask[1:]) // 8, kind)
+            return Layout(kind, self.lanes * self.bytes(dtype))
+        if self.mask == "i1":
+            return Layout(kind, -(-self.lanes // 8))
+        return Layout(f"<{self.lanes} x {self.mask}>", self.lanes * int(self.mask[1:]) // 8, kind)
 
     def _reads(self, names: Sequence[str]) -> tuple[str, ...]:
-        return tuple(dict.fromkeys(one for one in names if one in self.names.layouts))
+        layouts = self.names.layouts
+        return tuple(dict.fromkeys([one for one in names if one in layouts]))
 
     def work(self, lines: Sequence[str], dtype: str | None = None) -> str:
         """Lines that stay together, of one vector; the name of the last one's value, where it has one: `{}` in it."""
@@ -144,7 +154,7 @@ class Text:
         if dtype is not None:
             name = self.fresh()
             self.depth[name] = len(self.levels) - 1
-            self._differs(name, dtype)
+            self.names.layouts[name] = self.layout(dtype)
             own[-1] = f"{name} = {own[-1]}"
         inside = {one.split(" = ")[0].strip() for one in own}
         names = [one for line in own for one in NAMES.findall(line) if one not in inside]
@@ -159,6 +169,7 @@ class Text:
     def open(self, label: str, sure: bool) -> str:
         """Begin a loop at `label`; `sure`: it runs once at least. The name of its count."""
         self.levels.append(_Level(sure))
+        self._find_least_depth()
         self.label(label)
         count = self.fresh("i")
         self.depth[count] = len(self.levels) - 1
@@ -167,21 +178,25 @@ class Text:
     def close(self, count: str, following: str, before: str, first: str = "0") -> None:
         """The end of the last loop begun, with the value of its count in the next round, and the block before it."""
         top, *rest = self.levels.pop().items
+        self._find_least_depth()
         assert isinstance(top, str)
         phi = f"  {count} = phi i64 [ {first}, %{before} ], [ {following}, %{self.block} ]"
         self.levels[-1].items += [f"  br label %{top[:-1]}", Edge(begins=True), top, phi, *rest, Edge(begins=False)]
 
+    def _find_least_depth(self) -> None:
+        self.least_depth = max(k for k, level in enumerate(self.levels) if k == 0 or not level.sure)
+
     def cell(self, dtype: str) -> Lane:
         """A number that will be written over."""
         name = self.fresh("c")
-        self._differs(name, dtype)
+        self.names.layouts[name] = self.layout(dtype)
         self.names.cells[name] = name
         return Lane(name, dtype)
 
     def present(self, cell: Lane) -> Lane:
         """What a cell holds here and now, to be read before it is written again."""
         name = self.fresh("n")
-        self._differs(name, cell.dtype)
+        self.names.layouts[name] = self.layout(cell.dtype)
         self.names.cells[name] = cell.name
         self.depth[name] = len(self.levels) - 1
         return Lane(name, cell.dtype)

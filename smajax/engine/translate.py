@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import prod
-from typing import Any
+from typing import Any, cast
 
 import jax
-import jax.extend as jex
 import jax.numpy as jnp
 import numpy as np
 from jax.interpreters import partial_eval
 
-from smajax.engine.arithmetic import ELEMENTWISE, exact_quotient, select
+from smajax.engine.arithmetic import ELEMENTWISE, Operation, select
 from smajax.engine.array_operations import (
     MOVES,
     OPERATIONS,
@@ -26,14 +25,16 @@ from smajax.engine.array_operations import (
     reduced,
     whole_number,
 )
+from smajax.engine.equations import Read, Step, array_of, note, read_of, steps_of
 from smajax.engine.expansions import EXPANSIONS
-from smajax.engine.jax_versions import TABLE, expanded, kind_of, opened, parameters_of, refuse_unread
+from smajax.engine.jax_versions import TABLE, expanded, opened
 from smajax.engine.loop import Loop
 from smajax.engine.memory import in_memory, in_registers, mapped, row, write
 from smajax.engine.phases import laid_out
 from smajax.engine.text import NAME, Array, Lane, Text, Unsupported, scalar_type
 from smajax.engine.values import SMALL, Filled, Held, Stored, Value, held, is_known, name_of, size_of
 
+OF_TWO_KINDS = ("select_n", "convert_element_type", "bitcast_convert_type")
 VECTORS = 8  # of a group: while one waits for a result others go on
 CALLS = {
     name for name, own in TABLE.items() if "program" in own and name != "scan"
@@ -54,19 +55,6 @@ class Translated:
     lanes: int  # runs of a vector
     results: tuple[Array, ...]
     scratch: int  # bytes a thread needs
-
-
-def _array(aval: Any) -> Array:
-    return Array(*kind_of(aval))
-
-
-def _rounds(equation: Any) -> bool:
-    """Whether it cuts its argument to a whole number: a quotient must not be a bit below one then."""
-    name = equation.primitive.name
-    if name in ("jit", "pjit"):
-        name = str(parameters_of(equation)["name"])
-    to_whole = name == "convert_element_type" and "int" in str(parameters_of(equation)["new_dtype"])
-    return to_whole or name in ("floor", "ceil", "round", "trunc", "fix", "floor_divide")
 
 
 def _numbers(known: Any) -> np.ndarray:
@@ -91,44 +79,47 @@ def _as_shape(lanes: Held, shape: tuple[int, ...]) -> np.ndarray:
 class _Translation:
     def __init__(self, text: Text) -> None:
         self.text = text
+        self._prepared: dict[
+            int, tuple[Any, tuple[tuple[Step, ...], list[Read]]]
+        ] = {}  # with the program, whose number it is
 
     def program(self, jaxpr: Any, consts: Sequence[Value], given: Sequence[Value]) -> list[Value]:
         """The results of a program of which the arguments are `given`."""
-        names: dict[Any, Value] = {}
-
-        def read(atom: Any) -> Value:
-            if isinstance(atom, jex.core.Literal):
-                return np.asarray(atom.val, dtype=_array(atom.aval).dtype)
-            return names[atom]
-
-        for variable, value in zip([*jaxpr.constvars, *jaxpr.invars], [*consts, *given], strict=True):
-            names[variable] = value
-        to_the_bit = {id(one) for equation in jaxpr.eqns if _rounds(equation) for one in equation.invars}
-        for equation in jaxpr.eqns:
-            given = [read(one) for one in equation.invars]
-            whole = equation.primitive.name == "div" and id(equation.outvars[0]) in to_the_bit
+        steps, last = self.prepared(jaxpr)
+        names: dict[Any, Value] = dict(zip([*jaxpr.constvars, *jaxpr.invars], [*consts, *given], strict=True))
+        for step in steps:
+            arguments = [names[one] if known is None else known for one, known in step.reads]
             try:
-                result = self.equation(equation, given, "exact_div" if whole else equation.primitive.name)
+                result = self.equation(step, arguments)
             except Exception as error:
-                if not hasattr(error, "__notes__"):  # of the innermost alone
-                    error.add_note(f"while the operation `{equation.primitive.name}` was translated")
+                note(error, step.equation)
                 raise
-            for variable, value in zip(equation.outvars, result, strict=True):
+            for variable, value in zip(step.equation.outvars, result, strict=True):
                 names[variable] = value
-        return [read(one) for one in jaxpr.outvars]
+        return [names[one] if known is None else known for one, known in last]
+
+    def prepared(self, jaxpr: Any) -> tuple[tuple[Step, ...], list[Read]]:
+        """The steps of a program and what it ends with, read once."""
+        found = self._prepared.get(id(jaxpr))
+        if found is None:
+            found = self._prepared[id(jaxpr)] = jaxpr, (steps_of(jaxpr), [read_of(one) for one in jaxpr.outvars])
+        return found[1]
 
     def closed(self, program: Any, given: Sequence[Value]) -> list[Value]:
         jaxpr, consts = opened(program)
         return self.program(jaxpr, _constants(consts), given)
 
-    def equation(self, equation: Any, given: list[Value], name: str) -> list[Value]:
-        params = parameters_of(equation)
+    def equation(self, step: Step, given: list[Value]) -> list[Value]:
+        equation, name, params = step.equation, step.name, step.params
+        if step.operation is not None and step.out is not None and not all(map(is_known, given)):
+            step.check()
+            return [self.elementwise(name, params, given, step.operation, step.out)]
         if name in SAME:
             return given
         if name in CALLS:
             return self.closed(params["program"], given)
         if name == "scan":
-            return self.scan(params, given, [_array(one.aval) for one in equation.outvars])
+            return self.scan(params, given, [array_of(one.aval) for one in equation.outvars])
         if name == "while":
             return self.repeat(params, given)
         if name == "cond":
@@ -139,17 +130,12 @@ class _Translation:
             with jax.ensure_compile_time_eval():
                 result = equation.primitive.bind(*given, **equation.params)
             return [_numbers(one) for one in (result if equation.primitive.multiple_results else [result])]
-        out = _array(equation.outvars[0].aval)
+        out = array_of(equation.outvars[0].aval)
         kinds = [name_of(one.aval.dtype) for one in equation.invars]
-        if name == "exact_div" and not out.dtype.startswith("float"):
-            name = "div"
-        if name in ELEMENTWISE or name in REDUCTIONS or name == "exact_div":
-            refuse_unread(equation)
-        if name in ELEMENTWISE or name == "exact_div":
-            return [self.elementwise(name, params, given, out)]
         if name == "gather" and "FILL" in str(params["mode"]) and not at_known_places(name, given):
             raise Unsupported("a gathering that puts something in the place of what is beyond the ends")
         if name in REDUCTIONS:
+            step.check()
             return [reduced(self.text, REDUCTIONS[name], given, params["axes"], out)]
         small = all(size_of(one) <= SMALL for one in given)
         small &= all(prod(one.aval.shape) <= SMALL for one in equation.outvars)
@@ -161,7 +147,7 @@ class _Translation:
             if lane is not None and name not in ("dynamic_update_slice", "scatter", "split"):
                 return [filled(lane, out.shape)]
         if name == "split":
-            return parted(self.text, given[0], params, [_array(one.aval) for one in equation.outvars])
+            return parted(self.text, given[0], params, [array_of(one.aval) for one in equation.outvars])
         operation = OPERATIONS.get(name)
         if operation is None:
             program = expanded(equation)
@@ -172,22 +158,23 @@ class _Translation:
 
     # Arithmetic, and the shapes of arrays.
 
-    def elementwise(self, name: str, params: dict[str, Any], given: list[Value], out: Array) -> Value:
+    def elementwise(
+        self, name: str, params: dict[str, Any], given: list[Value], operation: Operation, out: Array
+    ) -> Value:
         size = prod(out.shape)
         scalar_type(out.dtype)
         if name == "convert_element_type" and isinstance(given[0], Stored) and given[0].dtype == out.dtype:
             return given[0]
 
-        operation = exact_quotient if name == "exact_div" else ELEMENTWISE[name]
-
         def put(*lanes: Lane) -> Lane:
-            if (
-                name not in ("select_n", "convert_element_type", "bitcast_convert_type")
-                and len({one.dtype for one in lanes}) > 1
-            ):
+            if name not in OF_TWO_KINDS and any(one.dtype != lanes[0].dtype for one in lanes):
                 raise Unsupported(f"`{name}` of different kinds of numbers")
             return operation(self.text, out.dtype, *lanes, **params)
 
+        if out.shape == () and all(type(one) is Held and one.shape == () for one in given):
+            return held(
+                put(*(cast(Held, one).item() for one in given))
+            )  # nearly all there is: without the ways of arrays
         if size > SMALL:
             if all(isinstance(one, Filled) or (is_known(one) and size_of(one) == 1) for one in given):
                 lanes = [
@@ -218,7 +205,7 @@ class _Translation:
         known = _constants(consts)
         start = [self.carried(one) for one in given[fixed : fixed + carry]]
         series = given[fixed + carry :]
-        kinds = [_array(one.aval) for one in jaxpr.invars[fixed + carry :]]
+        kinds = [array_of(one.aval) for one in jaxpr.invars[fixed + carry :]]
         stacked = out[carry:]
         if length == 0:
             raise Unsupported("a loop of no steps")
@@ -300,7 +287,7 @@ def translate(
     """
     text = Text(lanes, estimates, vectors, mask)
     put = _Translation(text)
-    arguments = [_array(aval) for aval in program.in_avals]
+    arguments = [array_of(aval) for aval in program.in_avals]
     shared: list[Value | None] = []
     places = {True: 0, False: 0}
     pointers = []
@@ -329,7 +316,7 @@ def translate(
         if value is None:
             value = held(text.load_lanes(text.address(pointer, first, argument.dtype), argument.dtype))
         given.append(value)
-    results = tuple(_array(aval) for aval in program.out_avals)
+    results = tuple(array_of(aval) for aval in program.out_avals)
     # What no result asks for may well be what has no translation.
     needed, _ = partial_eval.dce_jaxpr(program.jaxpr, [True] * len(results), instantiate=True)
     outcome = put.program(needed, _constants(program.consts), given)

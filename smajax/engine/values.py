@@ -52,15 +52,19 @@ def name_of(dtype: Any) -> str:
 
 def held(lanes: Any, shape: tuple[int, ...] = ()) -> Held:
     """An array of `Lane`s: numpy must not look into them."""
-    flat = lanes if isinstance(lanes, list) else [lanes]
-    result = np.empty(len(flat), dtype=object)
-    for number, lane in enumerate(flat):
-        result[number] = lane
-    return result.reshape(shape).view(Held)
+    if not isinstance(lanes, list) or len(lanes) == 1:
+        result = Held(shape, dtype=object)
+        result[(0,) * len(shape)] = lanes[0] if isinstance(lanes, list) else lanes
+        return result
+    flat = np.empty(len(lanes), dtype=object)
+    for number, lane in enumerate(lanes):
+        flat[number] = lane
+    return flat.reshape(shape).view(Held)
 
 
 def is_known(value: Value) -> bool:
-    return isinstance(value, np.ndarray) and not isinstance(value, Held)
+    kind = type(value)
+    return kind is np.ndarray or (kind is not Held and isinstance(value, np.ndarray))
 
 
 def size_of(value: Value) -> int:

@@ -22,6 +22,7 @@ from smajax.engine import (
     Unsupported,
     arithmetic,
     cache,
+    equations,
     jax_versions,
     kernel,
     native,
@@ -70,7 +71,7 @@ def _without_llvmlite(patched: pytest.MonkeyPatch) -> None:
 BROKEN: dict[str, tuple[Break, str, type[Exception]]] = {
     "a primitive that is unknown": (
         lambda patched: patched.setattr(
-            translate, "ELEMENTWISE", {name: one for name, one in arithmetic.ELEMENTWISE.items() if name != "max"}
+            equations, "ELEMENTWISE", {name: one for name, one in arithmetic.ELEMENTWISE.items() if name != "max"}
         ),
         "the operation `max`",
         Unsupported,
