@@ -7,7 +7,6 @@ from typing import ClassVar
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
 from smajax.model.effects.candidate import Actuator, Candidate, Width
-from smajax.model.load.coupon import Coupon
 from smajax.model.types import Scalar, WireState
 from smajax.model.wire.constitutive import ConstitutiveTerm
 from smajax.model.wire.form import RateForm
@@ -18,7 +17,7 @@ OF_STRESS, OF_TEMPERATURE = "mismatch_of_stress", "mismatch_of_temperature"
 
 
 def _applies(system: Actuator) -> bool:
-    return isinstance(system.load, Coupon) and isinstance(system.wire.constitutive.form, RateForm)
+    return isinstance(system.wire.constitutive.form, RateForm)
 
 
 class ElasticMismatch(AbstractEffect, HistoryTerm, ConstitutiveTerm):
@@ -27,8 +26,7 @@ class ElasticMismatch(AbstractEffect, HistoryTerm, ConstitutiveTerm):
     The source's rate form $\dot\sigma = E \dot\varepsilon + \ldots$ (Elahinia 2004, eq. 3.2) leaves out how the elastic strain
     $\sigma/E(\xi)$ moves with the phase; its integrated form (eq. 4.51, 4.52, with the thermal term) has it. With
     $E_A = (1 + a) E_M$ for the wire's own moduli this effect turns the one into the other to rounding
-    (`wire.form.IntegratedForm`). A candidate of coupons whose stress is given: under a constant stress the rate form knows
-    nothing of the moduli.
+    (`wire.form.IntegratedForm`), whatever the load. Under a constant stress the rate form knows nothing of the moduli.
     """
 
     contrast: Scalar = parameter(
