@@ -114,6 +114,15 @@ def set_parameters(document: tomlkit.TOMLDocument, form: Form) -> None:
     for field, value in form.items():
         if name := field.removeprefix("model.parameters.") if field.startswith("model.parameters.") else "":
             put(document, ("model", "parameters", name), value.strip())
+            if value.strip():
+                no_prior(document, name)
+
+
+def no_prior(document: tomlkit.TOMLDocument, name: str) -> None:
+    """Without the prior of a value that is known, or an unknown, from here on."""
+    put(document, ("priors", "presets", name), None)
+    if not document.get("priors", {}).get("presets", True):
+        document["priors"].pop("presets")
 
 
 def set_unknowns(document: tomlkit.TOMLDocument, form: Form, fresh: Callable[[str], Mapping[str, str]]) -> None:
@@ -130,6 +139,7 @@ def set_unknowns(document: tomlkit.TOMLDocument, form: Form, fresh: Callable[[st
             box.update(fresh(name))
             table[name] = box
             put(document, ("model", "parameters", name), None)
+            no_prior(document, name)
         elif what in ("low", "high", "start") and name in table:
             table[name][what] = value.strip()
 

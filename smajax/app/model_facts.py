@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
@@ -11,6 +11,7 @@ from smajax.app import drawings
 from smajax.app.ready import ready
 from smajax.data.experiment.schema import ExperimentFile
 
+LIKELY = "of your bench, not measured: about what [priors.presets] says"
 # Where a preset's number comes from, in words.
 ORIGIN = {"printed": "from the source", "corrected": "from the source, corrected", "chosen": "an assumption"}
 
@@ -115,9 +116,11 @@ def rows_of(file: ExperimentFile) -> tuple[Row, ...]:
     if model.file is not None:
         return ()
     try:
-        return rows(model.wire, model.load, model.drive)
+        found = rows(model.wire, model.load, model.drive)
     except (KeyError, ValueError):
         return ()
+    likely = {name: str(one.base) for name, one in file.priors.presets.items() if one.base is not None}
+    return tuple(replace(row, preset=likely[row.name], origin=LIKELY) if row.name in likely else row for row in found)
 
 
 def fresh_bounds(row: Row) -> dict[str, str]:

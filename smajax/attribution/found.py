@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -145,7 +145,7 @@ def priors_found(job: Job, setting: Search) -> tuple[PriorFinding, ...]:
         for name in effects
         if name in declared.odds
     ]
-    model = base_model(job.experiment)
+    model = base_model(replace(job.experiment, priors=NONE_DECLARED))
     held_or_free = preset_priors(parameters(model), parameter_values(model), frozenset())
     if job.experiment.model_file is not None:
         held_or_free |= fitted_priors(job.experiment.model_file, frozenset())

@@ -139,7 +139,9 @@ def check_identifiability(setup: Setup, options: Options) -> tuple[str, ...]:
     at = _of_fit_runs(sensitivity(setup.every_run, values, setup.names), setup)
     sentences = [line for line in identifiability(at, setup.names, setup.bounds) if "are correlated" not in line]
     held = _held(setup)
-    unused = setup.experiment.priors and (held or setup.experiment.priors.odds or setup.experiment.priors.coefficients)
+    declared = setup.experiment.priors
+    widths_alone = held and any(one.base is None for one in declared.presets.values())
+    unused = declared.odds or declared.coefficients or widths_alone
     warnings = (*setup.experiment.warnings, *((UNUSED_PRIORS,) if unused else ()))
     report_checks(options.progress, warnings, [*sentences, *held])
     return (*warnings, *sentences, *held)

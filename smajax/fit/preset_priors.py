@@ -53,7 +53,8 @@ def preset_priors(
     }
     for name, one in declared.items():
         if one.sigma is not None:
-            found[name] = CoefficientPrior(float(values[name]), one.sigma, one.logarithmic)
+            base = float(values[name]) if one.base is None else one.base
+            found[name] = CoefficientPrior(base, one.sigma, one.logarithmic)
     return found
 
 

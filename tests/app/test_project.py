@@ -138,6 +138,13 @@ def test_the_resistance_of_the_wire_gives_its_resistivities(folder: Path, drafte
     assert drafted.post("/bench", data={"do": "resistance", "ohms": "20", "ohms_of": "wire"}).status_code == 200
     given = str(read_schema(folder / EXPERIMENT).model.parameters["resistivity_martensite"])
     assert float(given.split()[0]) == pytest.approx(20.0 / 0.5 * np.pi / 4 * 0.15e-3**2, rel=1e-3)
+    file = read_schema(folder / EXPERIMENT)
+    likely = str(file.priors.presets["resistivity_austenite"].base)
+    assert float(likely.split()[0]) == pytest.approx(84.0 / 76.0 * float(given.split()[0]), rel=1e-3)
+    assert likely in drafted.get("/bench").text
+    drafted.post("/bench", data={"model.parameters.resistivity_austenite": "8e-7 ohm m"})
+    file = read_schema(folder / EXPERIMENT)
+    assert ("resistivity_austenite" in file.model.parameters, file.priors.presets) == (True, {})
 
 
 def test_columns_without_headings_can_be_chosen(tmp_path: Path, folder: Path, client: TestClient) -> None:

@@ -19,6 +19,8 @@ from smajax.data.experiment.load import load_experiment
 from smajax.data.experiment.name_hints import hinted, mass_hint
 from smajax.data.model_catalogue import CATALOGUE
 from smajax.fit.base_model import base_model
+from smajax.fit.uncertain_presets import values_not_given
+from smajax.model.effects.prior_width import CoefficientPrior
 from smajax.model.presets import build
 
 AREA = 0.25 * math.pi * 0.31e-3**2
@@ -85,9 +87,15 @@ def test_a_known_value_is_refused_as_that_of_a_file(tmp_path: Path, known: dict[
     [({"ohms": 6.2, "known": KNOWN}, 12.4), ({"ohms_per_metre": 8.5, "known": KNOWN}, 8.5)],
 )
 def test_a_resistance_gives_both_resistivities(tmp_path: Path, facts: dict[str, Any], per_metre: float) -> None:
-    """R A/l_0 of the cold wire, and the hot one in the ratio of Table 3.2, 84 to 76."""
+    """R A/l_0 of the cold wire; the hot one, which nobody measured, in the ratio of Table 3.2, 84 to 76, and uncertain."""
     made = drafted(tmp_path, **facts)
-    values = parameter_values(base_model(load_experiment(tmp_path / "e.toml", CATALOGUE)))
+    experiment = load_experiment(tmp_path / "e.toml", CATALOGUE)
+    base = base_model(experiment)
+    values = parameter_values(base)
+    assert "resistivity_martensite" in experiment.parameters
+    priors, _ = values_not_given(experiment, base)
+    assert priors["resistivity_austenite"] == CoefficientPrior(values["resistivity_austenite"], 0.1, True)
+    assert "resistivity_martensite" not in priors
     assert values["resistivity_martensite"] == pytest.approx(per_metre * AREA, rel=1e-3)
     assert values["resistivity_austenite"] == pytest.approx(per_metre * AREA * 84.0 / 76.0, rel=1e-3)
     (said,) = [one for one in made.messages if "of the cold wire" in one]

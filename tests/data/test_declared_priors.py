@@ -103,10 +103,14 @@ MISTAKES = [
         "[priors.presets]\nyoung_modulus_austenite = { relative = -1.0 }",
         r"austenite.relative: got -1.0, expected a num",
     ),
-    ("[priors.presets]\nyoung_modulus_austenite = {}", r"young_modulus_austenite: says nothing; give width"),
+    ("[priors.presets]\nyoung_modulus_austenite = {}", r"young_modulus_austenite: does not say how uncertain"),
     (
-        '[priors.presets]\nyoung_modulus_austenite = { base = "1 GPa" }',
-        r"austenite.base: is not a known key; known here",
+        '[priors.presets]\nyoung_modulus_austenite = { base = "60 GPa" }',
+        r"austenite: does not say how uncertain .*what is known goes into \[model.parameters\]",
+    ),
+    (
+        '[priors.presets]\nyoung_modulus_austenite = { base = "60 MPa", relative = 0.1 }',
+        r"austenite.base: got '60 MPa', that is 6e\+07 Pa; expected",
     ),
     (
         "[priors.presets]\naustenite_start = { relative = 0.1 }",

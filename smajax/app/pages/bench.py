@@ -8,7 +8,7 @@ from typing import Any
 import tomlkit
 
 from smajax.app.drafted import draft_file, run_files
-from smajax.app.edit import edited, set_parameters
+from smajax.app.edit import edited, put, set_parameters
 from smajax.app.model_facts import cards, rows_of
 from smajax.app.project import Project
 from smajax.app.ready import ready
@@ -95,8 +95,16 @@ def _resistance(project: Project, sent: Sent) -> None:
     presets = f"{model.wire} {model.load} {model.drive}"
     try:
         found = checked(facts, project.path, presets, described, own, [run.name for run in file.runs])
-        values = {f"model.parameters.{name}": found.values[name] for name in PHASES}
-        edited(project.path, lambda document: set_parameters(document, values))
+        values = {f"model.parameters.{name}": found.values.get(name, "") for name in PHASES}
+
+        def change(document: tomlkit.TOMLDocument) -> None:
+            set_parameters(document, values)
+            for name, (base, relative) in found.likely.items():
+                prior = tomlkit.inline_table()
+                prior.update({"base": base, "relative": relative})
+                put(document, ("priors", "presets", name), prior)
+
+        edited(project.path, change)
     except ExperimentError as error:
         raise FieldError("ohms", str(error).replace(f"{project.path}: ", "")) from None
 
@@ -131,7 +139,8 @@ def _beside_the_values(project: Project, said: Mapping[str, str], head: str) -> 
     model = file.model
     inputs = tuple(name for name, one in file.channels.items() if one.role == "input")
     masses = {run.name: str(run.inputs["mass"]) for run in file.runs if "mass" in run.inputs}
-    known = Known({name: str(value) for name, value in model.parameters.items()}, masses=masses)
+    likely = {name: (str(one.base), 0.0) for name, one in file.priors.presets.items() if one.base is not None}
+    known = Known({name: str(value) for name, value in model.parameters.items()}, likely, masses=masses)
     drafted = preset_parameters(DraftModel(model.wire, model.load, model.drive, inputs, "", ""), known)
     text = ordered(project.text, drafted.presets, said)
     if text != project.text:

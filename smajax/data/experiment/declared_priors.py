@@ -129,11 +129,12 @@ def _presets(
                 path, key, f"{given[0]} gives it too, so it is not the preset's; remove one of the two"
             )
         info = own[name]
-        value = begun.get(name, info.preset or 0.0)
+        base = None if section.base is None else bounded(path, f"{key}.base", section.base, info)
+        value = begun.get(name, info.preset or 0.0) if base is None else base
         if section.relative is not None and (info.unit == CELSIUS or not value > 0.0):
-            got = f"a preset of {value:g} {info.unit}".strip()
+            got = f"{'a preset of' if base is None else 'a base of'} {value:g} {info.unit}".strip()
             raise _no_logarithm(path, f"{key}.relative", got)
-        found[name] = PriorSpread(None, *_spread(path, key, section, info))
+        found[name] = PriorSpread(base, *_spread(path, key, section, info))
     return found
 
 

@@ -69,11 +69,25 @@ def _given(known: Known) -> list[str]:
     return lines
 
 
+def _likely(known: Known) -> list[str]:
+    """The section [priors.presets] of what is known of the bench by its likely size alone."""
+    if not known.likely:
+        return []
+    lines = ["[priors.presets]  # how uncertain values are that nobody measured on this wire: close-loop fits them too"]
+    for name, (value, relative) in known.likely.items():
+        why = known.origins.get(name, "")
+        prior = f"{{ base = {toml_value(value)}, relative = {relative:g} }}"
+        lines.append(f"{toml_key(name)} = {prior}" + (f"  # {why}" if why else ""))
+    return [*lines, ""]
+
+
 def _preset_lines(model: DraftModel, system: System, known: Known, unknown: Sequence[str]) -> tuple[PresetLine, ...]:
     """Values of wire, load and drive that are the preset's; listed are those from a ruler, a balance or a data sheet."""
     table, values = parameters(system), parameter_values(system)
     heated = model.drive != "none"
-    out = {*known.values, *unknown} | ({"load_mass"} if "mass" in model.inputs or known.masses else set())
+    out = {*known.values, *known.likely, *unknown} | (
+        {"load_mass"} if "mass" in model.inputs or known.masses else set()
+    )
     sizes = [*WIRE_SIZES, *["ambient_temperature"] * heated] if model.load != "coupon" else []
     parts = [name for name, one in table.items() if one.path[0] in ("load", "drive")]
     rest = [name for name, one in table.items() if one.path[0] == "wire" and name not in sizes]
@@ -122,6 +136,7 @@ def preset_parameters(model: DraftModel, known: Known) -> ParameterSections:
         "[nuisance]",
         "offset = true  # the sensor's zero may differ from run to run",
         "",
+        *_likely(known),
     ]
     if not listed:
         return ParameterSections(lines, known.messages, presets)
@@ -138,7 +153,8 @@ def kept_parameters(model: DraftModel, kept: ActuatorModel, known: Known) -> Par
 
     Of a file in which nothing was fitted those that no data sheet has, with bounds around its values.
     """
-    fitted = {name: one for name, one in kept.parameters.items() if one.origin == "fitted" and name not in known.values}
+    out = {*known.values, *known.likely}
+    fitted = {name: one for name, one in kept.parameters.items() if one.origin == "fitted" and name not in out}
     lines = [
         "[model.parameters]  # known values that differ from the model file's, each with its unit",
         *_given(known),
@@ -157,4 +173,5 @@ def kept_parameters(model: DraftModel, kept: ActuatorModel, known: Known) -> Par
         why = "" if name in kept.errors else "  # the runs of before did not determine it"
         lines.append(f"{toml_key(name)} = {{ {box} }}{why}")
     offset = any(one.offset for one in kept.outputs) or not kept.outputs
-    return ParameterSections([*lines, "", "[nuisance]", f"offset = {toml_value(offset)}", ""], known.messages)
+    lines += ["", "[nuisance]", f"offset = {toml_value(offset)}", "", *_likely(known)]
+    return ParameterSections(lines, known.messages)

@@ -39,7 +39,8 @@ class PriorSpread:
 class DeclaredPriors:
     """Priors of candidate effects and of the presets' values that the file gives in the place of the library's.
 
-    odds: by effect. coefficients: by full name ("latent_heat.enthalpy"). presets: by parameter, about the presets' values.
+    odds: by effect. coefficients: by full name ("latent_heat.enthalpy"). presets: by parameter, about the presets' values where they have no
+    base.
     """
 
     odds: dict[str, float] = field(default_factory=dict)
@@ -159,9 +160,10 @@ class Experiment:
 
     @property
     def base_values(self) -> dict[str, float]:
-        """Values of the base model that are not the presets': of a model file, known ones, and starts of unknown ones, SI."""
+        """Values of the base model that are not the presets': of a model file, of priors, known ones, and starts of unknown ones, SI."""
         starts = {unknown.name: unknown.start for unknown in self.unknowns if unknown.name not in RUN_STARTS}
-        return {**(self.model_file.values if self.model_file else {}), **self.parameters, **starts}
+        middles = {name: one.base for name, one in self.priors.presets.items() if one.base is not None}
+        return {**(self.model_file.values if self.model_file else {}), **middles, **self.parameters, **starts}
 
     @property
     def offset(self) -> bool:

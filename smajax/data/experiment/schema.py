@@ -212,12 +212,19 @@ class CoefficientPriorSection(SpreadSection):
 
 
 class PresetPriorSection(SpreadSection):
-    """How uncertain a value is that the file does not list."""
+    """How uncertain a value is that the file does not list, and about what."""
+
+    base: Quantity | None = Field(
+        default=None, description="the middle of the prior, where it is not the preset's value; text like '0.9 uohm m'"
+    )
 
     @model_validator(mode="after")
     def _something(self) -> PresetPriorSection:
         if self.width is None and self.relative is None:
-            raise ValueError("says nothing; give width = 'number unit', or relative = 0.2 for a share of the value")
+            raise ValueError(
+                "does not say how uncertain the value is; give width = 'number unit', or relative = 0.2 for a share of it (what is "
+                "known goes into [model.parameters])"
+            )
         return self
 
 
