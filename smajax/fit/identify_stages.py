@@ -19,6 +19,7 @@ from smajax.fit.experiment_problem import declared_problem, free_by_name
 from smajax.fit.integration import IntegrationError, choose_integration, described, integration_error, with_integration
 from smajax.fit.levenberg_marquardt import Fit, FitSettings, levenberg_marquardt
 from smajax.fit.noise import fit_with_noise
+from smajax.fit.ordered_ranges import in_order
 from smajax.fit.posterior import library
 from smajax.fit.problem import Problem
 from smajax.fit.robust import NORMAL, clipped, robust_fit, robust_variance, unweighted_misfit
@@ -213,6 +214,9 @@ def fit_unknowns(setup: Setup, options: Options, initial_guess: np.ndarray | Non
     weighted = problem
     if options.robust:
         weighted, best = robust_fit(problem, best, refit("fitting by Huber's loss"))
+    # The last fits may have left the order that those of many starts were given.
+    task = weighted.task(names, setup.bounds, best.values)
+    (best,) = in_order(weighted, [task], [best], options.fit("fitting"))
     values = {name: float(best.values[problem.names.index(name)]) for name in names}
     own = _values_of_held_out_runs(setup, problem, best.values, options)
     return Fitted(problem, weighted, best, fits, estimated, values, own)

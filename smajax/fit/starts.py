@@ -11,6 +11,7 @@ import scipy  # its parts are imported when they are first used
 from smajax.core.progress import Stage
 from smajax.core.result_cache import ResultCache
 from smajax.fit.levenberg_marquardt import Fit, FitSettings, levenberg_marquardt
+from smajax.fit.ordered_ranges import in_order
 from smajax.fit.predicted import total_costs
 from smajax.fit.problem import FitTask, Problem
 
@@ -121,5 +122,6 @@ def multistart(
     ended = perturbed_restarts(
         problem, finished, ended, dataclasses.replace(settings, stage=f"{settings.stage} from nearby")
     )
+    ended = in_order(problem, finished, ended, settings)
     whole = [dataclasses.replace(fit, steps=fit.steps + before.steps) for fit, before in zip(ended, best, strict=True)]
     return sorted(whole, key=lambda fit: fit.cost)

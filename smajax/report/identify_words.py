@@ -13,6 +13,7 @@ from smajax.core.wording import and_listed, counted, times_noise
 from smajax.data.experiment.record import Prior
 from smajax.fit.identify_result import Estimate, Identified
 from smajax.fit.posterior import Posterior
+from smajax.report.range_words import range_sentences
 
 FAR = 2.0  # standard deviations of what was known before, from which on an estimate contradicts it
 NAMED = 3  # parameters of a headline
@@ -76,6 +77,8 @@ def conclusions(result: Identified) -> list[str]:
             f"It is not normally distributed ({p_value(result.normality_p)}): if single samples are far off, fit by Huber's "
             "loss (`--robust`)."
         )
+    if result.model is not None:
+        sentences += range_sentences(result.model.values)
     sentences += [said for one in result.estimates if (said := _contradicted(one))]
     edge = [one.name for one in result.estimates if "bound" in one.remark and one.standard_error is None]
     not_identifiable = [one.name for one in result.estimates if one.standard_error is None and one.name not in edge]

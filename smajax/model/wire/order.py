@@ -9,11 +9,11 @@ import numpy as np
 from smajax.core.parameters import get_parameters, parameters
 
 # (lower, higher, what that says): the names of parameters.
-ORDER = (
+RANGES = (
     ("austenite_start", "austenite_finish", "on heating the wire starts to transform at A_s and has finished at A_f"),
     ("martensite_finish", "martensite_start", "on cooling the wire starts to transform at M_s and has finished at M_f"),
-    ("lower_stop", "upper_stop", "the load moves between its two end stops"),
 )
+ORDER = (*RANGES, ("lower_stop", "upper_stop", "the load moves between its two end stops"))
 
 
 def disorder(model: eqx.Module) -> tuple[str, str, str] | None:

@@ -13,6 +13,7 @@ from smajax.report.narrative.record_errors import of_wrong_records
 from smajax.report.narrative.rounds import reason_text
 from smajax.report.narrative.unknown import unknown_sentences
 from smajax.report.narrative.values import error_text
+from smajax.report.range_words import range_sentences
 
 
 def summary(findings: Findings) -> tuple[str, ...]:
@@ -30,6 +31,8 @@ def summary(findings: Findings) -> tuple[str, ...]:
     sentences[place:place] = [*_unconfirmed(findings), *(_rejected(findings, one) for one in findings.rejected)]
     sentences += _errors(findings)
     sentences += caveats.of_bounds(findings)
+    if (model := findings.extended_model or findings.base_model) is not None:
+        sentences += range_sentences(model.values)
     sentences += caveats.of_priors_left(findings)
     for effect in findings.added:
         meaning = caveats.of_the_preset(findings, effect) or LIBRARY[effect.name].candidate.sentence
