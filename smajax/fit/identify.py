@@ -32,6 +32,7 @@ from smajax.fit.identify_stages import (
 from smajax.fit.posterior import ChainSettings, Posterior, posterior
 from smajax.fit.profile import EQUAL_COST, profiles
 from smajax.fit.starts import SCREENED
+from smajax.fit.uncertain_presets import values_not_given
 from smajax.fit.uncertainty import Uncertainty, at_bound
 
 SEED = 2004
@@ -111,6 +112,8 @@ def identify(  # ten parameters: the options of the command, by keyword
         step=experiment.step,
         clocked=experiment.clocked,
         provenance=_provenance(command, seed, starts, clock.monotonic() - begin, options.cache),
+        held_presets=tuple(values_not_given(experiment, setup.problem.system)[0]),
+        fitted_presets=experiment.fitted_presets,
         model=identified_model(setup, fitted, statistics, runs),
     )
 

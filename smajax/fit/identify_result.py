@@ -100,4 +100,6 @@ class Identified:
     step: float  # s from sample to sample of every run; one where only the order of the samples is known
     clocked: bool  # whether the samples have times
     provenance: dict[str, str]
+    held_presets: tuple[str, ...] = ()  # values that the file does not give, held at the presets'
+    fitted_presets: tuple[str, ...] = ()  # values that the file does not give and that were fitted too
     model: ActuatorModel | None = None  # as it is saved

@@ -138,7 +138,7 @@ def check_identifiability(setup: Setup, options: Options) -> tuple[str, ...]:
     """
     values = _full_values(setup.every_run, setup.problem, setup.problem.start_values())
     at = _of_fit_runs(sensitivity(setup.every_run, values, setup.names), setup)
-    sentences = [line for line in identifiability(at, setup.names, setup.bounds) if "are correlated" not in line]
+    sentences = identifiability(at, setup.names, setup.bounds, correlations=False)
     held = _held(setup)
     declared = setup.experiment.priors
     widths_alone = held and any(one.base is None for one in declared.presets.values())

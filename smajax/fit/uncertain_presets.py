@@ -53,4 +53,5 @@ def with_uncertain_presets(experiment: Experiment) -> Experiment:
     if not added:
         return experiment
     said = f"the file does not give {listed(tuple(priors))}: fitted too, within what data sheets leave open."
-    return replace(experiment, unknowns=(*experiment.unknowns, *added), warnings=(*experiment.warnings, said))
+    unknowns, warnings = (*experiment.unknowns, *added), (*experiment.warnings, said)
+    return replace(experiment, unknowns=unknowns, warnings=warnings, fitted_presets=tuple(priors))

@@ -143,8 +143,9 @@ def _extents(directions: np.ndarray, scale: np.ndarray, ranges: np.ndarray) -> n
     return np.asarray(extents / np.where(longest > 0.0, longest, 1.0))
 
 
-def _clusters(covariance: np.ndarray) -> list[list[int]]:
-    """Correlated estimates, directly or through another one: the indices of each group of two or more.
+def clusters(covariance: np.ndarray) -> list[list[int]]:
+    """Correlated estimates, directly or through another one, from their covariance or correlation (K, K): the indices of each group of two
+    or more.
 
     Six correlated ones make fifteen pairs but one remark.
     """
@@ -203,7 +204,7 @@ def uncertainty(
     for index, name in enumerate(free):
         if not remark[name] and error[index] / scale[index] > ranges[index]:
             errors[name], remark[name] = None, Remark(RemarkKind.RANGE_OPEN)
-    groups = [tuple(free[clear[index]] for index in cluster) for cluster in _clusters(covariance[np.ix_(clear, clear)])]
+    groups = [tuple(free[clear[index]] for index in cluster) for cluster in clusters(covariance[np.ix_(clear, clear)])]
     for group in groups:
         for name in group:
             others = tuple(other for other in group if other != name)
@@ -223,12 +224,24 @@ def covariance_of(
     return estimated, covariance / np.outer(scale, scale)
 
 
-def _rank_sentence(rank: int, unknowns: int, samples: int) -> str:
-    """How many of the unknowns are identifiable."""
+def _rank_sentence(rank: int, unknowns: int, samples: int, correlated: Sequence[str] | None) -> str:
+    """How many of the unknowns are identifiable. correlated: what is said of each group of them; None: not looked at."""
     how = f"(Jacobian of {samples} samples, rank {rank})"
+    if rank == unknowns and correlated:
+        one, of_each = ("one of them", "") if len(correlated) == 1 else ("one", "Of each group ")
+        do = f"{of_each}fix {one} or measure runs that separate them."
+        return (
+            f"The {unknowns} unknowns are identifiable from these runs {how}, but not each by itself: {and_listed(correlated)}. "
+            f"{do[0].upper()}{do[1:]}"
+        )
     if rank == unknowns:
         which = f"All {unknowns} unknowns are" if unknowns > 1 else "The one unknown is"
-        return f"{which} identifiable from these runs {how}."
+        later = (
+            ", each by itself as far as the correlations at the fit allow"
+            if correlated is None and unknowns > 1
+            else ""
+        )
+        return f"{which} identifiable from these runs {how}{later}."
     if rank == 0:
         return f"No unknown is identifiable from these runs {how}."
     return (
@@ -238,13 +251,27 @@ def _rank_sentence(rank: int, unknowns: int, samples: int) -> str:
     )
 
 
+def _correlated(covariance: np.ndarray, names: Sequence[str]) -> list[str]:
+    """`a and b are correlated (up to 0.995)` for each group."""
+    correlation = np.abs(correlation_of(covariance))
+    result = []
+    for cluster in clusters(covariance):
+        pairs = correlation[np.ix_(cluster, cluster)][np.triu_indices(len(cluster), 1)]
+        # Cut and not rounded: 0.9996 is not yet 1.
+        most = np.floor(1e3 * float(pairs.max()) + 1e-6) / 1e3
+        result.append(f"{and_listed([names[index] for index in cluster])} are correlated (up to {most:.3f})")
+    return result
+
+
 def identifiability(
     at: Sensitivity,
     names: Sequence[str],
     bounds: Mapping[str, tuple[float, float]],
     where: str = "at the initial guess",
+    *,
+    correlations: bool = True,
 ) -> list[str]:
-    """Which of `names` are identifiable from these runs, in sentences.
+    """Which of `names` are identifiable from these runs, in sentences; `correlations`: and which are correlated.
 
     From the Jacobian `where` it was taken and the noise alone: it holds only for a model that lacks no effect.
     """
@@ -255,9 +282,8 @@ def identifiability(
     scaled = columns * span
     singular = np.linalg.svd(scaled, compute_uv=False)
     rank = int(np.sum(singular > 1e-8 * singular[0])) if singular[0] > 0.0 else 0
-    sentences = [_rank_sentence(rank, len(names), len(scaled))]
     without_effect = [name for index, name in enumerate(names) if not np.any(columns[:, index])]
-    sentences += [
+    sentences = [
         f"{name}: nothing in these runs depends on it; fix it or measure something else." for name in without_effect
     ]
     if without_effect:
@@ -266,24 +292,19 @@ def identifiability(
             "is unexpected, check the bench's sizes, the drive and the initial guess first."
         )
     visible = [name for name in names if name not in without_effect]
-    if not visible:
-        return sentences
-    picked = scaled[:, [list(names).index(name) for name in visible]]
-    covariance = np.linalg.pinv(picked.T @ picked, rcond=1e-14, hermitian=True)
-    error = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
-    undetermined = [name for name, value in zip(visible, error, strict=True) if value > UNDETERMINED]
-    sentences += [
-        f"{name}: the noise alone leaves more than a quarter of its range undetermined." for name in undetermined
-    ]
-    correlation = np.abs(correlation_of(covariance))
-    for cluster in _clusters(covariance):
-        pairs = correlation[np.ix_(cluster, cluster)][np.triu_indices(len(cluster), 1)]
-        # Cut and not rounded: 0.9996 is not yet 1.
-        most = np.floor(1e3 * float(pairs.max()) + 1e-6) / 1e3
-        sentences.append(
-            f"{and_listed([visible[index] for index in cluster])} are correlated in these runs (correlation up to {most:.3f}): "
-            "fix one of them or measure runs that separate them."
-        )
-    if len(sentences) == 1 and 1 < len(names) == rank:
+    groups: list[str] = []
+    if visible:
+        picked = scaled[:, [list(names).index(name) for name in visible]]
+        covariance = np.linalg.pinv(picked.T @ picked, rcond=1e-14, hermitian=True)
+        error = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+        sentences += [
+            f"{name}: the noise alone leaves more than a quarter of its range undetermined."
+            for name, value in zip(visible, error, strict=True)
+            if value > UNDETERMINED
+        ]
+        groups = _correlated(covariance, visible) if correlations else []
+    if groups and rank < len(names):
+        sentences += [f"{group}: fix one of them or measure runs that separate them." for group in groups]
+    elif correlations and not (sentences or groups) and 1 < len(names) == rank:
         sentences.append("No two of them are strongly correlated.")
-    return sentences
+    return [_rank_sentence(rank, len(names), len(scaled), groups if correlations else None), *sentences]

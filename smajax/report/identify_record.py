@@ -83,6 +83,7 @@ def record(result: Identified) -> dict[str, Any]:
             {"run": one.what, "information_nats": one.information, "standard_errors_become": one.shrinks}
             for one in result.suggestions
         ],
+        "presets": {"held": list(result.held_presets), "fitted": list(result.fitted_presets)},
         "check": list(result.check),
         "provenance": result.provenance,
     }

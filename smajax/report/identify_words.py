@@ -13,10 +13,12 @@ from smajax.core.wording import and_listed, counted, times_noise
 from smajax.data.experiment.record import Prior
 from smajax.fit.identify_result import Estimate, Identified
 from smajax.fit.posterior import Posterior
+from smajax.fit.uncertainty import clusters
 from smajax.report.range_words import range_sentences
 
 FAR = 2.0  # standard deviations of what was known before, from which on an estimate contradicts it
 NAMED = 3  # parameters of a headline
+HELD = 4  # names of held values in a sentence
 OFF = 1.25  # ratio of residual to noise that is worth a sentence
 
 
@@ -26,9 +28,50 @@ def answer(result: Identified) -> str:
     every = counted(len(result.estimates), "parameter")
     if not known:
         return f"Of {every} the runs determine none."
+    together = {name for group in correlated_groups(result) for name in group}
+    known.sort(key=lambda one: one.name in together)
     values = "; ".join(f"{label(one.name)} {_with_unit(one)}" for one in known[:NAMED])
     more = f"; {len(known) - NAMED} more in the table" if len(known) > NAMED else ""
-    return f"{len(known)} of {every} determined: {values}{more}."
+    among = f", {len(together)} of them correlated" if together else ""
+    return f"{len(known)} of {every} determined{among}: {values}{more}."
+
+
+def correlated_groups(result: Identified) -> list[list[str]]:
+    """Parameters with a standard error whose estimates are correlated so much that what one has too much another makes up for."""
+    return [[result.correlated[k] for k in group] for group in clusters(result.correlation)]
+
+
+def _determined(result: Identified) -> list[str]:
+    """What "determined" means where estimates are correlated."""
+    groups = correlated_groups(result)
+    if not groups:
+        return []
+    place = result.correlated.index
+    pairs = [abs(result.correlation[place(a), place(b)]) for group in groups for a in group for b in group if a != b]
+    # Cut and not rounded: 0.9996 is not yet 1.
+    most = math.floor(1e3 * max(pairs) + 1e-6) / 1e3
+    which = "; and ".join(and_listed(group) for group in groups)
+    other = "another" if any(len(group) > 2 for group in groups) else "the other"
+    return [
+        f"Determined means known to the standard error beside the value. Correlated (up to {most:.3f}) are {which}: what one has too much "
+        f"{other} makes up for, so use these values together; each by itself is only as good as its standard error."
+    ]
+
+
+def _held(result: Identified) -> list[str]:
+    """Which values nobody gave and nothing was fitted to; the first few where there are many."""
+    names = result.held_presets
+    if not names:
+        return []
+    shown = (
+        [*names[:HELD], f"{len(names) - HELD} more (all are on the page, under Checks)"]
+        if len(names) > HELD + 1
+        else names
+    )
+    return [
+        f"Held at the preset's value, because the file does not give {'it' if len(names) == 1 else 'them'}: {and_listed(shown)}. "
+        f"`--presets fitted` fits {'it' if len(names) == 1 else 'them'} too."
+    ]
 
 
 def _with_unit(one: Estimate) -> str:
@@ -39,7 +82,12 @@ def _with_unit(one: Estimate) -> str:
 
 def conclusions(result: Identified) -> list[str]:
     """What was found, in sentences that say no more than the numbers."""
-    sentences = [result.stopped, *(_error(result, k) for k in range(len(result.outputs)))]
+    sentences = [
+        *_held(result),
+        *_determined(result),
+        result.stopped,
+        *(_error(result, k) for k in range(len(result.outputs))),
+    ]
     given = [one.noise_before is None for one in result.outputs]
     if not all(np.isfinite(one.ratio) for one in result.outputs):
         sentences.append("The residual of these runs is NaN or infinite: neither it nor the values mean anything.")

@@ -149,7 +149,7 @@ def after_identify(result: Identified, folder: Path, experiment: str) -> list[St
     if result.model is not None:
         steps.append(Step(TO_PREDICT, command("predict", model, RUN, "--out", "predicted")))
     if not result.suggestions:
-        presets = ("--presets", "fitted") if "--presets fitted" in result.provenance.get("command", "") else ()
+        presets = ("--presets", "fitted") if result.fitted_presets else ()
         design = command("identify", experiment, *presets, "--design", "--out", folder)
         steps.append(Step("Design the run that would determine most", design))
     if result.model is not None:

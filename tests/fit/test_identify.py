@@ -27,7 +27,7 @@ from smajax.fit.sensitivity import Sensitivity
 from smajax.model.presets import build
 from smajax.report.identify_page import page, write_identified
 from smajax.report.identify_record import record
-from smajax.report.identify_words import conclusions
+from smajax.report.identify_words import answer, conclusions
 from smajax.report.next_steps import after_identify
 from smajax.simulation.compiled import simulate_compiled
 from tests.helpers.in_browser import HOSTILE, faults
@@ -243,6 +243,16 @@ def test_the_page_gives_advice_for_correlated_parameters(found: Identified) -> N
     assert advice not in page(dataclasses.replace(found, weak=("a is known to 9 % only.",)))
 
 
+def test_the_headline_counts_correlated_parameters_and_a_sentence_says_what_that_means(found: Identified) -> None:
+    names, matrix = list(found.correlated), np.eye(len(found.correlated))
+    assert "correlated" not in answer(dataclasses.replace(found, correlation=matrix))
+    matrix[0, 1] = matrix[1, 0] = -0.9996
+    together = dataclasses.replace(found, correlation=matrix)
+    assert answer(together).startswith("4 of 4 parameters determined, 2 of them correlated: ")
+    (sentence,) = [one for one in conclusions(together) if "Determined means" in one]
+    assert f"Correlated (up to 0.999) are {names[0]} and {names[1]}: " in sentence
+
+
 def test_the_page_has_no_fault_in_a_browser(found: Identified, browser: Any, tmp_path: Path) -> None:
     runs = (dataclasses.replace(found.runs[0], name=HOSTILE), *found.runs[1:])
     assert faults(browser, write_identified(dataclasses.replace(found, title=HOSTILE, runs=runs), tmp_path)) == []
@@ -318,6 +328,13 @@ def test_a_value_that_the_file_does_not_give_may_be_fitted_too(tmp_path: Path, m
         for how in ("held", "fitted")
     }
     held, fitted = records["held"], records["fitted"]
+    assert any("Held at the preset's value" in line for line in held["conclusions"])
+    assert "Held at the preset" in (tmp_path / "held" / "identify.html").read_text(encoding="utf-8").split("<h2>")[0]
+    assert "stress_slope_austenite" in held["presets"]["held"]
+    assert held["presets"]["held"] == fitted["presets"]["fitted"]
+    assert not fitted["presets"]["held"]
+    again = [(tmp_path / how / "identify.html").read_text(encoding="utf-8") for how in ("held", "fitted")]
+    assert ["--presets fitted --design" in text for text in again] == [False, True]
     assert held["residual"]["rms_over_noise"] > 1.3
     assert any("stress_slope_austenite" in line and "--presets fitted" in line for line in held["check"])
     assert fitted["residual"]["rms_over_noise"] == pytest.approx(1.0, abs=0.1)

@@ -96,14 +96,14 @@ def _correlated(at: Sensitivity) -> tuple[list[str], dict[str, str]]:
     return [line for line in lines if "are correlated" in line], remark
 
 
-def test_two_correlated_pairs_are_two_lines() -> None:
+def test_two_correlated_pairs_are_named_in_the_sentence_that_counts_what_is_identifiable() -> None:
     covariance = np.eye(5)
     covariance[0, 1] = covariance[1, 0] = 0.995
     covariance[3, 4] = covariance[4, 3] = -0.9996
     lines, remark = _correlated(_estimates_with(covariance, 7))
-    assert [line.split(":")[0] for line in lines] == [
-        "a and b are correlated in these runs (correlation up to 0.995)",
-        "d and e are correlated in these runs (correlation up to 0.999)",
+    assert lines == [
+        "The 5 unknowns are identifiable from these runs (Jacobian of 4000 samples, rank 5), but not each by itself: "
+        "a and b are correlated (up to 0.995) and d and e are correlated (up to 0.999). Of each group fix one or measure runs that separate them."
     ]
     assert remark == {
         "a": "correlated with b",
@@ -126,8 +126,8 @@ def test_groups_of_correlated_parameters_are_separated() -> None:
 def test_six_correlated_parameters_are_one_line_and_short_remarks() -> None:
     lines, remark = _correlated(_estimates_with(0.01 * np.eye(6) + 0.99, 8))
     assert lines == [
-        "a, b, c, d, e and f are correlated in these runs (correlation up to 0.990): fix one of them or measure runs that "
-        "separate them."
+        "The 6 unknowns are identifiable from these runs (Jacobian of 4000 samples, rank 6), but not each by itself: "
+        "a, b, c, d, e and f are correlated (up to 0.990). Fix one of them or measure runs that separate them."
     ]
     assert remark["a"] == "correlated with b and 4 others"
     assert {remark[name] for name in "bcdef"} == {"correlated with a and 4 others"}
@@ -140,7 +140,16 @@ def test_a_chain_is_one_group_though_its_ends_differ() -> None:
     assert covariance[0, 3] / np.sqrt(covariance[3, 3]) < 0.98
     lines, _ = _correlated(_estimates_with(covariance, 9))
     assert len(lines) == 1
-    assert lines[0].startswith("a, b, c and d are correlated")
+    assert "not each by itself: a, b, c and d are correlated (up to " in lines[0]
+
+
+def test_correlations_beside_a_combination_without_effect_have_a_line_of_their_own() -> None:
+    """Where the count says already that something has to be fixed, it is not repeated there."""
+    at = _estimates_with(np.asarray([[1.0, 0.995], [0.995, 1.0]]), 7)
+    jacobian = np.concatenate([at.jacobian, np.zeros((1, at.jacobian.shape[1], 1))], axis=2)
+    lines = identifiability(Sensitivity(("a", "b", "c"), at.misfit, jacobian, at.mask), "abc", BOUNDS)
+    assert lines[0].startswith("Only 2 combinations are identifiable")
+    assert lines[-1] == "a and b are correlated (up to 0.995): fix one of them or measure runs that separate them."
 
 
 @pytest.mark.parametrize(

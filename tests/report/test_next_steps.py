@@ -66,8 +66,8 @@ def test_the_commands_of_a_fitted_model_are_read_and_name_its_files() -> None:
 def test_an_identification_suggests_a_design_unless_it_has_one() -> None:
     model = model_of_presets("flexinol_table_3_2", "dead_weight", "voltage")
     for suggestions, expected in (((), True), (("a run",), False)):
-        for given in ("", "smajax identify experiment.toml --presets fitted"):
-            result: Any = SimpleNamespace(model=model, suggestions=suggestions, provenance={"command": given})
+        for given in ((), ("convection_coefficient",)):
+            result: Any = SimpleNamespace(model=model, suggestions=suggestions, fitted_presets=given)
             found = read(next_steps.after_identify(result, FOLDER, "experiment.toml"))
             designs = [one for one in found if one["command"] == "identify"]
             assert bool(designs) == expected

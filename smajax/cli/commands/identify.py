@@ -138,10 +138,10 @@ def identify_command(
 
 def _print(identified: Identified) -> None:
     """The result for a terminal."""
-    from smajax.report.identify_words import conclusions, estimate_rows, posterior_rows
+    from smajax.report.identify_words import answer, conclusions, estimate_rows, posterior_rows
 
     typer.echo(f"\n{identified.title or identified.experiment}")
-    for sentence in [*conclusions(identified), *identified.weak]:
+    for sentence in [answer(identified), *conclusions(identified), *identified.weak]:
         typer.echo(f"  {sentence}")
     rows = estimate_rows(identified)
     width = max(28, *(len(row[0]) for row in rows))

@@ -135,7 +135,8 @@ class FromModelFile:
 class Experiment:
     """A validated experiment; every number is in the program's own units (SI, degC, rad).
 
-    effects_only None: every effect is a candidate. warnings: what is allowed and looks wrong, one sentence each.
+    effects_only None: every effect is a candidate. warnings: what is allowed and looks wrong, one sentence each. fitted_presets: those of
+    the unknowns that the file does not give, with priors in the place of the presets' values (`fit.uncertain_presets`).
     """
 
     name: str
@@ -157,6 +158,7 @@ class Experiment:
     log_format: LogFormat | None = None  # how the logs of its runs were read
     model_file: FromModelFile | None = None
     priors: DeclaredPriors = field(default_factory=DeclaredPriors)
+    fitted_presets: tuple[str, ...] = ()
 
     @property
     def base_values(self) -> dict[str, float]:
