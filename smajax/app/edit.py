@@ -15,11 +15,13 @@ import tomlkit
 from tomlkit.exceptions import TOMLKitError
 
 from smajax.core.files import replace
-from smajax.data.experiment.column_guess import TIME
+from smajax.data.experiment.column_guess import GUESS, LIKELY, SURE, TIME
 from smajax.data.experiment.errors import ExperimentError
 
 Form = Mapping[str, str]
 ON = "on"
+# Begins of comments in which a draft says why a value is what it is; the last one stood behind the role of a run.
+REASONS = (f"# {SURE}:", f"# {LIKELY}:", f"# {GUESS}", "# not fitted: the error on it validates the model")
 _WRITING = threading.Lock()
 
 
@@ -52,6 +54,13 @@ def put(table: Any, keys: tuple[str, ...], value: Any) -> None:
         table.pop(last, None)
     elif table.get(last) != value:
         table[last] = value
+        _without_reason(table[last])
+
+
+def _without_reason(item: Any) -> None:
+    """The draft's reason behind a value, or behind the heading of a table, goes with the value; a person's comment stays."""
+    if item.trivia.comment.startswith(REASONS):
+        item.trivia.comment_ws = item.trivia.comment = ""
 
 
 def number_or_text(text: str) -> int | str:
@@ -98,7 +107,11 @@ def set_channel_values(document: tomlkit.TOMLDocument, form: Form) -> None:
     for field, value in form.items():
         match field.split("."):
             case ["channels", name, ("unit" | "noise") as what] if name in document.get("channels", {}):
-                put(document["channels"][name], (what,), value.strip() or ("1" if what == "unit" else ""))
+                channel = document["channels"][name]
+                before = channel.get(what)
+                put(channel, (what,), value.strip() or ("1" if what == "unit" else ""))
+                if what == "unit" and channel.get(what) != before:
+                    _without_reason(channel)
             case ["channels", name, "reversed"] if name in document.get("channels", {}):
                 put(document["channels"][name], ("reversed",), True if value == ON else None)
             case ["time", "unit"] | ["sampling", "step"] | ["data", "decimal"]:
@@ -153,7 +166,7 @@ def set_runs(document: tomlkit.TOMLDocument, form: Form) -> None:
                 continue
             match field.removeprefix(prefix).split(".", 1):
                 case ["role"] if value in ("fit", "held-out"):
-                    run["role"] = value
+                    put(run, ("role",), value)
                 case [("start" | "end") as what]:
                     put(run, (what,), value.strip())
                 case [("inputs" | "parameters") as what, name]:
@@ -166,6 +179,8 @@ def _put_inline(run: Any, what: str, name: str, value: str) -> None:
         if not value:
             return
         run[what] = tomlkit.inline_table()
+    if run[what].get(name) != value:
+        _without_reason(run[what])
     put(run[what], (name,), value)
     if not run[what]:
         del run[what]

@@ -69,7 +69,11 @@ def test_a_log_from_the_browser_is_read_before_it_is_kept(folder: Path, client: 
 def test_a_column_is_another_one_and_the_rest_of_the_file_stays(folder: Path, drafted: TestClient) -> None:
     before = (folder / EXPERIMENT).read_text(encoding="utf-8")
     assert drafted.post("/columns", data={"channels.position.unit": "um"}).status_code == 200
-    assert (folder / EXPERIMENT).read_text(encoding="utf-8") == before.replace('unit = "mm"', 'unit = "um"')
+    assert "[channels.position]  # likely: heading; unit by magnitude\n" in before
+    expected = before.replace('unit = "mm"', 'unit = "um"').replace(
+        "position]  # likely: heading; unit by magnitude", "position]"
+    )
+    assert (folder / EXPERIMENT).read_text(encoding="utf-8") == expected
     drafted.post("/columns", data={"column.x": "angle"})
     file = read_schema(folder / EXPERIMENT)
     assert "position" not in file.channels
@@ -118,6 +122,27 @@ def test_another_load_keeps_what_was_said(folder: Path, drafted: TestClient) -> 
     assert refused.status_code == 422
     assert "does not go with these columns" in refused.text
     assert read_schema(folder / EXPERIMENT).model.load == "bias_spring"
+
+
+def test_a_reason_goes_with_the_value_that_it_was_given_for(folder: Path, drafted: TestClient) -> None:
+    """A comment of the draft that says why is dropped where the value is changed; a person's, and one that is true of any value, stays."""
+    path = folder / EXPERIMENT
+    text = path.read_text(encoding="utf-8")
+    assert text.count('[[runs]]\n# Runs of role "fit" are fitted; those of role "held-out" are not') == 1
+    text = text.replace('role = "held-out"', 'role = "held-out"  # not fitted: the error on it validates the model')
+    text = text.replace('name = "first"\nrole = "fit"', 'name = "first"\nrole = "fit"  # of Monday')
+    path.write_text(text, encoding="utf-8")
+    assert "\n[channels.position]  # " in text
+    drafted.post("/runs", data={"runs.first.role": "held-out"})
+    drafted.post("/runs", data={"runs.third.role": "fit"})
+    drafted.post("/columns", data={"channels.position.unit": "cm"})
+    after = path.read_text(encoding="utf-8")
+    assert 'role = "held-out"  # of Monday\n' in after
+    assert '[[runs]]\n# Runs of role "fit" are fitted; those of role "held-out" are not' in after
+    assert "# not fitted" not in after
+    assert "\n[channels.position]\n" in after
+    assert "\n[channels.voltage]  # " in after
+    assert '# or its sigma, such as "0.01 mm"' in after
 
 
 def test_an_unknown_is_added_and_taken_away(folder: Path, drafted: TestClient) -> None:

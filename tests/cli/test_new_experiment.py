@@ -38,6 +38,10 @@ def test_a_template_loads_as_it_is(tmp_path: Path) -> None:
     assert json.loads(told.stdout)["loads"]
     begun_as, made = load_experiment(tmp_path / "e.toml", CATALOGUE), load_experiment(DEMO, CATALOGUE)
     assert [one.role for one in begun_as.runs] == ["fit", "fit", "held-out"]
+    # What a role means stands once, and is true whatever the roles are.
+    text = (tmp_path / "e.toml").read_text(encoding="utf-8")
+    assert '\n# Runs of role "fit" are fitted; those of role "held-out" are not: ' in text
+    assert re.findall('^role = "(?:fit|held-out)"(.*)$', text, re.MULTILINE) == ["", "", ""]
     np.testing.assert_array_equal(begun_as.runs[0].inputs["voltage"], made.runs[0].inputs["voltage"])
     np.testing.assert_array_equal(begun_as.runs[0].outputs["position"], made.runs[0].outputs["position"])
     assert run.invoke(app, ["new-experiment", *logs, "--out", str(tmp_path / "e.toml")]).exit_code == 2

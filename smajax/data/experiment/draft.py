@@ -34,6 +34,7 @@ from smajax.data.readers.table import MeasuredDataError, Table
 
 MOST_SAMPLES = 2000  # of the longest run on the clock
 HELD_OUT_FROM = 3  # runs from which on the last one is held out
+ROLES = '# Runs of role "fit" are fitted; those of role "held-out" are not: the error on them validates the model.'
 
 
 @dataclass(frozen=True)
@@ -373,8 +374,9 @@ def _runs(inputs: _Inputs, target: Path) -> _Section:
         overrides = inputs.overrides(run.files[0])
         lines += [
             "[[runs]]",
+            *([ROLES] if run is runs[0] else []),  # within the table, where an edit of the file leaves it
             f"name = {toml_value(run.name)}",
-            f'role = "{role}"' + ("  # not fitted: the error on it validates the model" if run is held_out else ""),
+            f'role = "{role}"',
             *(
                 [f'parameters = {{ pretension = "{forces[run.name]:.4g} N" }}  # {GUESS}: what the force begins with']
                 if forces
