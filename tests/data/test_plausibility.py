@@ -62,6 +62,29 @@ def test_few_runs_and_none_held_out_are_warnings(bench: Path) -> None:
     assert "no run is held out: the error after is shown on no run that the fit never saw" in warnings
 
 
+def test_a_run_in_which_hardly_anything_moves_is_a_warning(bench: Path) -> None:
+    """Held out, below a tenth of what the fit runs do; fitted, hardly more than the noise. The runs of the bench move by 8 mm."""
+
+    def said() -> list[str]:
+        return [text for text in load(bench).warnings if "changes by" in text]
+
+    ramp, noise = np.linspace(0.0, 1.0, 500), 0.01 * np.random.default_rng(7).normal(size=500)
+    assert said() == []
+    rewrite(bench / "b.csv", position=noise + 0.9 * ramp)
+    assert said() == []
+    rewrite(bench / "b.csv", position=noise + 0.6 * ramp)
+    (sentence,) = said()
+    assert sentence.startswith("run 'B' is held out, and its output 'position' changes by 0.58")
+    assert "% of what it changes by in the fit runs" in sentence
+    rewrite(bench / "b.csv", position=noise)
+    assert any("times its noise: an error on it says little" in text for text in said())
+    rewrite(bench / "b.csv")
+    rewrite(bench / "a.csv", position=noise)
+    (sentence,) = said()
+    assert sentence.startswith("run 'A': the output 'position' changes by 0.0")
+    assert "so the fit learns little from it" in sentence
+
+
 def test_a_run_of_hours_is_a_warning(bench: Path) -> None:
     changed(bench, '"50 ms"', '"50 s"')
     assert "run 'B' lasts 7150 s; is the time in ms?" not in load(changed(bench, 'unit = "ms"', 'unit = "s"')).warnings

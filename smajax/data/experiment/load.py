@@ -20,6 +20,7 @@ from smajax.data.experiment.from_model_file import with_model_file
 from smajax.data.experiment.headings import heading_warnings
 from smajax.data.experiment.magnitude import common_warnings, magnitude_warnings
 from smajax.data.experiment.model_description import WIRE_SIZES, Catalogue, ModelDescription
+from smajax.data.experiment.motion import motion_warnings
 from smajax.data.experiment.plausibility import (
     constant_warnings,
     copy_warnings,
@@ -343,6 +344,7 @@ def experiment_of(path: Path, file: ExperimentFile, catalogue: Catalogue) -> Exp
     warnings += _useless(file, model) + not_tried + _untold(file, free)
     warnings += [] if kept else preset_warnings(file.model.wire, free, model.parameters)
     warnings += role_warnings(file.runs)
+    warnings += motion_warnings([read.run for read in runs], [output for output, _ in outputs])
     warnings += (
         []
         if kept is None

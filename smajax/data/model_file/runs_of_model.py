@@ -7,6 +7,7 @@ from dataclasses import replace
 from smajax.core.names import close_matches
 from smajax.core.units import parse_quantity
 from smajax.data.experiment.errors import ExperimentError
+from smajax.data.experiment.motion import motion_warnings
 from smajax.data.experiment.plausibility import role_warnings
 from smajax.data.experiment.record import RUN_STARTS, Experiment
 from smajax.data.model_file.record import ModelRecord
@@ -39,7 +40,7 @@ def runs_of_model(model: ModelRecord, experiment: Experiment) -> tuple[Experimen
     runs = tuple(replace(run, parameters={**known, **run.parameters}) for run in experiment.runs)
     notes += _left_out(model, experiment)
     # What is said of roles is of a fit, and none is made here.
-    roles = set(role_warnings(experiment.runs))
+    roles = {*role_warnings(experiment.runs), *motion_warnings(experiment.runs, experiment.outputs)}
     warnings = tuple(text for text in experiment.warnings if text not in roles)
     return replace(experiment, runs=runs, warnings=warnings), tuple(notes)
 
