@@ -23,6 +23,7 @@ from starlette.staticfiles import StaticFiles
 from smajax.app.access import HEADERS, Access
 from smajax.app.confined import OutsideError, inside
 from smajax.app.log_files import table_of
+from smajax.app.opened import note_opened, opened
 from smajax.app.pages import bench, columns, download, fit, folder, logs, predict, result, runs, tune
 from smajax.app.plots import series
 from smajax.app.project import Examined, Project, read_project
@@ -47,7 +48,7 @@ STEPS: tuple[Step, ...] = (
     download.STEP,
 )
 BY_NAME = {step.name: step for step in STEPS}
-WATCHED = {"fit": fit.COMMANDS, "predict": ("predict",), "tune": ("tune",)}
+WATCHED = {"fit": fit.COMMANDS, "predict": ("predict",), "tune": ("tune",), "download": ("export",)}
 # A page that a command wrote: its own scripts and styles, and nothing from anywhere; it cannot reach the pages of the server.
 OF_A_REPORT = (
     "sandbox allow-scripts allow-popups allow-downloads allow-modals; default-src 'none'; script-src 'unsafe-inline'; "
@@ -71,11 +72,13 @@ def _marks(project: Project, current: Step, examined: Examined) -> list[Mark]:
     errors = examined.errors
     loads = examined.experiment is not None
     there = {"": True, "experiment": bool(project.text), "loads": loads, "model": bool(predict.models(project))}
-    found = []
+    fitted, seen, found = fit.done(project), opened(project.folder), []
     for number, step in enumerate(STEPS, start=1):
         wrong = any(key.split(".")[0] in step.keys for key in errors)
         of_file = bool(step.keys) and bool(project.text) and step.name not in ("fit",)
         done = (of_file and not wrong and (loads or bool(errors))) if step.needs == "experiment" else step.done(project)
+        # A fit that was made without the page says as much of the steps before it.
+        done = done and (not step.to_look_at or step.name in seen or (step.needs == "experiment" and fitted))
         found.append(Mark(step, number, step is current, done, wrong, there[step.needs]))
     return found
 
@@ -151,11 +154,12 @@ class Server:
     def show(self, request: Request) -> Response:
         """A step's page."""
         step = BY_NAME.get(request.path_params["step"])
-        return (
-            PlainTextResponse("no such page", 404)
-            if step is None
-            else _page(self.pages, self.project(request), step, {})
-        )
+        if step is None:
+            return PlainTextResponse("no such page", 404)
+        project = self.project(request)
+        if step.to_look_at and project.text:
+            note_opened(project.folder, step.name)
+        return _page(self.pages, project, step, {})
 
     async def change(self, request: Request) -> Response:
         """A step's form; then its page, or that of the step that follows."""

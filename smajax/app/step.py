@@ -53,3 +53,4 @@ class Step:
     done: Callable[[Project], bool] = lambda project: False
     needs: str = ""  # "experiment", "loads", "model": what has to be there first
     light: bool = False  # whether it is shown before JAX is loaded, and the experiment file checked
+    to_look_at: bool = False  # whether it is done only once a person has opened it

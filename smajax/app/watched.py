@@ -35,6 +35,11 @@ class Watched:
     errors: tuple[tuple[float, tuple[float, ...]], ...] = ()
     stages: tuple[str, ...] = ()  # that have ended
 
+    @property
+    def between(self) -> bool:
+        """Whether a stage has ended and none has begun since: programs of the next one are made, which reports no share."""
+        return bool(self.stage) and self.share >= 1.0
+
     def seconds_left(self, now: float) -> float | None:
         """Of the stage, at its pace so far, as the command line's bar has it; None before it has one."""
         if not 0.0 < self.share < 1.0 or self.moved <= self.since:

@@ -8,9 +8,10 @@ from typing import Any
 
 from smajax.control.gains_file import write_gains
 from smajax.control.plants import Plants
+from smajax.control.tune.folder_names import GAINS, RECORD, RESULTS
 from smajax.control.tune.settings import TuneSettings
 from smajax.control.tune.tuning import TuningResult
-from smajax.control.tune.tuning_folder import GAINS, RECORD, RESULTS, check_folder, settings_record
+from smajax.control.tune.tuning_folder import check_folder, settings_record
 from smajax.core.files import json_text, replace
 from smajax.core.provenance import made_with
 from smajax.model.system import System
@@ -44,7 +45,7 @@ def write_tuning(tuned: TuningResult, out: Path, command: str = "", plant: Plant
     pictures = {"before_after.png": before_after(tuned), "descent.png": costs_over_loops(tuned)}
     for name, png in pictures.items():
         replace(out / name, png)
-    whole = record(tuned, command)
+    whole = {**record(tuned, command), "model": plant.model}
     replace(out / RECORD, json_text(whole))
     replace(out / "loops.csv", loops(tuned))
     settings = tuned.settings

@@ -126,6 +126,7 @@ def test_what_the_page_starts_stops_and_resumes(small: Path, folder: Path, draft
     assert job.words == ("experiment.toml", "--budget", "120s")
     assert [one["run"] for one in job.about["series"]] == ["first", "second"]
     until((folder / "count").exists)
+    until(lambda: "of this stage" in drafted.get("/watch/fit").text or "for 0 s" in drafted.get("/watch/fit").text)
     assert 'data-running="yes"' in drafted.get("/watch/fit").text
     assert "it ends" not in drafted.get("/predict").text
     drafted.post("/fit", data={"do": "stop"})
@@ -166,6 +167,15 @@ def test_events_become_a_record_of_the_fit() -> None:
     ((at, errors),) = found.errors
     assert (at, errors[0]) == (70.0, 1e-3)
     assert math.isnan(errors[1])
+
+
+def test_between_two_stages_nothing_is_done_to_the_whole() -> None:
+    """A stage that has ended is not the one that runs: what comes next is compiled, and has no share yet."""
+    ended = seen(Stage("fitting", 0.0), Stage("fitting", 0.5), Stage("fitting", 1.0))
+    assert ended.between
+    assert ended.seconds_left(40.0) is None
+    assert not seen(Stage("fitting", 0.5)).between
+    assert not after(ended, json.dumps({"event": "Stage", "name": "checking", "share": 0.0, "at": 50.0})).between
 
 
 def test_the_curve_of_the_errors_stays_short() -> None:

@@ -33,6 +33,7 @@ from smajax.control.tune.terms import TERMS, terms_in
 from smajax.control.tune.tuning import tune
 from smajax.core.parameters import get_parameters, set_parameters
 from smajax.model.rigs import arm
+from smajax.report.next_steps import PlantWords
 from smajax.report.sweep_folder import write_sweep
 from smajax.report.tune_folder import finished, write_tuning
 from tests.helpers.machine_code import by_machine_code
@@ -70,7 +71,8 @@ def test_tuning_pid_on_a_dead_weight_lowers_its_cost(tmp_path: Path) -> None:
     assert after < 0.7 * before
     assert found.costs[1] <= found.costs[0], "nor is it worse than the scaled gains of the arm"
     assert found.units["proportional_gain"] == "V/m"
-    record = write_tuning(found, tmp_path)
+    record = write_tuning(found, tmp_path, plant=PlantWords(model="report/model.toml"))
+    assert record["model"] == "report/model.toml"
     assert record["settings"]["set_points_mm"] == [5.0, 15.0]
     assert record["checks"]["inside"]["before"]["overshoot"]["unit"] == "mm"
     gains = read_gains(tmp_path / "gains.json", HANGING)

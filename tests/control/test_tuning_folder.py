@@ -27,10 +27,11 @@ from smajax.control.sweep.grid import loop_rows
 from smajax.control.sweep.run_sweep import SweepSettings, sweep_controllers
 from smajax.control.tune.cma_es import CmaEsState
 from smajax.control.tune.evaluate import TuningProblem
+from smajax.control.tune.folder_names import FILES
 from smajax.control.tune.moves import walk
 from smajax.control.tune.multistart import MultistartState, load
 from smajax.control.tune.settings import TuneSettings
-from smajax.control.tune.tuning_folder import FILES, tune_in_folder
+from smajax.control.tune.tuning_folder import tune_in_folder
 from smajax.core.display_units import digits
 from smajax.core.parameters import get_parameters, parameters
 from smajax.core.progress import Event

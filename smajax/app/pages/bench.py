@@ -153,4 +153,4 @@ def _beside_the_values(project: Project, said: Mapping[str, str], head: str) -> 
         edited(project.path, change)
 
 
-STEP = Step("bench", "Bench", page, save, keys=("model",), needs="experiment")
+STEP = Step("bench", "Bench", page, save, keys=("model",), needs="experiment", to_look_at=True)

@@ -107,4 +107,6 @@ def save(project: Project, sent: Sent) -> str:
     return ""
 
 
-STEP = Step("columns", "Columns", page, save, keys=("channels", "time", "sampling"), needs="experiment")
+STEP = Step(
+    "columns", "Columns", page, save, keys=("channels", "time", "sampling"), needs="experiment", to_look_at=True
+)

@@ -75,6 +75,9 @@ def watch(project: Project, commands: tuple[str, ...]) -> dict[str, Any]:
         "busy": None,
         "seen": seen,
         "left": "" if left is None else f"about {left:.0f} s" if left < 90.0 else f"about {left / 60.0:.0f} min",
+        "stage_time": _in_words(clock.time() - seen.moved if seen.between else clock.time() - seen.since)
+        if seen.stage
+        else "",
         "elapsed": _in_words((clock.time() if job.running else max(seen.latest, job.began)) - job.began),
         "now": _errors(job, seen),
         "parameters": _parameters(seen),

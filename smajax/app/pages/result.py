@@ -55,4 +55,4 @@ def done(project: Project) -> bool:
     return project.result(*COMMANDS) is not None
 
 
-STEP = Step("result", "Result", page, done=done, light=True)
+STEP = Step("result", "Result", page, done=done, light=True, to_look_at=True)

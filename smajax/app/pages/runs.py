@@ -77,4 +77,6 @@ def save(project: Project, sent: Sent) -> str:
     return ""
 
 
-STEP = Step("runs", "Unknowns and runs", page, save, keys=("unknown", "runs", "nuisance"), needs="experiment")
+STEP = Step(
+    "runs", "Unknowns and runs", page, save, keys=("unknown", "runs", "nuisance"), needs="experiment", to_look_at=True
+)

@@ -14,6 +14,7 @@ from smajax.app.pages.predict import chosen_model, models
 from smajax.app.project import Project
 from smajax.app.ready import ready
 from smajax.app.step import FieldError, Sent, Step
+from smajax.core.display_units import digits
 
 
 @lru_cache(maxsize=8)
@@ -36,6 +37,15 @@ def _able(at: tuple[str, int, int]) -> tuple[tuple[str, ...], str, str]:
         return (), "", str(error.args[0])
 
 
+def _gain_rows(record: Mapping[str, Any]) -> list[dict[str, str]]:
+    """Each gain before and after, with its unit; none of a record without numbers."""
+    rows = []
+    for name, one in record.get("gains", {}).items():
+        before, after = (digits(one.get(key), 4) for key in ("before", "after"))
+        rows.append({"name": name, "before": before, "after": after, "unit": one.get("unit", "")})
+    return rows
+
+
 def page(project: Project) -> Mapping[str, Any]:
     there = models(project)
     able, unit, why = _able(stamp(project.folder / there[0])) if there else ((), "", "")
@@ -43,7 +53,7 @@ def page(project: Project) -> Mapping[str, Any]:
     for one in project.results:
         if one.command == "tune":
             record = project.record_of(one)
-            found.append({"result": one, "controller": record.get("controller", ""), "gains": record.get("gains", {})})
+            found.append({"result": one, "headline": record.get("headline", ""), "gains": _gain_rows(record)})
     return {
         "models": there,
         "controllers": able,

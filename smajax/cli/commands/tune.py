@@ -100,7 +100,8 @@ def _run(
     from smajax.cli.result_folder import FolderTaken, claimed
     from smajax.control.presets import CONTROLLERS
     from smajax.control.reach import reach_of, reach_sentence
-    from smajax.control.tune.tuning_folder import FILES, STATE, tune_in_folder
+    from smajax.control.tune.folder_names import FILES, STATE
+    from smajax.control.tune.tuning_folder import tune_in_folder
     from smajax.report.tune_folder import finished, write_tuning
 
     resume = "Finished rounds are cached: the same command resumes."

@@ -9,5 +9,6 @@ Out: `TuningResult`: gains before and after, validated on held-out plants and se
     multistart               rounds from many starts by `trust` (linear programs in a trust region) or `adam`
     cma_es                   the derivative-free search that follows
     tuning, tuning_folder    `tune`; `tune_in_folder`, which resumes
+    folder_names             of the files in such a folder
     moves                    moves between set points, for validation
 """

@@ -11,6 +11,7 @@ from smajax.control.plants import Plants
 from smajax.control.presets import CONTROLLERS
 from smajax.control.tune.cma_es import CmaEsState
 from smajax.control.tune.cma_es import load as load_evolution
+from smajax.control.tune.folder_names import FILES, FINISH, SETTINGS, STATE
 from smajax.control.tune.multistart import MultistartState, load
 from smajax.control.tune.settings import TuneSettings
 from smajax.control.tune.tuning import TuningResult, tune
@@ -18,12 +19,6 @@ from smajax.core.files import json_text, replace
 from smajax.core.progress import Message, Progress, quiet
 from smajax.core.provenance import digest
 from smajax.model.system import System
-
-# `asked.json` has this name since version 0.1: folders of before are resumed.
-SETTINGS, STATE, FINISH, GAINS, RECORD = "asked.json", "state.npz", "finish.npz", "gains.json", "tune.json"
-PAGES = ("tune.html", "loops.csv", "before_after.png", "descent.png")
-RESULTS = frozenset({SETTINGS, GAINS, RECORD, *PAGES})  # of a finished tuning
-FILES = RESULTS | {STATE, FINISH}
 
 
 def settings_record(system: System, settings: TuneSettings, plants: Plants | None = None) -> dict[str, Any]:
