@@ -18,7 +18,7 @@ from smajax.model.wire.kinetics import NARROWEST_RANGE
 from smajax.model.wire.order import RANGES
 
 ROOM = 5.0  # K: about the narrowest range of a wire
-SAME = 1e-9  # relative: two costs of one simulation
+SAME = 1e-7  # relative: two costs of one simulation, added up in different orders
 
 
 def _places(problem: Problem) -> list[tuple[int, int]]:

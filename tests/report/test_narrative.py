@@ -32,6 +32,7 @@ from smajax.attribution.findings import (
 from smajax.attribution.record_error import OutlierRun
 from smajax.attribution.unknown.terms import UNKNOWN
 from smajax.core.progress import Event, Message, Result, Stage
+from smajax.data.model_file.of_presets import model_of_presets
 from smajax.fit.integration import IntegrationError
 from smajax.fit.uncertainty import Remark, RemarkKind
 from smajax.report.html import findings_to_html
@@ -122,6 +123,15 @@ def test_a_load_far_off_is_reported_with_the_sizes_that_were_not_given() -> None
     ) in said(-0.79, False)
     assert "a size of the bench" not in said(-0.1, False)
     assert "a size of the bench" not in said(-0.79, True)
+
+
+def test_a_model_that_ends_with_a_reversed_range_is_said_to() -> None:
+    model = model_of_presets("flexinol_table_3_2", "dead_weight", "voltage")
+    assert "reversed" not in _summary(extended_model=model)
+    start = model.parameters["martensite_start"]
+    cold = dataclasses.replace(start, value=model.values["martensite_finish"] - 2.0)
+    wrong = dataclasses.replace(model, parameters={**model.parameters, "martensite_start": cold})
+    assert "Mind: the range on cooling is reversed: martensite_finish is " in _summary(extended_model=wrong)
 
 
 def test_each_cluster_of_correlated_parameters_has_one_line_with_advice() -> None:
