@@ -174,6 +174,11 @@ def prepared(  # the stage's inputs, each once
     )
     report_checks(progress, experiment.warnings, ())
     base = setting.base(start, seed)
+    if integration is None:
+        # It was chosen where the fit begins, at which the wire may not even move. Now, and not when the whole search has been made with it.
+        finer = finer_integration(setting, (), base.values)
+        if finer is not None:
+            return prepared(experiment, cache, progress, seed, config, interim, finer)
     progress(Stage(CHECKING, 0.0))
     problem, index = setting.restricted(())
     at_fit = sensitivity(problem, base.values[np.asarray(index)], [*job.unknowns, *job.presets])
@@ -210,7 +215,7 @@ def searched(context: Context) -> Outcome:
 def searched_finely(context: Context) -> tuple[Context, Outcome]:
     """The search; where the model that it ends with asks for a finer integration, all of it again with that."""
     outcome, setting = searched(context), context.setting
-    finer = finer_integration(setting, outcome.final)
+    finer = finer_integration(setting, outcome.final.effects, outcome.final.values)
     if finer is None:
         return context, outcome
     # Models are compared as one integration gives them.

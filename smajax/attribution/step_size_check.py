@@ -63,13 +63,13 @@ def integration_error_of(setting: Search, final: Model) -> IntegrationError:
     return integration_error(problem, problem.system_at(jnp.asarray(final.values[index])))
 
 
-def finer_integration(setting: Search, model: Model) -> Integration | None:
-    """The integration that `model` asks for, where the present one leaves more than a tenth of the noise in its output on the fit runs.
+def finer_integration(setting: Search, effects: tuple[str, ...], values: np.ndarray) -> Integration | None:
+    """The integration that a model with these values (P,) asks for, where the present one leaves more than a tenth of the noise on the fit runs.
 
     None where it does not, or where none leaves less.
     """
-    problem, index = setting.restricted(model.effects)
-    system = problem.system_at(jnp.asarray(model.values[index]))
+    problem, index = setting.restricted(effects)
+    system = problem.system_at(jnp.asarray(values[np.asarray(index)]))
     if integration_error(problem, system).small:
         return None
     finer = choose_integration(problem, system)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
+from types import SimpleNamespace
 
 import jax.numpy as jnp
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 
 from smajax.attribution.close_loop import prepared
 from smajax.attribution.config import AttributionConfig
+from smajax.attribution.job import job_of
 from smajax.attribution.model_fits import Model, Search
 from smajax.attribution.step_size_check import finer_integration, gain_kept_at_half_step, integration_error_of
 from smajax.core.parameters import parameters
@@ -89,6 +91,24 @@ def test_a_gain_that_depends_on_the_step_is_lost_at_half_the_step(setting: Searc
     assert gain_kept_at_half_step(setting, lucky, base) < 0.1
 
 
+def test_the_integration_is_that_of_the_base_fit_where_the_wire_does_not_move_at_the_start(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Else the whole search is made, and then made again. The base fit is taken to end where the demo's file begins."""
+    experiment = dataclasses.replace(open_experiment(DEMO), effects_only=())
+    moving = job_of(experiment).problem
+    high = {"convection_coefficient", "austenite_start", "austenite_finish"}
+    cold = tuple(
+        dataclasses.replace(one, start=one.high if one.name in high else one.start) for one in experiment.unknowns
+    )
+    experiment = dataclasses.replace(experiment, unknowns=cold)
+    assert described(job_of(experiment).problem.batch.integration) == "one step a sample"
+    monkeypatch.setattr(Search, "base", lambda *_: SimpleNamespace(values=moving.start_values()))
+    context = prepared(experiment, ResultCache(), quiet, 1, AttributionConfig())
+    assert described(context.job.problem.batch.integration) == described(moving.batch.integration)
+    assert finer_integration(context.setting, (), context.base.values) is None
+
+
 @pytest.mark.slow  # a whole loop at two steps
 def test_an_effect_that_needs_a_finer_integration_than_the_base_model_gets_it() -> None:
     """The demo logs at 100 ms; under Liang's conditions its branches end more sharply than those of the base model."""
@@ -97,11 +117,11 @@ def test_an_effect_that_needs_a_finer_integration_than_the_base_model_gets_it() 
     setting = context.setting
     base, liang = _model(setting, ()), _model(setting, ("liang_conditions",), share=1.0)
     assert integration_error_of(setting, base).small
-    assert finer_integration(setting, base) is None
+    assert finer_integration(setting, (), base.values) is None
     assert not integration_error_of(setting, liang).small
-    finer = finer_integration(setting, liang)
+    finer = finer_integration(setting, liang.effects, liang.values)
     assert finer is not None
-    again = prepared(experiment, ResultCache(), quiet, 1, AttributionConfig(), finer)
+    again = prepared(experiment, ResultCache(), quiet, 1, AttributionConfig(), integration=finer)
     assert integration_error_of(again.setting, liang).small
     assert again.job.held_out is not None
     assert described(again.job.held_out.integration) == described(finer)
