@@ -199,10 +199,10 @@ def model_filter(system: System) -> ModelFilter:
 def adaptive_filter(system: System) -> AdaptiveFilter:
     """`model_filter` that also estimates the convection and, of a load that has them, damping and inertia.
 
-    What these have wrong needs no walks any more: they are 0.3 to 0.03 of `model_filter`'s.
+    What these have wrong needs no walks any more: they are 0.3 to 0.03 of `model_filter`'s. Nor has the amplitude of a branch to stand for it.
     """
     names, less = mismatches_of(system), 0.3
-    filtered = model_filter(system)
+    filtered = dataclasses.replace(model_filter(system), keeps_branches=True)
     walks = {
         "position_walk": filtered.position_walk,
         "velocity_walk": less * filtered.velocity_walk,

@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 from smajax.control.estimators.adaptive_filter import LARGEST, AdaptiveFilter
+from smajax.control.estimators.believed_state import with_vector
+from smajax.control.estimators.kalman import Innovation
 from smajax.control.estimators.run import estimate
 from smajax.control.presets import FILTERS, adaptive_filter
 from smajax.core.parameters import get_parameters, set_parameters
@@ -133,3 +135,24 @@ def test_its_parameters_are_those_that_the_load_has() -> None:
     assert spring.estimated[0] == "convection_coefficient"
     assert set(FILTER.estimated) == set(WRONG)
     assert dataclasses.replace(FILTER, estimated=("convection_coefficient",)).believed(jnp.zeros(1)).load == ARM.load
+
+
+def test_the_heating_curve_begins_at_all_martensite_at_most(wrong_convection) -> None:
+    """Below, where the amplitude stands for a temperature that is off, it does not."""
+    _, readings, memory, _ = wrong_convection
+    assert float(memory.state.wire.xi_M.max()) <= 1.0
+    free = dataclasses.replace(FILTER, filter=dataclasses.replace(FILTER.filter, keeps_branches=False))
+    assert float(followed(free, readings, VOLTS)[0].state.wire.xi_M.max()) > 1.0
+
+
+@pytest.mark.parametrize(("sigmas", "amplitude"), [(4.0, 1.0), (-4.0, 1.0), (6.0, 0.3), (-6.0, 0.3)])
+def test_an_innovation_that_nothing_explains_lays_the_curves_through_the_state(sigmas: float, amplitude: float) -> None:
+    """A wire of 0.28 martensite rests below the curve of a full transformation, and the correction makes it 0.30: it has turned back unseen."""
+    at_rest = FILTER.start(jnp.asarray(0.0))[0].state
+    # Strain and stress count from the rest, so the position goes with the fraction.
+    vector = jnp.asarray([0.5, 0.0, 65.0, 0.28])
+    resting = with_vector(ARM, at_rest, vector)
+    innovation = Innovation(jnp.asarray(sigmas * 2e-3), jnp.asarray(4e-6))
+    no = jnp.zeros((), bool)
+    found = FILTER.filter.consistent(ARM, resting, vector.at[3].set(0.30), no, innovation)
+    assert float(found.wire.xi_M) == pytest.approx(amplitude, abs=1e-6)

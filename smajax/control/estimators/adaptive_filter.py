@@ -18,7 +18,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from smajax.control.estimators.base import AbstractEstimator
-from smajax.control.estimators.believed_state import advanced, vector_of, with_correction, with_vector
+from smajax.control.estimators.believed_state import advanced, vector_of, with_vector
 from smajax.control.estimators.kalman import Belief, Innovation, Matrix, Vector, corrected
 from smajax.control.estimators.model_filter import ModelFilter
 from smajax.control.measured_state import MeasuredState, truth
@@ -88,5 +88,6 @@ class AdaptiveFilter(AbstractEstimator):
         position = jnp.zeros_like(belief.mean).at[0].set(1.0)
         belief, innovation = corrected(belief, reading, position, self.filter.reading_noise**2)
         logarithms = limited(belief.mean[STATES:], -LARGEST, LARGEST)
-        state = with_correction(self.believed(logarithms), state, belief.mean[:STATES], transforming)
+        system = self.believed(logarithms)
+        state = self.filter.consistent(system, state, belief.mean[:STATES], transforming, innovation)
         return AdaptiveFilterMemory(state, logarithms, belief.covariance, innovation), truth(state)

@@ -51,6 +51,18 @@ def with_correction(system: System, state: State, vector: Corrected, transformin
     return dataclasses.replace(new, wire=wire)
 
 
+def within_one(state: State) -> State:
+    """`state`, whose heating curve begins at all martensite at most.
+
+    An amplitude beyond 1 is no branch of any wire: it is a temperature believed too high while the wire rests on its curve.
+    """
+    wire = state.wire
+    beyond_one = (wire.xi_M > 1.0) & (wire.heating_missed < 0.5)
+    return dataclasses.replace(
+        state, wire=dataclasses.replace(wire, xi_M=jnp.where(beyond_one, jnp.ones_like(wire.xi_M), wire.xi_M))
+    )
+
+
 def advanced(system: System, state: State, voltage: Scalar, period: Scalar, substeps: int) -> State:
     """The simulator's own steps through one period with `voltage` held."""
     refuse_lag(system, "a filter")
