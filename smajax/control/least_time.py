@@ -6,6 +6,9 @@ none is below it earlier than none. What the largest command does not reach is u
 
 from __future__ import annotations
 
+import math
+from typing import NamedTuple
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -15,9 +18,10 @@ from jaxtyping import Array, Float
 from smajax.control.closed_loop import ClosedLoopSetup
 from smajax.control.controllers.base import AbstractController
 from smajax.control.figures_of_merit import evaluated_loop
+from smajax.control.gains_file import LARGEST
 from smajax.control.measured_state import MeasuredState
 from smajax.control.reference import Reference, clock, constant
-from smajax.core.parameters import parameter
+from smajax.core.parameters import parameter, parameter_values
 from smajax.model.system import System
 from smajax.model.types import Scalar
 
@@ -52,3 +56,35 @@ def least_reach_times(
     """
     targets = jnp.asarray(set_points, dtype=float)
     return np.asarray(_reach_times(system, Largest(largest_voltage), targets, clock(seconds, dt)))
+
+
+LIMITS = (LARGEST, "high_voltage")  # parameters that limit the command of a controller; the second of one that switches
+
+
+def command_limit(system: System, controller: AbstractController) -> float:
+    """Largest command that the controller may give and the drive follows, in the unit of the drive's command; infinite where neither has a limit."""
+    own = parameter_values(controller)
+    return min(float(system.drive.largest_command()), *(own.get(name, math.inf) for name in LIMITS))
+
+
+class Distance(NamedTuple):
+    """Settling time over the least time of the same set point on the same plant, of several runs; what is out of reach is counted by itself."""
+
+    median: float  # of the runs that settle; NaN where none does
+    worst: float  # of these
+    settled: int
+    never: int  # in reach of the plant, and the run does not settle: failures of the controller
+    unreachable: int  # of the plant, with the largest command
+
+
+def distance(settling: np.ndarray, least: np.ndarray) -> Distance:
+    """settling: s, infinite where a run never settles; least: s, infinite where the largest command does not get there; any shape, the same.
+
+    Runs that begin at their set point, where the least time is 0, have no ratio and count among those that settle, or do not.
+    """
+    settled, in_reach = np.isfinite(settling), np.isfinite(least)
+    ratio = settling[settled & in_reach & (least > 0.0)] / least[settled & in_reach & (least > 0.0)]
+    median, worst = (float(np.median(ratio)), float(ratio.max())) if ratio.size else (math.nan, math.nan)
+    return Distance(
+        median, worst, int(settled.sum()), int((in_reach & ~settled).sum()), int((~in_reach & ~settled).sum())
+    )

@@ -93,12 +93,12 @@ def write_sweep(
         for one in results:
             write_picture(f"{one.name}_maps.png", MAPS, partial(draw_maps, grid=grid, sweep=one, limits=limits))
     whole = SweepResults(settings, tuple(results), assumed_air(system), found)
-    comparison = partial(draw_comparison, targets=grid.targets, merits=whole.nominal, position=found.unit)
+    comparison = partial(draw_comparison, targets=grid.targets, sweeps=whole.sweeps, position=found.unit)
     write_picture("comparison.png", (10.0, 11.0), comparison)
     replace(out / "sweep.json", as_json(whole, command, remarks))
     replace(out / "sweep.nc", as_netcdf(as_dataset(whole, command)))
     pictures = {name: ((out / name).read_bytes(), narrow) for name, narrow in upright.items()}
-    best = ranked(whole)[0][2]
+    best = ranked(whole)[0].name
     steps = after_sweep(out, remarks.plant, best, settings.set_points, found.unit.shown, remarks.gains.get(best, ""))
     replace(out / "index.html", page(whole, pictures, command, remarks, plots, steps))
     return whole
@@ -116,6 +116,8 @@ def as_text(results: SweepResults) -> str:
     head = [
         "controller",
         "settles",
+        "over least",
+        f"limit {results.unit.command}",
         "reach s",
         "settle s",
         f"overshoot {results.unit.label}",

@@ -7,13 +7,14 @@ import dataclasses
 import html
 import io
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from smajax.control.least_time import Distance
 from smajax.control.position_unit import DEGREES, PositionUnit
 from smajax.control.presets import CONTROLLERS, with_printed_law
 from smajax.control.sweep.grid import Grid
@@ -60,22 +61,45 @@ def write_rows(path: Path, grid: Grid, sweep: ControllerSweep) -> None:
     outputs = np.stack([merit_values(sweep.merits, name, position).ravel() for name in SHOWN], axis=1)
     text = io.StringIO(newline="")
     writer = csv.writer(text)
-    writer.writerow([*columns, *merits, "failed_at_s"])
-    for before, after, failed in zip(inputs, outputs, sweep.failed_at.ravel(), strict=True):
-        writer.writerow([f"{cell:.6g}" if np.isfinite(cell) else "" for cell in (*before, *after, failed)])
+    least = np.broadcast_to(sweep.least[..., None], grid.shape).ravel()
+    writer.writerow([*columns, *merits, "failed_at_s", "least_time_s"])
+    for before, after, *rest in zip(inputs, outputs, sweep.failed_at.ravel(), least, strict=True):
+        writer.writerow([f"{cell:.6g}" if np.isfinite(cell) else "" for cell in (*before, *after, *rest)])
     replace(path, text.getvalue())
 
 
 def perturbed_sentence(grid: Grid, sweep: ControllerSweep) -> str:
     """The results of a controller on all the perturbed plants of the grid, in a sentence."""
     at = nominal_gain(grid)
-    settles = float(np.isfinite(merit_values(sweep.merits, "settling_time")[..., at]).mean())
-    unit = grid.plants.unit
+    found, unit = sweep.distance_at(at), grid.plants.unit
     overshoot = float(np.nanmax(merit_values(sweep.merits, "overshoot", unit)[..., at]))
-    return (
-        f"On all {grid_in_words(grid)} it settles in {100 * settles:.0f} % of the runs at "
-        f"{grid.gains[at]:g} times its main gain; overshoot up to {overshoot:.3g}{unit.symbol}."
+    beyond = 0 if found is None else found.unreachable
+    runs = (
+        f"the runs whose set point its plant can reach ({counted(beyond, 'other')} not counted)"
+        if beyond
+        else "the runs"
     )
+    return (
+        f"On all {grid_in_words(grid)} it settles in {100 * settled_share(grid, sweep):.0f} % of {runs} at "
+        f"{grid.gains[at]:g} times its main gain{_times_the_least(found)}; overshoot up to {overshoot:.3g}{unit.symbol}."
+    )
+
+
+def settled_share(grid: Grid, sweep: ControllerSweep) -> float:
+    """Of the runs on perturbed plants at the nominal gain whose set point the plant can reach, those in which it settles; NaN of none."""
+    at = nominal_gain(grid)
+    found = sweep.distance_at(at)
+    if found is None:
+        return float(np.isfinite(merit_values(sweep.merits, "settling_time")[..., at]).mean())
+    in_reach = found.settled + found.never
+    return found.settled / in_reach if in_reach else float("nan")
+
+
+def _times_the_least(found: Distance | None) -> str:
+    """`, in 1.9 times the least time in the median and 2.6 at worst`; "" where that is not known."""
+    if found is None or np.isnan(found.median):
+        return ""
+    return f", in {found.median:.3g} times the least time in the median and {found.worst:.3g} at worst"
 
 
 def grid_in_words(grid: Grid) -> str:
@@ -92,16 +116,35 @@ def _cell(value: float) -> str:
 
 
 def comparison_rows(results: SweepResults) -> list[list[str]]:
-    """A row a controller: set points at which it settles, then median and worst of each figure of merit."""
+    """A row a controller: set points at which it settles, distance to the least time, largest command, then median and worst of each figure of merit."""
     rows = []
-    for name, one in results.nominal.items():
-        settles = int(np.isfinite(merit_values(one, "settling_time")).sum())
-        cells = [name, f"{settles} of {len(results.settings.set_points)}"]
+    for sweep in results.sweeps:
+        settles = int(np.isfinite(merit_values(sweep.nominal, "settling_time")).sum())
+        found = sweep.nominal_distance
+        beyond = f", {found.unreachable} out of reach" if found is not None and found.unreachable else ""
+        cells = [sweep.name, f"{settles} of {len(results.settings.set_points)}{beyond}", _distance_cell(found)]
+        cells.append("no limit" if found is None else f"{sweep.command_limit:.4g}")
         for merit_name in SHOWN:
-            values = merit_values(one, merit_name, results.unit)
+            values = merit_values(sweep.nominal, merit_name, results.unit)
             cells.append(" / ".join(_cell(float(of(values))) for of in (np.median, np.max)))
         rows.append(cells)
     return rows
+
+
+def _distance_cell(found: Distance | None) -> str:
+    """Median / worst of the set points at which it settles."""
+    if found is None:
+        return "no least time"
+    if not np.isfinite(found.median):
+        return "never" if found.never else "no number"
+    return f"{found.median:.3g} / {found.worst:.3g}"
+
+
+LEAST_TIME = (
+    "The least time is that in which the largest command of the controller is first there, at the same set point on the same plant; no command within "
+    "the limit is there earlier. Set points that it does not reach are out of reach of the plant, which is no failure of the controller. Settling time over "
+    "least time: median / worst of the set points at which the controller settles; 1 is the best that is possible, also for controllers with other limits."
+)
 
 
 def _panels(pictures: Pictures, name: str, alt: str) -> str:
@@ -151,13 +194,20 @@ def page(
         if grid.second
         else "Lines: median over the set points; bands: their range, where all have a value"
     )
-    head = ["controller", "settles at", *(f"{label} ({symbol})" for label, symbol, _ in shown_in(unit).values())]
+    limit = f"largest command ({unit.command})"
+    head = [
+        "controller",
+        "settles at",
+        "settling over least time",
+        limit,
+        *(f"{label} ({symbol})" for label, symbol, _ in shown_in(unit).values()),
+    ]
     parts = [
         f"<h1>Controllers compared</h1>{headline(answer(results))}{bullets(remarks.notes)}",
         _panels(pictures, "comparison.png", "figures of merit over the set point"),
         f"{bullets(conclusions(results))}<p>The unperturbed plant, "
         f"{len(settings.set_points)} set points from {low:{precision}}{unit.symbol} to {high:{precision}}{unit.symbol}; "
-        f"median / worst over the set points. {arrived} {say(settings.between)}</p>{bullets(remarks.settings)}",
+        f"median / worst over the set points. {arrived} {say(settings.between)}</p><p>{say(LEAST_TIME)}</p>{bullets(remarks.settings)}",
         table(head, comparison_rows(results)),
         section(steps),
         _what_differs(results, drawn_as),
@@ -201,38 +251,64 @@ def conclusions(results: SweepResults) -> list[str]:
     for one in results.sweeps:
         settles = int(np.isfinite(merit_values(one.nominal, "settling_time")).sum())
         points = counted(len(results.settings.set_points), "set point")
-        nominal = f"{one.name} settles at {settles} of {points} on the unperturbed plant."
+        found = one.nominal_distance
+        beyond = f", {found.unreachable} out of reach" if found is not None and found.unreachable else ""
+        nominal = (
+            f"{one.name} settles at {settles} of {points}{beyond} on the unperturbed plant{_times_the_least(found)}."
+        )
         sentences.append(f"{nominal} {perturbed_sentence(results.grid, one)}")
     return sentences
 
 
-def ranked(results: SweepResults) -> list[tuple[float, float, str, float]]:
-    """(minus the share of the runs on perturbed plants in which it settles, median settling time, name, largest overshoot), the best controller first."""
+class Ranked(NamedTuple):
+    """A controller on the perturbed plants at its nominal gain, in the order in which they are ranked."""
+
+    unsettled: float  # share of the runs in reach in which it does not settle; infinite where none is in reach
+    times_least: float  # median settling time over the least time; infinite where there is none
+    seconds: float  # median settling time, infinite where it never settles
+    name: str
+    overshoot: float  # the largest, in the unit shown
+
+
+def ranked(results: SweepResults) -> list[Ranked]:
+    """The best controller first: by the share of the runs in reach in which it settles, then by its distance to the least time."""
     at, unit = nominal_gain(results.grid), results.unit
     rows = []
     for one in results.sweeps:
-        times = merit_values(one.merits, "settling_time")[..., at]
-        settled = np.isfinite(times)
-        overshoot = float(np.nanmax(merit_values(one.merits, "overshoot", unit)[..., at]))
-        median = float(np.median(times[settled])) if settled.any() else np.inf
-        rows.append((-float(settled.mean()), median, one.name, overshoot))
+        times, found = merit_values(one.merits, "settling_time")[..., at], one.distance_at(at)
+        settled, share = np.isfinite(times), settled_share(results.grid, one)
+        rows.append(
+            Ranked(
+                np.inf if np.isnan(share) else 1.0 - share,
+                np.inf if found is None or np.isnan(found.median) else found.median,
+                float(np.median(times[settled])) if settled.any() else np.inf,
+                one.name,
+                float(np.nanmax(merit_values(one.merits, "overshoot", unit)[..., at])),
+            )
+        )
     return sorted(rows)
 
 
 def answer(results: SweepResults) -> str:
-    """The controllers by the share of the runs on perturbed plants in which they settle; then the quicker ones first."""
-    unit = results.unit
-    each = [
-        f"{name} settles in {-100 * share:.0f} %"
-        + (
-            f" (after {median:.3g} s in the median, overshoot up to {overshoot:.2g}{unit.symbol})"
-            if np.isfinite(median)
-            else ""
-        )
-        for share, median, name, overshoot in ranked(results)
-    ]
+    """The controllers by the share of the runs on perturbed plants in which they settle; then those nearer to the least time first."""
+
+    def words(one: Ranked) -> str:
+        if not np.isfinite(one.unsettled):
+            return f"{one.name} has no set point within reach"
+        said = f"{one.name} settles in {100 * (1.0 - one.unsettled):.0f} %"
+        if not np.isfinite(one.seconds):
+            return said
+        quick = f"after {one.seconds:.3g} s"
+        if np.isfinite(one.times_least):
+            quick = f"in {one.times_least:.3g} times the least time"
+        return f"{said} ({quick} in the median, overshoot up to {one.overshoot:.2g}{results.unit.symbol})"
+
+    each = [words(one) for one in ranked(results)]
     rest = f"; then {counted(len(each) - NAMED, 'other')}" if len(each) > NAMED else ""
     plants = "plants drawn from the batch" if results.grid.numbered else "perturbed plants"
+    at = nominal_gain(results.grid)
+    if any(found is not None and found.unreachable for found in (one.distance_at(at) for one in results.sweeps)):
+        plants += " with a set point within reach"
     return f"Of the runs on {plants} {', '.join(each[:NAMED])}{rest}."
 
 
@@ -274,6 +350,7 @@ def as_json(results: SweepResults, command: str = "", remarks: Remarks = NO_REMA
             name: {field.name: plain(getattr(one, field.name)) for field in dataclasses.fields(one)}
             for name, one in results.nominal.items()
         },
+        "least_times": {one.name: _least_times(one, plain) for one in results.sweeps},
         "sweep": {
             "mismatches": list(grid.mismatches),
             **(
@@ -286,9 +363,28 @@ def as_json(results: SweepResults, command: str = "", remarks: Remarks = NO_REMA
             "gain_ratios": plain(grid.gains),
             "loops": grid.size,
             "failed": {one.name: int(np.isfinite(one.failed_at).sum()) for one in results.sweeps},
+            "settling_over_least_time": {
+                one.name: _as_record(one.distance_at(nominal_gain(grid))) for one in results.sweeps
+            },
         },
         "integration_error": {one.name: one.integration_error for one in results.sweeps},
         "command": command,
         "made_with": made_with(),
     }
     return json.dumps(record, indent=2) + "\n"
+
+
+def _as_record(found: Distance | None) -> dict[str, float | None] | None:
+    """null where the command has no limit; median and worst are null where no run settles."""
+    if found is None:
+        return None
+    return {name: one if np.isfinite(one) else None for name, one in found._asdict().items()}
+
+
+def _least_times(sweep: ControllerSweep, plain: Callable[[np.ndarray], list[float | None]]) -> dict[str, Any]:
+    """Of the unperturbed plant, at every set point; null: out of reach, or of a command without a limit."""
+    return {
+        "command_limit": sweep.command_limit if np.isfinite(sweep.command_limit) else None,
+        "seconds": plain(sweep.nominal_least),
+        "settling_over_least_time": _as_record(sweep.nominal_distance),
+    }

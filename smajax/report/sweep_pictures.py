@@ -32,6 +32,7 @@ SHOWN = {
 ROUNDING = 1e-6  # in the unit shown: below it a figure is a zero with rounding errors
 MAPPED = ("settling_time", "overshoot", "steady_error", "energy")
 COLOURS = ("#1f6fb2", "#c8553d", "#d9a441", "#3f8f5b", "#7a5195", "#8a8f98", "#1d1d1f", "#2aa5a0")
+DASHES = ("-", "--", ":")  # of the first controllers, and of those that have the same colours again
 # Figure of merit -> (the one that decides whether it exists, what its absence means).
 GREY = {"settling_time": ("settling_time", "never settles"), "overshoot": ("reach_time", "never arrives")}
 
@@ -215,22 +216,37 @@ def lines_plot(
     return SeriesPlot(f"{sweep.name}, one mismatch at a time", time, tuple(panels))
 
 
+OVER_LEAST = "over least time"  # the first panel
+
+
+def _over_least(sweep: ControllerSweep) -> np.ndarray:
+    """Settling time over least time on the unperturbed plant; NaN where either has no number."""
+    settling, least = np.asarray(sweep.nominal.settling_time), sweep.nominal_least
+    known = np.isfinite(settling) & np.isfinite(least) & (least > 0.0)
+    return np.where(known, settling / np.where(known, least, 1.0), np.nan)
+
+
 def draw_comparison(
-    figure: Figure, targets: np.ndarray, merits: Mapping[str, Merit], position: PositionUnit = DEGREES
+    figure: Figure, targets: np.ndarray, sweeps: Sequence[ControllerSweep], position: PositionUnit = DEGREES
 ) -> None:
-    """Every figure of merit over the set point, one line a controller."""
+    """Settling time over least time and every figure of merit over the set point, one line a controller."""
     axes_of = panels(figure, 4, 2)
-    for axes, name in zip(axes_of, SHOWN, strict=False):
-        for k, (colour, (controller, one)) in enumerate(zip(COLOURS, merits.items(), strict=False)):
-            values = merit_values(one, name, position)
+    for axes, name in zip(axes_of, (OVER_LEAST, *SHOWN), strict=True):
+        for k, one in enumerate(sweeps):
+            colour, dashes = COLOURS[k % len(COLOURS)], DASHES[k // len(COLOURS) % len(DASHES)]
+            values = _over_least(one) if name == OVER_LEAST else merit_values(one.nominal, name, position)
             values = np.where(np.abs(values) < ROUNDING, 0.0, np.where(np.isfinite(values), values, np.nan))
             if np.isnan(values).all():
-                nowhere = f"{controller}: at no set point"
+                nowhere = f"{one.name}: at no set point"
                 axes.text(0.03, 0.92 - 0.09 * k, nowhere, color=colour, transform=axes.transAxes, fontsize=9)
-            axes.plot(position.of(targets), values, "o-", color=colour, markersize=3, linewidth=1.2, label=controller)
+            look: dict[str, Any] = {"color": colour, "linestyle": dashes, "markersize": 3, "linewidth": 1.2}
+            axes.plot(position.of(targets), values, marker="o", label=one.name, **look)
+        if name == OVER_LEAST:
+            axes.axhline(1.0, color="#9aa0a8", linewidth=0.8)
+            named(axes, f"set point ({position.label})", "settling time over least time")
+            continue
         label, unit, _ = shown_in(position)[name]
         named(axes, f"set point ({position.label})", f"{label} ({unit})")
-    axes_of[-1].axis("off")
     handles, labels = axes_of[0].get_legend_handles_labels()
     # Above all panels: on the first screen.
     figure.legend(handles, labels, frameon=False, fontsize=9, loc="outside upper center", ncols=min(len(labels), 4))

@@ -14,6 +14,7 @@ import numpy as np
 
 from smajax.control.gains_file import Gains, read_gains, write_gains
 from smajax.control.interface import Interface, interface_of
+from smajax.control.least_time import command_limit, distance
 from smajax.control.presets import CONTROLLERS
 from smajax.control.sweep.batched_loops import LoopSetup, closed_loops
 from smajax.control.tune.scenarios import tuned_on
@@ -24,6 +25,7 @@ from smajax.model.rigs import arm
 from studies.requirement.search import (
     DELAY,
     FILTER,
+    FULL,
     HIGH,
     LIMITS,
     LOW,
@@ -56,11 +58,12 @@ def judged_on() -> np.ndarray:
     return np.concatenate([np.append(corners, np.ones((len(corners), 1)), axis=1), drawn(DRAWN, SEED)])
 
 
-def judged(name: str, interface: Interface, rows: np.ndarray, gains: Gains, least: np.ndarray) -> dict[str, Any]:
-    """Shares of loops, and the times over the least ones."""
+def judged(name: str, interface: Interface, rows: np.ndarray, gains: Gains) -> dict[str, Any]:
+    """Shares of loops, and the times over the least ones: under the 10 V of the drive, and under the limit of the controller's own command."""
     preset = CONTROLLERS[name]
     plant = preset.plant(arm())
-    setup = LoopSetup(plant, gains.put(plant), preset.main_gain, SECONDS, STEP, interface)
+    controller = gains.put(plant)
+    setup = LoopSetup(plant, controller, preset.main_gain, SECONDS, STEP, interface)
     merits = closed_loops(setup, rows).merits
     settling, overshoot = np.asarray(merits.settling_time), np.degrees(merits.overshoot)
     error = np.degrees(merits.steady_error)
@@ -69,7 +72,7 @@ def judged(name: str, interface: Interface, rows: np.ndarray, gains: Gains, leas
         "overshoot": overshoot <= LIMITS["overshoot"],
         "steady_error": error <= LIMITS["steady_error"],
     }
-    over = settling / least
+    limit, reach = command_limit(plant, controller), np.asarray(merits.reach_time)
     return {
         "loops": len(rows),
         "met": int(np.all(list(within.values()), axis=0).sum()),
@@ -79,8 +82,18 @@ def judged(name: str, interface: Interface, rows: np.ndarray, gains: Gains, leas
         "worst_settling_s": _finite(settling.max()),
         "worst_overshoot_deg": float(overshoot.max()),
         "worst_steady_error_deg": float(error.max()),
-        "median_settling_over_least_time": _finite(np.median(over)),
-        "median_reach_over_least_time": _finite(np.median(np.asarray(merits.reach_time) / least)),
+        "over_least_time": _over(settling, reach, least_times(rows, FULL, preset.plant)) | {"limit_V": FULL},
+        "over_least_time_under_own_limit": _over(settling, reach, least_times(rows, limit, preset.plant))
+        | {"limit_V": limit},
+    }
+
+
+def _over(settling: np.ndarray, reach: np.ndarray, least: np.ndarray) -> dict[str, Any]:
+    """`Distance` of the loops, and the median of the time to be there over the least one, of those that are in reach."""
+    found = distance(settling, least)._asdict()
+    first = np.median(reach[np.isfinite(least)] / least[np.isfinite(least)])
+    return {name: one if isinstance(one, int) else _finite(one) for name, one in found.items()} | {
+        "median_to_be_there": _finite(float(first))
     }
 
 
@@ -109,6 +122,11 @@ def _never(value: float | None, digits: int = 2) -> str:
     return "never" if value is None else f"{value:.{digits}f}"
 
 
+def _distance(one: dict[str, Any]) -> str:
+    """Of the loops that settle."""
+    return f"{_never(one['median'])} / {_never(one['worst'])}"
+
+
 def _met(one: dict[str, Any]) -> str:
     return f"{100.0 * one['met'] / one['loops']:.1f} %"
 
@@ -116,11 +134,14 @@ def _met(one: dict[str, Any]) -> str:
 def table(results: dict[str, Any]) -> str:
     """A row a controller."""
     head = ["controller", "gains", "met, filter", "settled, filter", "median / worst settling, s", "worst overshoot, °"]
-    head += ["worst steady error, °", "too late / too far / too wrong, loops", "settling over the least time, median"]
+    head += ["worst steady error, °", "too late / too far / too wrong, loops"]
+    head += ["settling over the least time under 10 V, median / worst", "never settled / out of reach, loops"]
+    head += ["own limit, V", "over the least time under it, median / worst / out of reach"]
     head += ["met, true state", f"met, filter `{NOMINAL}`"]
     rows = []
     for name, one in results.items():
         seen, nominal = one["filter"], one.get("nominal_filter")
+        full, own = seen["over_least_time"], seen["over_least_time_under_own_limit"]
         rows.append(
             [
                 name,
@@ -131,7 +152,10 @@ def table(results: dict[str, Any]) -> str:
                 f"{seen['worst_overshoot_deg']:.1f}",
                 f"{seen['worst_steady_error_deg']:.2f}",
                 " / ".join(map(str, seen["beyond"].values())),
-                _never(seen["median_settling_over_least_time"]),
+                _distance(full),
+                f"{full['never']} / {full['unreachable']}",
+                f"{own['limit_V']:.3g}",
+                f"{_distance(own)} / {own['unreachable']}",
                 _met(one["true_state"]),
                 "" if nominal is None else _met(nominal),
             ]
@@ -141,12 +165,18 @@ def table(results: dict[str, Any]) -> str:
 
 def frontier_table(frontier: dict[str, Any]) -> str:
     """A row a set of gains."""
-    head = ["gains", "met", "settling over the least time, median", "median / worst settling, s", "worst overshoot, °"]
+    head = [
+        "gains",
+        "met",
+        "settling over the least time, median / worst",
+        "median / worst settling, s",
+        "worst overshoot, °",
+    ]
     rows = [
         [
             name,
             _met(one),
-            _never(one["median_settling_over_least_time"]),
+            _distance(one["over_least_time"]),
             f"{_never(one['median_settling_s'])} / {_never(one['worst_settling_s'])}",
             f"{one['worst_overshoot_deg']:.1f}",
         ]
@@ -182,24 +212,23 @@ def main(arguments: list[str]) -> None:
         _judge_afresh(named, int(arguments[arguments.index("--fresh") + 1]))
         return
     rows, system = judged_on(), arm()
-    least = least_times(rows)
     between, nominal = (interface_of(system, one, NOISE, PERIOD, STEP, DELAY) for one in (FILTER, NOMINAL))
     results = json.loads((HERE / "results.json").read_text(encoding="utf-8")) if named else {}
     for name in named or CONTROLLERS:
         gains, origin = gains_of(name)
         one: dict[str, Any] = {
             "gains": origin,
-            "true_state": judged(name, Interface(), rows, gains, least),
-            "filter": judged(name, between, rows, gains, least),
+            "true_state": judged(name, Interface(), rows, gains),
+            "filter": judged(name, between, rows, gains),
         }
         if one["filter"]["met"] >= ASKED * len(rows):
-            one["nominal_filter"] = judged(name, nominal, rows, gains, least)
+            one["nominal_filter"] = judged(name, nominal, rows, gains)
         results.setdefault("controllers", {})[name] = one
         print(name, json.dumps(one), flush=True)
         if name == QUICKEST:
             results["frontier"] = {}
             for path in sorted(FRONTIER.glob("*.json")):
-                other = judged(name, between, rows, read_gains(path, system), least)
+                other = judged(name, between, rows, read_gains(path, system))
                 results["frontier"][path.stem.replace("_", " ")] = other
                 print(path.stem, json.dumps(other), flush=True)
         _write(results)
@@ -209,7 +238,7 @@ def _judge_afresh(names: list[str], seed: int) -> None:
     """Print what the gains do on `FRESH` other plants, drawn with `seed`; nothing is written."""
     rows, between = drawn(FRESH, seed), interface_of(arm(), FILTER, NOISE, PERIOD, STEP, DELAY)
     for name in names or CONTROLLERS:
-        one = judged(name, between, rows, gains_of(name)[0], np.ones(len(rows)))
+        one = judged(name, between, rows, gains_of(name)[0])
         print(f"{name}: {_met(one)} of {one['loops']} loops, beyond the limits {one['beyond']}", flush=True)
 
 

@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from cmaes import CMA
 from scipy.stats import qmc
 
 from smajax.control.controllers.preset import Box
+from smajax.control.gains_file import LARGEST
 from smajax.control.interface import interface_of
 from smajax.control.least_time import Largest
 from smajax.control.presets import CONTROLLERS
-from smajax.control.sweep.batched_loops import LoopSetup, closed_loops
+from smajax.control.sweep.batched_loops import LoopSetup
+from smajax.control.sweep.batched_loops import least_times as batched_least_times
 from smajax.control.sweep.grid import loop_rows
 from smajax.control.tune.evaluate import STEP, TuningProblem
 from smajax.control.tune.scenarios import Scenarios, tuned_on
 from smajax.control.tune.terms import SETTLING, TERMS
 from smajax.core.parameters import parameters
 from smajax.model.rigs import arm
+from smajax.model.system import System
 
 LIMITS = {"settling_time": 4.0, "overshoot": 2.0, "steady_error": 0.5}
 MARGIN = 0.95
@@ -27,6 +30,7 @@ FILTER, NOISE, PERIOD, DELAY = "adaptive", 0.1, 0.01, 1  # degrees, s, periods
 SET_POINTS = (-40.0, -15.0, 10.0, 35.0, 60.0, 85.0)
 LOW, HIGH = -40.0, 85.0  # degrees
 FULL = 10.0  # V
+LONGEST = 10.0  # s, in which a set point has to be reached
 DRAWN, SEED = 64, 20261126  # loops drawn beside the corners: other than those that judge
 ALSO = {"largest_voltage": (7.0, FULL), "braking": (2.0, 200.0), "rate_filter": (0.002, 0.1)}
 POPULATION, SIGMA = 14, 0.2
@@ -47,11 +51,14 @@ def searched_on() -> Scenarios:
     return Scenarios(np.concatenate([corners.rows, other]), np.append(corners.nominal, np.zeros(len(other), bool)))
 
 
-def least_times(rows: np.ndarray) -> np.ndarray:
-    """Seconds in which the largest command is first within the band of each row's set point on its plant."""
-    return np.asarray(
-        closed_loops(LoopSetup(arm(), Largest(FULL), "largest_voltage", 3.0, STEP), rows).merits.reach_time
-    )
+def least_times(
+    rows: np.ndarray, limit: float = FULL, section: Callable[[System], System] = lambda plant: plant
+) -> np.ndarray:
+    """Seconds in which that command is first within the band of each row's set point on its plant; infinite where it never is.
+
+    section: makes the plant of a section of the source from the arm, as `ControllerPreset.plant` does.
+    """
+    return batched_least_times(LoopSetup(section(arm()), Largest(limit), LARGEST, LONGEST, STEP), rows, limit)
 
 
 def costs(exact: np.ndarray, least: np.ndarray | None = None, quick: float = 0.0) -> np.ndarray:

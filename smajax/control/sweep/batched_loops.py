@@ -17,7 +17,9 @@ import numpy as np
 from smajax.control.closed_loop import ClosedLoopSetup, stored_loop
 from smajax.control.controllers.base import AbstractController
 from smajax.control.figures_of_merit import Merit, evaluated_loop
+from smajax.control.gains_file import LARGEST
 from smajax.control.interface import Interface
+from smajax.control.least_time import Largest
 from smajax.control.perturbed_plant import OF_ARM, Perturbation, perturbed_plant
 from smajax.control.reference import clock, constant
 from smajax.core.parameters import get_parameters, set_vector
@@ -115,6 +117,18 @@ def closed_loops(setup: LoopSetup, rows: np.ndarray, progress: Progress = quiet)
     """Run every row of `grid.loop_rows`, on all devices; trajectories are not stored."""
     whole = _run(_merits, setup, rows, progress)
     return Outcome(whole["merits"], whole["failed_at"])
+
+
+def least_times(setup: LoopSetup, rows: np.ndarray, largest_command: float) -> np.ndarray:
+    """Least times to the set points of the rows on their plants under that command, s, (L,): no gain, filter, noise or delay has a part in them.
+
+    Infinite where the plant is not there within the length of a loop; see `least_time`.
+    """
+    plant_alone = dataclasses.replace(
+        setup, controller=Largest(largest_command), main_gain=LARGEST, interface=IDEAL_INTERFACE
+    )
+    at_its_gain = np.concatenate([rows[:, :-1], np.ones((len(rows), 1))], axis=1)
+    return np.asarray(closed_loops(plant_alone, at_its_gain).merits.reach_time)
 
 
 def positions(setup: LoopSetup, rows: np.ndarray) -> np.ndarray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,12 +15,13 @@ import numpy as np
 from smajax.control.figures_of_merit import Merit
 from smajax.control.gains_file import Gains
 from smajax.control.interface import between_in_words, check_interface, check_set_points, interface_of
+from smajax.control.least_time import Distance, command_limit, distance
 from smajax.control.mismatch import MISMATCHES, default_mismatches
 from smajax.control.plants import Plants, PlantSet, carrying, plant_set
 from smajax.control.position_unit import PositionUnit, check_unit, default_set_points, unit_named, unit_of
 from smajax.control.presets import CONTROLLERS, check_controller, controllers_for
 from smajax.control.scales import is_arm, seconds_for
-from smajax.control.sweep.batched_loops import LoopSetup, closed_loops, integrated_setup, positions
+from smajax.control.sweep.batched_loops import LoopSetup, closed_loops, integrated_setup, least_times, positions
 from smajax.control.sweep.grid import OF_ARM, PLANT, Grid, loop_rows, sweep_ratios
 from smajax.core.files import json_line, writing
 from smajax.core.parameters import get_parameters
@@ -32,6 +34,7 @@ from smajax.simulation.integration_error import AUTO, Tolerance
 LINES = (0.5, 0.8, 1.0, 1.25, 2.0)  # ratios of which the angle over time is stored
 LINE_TARGET = 40.0  # deg, of the arm
 CACHED = f"finished/*-{'[0-9a-f]' * 16}.npz"  # files of the cache, below the folder of the sweep
+LEAST = "with least times"
 FIELDS = tuple(field.name for field in dataclasses.fields(Merit))
 
 
@@ -128,6 +131,24 @@ class ControllerSweep:
     lines: Mapping[str, np.ndarray]  # mismatch -> (len(LINES), time), rad or m, at `line_target`; of a batch: none
     nominal: Merit  # of the unperturbed plant, arrays (set points,)
     integration_error: Mapping[str, Any]  # what the integration leaves in the positions, as `IntegrationError.record`
+    command_limit: float  # largest command, in the drive's unit; infinite: none
+    least: (
+        np.ndarray
+    )  # s, least times under it of plants and set points, the grid's shape without its last axis; NaN without a limit
+    nominal_least: np.ndarray  # s, of the unperturbed plant, (set points,)
+
+    @property
+    def nominal_distance(self) -> Distance | None:
+        """From the least times, on the unperturbed plant. None where the command has no limit, and so no time is the least."""
+        if not math.isfinite(self.command_limit):
+            return None
+        return distance(np.asarray(self.nominal.settling_time), self.nominal_least)
+
+    def distance_at(self, gain: int) -> Distance | None:
+        """The same on all plants of the grid at one ratio of the main gain, by its index."""
+        if not math.isfinite(self.command_limit):
+            return None
+        return distance(np.asarray(self.merits.settling_time)[..., gain], self.least)
 
 
 @dataclass(frozen=True)
@@ -206,7 +227,10 @@ def _sweep(
     preset = CONTROLLERS[name]
     plant = preset.plant(system)
     tuned = tuple(gains for gains in settings.tuned if gains.controller == name)
-    key = digest(plant, [str(dataclasses.replace(settings, controllers=(name,), tuned=tuned)), *plants.marks])[:16]
+    # LEAST: what an older version cached has no least times.
+    key = digest(plant, [LEAST, str(dataclasses.replace(settings, controllers=(name,), tuned=tuned)), *plants.marks])[
+        :16
+    ]
     file = None if folder is None else folder / "finished" / f"{name}-{key}.npz"
     saved: dict[str, Any] | None = None if file is None else arrays(file)
     if saved is None:
@@ -223,6 +247,9 @@ def _sweep(
         {mismatch: saved[f"line_{mismatch}"] for mismatch in _lined(plants)},
         Merit(**{field: saved[f"nominal_{field}"] for field in FIELDS}),
         json.loads(str(saved["integration_error"])),
+        float(saved["command_limit"]),
+        saved["least"],
+        saved["nominal_least"],
     )
 
 
@@ -259,9 +286,16 @@ def _computed(
         target = line_target(plant, grid)
         rows = np.concatenate([loop_rows({one: np.asarray(LINES)}, target, plants=plants) for one in lined])
         angles = list(positions(setup, rows).reshape(len(lined), len(LINES), -1))
+    limit = command_limit(plant, setup.controller)
+    at_one_gain = grid.rows().reshape(*grid.shape, -1)[..., 0, :]
+    unperturbed = whole[grid.size :]
+    some = np.concatenate([at_one_gain.reshape(-1, whole.shape[1]), unperturbed])
+    least = least_times(setup, some, limit) if math.isfinite(limit) else np.full(len(some), math.nan)
     inside, nominal = slice(grid.size), grid.size + np.arange(len(grid.targets))
     result: dict[str, Any] = {"failed": outcome.failed_at[inside].reshape(grid.shape)}
     result["integration_error"] = np.asarray(json_line(error.record()))
+    result["command_limit"], result["nominal_least"] = np.asarray(limit), least[-len(unperturbed) :]
+    result["least"] = least[: -len(unperturbed)].reshape(grid.shape[:-1])
     for field in FIELDS:
         values = np.asarray(getattr(outcome.merits, field))
         result[f"grid_{field}"], result[f"nominal_{field}"] = values[inside].reshape(grid.shape), values[nominal]
