@@ -16,8 +16,8 @@ from smajax.core.provenance import made_with
 def as_dataset(results: SweepResults, command: str) -> xr.Dataset:
     """Figures of merit of every closed loop, SI, (controller, each mismatch, set point, ratio of the main gain).
 
-    Times are infinite where a run never arrives or settles; `failed_at` is NaN where no loop failed. `least_time`, which the gain does not change, is
-    infinite where the plant does not reach the set point under the largest command, and NaN where the command has no limit.
+    Times are infinite where a run never arrives or settles; `failed_at` is NaN where no loop failed. Least times, which the gain does not change, are
+    infinite where the plant does not reach the set point with the largest command (of all controllers, of its own), and NaN where that has no limit.
     """
     sweeps, grid = results.sweeps, results.grid
     ratios = grid.axis_names
@@ -42,7 +42,11 @@ def as_dataset(results: SweepResults, command: str) -> xr.Dataset:
         "set_point": ("set_point", grid.targets, {"units": results.unit.own}),
         "gain_ratio": ("gain_ratio", grid.gains, {"units": "1", "long_name": "ratio to the controller's main gain"}),
     }
-    variables["least_time"] = (dims[:-1], np.stack([one.least for one in sweeps]).reshape(shape[:-1]), {"units": "s"})
+    for name, least in (
+        ("least_time", [one.least for one in sweeps]),
+        ("least_time_own_limit", [one.own_least for one in sweeps]),
+    ):
+        variables[name] = (dims[:-1], np.stack([one.grid for one in least]).reshape(shape[:-1]), {"units": "s"})
     gains = "; ".join(f"{one.name}: {one.main_gain}" for one in sweeps)
     attributes = {"command": command, "between": results.settings.between, "main gains": gains, **made_with()}
     attributes["integration_error"] = json_line({one.name: one.integration_error for one in sweeps})

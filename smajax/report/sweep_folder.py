@@ -32,7 +32,6 @@ from smajax.report.sweep_dataset import as_dataset
 from smajax.report.sweep_page import (
     NO_REMARKS,
     Remarks,
-    as_json,
     comparison_rows,
     failures,
     page,
@@ -41,6 +40,7 @@ from smajax.report.sweep_page import (
     write_rows,
 )
 from smajax.report.sweep_pictures import common_limits, draw_comparison, draw_curves, draw_lines, draw_maps, lines_plot
+from smajax.report.sweep_record import as_json
 
 MAPS = (10.0, 7.6)  # inches
 
@@ -118,6 +118,7 @@ def as_text(results: SweepResults) -> str:
         "settles",
         "over least",
         f"limit {results.unit.command}",
+        "over own least",
         "reach s",
         "settle s",
         f"overshoot {results.unit.label}",

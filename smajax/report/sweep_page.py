@@ -1,16 +1,14 @@
-"""A sweep as one page that compares controllers, as a table of every closed loop, and as a record for machines."""
+"""A sweep as one page that compares controllers, and as a table of every closed loop."""
 
 from __future__ import annotations
 
 import csv
-import dataclasses
 import html
 import io
-import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -61,9 +59,9 @@ def write_rows(path: Path, grid: Grid, sweep: ControllerSweep) -> None:
     outputs = np.stack([merit_values(sweep.merits, name, position).ravel() for name in SHOWN], axis=1)
     text = io.StringIO(newline="")
     writer = csv.writer(text)
-    least = np.broadcast_to(sweep.least[..., None], grid.shape).ravel()
-    writer.writerow([*columns, *merits, "failed_at_s", "least_time_s"])
-    for before, after, *rest in zip(inputs, outputs, sweep.failed_at.ravel(), least, strict=True):
+    least, own = (np.broadcast_to(one.grid[..., None], grid.shape).ravel() for one in (sweep.least, sweep.own_least))
+    writer.writerow([*columns, *merits, "failed_at_s", "least_time_s", "least_time_own_limit_s"])
+    for before, after, *rest in zip(inputs, outputs, sweep.failed_at.ravel(), least, own, strict=True):
         writer.writerow([f"{cell:.6g}" if np.isfinite(cell) else "" for cell in (*before, *after, *rest)])
     replace(path, text.getvalue())
 
@@ -71,7 +69,7 @@ def write_rows(path: Path, grid: Grid, sweep: ControllerSweep) -> None:
 def perturbed_sentence(grid: Grid, sweep: ControllerSweep) -> str:
     """The results of a controller on all the perturbed plants of the grid, in a sentence."""
     at = nominal_gain(grid)
-    found, unit = sweep.distance_at(at), grid.plants.unit
+    found, unit = sweep.distance_at(at, sweep.least), grid.plants.unit
     overshoot = float(np.nanmax(merit_values(sweep.merits, "overshoot", unit)[..., at]))
     beyond = 0 if found is None else found.unreachable
     runs = (
@@ -88,7 +86,7 @@ def perturbed_sentence(grid: Grid, sweep: ControllerSweep) -> str:
 def settled_share(grid: Grid, sweep: ControllerSweep) -> float:
     """Of the runs on perturbed plants at the nominal gain whose set point the plant can reach, those in which it settles; NaN of none."""
     at = nominal_gain(grid)
-    found = sweep.distance_at(at)
+    found = sweep.distance_at(at, sweep.least)
     if found is None:
         return float(np.isfinite(merit_values(sweep.merits, "settling_time")[..., at]).mean())
     in_reach = found.settled + found.never
@@ -116,14 +114,14 @@ def _cell(value: float) -> str:
 
 
 def comparison_rows(results: SweepResults) -> list[list[str]]:
-    """A row a controller: set points at which it settles, distance to the least time, largest command, then median and worst of each figure of merit."""
+    """A row a controller: set points at which it settles, distance to the least time with the largest command of all and with its own, then median and worst of each figure of merit."""
     rows = []
     for sweep in results.sweeps:
         settles = int(np.isfinite(merit_values(sweep.nominal, "settling_time")).sum())
-        found = sweep.nominal_distance
+        found, own = (sweep.nominal_distance(least) for least in (sweep.least, sweep.own_least))
         beyond = f", {found.unreachable} out of reach" if found is not None and found.unreachable else ""
         cells = [sweep.name, f"{settles} of {len(results.settings.set_points)}{beyond}", _distance_cell(found)]
-        cells.append("no limit" if found is None else f"{sweep.command_limit:.4g}")
+        cells += ["no limit" if own is None else f"{sweep.own_least.limit:.4g}", _distance_cell(own)]
         for merit_name in SHOWN:
             values = merit_values(sweep.nominal, merit_name, results.unit)
             cells.append(" / ".join(_cell(float(of(values))) for of in (np.median, np.max)))
@@ -141,9 +139,9 @@ def _distance_cell(found: Distance | None) -> str:
 
 
 LEAST_TIME = (
-    "The least time is that in which the largest command of the controller is first there, at the same set point on the same plant; no command within "
-    "the limit is there earlier. Set points that it does not reach are out of reach of the plant, which is no failure of the controller. Settling time over "
-    "least time: median / worst of the set points at which the controller settles; 1 is the best that is possible, also for controllers with other limits."
+    "The least time is that in which the largest command of all controllers here is first there, at the same set point on the same plant; none of them is "
+    "there earlier. Set points that it does not reach are out of reach of the plant, which is no failure of a controller. Settling time over least time: median / "
+    "worst of the set points at which the controller settles; 1 is the best that is possible. Once more with the largest command of the controller itself."
 )
 
 
@@ -194,12 +192,12 @@ def page(
         if grid.second
         else "Lines: median over the set points; bands: their range, where all have a value"
     )
-    limit = f"largest command ({unit.command})"
     head = [
         "controller",
         "settles at",
         "settling over least time",
-        limit,
+        f"own largest command ({unit.command})",
+        "settling over least time with it",
         *(f"{label} ({symbol})" for label, symbol, _ in shown_in(unit).values()),
     ]
     parts = [
@@ -251,7 +249,7 @@ def conclusions(results: SweepResults) -> list[str]:
     for one in results.sweeps:
         settles = int(np.isfinite(merit_values(one.nominal, "settling_time")).sum())
         points = counted(len(results.settings.set_points), "set point")
-        found = one.nominal_distance
+        found = one.nominal_distance(one.least)
         beyond = f", {found.unreachable} out of reach" if found is not None and found.unreachable else ""
         nominal = (
             f"{one.name} settles at {settles} of {points}{beyond} on the unperturbed plant{_times_the_least(found)}."
@@ -264,7 +262,9 @@ class Ranked(NamedTuple):
     """A controller on the perturbed plants at its nominal gain, in the order in which they are ranked."""
 
     unsettled: float  # share of the runs in reach in which it does not settle; infinite where none is in reach
-    times_least: float  # median settling time over the least time; infinite where there is none
+    times_least: (
+        float  # median settling time over the least time with the largest command of all; infinite where there is none
+    )
     seconds: float  # median settling time, infinite where it never settles
     name: str
     overshoot: float  # the largest, in the unit shown
@@ -275,7 +275,7 @@ def ranked(results: SweepResults) -> list[Ranked]:
     at, unit = nominal_gain(results.grid), results.unit
     rows = []
     for one in results.sweeps:
-        times, found = merit_values(one.merits, "settling_time")[..., at], one.distance_at(at)
+        times, found = merit_values(one.merits, "settling_time")[..., at], one.distance_at(at, one.least)
         settled, share = np.isfinite(times), settled_share(results.grid, one)
         rows.append(
             Ranked(
@@ -298,16 +298,20 @@ def answer(results: SweepResults) -> str:
         said = f"{one.name} settles in {100 * (1.0 - one.unsettled):.0f} %"
         if not np.isfinite(one.seconds):
             return said
-        quick = f"after {one.seconds:.3g} s"
+        unit, least = results.unit, ""
         if np.isfinite(one.times_least):
-            quick = f"in {one.times_least:.3g} times the least time"
-        return f"{said} ({quick} in the median, overshoot up to {one.overshoot:.2g}{results.unit.symbol})"
+            least = f", {one.times_least:.3g} times the least time"
+        return (
+            f"{said} (after {one.seconds:.3g} s in the median{least}, overshoot up to {one.overshoot:.2g}{unit.symbol})"
+        )
 
     each = [words(one) for one in ranked(results)]
     rest = f"; then {counted(len(each) - NAMED, 'other')}" if len(each) > NAMED else ""
     plants = "plants drawn from the batch" if results.grid.numbered else "perturbed plants"
     at = nominal_gain(results.grid)
-    if any(found is not None and found.unreachable for found in (one.distance_at(at) for one in results.sweeps)):
+    if any(
+        found is not None and found.unreachable for found in (one.distance_at(at, one.least) for one in results.sweeps)
+    ):
         plants += " with a set point within reach"
     return f"Of the runs on {plants} {', '.join(each[:NAMED])}{rest}."
 
@@ -329,62 +333,3 @@ def failures(sweep: ControllerSweep) -> str:
         if bad == 0
         else f"{bad} failed: the controller's output was no finite voltage, or a gain is out of its bounds"
     )
-
-
-def as_json(results: SweepResults, command: str = "", remarks: Remarks = NO_REMARKS) -> str:
-    """The comparison and the grid, SI; infinite times are null."""
-    settings, grid, own = results.settings, results.grid, results.unit.own
-
-    def plain(values: np.ndarray) -> list[float | None]:
-        return [float(value) if np.isfinite(value) else None for value in np.asarray(values).ravel()]
-
-    batch = grid.plants.batch
-    record = {
-        "headline": answer(results),
-        "conclusions": conclusions(results),
-        "between": settings.between,
-        "notes": list(remarks.notes),
-        "settings": list(remarks.settings),
-        f"set_points_{own}": plain(grid.targets),
-        "controllers": {
-            name: {field.name: plain(getattr(one, field.name)) for field in dataclasses.fields(one)}
-            for name, one in results.nominal.items()
-        },
-        "least_times": {one.name: _least_times(one, plain) for one in results.sweeps},
-        "sweep": {
-            "mismatches": list(grid.mismatches),
-            **(
-                {"plants": dict(zip(grid.plants.columns, map(plain, batch.T), strict=True))}
-                if batch is not None
-                else {}
-            ),
-            "ratios": plain(grid.ratios),
-            f"set_points_{own}": plain(grid.targets),
-            "gain_ratios": plain(grid.gains),
-            "loops": grid.size,
-            "failed": {one.name: int(np.isfinite(one.failed_at).sum()) for one in results.sweeps},
-            "settling_over_least_time": {
-                one.name: _as_record(one.distance_at(nominal_gain(grid))) for one in results.sweeps
-            },
-        },
-        "integration_error": {one.name: one.integration_error for one in results.sweeps},
-        "command": command,
-        "made_with": made_with(),
-    }
-    return json.dumps(record, indent=2) + "\n"
-
-
-def _as_record(found: Distance | None) -> dict[str, float | None] | None:
-    """null where the command has no limit; median and worst are null where no run settles."""
-    if found is None:
-        return None
-    return {name: one if np.isfinite(one) else None for name, one in found._asdict().items()}
-
-
-def _least_times(sweep: ControllerSweep, plain: Callable[[np.ndarray], list[float | None]]) -> dict[str, Any]:
-    """Of the unperturbed plant, at every set point; null: out of reach, or of a command without a limit."""
-    return {
-        "command_limit": sweep.command_limit if np.isfinite(sweep.command_limit) else None,
-        "seconds": plain(sweep.nominal_least),
-        "settling_over_least_time": _as_record(sweep.nominal_distance),
-    }

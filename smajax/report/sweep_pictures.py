@@ -221,7 +221,7 @@ OVER_LEAST = "over least time"  # the first panel
 
 def _over_least(sweep: ControllerSweep) -> np.ndarray:
     """Settling time over least time on the unperturbed plant; NaN where either has no number."""
-    settling, least = np.asarray(sweep.nominal.settling_time), sweep.nominal_least
+    settling, least = np.asarray(sweep.nominal.settling_time), sweep.least.nominal
     known = np.isfinite(settling) & np.isfinite(least) & (least > 0.0)
     return np.where(known, settling / np.where(known, least, 1.0), np.nan)
 

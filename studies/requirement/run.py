@@ -59,7 +59,7 @@ def judged_on() -> np.ndarray:
 
 
 def judged(name: str, interface: Interface, rows: np.ndarray, gains: Gains) -> dict[str, Any]:
-    """Shares of loops, and the times over the least ones: under the 10 V of the drive, and under the limit of the controller's own command."""
+    """Shares of loops, and the times over the least ones: under 10 V, and under the limit of the controller's own command."""
     preset = CONTROLLERS[name]
     plant = preset.plant(arm())
     controller = gains.put(plant)

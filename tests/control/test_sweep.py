@@ -18,6 +18,7 @@ from smajax.control.closed_loop import simulate_closed_loop
 from smajax.control.figures_of_merit import MERIT_UNITS, Merit, merit
 from smajax.control.gains_file import Gains
 from smajax.control.interface import Interface
+from smajax.control.least_time import least_reach_times
 from smajax.control.measured_state import Sensor
 from smajax.control.presets import CONTROLLERS
 from smajax.control.reference import clock, constant
@@ -97,8 +98,31 @@ def test_the_data_set_holds_every_row(folder: Path) -> None:
             **MERIT_UNITS,
             "failed_at": "s",
             "least_time": "s",
+            "least_time_own_limit": "s",
         }
         assert [field.name for field in dataclasses.fields(Merit)] == list(MERIT_UNITS)
+
+
+def test_half_the_supply_is_out_of_reach_and_no_failure(folder: Path) -> None:
+    """And where the plant can reach the set point, the least time is that of the single run."""
+    with (folder / "vsc3.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    weak = [row for row in rows if row["supply_ratio"] == "0.5"]
+    assert len(weak) == 4
+    assert {row["least_time_s"] for row in weak} == {""}
+    last = rows[-1]
+    believed = dict(zip(names := ["payload_mass", "amplifier_gain"], get_parameters(arm(), names), strict=True))
+    plant = set_parameters(arm(), {name: 2.0 * float(value) for name, value in believed.items()})
+    least = least_reach_times(plant, np.radians([float(last["set_point_deg"])]), 10.0, 3.0, 0.01)
+    assert float(last["least_time_s"]) == pytest.approx(float(least[0]), abs=1e-9)
+    assert last["least_time_s"] == last["least_time_own_limit_s"]
+    record = json.loads((folder / "sweep.json").read_text(encoding="utf-8"))
+    counted = record["sweep"]["settling_over_least_time"]["vsc3"]["all_controllers"]
+    settled = sum(row["settling_time_s"] != "" for row in rows)
+    assert (counted["unreachable"], counted["settled"], counted["never"]) == (4, settled, 4 - settled)
+    page = (folder / "index.html").read_text(encoding="utf-8")
+    assert "settling over least time" in page
+    assert "whose set point its plant can reach (4 others not counted)" in page
 
 
 @pytest.mark.slow

@@ -8,10 +8,11 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from smajax.control.controllers.base import AbstractController
 from smajax.control.figures_of_merit import Merit
 from smajax.control.gains_file import Gains
 from smajax.control.interface import between_in_words, check_interface, check_set_points, interface_of
@@ -35,6 +36,7 @@ LINES = (0.5, 0.8, 1.0, 1.25, 2.0)  # ratios of which the angle over time is sto
 LINE_TARGET = 40.0  # deg, of the arm
 CACHED = f"finished/*-{'[0-9a-f]' * 16}.npz"  # files of the cache, below the folder of the sweep
 LEAST = "with least times"
+SAVED_LEAST = ("least_", "own_least_")
 FIELDS = tuple(field.name for field in dataclasses.fields(Merit))
 
 
@@ -120,6 +122,14 @@ def sweep_settings_for(system: System, controllers: Sequence[str] | None = None,
     )
 
 
+class LeastTimes(NamedTuple):
+    """Before which no command within the limit is at the set points, s; infinite: out of reach, NaN: the command has no limit."""
+
+    limit: float  # largest command, in the drive's unit; infinite: none
+    grid: np.ndarray  # of plants and set points, the grid's shape without its last axis: no gain has a part in it
+    nominal: np.ndarray  # of the unperturbed plant, (set points,)
+
+
 @dataclass(frozen=True)
 class ControllerSweep:
     """One controller: figures of merit and failures on the grid, angles over time by mismatch, and the unperturbed plant."""
@@ -131,24 +141,20 @@ class ControllerSweep:
     lines: Mapping[str, np.ndarray]  # mismatch -> (len(LINES), time), rad or m, at `line_target`; of a batch: none
     nominal: Merit  # of the unperturbed plant, arrays (set points,)
     integration_error: Mapping[str, Any]  # what the integration leaves in the positions, as `IntegrationError.record`
-    command_limit: float  # largest command, in the drive's unit; infinite: none
-    least: (
-        np.ndarray
-    )  # s, least times under it of plants and set points, the grid's shape without its last axis; NaN without a limit
-    nominal_least: np.ndarray  # s, of the unperturbed plant, (set points,)
+    least: LeastTimes  # with the largest command of all controllers of the sweep: the same for all on the same plant
+    own_least: LeastTimes  # with that of the controller
 
-    @property
-    def nominal_distance(self) -> Distance | None:
-        """From the least times, on the unperturbed plant. None where the command has no limit, and so no time is the least."""
-        if not math.isfinite(self.command_limit):
+    def nominal_distance(self, least: LeastTimes) -> Distance | None:
+        """From these least times, on the unperturbed plant. None where the command has no limit, and so no time is the least."""
+        if not math.isfinite(least.limit):
             return None
-        return distance(np.asarray(self.nominal.settling_time), self.nominal_least)
+        return distance(np.asarray(self.nominal.settling_time), least.nominal)
 
-    def distance_at(self, gain: int) -> Distance | None:
+    def distance_at(self, gain: int, least: LeastTimes) -> Distance | None:
         """The same on all plants of the grid at one ratio of the main gain, by its index."""
-        if not math.isfinite(self.command_limit):
+        if not math.isfinite(least.limit):
             return None
-        return distance(np.asarray(self.merits.settling_time)[..., gain], self.least)
+        return distance(np.asarray(self.merits.settling_time)[..., gain], least.grid)
 
 
 @dataclass(frozen=True)
@@ -213,7 +219,8 @@ def sweep_controllers(
     posterior, in the place of mismatches. Raises ValueError as `SweepSettings.check`.
     """
     found, system = settings.check(system, plants), carrying(system, plants)
-    return (_sweep(system, name, settings, found, folder, progress) for name in settings.controllers)
+    shared = max(command_limit(*_plant_and_controller(system, name, settings)) for name in settings.controllers)
+    return (_sweep(system, name, settings, found, folder, progress, shared) for name in settings.controllers)
 
 
 def _sweep(
@@ -223,18 +230,21 @@ def _sweep(
     plants: PlantSet,
     folder: Path | None,
     progress: Progress,
+    shared: float,
 ) -> ControllerSweep:
+    """shared: the largest command of all controllers of the sweep."""
     preset = CONTROLLERS[name]
     plant = preset.plant(system)
     tuned = tuple(gains for gains in settings.tuned if gains.controller == name)
     # LEAST: what an older version cached has no least times.
-    key = digest(plant, [LEAST, str(dataclasses.replace(settings, controllers=(name,), tuned=tuned)), *plants.marks])[
-        :16
-    ]
+    key = digest(
+        plant,
+        [f"{LEAST} {shared:g}", str(dataclasses.replace(settings, controllers=(name,), tuned=tuned)), *plants.marks],
+    )[:16]
     file = None if folder is None else folder / "finished" / f"{name}-{key}.npz"
     saved: dict[str, Any] | None = None if file is None else arrays(file)
     if saved is None:
-        saved = _computed(plant, name, settings, plants, progress)
+        saved = _computed(system, name, settings, plants, progress, shared)
         if file is not None:
             file.parent.mkdir(parents=True, exist_ok=True)
             with writing(file) as stream:
@@ -247,9 +257,7 @@ def _sweep(
         {mismatch: saved[f"line_{mismatch}"] for mismatch in _lined(plants)},
         Merit(**{field: saved[f"nominal_{field}"] for field in FIELDS}),
         json.loads(str(saved["integration_error"])),
-        float(saved["command_limit"]),
-        saved["least"],
-        saved["nominal_least"],
+        *(LeastTimes(float(saved[f"{of}limit"]), saved[f"{of}grid"], saved[f"{of}nominal"]) for of in SAVED_LEAST),
     )
 
 
@@ -258,8 +266,14 @@ def _lined(plants: PlantSet) -> tuple[str, ...]:
     return plants.columns if plants.batch is None else ()
 
 
+def _plant_and_controller(system: System, name: str, settings: SweepSettings) -> tuple[System, AbstractController]:
+    """The plant of the controller's section, and the controller with its gains."""
+    plant, tuned = CONTROLLERS[name].plant(system), [one for one in settings.tuned if one.controller == name]
+    return plant, tuned[-1].put(plant) if tuned else CONTROLLERS[name].make(plant)
+
+
 def _computed(
-    plant: System, name: str, settings: SweepSettings, plants: PlantSet, progress: Progress
+    system: System, name: str, settings: SweepSettings, plants: PlantSet, progress: Progress, shared: float
 ) -> dict[str, Any]:
     """Arrays by name: the grid, the unperturbed plant at every set point, and the lines."""
 
@@ -267,10 +281,10 @@ def _computed(
         progress(dataclasses.replace(event, name=f"sweeping {name}") if isinstance(event, Stage) else event)
 
     preset, grid, lined = CONTROLLERS[name], settings.grid_on(plants), _lined(plants)
-    tuned = [gains for gains in settings.tuned if gains.controller == name]
+    plant, controller = _plant_and_controller(system, name, settings)
     setup = LoopSetup(
         plant,
-        tuned[-1].put(plant) if tuned else preset.make(plant),
+        controller,
         preset.main_gain,
         settings.seconds,
         settings.dt,
@@ -286,17 +300,24 @@ def _computed(
         target = line_target(plant, grid)
         rows = np.concatenate([loop_rows({one: np.asarray(LINES)}, target, plants=plants) for one in lined])
         angles = list(positions(setup, rows).reshape(len(lined), len(LINES), -1))
-    limit = command_limit(plant, setup.controller)
-    at_one_gain = grid.rows().reshape(*grid.shape, -1)[..., 0, :]
-    unperturbed = whole[grid.size :]
-    some = np.concatenate([at_one_gain.reshape(-1, whole.shape[1]), unperturbed])
-    least = least_times(setup, some, limit) if math.isfinite(limit) else np.full(len(some), math.nan)
     inside, nominal = slice(grid.size), grid.size + np.arange(len(grid.targets))
     result: dict[str, Any] = {"failed": outcome.failed_at[inside].reshape(grid.shape)}
     result["integration_error"] = np.asarray(json_line(error.record()))
-    result["command_limit"], result["nominal_least"] = np.asarray(limit), least[-len(unperturbed) :]
-    result["least"] = least[: -len(unperturbed)].reshape(grid.shape[:-1])
+    both = _least(setup, grid, [shared, command_limit(plant, controller)])
+    for of, least in zip(SAVED_LEAST, both, strict=True):
+        result |= {f"{of}{name}": np.asarray(value) for name, value in least._asdict().items()}
     for field in FIELDS:
         values = np.asarray(getattr(outcome.merits, field))
         result[f"grid_{field}"], result[f"nominal_{field}"] = values[inside].reshape(grid.shape), values[nominal]
     return result | {f"line_{mismatch}": line for mismatch, line in zip(lined, angles, strict=True)}
+
+
+def _least(setup: LoopSetup, grid: Grid, limits: Sequence[float]) -> list[LeastTimes]:
+    """Of each limit; a limit given twice is run once."""
+    rows = grid.rows().reshape(*grid.shape, -1)[..., 0, :].reshape(math.prod(grid.shape[:-1]), -1)
+    some = np.concatenate([rows, loop_rows({}, grid.targets, plants=grid.plants)])
+    found: dict[float, LeastTimes] = {}
+    for limit in dict.fromkeys(limits):
+        seconds = least_times(setup, some, limit) if math.isfinite(limit) else np.full(len(some), math.nan)
+        found[limit] = LeastTimes(limit, seconds[: len(rows)].reshape(grid.shape[:-1]), seconds[len(rows) :])
+    return [found[limit] for limit in limits]
