@@ -1,6 +1,6 @@
 """`python -m studies.requirement.run`: judges the controllers (some minutes); with names these alone, beside the stored numbers of the others.
 
-`--search NAME...` first searches gains again (some minutes each), `--quick WEIGHT` with a weight of the settling time. Writes `results.json` and the tables of `README.md`.
+`--search NAME...` first searches gains again (some minutes each), `--quick WEIGHT` with a weight of the settling time, `--seed NUMBER` with other draws. Writes `results.json` and the tables of `README.md`.
 """
 
 from __future__ import annotations
@@ -185,12 +185,12 @@ def frontier_table(frontier: dict[str, Any]) -> str:
     return _lines(head, rows)
 
 
-def _search_again(names: list[str], quick: float) -> None:
+def _search_again(names: list[str], quick: float, seed: int) -> None:
     for name in names:
         start, _ = gains_of(name)
         box = list(box_of(name))
         whole = dict(zip(box, map(float, get_parameters(start.put(arm()), box)), strict=True))
-        gains = Gains(name, searched(name, whole, quick=quick))
+        gains = Gains(name, searched(name, whole, seed=seed, quick=quick))
         more = {"by": "studies.requirement.search", "filter": FILTER, "weight of the settling time": quick}
         write_gains(GAINS / f"{name}.json", gains, gains.units(arm()), more)
 
@@ -206,7 +206,8 @@ def main(arguments: list[str]) -> None:
     prepare(cores=True)
     if "--search" in arguments:
         quick = float(arguments[arguments.index("--quick") + 1]) if "--quick" in arguments else 0.0
-        _search_again([one for one in arguments if one in CONTROLLERS], quick)
+        seed = int(arguments[arguments.index("--seed") + 1]) if "--seed" in arguments else 0
+        _search_again([one for one in arguments if one in CONTROLLERS], quick, seed)
     named = [name for name in arguments if name in CONTROLLERS]
     if "--fresh" in arguments:
         _judge_afresh(named, int(arguments[arguments.index("--fresh") + 1]))
