@@ -86,8 +86,8 @@ axes[0].legend()
 plt.show()
 
 # %% [markdown]
-# The conclusion that the numbers support: expansion of each phase is missing from the base model. A smooth transformation in two parts, latent heat, a loss that
-# grows faster than the temperature (radiation, or a convection that rises: they are as likely) and residual strain help, and may in part stand in for
+# The conclusion that the numbers support: expansion of each phase is missing from the base model. A smooth transformation in two parts, latent heat and a loss that
+# grows faster than the temperature (a convection that rises, or radiation) help, and may in part stand in for
 # something outside the library (that the smooth part ends at all of the transformation is not plausible). The error of the run of another day is seven times that of the fit runs, and no effect of the wire explains it.
 
 # %%

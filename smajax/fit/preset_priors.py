@@ -44,18 +44,23 @@ def preset_priors(
     """Priors about the preset's `values` (SI) of the parameters in `table` that are not among those `given`.
 
     `given`: known from the experiment file or the runs, or unknowns of the fit. `declared`: how uncertain they are by the experiment file, of
-    parameters that `RELATIVE` does not have too. Those of `RELATIVE` are logarithmic; a value of zero has no logarithm and is held.
+    parameters that `RELATIVE` does not have too. Those of `RELATIVE` are logarithmic; of a value below zero, which has no logarithm, normal. A value of zero is
+    held.
     """
     found = {
-        name: CoefficientPrior(float(values[name]), sigma, True)
+        name: _relative(float(values[name]), sigma)
         for name, (sigma, _) in RELATIVE.items()
-        if name in table and name not in given and values[name] > 0.0
+        if name in table and name not in given and values[name] != 0.0
     }
     for name, one in declared.items():
         if one.sigma is not None:
             base = float(values[name]) if one.base is None else one.base
             found[name] = CoefficientPrior(base, one.sigma, one.logarithmic)
     return found
+
+
+def _relative(value: float, sigma: float) -> CoefficientPrior:
+    return CoefficientPrior(value, sigma, True) if value > 0.0 else CoefficientPrior(value, -sigma * value, False)
 
 
 def fitted_priors(kept: FromModelFile, given: frozenset[str]) -> dict[str, CoefficientPrior]:
@@ -74,8 +79,8 @@ def fitted_priors(kept: FromModelFile, given: frozenset[str]) -> dict[str, Coeff
         value, (low, high), own = float(kept.values[name]), kept.bounds[name], kept.priors.get(name)
         if own is not None:
             found[name] = CoefficientPrior(own.mean, own.sigma, own.logarithmic)
-        elif name in RELATIVE and value > 0.0:
-            found[name] = CoefficientPrior(value, RELATIVE[name][0], True)
+        elif name in RELATIVE and value != 0.0:
+            found[name] = _relative(value, RELATIVE[name][0])
         else:
             found[name] = CoefficientPrior(value, (high - low) / math.sqrt(12.0), False)
     return found

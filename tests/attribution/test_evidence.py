@@ -149,6 +149,13 @@ def test_values_of_a_preset_are_free_within_their_widths_unless_the_file_gives_t
     for name, (low, high) in boxes.items():
         assert max(0.0, table[name].low) <= low < values[name] < high <= table[name].high
     assert boxes["thermal_modulus"][0] > 0.0  # at zero there is no logarithm
+    lengthening = parameter_values(build("flexinol_table_3_2_expanding", "dead_weight", "voltage"))["thermal_modulus"]
+    below_zero = preset_priors(table, {**values, "thermal_modulus": lengthening}, frozenset())["thermal_modulus"]
+    assert below_zero.base == lengthening
+    assert below_zero.sigma == pytest.approx(-0.2 * lengthening)
+    assert not below_zero.logarithmic
+    low, high = preset_bounds({"thermal_modulus": below_zero}, {"thermal_modulus": (-1e9, 1e9)})["thermal_modulus"]
+    assert low < lengthening < high < 0.0
     known = {name for wire in WIRES for load in LOADS for name in _names(wire, load)}
     assert set(RELATIVE) <= known
     assert all(source for _, source in RELATIVE.values())
