@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import subprocess
 import sys
@@ -19,11 +20,12 @@ from smajax.engine import cache, facade, kernel, native
 from smajax.model.presets import build
 from smajax.model.system import System
 from smajax.model.types import Trajectory
+from smajax.model.wire.laws import under_law
 from smajax.simulation.compiled import simulate_compiled
 
-ARM = build("niti_table_3_1", "arm", "amplified_voltage")
-OTHER = build("niti_table_3_1", "dead_weight", "voltage")
-HEATED = {"voltage": jnp.full(120, 7.0)}
+COUPON = build("flexinol_table_3_2", "coupon", "none")
+OTHER = dataclasses.replace(COUPON, wire=under_law(COUPON.wire, "liang"))
+HEATED = {"temperature": jnp.linspace(20.0, 110.0, 120), "stress": jnp.full(120, 1e8)}
 
 
 @contextmanager
@@ -47,7 +49,7 @@ def programs(tmp_path: Path) -> Iterator[Path]:
     facade._programs.update(remembered)
 
 
-def _run(system: System = ARM) -> Trajectory:
+def _run(system: System = COUPON) -> Trajectory:
     return simulate_compiled(system, HEATED, 0.01)
 
 
@@ -73,15 +75,16 @@ def test_another_process_reads_the_cached_program(programs: Path) -> None:
     code = (
         "import numpy as np, jax.numpy as jnp\nfrom smajax.core.runtime import prepare\nprepare()\n"
         "from smajax.simulation.compiled import simulate_compiled\nfrom smajax.model.presets import build\n"
-        "run = simulate_compiled(build('niti_table_3_1', 'arm', 'amplified_voltage'), {'voltage': jnp.full(120, 7.0)}, 0.01)\n"
-        "print(run.position[-1].hex())"
+        "inputs = {'temperature': jnp.linspace(20.0, 110.0, 120), 'stress': jnp.full(120, 1e8)}\n"
+        "run = simulate_compiled(build('flexinol_table_3_2', 'coupon', 'none'), inputs, 0.01)\n"
+        "print(run.strain[-1].hex())"
     )
     env = {**os.environ, "JAX_COMPILATION_CACHE_DIR": str(programs.parent)}
     first, second = (
         subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, check=True).stdout
         for _ in range(2)
     )
-    assert first == second == f"{float(_run().position[-1]).hex()}\n"
+    assert first == second == f"{float(_run().strain[-1]).hex()}\n"
     assert len(list(programs.iterdir())) == 1
 
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import subprocess
 import sys
 import warnings
 from collections.abc import Callable
+from functools import cache as cache_of_calls
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +37,7 @@ from smajax.fit.predicted import predicted_and_derivatives
 from smajax.model.presets import build
 from smajax.simulation.compiled import simulate_compiled
 from tests.helpers.engine_results import summed
+from tests.helpers.often import often
 
 DEMO = Path(__file__).parents[2] / "smajax" / "data" / "demo" / "latent" / "experiment.toml"
 Break = Callable[[pytest.MonkeyPatch], object]
@@ -48,11 +51,21 @@ def _demo() -> tuple[np.ndarray, np.ndarray]:
     return predicted_and_derivatives(problem, start[None], np.eye(len(start))[None])
 
 
-@pytest.fixture(scope="module")
-def right() -> tuple[np.ndarray, np.ndarray]:
+def _coupon() -> tuple[np.ndarray, np.ndarray]:
+    """Strain and fraction of a heated coupon."""
+    coupon = build("flexinol_table_3_2", "coupon", "none")
+    run = simulate_compiled(coupon, {"temperature": np.linspace(20.0, 110.0, 50), "stress": np.full(50, 1e8)}, 1.0)
+    return np.asarray(run.strain), np.asarray(run.martensite_fraction)
+
+
+RUNS: dict[str, Callable[[], tuple[np.ndarray, np.ndarray]]] = {"a coupon": _coupon, "the demo": _demo}
+
+
+@cache_of_calls
+def right(run: str) -> tuple[np.ndarray, np.ndarray]:
     with pytest.MonkeyPatch.context() as patched:
         patched.setenv("SMAJAX_ENGINE", "native")
-        return _demo()
+        return RUNS[run]()
 
 
 def _fails(message: str) -> Callable[..., Any]:
@@ -121,15 +134,19 @@ BROKEN: dict[str, tuple[Break, str, type[Exception]]] = {
 
 
 @pytest.mark.usefixtures("forgetful")
-@pytest.mark.parametrize("what", BROKEN)
-def test_xla_gives_the_demos_numbers_when_machine_code_fails(
-    what: str, monkeypatch: pytest.MonkeyPatch, right: tuple[np.ndarray, np.ndarray]
+@pytest.mark.parametrize(
+    ("run", "what"), often(itertools.product(RUNS, BROKEN), [("a coupon", what) for what in BROKEN])
+)
+def test_xla_gives_the_same_numbers_when_machine_code_fails(
+    run: str, what: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    expected = right(run)
+    _programs.clear()
     broken, said, error = BROKEN[what]
     broken(monkeypatch)
     with pytest.warns(EngineWarning, match=said) as told:
-        found = _demo()
-    for one, other in zip(found, right, strict=True):
+        found = RUNS[run]()
+    for one, other in zip(found, expected, strict=True):
         np.testing.assert_allclose(one, other, rtol=0.0, atol=1e-9 * float(np.abs(other).max()))
     (line,) = {str(one.message) for one in told}
     assert "several times slower" in line
@@ -139,21 +156,22 @@ def test_xla_gives_the_demos_numbers_when_machine_code_fails(
     _programs.clear()
     monkeypatch.setenv("SMAJAX_ENGINE", "native")
     with pytest.raises(error):
-        _demo()
+        RUNS[run]()
 
 
 @pytest.mark.usefixtures("forgetful")
-def test_a_corrupt_cache_entry_is_compiled_again(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, right: tuple[np.ndarray, np.ndarray]
-) -> None:
+@pytest.mark.parametrize("run", often(RUNS, ["a coupon"]))
+def test_a_corrupt_cache_entry_is_compiled_again(run: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """No warning, the same numbers, and a sound entry afterwards."""
+    expected = right(run)
+    _programs.clear()
     monkeypatch.setattr(cache, "folder", lambda: tmp_path)
-    _demo()
+    RUNS[run]()
     (entry,) = tmp_path.iterdir()
     sound = entry.read_bytes()
     entry.write_bytes(sound[:100] + bytes(len(sound) - 100))
     _programs.clear()
-    np.testing.assert_array_equal(_demo()[0], right[0])
+    np.testing.assert_array_equal(RUNS[run]()[0], expected[0])
     assert entry.read_bytes() == sound
 
 
@@ -164,11 +182,9 @@ def test_a_reason_is_warned_of_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cache, "load", lambda key: None)
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("default")
-        for wire, load, drive in (
-            ("niti_table_3_1", "arm", "amplified_voltage"),
-            ("flexinol_table_3_2", "dead_weight", "voltage"),
-        ):
-            simulate_compiled(build(wire, load, drive), {"voltage": jnp.full(5, 5.0)}, 0.01)
+        for load, held in (("coupon", {"stress": jnp.full(5, 1e8)}), ("strain_coupon", {"strain": jnp.full(5, 0.01)})):
+            rig = build("flexinol_table_3_2", load, "none")
+            simulate_compiled(rig, {"temperature": jnp.full(5, 25.0), **held}, 0.01)
     assert sum("expected type" in str(one.message) for one in told) == 1
 
 
@@ -274,7 +290,11 @@ with warnings.catch_warnings(record=True) as told:
 
 
 @pytest.mark.parametrize(
-    ("module", "name"), [("extend.random", "threefry_prng_impl"), ("interpreters.partial_eval", "dce_jaxpr")]
+    ("module", "name"),
+    [
+        pytest.param("extend.random", "threefry_prng_impl", marks=pytest.mark.slow),
+        ("interpreters.partial_eval", "dce_jaxpr"),
+    ],
 )
 def test_a_name_that_jax_has_moved_leads_to_xla(module: str, name: str) -> None:
     """The translator imports names of JAX that a release may move: nothing of smajax but machine code needs them."""

@@ -25,7 +25,7 @@ def levels(channel: str, top: float) -> dict[str, jax.Array]:
     return {channel: top * jnp.concatenate(shares)}
 
 
-def heat_lost(system: System, temperature: float) -> float:
+def heat_lost(system: System, temperature: Any) -> Any:
     """h_c A_c (T - T_inf), W/m: what keeps the wire at `temperature`."""
     heat = system.wire.heat
     surface = np.pi * float(system.wire.wire_diameter)
@@ -42,7 +42,7 @@ def settled(
     return full, jax.tree.map(lambda series: float(series[-1]), run)
 
 
-def resistance(system: System, fraction: float) -> float:
+def resistance(system: System, fraction: Any) -> Any:
     law, area = system.wire.resistance, 0.25 * np.pi * float(system.wire.wire_diameter) ** 2
     resistivity = (1.0 - fraction) * float(law.resistivity_austenite) + fraction * float(law.resistivity_martensite)
     return resistivity / area * float(system.wire.wire_length)

@@ -52,8 +52,8 @@ def test_the_latent_heat_is_constant_or_follows_kirchhoff(share: float) -> None:
     wire = system.wire
     assert run.martensite_fraction[-1] < 1e-6
     temperature, fraction = np.asarray(run.temperature), np.asarray(run.martensite_fraction)
-    power = volts**2 / np.asarray([resistance(system, one) for one in fraction]) / float(wire.wire_length)
-    given = float(np.trapezoid(power - np.asarray([heat_lost(system, one) for one in temperature]), dx=dt))
+    power = volts**2 / resistance(system, fraction) / float(wire.wire_length)
+    given = float(np.trapezoid(power - heat_lost(system, temperature), dx=dt))
     m_c = float(mass_per_metre(wire) * wire.heat.specific_heat)
     law = wire.kinetics
     neutral = 0.5 * float(law.martensite_start + law.austenite_finish)

@@ -24,6 +24,7 @@ from smajax.model.types import Trajectory
 from smajax.model.wire.laws import under_law
 from smajax.simulation.compiled import simulate_compiled
 from smajax.simulation.simulate import simulate
+from tests.helpers.often import often
 
 NUDGE = AttributionConfig().nudge
 
@@ -109,7 +110,8 @@ def _sound(system: System, run: Trajectory) -> None:
     np.testing.assert_allclose(np.asarray(run.strain)[taut], geometric[taut], rtol=0.0, atol=1e-8)
 
 
-@pytest.mark.parametrize("rig", RIGS)
+# A share of the other law's conditions is held to more by `test_a_share_of_one_is_the_other_law...`.
+@pytest.mark.parametrize("rig", often(RIGS, ["strokes", "held", "split"]))
 def test_effects_at_their_base_value_are_the_base_model_and_each_off_it_is_not(rig):
     system, inputs, names = RIGS[rig]
     full = extended(system, names)
@@ -170,6 +172,7 @@ def test_derivatives_agree_with_differences_and_every_switch_has_a_score(rig):
             assert np.abs(slope).max() > 1e-6 * np.abs(here).max() * step, f"the score test does not see {key}"
 
 
+@pytest.mark.slow
 def test_error_controlled_steps_carry_the_history_of_effects():
     """The same readings by steps of its own as by short fixed ones, with a lag, a backlash and a late transformation."""
     names = ("lagging_transformation", "sensor_lag", "sensor_gain", "sensor_backlash")

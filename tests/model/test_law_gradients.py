@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
@@ -23,6 +24,7 @@ from smajax.simulation.compiled import simulate_compiled
 from smajax.simulation.simulate import simulate
 from tests.helpers.derivatives import compare
 from tests.helpers.machine_code import by_machine_code
+from tests.helpers.often import often
 
 DT = 0.05
 NAMES = sorted(LAWS)
@@ -64,21 +66,21 @@ MOVING = {
 # Every law and every load is in `make test` once, the enhanced law's arm in `test_gradients`; the whole grid is in
 # `make test-all`.
 OFTEN = {("tanaka", "arm"), ("brinson", "dead_weight"), ("liang", "bias_spring")}
-GRID = [
-    pytest.param(law, load, marks=() if (law, load) in OFTEN else pytest.mark.slow)
-    for law in NAMES
-    for load in sorted(MOVING)
-]
 
 
-@pytest.mark.parametrize(("law", "load"), GRID)
+@pytest.mark.parametrize(("law", "load"), often(itertools.product(NAMES, sorted(MOVING)), OFTEN))
 def test_derivatives_in_every_parameter_of_a_moving_load_agree_with_differences(law: str, load: str) -> None:
     wire, name, drive, top, wanted = MOVING[load]
     compare(_under(law, wire, name, drive), _moved(top, wanted))
 
 
-@pytest.mark.parametrize("law", NAMES)
-@pytest.mark.parametrize("load", ["coupon", "strain_coupon"])
+@pytest.mark.parametrize(
+    ("load", "law"),
+    often(
+        itertools.product(["coupon", "strain_coupon"], NAMES),
+        [("coupon", "brinson"), ("coupon", "tanaka"), ("strain_coupon", "enhanced"), ("strain_coupon", "liang")],
+    ),
+)
 def test_derivatives_in_every_parameter_of_a_coupon_agree_with_differences(law: str, load: str) -> None:
     """A path on which temperature and load change together, with a reversal inside each range."""
     system = _under(law, "flexinol_table_3_2", load, "none")
@@ -145,9 +147,7 @@ def _finite(system: System, inputs: dict[str, jax.Array], dt: float = DT) -> Non
     np.testing.assert_allclose(backward, forward, rtol=1e-6, atol=1e-9 * np.abs(forward).max())
 
 
-@pytest.mark.parametrize(
-    "law", ["enhanced", *(pytest.param(law, marks=pytest.mark.slow) for law in NAMES if law != "enhanced")]
-)
+@pytest.mark.parametrize("law", often(NAMES, ["enhanced"]))
 def test_derivatives_are_finite_at_the_start_of_a_range(law: str) -> None:
     """The wire sits exactly on A_s' with all martensite, then on M_s' with none: the slopes there are 0/0 forms."""
     system = _under(law, "flexinol_table_3_2", "coupon", "none")
@@ -168,6 +168,7 @@ def test_derivatives_are_finite_at_end_stops_and_when_slack() -> None:
     assert (np.asarray(run.stress) == 0.0).any(), "the case does not go slack any more"
 
 
+@pytest.mark.slow  # one of the parameters above
 def test_a_clipped_voltage_has_the_derivative_of_the_limit() -> None:
     """Beyond the amplifier's limit the end depends on the limit and not on the voltage; below it, the other way round."""
     weight = build("flexinol_table_3_2", "dead_weight", "voltage")

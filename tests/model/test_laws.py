@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 
 import equinox as eqx
 import jax
@@ -25,10 +26,12 @@ from smajax.model.wire.stiffness import Constant, Mixed, MixedConstantOmega
 from smajax.simulation.compiled import simulate_compiled
 from smajax.simulation.simulate import simulate
 from tests.helpers.machine_code import by_machine_code
+from tests.helpers.often import often
 
 RUN = simulate_compiled
 EACH = 60  # samples a leg
 NAMES = sorted(LAWS)
+RENEWALS = {"corrected": Corrected, "printed": AsPrinted}
 
 
 def _with(system: System, law: str = "enhanced", **parts: object) -> System:
@@ -69,14 +72,19 @@ WIRES = st.fixed_dictionaries(
 )
 
 
-@pytest.mark.parametrize("law", NAMES)
-@pytest.mark.parametrize("renewal", [Corrected(), AsPrinted()], ids=["corrected", "printed"])
+@pytest.mark.parametrize(
+    ("renewal", "law"),
+    often(
+        itertools.product(RENEWALS, NAMES),
+        [("corrected", "enhanced"), ("corrected", "tanaka"), ("printed", "brinson"), ("printed", "liang")],
+    ),
+)
 @settings(max_examples=25, deadline=None)
 @given(temperature=TEMPERATURES, stress=STRESSES, wire=WIRES, start=st.floats(0.0, 1.0))
 def test_fractions_stay_in_range_and_follow_their_branch(
-    law: str, renewal: object, temperature: list[float], stress: list[float], wire: dict[str, float], start: float
+    law: str, renewal: str, temperature: list[float], stress: list[float], wire: dict[str, float], start: float
 ) -> None:
-    system = set_parameters(_with(COUPON, law, renewal=renewal), {**wire, "start_fraction": start})
+    system = set_parameters(_with(COUPON, law, renewal=RENEWALS[renewal]()), {**wire, "start_fraction": start})
     run = _driven(system, temperature, stress)
     xi, part = np.asarray(run.martensite_fraction), np.asarray(run.detwinned_fraction)
     assert np.isfinite(run.strain).all()
@@ -155,6 +163,7 @@ def test_integrated_form_is_a_function_of_state(
     np.testing.assert_allclose(offset, offset[0], rtol=0.0, atol=1e-14)
 
 
+@pytest.mark.slow  # each is held to scipy in `test_law_reference`
 @settings(max_examples=20, deadline=None)
 @given(temperature=TEMPERATURES, stress=STRESSES, law=st.sampled_from(NAMES))
 def test_rate_and_integrated_form_agree_where_e_is_constant(
@@ -191,6 +200,7 @@ def test_work_of_a_closed_stress_strain_cycle_is_not_negative(at: float, top: fl
     assert np.trapezoid(run.stress, strain) >= -1e-3 * float(run.stress.max()) * top
 
 
+@pytest.mark.slow  # both are held to scipy in `test_law_reference`
 @settings(max_examples=12, deadline=None)
 @given(temperature=TEMPERATURES, stress=STRESSES, law=st.sampled_from(NAMES))
 def test_strain_coupon_inverts_the_stress_coupon(temperature: list[float], stress: list[float], law: str) -> None:
@@ -234,6 +244,7 @@ def test_a_strained_wire_that_goes_slack_comes_back_on_its_law(
     np.testing.assert_allclose(offset, offset[0], rtol=0.0, atol=1e-9)
 
 
+@pytest.mark.slow  # by machine code in `test_batch` and `test_engine`
 @pytest.mark.parametrize("rig", [pytest.param("arm", marks=pytest.mark.slow), "dead_weight"])
 def test_a_run_in_a_batch_is_the_run_alone(rig: str) -> None:
     """Voltage, a parameter of each part and the start differ from lane to lane; the other lanes must not be felt."""
@@ -262,8 +273,13 @@ def test_conditions_as_table_3_3_prints_them_transform_nothing_under_a_constant_
     assert np.all(np.asarray(run.martensite_fraction) == 1.0)
 
 
-@pytest.mark.parametrize("rig", ["arm", "dead_weight"])
-@pytest.mark.parametrize("law", NAMES)
+@pytest.mark.parametrize(
+    ("law", "rig"),
+    often(
+        itertools.product(NAMES, ["arm", "dead_weight"]),
+        [("tanaka", "arm"), ("brinson", "dead_weight"), ("enhanced", "dead_weight"), ("liang", "dead_weight")],
+    ),
+)
 def test_zero_voltage_rests_for_a_thousand_seconds(rig: str, law: str) -> None:
     wire = "niti_table_3_1" if rig == "arm" else "flexinol_table_3_2"
     run = RUN(_with(build(wire, rig, "voltage"), law), {"voltage": jnp.zeros(2_001)}, 0.5)
@@ -273,6 +289,7 @@ def test_zero_voltage_rests_for_a_thousand_seconds(rig: str, law: str) -> None:
     assert np.all(np.asarray(run.martensite_fraction) == 1.0)
 
 
+@pytest.mark.slow  # of more wires in `test_honest_numbers`
 @settings(max_examples=8, deadline=None)
 @given(levels=st.lists(st.floats(0.0, 12.0), min_size=4, max_size=4), law=st.sampled_from(NAMES))
 def test_no_wire_cools_below_the_ambient_temperature(levels: list[float], law: str) -> None:

@@ -37,7 +37,9 @@ def _constitutive(system: System, **changed: object) -> System:
     return dataclasses.replace(system, wire=dataclasses.replace(system.wire, constitutive=law))
 
 
-@pytest.mark.parametrize(("form", "constant"), [(RateForm(), True), (IntegratedForm(), False)])
+@pytest.mark.parametrize(
+    ("form", "constant"), [(RateForm(), True), pytest.param(IntegratedForm(), False, marks=pytest.mark.slow)]
+)
 def test_the_effect_turns_one_modulus_into_the_mixture_of_two(form: AbstractForm, constant: bool) -> None:
     inputs = {"duty": 0.35 * jnp.concatenate([jnp.ones(150), 0.5 * jnp.ones(50), jnp.ones(50), jnp.zeros(200)])}
     two = _constitutive(_moduli(RIG, AUSTENITE), form=form)

@@ -170,7 +170,13 @@ def _asked(code: str, environment: dict[str, str], cwd: Path) -> subprocess.Comp
     )
 
 
-@pytest.mark.parametrize("package", [PACKAGE, OLD], ids=["of today", "of version 0.1"])
+@pytest.mark.parametrize(
+    "package",
+    [
+        pytest.param(PACKAGE, id="of today"),
+        pytest.param(OLD, id="of version 0.1", marks=pytest.mark.slow),  # in this process in `test_old_contract`
+    ],
+)
 def test_an_effect_and_a_load_of_another_package(package: str, tmp_path: Path) -> None:
     """One of the form of version 0.1 does the same, with a warning that says what to inherit from."""
     points = "[smajax.effects]\nbreeze = airflow:Breeze\n[smajax.loads]\nbucket = airflow:bucket\n"
@@ -214,24 +220,33 @@ def test_an_unusable_plug_in_is_refused_by_name(
 @pytest.mark.parametrize(
     ("points", "told"),
     [
-        (
+        pytest.param(
             "[smajax.effects]\ngale = airflow:Gale\n",
             ["the effect 'gale', which must change nothing at its base value"],
+            id="not neutral",
+            marks=pytest.mark.slow,
         ),
-        (
+        pytest.param(
             "[smajax.effects]\ndraft = airflow:Breeze\n[smajax.loads]\nbucket = nowhere:bucket\n",
             ["calls itself 'breeze'", "'smajax.loads' cannot be loaded (ModuleNotFoundError"],
+            id="misnamed, missing",
         ),
-        (
+        pytest.param(
             "[smajax.effects]\nbreeze = nowhere:Breeze\n[smajax.loads]\nweight = airflow:DeadWeight\n",
             [
                 "'smajax.effects' cannot be loaded (ModuleNotFoundError",
                 "is the class DeadWeight, which cannot be called without",
             ],
+            id="missing, a class",
+            marks=pytest.mark.slow,
         ),
-        ("[smajax.loads]\nheap = airflow:heap\n", ["returns 3.0; expected a function without arguments"]),
+        pytest.param(
+            "[smajax.loads]\nheap = airflow:heap\n",
+            ["returns 3.0; expected a function without arguments"],
+            id="no load",
+            marks=pytest.mark.slow,
+        ),
     ],
-    ids=["not neutral", "misnamed, missing", "missing, a class", "no load"],
 )
 def test_the_doctor_reports_faulty_plug_ins_and_nothing_else(points: str, told: list[str], tmp_path: Path) -> None:
     code = "import sys; sys.argv = ['smajax', 'doctor']; from smajax.cli.main import main; main()"
@@ -256,6 +271,7 @@ def test_the_loop_refuses_an_effect_that_is_not_neutral_and_says_by_how_much(tmp
     assert ended.returncode == 0, ended.stderr
 
 
+@pytest.mark.slow  # an effect is, below
 def test_a_load_that_is_no_preset_is_refused_without_a_traceback(tmp_path: Path) -> None:
     environment = _installed(tmp_path, "[smajax.loads]\nweight = airflow:DeadWeight\n")
     code = "import sys; sys.argv = ['smajax', 'simulate', 'flexinol_table_3_2', 'weight', 'voltage', '--step', '3V:1s']; from smajax.cli.main import main; main()"

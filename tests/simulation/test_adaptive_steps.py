@@ -97,6 +97,7 @@ def test_the_scheme_is_of_order_three_where_nothing_bends():
     assert errors[1] / errors[2] > 6.0
 
 
+@pytest.mark.slow  # a tolerance that bounds the error is above
 def test_the_error_estimate_has_the_size_of_the_error():
     """Over 40 ms of an arm on its way, at several moments."""
 

@@ -23,6 +23,7 @@ from smajax.simulation.batch.axes import grid
 from smajax.simulation.batch.run_batch import run_batch
 from smajax.simulation.compiled import simulate_compiled
 from smajax.simulation.simulate import simulate
+from tests.helpers.often import often
 
 pytestmark = pytest.mark.usefixtures("optimised")  # machine code as users have it
 SAMPLES, DT = 241, 0.025
@@ -75,6 +76,10 @@ ON_A_WEIGHT = (
 ON_A_SPRING = set(LIBRARY) - ON_A_WEIGHT - {*OF_KINETICS}
 OF_MOTION = {name for name in ON_A_SPRING if LIBRARY[name].candidate.equation in ("constitutive", "mechanics")}
 EFFECTS = {
+    "with a memory": (
+        "dead_weight",
+        {"input_delay", "supply_memory", "lagging_transformation", "creep", "sensor_backlash"},
+    ),
     "circuit, input and sensor": ("dead_weight", ON_A_WEIGHT),
     "kinetics, one half": ("dead_weight", {*OF_KINETICS[::2]}),
     "kinetics, the other": ("dead_weight", {*OF_KINETICS[1::2]}),
@@ -87,7 +92,7 @@ EFFECTS = {
     ("rig", "names"),
     [
         *(
-            pytest.param(*part, id=name, marks=() if name == "circuit, input and sensor" else pytest.mark.slow)
+            pytest.param(*part, id=name, marks=() if name == "with a memory" else pytest.mark.slow)
             for name, part in EFFECTS.items()
         ),
         pytest.param("dead_weight", set(LIBRARY), id="dead_weight, all", marks=pytest.mark.slow),
@@ -141,6 +146,13 @@ def test_error_controlled_and_fixed_steps_are_programs_of_their_own():
         simulate_compiled(system, {}, 0.1)
 
 
+COUPON = build("flexinol_table_3_2", "coupon", "none")
+
+
+def _warmed(samples: int, top: float) -> dict[str, jax.Array]:
+    return {"temperature": jnp.linspace(20.0, top, samples), "stress": jnp.full(samples, 1e8)}
+
+
 @pytest.fixture
 def traces(monkeypatch: pytest.MonkeyPatch) -> list[object]:
     """One entry for each function that is traced, in a process that has no programs yet."""
@@ -156,26 +168,23 @@ def traces(monkeypatch: pytest.MonkeyPatch) -> list[object]:
     return traces
 
 
-@pytest.mark.parametrize("engine", ["auto", "native"])
+@pytest.mark.parametrize("engine", often(["auto", "native"], ["auto"]))
 def test_a_program_is_traced_once_for_runs_of_one_kind(engine: Engine, traces: list[object]) -> None:
     """Other values trace nothing; another length of the series, or another effect, traces once more."""
-    system = build("flexinol_table_3_2", "dead_weight", "voltage")
-    for volts, mass in ((4.0, 0.075), (5.0, 0.075), (5.0, 0.1)):
-        heavier = set_parameters(system, {"load_mass": mass})
-        simulate_compiled(heavier, {"voltage": jnp.full(20, volts)}, 0.01, engine=engine)
+    for top, start in ((100.0, 68.0), (120.0, 68.0), (120.0, 60.0)):
+        other = set_parameters(COUPON, {"austenite_start": start})
+        simulate_compiled(other, _warmed(20, top), 0.01, engine=engine)
     assert len(traces) == 1
-    simulate_compiled(system, {"voltage": jnp.full(21, 5.0)}, 0.01, engine=engine)
+    simulate_compiled(COUPON, _warmed(21, 120.0), 0.01, engine=engine)
     assert len(traces) == 2
-    simulate_compiled(extended(system, ("latent_heat",)), {"voltage": jnp.full(21, 5.0)}, 0.01, engine=engine)
+    simulate_compiled(extended(COUPON, ("minor_loops",)), _warmed(21, 120.0), 0.01, engine=engine)
     assert len(traces) == 3
 
 
 def test_batches_of_every_size_share_a_trace(traces: list[object]) -> None:
     """A sweep of three runs, of seventy and in chunks: one program, and one more of what the first is checked against."""
-    system = build("flexinol_table_3_2", "dead_weight", "voltage")
     for count in (3, 70):
-        batch = run_batch(
-            system, {"voltage": jnp.full(20, 5.0)}, grid(load_mass=np.linspace(0.05, 0.1, count)), keep=("position",)
-        )
-        assert batch.sizes["load_mass"] == count
+        axes = grid(austenite_start=np.linspace(60.0, 68.0, count))
+        batch = run_batch(COUPON, _warmed(20, 120.0), axes, keep=("strain",))
+        assert batch.sizes["austenite_start"] == count
     assert len(traces) == 2

@@ -17,6 +17,7 @@ from smajax.model.presets import build
 from smajax.model.system import System
 from smajax.simulation.simulate import simulate
 from tests.helpers.derivatives import compare, open_loop
+from tests.helpers.often import often
 
 DT = 0.05
 
@@ -40,16 +41,13 @@ CASES: dict[str, tuple[System, dict[str, jax.Array]]] = {
 }
 
 
-# The loads of the others are under other laws in `test_law_gradients`.
-OFTEN = ("arm", "coupon")
-ENGINES: dict[str, Engine] = {"arm": "xla"}  # one rig by the other engine
-
-
+# The loads of the others are under other laws in `test_law_gradients`; one rig by the other engine too.
 @pytest.mark.parametrize(
-    "case", [pytest.param(case, marks=() if case in OFTEN else pytest.mark.slow) for case in sorted(CASES)]
+    ("case", "engine"),
+    often([*((case, "native") for case in sorted(CASES)), ("arm", "xla")], [("arm", "native"), ("coupon", "native")]),
 )
-def test_derivatives_in_every_base_parameter_agree_with_differences(case: str) -> None:
-    compare(CASES[case][0], open_loop(CASES[case][1], DT), engine=ENGINES.get(case, "native"))
+def test_derivatives_in_every_base_parameter_agree_with_differences(case: str, engine: Engine) -> None:
+    compare(CASES[case][0], open_loop(CASES[case][1], DT), engine=engine)
 
 
 @pytest.mark.slow

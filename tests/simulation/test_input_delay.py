@@ -20,6 +20,7 @@ from smajax.simulation.steppers import Integration
 from studies import integration as study
 from studies.reference.wire_parameters import DeadWeightParameters
 from studies.reference.wire_reference import simulate_dead_weight
+from tests.helpers.often import often
 
 NOISE = 1e-5  # m
 MASS = 0.110
@@ -54,7 +55,7 @@ def test_a_delay_of_a_part_of_a_step_agrees_with_scipy(clock: float) -> None:
 
 
 # At no delay, where a score test takes it, the first part of the step has no length.
-@pytest.mark.parametrize("delay", [0.0, 0.03])
+@pytest.mark.parametrize("delay", often([0.0, 0.03], [0.03]))
 def test_the_derivative_in_the_delay_agrees_with_differences(delay: float) -> None:
     times, _, slope = _late(0.1, delay)
     low, high = max(delay - 1e-4, 0.0), delay + 1e-4
@@ -67,12 +68,13 @@ def test_a_constant_command_has_no_delay() -> None:
     """A batch over levels of the voltage has no series of it."""
     system = extended(build("flexinol_table_3_2", "dead_weight", "voltage"), ("input_delay",))
     levels = zipped({"voltage": [4.0, 6.0], "input_delay.delay": [0.0, 0.03]})
-    late = run_batch(system, {"mass": MASS}, levels, seconds=2.0, dt=0.02)
+    late = run_batch(system, {"mass": MASS}, levels, seconds=2.0, dt=0.02, tolerance=None)
     plain = run_batch(
         build("flexinol_table_3_2", "dead_weight", "voltage"),
         {"mass": MASS},
         zipped({"voltage": [4.0, 6.0]}),
         seconds=2.0,
         dt=0.02,
+        tolerance=None,
     )
     np.testing.assert_allclose(late["position"], plain["position"], rtol=0.0, atol=1e-12)

@@ -28,7 +28,7 @@ from tests.model.test_every_effect import RIGS, _rig
 ARM = build("niti_table_3_1", "arm", "amplified_voltage")
 TRACKED = MeanSquare("position", jnp.linspace(-0.7, 0.2, 101), 0.1)
 BY = ("voltage", "wire_diameter", "payload_mass", "austenite_start")
-SPREAD: dict[str, Any] = {"seconds": 2.0, "dt": 0.02, "keep": ()}
+SPREAD: dict[str, Any] = {"seconds": 2.0, "dt": 0.02, "keep": (), "tolerance": None}
 
 
 def _along(asked: tuple[Recipe, dict[str, float]], own: dict[str, jax.Array]) -> dict[str, jax.Array]:
