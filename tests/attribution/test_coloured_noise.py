@@ -66,7 +66,8 @@ def test_autocorrelated_noise_leads_to_no_effect(seed: int, tmp_path: Path) -> N
     assert not any(term.named for term in findings.unknown)
 
 
-@pytest.mark.parametrize("memory", [pytest.param(0.6, marks=pytest.mark.slow), 0.9])
+@pytest.mark.slow  # a loop
+@pytest.mark.parametrize("memory", [0.6, 0.9])
 def test_undeclared_autocorrelated_noise_is_recognised_as_noise(memory: float, tmp_path: Path) -> None:
     findings = close_loop(_estimated(_coupon(tmp_path, 0, memory=memory)))
     assert findings.residual_after.ratio > 1.5

@@ -40,6 +40,7 @@ def test_odds_and_widths_of_the_file_go_before_those_of_the_effects() -> None:
     assert [ours.log_odds[name] for name in CANDIDATES[1:]] == [library.log_odds[name] for name in CANDIDATES[1:]]
 
 
+@pytest.mark.slow  # two searches; that the odds are the file's is tested above
 def test_odds_decide_what_the_runs_do_not() -> None:
     """A latent heat so small that the runs hardly show it is named by large odds and not by small ones."""
     named = {}

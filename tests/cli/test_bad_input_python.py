@@ -18,6 +18,7 @@ from smajax.simulation.batch.run_batch import run_batch
 from smajax.simulation.compiled import simulate_compiled
 from smajax.simulation.dataset import simulate_dataset
 from smajax.simulation.simulate import simulate
+from tests.helpers.machine_code import by_machine_code
 
 SYSTEM = build("flexinol_table_3_2", "dead_weight", "flexinol_voltage")
 VOLTAGE = {"voltage": jnp.full(50, 5.0)}
@@ -91,7 +92,7 @@ def test_impossible_values_are_named_before_a_run() -> None:
 
 
 @pytest.mark.parametrize("run", [simulate, simulate_compiled, simulate_dataset])
-def test_a_known_parameter_out_of_its_bounds_is_refused_and_a_traced_one_is_not(run) -> None:
+def test_a_known_parameter_out_of_its_bounds_is_refused(run) -> None:
     beyond = set_parameters(SYSTEM, {"wire_diameter": -1.0})
     with pytest.raises(ValueError, match=r"outside of the bounds: `wire_diameter` = -1 m \(from"):
         run(beyond, VOLTAGE)
@@ -100,10 +101,13 @@ def test_a_known_parameter_out_of_its_bounds_is_refused_and_a_traced_one_is_not(
     with pytest.raises(ValueError, match=r"`wire_diameter` = -1 m \(from"):
         check_bounds(beyond)
 
+
+def test_a_traced_parameter_out_of_its_bounds_is_not_refused() -> None:
     def end(share: jax.Array) -> jax.Array:
         return simulate(set_parameters(SYSTEM, {"start_fraction": share}), VOLTAGE).reading[-1]
 
-    assert jnp.isfinite(jax.jit(jax.vmap(jax.grad(end)))(jnp.array([0.5, 1.5]))).all()
+    slope = by_machine_code(jax.grad(end))
+    assert all(np.isfinite(slope(jnp.asarray(share))) for share in (0.5, 1.5))
 
 
 def test_a_loop_around_a_plant_out_of_its_bounds_is_refused() -> None:

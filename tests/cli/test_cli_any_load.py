@@ -67,6 +67,7 @@ def test_the_tuned_gains_go_into_a_sweep_and_a_run_of_the_same_plant(tuned: Path
     assert record["summary"]["position"]["last"] == pytest.approx(8e-3, abs=3e-4)
 
 
+@pytest.mark.slow  # of the arm in `test_tuning_folder`
 def test_the_same_folder_of_another_plant_is_refused(tuned: Path) -> None:
     words = ["tune", "pid", *HANGING, "--set", "load_mass='120 g'", "--set-point", "5mm,1.2cm", *SHORT]
     assert smajax(*words, "--out", tuned).code != 0

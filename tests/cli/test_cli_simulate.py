@@ -273,6 +273,7 @@ def test_levels_hold_until_the_next(tmp_path: Path) -> None:
         levels("6V:0s", "V")
 
 
+@pytest.mark.slow  # the help is held to the unit in `test_options`
 def test_a_quantity_without_a_unit_has_that_of_its_option(tmp_path: Path) -> None:
     """The same run in both ways, of every option that takes one."""
 
@@ -333,8 +334,9 @@ def test_a_coupon_is_given_its_temperature_and_stress(tmp_path: Path) -> None:
     ("load", "values", "beside"),
     [
         ("coupon", {}, []),
-        ("strain_coupon", {}, []),
-        ("coupon", {"sensor_gain.error": "0.1"}, ["reading"]),  # what is read is not the strain
+        pytest.param("strain_coupon", {}, [], marks=pytest.mark.slow),
+        # What is read is not the strain.
+        pytest.param("coupon", {"sensor_gain.error": "0.1"}, ["reading"], marks=pytest.mark.slow),
     ],
 )
 def test_a_coupon_has_no_position_on_its_page_and_each_number_once(

@@ -38,7 +38,7 @@ def _interrupted(folder: Path, words: list[str], begun: str) -> str:
 
 def test_ctrl_c_ends_a_command_with_130(tmp_path: Path) -> None:
     """The base fit has begun."""
-    said = _interrupted(tmp_path, ["demo", "--only", "complete", "--out", "out"], "points of the box")
+    said = _interrupted(tmp_path, ["close-loop", str(bench(tmp_path)), "--out", "out"], "points of the box")
     assert said.index("Stopping: ") < said.index("Interrupted. ")
     assert "Interrupted. Nothing was finished: the same command starts from the beginning." in said
 

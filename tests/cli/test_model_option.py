@@ -123,7 +123,7 @@ def test_plants_need_a_model_of_which_something_was_fitted(tmp_path: Path, model
 def test_an_input_that_the_models_logs_had_and_a_run_has_not_is_said(tmp_path: Path) -> None:
     kept = dataclasses.replace(kept_model(), fitted_range={"voltage": (0.0, 5.0), "mass": (0.5, 1.0)})
     path = kept.save(tmp_path / "model.toml")
-    step: list[str | Path] = ["simulate", "--model", path, "--step", "4V:2s", "--dt", "100ms"]
+    step: list[str | Path] = ["simulate", "--model", path, "--step", "4V:2s", "--dt", "100ms", "--tolerance", "none"]
     said = smajax(*step, "--out", tmp_path / "without").said
     assert "fitted to runs with their own mass, 0.5 to 1 kg; here it is load_mass, 0.075. Give --input mass=..." in said
     assert "their own mass" not in smajax(*step, "--input", "mass=0.6kg", "--out", tmp_path / "with").said
@@ -139,6 +139,7 @@ def hotter_model() -> ActuatorModel:
     return dataclasses.replace(kept, effects=("radiation",), parameters=parameters, likely=(), title="hotter")
 
 
+@pytest.mark.slow  # those of `simulate` are in `test_loop_settings`
 def test_loops_of_a_sweep_run_on_the_plant_of_another_file(tmp_path: Path, model: Path) -> None:
     plant = hotter_model().save(tmp_path / "plant.toml")
     loop: list[str | Path] = ["--model", model, "--plant", plant, "--noise", "0", "--seconds", "8"]

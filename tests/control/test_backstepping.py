@@ -31,6 +31,7 @@ from smajax.model.load.arm import Arm
 from smajax.model.wire.kinetics import austenite_left, martensite_left
 from smajax.model.wire.kinetics_terms import NO_TERMS
 from studies.source.backstepping_runs import on_heating_curve, plant, stacked
+from tests.helpers.machine_code import by_machine_code
 
 PLANT = plant()
 ONE, TWO = backstepping_one(PLANT), backstepping_two(PLANT)
@@ -113,7 +114,13 @@ def test_the_stress_error_dies_out_at_its_gain_in_the_limit_of_a_small_step() ->
         assert off[first] / off[first + 2] > 2.5, f"order one in the step: {off}"
 
 
-@pytest.mark.parametrize("tuned", [TWO, set_parameters(ONE, {"measured_rate_share": 0.0})], ids=["two", "one"])
+@pytest.mark.parametrize(
+    "tuned",
+    [
+        pytest.param(TWO, id="two", marks=pytest.mark.slow),
+        pytest.param(set_parameters(ONE, {"measured_rate_share": 0.0}), id="one"),
+    ],
+)
 def test_the_lyapunov_function_falls(tuned: Any) -> None:
     """(x_1^2 + x_2^2)/2 (eq. 4.56), from both sides, once the wire has taken over; and at the rate -K x_2^2."""
     starts = [(0.0, 0.0), (-30.0, 0.0), (10.0, 0.0), (40.0, 0.0), (60.0, 0.0), (30.0, -1.0)]
@@ -256,6 +263,7 @@ VOLTAGE = {
 ENDS = st.sampled_from([0.0, 1.0, 0.5, 1e-12, 1.0 - 1e-12]) | st.floats(0.0, 1.0)
 
 
+@pytest.mark.slow  # those of runs are below
 @SETTINGS
 @given(
     st.sampled_from(["one", "two"]),
@@ -299,7 +307,7 @@ def test_derivatives_in_the_gains_agree_with_differences_of_runs() -> None:
         return loop.run.position[-1]
 
     # One compilation gives the value and the slope in any direction.
-    along = jax.jit(lambda gains, direction: jax.jvp(end, (gains,), (direction,)))
+    along = by_machine_code(lambda gains, direction: jax.jvp(end, (gains,), (direction,)))
     at = jnp.array([1.7, 20.0])
     for k, small in enumerate((1e-4, 1e-3)):
         direction = jnp.eye(2)[k]

@@ -29,6 +29,7 @@ from smajax.model.system import System
 from smajax.model.types import Scalar
 from smajax.simulation.compiled import simulate_compiled
 from tests.helpers.machine_code import by_machine_code
+from tests.helpers.often import often
 
 ARM = System(niti_table_3_1(), arm(), amplified_voltage())
 DT = 0.01
@@ -194,7 +195,11 @@ def test_the_settling_band_of_a_length_is_a_share_of_its_stroke() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "engine"), [("sld", "xla"), ("sld", "native"), ("backstepping1", "native"), ("backstepping2", "native")]
+    ("name", "engine"),
+    often(
+        [("sld", "xla"), ("sld", "native"), ("backstepping1", "native"), ("backstepping2", "native")],
+        [("sld", "native"), ("backstepping2", "native")],
+    ),
 )
 def test_a_wrong_gain_of_a_batch_makes_only_its_own_run_nan(name: str, engine: Engine) -> None:
     """In a batch, where no error can be raised: a gain that is no number, and one out of its bounds."""

@@ -230,7 +230,7 @@ def test_a_corrected_fraction_does_not_jump_back() -> None:
     """On a branch the curve is laid anew; a curve on which the wire turned back stays where it was."""
     state = initial_state(ARM, ARM.drive.from_command(jnp.asarray(8.0)))
 
-    @jax.jit
+    @by_machine_code
     def heated(state, volts, period, count):
         return jax.lax.fori_loop(0, count, lambda _, state: advanced(ARM, state, volts, period, 1), state)
 
@@ -332,10 +332,18 @@ def _missed(estimator, names, at, direction):
 @pytest.mark.parametrize(
     ("estimator", "names"),
     [
-        (MODEL, ("temperature_walk", "reading_noise", "convection_coefficient", "austenite_start", "damping")),
-        (PRINTED, ("reading_variance", "process_variance", "convection_coefficient", "damping")),
+        pytest.param(
+            MODEL,
+            ("temperature_walk", "reading_noise", "convection_coefficient", "austenite_start", "damping"),
+            id="model",
+        ),
+        pytest.param(
+            PRINTED,
+            ("reading_variance", "process_variance", "convection_coefficient", "damping"),
+            id="printed",
+            marks=pytest.mark.slow,
+        ),
     ],
-    ids=["model", "printed"],
 )
 def test_derivatives_in_the_filters_gains_and_model_agree_with_differences(estimator, names) -> None:
     """Those of the model filter's gains pass through the second derivative of the simulator's step."""

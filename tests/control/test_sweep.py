@@ -8,7 +8,6 @@ import json
 from pathlib import Path
 from typing import Any
 
-import equinox as eqx
 import jax
 import numpy as np
 import pytest
@@ -61,7 +60,7 @@ def test_a_run_of_a_sweep_equals_the_single_loop(folder: Path) -> None:
     doubled = dict(zip(names, 2.0 * np.asarray(get_parameters(system, names)), strict=True))
     plant = set_parameters(system, doubled)
     controller = CONTROLLERS["vsc3"].make(system)
-    loop = eqx.filter_jit(simulate_closed_loop)(plant, controller, constant(clock(3.0, 0.01), np.radians(30.0)), 0.01)
+    loop = by_machine_code(simulate_closed_loop)(plant, controller, constant(clock(3.0, 0.01), np.radians(30.0)), 0.01)
     one = merit(loop, plant)
     assert float(row["energy_J"]) == pytest.approx(float(one.energy), rel=1e-5)
     assert float(row["overshoot_deg"]) == pytest.approx(float(np.degrees(one.overshoot)), rel=1e-5, abs=1e-6)

@@ -154,6 +154,7 @@ def test_a_batch_of_plants_takes_the_place_of_a_variation() -> None:
     assert float(seen.merits.energy[0, row]) == pytest.approx(float(merit(loop, plant).energy), rel=1e-5)
 
 
+@pytest.mark.slow  # of a variation in `test_tuning_folder`
 def test_tuning_on_a_batch_is_recorded_and_resumed_as_such(tmp_path: Path) -> None:
     little = {**LITTLE, "rounds": 1, "finish": 0}
     settings = settings_for(HANGING, "vsc2", PLANTS, set_points=(5.0, 15.0), **little)
@@ -247,6 +248,7 @@ SWEEP = SweepSettings(
 )
 
 
+@pytest.mark.slow  # that of a batch, below, is in millimetres too
 def test_a_sweep_of_a_bias_spring_is_in_millimetres(tmp_path: Path) -> None:
     """Its loops are single ones; tables, data set and page are in the load's unit."""
     write_sweep(SPRING, SWEEP, sweep_controllers(SPRING, SWEEP, tmp_path), tmp_path)

@@ -41,6 +41,7 @@ from smajax.report.sweep_folder import write_sweep
 from smajax.report.tune_folder import finished as ended
 from smajax.report.tune_folder import write_tuning
 from tests.helpers.in_browser import HOSTILE, faults
+from tests.helpers.machine_code import by_machine_code
 from tests.helpers.small_bench import refused
 from tests.helpers.tuning_rig import ROWS, SECONDS, SETTINGS
 
@@ -111,7 +112,7 @@ def test_moves_between_set_points_are_checked_and_reported(folder: Path) -> None
     rig = TuningProblem(CONTROLLERS["vsc3"], arm(), seconds=SECONDS, loops=16)
     gains = read_gains(folder / "gains.json", arm()).put(rig.system)
     wanted = resting(jnp.asarray(np.radians(np.repeat([0.0, 30.0], [600, 601]))))
-    loop = simulate_closed_loop(rig.system, gains, wanted, 0.005, every=2)
+    loop = by_machine_code(simulate_closed_loop)(rig.system, gains, wanted, 0.005, every=2)
     (_, second) = merit_by_set_point(loop, rig.system)
     assert moves["after"]["overshoot_deg"][0] == pytest.approx(np.degrees(float(second.merit.overshoot)), abs=1e-6)
     told = " ".join(record["conclusions"])
@@ -126,7 +127,11 @@ def test_the_page_has_no_fault_in_a_browser(folder: Path, browser: Any) -> None:
 
 @pytest.mark.parametrize(
     ("state", "count", "finished"),
-    [(MultistartState, "round", 0), (MultistartState, "round", 2), (CmaEsState, "generations", 2)],
+    [
+        pytest.param(MultistartState, "round", 0, marks=pytest.mark.slow),
+        (MultistartState, "round", 2),
+        (CmaEsState, "generations", 2),
+    ],
 )
 def test_a_stopped_tuning_resumes_to_the_same_result(
     folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, state: Any, count: str, finished: int

@@ -32,7 +32,7 @@ from smajax.data.readers.table import MeasuredDataError, Table
 from smajax.model.presets import build
 from tests.helpers.small_bench import BENCH, log
 
-FAST, SLOW = 400, 10_000
+FAST, SLOW = 150, 10_000
 LONGEST = timedelta(seconds=5)  # of one input
 MOST_MEMORY = 400e6  # bytes that the process may have grown by after all of them
 

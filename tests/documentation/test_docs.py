@@ -15,11 +15,13 @@ import pytest
 import smajax
 from smajax import __version__
 from smajax.model.effects.library import LIBRARY, of_others
+from tests.helpers.often import often
 
 ROOT = Path(__file__).parents[2]
 PAGES = [*sorted((ROOT / "docs" / "how-to").glob("*.md")), ROOT / "CONTRIBUTING.md"]
 FENCE = re.compile(r'^```(\w+)(?: title="([^"]+)")?\n(.*?)^```\n(?:\n^```text\n(.*?)^```\n)?', re.MULTILINE | re.DOTALL)
 SLOW = "found = identify("  # blocks of the slow tests only
+LONG = ("control-your-bench", "on-a-gpu")  # pages that take seconds: in the slow tests
 LINES = 20  # of code a page shows in a row, imports aside
 
 
@@ -46,7 +48,9 @@ def run(page: Path, folder: Path, only: str = "", without: str = "\0") -> None:
             assert printed.getvalue() == shown, page.name
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+@pytest.mark.parametrize(
+    "page", often(PAGES, [page for page in PAGES if page.stem not in LONG]), ids=lambda page: page.stem
+)
 def test_the_code_of_a_page_runs_and_prints_the_output_shown(
     page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

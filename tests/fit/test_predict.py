@@ -291,6 +291,7 @@ def test_the_command_writes_page_record_and_series_and_a_saved_model_predicts_th
     assert one.runs[0].series[0].half_width.tobytes() == sma.predict(model, run).runs[0].series[0].half_width.tobytes()
 
 
+@pytest.mark.slow  # by Python above
 def test_values_and_constant_inputs_of_the_runs_may_be_given_with_the_command(tmp_path: Path) -> None:
     model = kept_model()
     path = model.save(tmp_path / "model.toml")

@@ -12,12 +12,12 @@ from tests.helpers.made_findings import made_findings
 from tests.helpers.report_page import Page
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def findings() -> Findings:
     return made_findings()
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def folder(findings, tmp_path_factory) -> Path:
     """A folder that the report was written into once, over an older one."""
     folder = tmp_path_factory.mktemp("out") / "new" / "report"
@@ -27,6 +27,6 @@ def folder(findings, tmp_path_factory) -> Path:
     return folder
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def page(folder) -> Page:
     return Page((folder / "report.html").read_text(encoding="utf-8"))

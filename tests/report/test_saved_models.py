@@ -5,10 +5,14 @@ from __future__ import annotations
 import dataclasses
 from pathlib import Path
 
+import pytest
+
 import smajax as sma
 from smajax.data.model_file.of_presets import model_of_presets
 from smajax.report.write import write_report
 from tests.helpers.made_findings import made_findings
+
+pytestmark = pytest.mark.usefixtures("blank_pictures")
 
 
 def test_both_models_are_written_and_the_page_leads_to_them(tmp_path: Path) -> None:

@@ -78,7 +78,7 @@ OF_MOTION = {name for name in ON_A_SPRING if LIBRARY[name].candidate.equation in
 EFFECTS = {
     "with a memory": (
         "dead_weight",
-        {"input_delay", "supply_memory", "lagging_transformation", "creep", "sensor_backlash"},
+        {"supply_memory", "lagging_transformation", "sensor_backlash"},
     ),
     "circuit, input and sensor": ("dead_weight", ON_A_WEIGHT),
     "kinetics, one half": ("dead_weight", {*OF_KINETICS[::2]}),

@@ -29,6 +29,7 @@ ARM = build("niti_table_3_1", "arm", "amplified_voltage")
 TRACKED = MeanSquare("position", jnp.linspace(-0.7, 0.2, 101), 0.1)
 BY = ("voltage", "wire_diameter", "payload_mass", "austenite_start")
 SPREAD: dict[str, Any] = {"seconds": 2.0, "dt": 0.02, "keep": (), "tolerance": None}
+WARMTH: dict[str, Any] = {"measures": (Last("temperature"),), "slopes": ("voltage", "damping"), **SPREAD}
 
 
 def _along(asked: tuple[Recipe, dict[str, float]], own: dict[str, jax.Array]) -> dict[str, jax.Array]:
@@ -82,13 +83,17 @@ def test_slopes_agree_with_differences() -> None:
     volts, mass = np.array([6.0, 7.0, 8.0]), np.array([0.05, 0.06, 0.07])
     found = run_batch(ARM, {}, zipped(voltage=volts, payload_mass=mass), measures=(TRACKED,), slopes=BY, **SPREAD)
 
+    at = {name: np.full(3, float(get_parameters(ARM, [name])[0])) for name in BY[1:]} | {
+        "voltage": volts,
+        "payload_mass": mass,
+    }
+
     def moved(**by: np.ndarray) -> np.ndarray:
-        axes = zipped({"voltage": volts, "payload_mass": mass, **by})
+        axes = zipped({**at, **by})  # every one of them: one program
         return run_batch(ARM, {}, axes, measures=(TRACKED,), **SPREAD)[TRACKED.name].to_numpy()
 
-    at = {"voltage": volts, "payload_mass": mass}
     for name in BY:
-        value = at[name] if name in at else np.full(3, float(get_parameters(ARM, [name])[0]))
+        value = at[name]
         step = change * np.abs(value)
         difference = (moved(**{name: value + step}) - moved(**{name: value - step})) / (2.0 * step)
         np.testing.assert_allclose(
@@ -112,15 +117,14 @@ def test_slopes_have_the_unit_of_the_measure_over_that_of_the_parameter() -> Non
 
 def test_slopes_are_streamed_to_disk_and_resumed(tmp_path: Path) -> None:
     axes = sampled(40, voltage=(5.5, 8.5), seed=2)
-    asked: dict[str, Any] = {"measures": (Last("position"),), "slopes": ("voltage", "damping"), **SPREAD}
-    here = run_batch(ARM, {}, axes, **asked)
+    here = run_batch(ARM, {}, axes, **WARMTH)
     for _ in range(2):
-        there = run_batch(ARM, {}, axes, out=tmp_path / "batch", **asked)
+        there = run_batch(ARM, {}, axes, out=tmp_path / "batch", **WARMTH)
         for name in here.data_vars:
             np.testing.assert_array_equal(here[name], there[name])
             assert here[name].attrs["units"] == there[name].attrs["units"]
     with pytest.raises(ValueError, match="another batch"):
-        run_batch(ARM, {}, axes, out=tmp_path / "batch", **{**asked, "slopes": ("voltage",)})
+        run_batch(ARM, {}, axes, out=tmp_path / "batch", **{**WARMTH, "slopes": ("voltage",)})
 
 
 @pytest.mark.parametrize(
@@ -144,9 +148,8 @@ def test_measures_and_settings_without_slopes_are_errors(more: dict[str, Any], t
 
 def test_a_run_that_goes_wrong_spoils_no_slope_of_another() -> None:
     """A wire that melts has no slopes to trust; those beside it are as without it."""
-    asked: dict[str, Any] = {"measures": (Last("temperature"),), "slopes": ("voltage",), **SPREAD}
-    alone = run_batch(ARM, {}, zipped(voltage=[6.0, 7.0]), **asked)
-    beside = run_batch(ARM, {}, zipped(voltage=[6.0, 1e200, 7.0]), **asked)
+    alone = run_batch(ARM, {}, zipped(voltage=[6.0, 7.0]), **WARMTH)
+    beside = run_batch(ARM, {}, zipped(voltage=[6.0, 1e200, 7.0]), **WARMTH)
     assert beside["status"].values.tolist()[1] != 0
     np.testing.assert_array_equal(beside["last_temperature_by_voltage"][[0, 2]], alone["last_temperature_by_voltage"])
 
