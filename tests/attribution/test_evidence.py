@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 
 import numpy as np
@@ -17,6 +18,7 @@ from smajax.core.parameters import parameter_values, parameters
 from smajax.fit.preset_priors import RELATIVE, preset_bounds, preset_priors
 from smajax.model.presets import LOADS, WIRES, build
 from tests.helpers.hot_weight import NOISE, hot_weight
+from tests.helpers.often import often
 
 A, B = Variant("latent_heat", -1), Variant("rising_convection", -1)
 
@@ -46,8 +48,13 @@ def _linear(one_sided: bool, sizes: tuple[float, float], seed: int = 0) -> tuple
     )
 
 
-@pytest.mark.parametrize("one_sided", [False, True])
-@pytest.mark.parametrize("sizes", [(0.0, 0.0), (1.5, -1.0), (-0.5, 0.7)])
+@pytest.mark.parametrize(
+    ("sizes", "one_sided"),
+    often(
+        itertools.product([(0.0, 0.0), (1.5, -1.0), (-0.5, 0.7)], [False, True]),
+        [((0.0, 0.0), True), ((1.5, -1.0), False), ((-0.5, 0.7), True)],
+    ),
+)
 def test_the_evidence_of_a_set_is_the_integral_over_its_parameters(one_sided: bool, sizes: tuple[float, float]) -> None:
     linear, columns, outputs = _linear(one_sided, sizes)
 

@@ -64,6 +64,7 @@ def test_the_hint_how_to_see_progress_is_given_once(
     assert said(True) == ""
 
 
+@pytest.mark.slow
 def test_long_work_gives_the_hint_and_with_json_does_not(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv(VARIABLE, raising=False)
     words = ["figures", "M9", "--fast", "--out", str(tmp_path / "out")]

@@ -20,6 +20,7 @@ from smajax.data.model_catalogue import CATALOGUE
 from smajax.fit.experiment_problem import declared_problem
 from smajax.fit.identify import identify
 from smajax.fit.identify_result import Estimate, Identified
+from smajax.fit.predicted import misfits
 from smajax.model.presets import build
 from smajax.report.identify_page import page
 from smajax.report.identify_record import record
@@ -28,7 +29,8 @@ from smajax.simulation.compiled import simulate_compiled
 from smajax.simulation.sensors import sensor_output
 from tests.helpers import hung_weight
 from tests.helpers.hung_weight import PULSED, STAIRS, SWITCHED, HungRun
-from tests.helpers.machine_code import by_machine_code
+
+pytestmark = pytest.mark.usefixtures("blank_pictures")
 
 TRUTH = {"recoverable_strain": 0.044, "austenite_start": 70.0}
 NOISE = {"strain": 2e-4, "resistance": 0.01}  # -, ohm
@@ -311,7 +313,7 @@ def test_sensors_and_starts_are_those_of_scipys_integration(tmp_path: Path) -> N
     problem = declared_problem(experiment := _loaded(path), experiment.runs)
     values = problem.start_values()
     values[problem.names.index("initial_temperature[warm]")] = 45.0
-    misfit = by_machine_code(lambda one, at: one.misfit(at))(problem, jnp.asarray(values))
+    (misfit,) = misfits(problem, [values])
     for k, limit in enumerate((4e-5, 3e-3, 1e-3)):
         assert np.abs(misfit[k::3]).max() < limit
 

@@ -22,6 +22,8 @@ from smajax.report.predict_page import page
 from smajax.report.predict_words import HEAD, conclusions, run_rows
 from tests.helpers.small_bench import bench, smajax, table
 
+pytestmark = pytest.mark.usefixtures("blank_pictures")
+
 VALUES = {"convection_coefficient": 90.0, "specific_heat": 500.0}
 TIME = np.arange(0.0, 30.0, 0.1)
 VOLTS = np.where((TIME > 2.0) & (TIME < 15.0), 5.0, np.where(TIME < 22.0, 0.0, 4.0))

@@ -20,6 +20,7 @@ from smajax.report.simulate_page import write_run
 from smajax.report.write import write_report
 from tests.helpers.in_browser import HOSTILE, faults
 from tests.helpers.made_findings import made_findings
+from tests.helpers.often import often
 
 
 def test_the_report_has_no_fault_in_a_browser(browser: Any, tmp_path: Path) -> None:
@@ -36,28 +37,28 @@ def test_the_page_of_a_run_has_no_fault_in_a_browser(browser: Any, tmp_path: Pat
     assert faults(browser, write_run(ran, tmp_path, HOSTILE, f"smajax simulate --out {HOSTILE}", animated=True)) == []
 
 
-def test_a_table_that_continues_sideways_has_an_edge(browser: Any, tmp_path: Path) -> None:
+@pytest.mark.parametrize("of", often(["a run", "a report"], ["a report"]))
+def test_a_table_that_continues_sideways_has_an_edge(of: str, browser: Any, folder: Path, tmp_path: Path) -> None:
     """A grey edge on the side where there is more, of tables that are wider than a telephone; none at their ends."""
-    loop = LoopRequest("pid", "30deg:1s,10deg:1s")
+    page = folder / "report.html"
+    if of == "a run":
+        ran = run_closed(RunRequest(dt=0.01), LoopRequest("pid", "30deg:1s,10deg:1s"))
+        page = write_run(ran, tmp_path, "A run", "")
     shown = browser.new_page(viewport={"width": 400, "height": 900})
-    for page in (
-        write_run(run_closed(RunRequest(dt=0.01), loop), tmp_path, "A run", ""),
-        write_report(made_findings(), tmp_path),
-    ):
-        shown.goto(page.as_uri())
-        wide = [
-            box
-            for box in shown.query_selector_all(".scroll:has(table)")
-            if box.evaluate("box => box.scrollWidth - box.clientWidth") > 80
-        ]
-        assert wide
-        for box in wide:
-            for where, left, right in ((0, False, True), (40, True, True), (1e6, True, False)):
-                box.evaluate("(box, where) => { box.scrollLeft = where; }", where)
-                with Image.open(io.BytesIO(box.screenshot())) as image:
-                    columns = np.median(np.asarray(image.convert("L")), axis=0)  # between the lines
-                assert ((columns[1] < 200), (columns[-2] < 200)) == (left, right)
-                assert columns[columns.size // 2] == 255
+    shown.goto(page.as_uri())
+    wide = [
+        box
+        for box in shown.query_selector_all(".scroll:has(table)")
+        if box.evaluate("box => box.scrollWidth - box.clientWidth") > 80
+    ]
+    assert wide
+    for box in wide:
+        for where, left, right in ((0, False, True), (40, True, True), (1e6, True, False)):
+            box.evaluate("(box, where) => { box.scrollLeft = where; }", where)
+            with Image.open(io.BytesIO(box.screenshot())) as image:
+                columns = np.median(np.asarray(image.convert("L")), axis=0)  # between the lines
+            assert ((columns[1] < 200), (columns[-2] < 200)) == (left, right)
+            assert columns[columns.size // 2] == 255
     narrow = tmp_path / "narrow.html"
     narrow.write_text(whole("A page", [table(["a", "b"], [["1", "2"]])]), encoding="utf-8")
     shown.goto(narrow.as_uri())

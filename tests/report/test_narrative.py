@@ -191,6 +191,7 @@ def test_likely_models_that_failed_a_check_are_named_with_the_reason() -> None:
     ]
 
 
+@pytest.mark.usefixtures("blank_pictures")
 def test_a_value_of_a_preset_far_from_its_prior_is_reported_with_the_distance() -> None:
     fitted = {"near": (78e9, 0.2), "edge": (90e9, 2.0), "far": (100e9, 3.1), "low": (40e9, -2.5)}
     after = tuple(
