@@ -82,6 +82,7 @@ def at_base_of(setting: Search, model: Model) -> Model:
     return dataclasses.replace(model, effects=(), values=values)
 
 
+@pytest.mark.slow  # by its prior odds below
 def test_a_confounder_is_weighed_by_its_evidence() -> None:
     setting, model, runs = _setting()
     setting.config = AttributionConfig(overlap_listed=0.01)  # of two that these runs distinguish well

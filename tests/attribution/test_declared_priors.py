@@ -123,6 +123,7 @@ austenite_start = { width = "5 K" }
     assert "± 5 K by the experiment file, and held without it." in page
 
 
+@pytest.mark.slow  # an identification, for a sentence
 @pytest.mark.usefixtures("blank_pictures")
 def test_identify_says_that_it_uses_none_of_them(tmp_path: Path) -> None:
     path = bench(tmp_path / "bench", ("[sampling]", "[priors.latent_heat]\nodds = 0.25\n[sampling]"))

@@ -112,6 +112,7 @@ def test_free_values_of_presets_hide_no_effect() -> None:
     assert {"latent_heat", "rising_convection", "asymmetric_transformation"} <= set(found)
 
 
+@pytest.mark.slow
 def test_errors_on_runs_left_out_agree_with_refits() -> None:
     search, _, _ = _found({"latent_heat.enthalpy": 1.2e4})
     joint, model = search.joint, search.fitted[("latent_heat",)]

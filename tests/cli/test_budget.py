@@ -22,6 +22,8 @@ from smajax.report.write import write_report
 from tests.helpers.made_findings import made_findings
 from tests.helpers.small_bench import bench, smajax
 
+pytestmark = pytest.mark.usefixtures("blank_pictures")
+
 
 class EndedError(Exception):
     """Raised in the place of the end of a process."""

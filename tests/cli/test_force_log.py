@@ -21,6 +21,8 @@ from smajax.data.model_catalogue import CATALOGUE
 from smajax.data.readers.table import MeasuredDataError
 from tests.helpers.small_bench import smajax
 
+pytestmark = pytest.mark.usefixtures("blank_pictures")
+
 TIME = np.arange(0.0, 16.0, 0.05)
 TRUTH = {"wire_length": 0.3, "convection_coefficient": 120.0, "austenite_start": 66.0}
 NOISE = 0.02  # N

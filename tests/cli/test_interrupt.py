@@ -43,7 +43,9 @@ def test_ctrl_c_ends_a_command_with_130(tmp_path: Path) -> None:
     assert "Interrupted. Nothing was finished: the same command starts from the beginning." in said
 
 
-@pytest.mark.parametrize("budget", [[], ["--budget", "60s"]], ids=["plain", "budget"])
+@pytest.mark.parametrize(
+    "budget", [[], pytest.param(["--budget", "60s"], marks=pytest.mark.slow)], ids=["plain", "budget"]
+)
 def test_ctrl_c_while_the_runs_are_read_is_answered_in_words(tmp_path: Path, budget: list[str]) -> None:
     """No fit has begun. With --budget the work is that of a second process, and the first one alone gets the signal."""
     said = _interrupted(tmp_path, ["close-loop", str(bench(tmp_path)), "--out", "out", *budget], "loading")

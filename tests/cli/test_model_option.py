@@ -21,6 +21,8 @@ from smajax.data.model_file.record import ModelParameter
 from tests.fit.test_predict import NOISE, kept_model, log, reading
 from tests.helpers.small_bench import refused, smajax
 
+pytestmark = pytest.mark.usefixtures("blank_pictures")
+
 
 @pytest.fixture
 def model(tmp_path: Path) -> Path:

@@ -133,7 +133,7 @@ def test_an_argument_given_as_an_option_is_an_error_that_shows_its_place(typed: 
 
 
 def test_a_listing_may_be_piped_into_head(tmp_path: Path) -> None:
-    shell = f"{sys.executable} -m smajax effects | head -n 1; exit ${{PIPESTATUS[0]}}"
+    shell = f"{sys.executable} -m smajax presets | head -n 1; exit ${{PIPESTATUS[0]}}"
     told = subprocess.run(["bash", "-c", shell], cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False)
     assert told.returncode == 0, told.stderr
     assert told.stdout.count("\n") == 1

@@ -136,6 +136,7 @@ def test_the_lyapunov_function_falls(tuned: Any) -> None:
     assert (level[3:, -1] < level[3:, 0]).all()
 
 
+@pytest.mark.slow
 def test_a_moving_set_point_is_followed() -> None:
     """x_2 and the wanted acceleration count in: a ramp leaves an error only of how it begins."""
     time, speed = 0.01 * jnp.arange(COUNT), 0.3

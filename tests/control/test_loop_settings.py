@@ -160,6 +160,7 @@ def test_of_two_limits_of_the_command_the_page_says_which_one_holds() -> None:
     assert limit_words(LoopSettings()) == "no limit"
 
 
+@pytest.mark.slow
 def test_a_loop_without_a_file_of_gains_says_that_they_are_the_presets(gains: Path) -> None:
     request = RunRequest(model=kept_model(), dt=0.01, seconds=0.4)
     own = run_closed(request, LoopRequest("pid", "5mm:0.4s", noise=0.0))

@@ -89,6 +89,7 @@ def test_backstepping_follows_a_wire_of_another_law_from_its_measured_state(cont
         assert abs(1e3 * float(run["position"][-1]) - 6.0) > 3.0
 
 
+@pytest.mark.slow
 def test_the_temperature_controller_overshoots_by_less_than_the_vsc_that_is_in_it() -> None:
     """NVSC against the VSC3 that is in it, on the dead weight: less beyond the set point."""
     nvsc = CONTROLLERS["nvsc"].make(HANGING)
@@ -116,6 +117,7 @@ def test_any_wire_law_and_effects_are_a_plant(law: str) -> None:
     assert led(plant, "pid", 8.0, 15.0)[-1] == pytest.approx(8.0, abs=0.05)
 
 
+@pytest.mark.slow  # on the arm in `test_closed_loop`
 def test_a_duty_cycle_heats_as_the_voltage_does() -> None:
     switched = dataclasses.replace(SPRING, drive=sma.DRIVES["duty"]())
     np.testing.assert_allclose(led(switched, "pid", 6.0, 20.0), led(SPRING, "pid", 6.0, 20.0), atol=1e-6)
@@ -153,6 +155,7 @@ def test_a_current_source_and_a_power_supply_are_commanded_in_their_own_unit(
     assert DT * power[:-1].sum() == pytest.approx(DT * loss[1:].sum() + stored, rel=5e-3)
 
 
+@pytest.mark.slow  # on the arm in `test_estimators`
 def test_a_filter_and_noise_go_with_any_load() -> None:
     loop = loop_around(HANGING, "sld", estimator="model", noise="20 um")
     assert isinstance(loop.estimator, ModelFilter)

@@ -85,6 +85,7 @@ def test_tuning_pid_on_a_dead_weight_lowers_its_cost(tmp_path: Path) -> None:
     assert "°" not in "".join(record["conclusions"])
 
 
+@pytest.mark.slow  # on the arm in `test_tune`
 def test_derivatives_of_every_term_agree_with_differences_on_a_bias_spring() -> None:
     """VSC3 on a length: terms in millimetres, gains in V and m/s."""
     rig = TuningProblem(CONTROLLERS["vsc3"], SPRING, seconds=6.0, loops=16)
@@ -193,6 +194,7 @@ def test_batches_of_systems_and_stacked_systems_are_the_same_plants() -> None:
     assert alike.shape == (2, 1)
 
 
+@pytest.mark.slow
 def test_plants_may_have_effects_that_the_assumed_model_lacks() -> None:
     """Draws over several models carry the effects of all: the assumed one has them at base value, where they change nothing."""
     plants = {"latent_heat.enthalpy": [0.0, 8e3, 15e3, 20e3], "load_mass": [0.075, 0.07, 0.08, 0.075]}

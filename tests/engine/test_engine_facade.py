@@ -54,7 +54,7 @@ def _demo() -> tuple[np.ndarray, np.ndarray]:
 def _coupon() -> tuple[np.ndarray, np.ndarray]:
     """Strain and fraction of a heated coupon."""
     coupon = build("flexinol_table_3_2", "coupon", "none")
-    run = simulate_compiled(coupon, {"temperature": np.linspace(20.0, 110.0, 50), "stress": np.full(50, 1e8)}, 1.0)
+    run = simulate_compiled(coupon, {"temperature": jnp.linspace(20.0, 110.0, 50), "stress": jnp.full(50, 1e8)}, 1.0)
     return np.asarray(run.strain), np.asarray(run.martensite_fraction)
 
 

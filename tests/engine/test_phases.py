@@ -95,7 +95,7 @@ def _small(a: jax.Array) -> jax.Array:
     [
         pytest.param(1, "i1", marks=pytest.mark.slow),
         (3, "i1"),
-        (8, "i1"),
+        pytest.param(8, "i1", marks=pytest.mark.slow),
         pytest.param(8, "i64", marks=pytest.mark.slow),
     ],
 )

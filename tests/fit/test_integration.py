@@ -58,6 +58,7 @@ def test_one_step_a_sample_is_chosen_when_it_is_accurate_enough() -> None:
     assert described(choose_integration(problem, problem.system)) == "one step a sample"
 
 
+@pytest.mark.slow  # that the error is below a tenth of the noise is above
 def test_less_noise_asks_for_a_finer_integration() -> None:
     problem = _problem("dead weight", 0.05)
     quiet = dataclasses.replace(problem, noise_sigma=problem.noise_sigma / 30.0)

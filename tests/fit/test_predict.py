@@ -149,6 +149,7 @@ def test_a_run_beyond_the_fitted_range_is_said_to_be_extrapolation_with_where(tm
     assert "Extrapolation in run: voltage goes up to 5 V; the model was fitted to 0 to 4.2 V" in text
 
 
+@pytest.mark.slow  # an input's range is above
 def test_a_value_of_these_runs_that_no_run_of_the_fit_had_is_extrapolation(tmp_path: Path) -> None:
     model = kept_model()
     path = log(tmp_path / "run.csv", reading(model))

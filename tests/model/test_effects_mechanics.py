@@ -18,6 +18,7 @@ from smajax.simulation.compiled import simulate_compiled
 from tests.helpers.effect_rigs import DT, RIGS, settled
 
 
+@pytest.mark.slow
 def test_a_friction_that_grows_with_the_load_is_that_share_of_each_weight() -> None:
     """The same wire under two weights: a friction of one size, chosen for the one, is wrong for the other by their ratio."""
     system = RIGS["dead_weight"][0]

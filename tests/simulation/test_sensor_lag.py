@@ -28,7 +28,8 @@ def _filtered(series: np.ndarray) -> np.ndarray:
 
 
 # By the backward Euler rule 0.66 noises were left of the coupon.
-@pytest.mark.parametrize("rig", ["coupon", pytest.param("dead weight", marks=pytest.mark.slow)])
+@pytest.mark.slow  # most of it scipy's; derivatives are in `test_every_effect`
+@pytest.mark.parametrize("rig", ["coupon", "dead weight"])
 def test_a_log_of_100_ms_has_the_lag_of_the_sensor(rig: str) -> None:
     plain = study.RIGS[rig]()
     system = extended(plain.system, ("sensor_lag",), {"sensor_lag.time_constant": LAG})
