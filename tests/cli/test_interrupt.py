@@ -36,6 +36,7 @@ def _interrupted(folder: Path, words: list[str], begun: str) -> str:
     return said
 
 
+@pytest.mark.slow  # in the middle of a fit; while the runs are read below
 def test_ctrl_c_ends_a_command_with_130(tmp_path: Path) -> None:
     """The base fit has begun."""
     said = _interrupted(tmp_path, ["close-loop", str(bench(tmp_path)), "--out", "out"], "points of the box")

@@ -43,11 +43,11 @@ print(json.dumps(ended))
 )
 QUICK = (
     "presets",
-    "simulate flexinol_table_3_2 dead_weight flexinol_voltage --step 5V:1s --out {out}/run",
     "new-experiment {out}/log.csv --out {out}/begun.toml",
 )
 LONG = (
     "effects",
+    "simulate flexinol_table_3_2 dead_weight flexinol_voltage --step 5V:1s --out {out}/run",
     "identify {bench} --starts 0 --out {out}/identified",
     "figures M9 --fast --no-open --out {out}/figures",
 )
