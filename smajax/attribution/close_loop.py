@@ -172,7 +172,8 @@ def prepared(  # the stage's inputs, each once
         config,
         declared=experiment.priors,
     )
-    report_checks(progress, experiment.warnings, ())
+    if integration is None:
+        report_checks(progress, experiment.warnings, ())
     base = setting.base(start, seed)
     if integration is None:
         # It was chosen where the fit begins, at which the wire may not even move. Now, and not when the whole search has been made with it.

@@ -56,13 +56,13 @@ def command_line() -> str:
     return "smajax " + as_typed(sys.argv[1:])
 
 
-def _imports(frame: FrameType | None) -> bool:
-    """Whether what runs at this moment is part of an import."""
+def _imports(frame: FrameType | None) -> int:
+    """How many imports what runs in this frame is part of."""
+    found = 0
     while frame is not None:
-        if (frame.f_code.co_filename, frame.f_code.co_name) == IMPORTING:
-            return True
+        found += (frame.f_code.co_filename, frame.f_code.co_name) == IMPORTING
         frame = frame.f_back
-    return False
+    return found
 
 
 @contextmanager
@@ -76,6 +76,7 @@ def answer_interrupts() -> Iterator[None]:
     if not own or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
         yield
         return
+    around = _imports(sys._getframe())  # a program that is itself imported
 
     def interrupt(number: int, frame: FrameType | None) -> None:
         if _INTERRUPTS.answered:
@@ -84,7 +85,7 @@ def answer_interrupts() -> Iterator[None]:
             _INTERRUPTS.came = True
             with suppress(OSError):
                 os.write(2, STOPPING)  # no buffer of Python's, which may be in use at this moment
-        waits = (frame is not None and frame.f_code.co_name in CALLBACKS) or _imports(frame)
+        waits = (frame is not None and frame.f_code.co_name in CALLBACKS) or _imports(frame) > around
         repeat(RETRY if waits else REPEAT)
         if not waits:
             raise KeyboardInterrupt

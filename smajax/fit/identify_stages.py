@@ -154,7 +154,7 @@ def _held(setup: Setup) -> tuple[str, ...]:
     if not names:
         return ()
     return (
-        f"The file does not give {listed(tuple(names))}: held at the values of the presets. `--presets fitted` fits them too, "
+        f"The file does not give {listed(tuple(names))}: held at the values of the presets, or at the base that [priors.presets] has. `--presets fitted` fits them too, "
         "within what data sheets leave open, as close-loop does.",
     )
 

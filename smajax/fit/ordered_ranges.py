@@ -31,14 +31,21 @@ def _reversed(problem: Problem, values: np.ndarray) -> list[tuple[int, int]]:
     return [(low, high) for low, high in _places(problem) if values[low] >= values[high]]
 
 
+def _stuck(problem: Problem, values: np.ndarray) -> bool:
+    """Whether a range is reversed, or so narrow that its higher end changes nothing either: a descent does not leave it."""
+    return any(values[high] - values[low] < NARROWEST_RANGE for low, high in _places(problem))
+
+
 def _exchanged(problem: Problem, task: FitTask, values: np.ndarray) -> np.ndarray:
     """`values` (P,) with reversed ranges in order, `ROOM` wide or more as far as the bounds allow."""
     found, places = np.array(values), task.slots.tolist()
     bounds: dict[int, tuple[float, float]] = dict(
         zip(places, zip(task.low.tolist(), task.high.tolist(), strict=True), strict=True)
     )
-    for low, high in _reversed(problem, values):
-        if low in bounds and high in bounds:
+    for low, high in _places(problem):
+        if values[high] - values[low] >= NARROWEST_RANGE:
+            continue
+        if low in bounds and high in bounds and values[low] > values[high]:
             found[low], found[high] = np.clip(values[high], *bounds[low]), np.clip(values[low], *bounds[high])
         if low in bounds:
             found[low] = np.clip(min(found[low], found[high] - ROOM), *bounds[low])
@@ -60,12 +67,12 @@ def _narrow(problem: Problem, task: FitTask, values: np.ndarray) -> np.ndarray:
 def in_order(
     problem: Problem, tasks: Sequence[FitTask], fits: Sequence[Fit], settings: FitSettings | None = None
 ) -> list[Fit]:
-    """`fits` of these tasks, in which all runs count alike; each that ends with a reversed range once more from its ends exchanged.
+    """`fits` of these tasks, in which all runs count alike; each that ends with a reversed range, or with one of no width, once more from ends in order.
 
     The better of the two is taken, as a range of next to no width where it is the reversed one. One whose bounds, or whose given
     values, allow no order stays reversed.
     """
-    wrong = [k for k, fit in enumerate(fits) if _reversed(problem, fit.values)]
+    wrong = [k for k, fit in enumerate(fits) if _stuck(problem, fit.values)]
     if not wrong:
         return list(fits)
     settings = dataclasses.replace(settings or FitSettings(), stage="fitting with ranges in order")

@@ -69,7 +69,8 @@ def _held(result: Identified) -> list[str]:
         else names
     )
     return [
-        f"Held at the preset's value, because the file does not give {'it' if len(names) == 1 else 'them'}: {and_listed(shown)}. "
+        f"Held at the preset's value, or at the base that [priors.presets] has, because the file does not give "
+        f"{'it' if len(names) == 1 else 'them'}: {and_listed(shown)}. "
         f"`--presets fitted` fits {'it' if len(names) == 1 else 'them'} too."
     ]
 

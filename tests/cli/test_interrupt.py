@@ -86,8 +86,9 @@ def test_ctrl_c_while_garbage_is_collected_ends_the_command() -> None:
     assert "Interrupted." in told.stderr
 
 
-def test_ctrl_c_waits_for_the_end_of_an_import(tmp_path: Path) -> None:
-    """Compiled code that imports, and is told of an exception, aborts the process."""
+@pytest.mark.parametrize("imported", [False, True])
+def test_ctrl_c_waits_for_the_end_of_an_import(tmp_path: Path, imported: bool) -> None:
+    """Compiled code that imports, and is told of an exception, aborts the process. What is around the whole program is not waited for."""
     (tmp_path / "compiled.py").write_text(
         "import os, signal, time\ntry:\n    os.kill(os.getpid(), signal.SIGINT)\n    time.sleep(0.2)\n"
         "except KeyboardInterrupt:\n    os.abort()\n"
@@ -97,11 +98,13 @@ def test_ctrl_c_waits_for_the_end_of_an_import(tmp_path: Path) -> None:
         "from smajax.cli.terminal import resumable\nwith resumable():\n    import compiled\n"
         "    print('imported', flush=True)\n    time.sleep(20)"
     )
+    (tmp_path / "whole.py").write_text(code)
     told = subprocess.run(
-        [sys.executable, "-c", code],
+        [sys.executable, "-c", "import whole" if imported else code],
         capture_output=True,
         text=True,
         check=False,
+        timeout=15,
         env={**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])},
     )
     assert told.returncode == 130, told.stderr

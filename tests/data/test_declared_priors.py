@@ -50,6 +50,15 @@ austenite_start = { width = "5 degC" }
     }
 
 
+def test_a_share_of_a_value_below_zero_is_a_width(tmp_path: Path) -> None:
+    read = _load(
+        tmp_path,
+        "[priors.presets]\nthermal_modulus = { relative = 0.5 }",
+        ('"flexinol_table_3_2"', '"flexinol_table_3_2_expanding"'),
+    )
+    assert read.priors.presets == {"thermal_modulus": PriorSpread(None, 0.275e6, False)}
+
+
 def test_a_file_without_priors_has_none(tmp_path: Path) -> None:
     priors = _load(tmp_path, "").priors
     assert priors == DeclaredPriors()

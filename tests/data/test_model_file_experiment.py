@@ -93,6 +93,19 @@ def test_fitted_values_that_no_run_determined_take_part_in_a_following_loop(tmp_
     assert not any("austenite_start" in one for one in given.warnings)
 
 
+def test_a_base_of_the_experiment_file_goes_before_what_a_model_file_fitted(tmp_path: Path) -> None:
+    fitted_model().save(tmp_path / "model.toml")
+    presets = 'wire = "flexinol_table_3_2"\nload = "dead_weight"\ndrive = "voltage"\n'
+    own = 'file = "model.toml"\n[priors.presets]\nspecific_heat = { base = "700 J/(kg K)", relative = 0.1 }\n'
+    experiment = open_experiment(bench(tmp_path, (presets, own)))
+    assert job_of(experiment).presets["specific_heat"] == CoefficientPrior(700.0, 0.1, True)
+    likely = LikelyModel(("latent_heat",), 1.0, {"convection_coefficient": 120.0})
+    made = actuator_model(experiment, [likely], {"convection_coefficient": (40.0, 400.0)}, {}, [], {})
+    held = made.parameters["specific_heat"]
+    assert (held.value, held.origin, held.standard_error) == (700.0, "preset", None)
+    assert load_model(made.save(tmp_path / "made.toml")).values["specific_heat"] == 700.0
+
+
 def test_a_draft_from_a_model_says_which_values_no_run_determined(tmp_path: Path) -> None:
     undetermined_model().save(tmp_path / "model.toml")
     bench(tmp_path)

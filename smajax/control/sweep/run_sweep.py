@@ -16,7 +16,7 @@ from smajax.control.controllers.base import AbstractController
 from smajax.control.figures_of_merit import Merit
 from smajax.control.gains_file import Gains
 from smajax.control.interface import between_in_words, check_interface, check_set_points, interface_of
-from smajax.control.least_time import Distance, command_limit, distance
+from smajax.control.least_time import LIMITS, Distance, command_limit, distance
 from smajax.control.mismatch import MISMATCHES, default_mismatches
 from smajax.control.plants import Plants, PlantSet, carrying, plant_set
 from smajax.control.position_unit import PositionUnit, check_unit, default_set_points, unit_named, unit_of
@@ -25,7 +25,7 @@ from smajax.control.scales import is_arm, seconds_for
 from smajax.control.sweep.batched_loops import LoopSetup, closed_loops, integrated_setup, least_times, positions
 from smajax.control.sweep.grid import OF_ARM, PLANT, Grid, loop_rows, sweep_ratios
 from smajax.core.files import json_line, writing
-from smajax.core.parameters import get_parameters
+from smajax.core.parameters import get_parameters, set_parameters
 from smajax.core.progress import Event, Progress, Stage, quiet
 from smajax.core.provenance import digest
 from smajax.core.result_cache import arrays
@@ -219,7 +219,7 @@ def sweep_controllers(
     posterior, in the place of mismatches. Raises ValueError as `SweepSettings.check`.
     """
     found, system = settings.check(system, plants), carrying(system, plants)
-    shared = max(command_limit(*_plant_and_controller(system, name, settings)) for name in settings.controllers)
+    shared = max(_limit(system, name, settings) for name in settings.controllers)
     return (_sweep(system, name, settings, found, folder, progress, shared) for name in settings.controllers)
 
 
@@ -272,6 +272,17 @@ def _plant_and_controller(system: System, name: str, settings: SweepSettings) ->
     return plant, tuned[-1].put(plant) if tuned else CONTROLLERS[name].make(plant)
 
 
+def _limit(system: System, name: str, settings: SweepSettings) -> float:
+    """Largest command of a controller; of one whose main gain is that limit at the ratio nearest to 1, of which distances are told."""
+    plant, controller = _plant_and_controller(system, name, settings)
+    gain = CONTROLLERS[name].main_gain
+    if gain in LIMITS:
+        ratio = min(settings.gain_ratios, key=lambda one: abs(one - 1.0))
+        (limit,) = get_parameters(controller, [gain])
+        controller = set_parameters(controller, {gain: max(1.0, ratio) * float(limit)})
+    return command_limit(plant, controller)
+
+
 def _computed(
     system: System, name: str, settings: SweepSettings, plants: PlantSet, progress: Progress, shared: float
 ) -> dict[str, Any]:
@@ -303,7 +314,7 @@ def _computed(
     inside, nominal = slice(grid.size), grid.size + np.arange(len(grid.targets))
     result: dict[str, Any] = {"failed": outcome.failed_at[inside].reshape(grid.shape)}
     result["integration_error"] = np.asarray(json_line(error.record()))
-    both = _least(setup, grid, [shared, command_limit(plant, controller)])
+    both = _least(setup, grid, [shared, _limit(system, name, settings)])
     for of, least in zip(SAVED_LEAST, both, strict=True):
         result |= {f"{of}{name}": np.asarray(value) for name, value in least._asdict().items()}
     for field in FIELDS:

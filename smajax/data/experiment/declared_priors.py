@@ -131,10 +131,13 @@ def _presets(
         info = own[name]
         base = None if section.base is None else bounded(path, f"{key}.base", section.base, info)
         value = begun.get(name, info.preset or 0.0) if base is None else base
-        if section.relative is not None and (info.unit == CELSIUS or not value > 0.0):
+        if section.relative is not None and (info.unit == CELSIUS or value == 0.0):
             got = f"{'a preset of' if base is None else 'a base of'} {value:g} {info.unit}".strip()
             raise _no_logarithm(path, f"{key}.relative", got)
-        found[name] = PriorSpread(base, *_spread(path, key, section, info))
+        sigma, logarithmic = _spread(path, key, section, info)
+        if logarithmic and value < 0.0:  # no logarithm, and a share of it all the same
+            sigma, logarithmic = -sigma * value, False
+        found[name] = PriorSpread(base, sigma, logarithmic)
     return found
 
 

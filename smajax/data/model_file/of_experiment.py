@@ -87,7 +87,9 @@ def _parameter(
         return ModelParameter(logged, "given", entry.low, entry.high)
     if name in experiment.parameters:
         return ModelParameter(float(start), "given", entry.low, entry.high)
-    if kept is not None and name in kept.errors:
+    stated = experiment.priors.presets.get(name)
+    of_file = stated is not None and stated.base is not None  # it goes before what a fit left
+    if kept is not None and name in kept.errors and not of_file:
         return ModelParameter(float(start), "fitted", *kept.bounds[name], kept.errors[name])
     return ModelParameter(float(start), "preset", entry.low, entry.high)
 

@@ -39,8 +39,8 @@ class ElasticMismatch(AbstractEffect, HistoryTerm, ConstitutiveTerm):
         equation="constitutive",
         formula="strain += int [sigma - theta_T (T - T_inf)] d(1/E), E = E_M [1 + a (1 - xi)]: eq. 3.2 in the integrated form "
         "(Elahinia 2004, eq. 4.51, 4.52)",
-        sentence="Austenite stretches less under the stress than martensite does, so a wire that is heated under a held stress "
-        "also gives back elastic strain: the more, the higher the stress.",
+        sentence="Austenite stretches less than martensite under the same elastic stress (the stress less its thermal part), so a wire that "
+        "is heated under a high stress also gives back elastic strain: the more, the higher the stress.",
         switches=("contrast",),
         initial_guess={"contrast": 0.5},
         applies=_applies,
