@@ -10,6 +10,7 @@ import jax
 import numpy as np
 
 from smajax.engine.arithmetic import ELEMENTWISE, select
+from smajax.engine.by_numpy import by_numpy
 from smajax.engine.loop import Loop
 from smajax.engine.memory import copy, in_memory, in_registers, mapped, row, write
 from smajax.engine.text import Array, Lane, Text, Unsupported, scalar_type
@@ -96,10 +97,13 @@ def moved(
         lanes += list(own.ravel())
     if primitive.name == "gather" and "FILL" in str(params.get("mode")):
         params = {**params, "fill_value": -1}  # not a place there is: found out below where it would be put in
-    with jax.ensure_compile_time_eval():
-        result = primitive.bind(*named, **params)
-    results = result if primitive.multiple_results else [result]
-    places = [np.asarray(one) for one in results]
+    plain = by_numpy(primitive.name, params, named)
+    if plain is None:
+        with jax.ensure_compile_time_eval():
+            result = primitive.bind(*named, **params)
+        places = [np.asarray(one) for one in (result if primitive.multiple_results else [result])]
+    else:
+        places = [plain]
     if any(((one < 0) | (one >= len(lanes))).any() for one in places):
         raise Unsupported(f"the operation `{primitive.name}` beyond the ends of an array")
     return [held([lanes[k] for k in one.ravel()], one.shape) for one in places]

@@ -25,6 +25,7 @@ from smajax.engine.array_operations import (
     reduced,
     whole_number,
 )
+from smajax.engine.by_numpy import by_numpy
 from smajax.engine.equations import Read, Step, array_of, note, read_of, steps_of
 from smajax.engine.expansions import EXPANSIONS
 from smajax.engine.jax_versions import TABLE, expanded, opened
@@ -68,6 +69,15 @@ def _constants(consts: Sequence[Any]) -> list[Value]:
         return [_numbers(one) for one in consts]
     except TypeError:
         raise Unsupported("a constant that is no array of numbers") from None
+
+
+def _plainly(equation: Any, given: Sequence[Value]) -> np.ndarray | None:
+    """The result of an operation on known arrays by numpy, of the shape and the kind of number that JAX says; None where JAX has to do it."""
+    if any(name_of(one.aval.dtype).startswith("key<") for one in (*equation.invars, *equation.outvars)):
+        return None
+    out = equation.outvars[0].aval
+    result = by_numpy(equation.primitive.name, equation.params, [np.asarray(one) for one in given])
+    return result if result is not None and (result.shape, result.dtype) == (out.shape, out.dtype) else None
 
 
 def _as_shape(lanes: Held, shape: tuple[int, ...]) -> np.ndarray:
@@ -126,7 +136,10 @@ class _Translation:
             return self.choice(params, given)
         if name in EXPANSIONS and not (name in ("threefry2x32", "erf_inv") and all(map(is_known, given))):
             return self.closed(expanded(equation), given)
-        if all(is_known(one) for one in given):
+        if all(map(is_known, given)):
+            plain = _plainly(equation, given)
+            if plain is not None:
+                return [plain]
             with jax.ensure_compile_time_eval():
                 result = equation.primitive.bind(*given, **equation.params)
             return [_numbers(one) for one in (result if equation.primitive.multiple_results else [result])]
