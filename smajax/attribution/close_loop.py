@@ -26,7 +26,7 @@ from smajax.attribution.findings import (
 from smajax.attribution.found import effects_found, parameters_found, priors_found
 from smajax.attribution.held_out import Compared, compare, every_run, validated
 from smajax.attribution.input_of_run import corrected, record_error
-from smajax.attribution.job import Job, effects_excluded, job_of
+from smajax.attribution.job import Job, cannot_show, effects_excluded, job_of
 from smajax.attribution.joint_search import JointSearch
 from smajax.attribution.joint_stage import base_alone, likeliest_so_far, search_by_evidence, search_without
 from smajax.attribution.laplace_evidence import FittedModel
@@ -185,7 +185,7 @@ def prepared(  # the stage's inputs, each once
     at_fit = sensitivity(problem, base.values[np.asarray(index)], [*job.unknowns, *job.presets])
     values = dict(zip(job.problem.names, base.values.tolist(), strict=True))
     setting.presets = visible(at_fit, values, job.presets)
-    identifiable = identifiability(at_fit, job.unknowns, job.bounds, "at the base model's fit")
+    identifiable = (*identifiability(at_fit, job.unknowns, job.bounds, "at the base model's fit"), *cannot_show(job))
     progress(Stage(CHECKING, 1.0))
     report_checks(progress, (), identifiable)
     context = Context(job, setting, start, base, seed, (*experiment.warnings, *identifiable), interim)

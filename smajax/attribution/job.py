@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from smajax.attribution.run_extent import extent_of
 from smajax.core.parameters import parameter_values, parameters
+from smajax.core.wording import and_listed
 from smajax.data.experiment.record import Experiment, Run
 from smajax.data.model_catalogue import candidates
 from smajax.fit.base_model import base_model
@@ -31,6 +32,7 @@ class Job:
     bounds: dict[str, tuple[float, float]]
     candidates: tuple[str, ...]
     presets: dict[str, CoefficientPrior]  # of the values that the experiment does not give
+    hidden_by_one_force: tuple[str, ...] = ()  # effects that runs under another load could show
 
 
 def job_of(experiment: Experiment, integration: Integration | None = None) -> Job:
@@ -52,6 +54,12 @@ def job_of(experiment: Experiment, integration: Integration | None = None) -> Jo
 
     declared_problem = problem_with(declared)
     extent = extent_of(declared_problem)
+    other_loads = extent._replace(one_force=False)
+    hidden = tuple(
+        name
+        for name in names
+        if LIBRARY[name].candidate.observable(other_loads) and not LIBRARY[name].candidate.observable(extent)
+    )
     names = tuple(name for name in names if LIBRARY[name].candidate.observable(extent))
     integration = integration or choose_integration(declared_problem, declared_problem.system)
     problem = with_integration(problem_with((*declared, *names)), integration)
@@ -64,7 +72,18 @@ def job_of(experiment: Experiment, integration: Integration | None = None) -> Jo
     unknowns = tuple(unknown.name for unknown in experiment.unknowns)
     presets, of_presets = values_not_given(experiment, base, bounds)
     bounds |= of_presets
-    return Job(experiment, runs, problem, held_out, unknowns, bounds, names, presets)
+    return Job(experiment, runs, problem, held_out, unknowns, bounds, names, presets, hidden)
+
+
+def cannot_show(job: Job) -> tuple[str, ...]:
+    """Which effects the fit runs cannot show, in a sentence."""
+    if not job.hidden_by_one_force:
+        return ()
+    titles = and_listed([LIBRARY[name].candidate.title for name in job.hidden_by_one_force])
+    return (
+        f"In all fit runs the load pulls with the same force, so what depends on the stress cannot show: {titles} are not looked for. "
+        "Runs under another load would show them.",
+    )
 
 
 def effects_excluded(experiment: Experiment) -> int:

@@ -2,19 +2,45 @@
 
 from __future__ import annotations
 
+import jax.numpy as jnp
 import numpy as np
 
+from smajax.core.parameters import parameters
 from smajax.data.readers.resolution_levels import likeliest_increment
 from smajax.fit.problem import Problem
 from smajax.model.effects.candidate import Extent
+from smajax.model.load.base import AbstractMovingLoad
+
+SAME_FORCE = 0.02  # of the force: what it may change by and still be one
+
+
+def _one_force(problem: Problem, lowest: float, highest: float) -> bool:
+    """Whether the load at rest pulls with one force, at both ends of its way and under the inputs of all samples."""
+    load, batch = problem.system.load, problem.batch
+    own = {entry.name for entry in parameters(problem.system).values() if entry.path[0] == "load"}
+    if own & {*batch.override_names, *problem.per_run.names}:
+        return False  # runs have a load of their own
+    mask = np.asarray(batch.mask).reshape(len(batch.mask), -1)[:: len(batch.outputs)] > 0
+    if isinstance(load, AbstractMovingLoad):
+        at = [
+            np.broadcast_to(load.resistance(jnp.asarray(end), jnp.asarray(0.0), batch.inputs), mask.shape)
+            for end in (lowest, highest)
+        ]
+    elif "stress" in batch.inputs:
+        at = [np.asarray(batch.inputs["stress"])]
+    else:
+        return False
+    forces = np.concatenate([np.abs(one[mask]) for one in at])
+    return bool(np.ptp(forces) <= SAME_FORCE * forces.max())
 
 
 def extent_of(problem: Problem) -> Extent:
-    """Length of a typical run, range of all readings, the increment at which they lie, and the lowest and highest of them."""
+    """Length of a typical run, range of all readings, the increment at which they lie, the lowest and highest of them, and whether the load is one force."""
     batch = problem.batch
     mask = np.asarray(batch.mask) > 0
     readings = [row[valid] for row, valid in zip(problem.measured, mask, strict=True) if valid.any()]
     stroke = max(float(np.ptp(one)) for one in readings)
     increment = likeliest_increment(readings, float(np.median(problem.noise)))
     lowest, highest = (float(end([end(one) for one in readings])) for end in (np.min, np.max))
-    return Extent(float(np.median(mask.sum(axis=1)) * batch.dt), stroke, increment, lowest, highest)
+    one_force = _one_force(problem, lowest, highest)
+    return Extent(float(np.median(mask.sum(axis=1)) * batch.dt), stroke, increment, lowest, highest, one_force)

@@ -39,6 +39,12 @@ class Extent(NamedTuple):
     increment: float  # from one level to the next where the readings lie on levels, SI; 0 where they do not
     lowest: float = 0.0  # reading of all, SI
     highest: float = 0.0  # reading of all, SI; as `lowest`: not known
+    one_force: bool = False  # whether the load pulls with the same force in all runs, wherever it is
+
+
+def several_forces(extent: Extent) -> bool:
+    """Whether runs can show what depends on the stress: under one force it is a constant, which temperatures or strains take up."""
+    return not extent.one_force
 
 
 class Width(NamedTuple):

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Candidate, Extent, Width
+from smajax.model.effects.candidate import Candidate, Extent, Width, several_forces
 from smajax.model.types import Scalar, WireState
 from smajax.model.wire.constitutive import ConstitutiveTerm
 from smajax.model.wire.history import HistoryTerm
@@ -51,6 +51,7 @@ class StressDependentStrain(AbstractEffect, HistoryTerm, ConstitutiveTerm):
         switches=("gain",),
         initial_guess={"gain": 0.01, "scale": 1e8, "returned": 0.5},
         grid=_grid,
+        observable=several_forces,
         prior_class="material",
         widths={
             "gain": Width(0.02, "NiTi: 1 to 4 % more strain from low to high stress"),

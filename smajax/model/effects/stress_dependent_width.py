@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Candidate, Width
+from smajax.model.effects.candidate import Candidate, Width, several_forces
 from smajax.model.types import Scalar, WireState
 from smajax.model.wire.kinetics_terms import RangeTerm
 from smajax.model.wire.wire import Kinetics
@@ -31,6 +31,7 @@ class StressDependentWidth(AbstractEffect, RangeTerm):
         sentence="Under a heavier load the transformation is spread over more degrees: it starts where it should and ends late.",
         switches=("heating", "cooling"),
         initial_guess={"heating": 1e-9, "cooling": 1e-9},
+        observable=several_forces,
         prior_class="material",
         widths={
             "heating": Width(

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from smajax.core.parameters import parameter
 from smajax.model.effects.base import AbstractEffect
-from smajax.model.effects.candidate import Candidate, Width
+from smajax.model.effects.candidate import Candidate, Width, several_forces
 from smajax.model.types import Scalar, WireState
 from smajax.model.wire.kinetics import cooling_width, heating_width
 from smajax.model.wire.kinetics_terms import RangeTerm
@@ -37,6 +37,7 @@ class UnequalStressSlopes(AbstractEffect, RangeTerm):
         "gets wider or narrower with the load.",
         switches=("heating", "cooling"),
         initial_guess={"heating": 0.1, "cooling": 0.1},
+        observable=several_forces,
         prior_class="material",
         widths={
             "heating": Width(
