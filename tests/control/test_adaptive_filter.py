@@ -12,6 +12,7 @@ import pytest
 from smajax.control.estimators.adaptive_filter import LARGEST, AdaptiveFilter
 from smajax.control.estimators.believed_state import with_vector
 from smajax.control.estimators.kalman import Innovation
+from smajax.control.estimators.model_filter import OFF_BRANCH, none_yet, unexplained
 from smajax.control.estimators.run import estimate
 from smajax.control.presets import FILTERS, adaptive_filter
 from smajax.core.parameters import get_parameters, set_parameters
@@ -145,14 +146,70 @@ def test_the_heating_curve_begins_at_all_martensite_at_most(wrong_convection) ->
     assert float(followed(free, readings, VOLTS)[0].state.wire.xi_M.max()) > 1.0
 
 
-@pytest.mark.parametrize(("sigmas", "amplitude"), [(4.0, 1.0), (-4.0, 1.0), (6.0, 0.3), (-6.0, 0.3)])
-def test_an_innovation_that_nothing_explains_lays_the_curves_through_the_state(sigmas: float, amplitude: float) -> None:
+@pytest.mark.parametrize(
+    ("last", "now", "lost"),
+    [
+        (0.0, 9.0, False),  # a glitch
+        (9.0, -9.0, False),  # and the reading after it
+        (9.0, 4.0, False),
+        (4.0, 9.0, False),
+        (6.0, 6.0, True),
+        (-6.0, -6.0, True),
+    ],
+)
+def test_two_innovations_beyond_five_standard_deviations_on_the_same_side_are_a_branch_lost(
+    last: float, now: float, lost: bool
+) -> None:
+    of = lambda sigmas: Innovation(jnp.asarray(sigmas * 2e-3), jnp.asarray(4e-6))  # noqa: E731
+    assert bool(unexplained(of(last), of(now))) is lost
+    assert not bool(unexplained(none_yet(jnp.asarray(1.0)), of(now)))
+
+
+@pytest.mark.parametrize(("lost", "amplitude"), [(False, 1.0), (True, 0.3)])
+def test_a_branch_that_is_lost_lays_the_curves_through_the_state(lost: bool, amplitude: float) -> None:
     """A wire of 0.28 martensite rests below the curve of a full transformation, and the correction makes it 0.30: it has turned back unseen."""
     at_rest = FILTER.start(jnp.asarray(0.0))[0].state
     # Strain and stress count from the rest, so the position goes with the fraction.
     vector = jnp.asarray([0.5, 0.0, 65.0, 0.28])
     resting = with_vector(ARM, at_rest, vector)
-    innovation = Innovation(jnp.asarray(sigmas * 2e-3), jnp.asarray(4e-6))
     no = jnp.zeros((), bool)
-    found = FILTER.filter.consistent(ARM, resting, vector.at[3].set(0.30), no, innovation)
+    found = FILTER.filter.consistent(ARM, resting, vector.at[3].set(0.30), no, jnp.asarray(lost))
     assert float(found.wire.xi_M) == pytest.approx(amplitude, abs=1e-6)
+
+
+def test_a_branch_that_is_lost_makes_temperature_and_fraction_less_certain_and_nothing_else(wrong_convection) -> None:
+    covariance = wrong_convection[2].covariance[-1]
+    added = np.asarray(FILTER.filter.widened(covariance, jnp.asarray(True)) - covariance)
+    np.testing.assert_allclose(np.sqrt(added.diagonal()), [0.0, 0.0, *OFF_BRANCH, 0.0, 0.0, 0.0], rtol=1e-9)
+    assert np.count_nonzero(added) == 2
+    assert (FILTER.filter.widened(covariance, jnp.asarray(False)) == covariance).all()
+
+
+def _swing(period: float):
+    """(truth, readings, voltages) of a wire that is heated and then swings inside its hysteresis, `period` seconds long, with 0.8 of the convection."""
+    time = np.arange(COUNT) * PERIOD
+    volts = jnp.asarray(np.where(time < 1.4, 8.0, 6.0 + 1.5 * np.sin(2.0 * np.pi * time / period)))
+    truth = simulate_compiled(_plant({"convection_coefficient": 0.8}), {"voltage": volts}, PERIOD)
+    return truth, truth.position + NOISE * jax.random.normal(jax.random.key(2), (COUNT,)), volts
+
+
+def _rms(truth, readings, volts, after: slice) -> float:
+    """Of the error of the estimated position, degrees."""
+    _, told = followed(FILTER, readings, volts)
+    return float(np.degrees(np.sqrt(np.mean(np.asarray(told.position - truth.position)[after] ** 2))))
+
+
+def test_a_wire_that_turns_inside_its_hysteresis_is_followed() -> None:
+    """0.20 degrees where the fraction is believed as surely after the branch was lost as before."""
+    truth, readings, volts = _swing(2.5)
+    assert _rms(truth, readings, volts, slice(200, COUNT)) < 0.1
+
+
+def test_one_wrong_reading_of_a_wire_between_its_branches_lays_no_curve() -> None:
+    """By 1.1 degrees, while nothing transforms: 0.1 degrees in the second after it where one innovation lays the curves."""
+    truth, readings, volts = _swing(1.5)
+    assert _rms(truth, readings, volts, slice(272, 372)) < 0.03
+    for wrong in (258, 271, 285, 299):
+        assert np.ptp(np.asarray(truth.martensite_fraction)[wrong - 5 : wrong + 5]) < 1e-3
+        for by in (0.02, -0.02):
+            assert _rms(truth, readings.at[wrong].add(by), volts, slice(wrong + 1, wrong + 101)) < 0.05

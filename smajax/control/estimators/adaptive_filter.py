@@ -20,7 +20,7 @@ from jaxtyping import Array, Bool, Float
 from smajax.control.estimators.base import AbstractEstimator
 from smajax.control.estimators.believed_state import advanced, vector_of, with_vector
 from smajax.control.estimators.kalman import Belief, Innovation, Matrix, Vector, corrected
-from smajax.control.estimators.model_filter import ModelFilter
+from smajax.control.estimators.model_filter import ModelFilter, none_yet, unexplained
 from smajax.control.measured_state import MeasuredState, truth
 from smajax.core.limited import limited
 from smajax.core.parameters import get_parameters, parameter, set_vector
@@ -56,7 +56,7 @@ class AdaptiveFilter(AbstractEstimator):
         nothing = jnp.zeros(len(self.estimated), belief.mean.dtype)
         errors = jnp.concatenate([jnp.diag(belief.covariance), self.ratio_error**2 + nothing])
         belief = Belief(jnp.concatenate([belief.mean, nothing]), jnp.diag(errors))
-        return self._read(rest, belief, jnp.zeros_like(reading, bool), reading)
+        return self._read(rest, belief, jnp.zeros_like(reading, bool), reading, none_yet(reading))
 
     def step(
         self, memory: AdaptiveFilterMemory, reading: Scalar, voltage: Scalar, period: Scalar
@@ -74,7 +74,7 @@ class AdaptiveFilter(AbstractEstimator):
         noise = jnp.concatenate([self.filter.walks() ** 2 * period, wander])
         belief, after = self.filter.prediction.predicted(transition, before, jnp.diag(noise))
         transforming = beyond(jnp.abs(after.wire.martensite_fraction - memory.state.wire.martensite_fraction))
-        return self._read(after, belief, transforming, reading)
+        return self._read(after, belief, transforming, reading, memory.innovation)
 
     def believed(self, logarithms: Float[Array, " parameters"]) -> System:
         """The system with its estimated parameters put in."""
@@ -82,12 +82,14 @@ class AdaptiveFilter(AbstractEstimator):
         return set_vector(system, self.estimated, get_parameters(system, self.estimated) * jnp.exp(logarithms))
 
     def _read(
-        self, state: State, belief: Belief, transforming: Bool[Array, ""], reading: Scalar
+        self, state: State, belief: Belief, transforming: Bool[Array, ""], reading: Scalar, last: Innovation
     ) -> tuple[AdaptiveFilterMemory, MeasuredState]:
         """Correct by the reading; a parameter stays within a factor of e of what is believed."""
         position = jnp.zeros_like(belief.mean).at[0].set(1.0)
         belief, innovation = corrected(belief, reading, position, self.filter.reading_noise**2)
         logarithms = limited(belief.mean[STATES:], -LARGEST, LARGEST)
         system = self.believed(logarithms)
-        state = self.filter.consistent(system, state, belief.mean[:STATES], transforming, innovation)
-        return AdaptiveFilterMemory(state, logarithms, belief.covariance, innovation), truth(state)
+        lost = unexplained(last, innovation) & ~transforming
+        state = self.filter.consistent(system, state, belief.mean[:STATES], transforming, lost)
+        covariance = self.filter.widened(belief.covariance, lost)
+        return AdaptiveFilterMemory(state, logarithms, covariance, innovation), truth(state)

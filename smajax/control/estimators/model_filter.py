@@ -34,9 +34,26 @@ from smajax.model.system import System, initial_state
 from smajax.model.types import Scalar, State
 from smajax.model.wire.branch_amplitude import beyond
 
-# Standard deviations of an innovation from which on the wire has transformed where its believed curves had nothing to transform: noise
-# alone is beyond five once in 1.7 million readings.
+# Standard deviations of an innovation, from which on, twice in a row on the same side, the wire has transformed where its believed curves had
+# nothing to transform. Twice, since one wrong reading is a glitch of the sensor as likely as a lost branch: after a glitch the correction has gone
+# too far, and the next innovation is on the other side. This is no error rate: innovations of a model with wrong parameters are not white (with
+# the air 3 K warmer their autocorrelation is some 0.5 from one reading to the next), and two in a row are then no rarity.
 UNEXPLAINED = 5.0
+# By how much temperature (K) and fraction may then be off beside what the filter believed: without it the filter that has lost its branch is too
+# sure of its fraction to follow the readings, and the curves go through the wrong state. Not where it believes that the wire transforms: there the
+# curves go with every correction, and are no less certain for it.
+OFF_BRANCH = (1.0, 3e-3)
+
+
+def none_yet(reading: Scalar) -> Innovation:
+    """The innovation before the first reading: it tells nothing."""
+    return Innovation(jnp.zeros_like(reading), jnp.ones_like(reading))
+
+
+def unexplained(last: Innovation, now: Innovation) -> Bool[Array, ""]:
+    """Whether two innovations in a row are beyond `UNEXPLAINED` standard deviations on the same side."""
+    both = jnp.minimum(last.value**2 / last.variance, now.value**2 / now.variance) > UNEXPLAINED**2
+    return both & (last.value * now.value > 0.0)
 
 
 class ModelFilterMemory(eqx.Module):
@@ -67,8 +84,9 @@ class ModelFilter(AbstractEstimator):
     start_fraction_error: Scalar = parameter("-", 0.0, 1.0, "of the martensite fraction")
     prediction: AbstractPrediction = Linearised()
     substeps: int = eqx.field(static=True, default=1)
-    # Whether the memory of the branches is held to what a wire can have: xi_M is a fraction, and an innovation that nothing explains lays both
-    # curves through the corrected state. Not where xi_M has to stand for a temperature that is degrees off, as with a wrong convection.
+    # Whether the memory of the branches is held to what a wire can have: xi_M is a fraction, and innovations that nothing explains lay both
+    # curves through the corrected state, whose temperature and fraction are then less certain (`unexplained`). Not where xi_M has to stand for
+    # a temperature that is degrees off, as with a wrong convection.
     keeps_branches: bool = eqx.field(static=True, default=False)
 
     def belief_at_rest(self, reading: Scalar) -> tuple[State, Belief]:
@@ -85,7 +103,7 @@ class ModelFilter(AbstractEstimator):
 
     def start(self, reading: Scalar) -> tuple[ModelFilterMemory, MeasuredState]:
         rest, belief = self.belief_at_rest(reading)
-        return self._read(rest, belief, jnp.zeros_like(reading, bool), reading)
+        return self._read(rest, belief, jnp.zeros_like(reading, bool), reading, none_yet(reading))
 
     def step(
         self, memory: ModelFilterMemory, reading: Scalar, voltage: Scalar, period: Scalar
@@ -100,22 +118,34 @@ class ModelFilter(AbstractEstimator):
         belief, after = self.prediction.predicted(transition, before, jnp.diag(self.walks() ** 2) * period)
         # Rounding alone does not transform.
         transforming = beyond(jnp.abs(after.wire.martensite_fraction - memory.state.wire.martensite_fraction))
-        return self._read(after, belief, transforming, reading)
+        return self._read(after, belief, transforming, reading, memory.innovation)
 
     def _read(
-        self, state: State, belief: Belief, transforming: Bool[Array, ""], reading: Scalar
+        self, state: State, belief: Belief, transforming: Bool[Array, ""], reading: Scalar, last: Innovation
     ) -> tuple[ModelFilterMemory, MeasuredState]:
         """Correct by the reading, and make the rest of the state consistent with what came out."""
         position = jnp.zeros_like(belief.mean).at[0].set(1.0)
         belief, innovation = corrected(belief, reading, position, self.reading_noise**2)
-        state = self.consistent(self.system, state, belief.mean, transforming, innovation)
-        return ModelFilterMemory(state, belief.covariance, innovation), truth(state)
+        lost = unexplained(last, innovation) & ~transforming
+        state = self.consistent(self.system, state, belief.mean, transforming, lost)
+        return ModelFilterMemory(state, self.widened(belief.covariance, lost), innovation), truth(state)
 
     def consistent(
-        self, system: System, state: State, vector: Corrected, transforming: Bool[Array, ""], innovation: Innovation
+        self,
+        system: System,
+        state: State,
+        vector: Corrected,
+        transforming: Bool[Array, ""],
+        lost: Bool[Array, ""],
     ) -> State:
-        """`with_correction`, and what `keeps_branches` says."""
+        """`with_correction`, and what `keeps_branches` says where the branch is `lost`."""
         if not self.keeps_branches:
             return with_correction(system, state, vector, transforming)
-        unexplained = innovation.value**2 > UNEXPLAINED**2 * innovation.variance
-        return within_one(with_correction(system, state, vector, transforming | unexplained))
+        return within_one(with_correction(system, state, vector, transforming | lost))
+
+    def widened(self, covariance: Matrix, lost: Bool[Array, ""]) -> Matrix:
+        """`covariance`, of temperature and fraction by `OFF_BRANCH` more where the branch is `lost`."""
+        if not self.keeps_branches:
+            return covariance
+        errors = jnp.zeros(covariance.shape[0], covariance.dtype).at[2:4].set(jnp.asarray(OFF_BRANCH, covariance.dtype))
+        return covariance + jnp.where(lost, jnp.diag(errors**2), 0.0)
