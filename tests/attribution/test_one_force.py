@@ -36,5 +36,5 @@ def test_under_one_weight_what_depends_on_the_stress_is_not_looked_for_and_said(
 )
 def test_under_more_forces_it_is(tmp_path: Path, change: tuple[str, str]) -> None:
     job = job_of(open_experiment(bench(tmp_path, change)))
-    assert OF_STRESS <= set(job.candidates)
-    assert cannot_show(job) == ()
+    assert set(job.candidates) >= OF_STRESS
+    assert not cannot_show(job)
