@@ -105,25 +105,29 @@ def presets(
     if out is not None:
         _write(names or [], out)
         return
+    with until_pipe_closes():
+        _list(names or [], json_out)
+
+
+def _list(names: Sequence[str], json_out: bool) -> None:
     if names:
         parts = _parts(names)
         if json_out:
             typer.echo(json.dumps(parts))
             return
-        with until_pipe_closes():
-            for name, entries in parts.items():
-                typer.echo(name if entries else f"{name}  (no parameters)")
-                rows = [
-                    [
-                        f"  {one}",
-                        f"{entry['value']:.5g} {entry['unit']}".removesuffix(" -"),
-                        f"{entry['bounds'][0]:g} to {entry['bounds'][1]:g}",
-                        entry["meaning"],
-                    ]
-                    for one, entry in entries.items()
+        for name, entries in parts.items():
+            typer.echo(name if entries else f"{name}  (no parameters)")
+            rows = [
+                [
+                    f"  {one}",
+                    f"{entry['value']:.5g} {entry['unit']}".removesuffix(" -"),
+                    f"{entry['bounds'][0]:g} to {entry['bounds'][1]:g}",
+                    entry["meaning"],
                 ]
-                for line in aligned(rows) if rows else ():
-                    typer.echo(line.rstrip())
+                for one, entry in entries.items()
+            ]
+            for line in aligned(rows) if rows else ():
+                typer.echo(line.rstrip())
         return
     from smajax.control.presets import CONTROLLERS
     from smajax.core.parameters import parameter_values, parameters
