@@ -89,7 +89,7 @@ def test_a_run_whose_process_is_killed_resumes_with_fewer_processes(tmp_path: Pa
         time.sleep(0.5)
     for one in running:
         one.kill()
-        one.wait()
+        one.communicate()  # which closes the pipe as well
     before = Store.opened(tmp_path / "killed").missing()
     assert before, "there is something left to do"
     _together(tmp_path / "killed", 2)
