@@ -119,7 +119,7 @@ def rows_of(file: ExperimentFile) -> tuple[Row, ...]:
         found = rows(model.wire, model.load, model.drive)
     except (KeyError, ValueError):
         return ()
-    likely = {name: str(one.base) for name, one in file.priors.presets.items() if one.base is not None}
+    likely = file.priors.bases
     return tuple(replace(row, preset=likely[row.name], origin=LIKELY) if row.name in likely else row for row in found)
 
 

@@ -54,13 +54,11 @@ def job_of(experiment: Experiment, integration: Integration | None = None) -> Jo
 
     declared_problem = problem_with(declared)
     extent = extent_of(declared_problem)
-    other_loads = extent._replace(one_force=False)
-    hidden = tuple(
-        name
-        for name in names
-        if LIBRARY[name].candidate.observable(other_loads) and not LIBRARY[name].candidate.observable(extent)
+    under_other_loads = tuple(
+        name for name in names if LIBRARY[name].candidate.observable(extent._replace(one_force=False))
     )
-    names = tuple(name for name in names if LIBRARY[name].candidate.observable(extent))
+    names = tuple(name for name in under_other_loads if LIBRARY[name].candidate.observable(extent))
+    hidden = tuple(name for name in under_other_loads if name not in names)
     integration = integration or choose_integration(declared_problem, declared_problem.system)
     problem = with_integration(problem_with((*declared, *names)), integration)
     full = problem.system

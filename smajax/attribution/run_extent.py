@@ -20,7 +20,7 @@ def _one_force(problem: Problem, lowest: float, highest: float) -> bool:
     own = {entry.name for entry in parameters(problem.system).values() if entry.path[0] == "load"}
     if own & {*batch.override_names, *problem.per_run.names}:
         return False  # runs have a load of their own
-    mask = np.asarray(batch.mask).reshape(len(batch.mask), -1)[:: len(batch.outputs)] > 0
+    mask = np.asarray(batch.mask)[:: len(batch.outputs)] > 0
     if isinstance(load, AbstractMovingLoad):
         at = [
             np.broadcast_to(load.resistance(jnp.asarray(end), jnp.asarray(0.0), batch.inputs), mask.shape)

@@ -6,11 +6,10 @@ from collections.abc import Callable, Mapping, Sequence
 from math import prod
 from typing import Any
 
-import jax
 import numpy as np
 
 from smajax.engine.arithmetic import ELEMENTWISE, select
-from smajax.engine.by_numpy import by_numpy
+from smajax.engine.by_numpy import by_jax, by_numpy
 from smajax.engine.loop import Loop
 from smajax.engine.memory import copy, in_memory, in_registers, mapped, row, write
 from smajax.engine.text import Array, Lane, Text, Unsupported, scalar_type
@@ -98,12 +97,7 @@ def moved(
     if primitive.name == "gather" and "FILL" in str(params.get("mode")):
         params = {**params, "fill_value": -1}  # not a place there is: found out below where it would be put in
     plain = by_numpy(primitive.name, params, named)
-    if plain is None:
-        with jax.ensure_compile_time_eval():
-            result = primitive.bind(*named, **params)
-        places = [np.asarray(one) for one in (result if primitive.multiple_results else [result])]
-    else:
-        places = [plain]
+    places = [np.asarray(one) for one in by_jax(primitive, params, named)] if plain is None else [plain]
     if any(((one < 0) | (one >= len(lanes))).any() for one in places):
         raise Unsupported(f"the operation `{primitive.name}` beyond the ends of an array")
     return [held([lanes[k] for k in one.ravel()], one.shape) for one in places]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+import jax
 import numpy as np
 
 Params = Mapping[str, Any]
@@ -94,3 +95,10 @@ def by_numpy(name: str, params: Params, given: Sequence[np.ndarray]) -> np.ndarr
     except (KeyError, TypeError, ValueError, AttributeError):
         return None
     return None if result is None else np.asarray(result)
+
+
+def by_jax(primitive: Any, params: Params, given: Sequence[Any]) -> list[Any]:
+    """The results of an operation on known arrays, whatever is traced around it."""
+    with jax.ensure_compile_time_eval():
+        result = primitive.bind(*given, **params)
+    return list(result) if primitive.multiple_results else [result]

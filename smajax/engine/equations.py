@@ -13,8 +13,6 @@ from smajax.engine.jax_versions import kind_of, parameters_of, refuse_unread
 from smajax.engine.text import Array
 
 CUTTING = ("floor", "ceil", "round", "trunc", "fix", "floor_divide")
-
-
 Read = tuple[Any, np.ndarray | None]  # a variable, or None and the array that is known
 
 

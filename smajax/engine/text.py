@@ -34,9 +34,8 @@ class Unsupported(ValueError):
         return f"machine code has no translation for {self.args[0]}"
 
 
-@dataclass(
-    slots=True, unsafe_hash=True
-)  # not frozen, which takes three times as long to make: there are 100,000 of them
+# Not frozen, which takes three times as long to make: there are 100,000 of them.
+@dataclass(slots=True, unsafe_hash=True)
 class Lane:
     """One number a lane: its name in the text (or a constant, the same in every lane). Nothing changes it."""
 

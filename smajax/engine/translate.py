@@ -25,7 +25,7 @@ from smajax.engine.array_operations import (
     reduced,
     whole_number,
 )
-from smajax.engine.by_numpy import by_numpy
+from smajax.engine.by_numpy import by_jax, by_numpy
 from smajax.engine.equations import Read, Step, array_of, note, read_of, steps_of
 from smajax.engine.expansions import EXPANSIONS
 from smajax.engine.jax_versions import TABLE, expanded, opened
@@ -40,6 +40,7 @@ VECTORS = 8  # of a group: while one waits for a result others go on
 CALLS = {
     name for name, own in TABLE.items() if "program" in own and name != "scan"
 }  # they stand for a program of their own
+Prepared = tuple[tuple[Step, ...], list[Read]]  # the equations of a program, and what it ends with
 SAME = (
     "optimization_barrier",
     "name",
@@ -89,9 +90,8 @@ def _as_shape(lanes: Held, shape: tuple[int, ...]) -> np.ndarray:
 class _Translation:
     def __init__(self, text: Text) -> None:
         self.text = text
-        self._prepared: dict[
-            int, tuple[Any, tuple[tuple[Step, ...], list[Read]]]
-        ] = {}  # with the program, whose number it is
+        # By the number of a program, which it has as long as it is kept.
+        self._prepared: dict[int, tuple[Any, Prepared]] = {}
 
     def program(self, jaxpr: Any, consts: Sequence[Value], given: Sequence[Value]) -> list[Value]:
         """The results of a program of which the arguments are `given`."""
@@ -108,7 +108,7 @@ class _Translation:
                 names[variable] = value
         return [names[one] if known is None else known for one, known in last]
 
-    def prepared(self, jaxpr: Any) -> tuple[tuple[Step, ...], list[Read]]:
+    def prepared(self, jaxpr: Any) -> Prepared:
         """The steps of a program and what it ends with, read once."""
         found = self._prepared.get(id(jaxpr))
         if found is None:
@@ -140,9 +140,7 @@ class _Translation:
             plain = _plainly(equation, given)
             if plain is not None:
                 return [plain]
-            with jax.ensure_compile_time_eval():
-                result = equation.primitive.bind(*given, **equation.params)
-            return [_numbers(one) for one in (result if equation.primitive.multiple_results else [result])]
+            return [_numbers(one) for one in by_jax(equation.primitive, equation.params, given)]
         out = array_of(equation.outvars[0].aval)
         kinds = [name_of(one.aval.dtype) for one in equation.invars]
         if name == "gather" and "FILL" in str(params["mode"]) and not at_known_places(name, given):
@@ -185,9 +183,8 @@ class _Translation:
             return operation(self.text, out.dtype, *lanes, **params)
 
         if out.shape == () and all(type(one) is Held and one.shape == () for one in given):
-            return held(
-                put(*(cast(Held, one).item() for one in given))
-            )  # nearly all there is: without the ways of arrays
+            # Nearly all there is: without the ways of arrays.
+            return held(put(*(cast(Held, one).item() for one in given)))
         if size > SMALL:
             if all(isinstance(one, Filled) or (is_known(one) and size_of(one) == 1) for one in given):
                 lanes = [

@@ -139,7 +139,7 @@ def _beside_the_values(project: Project, said: Mapping[str, str], head: str) -> 
     model = file.model
     inputs = tuple(name for name, one in file.channels.items() if one.role == "input")
     masses = {run.name: str(run.inputs["mass"]) for run in file.runs if "mass" in run.inputs}
-    likely = {name: (str(one.base), 0.0) for name, one in file.priors.presets.items() if one.base is not None}
+    likely = {name: (base, 0.0) for name, base in file.priors.bases.items()}
     known = Known({name: str(value) for name, value in model.parameters.items()}, likely, masses=masses)
     drafted = preset_parameters(DraftModel(model.wire, model.load, model.drive, inputs, "", ""), known)
     text = ordered(project.text, drafted.presets, said)

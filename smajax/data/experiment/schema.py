@@ -247,6 +247,11 @@ class PriorsSection(Section):
         default={}, description="a table of parameter = { relative = 0.1 } or { width = 'number unit' }"
     )
 
+    @property
+    def bases(self) -> dict[str, str]:
+        """Likely values, with their units, that are not those of the presets."""
+        return {name: str(one.base) for name, one in self.presets.items() if one.base is not None}
+
 
 class ExperimentFile(Section):
     """The whole file."""
