@@ -16,17 +16,20 @@ BLOCK = 512  # runs at once on a core: about 100 numbers each fit its second-lev
 LEAST_BLOCK = 8
 SMALL = 8  # a small batch is cut into so many blocks
 ENOUGH_TO_COMPILE = 400.0  # blocks of 8 runs (`BlockLengths`)
-ON_CARD = 1 << 17  # on a graphics card everything runs at once
+ON_CARD = 1 << 17  # runs at once on a graphics card, which has no blocks: all of a chunk
 Function = Callable[[Any, dict[str, jax.Array]], Any]
 
 
-def block_size(runs: int, devices: Sequence[jax.Device]) -> int:
-    """Runs that a device does at once.
+def on_card(devices: Sequence[jax.Device]) -> bool:
+    """Whether these are graphics cards."""
+    return devices[0].platform != "cpu"
+
+
+def block_size(runs: int) -> int:
+    """Runs that a core does at once.
 
     Not a matter of how many devices there are: in blocks of another length more than the last bits would round otherwise.
     """
-    if devices[0].platform != "cpu":
-        return ON_CARD
     return min(BLOCK, max(LEAST_BLOCK, 1 << max(0, -(-runs // SMALL) - 1).bit_length()))
 
 

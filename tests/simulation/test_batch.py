@@ -8,7 +8,7 @@ import sys
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple, cast
 
 import equinox as eqx
 import jax
@@ -21,8 +21,10 @@ from smajax.core.checkpointed_scan import checkpointed_scan
 from smajax.core.parameters import get_parameters, parameters, set_parameters, set_vector
 from smajax.core.progress import Stage
 from smajax.core.provenance import provenance
+from smajax.engine.xla import ON_CARD
 from smajax.model.presets import build
 from smajax.simulation.batch.axes import Axes, grid, sampled, zipped
+from smajax.simulation.batch.chunks import chunk_size, run_bytes
 from smajax.simulation.batch.recipe import BatchSettings, recipe_of
 from smajax.simulation.batch.run_batch import good, opened, run_batch, status_summary
 from smajax.simulation.batch.single_run import single_run
@@ -178,6 +180,27 @@ def test_the_size_of_chunks_changes_no_number(small_chunks: None) -> None:
         np.stack([_batch(grid(voltage=[v]))["position"][0] for v in axes.runs(0, 11)["voltage"]]),
         rtol=1e-12,
     )
+
+
+class Card(NamedTuple):
+    """A device that is no processor, as JAX describes one."""
+
+    platform: str = "gpu"
+
+
+def test_a_chunk_on_graphics_cards_is_no_larger_than_the_batch_and_the_budget() -> None:
+    settings = BatchSettings(SECONDS, DT, 1, ("position",), (), None)
+
+    def size(axes: Axes, budget: int, cards: int) -> int:
+        return chunk_size(single_run, recipe_of(ARM, {}, axes, settings), axes, budget, cast(Any, [Card()] * cards))
+
+    many = grid(voltage=[6.0, 8.0]) * sampled(1 << 19, payload_mass=(0.04, 0.07))
+    room = 4 * run_bytes(single_run, recipe_of(ARM, {}, AXES, settings), AXES)  # for one run at a time
+    assert size(AXES, 1 << 30, 1) == AXES.size
+    assert size(AXES, 1 << 30, 4) == 8  # two runs each, one of them twice
+    assert size(AXES, 4 * room, 1) == 3  # in two chunks, each as long
+    assert size(many, 1 << 40, 1) == ON_CARD
+    assert size(many, 1 << 40, 2) == 2 * ON_CARD
 
 
 def test_a_stopped_batch_resumes_to_the_same_bytes(small_chunks: None, tmp_path: Path) -> None:

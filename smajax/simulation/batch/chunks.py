@@ -17,7 +17,7 @@ from smajax.core.operating_system import available_cores
 from smajax.engine import Engine, program
 from smajax.engine.arguments import key_of
 from smajax.engine.facade import cached
-from smajax.engine.xla import block_size, rounded
+from smajax.engine.xla import ON_CARD, block_size, on_card, rounded
 from smajax.simulation.batch.axes import Axes
 
 MOST = 1 << 15  # runs a chunk, however little is stored of each: what an interruption loses
@@ -41,13 +41,14 @@ def run_bytes(function: Function, model: Any, axes: Axes) -> int:
 
 
 def chunk_size(function: Function, model: Any, axes: Axes, budget: int, devices: Sequence[jax.Device]) -> int:
-    """Runs a chunk, so that its results take at most a quarter of `budget` bytes, and `MOST` at most; chunks are even.
+    """Runs a chunk, so that its results take at most a quarter of `budget` bytes, and `MOST` at most (`ON_CARD` on each graphics card); chunks are even.
 
     A quarter: blocks and their concatenation on the device, and the copy that is written while the next chunk runs.
     Raises ValueError when not even one block fits.
     """
     each = run_bytes(function, model, axes)
-    whole = rounded(1, block_size(axes.size, devices), devices)
+    card = on_card(devices)
+    whole = rounded(1, 1 if card else block_size(axes.size), devices)
     most = budget // 4 // max(each, 1)
     if most < whole:
         raise ValueError(
@@ -55,7 +56,7 @@ def chunk_size(function: Function, model: Any, axes: Axes, budget: int, devices:
             "fewer values, every so many steps only (`every`), or measures in the place of trajectories."
         )
     wholes = -(-axes.size // whole)
-    count = -(-wholes // max(1, min(most, MOST) // whole))
+    count = -(-wholes // max(1, min(most, ON_CARD * len(devices) if card else MOST) // whole))
     return whole * -(-wholes // count)
 
 
@@ -76,7 +77,7 @@ def chunks(
     several = tuple(devices or jax.local_devices())
     run = program(function, model, tuple(axes.names), engine=engine, devices=several)
     threads = len(several) if devices else available_cores()
-    block = block_size(axes.size, several)
+    block = -(-size // len(several)) if on_card(several) else block_size(axes.size)
     ahead: tuple[int, Callable[[], Results]] | None = None
     for number in wanted:
         start, stop = number * size, min((number + 1) * size, axes.size)
