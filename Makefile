@@ -13,6 +13,9 @@ OPEN = $$(test -t 2 && test -z "$$CI" && echo --open)
 demo: $(READY)
 	SMAJAX_PROGRESS=lines $(BIN)/smajax demo --out demo-report $(OPEN)
 
+# Compiled Python is kept, whatever the environment asks for: without it each worker and each command of a test compiles it anew.
+unexport PYTHONDONTWRITEBYTECODE
+
 # A file goes to one worker, in which its tests share compiled programs; the longest begin first (tests/conftest.py).
 PYTEST = $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 STUDIES = tests/studies tests/documentation/test_notebooks.py

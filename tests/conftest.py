@@ -13,13 +13,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from matplotlib.figure import Figure
-from PIL import Image
 
-from smajax.core.runtime import prepare
-from smajax.engine import kernel
-from smajax.engine.facade import _programs
 from tests.helpers.in_browser import FLAGS, NONE, chromium
+
+# JAX and the package are imported where they are used: the process that hands tests to workers needs neither.
 
 CACHE = "JAX_COMPILATION_CACHE_DIR"
 
@@ -34,15 +31,9 @@ UNOPTIMISED = "--xla_backend_optimization_level=0"
 if UNOPTIMISED.split("=")[0] not in os.environ.get("XLA_FLAGS", ""):
     os.environ["XLA_FLAGS"] = f"{os.environ.get('XLA_FLAGS', '')} {UNOPTIMISED}".strip()
 
-prepare()
-
 # Machine code as well: LLVM's optimisation took a fifth of the time of all tests. Those of the engine have it (`optimised`).
 UNOPTIMISED_LEVELS = {"codegen_level": 0, "speed_level": 0}
-OPTIMISED_LEVELS = {name: kernel.COMPILE_OPTIONS[name] for name in UNOPTIMISED_LEVELS}
-kernel.COMPILE_OPTIONS.update(UNOPTIMISED_LEVELS)
-
-# Tracing makes millions of small objects that live: the collector looked at them again and again, a tenth of the time.
-gc.set_threshold(100_000, 20, 50)
+OPTIMISED_LEVELS: dict[str, int] = {}
 
 # Files that take longest, longest first (CPU time of a run without cached programs). A worker takes a whole file, in which the
 # tests of a rig share traced and compiled programs; a long one begun last would keep one worker busy alone.
@@ -72,9 +63,27 @@ LONGEST = (
 )
 
 
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """Of a process that runs tests, before the first array of JAX."""
+    hands_out = session.config.getoption("numprocesses", None) and not hasattr(session.config, "workerinput")
+    if hands_out:
+        return
+    from smajax.core.runtime import prepare
+    from smajax.engine import kernel
+
+    prepare()
+    OPTIMISED_LEVELS.update({name: kernel.COMPILE_OPTIONS[name] for name in UNOPTIMISED_LEVELS})
+    kernel.COMPILE_OPTIONS.update(UNOPTIMISED_LEVELS)
+    # Tracing makes millions of small objects that live: the collector looked at them again and again, a tenth of the time.
+    gc.set_threshold(100_000, 20, 50)
+
+
 @pytest.fixture(scope="module")
 def optimised() -> Iterator[None]:
     """Machine code as users have it, and no program that was compiled without optimisation."""
+    from smajax.engine import kernel
+    from smajax.engine.facade import _programs
+
     with pytest.MonkeyPatch.context() as patch:
         for name, level in OPTIMISED_LEVELS.items():
             patch.setitem(kernel.COMPILE_OPTIONS, name, level)
@@ -104,6 +113,9 @@ def blank_pictures(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPat
     """A page's pictures are blank, for tests of its words and numbers: to draw them took more than half of their time."""
     if {"drawn", "browser"} & set(request.fixturenames):
         return
+    from matplotlib.figure import Figure
+    from PIL import Image
+
     picture = io.BytesIO()
     Image.new("RGB", (2, 2), "white").save(picture, format="png")
 
