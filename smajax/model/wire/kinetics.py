@@ -18,6 +18,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Bool
 
+from smajax.core.traced_once import traced_once
 from smajax.model.types import Scalar, WireState
 from smajax.model.wire.branch_amplitude import FINISHED, beyond
 from smajax.model.wire.history import over
@@ -124,6 +125,7 @@ def _shares(law: Kinetics, terms: KineticsTerms, state: WireState) -> tuple[Scal
     return martensite_left(law, terms, *at), austenite_left(law, terms, *at)
 
 
+@traced_once
 def curves(
     law: Kinetics, terms: KineticsTerms, state: WireState, temperature: Scalar, stress: Scalar
 ) -> tuple[Scalar, Scalar]:
@@ -133,6 +135,7 @@ def curves(
     return law.renewal.curves(state, *_shares(law, terms, state), h, k)
 
 
+@traced_once
 def curve_on(
     law: Kinetics,
     terms: KineticsTerms,
