@@ -29,7 +29,12 @@ from smajax.simulation.simulate import DEFAULT_STEP
 
 HOT, COLD = "#c8553d", "#1f6fb2"
 SIZE, UPRIGHT, DPI = (8.4, 3.9), (4.4, 7.6), 80  # inches
-COLOURS = 64  # of the picture file
+COLOURS, SHADES, TYPICAL = (
+    128,
+    24,
+    6,
+)  # of the picture file, those of the wire, and frames that the others are taken from
+NEARLY_WHITE = 250
 SHADE = LinearSegmentedColormap.from_list("phase", [HOT, COLD])  # by the martensite fraction
 Run = Trajectory | xr.Dataset  # as `simulate` or as `simulate_dataset` returns it
 Draw = Callable[[int], list[Any]]  # sets the sample to show; the artists that it changed
@@ -97,11 +102,30 @@ def moving(
         for draw in draws:
             for artist in draw(int(sample)):
                 figure.draw_artist(artist)
-        images.append(Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB").quantize(COLOURS))
+        images.append(Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB"))
         progress(Stage(stage, 0.8 * (number + 1) / len(shown)))
-    film = _gif(images, round(1e3 * seconds / len(images)))
+    film = _gif(_quantised(images), round(1e3 * seconds / len(images)))
     progress(Stage(stage, 1.0))
     return film
+
+
+def _quantised(images: list[Image.Image]) -> list[Image.Image]:
+    """With one palette for all: to choose one for each took most of the time, and colours flickered.
+
+    Of the colours of some of them, each counted once: the ground would have nearly all. The shades of the wire are in it.
+    """
+    some = [np.asarray(images[k]) for k in np.unique(np.linspace(0, len(images) - 1, TYPICAL).round().astype(int))]
+    every = np.unique(
+        np.concatenate(some).reshape(-1, 3).astype(np.uint32) @ np.asarray([1 << 16, 1 << 8, 1], np.uint32)
+    )
+    colours = np.stack([every >> 16, every >> 8 & 255, every & 255], axis=-1).astype(np.uint8)
+    chosen = Image.fromarray(colours[None]).quantize(COLOURS - SHADES).getpalette() or []
+    few = np.reshape(chosen[: 3 * (COLOURS - SHADES)], (-1, 3))
+    few = np.where((few >= NEARLY_WHITE).all(axis=1, keepdims=True), 255, few)  # the ground stays as white as the page
+    shades = (255.0 * SHADE(np.linspace(0.0, 1.0, SHADES))[:, :3]).round().astype(int)
+    palette = Image.new("P", (1, 1))
+    palette.putpalette([*shades.ravel().tolist(), *few.ravel().tolist()])
+    return [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
 
 
 def _gif(images: list[Image.Image], each: int) -> bytes:
