@@ -50,6 +50,17 @@ def _select(_: Params, which: np.ndarray, *cases: np.ndarray) -> np.ndarray | No
     return np.where(which, cases[1], cases[0]) if which.dtype == bool and len(cases) == 2 else None
 
 
+def _iota(params: Params) -> np.ndarray:
+    shape, dimension = tuple(params["shape"]), params["dimension"]
+    along = [1] * len(shape)
+    along[dimension] = shape[dimension]
+    return np.broadcast_to(np.arange(shape[dimension], dtype=params["dtype"]).reshape(along), shape)
+
+
+def _integer_pow(params: Params, one: np.ndarray) -> np.ndarray | None:
+    return one * one if params["y"] == 2 else None  # of others the order of the products is JAX's own
+
+
 def _plain(operation: Callable[..., Any]) -> Callable[..., np.ndarray]:
     return lambda _, *given: operation(*given)
 
@@ -72,12 +83,19 @@ OPERATIONS: dict[str, Callable[..., np.ndarray | None]] = {
     "or": _plain(np.bitwise_or),
     "not": _plain(np.bitwise_not),
     "is_finite": _plain(np.isfinite),
+    "square": lambda _, one: one * one,
+    "integer_pow": _integer_pow,
+    "sqrt": _plain(np.sqrt),
+    "floor": _plain(np.floor),
+    "ceil": _plain(np.ceil),
+    "iota": _iota,
     "select_n": _select,
     "convert_element_type": _convert,
     "broadcast_in_dim": _broadcast_in_dim,
     "reshape": _reshape,
     "squeeze": lambda params, one: np.squeeze(one, tuple(params["dimensions"])),
     "transpose": lambda params, one: np.transpose(one, params["permutation"]),
+    "stack": lambda params, *given: np.stack(given, params["axis"]),
     "concatenate": lambda params, *given: np.concatenate(given, params["dimension"]),
     "slice": _slice,
     "dynamic_slice": _dynamic_slice,

@@ -6,10 +6,10 @@ from functools import reduce
 from math import prod
 from typing import Any
 
-import jax
 import numpy as np
 
 from smajax.engine.array_operations import MOVES, REDUCTIONS
+from smajax.engine.by_numpy import by_jax, by_numpy
 from smajax.engine.values import Held, held
 from smajax.export.errors import NoTranslation
 from smajax.export.operations import ELEMENTWISE, select
@@ -62,9 +62,8 @@ def moved(primitive: Any, params: dict[str, Any], given: list[Value]) -> list[Va
         numbers += list(own.ravel())
     if primitive.name == "gather" and "FILL" in str(params.get("mode")):
         params = {**params, "fill_value": -1}  # not a place there is: found out below where it would be put in
-    with jax.ensure_compile_time_eval():
-        result = primitive.bind(*places, **params)
-    results = [np.asarray(one) for one in (result if primitive.multiple_results else [result])]
+    plain = by_numpy(primitive.name, params, places)
+    results = [np.asarray(one) for one in by_jax(primitive, params, places)] if plain is None else [plain]
     if any(((one < 0) | (one >= len(numbers))).any() for one in results):
         raise NoTranslation(f"the operation `{primitive.name}` beyond the ends of an array")
     return [settled(held([numbers[k] for k in one.ravel()], one.shape)) for one in results]

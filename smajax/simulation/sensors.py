@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 import jax
+import jax.numpy as jnp
+import numpy as np
 
 from smajax.model.load.base import AbstractMovingLoad
 from smajax.model.system import System
@@ -38,10 +40,18 @@ def sensor_output(system: System, run: Trajectory, name: str) -> Series:
     if name == "force":
         return run.stress * cross_section(system.wire)
     if name == "resistance":
+        at = (run.temperature, run.martensite_fraction)
+        if not (
+            system.terms.resistance
+            or any(isinstance(one, jax.core.Tracer) for one in jax.tree.leaves((system.wire, at)))
+        ):
+            # By numpy: by JAX each operation is a program of its own for every length of a run, compiled for 20 ms.
+            wire = jax.tree.map(np.asarray, system.wire)
+            return jnp.asarray(resistance_per_metre(wire, (), *map(np.asarray, at)) * wire.wire_length)
         ohms = jax.vmap(
             lambda temperature, fraction: resistance_per_metre(
                 system.wire, system.terms.resistance, temperature, fraction
             )
         )
-        return ohms(run.temperature, run.martensite_fraction) * system.wire.wire_length
+        return ohms(*at) * system.wire.wire_length
     return getattr(run, name)
