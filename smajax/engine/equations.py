@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import jax.extend as jex
@@ -38,8 +39,11 @@ class Step:
             self.checked = True
 
 
+_array = cache(Array)
+
+
 def array_of(aval: Any) -> Array:
-    return Array(*kind_of(aval))
+    return _array(*kind_of(aval))
 
 
 def note(error: Exception, equation: Any) -> None:

@@ -6,7 +6,7 @@ The translator reads a primitive's parameters by the names on the left, which ar
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
 import jax
@@ -80,10 +80,16 @@ TABLE: Mapping[str, Mapping[str, tuple[Reading, ...]]] = {
 OF_PLACE_OR_TYPE = {"sharding", "out_sharding", "weak_type", "new_dtype"}
 
 
+@cache
+def _read_of(name: str) -> frozenset[Any]:
+    """The parameters of a primitive that the translator reads, or need not read."""
+    return frozenset(one for readings in TABLE.get(name, {}).values() for one in readings) | OF_PLACE_OR_TYPE
+
+
 def refuse_unread(equation: Any) -> None:
     """Arithmetic asked for in a way that the translator does not read, by a parameter of a later release. Raises Unsupported."""
     name = equation.primitive.name
-    read = {one for readings in TABLE.get(name, {}).values() for one in readings} | OF_PLACE_OR_TYPE
+    read = _read_of(name)
     for parameter, value in equation.params.items():
         if parameter not in read and value is not None:
             raise Unsupported(f"the operation `{name}` with `{parameter}={value}`")

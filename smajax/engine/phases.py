@@ -292,11 +292,10 @@ def _settled(
     _lay_early(left, made, by_cell(cells), phases, loops, cells)
 
     touched: dict[str, set[int]] = {}
-    for number, name in [*read, *((one.phase, one.value) for one in left if one.value in names.layouts)]:
+    for number, name in dict.fromkeys([*read, *((one.phase, one.value) for one in left if one.value in names.layouts)]):
         if name in cells or made[name] != number:
             touched.setdefault(cells.get(name, name), set()).add(number)
-            if name not in phases[number].loads:
-                phases[number].loads.append(name)
+            phases[number].loads.append(name)
     for one in left:
         touched.setdefault(one.cell, set()).add(one.phase)
         phases[one.phase].stores.append((one.cell, one.value))

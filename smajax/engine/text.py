@@ -111,14 +111,15 @@ class Text:
 
         `dtype`: the kind of number of a vector.
         """
-        names, depth = NAMES.findall(right), self.least_depth
+        names, depth, depths = NAMES.findall(right), self.least_depth, self.depth
         for one in names:
-            depth = max(depth, self.depth.get(one, 0))
+            if (own := depths.get(one, 0)) > depth:
+                depth = own
         level = self.levels[depth]
         if (given := level.known.get(right)) is not None:
             return given
         name = level.known[right] = self.fresh()
-        self.depth[name] = depth
+        depths[name] = depth
         if reads := self._reads(names):
             assert dtype is not None, f"of an unknown kind: {right}"
             self.names.layouts[name] = self.layout(dtype)

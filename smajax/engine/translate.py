@@ -87,6 +87,24 @@ def _as_shape(lanes: Held, shape: tuple[int, ...]) -> np.ndarray:
     return alike.ravel()
 
 
+def _any_unknown(given: Sequence[Value]) -> bool:
+    for one in given:
+        if type(one) is Held:
+            return True
+    return not all(map(is_known, given))
+
+
+def _number(text: Text, value: Value) -> Lane | None:
+    """The lane of a number in registers, or of one that is known; None of anything else."""
+    kind = type(value)
+    if kind is not Held and kind is not np.ndarray:
+        return None
+    one = cast(np.ndarray, value)
+    if one.shape != ():
+        return None
+    return cast(Lane, one.item()) if kind is Held else text.constant(one[()], name_of(one.dtype))
+
+
 class _Translation:
     def __init__(self, text: Text) -> None:
         self.text = text
@@ -121,7 +139,7 @@ class _Translation:
 
     def equation(self, step: Step, given: list[Value]) -> list[Value]:
         equation, name, params = step.equation, step.name, step.params
-        if step.operation is not None and step.out is not None and not all(map(is_known, given)):
+        if step.operation is not None and step.out is not None and _any_unknown(given):
             step.check()
             return [self.elementwise(name, params, given, step.operation, step.out)]
         if name in SAME:
@@ -172,19 +190,23 @@ class _Translation:
     def elementwise(
         self, name: str, params: dict[str, Any], given: list[Value], operation: Operation, out: Array
     ) -> Value:
-        size = prod(out.shape)
         scalar_type(out.dtype)
         if name == "convert_element_type" and isinstance(given[0], Stored) and given[0].dtype == out.dtype:
             return given[0]
 
         def put(*lanes: Lane) -> Lane:
-            if name not in OF_TWO_KINDS and any(one.dtype != lanes[0].dtype for one in lanes):
-                raise Unsupported(f"`{name}` of different kinds of numbers")
+            if name not in OF_TWO_KINDS:
+                for one in lanes:
+                    if one.dtype != lanes[0].dtype:
+                        raise Unsupported(f"`{name}` of different kinds of numbers")
             return operation(self.text, out.dtype, *lanes, **params)
 
-        if out.shape == () and all(type(one) is Held and one.shape == () for one in given):
+        if out.shape == ():
             # Nearly all there is: without the ways of arrays.
-            return held(put(*(cast(Held, one).item() for one in given)))
+            numbers = [_number(self.text, one) for one in given]
+            if None not in numbers:
+                return held(put(*cast(list[Lane], numbers)))
+        size = prod(out.shape)
         if size > SMALL:
             if all(isinstance(one, Filled) or (is_known(one) and size_of(one) == 1) for one in given):
                 lanes = [
