@@ -123,6 +123,8 @@ def blank_pictures(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPat
         stream.write(picture.getvalue())
 
     monkeypatch.setattr(Figure, "savefig", savefig)
+    # To make its axes takes as long as to draw them.
+    monkeypatch.setattr("smajax.report.series_picture.as_picture", lambda *_, **__: picture.getvalue())
 
 
 @pytest.fixture(scope="module")

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from types import MappingProxyType
+from typing import TypeVar
 
 import jax
 import jax.numpy as jnp
@@ -15,6 +17,7 @@ from smajax.model.types import Series, Trajectory
 from smajax.model.wire.heat import cross_section
 from smajax.model.wire.resistance import resistance_per_metre
 
+Tree = TypeVar("Tree")
 # Name -> the program's own unit. The load's own sensor (position, angle, strain or stress) is the trajectory's `reading`,
 # the only one that an effect may delay.
 SENSORS: Mapping[str, str] = MappingProxyType(
@@ -37,21 +40,17 @@ def sensor_output(system: System, run: Trajectory, name: str) -> Series:
     """
     if name in ("reading", system.load.reading[0]):
         return run.reading
+    wire, stress, at = _known((system.wire, run.stress, (run.temperature, run.martensite_fraction)))
     if name == "force":
-        return run.stress * cross_section(system.wire)
+        return jnp.asarray(stress * cross_section(wire))
     if name == "resistance":
-        at = (run.temperature, run.martensite_fraction)
-        if not (
-            system.terms.resistance
-            or any(isinstance(one, jax.core.Tracer) for one in jax.tree.leaves((system.wire, at)))
-        ):
-            # By numpy: by JAX each operation is a program of its own for every length of a run, compiled for 20 ms.
-            wire = jax.tree.map(np.asarray, system.wire)
-            return jnp.asarray(resistance_per_metre(wire, (), *map(np.asarray, at)) * wire.wire_length)
-        ohms = jax.vmap(
-            lambda temperature, fraction: resistance_per_metre(
-                system.wire, system.terms.resistance, temperature, fraction
-            )
-        )
-        return ohms(*at) * system.wire.wire_length
+        terms = system.terms.resistance
+        ohms = partial(resistance_per_metre, wire, terms)
+        return jnp.asarray((jax.vmap(ohms)(*at) if terms else ohms(*at)) * wire.wire_length)
     return getattr(run, name)
+
+
+def _known(tree: Tree) -> Tree:
+    """With arrays of numpy, where nothing is traced: by JAX each operation is a program for every length of a run, compiled for 20 ms."""
+    traced = any(isinstance(one, jax.core.Tracer) for one in jax.tree.leaves(tree))
+    return tree if traced else jax.tree.map(np.asarray, tree)

@@ -41,22 +41,21 @@ DEGREE = math.pi / 180.0
 SETTINGS = settings(max_examples=60, deadline=None)
 
 
-@eqx.filter_jit
-def _batch(controllers: Any, wanted: Reference, dt: Any, starts: Any) -> ClosedLoop:
-    """One run a lane; `dt` differs from lane to lane, so that one compilation serves every step."""
-    return jax.vmap(lambda c, w, step, at: simulate_closed_loop(PLANT, c, w, step, initial=at))(
-        controllers, wanted, dt, starts
-    )
+@by_machine_code
+def _loop(controller: Any, wanted: Reference, dt: Any, start: Any) -> ClosedLoop:
+    """`dt` differs from run to run, so that one compilation serves every step."""
+    return simulate_closed_loop(PLANT, controller, wanted, dt, initial=start)
 
 
 def batch(controllers: list[Any], targets: list[Any], steps: list[float], starts: list[tuple[float, float]]) -> Any:
     """Set points (degrees) or references; starts on the heating curve: (degrees, rad/s)."""
     wanted = [one if isinstance(one, Reference) else resting(jnp.full(COUNT, one * DEGREE)) for one in targets]
     states = [on_heating_curve(PLANT, jnp.asarray(angle * DEGREE), jnp.asarray(rate)) for angle, rate in starts]
-    arguments = stacked(controllers), stacked(wanted), jnp.asarray(steps), stacked(states)
-    # Without weak types, which would compile again.
-    loops = _batch(*jax.tree.map(lambda leaf: jnp.asarray(leaf, dtype=float), arguments))
-    return jax.tree.map(np.asarray, loops)
+    loops = [
+        _loop(*jax.tree.map(lambda leaf: np.asarray(leaf, dtype=float), of))
+        for of in zip(controllers, wanted, steps, states, strict=True)
+    ]
+    return jax.tree.map(lambda *leaves: np.stack(leaves), *loops)
 
 
 @eqx.filter_jit
