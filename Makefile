@@ -57,12 +57,14 @@ lint: $(READY)
 notebooks: $(READY)
 	$(BIN)/python -m studies.make_notebooks
 
-# Wheel and source archive; the wheel must work from an empty folder in an environment of its own.
+# Wheel and source archive; the wheel must work from an empty folder in an environment of its own, of TRY.
+TRY = $(BIN)/python
+
 package: $(READY)
 	rm -rf dist build/try
 	$(BIN)/python -m build --outdir dist .
-	$(BIN)/python -m venv build/try/env
-	build/try/env/bin/python -m pip install --quiet --disable-pip-version-check dist/*.whl
+	$(TRY) -m venv build/try/env
+	build/try/env/bin/python -m pip install --quiet --disable-pip-version-check --no-compile dist/*.whl
 	mkdir build/try/empty
 	cd build/try/empty && ../env/bin/smajax --version && ../env/bin/smajax presets && ../env/bin/smajax doctor \
 	  && ../env/bin/smajax simulate --step 7V:2s --out run && ../env/bin/smajax figures M9 --fast && ../env/bin/python -c 'import smajax; smajax.simulate_dataset'
