@@ -92,15 +92,14 @@ def test_a_full_disk_is_reported(tmp_path: Path, small_disk: list[str]) -> None:
 
 
 def test_a_read_only_folder_is_reported_before_the_work(tmp_path: Path, small_disk: list[str]) -> None:
-    experiment = bench(tmp_path / "bench")
     (tmp_path / "disk" / "out").mkdir(parents=True)
     code = (
-        "import sys\nfrom smajax.cli.main import main\n_, experiment, disk = sys.argv\n"
-        "for out in ('out', 'deep/out'):\n    sys.argv = ['smajax', 'identify', experiment, '--out', f'{disk}/{out}']\n"
+        "import sys\nfrom smajax.cli.main import main\n_, disk, *words = sys.argv\n"
+        "for out in ('out', 'deep/out'):\n    sys.argv = ['smajax', 'simulate', *words, '--out', f'{disk}/{out}']\n"
         "    try:\n        main()\n    except SystemExit as end:\n        print(end.code)"
     )
     inside = 'mount -t tmpfs none "$0" && mkdir "$0/out" && mount -o remount,ro "$0" || exit 99; "$@"'
-    command = [sys.executable, "-c", code, str(experiment), str(tmp_path / "disk")]
+    command = [sys.executable, "-c", code, str(tmp_path / "disk"), *WIRE]
     told = subprocess.run(
         [*small_disk, "sh", "-c", inside, str(tmp_path / "disk"), *command], capture_output=True, text=True
     )

@@ -41,12 +41,9 @@ for command in json.loads(sys.argv[1]):
 print(json.dumps(ended))
 """
 )
-QUICK = (
-    "presets",
-    "new-experiment {out}/log.csv --out {out}/begun.toml",
-)
+QUICK = ("presets", "effects")
 LONG = (
-    "effects",
+    "new-experiment {out}/log.csv --out {out}/begun.toml",
     "simulate flexinol_table_3_2 dead_weight flexinol_voltage --step 5V:1s --out {out}/run",
     "identify {bench} --starts 0 --out {out}/identified",
     "figures M9 --fast --no-open --out {out}/figures",

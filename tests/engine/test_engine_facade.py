@@ -38,6 +38,7 @@ from smajax.model.presets import build
 from smajax.simulation.compiled import simulate_compiled
 from tests.helpers.engine_results import summed
 from tests.helpers.often import often
+from tests.helpers.small_bench import smajax
 
 DEMO = Path(__file__).parents[2] / "smajax" / "data" / "demo" / "latent" / "experiment.toml"
 Break = Callable[[pytest.MonkeyPatch], object]
@@ -250,12 +251,10 @@ def test_an_unknown_engine_is_an_error_with_the_valid_choices(monkeypatch: pytes
     monkeypatch.setenv("SMAJAX_ENGINE", "gpu")
     with pytest.raises(EngineError, match=r"SMAJAX_ENGINE is 'gpu'"):
         simulate_compiled(arm, {"voltage": jnp.full(5, 5.0)})
-    told = subprocess.run(
-        [sys.executable, "-m", "smajax", "doctor"], capture_output=True, text=True, env=dict(os.environ), timeout=120
-    )
-    assert told.returncode == 2
-    assert "SMAJAX_ENGINE is 'gpu'" in told.stderr
-    assert "Traceback" not in told.stderr
+    told = smajax("doctor")
+    assert told.code == 2
+    assert "SMAJAX_ENGINE is 'gpu'" in told.said
+    assert "Traceback" not in told.said
 
 
 def test_the_old_name_of_the_engine_works_for_one_version() -> None:
