@@ -12,7 +12,6 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from matplotlib.figure import Figure
@@ -27,11 +26,13 @@ from smajax.simulation.simulate import DEFAULT_STEP, simulate
 from studies.reference.sliding import sliding_controller
 from studies.reference.wire_parameters import ArmParameters, DeadWeightParameters
 from studies.reference.wire_reference import simulate_arm, simulate_dead_weight
+from studies.source.rigs import compiled
 
 PICTURE = Path(__file__).parent / "convergence.png"
 STEPS = (0.04, 0.02, 0.01, 0.005, 0.0025)
 EVERY = 0.04  # s between compared times
 PERIOD = 0.04  # s, of the controller: a multiple of every step
+RUN, CONTROLLED = compiled(simulate), compiled(simulate_closed_loop)
 Errors = tuple[float, float]  # of the position, in units that the two limits below are in; of the fraction
 LIMITS = (0.05, 1e-3)  # degrees (per cent of 10 mm), -
 
@@ -54,10 +55,9 @@ def _times(seconds: float) -> np.ndarray:
 
 def _arm_step(volts: float, seconds: float) -> Callable[[float], Errors]:
     exact = simulate_arm(arm_parameters(), [(seconds, volts)], _times(seconds))
-    run = eqx.filter_jit(simulate)
 
     def errors(dt: float) -> Errors:
-        got = run(
+        got = RUN(
             build("niti_table_3_1", "arm", "amplified_voltage"),
             {"voltage": jnp.full(round(seconds / dt) + 1, volts)},
             dt,
@@ -74,14 +74,13 @@ def _arm_step(volts: float, seconds: float) -> Callable[[float], Errors]:
 def _weight(segments: list[tuple[float, float, float]]) -> Callable[[float], Errors]:
     seconds = segments[-1][0]
     exact = simulate_dead_weight(DeadWeightParameters(), segments, _times(seconds))
-    run = eqx.filter_jit(simulate)
 
     def errors(dt: float) -> Errors:
         time = np.arange(round(seconds / dt) + 1) * dt
         which = np.searchsorted([end - 1e-9 for end, _, _ in segments[:-1]], time, side="right")
         volts, mass = (np.array([segment[k] for segment in segments])[which] for k in (1, 2))
         inputs = {"voltage": jnp.asarray(volts), "mass": jnp.asarray(mass)}
-        got = run(build("flexinol_table_3_2", "dead_weight", "voltage"), inputs, dt)
+        got = RUN(build("flexinol_table_3_2", "dead_weight", "voltage"), inputs, dt)
         at = slice(None, None, round(EVERY / dt))
         return (
             float(np.abs(got.position[at] - exact["position"]).max() / 1e-4),
@@ -102,11 +101,10 @@ def _regulated(seconds: float) -> Callable[[float], Errors]:
         period=PERIOD,
         memory=0.0,
     )
-    run = eqx.filter_jit(simulate_closed_loop)
 
     def errors(dt: float) -> Errors:
         target = jnp.full(round(seconds / dt) + 1, wanted)
-        got = run(arm, ours, target, dt, round(PERIOD / dt)).run
+        got = CONTROLLED(arm, ours, target, dt, round(PERIOD / dt)).run
         at = slice(None, None, round(EVERY / dt))
         return (
             float(np.degrees(np.abs(got.position[at] - exact["angle"]).max())),

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -30,7 +29,7 @@ from smajax.model.wire.start import start
 from smajax.report.drawing import GREY, keyed, named, panels
 from smajax.simulation.simulate import DEFAULT_STEP
 
-from .rigs import Recorded, recorded
+from .rigs import Recorded, compiled, together
 
 Tree = TypeVar("Tree")
 PERIOD, SECONDS = 0.01, 20.0
@@ -66,30 +65,23 @@ def stacked(trees: Sequence[Tree]) -> Tree:
     return stack
 
 
-@eqx.filter_jit
-def _runs(
-    systems: System,
-    controllers: AbstractController,
-    targets: jax.Array,
+@compiled
+def _run(
+    system: System,
+    controller: AbstractController,
+    target: Scalar,
     initial: State | None,
     seconds: float,
     dt: float,
-    estimator: AbstractEstimator | None = None,
-    sensors: Sensor | None = None,
+    estimator: AbstractEstimator | None,
+    sensor: Sensor | None,
 ) -> tuple[ClosedLoop, Merit]:
-    time = clock(seconds, dt)
-    key = None if sensors is None else jax.random.key(0)
-
-    def one(
-        system: System, controller: AbstractController, target: Scalar, initial: State | None, sensor: Sensor | None
-    ) -> tuple[ClosedLoop, Merit]:
-        wanted, every = constant(time, target), round(PERIOD / dt)
-        loop = simulate_closed_loop(
-            system, controller, wanted, dt, every, initial=initial, estimator=estimator, sensor=sensor, key=key
-        )
-        return loop, merit(loop, system)
-
-    return jax.vmap(one)(systems, controllers, targets, initial, sensors)
+    wanted, every = constant(clock(seconds, dt), target), round(PERIOD / dt)
+    key = None if sensor is None else jax.random.key(0)
+    loop = simulate_closed_loop(
+        system, controller, wanted, dt, every, initial=initial, estimator=estimator, sensor=sensor, key=key
+    )
+    return loop, merit(loop, system)
 
 
 def runs(
@@ -102,16 +94,19 @@ def runs(
     estimator: AbstractEstimator | None = None,
     noise: Sequence[float] | None = None,
 ) -> tuple[Recorded, Recorded]:
-    """A batch and its figures of merit, one system, controller and set point (degrees) a run; `initial` likewise.
+    """Runs and their figures of merit, one system, controller and set point (degrees) a run; `initial` likewise.
 
     Without an `estimator`, one for all, the controllers get the true state; `noise`, rad, is that of each run's
     reading of the position.
     """
     dt = PERIOD if fast else DEFAULT_STEP
-    at = jnp.radians(jnp.asarray(targets))
-    sensors = None if noise is None else stacked([Sensor(noise_sigma=sigma) for sigma in noise])
-    loops, merits = _runs(stacked(systems), stacked(controllers), at, initial, seconds, dt, estimator, sensors)
-    return recorded(loops), jax.tree.map(np.asarray, merits)
+    sensors = [None] * len(systems) if noise is None else [Sensor(noise_sigma=sigma) for sigma in noise]
+    found = []
+    for k, (system, controller, target) in enumerate(zip(systems, controllers, targets, strict=True)):
+        start = jax.tree.map(lambda leaf, k=k: leaf[k], initial)
+        found.append(_run(system, controller, np.radians(target), start, seconds, dt, estimator, sensors[k]))
+    loops, merits = together(found)
+    return loops, merits
 
 
 def degrees(loops: Recorded) -> Any:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
-import equinox as eqx
 import jax
 import numpy as np
 from jaxtyping import Array, Float
@@ -15,6 +14,7 @@ from smajax.control.controllers.base import AbstractController
 from smajax.control.presets import stress_sliding
 from smajax.model.system import System
 from smajax.model.types import Series, Trajectory
+from smajax.simulation.compiled import run_alone
 from smajax.simulation.simulate import simulate
 
 Batched = Float[Array, "runs time"]
@@ -29,29 +29,39 @@ def recorded(run: Trajectory | ClosedLoop) -> Recorded:
     return jax.tree.map(np.asarray, run)
 
 
-@eqx.filter_jit
-def _simulated(system: System, inputs: dict[str, Series], dt: float) -> Trajectory:
-    return simulate(system, inputs, dt)
+def compiled(function: Callable[..., Any]) -> Callable[..., Recorded]:
+    """`function` as machine code, in tenths of a second where XLA takes ten; in numpy. What is no array is part of the program."""
+
+    def applied(given: tuple[Any, ...], _: dict[str, Any]) -> Any:
+        return function(*given)
+
+    def run(*given: Any) -> Recorded:
+        return run_alone(applied, given, "auto")
+
+    return run
+
+
+def together(runs: Sequence[Any]) -> Recorded:
+    """One record of arrays (runs, ...) of many."""
+    return jax.tree.map(lambda *leaves: np.stack(leaves), *runs)
+
+
+_simulated = compiled(simulate)
 
 
 def simulated(system: System, inputs: dict[str, Series], dt: float) -> Recorded:
     """One run, compiled, in numpy."""
-    return recorded(_simulated(system, inputs, dt))
-
-
-@eqx.filter_jit
-def _batch(system: System, inputs: dict[str, Batched], dt: float) -> Trajectory:
-    return jax.vmap(lambda one: simulate(system, one, dt))(inputs)
+    return _simulated(system, inputs, dt)
 
 
 def batch(system: System, inputs: dict[str, Batched], dt: float) -> Recorded:
-    """Many runs of one system at once: every input, and every array that comes back, of shape (runs, time)."""
-    return recorded(_batch(system, inputs, dt))
+    """Many runs of one system: every input, and every array that comes back, of shape (runs, time)."""
+    series = {name: np.asarray(values) for name, values in inputs.items()}
+    count = len(next(iter(series.values())))
+    return together([simulated(system, {name: of[k] for name, of in series.items()}, dt) for k in range(count)])
 
 
-@eqx.filter_jit
-def _controlled(system: System, controller: AbstractController, target: Series, dt: float, every: int) -> ClosedLoop:
-    return simulate_closed_loop(system, controller, target, dt, every)
+_controlled = compiled(simulate_closed_loop)
 
 
 def controlled(
@@ -62,7 +72,7 @@ def controlled(
     make: Callable[[System], AbstractController] = stress_sliding,
 ) -> Recorded:
     """The arm under stress-based sliding control, with the gains of a preset, compiled, in numpy."""
-    return recorded(_controlled(system, make(system), target, dt, round(period / dt)))
+    return _controlled(system, make(system), target, dt, round(period / dt))
 
 
 def austenite_range(system: System, stress: Any) -> tuple[Any, Any]:

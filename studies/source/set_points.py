@@ -1,4 +1,4 @@
-"""The arm under a controller of chapter 4 at several set points, or with one gain swept: one batch each."""
+"""The arm under a controller of chapter 4 at several set points, or with one gain swept."""
 
 from __future__ import annotations
 
@@ -6,8 +6,6 @@ import dataclasses
 import functools
 from collections.abc import Callable, Sequence
 
-import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -28,7 +26,7 @@ from smajax.model.types import Scalar
 from smajax.report.drawing import BLACK, BLUE, GREEN, GREY, RED, named, panels
 from smajax.simulation.simulate import DEFAULT_STEP
 
-from .rigs import Recorded, austenite_range
+from .rigs import Recorded, austenite_range, compiled
 
 SECONDS, PERIOD = 10.0, 0.01
 SET_POINTS = (-30.0, -15.0, 0.0, 10.0, 20.0, 40.0, 50.0, 65.0)  # degrees
@@ -36,8 +34,24 @@ Runs = dict[float, tuple[Recorded, Recorded]]
 SHADES = (GREY, GREEN, BLUE, RED, BLACK, "#d9a441", "#7a5fa8", "#2aa5a0")
 
 
-@eqx.filter_jit
-def _batch(
+@compiled
+def _loop(
+    system: System,
+    controller: AbstractController,
+    names: tuple[str, ...],
+    gains: Float[Array, " names"],
+    target: Scalar,
+    dt: float,
+    estimator: AbstractEstimator | None,
+    seconds: float,
+) -> tuple[ClosedLoop, Merit]:
+    wanted = constant(clock(seconds, dt), target)
+    tuned = set_vector(controller, names, gains)
+    loop = simulate_closed_loop(system, tuned, wanted, dt, round(PERIOD / dt), estimator=estimator)
+    return loop, merit(loop, system)
+
+
+def _loops(
     system: System,
     controller: AbstractController,
     names: tuple[str, ...],
@@ -46,21 +60,9 @@ def _batch(
     dt: float,
     estimator: AbstractEstimator | None = None,
     seconds: float = SECONDS,
-) -> tuple[ClosedLoop, Merit]:
-    time = clock(seconds, dt)
-
-    def one(row: Float[Array, " names"], target: Scalar) -> tuple[ClosedLoop, Merit]:
-        tuned = set_vector(controller, names, row)
-        wanted = constant(time, target)
-        loop = simulate_closed_loop(system, tuned, wanted, dt, round(PERIOD / dt), estimator=estimator)
-        return loop, merit(loop, system)
-
-    return jax.vmap(one)(gains, targets)
-
-
-def _unstacked(both: tuple[ClosedLoop, Merit], count: int) -> list[tuple[Recorded, Recorded]]:
-    both = jax.tree.map(np.asarray, both)
-    return [jax.tree.map(lambda series, k=k: series[k], both) for k in range(count)]
+) -> list[tuple[Recorded, Recorded]]:
+    rows = zip(np.asarray(gains), np.asarray(targets), strict=True)
+    return [_loop(system, controller, names, row, target, dt, estimator, seconds) for row, target in rows]
 
 
 def at_set_points(
@@ -76,8 +78,8 @@ def at_set_points(
     """
     targets = jnp.radians(jnp.asarray(degrees, dtype=float))
     none = jnp.zeros((len(degrees), 0))
-    result = _batch(arm(), controller, (), none, targets, PERIOD if fast else DEFAULT_STEP, estimator, seconds)
-    return dict(zip(degrees, _unstacked(result, len(degrees)), strict=True))
+    dt = PERIOD if fast else DEFAULT_STEP
+    return dict(zip(degrees, _loops(arm(), controller, (), none, targets, dt, estimator, seconds), strict=True))
 
 
 @functools.cache
@@ -100,8 +102,8 @@ def swept(controller: AbstractController, gain: str, values: Sequence[float], de
     """(run, figures of merit) for each value of one gain, at one set point."""
     targets = jnp.full(len(values), jnp.radians(degrees))
     gains = jnp.asarray(values)[:, None]
-    result = _batch(arm(), controller, (gain,), gains, targets, PERIOD if fast else DEFAULT_STEP)
-    return dict(zip(values, _unstacked(result, len(values)), strict=True))
+    found = _loops(arm(), controller, (gain,), gains, targets, PERIOD if fast else DEFAULT_STEP)
+    return dict(zip(values, found, strict=True))
 
 
 def overshoot(one: Recorded) -> float:
