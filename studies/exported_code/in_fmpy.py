@@ -34,7 +34,8 @@ from smajax.simulation.compiled import simulate_compiled  # noqa: E402
 from smajax.simulation.steppers import Integration  # noqa: E402
 from studies.exported_code.run import PERIOD, source_of  # noqa: E402
 from studies.exported_code.slave import Slave  # noqa: E402
-from studies.source.unloading import INITIAL_MASS, VOLTS  # noqa: E402
+from studies.source.unloading import EVEN_VOLTS as VOLTS  # noqa: E402
+from studies.source.unloading import INITIAL_MASS  # noqa: E402
 
 RESULTS = Path(__file__).with_name("fmpy.json")
 TOLERANCE, CLOCK, MANY, ROUNDS = 1e-5, 0.005, 10_000, 3

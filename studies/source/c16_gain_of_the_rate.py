@@ -7,11 +7,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from smajax.control.presets import backstepping_two
 from smajax.core.parameters import set_parameters
 
 from .backstepping_runs import ON_ITS_PLANT, degrees, draw_sweep, draw_voltages, plant, runs
 from .row import Result, Row, State, judgement
+from .unprinted import backstepping
 
 GAINS = (0.0, 0.3, 1.0, 1.7, 4.0, 10.0)  # 1/s
 TARGET = 0.0
@@ -30,7 +30,7 @@ def judged(numbers: Mapping[str, float]) -> State:
 def work(fast: bool) -> Result:
     """One batch over K."""
     system = plant()
-    tuned = backstepping_two(system)
+    tuned = backstepping(system)
     swept = [set_parameters(tuned, {"damping_gain": gain}) for gain in GAINS]
     loops, merits = runs([system] * len(GAINS), swept, [TARGET] * len(GAINS), fast)
     angle, time = degrees(loops) - TARGET, loops.run.time[0]

@@ -7,14 +7,13 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.axes import Axes
 
-from smajax.control.presets import backstepping_two
 from smajax.core.parameters import set_parameters
 
 from .backstepping_runs import ON_ITS_PLANT, degrees, draw_sweep, draw_voltages, plant, runs
 from .row import Result, Row, State, judgement
+from .unprinted import backstepping
 
 GAINS = (0.2, 0.3, 3.0, 20.0, 150.0, 400.0)  # 1/s
-RATE_GAIN = 1.0  # 1/s, K: with an overshoot, so that the wire has to cool
 TARGET, SECONDS = 0.0, 100.0
 WINDOW = (16.0, 20.0)  # s: the last fifth of a run of the other rows of this section
 
@@ -32,7 +31,7 @@ def judged(numbers: Mapping[str, float]) -> State:
 def work(fast: bool) -> Result:
     """One batch over K_1."""
     system = plant()
-    tuned = set_parameters(backstepping_two(system), {"damping_gain": RATE_GAIN})
+    tuned = backstepping(system)
     swept = [set_parameters(tuned, {"temperature_gain": gain}) for gain in GAINS]
     loops, _ = runs([system] * len(GAINS), swept, [TARGET] * len(GAINS), fast, SECONDS)
     angle, time = degrees(loops) - TARGET, loops.run.time[0]

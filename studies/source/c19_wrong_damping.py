@@ -7,11 +7,11 @@ import itertools
 import jax
 import numpy as np
 
-from smajax.control.presets import backstepping_two
 from smajax.core.parameters import set_parameters
 
 from .backstepping_runs import ON_ITS_PLANT, draw_sweep, draw_voltages, plant, runs
 from .row import Result, Row
+from .unprinted import backstepping
 
 PAIRS = tuple(itertools.product((1.0, 1.67, 4.0, 8.0, 15.0), (1.0, 5.0, 20.0, 99.3)))  # (K, K_1), 1/s; the preset's too
 RATIOS = (0.8, 0.9, 0.95, 1.0, 1.05, 1.1)
@@ -21,7 +21,7 @@ TARGET = 20.0
 def work(fast: bool) -> Result:
     """One batch over the damping believed in, and over pairs of gains with 10 % too little and too much of it."""
     system = plant()
-    tuned = backstepping_two(system)
+    tuned = backstepping(system)
     damping, inertia = float(system.load.damping), float(system.load.inertia({}))
     swept = [set_parameters(tuned, {"damping": ratio * damping}) for ratio in RATIOS]
     swept += [

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from smajax.control.presets import backstepping_two
 from smajax.core.parameters import set_parameters
 
 from .backstepping_runs import ON_ITS_PLANT, degrees, draw_sweep, draw_voltages, plant, runs
 from .rigs import austenite_range
 from .row import Result, Row
+from .unprinted import backstepping
 
 RATIOS = (0.9, 0.95, 0.98, 1.0, 1.05, 1.1)
 TARGET = 20.0
@@ -18,7 +18,7 @@ TARGET = 20.0
 def work(fast: bool) -> Result:
     """One batch over the coefficient believed in."""
     system = plant()
-    tuned = backstepping_two(system)
+    tuned = backstepping(system)
     true = float(system.wire.heat.convection_coefficient)
     swept = [set_parameters(tuned, {"convection_coefficient": ratio * true}) for ratio in RATIOS]
     loops, merits = runs([system] * len(RATIOS), swept, [TARGET] * len(RATIOS), fast)

@@ -7,7 +7,6 @@ import math
 import jax.numpy as jnp
 import numpy as np
 
-from smajax.control.presets import backstepping_two
 from smajax.core.parameters import set_parameters
 
 from .backstepping_runs import (
@@ -20,6 +19,7 @@ from .backstepping_runs import (
     runs,
 )
 from .row import Result, Row
+from .unprinted import backstepping
 
 AIR = (15.0, 18.0, 20.0, 22.0, 25.0)  # C
 BELIEVED, TARGET = 20.0, 20.0  # C, degrees
@@ -28,7 +28,7 @@ BELIEVED, TARGET = 20.0, 20.0  # C, degrees
 def work(fast: bool) -> Result:
     """One batch over the air's temperature, and beside it the wrong h_c that loses the same heat as the coldest air."""
     system = plant()
-    tuned = backstepping_two(system)
+    tuned = backstepping(system)
     zero = jnp.zeros(())
     hot = float(on_heating_curve(system, jnp.asarray(math.radians(TARGET)), zero).wire.temperature)
     ratio = (hot - BELIEVED) / (hot - AIR[0])

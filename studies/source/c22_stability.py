@@ -9,13 +9,13 @@ import jax.numpy as jnp
 import numpy as np
 from matplotlib.figure import Figure
 
-from smajax.control.presets import backstepping_two
 from smajax.core.parameters import set_parameters
 from smajax.model.types import Scalar
 from smajax.report.drawing import BLUE, GREY, RED, is_upright, keyed, named, panels, styled
 
 from .backstepping_runs import ON_ITS_PLANT, on_heating_curve, plant, runs, stacked
 from .row import Result, Row
+from .unprinted import backstepping
 
 TARGET = 20.0  # degrees
 SECONDS = 60.0  # the slowest decay that has to be seen, at K = 18 1/s, has a time constant of 18 s
@@ -73,7 +73,7 @@ def work(fast: bool) -> Result:
     allowed = bool(printed(*(np.asarray(value) for value in BEYOND)))
 
     system = plant()
-    tuned = backstepping_two(system)
+    tuned = backstepping(system)
     angles = (-60.0, -30.0, 0.0, 30.0, 60.0) if fast else (-60.0, -45.0, -30.0, -15.0, 0.0, 15.0, 30.0, 45.0, 60.0)
     rates = (-2.0, 0.0, 2.0) if fast else (-2.0, -1.0, 0.0, 1.0, 2.0)
     tried = (0.0, 0.5, 1.7, 10.0, 30.0) if fast else (0.0, 0.2, 1.7, 10.0, 18.0, 30.0)

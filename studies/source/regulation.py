@@ -14,6 +14,7 @@ from smajax.report.drawing import LAW_COLOURS, LAW_STYLES, keyed, named, panels
 from smajax.simulation.simulate import DEFAULT_STEP
 
 from .rigs import LAWS, Recorded, austenite_range, controlled
+from .unprinted import sliding
 
 SECONDS, PERIOD = 20.0, 0.01
 
@@ -23,7 +24,7 @@ def to_85_degrees(fast: bool) -> dict[str, Recorded]:
     """Regulation at 85 degrees, beyond the angle of greatest stress, by law: M5 and M6 look at the same runs."""
     dt = PERIOD if fast else DEFAULT_STEP
     target = jnp.full(round(SECONDS / dt) + 1, jnp.radians(85.0))
-    return {law: controlled(arm(law), target, dt, PERIOD) for law in LAWS}
+    return {law: controlled(arm(law), target, dt, PERIOD, sliding) for law in LAWS}
 
 
 def draw_regulation(figure: Figure, loops: dict[str, Recorded], shown: str) -> None:

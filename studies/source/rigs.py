@@ -11,7 +11,6 @@ from jaxtyping import Array, Float
 
 from smajax.control.closed_loop import ClosedLoop, simulate_closed_loop
 from smajax.control.controllers.base import AbstractController
-from smajax.control.presets import stress_sliding
 from smajax.model.system import System
 from smajax.model.types import Series, Trajectory
 from smajax.simulation.compiled import run_alone
@@ -69,9 +68,9 @@ def controlled(
     target: Series,
     dt: float,
     period: float,
-    make: Callable[[System], AbstractController] = stress_sliding,
+    make: Callable[[System], AbstractController],
 ) -> Recorded:
-    """The arm under stress-based sliding control, with the gains of a preset, compiled, in numpy."""
+    """The arm under a controller made for it, compiled, in numpy."""
     return _controlled(system, make(system), target, dt, round(period / dt))
 
 
