@@ -12,6 +12,8 @@ from .regulation import draw_regulation, to_85_degrees
 from .rigs import austenite_range
 from .row import Result, Row
 
+LEAST = 0.1  # C: the wire cools by more than rounding
+
 
 def judged(numbers: Mapping[str, float]) -> bool:
     """The arm stalls with xi > 0 and T above A_f', which T passes while it falls, A_f' falling faster.
@@ -24,7 +26,7 @@ def judged(numbers: Mapping[str, float]) -> bool:
     for law in ("liang", "brinson"):
         checked &= numbers[f"{law}_end_deg"] < 84.0 and numbers[f"{law}_end_fraction"] > 0.01
         checked &= numbers[f"{law}_end_temperature_above_finish_C"] > 0.0
-        checked &= numbers[f"{law}_missed_seconds"] > 0.0 and numbers[f"{law}_crosses_cooling"] == 1.0
+        checked &= numbers[f"{law}_missed_warming_C"] < -LEAST and numbers[f"{law}_crosses_cooling"] == 1.0
     return checked
 
 

@@ -24,12 +24,12 @@ DEAD_WEIGHT = {
 }
 # M5, M6, M8 and C11 to C13.
 SLIDING = {
-    "surface_slope": 6.11,  # 1/s
-    "gain": 0.00319,  # N m
-    "boundary": 1.42,  # rad/s
-    "stress_gain": 3.19e-07,  # V/Pa
-    "stress_integral_gain": 7.34e-06,  # V/(Pa s)
-    "stress_derivative_gain": 7.54e-11,  # V s/Pa
+    "surface_slope": 3.72,  # 1/s
+    "gain": 0.00534,  # N m
+    "boundary": 0.378,  # rad/s
+    "stress_gain": 1.45e-07,  # V/Pa
+    "stress_integral_gain": 3.53e-06,  # V/(Pa s)
+    "stress_derivative_gain": 1.05e-09,  # V s/Pa
 }
 # C4, C5 and C7: VSC3.
 SURFACE = {
